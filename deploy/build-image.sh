@@ -1,0 +1,84 @@
+#!/usr/bin/env bash
+# Builds the container image without a container engine: debootstrap makes the Debian 12 base (kept
+# in build/image for the next time), buildah runs the Dockerfile in a chroot. Needs root.
+# Takes this machine's apt sources and proxy, and its npm settings and certificates, for the build.
+# Usage: deploy/build-image.sh [TAG]         the image stays in build/image/storage
+set -euo pipefail
+cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
+
+tag=${1:-windsplat:$(sed -n 's/^project(windsplat VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)}
+work=$PWD/build/image
+base=localhost/windsplat-base:bookworm
+
+fail() {
+  echo "build-image: $*" >&2
+  exit 1
+}
+for tool in buildah debootstrap; do
+  command -v "$tool" >/dev/null || fail "no $tool; say: apt-get install buildah debootstrap"
+done
+[ "$(id -u)" = 0 ] || fail "debootstrap and the chroot need root"
+
+mkdir -p "$work"
+# The storage is this folder's own, so that nothing of the machine's images is touched.
+buildah=(buildah --storage-driver vfs --root "$work/storage" --runroot "$work/run")
+
+# This machine's Debian 12 sources, as "URI suite component"; none known: debootstrap's own choice.
+sources() {
+  # shellcheck disable=SC2016  # apt fills these in
+  apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' \
+    'Created-By: Packages' 'Origin: Debian' 2>/dev/null |
+    awk '$2 ~ /^bookworm/ && $3 == "main"' | sort -u || true
+}
+proxy=$(apt-config shell value Acquire::http::Proxy | sed -n "s/^value='\(.*\)'$/\1/p")
+[ "${proxy:-DIRECT}" != DIRECT ] || proxy=${http_proxy:-}
+
+make_base() {
+  local mirror root=$work/base.part
+  rm -rf "$root"
+  mirror=$(sources | awk '$2 == "bookworm" {print $1; exit}')
+  echo "build-image: debootstrap (once)" >&2
+  http_proxy=$proxy debootstrap --variant=minbase bookworm "$root" ${mirror:+"$mirror"} \
+    >"$work/debootstrap.log" 2>&1 || {
+    tail -n 20 "$work/debootstrap.log" >&2
+    fail "debootstrap failed; the whole log is build/image/debootstrap.log"
+  }
+  if [ -n "$mirror" ]; then
+    sources | sed 's/^/deb /' >"$root/etc/apt/sources.list"
+  fi
+  rm -rf "$root"/var/cache/apt/* "$root"/var/lib/apt/lists/* "$root"/var/log/*.log
+  tar --numeric-owner -C "$root" -cf "$work/base.tar.part" .
+  rm -rf "$root"
+  mv "$work/base.tar.part" "$work/base.tar"
+}
+[ -f "$work/base.tar" ] || make_base
+
+if ! "${buildah[@]}" inspect --type image "$base" >/dev/null 2>&1; then
+  container=$("${buildah[@]}" from scratch)
+  "${buildah[@]}" add --quiet "$container" "$work/base.tar" / >/dev/null
+  "${buildah[@]}" config --cmd bash "$container"
+  "${buildah[@]}" commit --quiet --rm "$container" "$base" >/dev/null
+fi
+
+# Settings of this machine that the build sees and the image does not keep.
+options=(--build-arg "BASE=$base")
+for name in http_proxy https_proxy no_proxy; do
+  [ -z "${!name:-}" ] || options+=(--build-arg "$name=${!name}")
+done
+[ -z "$proxy" ] || [ -n "${http_proxy:-}" ] || options+=(--build-arg "http_proxy=$proxy")
+if [ -s /etc/ssl/certs/ca-certificates.crt ]; then
+  options+=(--volume /etc/ssl/certs/ca-certificates.crt:/run/build-ca.crt:ro
+    --build-arg NODE_EXTRA_CA_CERTS=/run/build-ca.crt)
+fi
+if [ -f "${HOME:-/root}/.npmrc" ]; then
+  options+=(--volume "${HOME:-/root}/.npmrc:/root/.npmrc:ro")
+fi
+
+echo "build-image: $tag" >&2
+"${buildah[@]}" bud --isolation chroot --format docker --layers=false --pull-never --force-rm \
+  "${options[@]}" --tag "$tag" --file Dockerfile . >"$work/build.log" 2>&1 || {
+  tail -n 40 "$work/build.log" >&2
+  fail "the build failed; the whole log is build/image/build.log"
+}
+echo "build-image: done; deploy/try-image.sh tries it" >&2
+"${buildah[@]}" images --filter "reference=${tag%%:*}"

@@ -1,0 +1,181 @@
+// Inside the codec only: hostile text -> a JSON tree within the wire's limits, and readers that
+// take typed, range-checked values out of it. Faults are collected with their JSON pointers.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "protocol/view.hpp"
+#include "server/base/error.hpp"
+
+namespace windsplat::protocol {
+
+using Json = nlohmann::json;  // objects are sorted by key, which is what makes text canonical
+
+// Errors: too_large (over message_bytes_max), malformed (syntax, UTF-8, NUL, byte order mark,
+// nesting, duplicate keys), invalid (a number that no double holds).
+Result<Json> parse_json(std::string_view text);
+
+// No spaces, keys sorted, invalid UTF-8 replaced, numbers that are not finite as null.
+std::string dump(const Json& value);
+
+// The canonical form of a number: an integer where it is whole and exact, no minus zero.
+Json canonical_number(double value);
+// Canonical numbers throughout a tree.
+void make_numbers_canonical(Json& value);
+
+// pointer + "/" + key, escaped as RFC 6901 says; a key of any length or content gives a short,
+// printable token.
+std::string join_pointer(const std::string& pointer, std::string_view key);
+std::string join_pointer(const std::string& pointer, std::size_t index);
+
+// Values at fault, in the order they were found. One answer names problem_errors_max of them.
+class Faults {
+ public:
+  void add(std::string pointer, std::string detail, ErrorKind kind = ErrorKind::invalid);
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+  [[nodiscard]] std::size_t count() const { return count_; }
+  // The first fault leads the message; `invalid` outweighs `too_large`. Only when not empty.
+  [[nodiscard]] Error error() const;
+
+ private:
+  std::vector<FieldError> at_;
+  std::size_t count_ = 0;
+  ErrorKind kind_ = ErrorKind::too_large;
+};
+
+enum class Presence { optional, required };
+enum class Null { refused, is_default };  // is_default: as if the key were absent
+
+struct NumberRange {
+  double min;
+  double max;
+};
+struct IntegerRange {
+  std::int64_t min;
+  std::int64_t max;
+};
+
+// Names of an enumeration's values on the wire.
+template <class E>
+struct Name {
+  E value;
+  const char* text;
+};
+
+// One JSON object, read key by key. A value that breaks its limit is recorded and leaves `out` as
+// it was. Keys that nobody asked for are recorded by finish().
+class ObjectReader {
+ public:
+  ObjectReader(const Json& value, std::string pointer, Faults& faults);
+
+  // The value at `key`, or null if there is nothing to read.
+  const Json* child(const char* key, Presence presence = Presence::optional,
+                    Null null = Null::refused);
+
+  void boolean(const char* key, bool& out, Presence presence = Presence::optional);
+  void number(const char* key, double& out, NumberRange range);
+  void number(const char* key, std::optional<double>& out, NumberRange range);
+  void text(const char* key, std::string& out, std::size_t chars_min,
+            Presence presence = Presence::optional);
+  void text(const char* key, std::optional<std::string>& out, std::size_t chars_min);
+  void color(const char* key, std::string& out);
+
+  template <class Int>
+  void integer(const char* key, Int& out, IntegerRange range,
+               Presence presence = Presence::optional) {
+    if (const Json* value = child(key, presence)) {
+      if (const auto read = read_integer(*value, at(key), range)) out = static_cast<Int>(*read);
+    }
+  }
+  template <class Int>
+  void integer(const char* key, std::optional<Int>& out, IntegerRange range) {
+    if (const Json* value = child(key, Presence::optional, Null::is_default)) {
+      if (const auto read = read_integer(*value, at(key), range)) out = static_cast<Int>(*read);
+    }
+  }
+  template <std::size_t N>
+  void numbers(const char* key, std::array<double, N>& out, NumberRange range) {
+    if (const Json* value = child(key)) read_numbers(*value, at(key), range, out);
+  }
+  template <std::size_t N>
+  void numbers(const char* key, std::optional<std::array<double, N>>& out, NumberRange range) {
+    if (const Json* value = child(key, Presence::optional, Null::is_default)) {
+      std::array<double, N> read{};
+      if (read_numbers(*value, at(key), range, read)) out = read;
+    }
+  }
+  template <class E, std::size_t N>
+  void choice(const char* key, E& out, const std::array<Name<E>, N>& names) {
+    if (const Json* value = child(key)) {
+      if (const auto index = read_name(*value, at(key), texts(names))) out = names[*index].value;
+    }
+  }
+  template <class E, std::size_t N>
+  void choice(const char* key, std::optional<E>& out, const std::array<Name<E>, N>& names) {
+    if (const Json* value = child(key, Presence::optional, Null::is_default)) {
+      if (const auto index = read_name(*value, at(key), texts(names))) out = names[*index].value;
+    }
+  }
+
+  [[nodiscard]] std::string at(const char* key) const { return join_pointer(pointer_, key); }
+  [[nodiscard]] const std::string& pointer() const { return pointer_; }
+  Faults& faults() { return faults_; }
+
+  void finish();  // refuses keys that nobody asked for
+
+ private:
+  template <class E, std::size_t N>
+  static std::array<std::string_view, N> texts(const std::array<Name<E>, N>& names) {
+    std::array<std::string_view, N> out;
+    for (std::size_t i = 0; i < N; ++i) out[i] = names[i].text;
+    return out;
+  }
+  template <std::size_t N>
+  bool read_numbers(const Json& value, const std::string& pointer, NumberRange range,
+                    std::array<double, N>& out) {
+    return read_number_array(value, pointer, range, out.data(), N);
+  }
+  bool read_number_array(const Json& value, const std::string& pointer, NumberRange range,
+                         double* out, std::size_t count);
+  std::optional<std::int64_t> read_integer(const Json& value, const std::string& pointer,
+                                           IntegerRange range);
+  std::optional<std::size_t> read_name(const Json& value, const std::string& pointer,
+                                       std::span<const std::string_view> names);
+  std::optional<std::string> read_text(const Json& value, const std::string& pointer,
+                                       std::size_t chars_min);
+
+  const Json* value_ = nullptr;  // null when there is no object to read
+  std::string pointer_;
+  Faults& faults_;
+  std::vector<std::string_view> asked_;
+};
+
+// One number of an array or object: its value if it is within the range.
+std::optional<double> read_number(const Json& value, const std::string& pointer, NumberRange range,
+                                  Faults& faults);
+
+// The wire name of an enumeration's value.
+template <class E, std::size_t N>
+const char* name_of(E value, const std::array<Name<E>, N>& names) {
+  for (const Name<E>& name : names) {
+    if (name.value == value) return name.text;
+  }
+  return "";
+}
+
+// What a value is, for messages: a number or word as it stands, else its kind.
+std::string described(const Json& value);
+
+// Any document as a typed View, everything checked; `view` is meaningful only without faults.
+View read_view(const Json& document, Faults& faults);
+Json view_to_json(const View& view);  // every key
+
+}  // namespace windsplat::protocol

@@ -1,0 +1,283 @@
+// Descriptions -> the JSON shapes of messages.schema.json that REST answers with.
+#include "protocol/codec_shapes.hpp"
+
+#include <cstdio>
+
+#include "protocol/codec.hpp"
+#include "protocol/limits.hpp"
+
+namespace windsplat::protocol {
+
+namespace {
+
+Json numbers_json(const std::vector<double>& values) {
+  Json out = Json::array();
+  for (const double value : values) out.push_back(canonical_number(value));
+  return out;
+}
+
+Json vec3_json(const Vec3& value) {
+  return Json::array(
+      {canonical_number(value[0]), canonical_number(value[1]), canonical_number(value[2])});
+}
+
+Json number_or_null(const std::optional<double>& value) {
+  return value ? canonical_number(*value) : Json(nullptr);
+}
+
+Json field_json(const FieldDescription& field) {
+  Json range;
+  if (field.range) {
+    range = Json::array({canonical_number((*field.range)[0]), canonical_number((*field.range)[1])});
+  }
+  return Json{{"name", field.name},
+              {"kind", field.kind},
+              {"components", field.components},
+              {"units", field.units},
+              {"standardName", field.standard_name},
+              {"longName", field.long_name},
+              {"range", std::move(range)},
+              {"masked", field.masked ? Json(*field.masked) : Json(nullptr)},
+              {"rangeOf", field.range_of.empty() ? Json(nullptr) : Json(field.range_of)},
+              {"dtype", field.dtype}};
+}
+
+Json fields_json(const std::vector<FieldDescription>& fields) {
+  Json out = Json::array();
+  for (const FieldDescription& field : fields) out.push_back(field_json(field));
+  return out;
+}
+
+Json axis_json(const AxisDescription& axis) {
+  return Json{{"name", axis.name},
+              {"standardName", axis.standard_name},
+              {"units", axis.units},
+              {"kind", axis.kind},
+              {"coordinates", numbers_json(axis.coordinates)},
+              {"world", numbers_json(axis.world)}};
+}
+
+std::string color_text(const std::array<unsigned char, 3>& rgb) {
+  std::array<char, 8> text{};
+  std::snprintf(text.data(), text.size(), "#%02x%02x%02x", rgb[0], rgb[1], rgb[2]);
+  return text.data();
+}
+
+// Reason phrases as RFC 9110 registers them; 499 and 507 are known by these names.
+const char* status_title(int status) {
+  switch (status) {
+    case 400:
+      return "Bad Request";
+    case 404:
+      return "Not Found";
+    case 413:
+      return "Content Too Large";
+    case 422:
+      return "Unprocessable Content";
+    case 429:
+      return "Too Many Requests";
+    case 499:
+      return "Client Closed Request";
+    case 503:
+      return "Service Unavailable";
+    case 507:
+      return "Insufficient Storage";
+    default:
+      return "Internal Server Error";
+  }
+}
+
+int status_of(ErrorKind kind) {
+  switch (kind) {
+    case ErrorKind::malformed:
+      return 400;
+    case ErrorKind::invalid:
+    case ErrorKind::bad_data:
+      return 422;
+    case ErrorKind::not_found:
+      return 404;
+    case ErrorKind::too_large:
+      return 413;
+    case ErrorKind::busy:
+      return 429;
+    case ErrorKind::draining:
+      return 503;
+    case ErrorKind::out_of_memory:
+      return 507;
+    case ErrorKind::cancelled:
+      return 499;
+    case ErrorKind::internal:
+      return 500;
+  }
+  return 500;
+}
+
+}  // namespace
+
+Problem problem_from(const Error& error) {
+  Problem problem;
+  problem.status = status_of(error.kind);
+  problem.title = status_title(problem.status);
+  problem.detail = error.message;
+  problem.errors = error.at;
+  return problem;
+}
+
+Json limits_json() {
+  return Json{{"messageBytesMax", limits::message_bytes_max},
+              {"jsonDepthMax", limits::json_depth_max},
+              {"httpHeaderBytesMax", limits::http_header_bytes_max},
+              {"httpBodyBytesMax", limits::http_body_bytes_max},
+              {"httpHeaderTimeoutS", limits::http_header_timeout_s},
+              {"httpBodyTimeoutS", limits::http_body_timeout_s},
+              {"writeTimeoutS", limits::write_timeout_s},
+              {"imageEdgeMax", limits::image_edge_max},
+              {"imagePixelsMax", limits::image_pixels_max},
+              {"extinctionPointsMax", limits::extinction_points_max},
+              {"scalarsMax", limits::scalars_max},
+              {"extinctionMax", canonical_number(limits::extinction_max)},
+              {"radiusMax", canonical_number(limits::radius_max)},
+              {"fovMin", canonical_number(limits::fov_min)},
+              {"fovMax", canonical_number(limits::fov_max)},
+              {"strideMax", limits::stride_max},
+              {"spanMin", canonical_number(limits::span_min)},
+              {"spanMax", canonical_number(limits::span_max)},
+              {"worldMax", canonical_number(limits::world_max)},
+              {"viewHeightMin", canonical_number(limits::view_height_min)},
+              {"upLengthMin", canonical_number(limits::up_length_min)},
+              {"geometryScaleMin", canonical_number(limits::geometry_scale_min)},
+              {"geometryScaleMax", canonical_number(limits::geometry_scale_max)},
+              {"componentScaleMax", canonical_number(limits::component_scale_max)},
+              {"lineLengthMax", canonical_number(limits::line_length_max)},
+              {"valueMax", canonical_number(limits::value_max)},
+              {"rangeWidthMin", canonical_number(limits::range_width_min)},
+              {"motionRateMax", canonical_number(limits::motion_rate_max)},
+              {"opticalDepthMax", canonical_number(limits::optical_depth_max)},
+              {"depthCueMax", canonical_number(limits::depth_cue_max)},
+              {"budgetMsMin", canonical_number(limits::budget_ms_min)},
+              {"budgetMsMax", canonical_number(limits::budget_ms_max)},
+              {"stepMax", limits::step_max},
+              {"seedMax", limits::seed_max},
+              {"nameCharsMax", limits::name_chars_max},
+              {"serialMax", limits::serial_max},
+              {"fpsMin", canonical_number(limits::fps_min)},
+              {"fpsMax", canonical_number(limits::fps_max)},
+              {"stillScaleMax", canonical_number(limits::still_scale_max)},
+              {"decodeMsMax", canonical_number(limits::decode_ms_max)},
+              {"problemErrorsMax", limits::problem_errors_max},
+              {"framesInFlightMax", limits::frames_in_flight_max},
+              {"sessionsMaxDefault", limits::sessions_max_default}};
+}
+
+Json problem_json(const Problem& problem) {
+  Json out{{"type", problem.type},
+           {"title", problem.title},
+           {"status", problem.status},
+           {"detail", problem.detail}};
+  for (const FieldError& error : problem.errors) {
+    out["errors"].push_back(Json{{"pointer", error.pointer}, {"detail", error.detail}});
+  }
+  return out;
+}
+
+Json frame_info_json(const FrameInfo& info) {
+  return Json{{"method", info.method},
+              {"compositing", info.compositing},
+              {"stride", info.stride},
+              {"slabThickness", number_or_null(info.slab_thickness)},
+              {"width", info.width},
+              {"height", info.height},
+              {"error", {{"value", number_or_null(info.error_value)}, {"kind", info.error_kind}}},
+              {"jpegError", number_or_null(info.jpeg_error)},
+              {"work",
+               {{"samples", info.samples},
+                {"culled", info.culled},
+                {"skippedVector", info.skipped_vector},
+                {"skippedScalar", info.skipped_scalar},
+                {"skippedBoth", info.skipped_both},
+                {"occluded", info.occluded},
+                {"pixelUpdates", info.pixel_updates},
+                {"exponentials", info.exponentials},
+                {"tiles", info.tiles},
+                {"tilesStopped", info.tiles_stopped},
+                {"fields", info.fields},
+                {"bytes", info.bytes},
+                {"variant", info.variant}}}};
+}
+
+Json dataset_summary_json(const DatasetDescription& dataset) {
+  return Json{{"id", dataset.id},
+              {"title", dataset.title},
+              {"state", dataset.state},
+              {"fields", fields_json(dataset.fields)},
+              {"steps", dataset.steps.size()},
+              {"residentBytes", dataset.resident_bytes}};
+}
+
+Json dataset_json(const DatasetDescription& dataset) {
+  Json left_out = Json::array();
+  for (const auto& [name, reason] : dataset.left_out) {
+    left_out.push_back(Json{{"name", name}, {"reason", reason}});
+  }
+  Json times = Json::array();
+  for (const StepDescription& step : dataset.steps) {
+    times.push_back(Json{{"value", canonical_number(step.value)}, {"text", step.text}});
+  }
+  Json out = dataset_summary_json(dataset);
+  out["source"] = dataset.source;
+  out["format"] = dataset.format;
+  out["dims"] = {{"x", dataset.dims[0]}, {"y", dataset.dims[1]}, {"z", dataset.dims[2]}};
+  out["axes"] = {{"x", axis_json(dataset.axes[0])},
+                 {"y", axis_json(dataset.axes[1])},
+                 {"z", axis_json(dataset.axes[2])}};
+  out["world"] = {{"min", vec3_json(dataset.world_min)}, {"max", vec3_json(dataset.world_max)}};
+  out["leftOut"] = std::move(left_out);
+  out["steps"] = {{"count", dataset.steps.size()}, {"times", std::move(times)}};
+  out["timeUnits"] = dataset.time_units;
+  out["bytesWhenResident"] = dataset.bytes_when_resident;
+  if (!dataset.default_view.dataset.empty()) {
+    out["defaultView"] = view_to_json(dataset.default_view);
+  }
+  return out;
+}
+
+std::string encode_problem(const Problem& problem) { return dump(problem_json(problem)); }
+
+std::string encode_dataset(const DatasetDescription& dataset) {
+  return dump(dataset_json(dataset));
+}
+
+std::string encode_dataset_list(const std::vector<DatasetDescription>& datasets) {
+  Json list = Json::array();
+  for (const DatasetDescription& dataset : datasets) {
+    list.push_back(dataset_summary_json(dataset));
+  }
+  return dump(Json{{"datasets", std::move(list)}});
+}
+
+std::string encode_frame_info(const FrameInfo& info) { return dump(frame_info_json(info)); }
+
+std::string encode_service(const ServiceDescription& service) {
+  Json links = Json::object();
+  for (const auto& [relation, target] : service.links) links[relation] = target;
+  return dump(Json{{"name", service.name},
+                   {"version", service.version},
+                   {"links", std::move(links)},
+                   {"limits", limits_json()}});
+}
+
+std::string encode_color_maps(const std::vector<ColorMapDescription>& maps) {
+  Json list = Json::array();
+  for (const ColorMapDescription& map : maps) {
+    Json colors = Json::array();
+    for (const auto& rgb : map.colors) colors.push_back(color_text(rgb));
+    list.push_back(Json{{"name", map.name}, {"kind", map.kind}, {"colors", std::move(colors)}});
+  }
+  return dump(Json{{"colormaps", std::move(list)}});
+}
+
+std::string encode_presets(const std::vector<std::string>& names) {
+  return dump(Json{{"presets", names}});
+}
+
+}  // namespace windsplat::protocol

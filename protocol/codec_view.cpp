@@ -1,0 +1,420 @@
+// JSON tree <-> View: the schema's keys, ranges and cross checks, one function an object.
+#include <cmath>
+
+#include "protocol/codec.hpp"
+#include "protocol/codec_json.hpp"
+#include "protocol/limits.hpp"
+
+namespace windsplat::protocol {
+
+namespace {
+
+using limits::value_max;
+
+constexpr std::array<Name<Projection>, 2> projection_names{
+    {{Projection::perspective, "perspective"}, {Projection::orthographic, "orthographic"}}};
+constexpr std::array<Name<VerticalPlacement>, 4> vertical_names{
+    {{VerticalPlacement::automatic, "auto"},
+     {VerticalPlacement::linear, "linear"},
+     {VerticalPlacement::logp, "logp"},
+     {VerticalPlacement::index, "index"}}};
+constexpr std::array<Name<GeometryMapping>, 1> mapping_names{{{GeometryMapping::flat, "flat"}}};
+constexpr std::array<Name<VectorSpace>, 2> space_names{
+    {{VectorSpace::components, "components"}, {VectorSpace::world, "world"}}};
+constexpr std::array<Name<ColorBy>, 5> color_by_names{{{ColorBy::world_z, "worldZ"},
+                                                       {ColorBy::screen_z, "screenZ"},
+                                                       {ColorBy::rise, "rise"},
+                                                       {ColorBy::magnitude, "magnitude"},
+                                                       {ColorBy::constant, "constant"}}};
+constexpr std::array<Name<MotionMode>, 1> motion_names{{{MotionMode::still, "still"}}};
+constexpr std::array<Name<MethodName>, 1> method_names{{{MethodName::kernel, "kernel"}}};
+constexpr std::array<Name<Compositing>, 1> compositing_names{{{Compositing::analytic, "analytic"}}};
+
+constexpr NumberRange fraction{0, 1};
+constexpr NumberRange world{-limits::world_max, limits::world_max};
+constexpr NumberRange field_value{-value_max, value_max};
+constexpr IntegerRange stride_range{1, limits::stride_max};
+
+std::string number_text(double value) { return dump(canonical_number(value)); }
+
+// --- reading ------------------------------------------------------------------------------------
+
+CameraView read_camera(const Json& json, const std::string& pointer, Faults& faults) {
+  CameraView camera;
+  ObjectReader reader(json, pointer, faults);
+  reader.choice("projection", camera.projection, projection_names);
+  reader.numbers("eye", camera.eye, world);
+  reader.numbers("target", camera.target, world);
+  reader.numbers("up", camera.up, world);
+  reader.number("fovY", camera.fov_y, {limits::fov_min, limits::fov_max});
+  reader.number("height", camera.height, {limits::view_height_min, limits::world_max});
+  reader.finish();
+  if (std::hypot(camera.up[0], camera.up[1], camera.up[2]) < limits::up_length_min) {
+    faults.add(reader.at("up"),
+               "must be a direction of length " + number_text(limits::up_length_min) + " or more");
+  }
+  return camera;
+}
+
+ImageView read_image(const Json& json, const std::string& pointer, Faults& faults) {
+  ImageView image;
+  ObjectReader reader(json, pointer, faults);
+  reader.integer("width", image.width, {1, limits::image_edge_max});
+  reader.integer("height", image.height, {1, limits::image_edge_max});
+  reader.color("background", image.background);
+  reader.finish();
+  const std::int64_t pixels = static_cast<std::int64_t>(image.width) * image.height;
+  if (pixels > limits::image_pixels_max) {
+    faults.add(pointer,
+               "must have at most " + std::to_string(limits::image_pixels_max) +
+                   " pixels, width times height, not " + std::to_string(pixels),
+               ErrorKind::too_large);
+  }
+  return image;
+}
+
+GeometryView read_geometry(const Json& json, const std::string& pointer, Faults& faults) {
+  GeometryView geometry;
+  ObjectReader reader(json, pointer, faults);
+  reader.numbers("scale", geometry.scale, {limits::geometry_scale_min, limits::geometry_scale_max});
+  reader.choice("vertical", geometry.vertical, vertical_names);
+  reader.choice("mapping", geometry.mapping, mapping_names);
+  reader.finish();
+  return geometry;
+}
+
+// Either order, so that a map can be turned about, but not so close that its slope overflows.
+void check_color_range(const std::optional<Range>& range, ObjectReader& reader) {
+  if (range && !(std::abs((*range)[1] - (*range)[0]) >= limits::range_width_min)) {
+    reader.faults().add(reader.at("range"), "must have ends that differ by at least " +
+                                                number_text(limits::range_width_min));
+  }
+}
+
+VectorColorView read_vector_color(const Json& json, const std::string& pointer, Faults& faults) {
+  VectorColorView color;
+  ObjectReader reader(json, pointer, faults);
+  reader.choice("by", color.by, color_by_names);
+  reader.text("map", color.map, 1);
+  reader.numbers("range", color.range, field_value);
+  reader.number("riseWeight", color.rise_weight, fraction);
+  reader.color("constant", color.constant);
+  reader.finish();
+  check_color_range(color.range, reader);
+  return color;
+}
+
+void read_motion(const Json& json, const std::string& pointer, Faults& faults, VectorView& vector) {
+  ObjectReader reader(json, pointer, faults);
+  reader.choice("mode", vector.motion, motion_names);
+  reader.number("rate", vector.motion_rate, {-limits::motion_rate_max, limits::motion_rate_max});
+  reader.finish();
+}
+
+JitterView read_jitter(const Json& json, const std::string& pointer, Faults& faults) {
+  JitterView jitter;
+  ObjectReader reader(json, pointer, faults);
+  reader.number("center", jitter.center, fraction);
+  reader.number("stride", jitter.stride, fraction);
+  reader.boolean("overlap", jitter.overlap);
+  reader.integer("seed", jitter.seed, {0, limits::seed_max});
+  reader.boolean("perStep", jitter.per_step);
+  reader.finish();
+  return jitter;
+}
+
+void read_field_choice(ObjectReader& reader, FieldChoice& field) {
+  const Json* value = reader.child("field");
+  if (value == nullptr) return;
+  if (value->is_null()) {
+    field.kind = FieldChoice::Kind::none;
+    return;
+  }
+  const std::size_t before = reader.faults().count();
+  reader.text("field", field.name, 1);
+  if (reader.faults().count() == before) field.kind = FieldChoice::Kind::named;
+}
+
+void check_vector(const VectorView& vector, ObjectReader& reader) {
+  if (vector.r1 > vector.r2) {
+    reader.faults().add(reader.at("r1"), "must be at most r2: " + number_text(vector.r1) +
+                                             " is more than " + number_text(vector.r2));
+  }
+  if (vector.magnitude_range) {
+    const auto& [low, high] = *vector.magnitude_range;
+    if (!(high - low >= limits::range_width_min)) {
+      reader.faults().add(reader.at("magnitudeRange"),
+                          "must ascend by at least " + number_text(limits::range_width_min));
+    }
+  }
+}
+
+VectorView read_vector(const Json& json, const std::string& pointer, Faults& faults) {
+  constexpr double scale_max = limits::component_scale_max;
+  VectorView vector;
+  ObjectReader reader(json, pointer, faults);
+  read_field_choice(reader, vector.field);
+  reader.choice("space", vector.space, space_names);
+  reader.numbers("scale", vector.scale, {-scale_max, scale_max});
+  reader.number("length", vector.length, {0, limits::line_length_max});
+  reader.number("span", vector.span, {limits::span_min, limits::span_max});
+  reader.integer("stride", vector.stride, stride_range);
+  reader.number("r1", vector.r1, {0, limits::radius_max});
+  reader.number("r2", vector.r2, {0, limits::radius_max});
+  reader.number("opacity", vector.opacity, fraction);
+  reader.number("headDesaturation", vector.head_desaturation, fraction);
+  if (const Json* color = reader.child("color")) {
+    vector.color = read_vector_color(*color, reader.at("color"), faults);
+  }
+  reader.numbers("magnitudeRange", vector.magnitude_range, field_value);
+  reader.number("minMagnitude", vector.min_magnitude, {0, value_max});
+  reader.number("magnitudeIntensity", vector.magnitude_intensity, fraction);
+  if (const Json* motion = reader.child("motion")) {
+    read_motion(*motion, reader.at("motion"), faults, vector);
+  }
+  if (const Json* jitter = reader.child("jitter")) {
+    vector.jitter = read_jitter(*jitter, reader.at("jitter"), faults);
+  }
+  reader.finish();
+  check_vector(vector, reader);
+  return vector;
+}
+
+ScalarColorView read_scalar_color(const Json& json, const std::string& pointer, Faults& faults) {
+  ScalarColorView color;
+  ObjectReader reader(json, pointer, faults);
+  reader.text("map", color.map, 1);
+  reader.numbers("range", color.range, field_value);
+  reader.finish();
+  check_color_range(color.range, reader);
+  return color;
+}
+
+std::vector<std::array<double, 2>> read_extinction(const Json& json, const std::string& pointer,
+                                                   Faults& faults) {
+  std::vector<std::array<double, 2>> points;
+  if (!json.is_array() || json.empty() ||
+      json.size() > static_cast<std::size_t>(limits::extinction_points_max)) {
+    faults.add(pointer, "must be an array of 1 to " +
+                            std::to_string(limits::extinction_points_max) +
+                            " points (value, extinction)");
+    return points;
+  }
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const Json& point = json[i];
+    const std::string at = join_pointer(pointer, i);
+    if (!point.is_array() || point.size() != 2) {
+      faults.add(at, "must be a pair (value, extinction), not " + described(point));
+      continue;
+    }
+    const auto value = read_number(point[0], join_pointer(at, 0), field_value, faults);
+    const auto extinction =
+        read_number(point[1], join_pointer(at, 1), {0, limits::extinction_max}, faults);
+    if (!value || !extinction) continue;
+    if (!points.empty() && *value < points.back()[0]) {
+      faults.add(join_pointer(at, 0), "must not be less than the point's before it: values ascend");
+    }
+    points.push_back({*value, *extinction});
+  }
+  return points;
+}
+
+ScalarView read_scalar(const Json& json, const std::string& pointer, Faults& faults) {
+  ScalarView scalar;
+  ObjectReader reader(json, pointer, faults);
+  reader.text("field", scalar.field, 1, Presence::required);
+  if (const Json* color = reader.child("color")) {
+    scalar.color = read_scalar_color(*color, reader.at("color"), faults);
+  }
+  if (const Json* points = reader.child("extinction", Presence::optional, Null::is_default)) {
+    scalar.extinction = read_extinction(*points, reader.at("extinction"), faults);
+  }
+  reader.number("minOpticalDepth", scalar.min_optical_depth, {0, limits::optical_depth_max});
+  reader.integer("stride", scalar.stride, stride_range);
+  reader.finish();
+  return scalar;
+}
+
+std::vector<ScalarView> read_scalars(const Json& json, const std::string& pointer, Faults& faults) {
+  std::vector<ScalarView> scalars;
+  if (!json.is_array() || json.size() > static_cast<std::size_t>(limits::scalars_max)) {
+    faults.add(pointer,
+               "must be an array of at most " + std::to_string(limits::scalars_max) +
+                   " media, not " +
+                   (json.is_array() ? "of " + std::to_string(json.size()) : described(json)));
+    return scalars;
+  }
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    scalars.push_back(read_scalar(json[i], join_pointer(pointer, i), faults));
+  }
+  return scalars;
+}
+
+DepthCueView read_depth_cue(const Json& json, const std::string& pointer, Faults& faults) {
+  constexpr NumberRange depth{-limits::depth_cue_max, limits::depth_cue_max};
+  DepthCueView cue;
+  ObjectReader reader(json, pointer, faults);
+  reader.number("strength", cue.strength, fraction);
+  reader.number("near", cue.near, depth);
+  reader.number("far", cue.far, depth);
+  reader.finish();
+  if (!(cue.near < cue.far)) {
+    faults.add(reader.at("near"), "must be less than far: " + number_text(cue.near) +
+                                      " is not less than " + number_text(cue.far));
+  }
+  return cue;
+}
+
+MethodView read_method(const Json& json, const std::string& pointer, Faults& faults) {
+  MethodView method;
+  ObjectReader reader(json, pointer, faults);
+  reader.choice("name", method.name, method_names);
+  reader.choice("compositing", method.compositing, compositing_names);
+  reader.number("stopTransmittance", method.stop_transmittance, fraction);
+  reader.finish();
+  return method;
+}
+
+QualityView read_quality(const Json& json, const std::string& pointer, Faults& faults) {
+  QualityView quality;
+  ObjectReader reader(json, pointer, faults);
+  reader.number("budgetMs", quality.budget_ms, {limits::budget_ms_min, limits::budget_ms_max});
+  if (const Json* bound = reader.child("maxError"); bound != nullptr && !bound->is_null()) {
+    faults.add(reader.at("maxError"), "must be null, not " + described(*bound));
+  }
+  reader.finish();
+  return quality;
+}
+
+// --- writing ------------------------------------------------------------------------------------
+
+Json number_or_null(const std::optional<double>& value) {
+  return value ? canonical_number(*value) : Json(nullptr);
+}
+
+template <std::size_t N>
+Json numbers_to_json(const std::array<double, N>& values) {
+  Json out = Json::array();
+  for (const double value : values) out.push_back(canonical_number(value));
+  return out;
+}
+
+template <std::size_t N>
+Json numbers_or_null(const std::optional<std::array<double, N>>& values) {
+  return values ? numbers_to_json(*values) : Json(nullptr);
+}
+
+Json vector_to_json(const VectorView& vector) {
+  Json color{{"by", nullptr},
+             {"map", vector.color.map},
+             {"range", numbers_or_null(vector.color.range)},
+             {"riseWeight", canonical_number(vector.color.rise_weight)},
+             {"constant", vector.color.constant}};
+  if (vector.color.by) color["by"] = name_of(*vector.color.by, color_by_names);
+  Json out{{"space", name_of(vector.space, space_names)},
+           {"scale", numbers_to_json(vector.scale)},
+           {"length", number_or_null(vector.length)},
+           {"span", canonical_number(vector.span)},
+           {"stride", vector.stride},
+           {"r1", canonical_number(vector.r1)},
+           {"r2", canonical_number(vector.r2)},
+           {"opacity", canonical_number(vector.opacity)},
+           {"headDesaturation", canonical_number(vector.head_desaturation)},
+           {"color", std::move(color)},
+           {"magnitudeRange", numbers_or_null(vector.magnitude_range)},
+           {"minMagnitude", number_or_null(vector.min_magnitude)},
+           {"magnitudeIntensity", canonical_number(vector.magnitude_intensity)},
+           {"motion",
+            {{"mode", name_of(vector.motion, motion_names)},
+             {"rate", canonical_number(vector.motion_rate)}}},
+           {"jitter",
+            {{"center", canonical_number(vector.jitter.center)},
+             {"stride", canonical_number(vector.jitter.stride)},
+             {"overlap", vector.jitter.overlap},
+             {"seed", vector.jitter.seed},
+             {"perStep", vector.jitter.per_step}}}};
+  // Null would say "no lines", so the dataset's default is told by the key's absence.
+  if (vector.field.kind == FieldChoice::Kind::none) out["field"] = nullptr;
+  if (vector.field.kind == FieldChoice::Kind::named) out["field"] = vector.field.name;
+  return out;
+}
+
+Json scalar_to_json(const ScalarView& scalar) {
+  Json extinction;
+  if (scalar.extinction) {
+    extinction = Json::array();
+    for (const auto& point : *scalar.extinction) extinction.push_back(numbers_to_json(point));
+  }
+  Json map;
+  if (scalar.color.map) map = *scalar.color.map;
+  return Json{{"field", scalar.field},
+              {"color", {{"map", std::move(map)}, {"range", numbers_or_null(scalar.color.range)}}},
+              {"extinction", std::move(extinction)},
+              {"minOpticalDepth", canonical_number(scalar.min_optical_depth)},
+              {"stride", scalar.stride}};
+}
+
+}  // namespace
+
+View read_view(const Json& document, Faults& faults) {
+  View view;
+  ObjectReader reader(document, "", faults);
+  reader.text("dataset", view.dataset, 0);
+  reader.integer("step", view.step, {0, limits::step_max});
+  const auto object = [&](const char* key, auto read, auto& out) {
+    if (const Json* json = reader.child(key)) out = read(*json, reader.at(key), faults);
+  };
+  object("camera", read_camera, view.camera);
+  object("image", read_image, view.image);
+  object("geometry", read_geometry, view.geometry);
+  object("vector", read_vector, view.vector);
+  if (const Json* scalars = reader.child("scalars", Presence::optional, Null::is_default)) {
+    view.scalars = read_scalars(*scalars, reader.at("scalars"), faults);
+  }
+  object("depthCue", read_depth_cue, view.depth_cue);
+  object("method", read_method, view.method);
+  object("quality", read_quality, view.quality);
+  reader.finish();
+  return view;
+}
+
+Json view_to_json(const View& view) {
+  Json scalars;
+  if (view.scalars) {
+    scalars = Json::array();
+    for (const ScalarView& scalar : *view.scalars) scalars.push_back(scalar_to_json(scalar));
+  }
+  return Json{
+      {"dataset", view.dataset},
+      {"step", view.step},
+      {"camera",
+       {{"projection", name_of(view.camera.projection, projection_names)},
+        {"eye", numbers_or_null(view.camera.eye)},
+        {"target", numbers_or_null(view.camera.target)},
+        {"up", numbers_to_json(view.camera.up)},
+        {"fovY", canonical_number(view.camera.fov_y)},
+        {"height", number_or_null(view.camera.height)}}},
+      {"image",
+       {{"width", view.image.width},
+        {"height", view.image.height},
+        {"background", view.image.background}}},
+      {"geometry",
+       {{"scale", numbers_to_json(view.geometry.scale)},
+        {"vertical", name_of(view.geometry.vertical, vertical_names)},
+        {"mapping", name_of(view.geometry.mapping, mapping_names)}}},
+      {"vector", vector_to_json(view.vector)},
+      {"scalars", std::move(scalars)},
+      {"depthCue",
+       {{"strength", canonical_number(view.depth_cue.strength)},
+        {"near", canonical_number(view.depth_cue.near)},
+        {"far", canonical_number(view.depth_cue.far)}}},
+      {"method",
+       {{"name", name_of(view.method.name, method_names)},
+        {"compositing", name_of(view.method.compositing, compositing_names)},
+        {"stopTransmittance", canonical_number(view.method.stop_transmittance)}}},
+      {"quality", {{"budgetMs", number_or_null(view.quality.budget_ms)}, {"maxError", nullptr}}}};
+}
+
+std::string encode_view(const View& view) { return dump(view_to_json(view)); }
+
+}  // namespace windsplat::protocol

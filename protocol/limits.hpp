@@ -1,0 +1,56 @@
+// Every limit of the wire in one place. The schemas repeat the view's ranges; a test compares them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace windsplat::protocol::limits {
+
+inline constexpr std::size_t message_bytes_max = std::size_t{64} * 1024;  // one JSON document
+inline constexpr std::size_t json_depth_max = 32;
+inline constexpr std::size_t http_header_bytes_max = std::size_t{8} * 1024;
+inline constexpr std::size_t http_body_bytes_max = message_bytes_max;
+inline constexpr int http_header_timeout_s = 5;
+inline constexpr int http_body_timeout_s = 5;
+inline constexpr int write_timeout_s = 15;
+
+inline constexpr int image_edge_max = 8192;  // pixels
+inline constexpr std::int64_t image_pixels_max = 8192LL * 4320LL;
+inline constexpr int extinction_points_max = 64;
+inline constexpr int scalars_max = 4;
+inline constexpr double extinction_max = 1e30;  // per world unit
+inline constexpr double radius_max = 64;        // r1, r2, pixels at a height of 720
+inline constexpr double fov_min = 0.001;        // degrees
+inline constexpr double fov_max = 179;
+inline constexpr int stride_max = 64;
+inline constexpr double span_max = 64;
+inline constexpr double world_max = 1e6;         // camera positions
+inline constexpr double view_height_min = 1e-6;  // world units, orthographic
+inline constexpr double up_length_min = 1e-6;
+inline constexpr double geometry_scale_min = 1e-3;
+inline constexpr double geometry_scale_max = 1e3;
+inline constexpr double component_scale_max = 1e9;
+inline constexpr double line_length_max = 10;  // world units
+inline constexpr double span_min = 0.1;        // grid strides
+inline constexpr double value_max = 1e38;      // of a field; its square fits a double
+inline constexpr double range_width_min = 1e-30;
+inline constexpr double motion_rate_max = 1e3;
+inline constexpr double optical_depth_max = 1e3;
+inline constexpr double depth_cue_max = 10;  // depths of the volume
+inline constexpr double budget_ms_min = 1;
+inline constexpr double budget_ms_max = 10000;
+inline constexpr std::int64_t step_max = 2147483647;
+inline constexpr std::int64_t seed_max = 4294967295;
+inline constexpr std::size_t name_chars_max = 256;  // code points of a dataset, field or map name
+
+inline constexpr std::int64_t serial_max = 4294967295;  // id, rev and seq of messages
+inline constexpr double fps_min = 0.1;
+inline constexpr double fps_max = 120;
+inline constexpr double still_scale_max = 4;
+inline constexpr double decode_ms_max = 1e9;
+inline constexpr std::size_t problem_errors_max = 16;  // values at fault that one answer names
+
+inline constexpr int frames_in_flight_max = 2;  // unacknowledged, a session
+inline constexpr int sessions_max_default = 64;
+
+}  // namespace windsplat::protocol::limits

@@ -1,0 +1,173 @@
+// What client and server say to each other, as typed values. Mirrors messages.schema.json.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "protocol/view.hpp"
+#include "server/base/error.hpp"
+
+namespace windsplat::protocol {
+
+inline constexpr const char* protocol_name = "windsplat.v1";  // the WebSocket subprotocol
+
+// --- client to server -------------------------------------------------------------------------
+
+struct OpenMessage {
+  std::uint32_t id = 0;  // echoed by `opened` or `error`
+  std::string dataset;
+};
+struct PatchMessage {
+  std::uint32_t rev = 0;   // the client's view revision, echoed in frames
+  double t = 0;            // the client's clock in ms, echoed in frames
+  std::string patch_json;  // a merge patch of the view, not yet validated
+};
+struct StillMessage {
+  std::uint32_t id = 0;
+  std::optional<int> width;  // pixels; the view's when absent
+  std::optional<int> height;
+  std::string format = "png";  // png | jpeg
+  double scale = 1;            // 1..4
+};
+struct PlayMessage {
+  int from = 0;
+  int to = 0;
+  double fps = 10;
+  bool loop = true;
+  bool drop = true;  // skip steps rather than fall behind
+};
+struct PauseMessage {};
+struct AckMessage {
+  std::uint32_t seq = 0;  // cumulative
+  double decode_ms = 0;
+};
+struct VisibilityMessage {
+  bool hidden = false;
+};
+using ClientMessage = std::variant<OpenMessage, PatchMessage, StillMessage, PlayMessage,
+                                   PauseMessage, AckMessage, VisibilityMessage>;
+
+// --- shapes shared by REST, stream and command line --------------------------------------------
+
+struct FieldDescription {
+  std::string name;
+  std::string kind;  // "scalar" | "vector"
+  std::vector<std::string> components;
+  std::string units;
+  std::string standard_name;
+  std::string long_name;
+  std::optional<Range> range;  // absent until the step was loaded; of a vector: its magnitude
+  std::optional<std::int64_t> masked;
+  std::string range_of;  // "step" | "all"; empty, told as null, while range is absent
+  std::string dtype;
+};
+struct AxisDescription {
+  std::string name;
+  std::string standard_name;
+  std::string units;
+  std::string kind;
+  std::vector<double> coordinates;
+  std::vector<double> world;  // where each sample stands along its world axis
+};
+struct StepDescription {
+  double value = 0;
+  std::string text;
+};
+struct DatasetDescription {
+  std::string id;
+  std::string title;
+  std::string source;
+  std::string format;
+  std::string state;  // "ready" | "loading" | "failed"
+  std::array<int, 3> dims{};
+  std::array<AxisDescription, 3> axes;
+  Vec3 world_min{};
+  Vec3 world_max{};
+  std::vector<FieldDescription> fields;
+  std::vector<std::pair<std::string, std::string>> left_out;  // variable, reason
+  std::vector<StepDescription> steps;
+  std::string time_units;
+  std::uint64_t resident_bytes = 0;
+  std::uint64_t bytes_when_resident = 0;  // every field at every step
+  View default_view;  // told only when it names its dataset: while nothing is read it does not
+};
+struct FrameInfo {
+  std::string method = "kernel";
+  std::string compositing = "analytic";
+  int stride = 1;
+  std::optional<double> slab_thickness;
+  int width = 0;
+  int height = 0;
+  std::optional<double> error_value;
+  std::string error_kind = "none";  // measured | estimated | none
+  std::optional<double> jpeg_error;
+  std::int64_t samples = 0, culled = 0, skipped_vector = 0, skipped_scalar = 0, skipped_both = 0;
+  std::int64_t occluded = 0, pixel_updates = 0, exponentials = 0;
+  std::int64_t tiles = 0, tiles_stopped = 0;
+  std::vector<std::string> fields;
+  std::int64_t bytes = 0;
+  std::string variant;
+};
+// RFC 9457.
+struct Problem {
+  std::string type = "about:blank";
+  std::string title;
+  int status = 500;
+  std::string detail;
+  std::vector<FieldError> errors;
+};
+Problem problem_from(const Error& error);
+
+struct ColorMapDescription {
+  std::string name;
+  std::string kind;
+  std::vector<std::array<unsigned char, 3>> colors;  // sRGB, evenly spaced
+};
+struct ServiceDescription {
+  std::string name = "windsplat";
+  std::string version;
+  std::vector<std::pair<std::string, std::string>> links;
+};
+
+// --- server to client -------------------------------------------------------------------------
+
+struct HelloMessage {
+  std::string version;
+  std::string session;
+  std::vector<DatasetDescription> datasets;  // short forms
+};
+struct OpenedMessage {
+  std::uint32_t id = 0;
+  DatasetDescription dataset;
+};
+struct ProgressMessage {
+  std::optional<std::uint32_t> id;
+  std::string phase;
+  double done = 0;  // 0..1
+  std::optional<double> eta_ms;
+};
+struct ChosenMessage {
+  std::uint32_t seq = 0;  // the frame it speaks of
+  FrameInfo info;
+  std::string view_json;  // the completed view that was drawn, canonical
+};
+struct StatsMessage {
+  std::uint64_t frames = 0;
+  std::uint64_t dropped = 0;
+  std::uint64_t cancelled = 0;
+  std::uint64_t bytes = 0;
+};
+struct ErrorMessage {
+  std::optional<std::uint32_t> id;   // of the message at fault, where it had one
+  std::optional<std::uint32_t> rev;  // of the patch at fault
+  Problem problem;
+};
+using ServerMessage = std::variant<HelloMessage, OpenedMessage, ProgressMessage, ChosenMessage,
+                                   StatsMessage, ErrorMessage>;
+
+}  // namespace windsplat::protocol

@@ -1,0 +1,135 @@
+// The view: everything that decides a picture except its pixels' encoding, as typed values. Mirrors
+// view.schema.json; defaults here and there are the same (a test compares them). An empty optional
+// means "the dataset's default": scene/complete fills it in.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace windsplat::protocol {
+
+using Vec3 = std::array<double, 3>;
+using Range = std::array<double, 2>;
+
+enum class Projection { perspective, orthographic };
+enum class VerticalPlacement { automatic, linear, logp, index };
+enum class GeometryMapping { flat };
+enum class VectorSpace { components, world };
+enum class ColorBy { world_z, screen_z, rise, magnitude, constant };
+enum class MotionMode { still };
+enum class MethodName { kernel };
+enum class Compositing { analytic };
+
+struct CameraView {
+  Projection projection = Projection::perspective;
+  std::optional<Vec3> eye;     // world
+  std::optional<Vec3> target;  // world
+  Vec3 up{0, 0, 1};
+  double fov_y = 35;             // degrees, perspective
+  std::optional<double> height;  // world height of the picture at the target, orthographic
+};
+
+struct ImageView {
+  int width = 1280;
+  int height = 720;
+  std::string background = "#000000";  // sRGB
+};
+
+struct GeometryView {
+  Vec3 scale{1, 1, 1};
+  VerticalPlacement vertical = VerticalPlacement::automatic;
+  GeometryMapping mapping = GeometryMapping::flat;
+};
+
+// A field chosen by name, by the dataset's default (key absent), or none at all (null).
+struct FieldChoice {
+  enum class Kind { dataset_default, none, named };
+  Kind kind = Kind::dataset_default;
+  std::string name;  // only when named
+  bool operator==(const FieldChoice&) const = default;
+};
+
+struct VectorColorView {
+  std::optional<ColorBy> by;
+  std::string map = "viridis";
+  std::optional<Range> range;        // of what `by` measures
+  double rise_weight = 0.2;          // 0..1, `rise` only: 0 height alone, 1 rise alone
+  std::string constant = "#ffffff";  // sRGB, `constant` only
+};
+
+struct JitterView {
+  double center = 0.5;  // of a stride: how far the line's centre may lie from the kernel's
+  double stride = 0.3;  // of a stride: how far the kernel itself may be moved
+  bool overlap = true;  // kernels as wide as `span`; false: no wider than the stride
+  std::int64_t seed = 1;
+  bool per_step = false;  // a new pattern for each time step
+};
+
+struct VectorView {
+  FieldChoice field;
+  VectorSpace space = VectorSpace::components;
+  Vec3 scale{1, 1, 1};
+  std::optional<double> length;  // world units drawn at the top of magnitude_range
+  double span = 7;               // kernel width in grid strides
+  int stride = 1;                // grid samples
+  double r1 = 0.6;               // pixels at a picture height of 720
+  double r2 = 1.4;
+  double opacity = 0.8;
+  double head_desaturation = 0.7;
+  VectorColorView color;
+  std::optional<Range> magnitude_range;
+  std::optional<double> min_magnitude;
+  double magnitude_intensity =
+      0.6;  // 0: every line equally bright; 1: brightness follows magnitude
+  MotionMode motion = MotionMode::still;
+  double motion_rate = 1.0;
+  JitterView jitter;
+};
+
+struct ScalarColorView {
+  std::optional<std::string> map;
+  std::optional<Range> range;
+};
+
+struct ScalarView {
+  std::string field;
+  ScalarColorView color;
+  // (value, extinction per world unit), ascending values, linear between, constant beyond.
+  std::optional<std::vector<std::array<double, 2>>> extinction;
+  double min_optical_depth = 1e-4;  // splats below it are left out
+  int stride = 1;
+};
+
+struct DepthCueView {
+  double strength = 0.3;
+  double near = 0;  // 0: where the volume is nearest to the eye
+  double far = 1;   // 1: where it is farthest
+};
+
+struct MethodView {
+  MethodName name = MethodName::kernel;
+  Compositing compositing = Compositing::analytic;
+  double stop_transmittance = 1.5e-4;
+};
+
+struct QualityView {
+  std::optional<double> budget_ms;  // a stream keeps moving frames within it by their resolution
+};
+
+struct View {
+  std::string dataset;
+  int step = 0;
+  CameraView camera;
+  ImageView image;
+  GeometryView geometry;
+  VectorView vector;
+  std::optional<std::vector<ScalarView>> scalars;
+  DepthCueView depth_cue;
+  MethodView method;
+  QualityView quality;
+};
+
+}  // namespace windsplat::protocol

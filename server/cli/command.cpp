@@ -1,0 +1,137 @@
+// The commands' common parts: numbers from words, bytes to files, errors to stderr.
+#include "server/cli/command.hpp"
+
+#include <cerrno>
+#include <charconv>
+#include <cstdio>
+#include <limits>
+#include <memory>
+#include <system_error>
+
+namespace windsplat::cli {
+namespace {
+
+constexpr unsigned threads_max = 1024;
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, CloseFile>;
+
+Error file_error(ErrorKind kind, const char* what, const std::string& path) {
+  return make_error(kind, std::string(what) + " '" + printable(path) +
+                              "': " + std::generic_category().message(errno));
+}
+
+bool write_whole(std::FILE* file, std::string_view bytes) {
+  const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
+  return std::fflush(file) == 0 && written;
+}
+
+}  // namespace
+
+void add_threads_option(CLI::App& command, unsigned& threads) {
+  command.add_option("--threads", threads, "Threads that render; 0: one a hardware thread")
+      ->envname("WINDSPLAT_THREADS")
+      ->check(CLI::Range(0U, threads_max))
+      ->type_name("N")
+      ->capture_default_str();
+}
+
+void complain(std::string_view message) {
+  const std::string line = "windsplat: " + std::string(message) + '\n';
+  std::fwrite(line.data(), 1, line.size(), stderr);
+}
+
+int exit_code(ErrorKind kind) {
+  switch (kind) {
+    case ErrorKind::malformed:
+    case ErrorKind::invalid:
+    case ErrorKind::too_large:
+      return exit_usage;
+    case ErrorKind::bad_data:
+      return exit_bad_data;
+    case ErrorKind::not_found:
+    case ErrorKind::busy:
+    case ErrorKind::draining:
+    case ErrorKind::out_of_memory:
+    case ErrorKind::cancelled:
+    case ErrorKind::internal:
+      return exit_failed;
+  }
+  return exit_failed;
+}
+
+int answer(const Error& error) {
+  complain(printable(error.message, 2000));
+  if (error.at.size() > 1) {
+    for (const FieldError& field : error.at) {
+      complain("  " + printable(field.pointer) + ": " + printable(field.detail, 500));
+    }
+  }
+  return exit_code(error.kind);
+}
+
+std::optional<std::array<std::int64_t, 3>> parse_extent(std::string_view text, std::size_t count) {
+  std::array<std::int64_t, 3> numbers{1, 1, 1};
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i > 0) {
+      if (at == end || (*at != 'x' && *at != 'X')) return std::nullopt;
+      ++at;
+    }
+    const auto [next, fault] = std::from_chars(at, end, numbers[i]);
+    if (fault != std::errc() || numbers[i] < 1) return std::nullopt;
+    at = next;
+  }
+  if (at != end) return std::nullopt;
+  return numbers;
+}
+
+std::optional<std::uint64_t> parse_bytes(std::string_view text) {
+  std::uint64_t number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [next, fault] = std::from_chars(text.data(), end, number);
+  if (fault != std::errc() || number == 0) return std::nullopt;
+  const std::string_view unit(next, static_cast<std::size_t>(end - next));
+  if (unit.empty()) return number;
+  constexpr std::string_view units = "KMGT";
+  const std::size_t power = units.find(unit[0]);
+  if (unit.size() != 1 || power == std::string_view::npos) return std::nullopt;
+  const unsigned shift = 10 * (static_cast<unsigned>(power) + 1);
+  if (number > std::numeric_limits<std::uint64_t>::max() >> shift) return std::nullopt;
+  return number << shift;
+}
+
+Result<std::string> read_text_file(const std::string& path, std::size_t bytes_max) {
+  const File file(std::fopen(path.c_str(), "rbe"));
+  if (!file) return file_error(ErrorKind::not_found, "cannot open", path);
+  std::string text(bytes_max + 1, '\0');
+  text.resize(std::fread(text.data(), 1, text.size(), file.get()));
+  if (std::ferror(file.get()) != 0) return file_error(ErrorKind::not_found, "cannot read", path);
+  if (text.size() > bytes_max) {
+    return make_error(ErrorKind::too_large, "'" + printable(path) + "' has more than " +
+                                                std::to_string(bytes_max) + " bytes");
+  }
+  return text;
+}
+
+Result<void> write_stdout(std::string_view text) {
+  if (!write_whole(stdout, text)) return file_error(ErrorKind::internal, "cannot write", "-");
+  return {};
+}
+
+Result<void> write_output(const std::string& path, std::span<const std::uint8_t> bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (path == "-") return write_stdout(text);
+  File file(std::fopen(path.c_str(), "wbe"));
+  if (!file) return file_error(ErrorKind::internal, "cannot create", path);
+  const bool written = write_whole(file.get(), text);
+  if (std::fclose(file.release()) == 0 && written) return {};
+  const Error error = file_error(ErrorKind::internal, "cannot write", path);
+  std::remove(path.c_str());
+  return error;
+}
+
+}  // namespace windsplat::cli

@@ -1,0 +1,56 @@
+// What the commands share: how they join the command line, answer errors, and read their arguments.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "server/base/error.hpp"
+
+namespace windsplat::cli {
+
+inline constexpr int exit_ok = 0;
+inline constexpr int exit_failed = 1;
+inline constexpr int exit_usage = 2;
+inline constexpr int exit_bad_data = 3;
+
+// What is run once the arguments are known to be right; the value is the exit code.
+using Action = std::function<int()>;
+
+// Each adds its subcommand; when that is the one chosen, `chosen` is set to run it.
+void add_serve(CLI::App& app, Action& chosen);
+void add_render(CLI::App& app, Action& chosen);
+void add_inspect(CLI::App& app, Action& chosen);
+void add_synth(CLI::App& app, Action& chosen);
+void add_healthcheck(CLI::App& app, Action& chosen);
+
+// --threads N, or WINDSPLAT_THREADS; 0, the default, means one a hardware thread.
+void add_threads_option(CLI::App& command, unsigned& threads);
+
+// One line on stderr.
+void complain(std::string_view message);
+
+// Says the error on stderr, each value at fault with its JSON pointer, and returns the exit code of
+// its kind.
+int answer(const Error& error);
+int exit_code(ErrorKind kind);
+
+// "1280x720" -> {1280, 720}: `count` whole numbers with an x between, at least 1 each.
+std::optional<std::array<std::int64_t, 3>> parse_extent(std::string_view text, std::size_t count);
+
+// "8G" -> bytes; K, M, G and T are powers of 1024. Empty if it is not of that form, 0 or too large.
+std::optional<std::uint64_t> parse_bytes(std::string_view text);
+
+// The whole file. Errors: not_found, too_large beyond `bytes_max`.
+Result<std::string> read_text_file(const std::string& path, std::size_t bytes_max);
+
+// To a file, or to stdout for "-". A file that could not be written whole is removed.
+Result<void> write_output(const std::string& path, std::span<const std::uint8_t> bytes);
+Result<void> write_stdout(std::string_view text);
+
+}  // namespace windsplat::cli

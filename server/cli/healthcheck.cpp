@@ -1,0 +1,37 @@
+// windsplat healthcheck: asks a running daemon whether it is ready.
+#include <memory>
+#include <string>
+
+#include "server/cli/command.hpp"
+#include "server/net/server.hpp"
+
+namespace windsplat::cli {
+namespace {
+
+constexpr int timeout_s = 5;
+constexpr int http_ok = 200;
+
+int healthcheck(std::string url) {
+  if (url.empty() || url.back() != '/') url += '/';
+  url += "readyz";
+  const auto status = net::http_status(url, timeout_s);
+  if (!status) return answer(status.error());
+  if (*status == http_ok) return exit_ok;
+  complain(printable(url) + " answers " + std::to_string(*status));
+  return exit_failed;
+}
+
+}  // namespace
+
+void add_healthcheck(CLI::App& app, Action& chosen) {
+  CLI::App* command =
+      app.add_subcommand("healthcheck", "Exit 0 if a daemon is ready to serve, 1 if not");
+  const auto url = std::make_shared<std::string>("http://127.0.0.1:8080/");
+  command->add_option("url", *url, "The daemon's base URL")
+      ->envname("WINDSPLAT_URL")
+      ->type_name("URL")
+      ->capture_default_str();
+  command->callback([&chosen, url] { chosen = [url] { return healthcheck(*url); }; });
+}
+
+}  // namespace windsplat::cli

@@ -1,0 +1,176 @@
+// Description -> text: one paragraph each for the grid, the fields, the steps, and what is left
+// out.
+#include "server/cli/inspect_text.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <string_view>
+#include <vector>
+
+#include "server/base/error.hpp"
+
+namespace windsplat::cli {
+namespace {
+
+using Row = std::vector<std::string>;
+
+// Numbers that a float32 holds exactly differ from even spacing by their rounding alone.
+constexpr double uneven_tolerance = 1e-3;  // of the mean spacing
+constexpr std::size_t steps_listed_max = 12;
+
+std::string number(double value) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.7g", value);
+  return text.data();
+}
+
+// A name or unit from the file.
+std::string word(std::string_view text, std::string_view if_empty = "-") {
+  return text.empty() ? std::string(if_empty) : printable(text, 80);
+}
+
+std::string byte_count(std::uint64_t bytes) {
+  constexpr std::array<const char*, 5> units{"B", "KiB", "MiB", "GiB", "TiB"};
+  auto scaled = static_cast<double>(bytes);
+  std::size_t unit = 0;
+  for (; scaled >= 1024 && unit + 1 < units.size(); ++unit) scaled /= 1024;
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), unit == 0 ? "%.0f %s" : "%.1f %s", scaled, units[unit]);
+  return text.data();
+}
+
+// Columns as wide as their widest cell, two spaces between, indented by two.
+std::string table(const std::vector<Row>& rows) {
+  std::vector<std::size_t> widths;
+  for (const Row& row : rows) {
+    widths.resize(std::max(widths.size(), row.size()));
+    for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
+  }
+  std::string out;
+  for (const Row& row : rows) {
+    std::string line;
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      line += "  " + row[c] + std::string(widths[c] - row[c].size(), ' ');
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    out += line + '\n';
+  }
+  return out;
+}
+
+bool is_uneven(const std::vector<double>& coordinates) {
+  if (coordinates.size() < 3) return false;
+  const double mean =
+      (coordinates.back() - coordinates.front()) / static_cast<double>(coordinates.size() - 1);
+  for (std::size_t i = 1; i < coordinates.size(); ++i) {
+    const double spacing = coordinates[i] - coordinates[i - 1];
+    if (std::abs(spacing - mean) > uneven_tolerance * std::abs(mean)) return true;
+  }
+  return false;
+}
+
+std::string grid_text(const protocol::DatasetDescription& dataset) {
+  constexpr std::array<const char*, 3> letters{"x", "y", "z"};
+  std::vector<Row> rows;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const protocol::AxisDescription& axis = dataset.axes[a];
+    const bool one = axis.coordinates.size() < 2;
+    std::string span = axis.coordinates.empty() ? "-" : number(axis.coordinates.front());
+    if (!one) span.append(" .. ").append(number(axis.coordinates.back()));
+    if (!axis.units.empty()) span.append(" ").append(word(axis.units));
+    rows.push_back({letters[a], word(axis.name), std::to_string(dataset.dims[a]), span, axis.kind,
+                    one ? "" : (is_uneven(axis.coordinates) ? "uneven" : "even")});
+  }
+  std::string world = "world  ";
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (a > 0) world += ", ";
+    world += letters[a];
+    world += ' ';
+    world += number(dataset.world_min[a]);
+    world += " .. ";
+    world += number(dataset.world_max[a]);
+  }
+  return "axes (first .. last)\n" + table(rows) + world + '\n';
+}
+
+std::string masked_text(const protocol::DatasetDescription& dataset,
+                        const protocol::FieldDescription& field) {
+  if (!field.masked) return "";
+  if (*field.masked == 0) return "none masked";
+  double samples = field.range_of == "all" ? static_cast<double>(dataset.steps.size()) : 1;
+  for (const int dim : dataset.dims) samples *= dim;
+  std::array<char, 40> share{};
+  std::snprintf(share.data(), share.size(), " masked (%.3g %%)",
+                100 * static_cast<double>(*field.masked) / samples);
+  return std::to_string(*field.masked) + share.data();
+}
+
+std::string fields_text(const protocol::DatasetDescription& dataset) {
+  std::vector<Row> rows;
+  bool whole = false;
+  for (const protocol::FieldDescription& field : dataset.fields) {
+    whole = field.range_of == "all";
+    std::string kind = field.kind;
+    if (field.kind == "vector") {
+      kind += " (";
+      for (const std::string& component : field.components) {
+        if (kind.back() != '(') kind += ", ";
+        kind += word(component);
+      }
+      kind += ')';
+    }
+    std::string range = "no value";
+    if (field.range) {
+      range = field.kind == "vector" ? "|v| " : "";
+      range.append(number((*field.range)[0])).append(" .. ").append(number((*field.range)[1]));
+    }
+    const std::string& meaning =
+        field.standard_name.empty() ? field.long_name : field.standard_name;
+    rows.push_back({word(field.name), kind, range, word(field.units, "(no units)"),
+                    masked_text(dataset, field), field.dtype, word(meaning, "")});
+  }
+  if (rows.empty()) return "fields: none\n";
+  return std::string("fields (ranges over ") +
+         (whole && dataset.steps.size() > 1 ? "all steps" : "the first step") + ")\n" + table(rows);
+}
+
+std::string steps_text(const protocol::DatasetDescription& dataset) {
+  const std::size_t count = dataset.steps.size();
+  std::string out = "steps: " + std::to_string(count);
+  if (!dataset.time_units.empty()) out += "  (" + word(dataset.time_units) + ')';
+  out += '\n';
+  std::vector<Row> rows;
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool left_out = count > steps_listed_max && i >= steps_listed_max - 2 && i + 1 < count;
+    if (left_out) {
+      if (i == steps_listed_max - 2) rows.push_back({"...", ""});
+      continue;
+    }
+    rows.push_back({std::to_string(i), word(dataset.steps[i].text)});
+  }
+  return out + table(rows);
+}
+
+}  // namespace
+
+std::string inspect_text(const protocol::DatasetDescription& dataset) {
+  std::string out = word(dataset.id) + ": " + word(dataset.title, "(no title)") + '\n';
+  out += "from   " + word(dataset.source) + ", " + dataset.format + '\n';
+  out += "grid   " + std::to_string(dataset.dims[0]) + " x " + std::to_string(dataset.dims[1]) +
+         " x " + std::to_string(dataset.dims[2]) + " samples\n";
+  out += "memory " + byte_count(dataset.bytes_when_resident) +
+         " with every field resident at every step\n\n";
+  out += grid_text(dataset) + '\n' + fields_text(dataset) + '\n' + steps_text(dataset);
+  if (!dataset.left_out.empty()) {
+    std::vector<Row> rows;
+    for (const auto& [variable, reason] : dataset.left_out) {
+      rows.push_back({word(variable), printable(reason)});
+    }
+    out += "\nleft out\n" + table(rows);
+  }
+  return out;
+}
+
+}  // namespace windsplat::cli

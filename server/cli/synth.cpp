@@ -1,0 +1,61 @@
+// windsplat synth: built-in sample -> CF netCDF file.
+#include <limits>
+#include <memory>
+#include <string>
+
+#include "server/cli/command.hpp"
+#include "server/data/dataset.hpp"
+
+namespace windsplat::cli {
+namespace {
+
+struct Arguments {
+  std::string sample;
+  std::string dims;  // "XxYxZ", empty: the sample's own
+  int steps = 0;     // 0: the sample's own
+  std::string output;
+};
+
+Result<void> synth(const Arguments& arguments) {
+  std::array<int, 3> dims{};
+  if (!arguments.dims.empty()) {
+    const auto extent = parse_extent(arguments.dims, 3);
+    if (!extent) {
+      return make_error(ErrorKind::malformed,
+                        "--dims '" + printable(arguments.dims) + "' is not of the form 64x64x64");
+    }
+    for (std::size_t a = 0; a < dims.size(); ++a) {
+      if ((*extent)[a] > std::numeric_limits<int>::max()) {
+        return make_error(ErrorKind::too_large,
+                          "--dims '" + printable(arguments.dims) + "' is too large");
+      }
+      dims[a] = static_cast<int>((*extent)[a]);
+    }
+  }
+  const auto source = data::open_sample(arguments.sample, dims, arguments.steps);
+  if (!source) return source.error();
+  return data::write_netcdf(**source, arguments.output);
+}
+
+}  // namespace
+
+void add_synth(CLI::App& app, Action& chosen) {
+  CLI::App* command = app.add_subcommand("synth", "Write a built-in sample as a CF netCDF file");
+  const auto arguments = std::make_shared<Arguments>();
+  command->add_option("sample", arguments->sample, "Which sample")
+      ->required()
+      ->check(CLI::IsMember(data::sample_names()));
+  command->add_option("--dims", arguments->dims, "Samples along x, y and z")->type_name("XxYxZ");
+  command->add_option("--steps", arguments->steps, "Time steps")
+      ->check(CLI::Range(1, std::numeric_limits<int>::max()).description(""))
+      ->type_name("N");
+  command->add_option("-o", arguments->output, "The file to write")->required()->type_name("F.nc");
+  command->callback([&chosen, arguments] {
+    chosen = [arguments] {
+      const auto done = synth(*arguments);
+      return done ? exit_ok : answer(done.error());
+    };
+  });
+}
+
+}  // namespace windsplat::cli

@@ -1,0 +1,120 @@
+// Mean changes of longitude and latitude along two dimensions decide which is which.
+#include "server/data/cf_curvilinear.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include "server/data/cf_packing.hpp"
+#include "server/data/cf_text.hpp"
+
+namespace windsplat::data::cf {
+
+namespace {
+
+constexpr std::size_t samples_read = std::size_t{1} << 24;
+
+struct Change {
+  double slow = 0;  // sum of the differences along the slower dimension of the file
+  double fast = 0;
+};
+
+// A difference of longitudes goes the short way round.
+double difference(double a, double b, bool is_longitude) {
+  return is_longitude ? std::remainder(b - a, 360.0) : b - a;
+}
+
+Change change_of(const std::vector<double>& values, std::size_t rows, std::size_t columns,
+                 bool is_longitude) {
+  Change sum;
+  const auto add = [&](double& total, std::size_t from, std::size_t to) {
+    const double step = difference(values[from], values[to], is_longitude);
+    total += std::isfinite(step) ? step : 0;
+  };
+  for (std::size_t r = 0; r < rows; ++r) {
+    for (std::size_t c = 0; c < columns; ++c) {
+      if (r + 1 < rows) {
+        add(sum.slow, r * columns + c, (r + 1) * columns + c);
+      }
+      if (c + 1 < columns) {
+        add(sum.fast, r * columns + c, r * columns + c + 1);
+      }
+    }
+  }
+  // Per step, so that a long dimension does not outweigh a short one.
+  sum.slow /= static_cast<double>(std::max<std::size_t>(1, (rows - 1) * columns));
+  sum.fast /= static_cast<double>(std::max<std::size_t>(1, rows * (columns - 1)));
+  return sum;
+}
+
+// Of a variable that is_position() already took for one of the two.
+bool is_longitude(const FileVariable& variable) {
+  const std::string name = lower(variable.standard_name);
+  return name == "longitude" || (name != "latitude" && is_east(lower(variable.units)));
+}
+
+// The 2-D longitude (or latitude) on exactly the two dimensions; -1 if there is none.
+int position_on(const FileContents& contents, int a, int b, bool longitude) {
+  for (std::size_t v = 0; v < contents.variables.size(); ++v) {
+    const FileVariable& variable = contents.variables[v];
+    const bool fits =
+        variable.dims == std::vector<int>{a, b} || variable.dims == std::vector<int>{b, a};
+    if (fits && variable.numeric && is_position(variable) && is_longitude(variable) == longitude) {
+      return static_cast<int>(v);
+    }
+  }
+  return -1;
+}
+
+}  // namespace
+
+Result<Bearing> find_bearing(const netcdf::File& file, const std::vector<DimensionRole>& roles,
+                             GridChoice& choice) {
+  const FileContents& contents = file.contents();
+  const int x = choice.space[0];
+  const int y = choice.space[1];
+  Bearing bearing;
+  if (x < 0 || y < 0 || roles.at(static_cast<std::size_t>(x)).coordinate >= 0 ||
+      roles.at(static_cast<std::size_t>(y)).coordinate >= 0) {
+    return bearing;
+  }
+  std::array<Change, 2> along_x_y{};  // of longitude, of latitude: fast is along x, slow along y
+  for (const bool longitude : {true, false}) {
+    const int v = position_on(contents, x, y, longitude);
+    if (v < 0) {
+      return bearing;
+    }
+    const auto& dims = contents.variables[static_cast<std::size_t>(v)].dims;
+    const std::size_t rows = contents.dimensions[static_cast<std::size_t>(dims[0])].length;
+    const std::size_t columns = contents.dimensions[static_cast<std::size_t>(dims[1])].length;
+    if (rows == 0 || columns == 0 || rows > samples_read / columns) {
+      return bearing;
+    }
+    auto values = file.read_all(v);
+    if (!values) {
+      return values.error();
+    }
+    const Packing packing = packing_of(file, v);
+    for (double& value : *values) {
+      value = unpack_double(packing, value);
+    }
+    Change change = change_of(*values, rows, columns, longitude);
+    if (dims[0] == x) {
+      std::swap(change.slow, change.fast);
+    }
+    along_x_y.at(longitude ? 0 : 1) = change;
+  }
+  bearing.is_curvilinear = true;
+  const bool swapped = std::abs(along_x_y[0].slow) > std::abs(along_x_y[0].fast) &&
+                       std::abs(along_x_y[1].fast) > std::abs(along_x_y[1].slow);
+  if (swapped) {
+    std::swap(choice.space[0], choice.space[1]);
+  }
+  bearing.turned = {(swapped ? along_x_y[0].slow : along_x_y[0].fast) < 0,
+                    (swapped ? along_x_y[1].fast : along_x_y[1].slow) < 0};
+  return bearing;
+}
+
+}  // namespace windsplat::data::cf

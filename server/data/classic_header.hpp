@@ -1,0 +1,20 @@
+// The size a classic netCDF file must have by its own header. The library opens a shorter file and
+// reads zeros where data are missing, so the reader asks here first.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "server/base/error.hpp"
+
+namespace windsplat::data::netcdf {
+
+// Copies `count` bytes at `offset` into `out`; false if the file does not hold them all.
+using ReadBytes = std::function<bool(std::uint64_t offset, std::size_t count, unsigned char* out)>;
+
+// Walks the header of a file of `file_bytes` bytes (CDF-1, CDF-2 and CDF-5, "NetCDF Classic Format
+// Specification"; integers are big-endian) and gives the end of its last value; the padding behind
+// it may be missing. Errors: bad_data if the header is broken or runs past the end of the file.
+Result<std::uint64_t> classic_bytes_expected(const ReadBytes& read, std::uint64_t file_bytes);
+
+}  // namespace windsplat::data::netcdf

@@ -1,0 +1,123 @@
+// What a file or a built-in sample is once opened: its grid, what fields it holds, and a way to
+// fetch one field at one step as an immutable Volume.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/base/error.hpp"
+
+namespace windsplat::data {
+
+enum class AxisKind { longitude, latitude, pressure, height, depth, level, cartesian };
+
+// One axis of a rectilinear grid. Index 0 is west, south or bottom: readers turn every axis so
+// that the index grows with the world coordinate (a pressure axis therefore descends in hPa).
+struct Axis {
+  std::string name;           // the dimension's name in the file
+  std::string standard_name;  // CF, empty if none
+  std::string units;          // as written in the file, empty if none
+  AxisKind kind = AxisKind::cartesian;
+  std::vector<double> coordinates;  // one a sample, strictly monotonic, in `units`
+};
+
+// x, y, z: always three axes; a dimension the data lacks has one coordinate.
+struct Grid {
+  std::array<Axis, 3> axes;
+  [[nodiscard]] std::array<int, 3> dims() const;
+  [[nodiscard]] std::size_t samples() const;
+};
+
+enum class FieldKind { scalar, vector };
+
+struct FieldInfo {
+  std::string name;  // as the view names it: the variable's name, "wind" or the like for a vector
+  FieldKind kind = FieldKind::scalar;
+  std::vector<std::string> components;  // the file's variables, in x, y(, z) order; 1 for a scalar
+  std::string units;                    // of a vector: its first component's
+  std::vector<std::string> component_units;  // one a component; they may differ (m/s, Pa/s)
+  std::string standard_name;
+  std::string long_name;
+  std::string dtype;  // of the file: "float32", "int16 packed", ...
+};
+
+// A variable of the file that is not shown, and why.
+struct LeftOut {
+  std::string name;
+  std::string reason;
+};
+
+struct TimeStep {
+  double value = 0;  // in the file's own unit
+  std::string
+      text;  // ISO 8601 where the calendar is understood ("2001-01-01T03:00:00Z"), else value
+};
+
+// One field at one step. Samples are x fastest, then y, then z; a vector's components follow each
+// other as whole arrays. A masked sample is NaN (in a vector: in every component).
+struct Volume {
+  std::array<int, 3> dims{};
+  int components = 1;  // 1 scalar, 2 a horizontal vector whose third component is zero, 3
+  std::vector<float> values;
+  std::array<float, 2> range{0, 0};  // of the values, or of a vector's magnitude; unmasked only
+  std::int64_t masked = 0;
+
+  [[nodiscard]] std::size_t samples() const {
+    return static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) *
+           static_cast<std::size_t>(dims[2]);
+  }
+  [[nodiscard]] const float* component(int c) const {
+    return values.data() + static_cast<std::size_t>(c) * samples();
+  }
+  [[nodiscard]] std::size_t bytes() const { return values.size() * sizeof(float); }
+};
+
+// Counts masked samples, makes a vector's mask common to its components, sets range. Readers and
+// samples call it last. Infinite values are masked too.
+void finish_volume(Volume& volume);
+
+// Everything about a dataset that is known without loading a field.
+struct DatasetInfo {
+  std::string id;
+  std::string title;
+  std::string source;  // "built-in sample" or the file's name without its folder
+  std::string format;  // "sample", "netCDF classic", "netCDF-4"
+  std::string digest;  // changes whenever the data may have changed
+  Grid grid;
+  std::vector<FieldInfo> fields;
+  std::vector<LeftOut> left_out;
+  std::vector<TimeStep> steps;  // at least one
+  std::string time_units;
+  std::string time_calendar;  // CF; empty means standard
+
+  [[nodiscard]] const FieldInfo* find(const std::string& name) const;  // null if there is none
+  [[nodiscard]] const FieldInfo* first(FieldKind kind) const;          // null if there is none
+};
+
+// Where a dataset's numbers come from: one implementation a format. Called under the store's lock
+// for that dataset, so it need not be thread-safe itself.
+class Source {
+ public:
+  virtual ~Source() = default;
+  [[nodiscard]] virtual const DatasetInfo& info() const = 0;
+  // field indexes info().fields; 0 <= step < info().steps.size().
+  virtual Result<Volume> read(std::size_t field, std::size_t step) = 0;
+};
+
+// Built-in samples, made on the spot and deterministic. name: tornado, climate or efield.
+// dims {0,0,0} and steps 0 mean the sample's own size.
+Result<std::unique_ptr<Source>> open_sample(const std::string& name,
+                                            std::array<int, 3> dims = {0, 0, 0}, int steps = 0);
+std::vector<std::string> sample_names();
+
+// Opens a local file by its content, whatever its name. Errors: not_found, bad_data.
+Result<std::unique_ptr<Source>> open_file(const std::string& path);
+
+// Writes every field and step of a source as CF netCDF-4 that open_file reads back.
+Result<void> write_netcdf(Source& source, const std::string& path);
+
+}  // namespace windsplat::data

@@ -1,0 +1,51 @@
+// The horizontal maps that the sample "climate" is made of: one value a column of the grid, at one
+// time. Longitude varies fastest. sample_climate.cpp multiplies them by vertical profiles.
+#pragma once
+
+#include <array>
+#include <vector>
+
+namespace windsplat::data::climate {
+
+using Map = std::vector<float>;
+
+// Where the columns stand, degrees.
+struct Columns {
+  std::vector<double> longitudes;
+  std::vector<double> latitudes;
+  [[nodiscard]] std::size_t count() const { return longitudes.size() * latitudes.size(); }
+};
+
+// A round low or high that drifts with the mean flow.
+struct Vortex {
+  double longitude;  // degrees, of its centre
+  double latitude;
+  double radius;      // degrees of arc to the fastest wind
+  double speed;       // m/s there
+  double spin;        // +1 counter-clockwise seen from above, -1 clockwise
+  double hemisphere;  // +1 north, -1 south
+  bool cyclone;       // a low: carries fronts
+};
+
+// Cyclones and the anticyclones between them, at a time in hours.
+std::vector<Vortex> vortices(double hours);
+
+// m/s, except lift: -1..1, times the profile of w.
+struct WindMaps {
+  Map jet_u, jet_v;    // at the level of the jets
+  Map low_u, low_v;    // vortices near the ground, without friction
+  Map high_u, high_v;  // vortices aloft
+  Map lift;
+  // About 1: the wind's unevenness, in threads along the flow; one level takes the first, the next
+  // the second, and so on in turn.
+  std::array<Map, 3> threads;
+};
+WindMaps wind_maps(const Columns& columns, double hours);
+
+// Coverage with texture: there is cloud where it exceeds the profile's threshold.
+struct CloudMaps {
+  Map low, middle, high, deep;
+};
+CloudMaps cloud_maps(const Columns& columns, double hours);
+
+}  // namespace windsplat::data::climate

@@ -1,0 +1,56 @@
+// The resident store: every dataset opened once, every field and step loaded once on first need,
+// shared by all sessions, the least recently used evicted beyond the memory limit.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/dataset.hpp"
+
+namespace windsplat::data {
+
+class Budget;  // the bytes that datasets share, with the volumes they pay for
+
+// One opened dataset. Thread-safe.
+class Dataset {
+ public:
+  Dataset(std::unique_ptr<Source> source, std::string id, std::uint64_t bytes_max);
+  // Shares the budget of a store's other datasets.
+  Dataset(std::unique_ptr<Source> source, std::string id, std::shared_ptr<Budget> budget);
+  ~Dataset();
+
+  [[nodiscard]] const DatasetInfo& info() const;
+
+  // The field at the step; loads it if it is not resident. What a caller holds stays valid.
+  // Errors: not_found (no such field or step), bad_data, out_of_memory.
+  Result<std::shared_ptr<const Volume>> volume(const std::string& field, std::size_t step);
+
+  [[nodiscard]] std::uint64_t resident_bytes() const;
+  [[nodiscard]] std::uint64_t loads() const;  // how many volumes were ever read from the source
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+// All datasets of a process. Thread-safe.
+class Store {
+ public:
+  explicit Store(std::uint64_t bytes_max);
+  ~Store();
+
+  // Opens and registers; the id is the sample's name or the file's name without its extension,
+  // made unique by -2, -3. A sample is named by its bare name, a file by its path.
+  Result<std::shared_ptr<Dataset>> add(const std::string& sample_or_path);
+  [[nodiscard]] Result<std::shared_ptr<Dataset>> find(const std::string& id) const;
+  [[nodiscard]] std::vector<std::shared_ptr<Dataset>> all() const;  // in the order they were added
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace windsplat::data

@@ -1,0 +1,28 @@
+// The portable body of the kernels, compiled once a target: the including file names the target by
+// WINDSPLAT_KERNEL_TABLE. Everything here has internal linkage, so no function built for one
+// instruction set can stand in for another's.
+//
+// A brick goes through three steps: its stops are projected and culled, what is left is prepared as
+// lines and splats in visibility order, and these are composited block by block.
+#include <cstddef>
+#include <cstdint>
+
+#include "server/engine/kernels/table.hpp"
+
+// clang-format off: the order matters, each part uses the one before.
+#include "server/engine/kernels/body_blocks.hpp"
+#include "server/engine/kernels/body_lines.hpp"
+#include "server/engine/kernels/body_math.hpp"
+#include "server/engine/kernels/body_splats.hpp"
+#include "server/engine/kernels/body_stops.hpp"
+// clang-format on
+
+namespace windsplat::engine::kernels {
+
+const Table& WINDSPLAT_KERNEL_TABLE() {
+  static constexpr Table table{WINDSPLAT_KERNEL_NAME, summarise, draw,  prefetch_brick,
+                               refresh_open,          attenuate, jitter};
+  return table;
+}
+
+}  // namespace windsplat::engine::kernels

@@ -1,0 +1,42 @@
+// Which instruction set's kernels this process uses.
+#include "server/engine/kernels/dispatch.hpp"
+
+#include <cstdlib>
+#include <string>
+
+namespace windsplat::engine::kernels {
+
+namespace {
+
+Result<const Table*> choose() {
+  const std::vector<const Table*> usable = usable_tables();
+  const char* wanted = std::getenv("WINDSPLAT_TARGET");  // NOLINT(concurrency-mt-unsafe)
+  if (wanted == nullptr) return usable.back();
+  std::string names;
+  for (const Table* table : usable) {
+    if (std::string(wanted) == table->name) return table;
+    names += names.empty() ? table->name : std::string(", ") + table->name;
+  }
+  return make_error(ErrorKind::invalid, "WINDSPLAT_TARGET is \"" + printable(wanted) +
+                                            "\"; this processor runs " + names);
+}
+
+}  // namespace
+
+std::vector<const Table*> usable_tables() {
+  std::vector<const Table*> usable{&portable_table()};
+#ifdef WINDSPLAT_X86_TARGETS
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+      __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2")) {
+    usable.push_back(&avx2_table());
+  }
+#endif
+  return usable;
+}
+
+Result<const Table*> chosen_table() {
+  static const Result<const Table*> table = choose();
+  return table;
+}
+
+}  // namespace windsplat::engine::kernels

@@ -1,0 +1,143 @@
+// What the kernels read and write: plain arrays and numbers, no functions, so that nothing shared
+// is ever compiled for one instruction set and linked into another.
+#pragma once
+
+#include <cstdint>
+
+namespace windsplat::engine::kernels {
+
+constexpr int block_side = 4;                          // pixels
+constexpr int block_pixels = block_side * block_side;  // lanes of one update
+constexpr int tile_side = 64;                          // pixels
+constexpr int tile_blocks = tile_side / block_side;    // blocks along a tile's side
+constexpr int block_channels = 5;                      // transmittance, alpha, red, green, blue
+constexpr int block_floats = block_channels * block_pixels;
+constexpr int ray_channels = 4;  // squared world components of the pixel ray, its length
+constexpr int ray_floats = ray_channels * block_pixels;
+constexpr int brick_side = 8;  // stops
+constexpr int brick_stops = brick_side * brick_side;
+
+// One axis of a pass: its kernel stops, in world order.
+struct Axis {
+  int stops;
+  const double* camera;   // 3 a stop: what this axis adds to (right, down, forward) from the eye
+  const float* from_eye;  // a stop: world coordinate minus the eye's
+  const float* position;  // a stop: world coordinate
+  const float* cell;      // a stop: stride times spacing, world units
+  const int* sample;      // a stop: index of its sample in the field
+  const int* visit;       // stops in visibility order: bricks outward from the eye's cell
+};
+
+struct ColorTable {
+  const float* rgb;  // 3 an entry
+  int entries;
+  float low;
+  float scale;  // entries - 1 over the range
+};
+
+struct LineStyle {
+  const float* velocity[3];  // third null for a horizontal field
+  float scale[3];
+  const float* rate_x;  // by sample index along y; null: components are drawn as they stand
+  float rate_y;
+  const float* rate_z;  // by sample index along z
+  float length;         // world units at full magnitude
+  float inverse_full_magnitude;
+  float min_magnitude;
+  float half_span;  // of the kernel box, in cells
+  float r1, r2;     // pixels
+  float inverse_ramp;
+  float opacity;
+  float head_desaturation;
+  float intensity_low, intensity_scale, intensity;
+  float cue_near, cue_scale, cue_strength;
+  int color_by;  // scene::LineColor
+  ColorTable color;
+  float rise_weight;
+  float box_low_z, inverse_box_height;
+  float jitter_center, jitter_stride;
+  std::uint32_t seed, epoch;
+};
+
+// Piecewise linear in the value: y[p] + slope[p] (v - x[p]) from x[p] on, y[0] below x[0].
+struct Extinction {
+  int points;
+  const float* x;
+  const float* y;
+  const float* slope;
+};
+
+constexpr int medium_layers_max = 8;
+
+struct MediumLayer {
+  const float* values;
+  Extinction extinction;
+  ColorTable color;
+};
+
+struct Medium {
+  int layers;
+  MediumLayer layer[medium_layers_max];
+  float min_optical_depth;
+};
+
+struct Camera {
+  int perspective;
+  int width, height;
+  float right[3], down[3], forward[3];  // world components
+  float half_width_px, half_height_px;
+  float pixel;  // size at unit distance (perspective) or in the world
+  float inverse_pixel;
+  float near;
+};
+
+// Kernel stops of one stride, with what is drawn at them.
+struct Pass {
+  Axis axis[3];
+  int major, u, v;       // slabs are stacked along major; u is innermost
+  std::int64_t step[3];  // of a sample index along each axis, in samples
+  int has_lines;
+  int has_medium;
+  LineStyle line;
+  Medium medium;
+  float cell_max[3];  // the widest cell along each axis
+};
+
+// A brick of 8 x 8 x 1 stops, as ranges of the visit lists.
+struct Brick {
+  std::int32_t slab;  // position along the major axis' visit list
+  std::int32_t u_first, u_count;
+  std::int32_t v_first, v_count;
+  std::int32_t pass;
+  float line_reach;               // half the longest line here, world units
+  std::int16_t block_x, block_y;  // blocks of the picture that it may touch, both ends included
+  std::int16_t block_x_last, block_y_last;
+};
+
+struct BrickSummary {
+  std::int64_t without_line;
+  std::int64_t without_splat;
+  std::int64_t without_both;
+  float magnitude_max;  // of the lines that are drawn
+  int lines;            // stops that have one
+  int splats;
+};
+
+struct Counters {
+  std::int64_t pixel_updates;
+  std::int64_t exponentials;
+  std::int64_t occluded;
+};
+
+// One tile's pixels as blocks of 4 x 4: see block_channels. Rays exist for perspective media.
+struct Tile {
+  int x, y;           // of its first pixel
+  int width, height;  // pixels inside the picture
+  float* blocks;
+  const float* rays;
+  std::uint32_t open[tile_blocks];  // bit set: the block still lets light through
+  int any_closed;
+  Counters counters;
+};
+
+}  // namespace windsplat::engine::kernels

@@ -1,0 +1,37 @@
+// The hot loops of one instruction set as a table of functions. They take plain data, cannot fail,
+// and give the same bits on every target. Plain includes only: see frame_data.hpp.
+#pragma once
+
+#include <cstdint>
+
+#include "server/engine/kernels/frame_data.hpp"
+
+namespace windsplat::engine::kernels {
+
+struct Table {
+  const char* name;  // "portable" or "avx2"
+
+  // What a brick holds once samples below their tolerances are left out.
+  void (*summarise)(const Pass& pass, const Brick& brick, BrickSummary& summary);
+
+  // Composites a brick's kernels into the tile's blocks that are still open, front to back.
+  void (*draw)(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile);
+
+  // Tells the processor that this brick's samples are wanted soon.
+  void (*prefetch)(const Pass& pass, const Brick& brick);
+
+  // Closes the blocks whose largest transmittance is at most `stop`; how many remain open.
+  int (*refresh_open)(Tile& tile, float stop);
+
+  // absorbed = -expm1(-tau) and transmitted = exp(-tau), tau in [0, inf], to about 1e-7.
+  void (*attenuate)(int count, const float* tau, float* absorbed, float* transmitted);
+
+  // Six numbers in [0, 1) for the stop at sample (i, j, k): how its kernel is moved along x, y, z,
+  // then how its line's centre is (Jarzynski & Olano 2020: pcg3d).
+  void (*jitter)(std::uint32_t seed, std::uint32_t epoch, int i, int j, int k, float* six);
+};
+
+const Table& portable_table();
+const Table& avx2_table();
+
+}  // namespace windsplat::engine::kernels

@@ -1,0 +1,308 @@
+// Scene -> RenderPlan.
+#include "server/engine/plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "server/base/check.hpp"
+
+namespace windsplat::engine {
+
+namespace {
+
+using scene::Camera;
+using scene::Lattice;
+using scene::Scene;
+
+// Optical depths stay finite in float: what is this dense is opaque over any distance.
+constexpr double extinction_max = 1e30;
+
+float bounded(double v) {
+  constexpr double largest = std::numeric_limits<float>::max();
+  return static_cast<float>(std::clamp(v, -largest, largest));
+}
+
+// 1 / (high - low) for clamp((v - low) * scale): a step where both are the same.
+float ramp_scale(double low, double high) {
+  constexpr double steepest = 1e30;
+  return high > low ? bounded(std::min(1.0 / (high - low), steepest)) : bounded(steepest);
+}
+
+kernels::Camera make_camera(const Camera& from) {
+  kernels::Camera to{};
+  to.perspective = from.perspective ? 1 : 0;
+  to.width = from.width;
+  to.height = from.height;
+  for (int a = 0; a < 3; ++a) {
+    to.right[a] = static_cast<float>(from.right[a]);
+    to.down[a] = static_cast<float>(-from.up[a]);
+    to.forward[a] = static_cast<float>(from.forward[a]);
+  }
+  to.half_width_px = static_cast<float>(0.5 * from.width);
+  to.half_height_px = static_cast<float>(0.5 * from.height);
+  const double pixel = 2.0 * from.half_height / from.height;
+  to.pixel = bounded(pixel);
+  to.inverse_pixel = bounded(1.0 / pixel);
+  to.near = static_cast<float>(from.near);
+  return to;
+}
+
+void place_axis(const Scene& scene, int a, int stride, AxisArrays& axis) {
+  const Camera& camera = scene.camera;
+  const auto& positions = scene.lattice.positions[a];
+  for (const auto& [sample, cell] : kernel_stops(scene.lattice.spacing[a], stride)) {
+    axis.sample.push_back(sample);
+    const double position = positions[sample];
+    const double from_eye = position - camera.eye[a];
+    axis.position.push_back(position);
+    axis.camera.push_back(from_eye * camera.right[a]);
+    axis.camera.push_back(from_eye * -camera.up[a]);
+    axis.camera.push_back(from_eye * camera.forward[a]);
+    axis.from_eye.push_back(static_cast<float>(from_eye));
+    axis.world.push_back(static_cast<float>(position));
+    axis.cell.push_back(static_cast<float>(cell));
+  }
+  const int count = static_cast<int>(axis.sample.size());
+  axis.visit = visit_order(count, eye_stop(camera, a, axis.position));
+  for (int first = 0; first < count;) {
+    const int brick = axis.visit[first] / kernels::brick_side;
+    int last = first;
+    while (last < count && axis.visit[last] / kernels::brick_side == brick) ++last;
+    axis.bricks.push_back({first, last - first});
+    first = last;
+  }
+}
+
+std::vector<float> flatten(const scene::ColorTable& table) {
+  std::vector<float> rgb;
+  rgb.reserve(3 * table.entries.size());
+  for (const auto& entry : table.entries) rgb.insert(rgb.end(), entry.begin(), entry.end());
+  return rgb;
+}
+
+kernels::ColorTable make_table(const scene::ColorTable& table, const std::vector<float>& rgb) {
+  WINDSPLAT_CHECK(!table.entries.empty());
+  kernels::ColorTable to{};
+  to.rgb = rgb.data();
+  to.entries = static_cast<int>(table.entries.size());
+  to.low = bounded(table.range[0]);
+  const double last = to.entries - 1;
+  to.scale = bounded(std::min(last * ramp_scale(table.range[0], table.range[1]), 1e30));
+  return to;
+}
+
+void check_volume(const data::Volume& volume, const Lattice& lattice) {
+  WINDSPLAT_CHECK(volume.dims == lattice.dims);
+  WINDSPLAT_CHECK(volume.values.size() ==
+                  volume.samples() * static_cast<std::size_t>(volume.components));
+}
+
+std::vector<float> to_floats(const std::vector<double>& from) {
+  std::vector<float> to;
+  to.reserve(from.size());
+  for (const double v : from) to.push_back(bounded(v));
+  return to;
+}
+
+// Jitter, box and ink: what a line looks like.
+void style_lines(const Scene& scene, const scene::VectorLayer& from, kernels::LineStyle& to) {
+  to.length = static_cast<float>(from.length);
+  const double full = from.magnitude_range[1];
+  to.inverse_full_magnitude = full > 0 ? bounded(1.0 / full) : std::numeric_limits<float>::max();
+  to.min_magnitude = bounded(from.min_magnitude);
+  to.half_span = static_cast<float>(0.5 * (from.overlap ? from.span : 1.0));
+  to.r1 = static_cast<float>(from.r1);
+  to.r2 = static_cast<float>(from.r2);
+  to.inverse_ramp = static_cast<float>(1.0 / std::max(from.r2 - from.r1, 1e-6));
+  to.opacity = static_cast<float>(from.opacity);
+  to.head_desaturation = static_cast<float>(from.head_desaturation);
+  to.intensity_low = bounded(from.magnitude_range[0]);
+  to.intensity_scale = ramp_scale(from.magnitude_range[0], from.magnitude_range[1]);
+  to.intensity = static_cast<float>(from.magnitude_intensity);
+  to.cue_near = bounded(scene.depth_cue.near);
+  to.cue_scale = ramp_scale(scene.depth_cue.near, scene.depth_cue.far);
+  to.cue_strength = static_cast<float>(scene.depth_cue.strength);
+  to.color_by = static_cast<int>(from.color_by);
+  to.rise_weight = static_cast<float>(from.rise_weight);
+  to.box_low_z = static_cast<float>(scene.lattice.box_min.z);
+  to.inverse_box_height =
+      static_cast<float>(1.0 / (scene.lattice.box_max.z - scene.lattice.box_min.z));
+  to.jitter_center = static_cast<float>(from.jitter_center);
+  to.jitter_stride = static_cast<float>(from.jitter_stride);
+  to.seed = from.seed;
+  to.epoch = from.epoch;
+}
+
+void add_lines(const Scene& scene, PassPlan& pass) {
+  const scene::VectorLayer& from = *pass.vector;
+  check_volume(*from.field, scene.lattice);
+  kernels::LineStyle& to = pass.kernel.line;
+  for (int c = 0; c < 3; ++c) {
+    to.velocity[c] = c < from.field->components ? from.field->component(c) : nullptr;
+    to.scale[c] = bounded(from.scale[c]);
+  }
+  pass.rate_x = to_floats(from.rate_x);
+  pass.rate_z = to_floats(from.rate_z);
+  to.rate_x = pass.rate_x.empty() ? nullptr : pass.rate_x.data();
+  to.rate_y = pass.rate_x.empty() ? 1.0F : bounded(from.rate_y);
+  to.rate_z = pass.rate_z.empty() ? nullptr : pass.rate_z.data();
+  style_lines(scene, from, to);
+  pass.line_rgb = flatten(from.color);
+  to.color = make_table(from.color, pass.line_rgb);
+  pass.kernel.has_lines = 1;
+}
+
+void add_medium(const Scene& scene, PassPlan& pass) {
+  kernels::Medium& to = pass.kernel.medium;
+  WINDSPLAT_CHECK(pass.scalars.size() <= kernels::medium_layers_max);
+  to.layers = static_cast<int>(pass.scalars.size());
+  to.min_optical_depth = std::numeric_limits<float>::max();
+  pass.layers.resize(pass.scalars.size());
+  for (std::size_t k = 0; k < pass.scalars.size(); ++k) {
+    const scene::ScalarLayer& from = *pass.scalars[k];
+    check_volume(*from.field, scene.lattice);
+    WINDSPLAT_CHECK(!from.extinction.empty());
+    LayerArrays& arrays = pass.layers[k];
+    for (std::size_t p = 0; p < from.extinction.size(); ++p) {
+      const double x = from.extinction[p][0];
+      const double y = std::min(from.extinction[p][1], extinction_max);
+      double slope = 0;
+      if (p + 1 < from.extinction.size() && from.extinction[p + 1][0] > x) {
+        slope = (std::min(from.extinction[p + 1][1], extinction_max) - y) /
+                (from.extinction[p + 1][0] - x);
+      }
+      arrays.x.push_back(bounded(x));
+      arrays.y.push_back(bounded(y));
+      arrays.slope.push_back(bounded(slope));
+    }
+    arrays.rgb = flatten(from.color);
+    to.layer[k].values = from.field->values.data();
+    to.layer[k].extinction = {static_cast<int>(arrays.x.size()), arrays.x.data(), arrays.y.data(),
+                              arrays.slope.data()};
+    to.layer[k].color = make_table(from.color, arrays.rgb);
+    to.min_optical_depth = std::min(to.min_optical_depth, bounded(from.min_optical_depth));
+  }
+  pass.kernel.has_medium = 1;
+}
+
+void finish_pass(const Scene& scene, int major, PassPlan& pass) {
+  const auto& dims = scene.lattice.dims;
+  kernels::Pass& to = pass.kernel;
+  to.major = major;
+  to.u = major == 0 ? 1 : 0;
+  to.v = major == 2 ? 1 : 2;
+  to.step[0] = 1;
+  to.step[1] = dims[0];
+  to.step[2] = static_cast<std::int64_t>(dims[0]) * dims[1];
+  for (int a = 0; a < 3; ++a) {
+    AxisArrays& axis = pass.axis[a];
+    place_axis(scene, a, pass.stride, axis);
+    to.axis[a] = {static_cast<int>(axis.sample.size()),
+                  axis.camera.data(),
+                  axis.from_eye.data(),
+                  axis.world.data(),
+                  axis.cell.data(),
+                  axis.sample.data(),
+                  axis.visit.data()};
+    to.cell_max[a] = *std::max_element(axis.cell.begin(), axis.cell.end());
+  }
+  if (pass.vector != nullptr) add_lines(scene, pass);
+  if (!pass.scalars.empty()) add_medium(scene, pass);
+}
+
+std::string describe(const Scene& scene, const RenderPlan& plan) {
+  std::string variant;
+  const bool vector = scene.vector.has_value();
+  if (vector) variant = "vector";
+  if (!scene.scalars.empty()) variant += vector ? "+scalar" : "scalar";
+  if (variant.empty()) return "empty";
+  variant += scene.camera.perspective ? " perspective" : " orthographic";
+  if (vector && scene.vector->head_desaturation > 0) variant += " heads";
+  if (plan.passes.size() > 1) variant += " passes=" + std::to_string(plan.passes.size());
+  return variant;
+}
+
+}  // namespace
+
+int major_axis(const Camera& camera, const Lattice& lattice) {
+  int major = 0;
+  double most = -1;
+  for (int a = 0; a < 3; ++a) {
+    double sum = 0;
+    for (const double width : lattice.spacing[a]) sum += width;
+    const double crossed =
+        std::abs(camera.forward[a]) * static_cast<double>(lattice.spacing[a].size()) / sum;
+    if (crossed > most) {
+      most = crossed;
+      major = a;
+    }
+  }
+  return major;
+}
+
+std::vector<Stop> kernel_stops(const std::vector<double>& spacing, int stride) {
+  const int dim = static_cast<int>(spacing.size());
+  std::vector<Stop> stops;
+  for (int first = 0; first < dim; first += stride) {
+    const int last = std::min(first + stride, dim) - 1;
+    const double cell = std::accumulate(spacing.begin() + first, spacing.begin() + last + 1, 0.0);
+    stops.push_back({first + (last - first) / 2, cell});
+  }
+  return stops;
+}
+
+int eye_stop(const Camera& camera, int axis, const std::vector<double>& positions) {
+  const int last = static_cast<int>(positions.size()) - 1;
+  if (!camera.perspective) return camera.forward[axis] >= 0 ? 0 : last;
+  int stop = 0;
+  while (stop < last && camera.eye[axis] >= 0.5 * (positions[stop] + positions[stop + 1])) {
+    ++stop;
+  }
+  return stop;
+}
+
+std::vector<int> visit_order(int stops, int eye) {
+  std::vector<int> order;
+  const auto visit_brick = [&](int brick) {
+    const int first = brick * kernels::brick_side;
+    const int last = std::min(first + kernels::brick_side, stops) - 1;
+    const int start = std::clamp(eye, first, last);
+    for (int i = start; i <= last; ++i) order.push_back(i);
+    for (int i = start - 1; i >= first; --i) order.push_back(i);
+  };
+  const int bricks = (stops + kernels::brick_side - 1) / kernels::brick_side;
+  const int own = eye / kernels::brick_side;
+  for (int brick = own; brick < bricks; ++brick) visit_brick(brick);
+  for (int brick = own - 1; brick >= 0; --brick) visit_brick(brick);
+  return order;
+}
+
+RenderPlan make_plan(const Scene& scene) {
+  WINDSPLAT_CHECK(scene.camera.width > 0 && scene.camera.height > 0);
+  WINDSPLAT_CHECK(scene.camera.half_height > 0);
+  RenderPlan plan;
+  plan.view = &scene.camera;
+  plan.camera = make_camera(scene.camera);
+  plan.stop_transmittance = static_cast<float>(scene.stop_transmittance);
+  if (scene.vector) {
+    plan.passes.emplace_back();
+    plan.passes.back().stride = scene.vector->stride;
+    plan.passes.back().vector = &*scene.vector;
+  }
+  for (const scene::ScalarLayer& scalar : scene.scalars) {
+    const auto same = std::find_if(plan.passes.begin(), plan.passes.end(),
+                                   [&](const auto& pass) { return pass.stride == scalar.stride; });
+    PassPlan& pass = same == plan.passes.end() ? plan.passes.emplace_back() : *same;
+    pass.stride = scalar.stride;
+    pass.scalars.push_back(&scalar);
+  }
+  plan.perspective_medium = scene.camera.perspective && !scene.scalars.empty();
+  const int major = major_axis(scene.camera, scene.lattice);
+  for (PassPlan& pass : plan.passes) finish_pass(scene, major, pass);
+  plan.variant = describe(scene, plan);
+  return plan;
+}
+
+}  // namespace windsplat::engine

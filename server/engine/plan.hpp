@@ -1,0 +1,84 @@
+// Scene -> RenderPlan: everything that the kernels need, as plain data. What the scene lacks is
+// neither computed nor allocated.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/engine/kernels/frame_data.hpp"
+#include "server/scene/scene.hpp"
+
+namespace windsplat::engine {
+
+// The axis along which slabs of kernels are stacked: the one that the view crosses most cells
+// along, |forward_a| / mean spacing_a largest; the first of equals.
+int major_axis(const scene::Camera& camera, const scene::Lattice& lattice);
+
+// Where kernels stop along one axis: each stop stands for `stride` samples, the last one for those
+// that are left, and has the middle one's place (the lower of two).
+struct Stop {
+  int sample = 0;
+  double cell = 0;  // world units: what it stands for, from one end to the other
+};
+std::vector<Stop> kernel_stops(const std::vector<double>& spacing, int stride);
+
+// The stop whose cell (bounded midway between stops) holds the eye; in orthographic views the end
+// of the axis that the view comes from. From it, outward is front to back.
+int eye_stop(const scene::Camera& camera, int axis, const std::vector<double>& positions);
+
+// Stops in visibility order: bricks of brick_side consecutive stops outward from the eye's, and
+// inside each brick stops outward from the eye's.
+std::vector<int> visit_order(int stops, int eye);
+
+// Backing store of one kernels::Axis.
+struct AxisArrays {
+  std::vector<double> position;
+  std::vector<double> camera;
+  std::vector<float> from_eye;
+  std::vector<float> world;
+  std::vector<float> cell;
+  std::vector<int> sample;
+  std::vector<int> visit;
+  std::vector<std::array<int, 2>> bricks;  // first and count of each brick in `visit`
+};
+
+struct LayerArrays {
+  std::vector<float> x, y, slope;  // extinction
+  std::vector<float> rgb;
+};
+
+// Layers that stop at the same samples share a pass: a line and a splat at one stop are composited
+// as one kernel. Layers of other strides have passes of their own, interleaved slab by slab.
+struct PassPlan {
+  int stride = 1;
+  const scene::VectorLayer* vector = nullptr;
+  std::vector<const scene::ScalarLayer*> scalars;
+  std::array<AxisArrays, 3> axis;
+  std::vector<float> line_rgb;
+  std::vector<float> rate_x, rate_z;
+  std::vector<LayerArrays> layers;
+  kernels::Pass kernel{};  // points into the arrays above
+};
+
+struct RenderPlan {
+  const scene::Camera* view = nullptr;
+  kernels::Camera camera{};
+  std::vector<PassPlan> passes;     // the one with lines first
+  bool perspective_medium = false;  // pixel rays are needed
+  float stop_transmittance = 0;
+  std::string variant;
+
+  RenderPlan() = default;
+  RenderPlan(const RenderPlan&) = delete;  // passes point into themselves
+  RenderPlan& operator=(const RenderPlan&) = delete;
+  RenderPlan(RenderPlan&&) = default;
+  RenderPlan& operator=(RenderPlan&&) = default;
+  ~RenderPlan() = default;
+};
+
+// The scene must outlive the plan.
+RenderPlan make_plan(const scene::Scene& scene);
+
+}  // namespace windsplat::engine

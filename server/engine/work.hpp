@@ -1,0 +1,28 @@
+// The work report of a frame: what was drawn, what was skipped, and why.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace windsplat::engine {
+
+struct WorkReport {
+  std::int64_t samples = 0;  // kernel stops of the scene
+  // Of bricks of 8 x 8 x 1 stops that lie wholly outside the picture or before the near plane.
+  std::int64_t culled = 0;
+  // Of the others, whatever the view direction:
+  std::int64_t skipped_vector = 0;  // line left out: magnitude below its tolerance, or masked
+  std::int64_t skipped_scalar = 0;  // splat left out: optical depth below its tolerance, or masked
+  std::int64_t skipped_both = 0;    // whole kernel left out; these count above too
+  std::int64_t occluded = 0;        // sample visits spared in tiles that had become opaque
+  std::int64_t pixel_updates = 0;
+  std::int64_t exponentials = 0;
+  std::int64_t tiles = 0;
+  std::int64_t tiles_stopped = 0;   // ended early by stop transmittance
+  std::vector<std::string> fields;  // filled by who knows their names
+  std::int64_t bytes = 0;           // of the fields touched
+  std::string variant;              // what the plan chose, for example "vector+scalar perspective"
+};
+
+}  // namespace windsplat::engine

@@ -1,0 +1,43 @@
+// One frame from a view to encoded bytes with its times and report: what REST, the stream and the
+// command line share.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "protocol/view.hpp"
+#include "server/base/cancel.hpp"
+#include "server/base/error.hpp"
+#include "server/base/thread_pool.hpp"
+#include "server/data/store.hpp"
+#include "server/engine/work.hpp"
+#include "server/image/encode.hpp"
+
+namespace windsplat::frame {
+
+enum class Format { jpeg, png, npy };
+
+struct Encoding {
+  Format format = Format::jpeg;
+  int quality = 90;
+  image::Subsampling subsampling = image::Subsampling::s444;
+  int level = 0;  // rendered at 1/2^level of the view's width and height, at least one pixel
+};
+
+struct Frame {
+  image::Bytes bytes;
+  protocol::View view;  // what was drawn: completed, its image as large as the view asked
+  int width = 0;        // as rendered
+  int height = 0;
+  engine::WorkReport work;
+  std::int64_t render_us = 0;  // scene and engine
+  std::int64_t encode_us = 0;
+};
+
+// `view` need not be completed. The report's fields and bytes are those of the volumes shown.
+// Errors: those of the scene and the engine (invalid, out_of_memory, cancelled, ...); invalid for a
+// level outside 0..15.
+Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
+                      ThreadPool& pool, const CancelToken& cancel);
+
+}  // namespace windsplat::frame

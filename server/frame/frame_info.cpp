@@ -1,0 +1,56 @@
+// Copies a frame's report into the words of the protocol.
+#include "server/frame/frame_info.hpp"
+
+namespace windsplat::frame {
+namespace {
+
+const char* method_text(protocol::MethodName name) {
+  switch (name) {
+    case protocol::MethodName::kernel:
+      return "kernel";
+  }
+  return "";
+}
+
+const char* compositing_text(protocol::Compositing compositing) {
+  switch (compositing) {
+    case protocol::Compositing::analytic:
+      return "analytic";
+  }
+  return "";
+}
+
+// The lines' stride; that of the medium where no lines are drawn.
+int stride_of(const protocol::View& view) {
+  const bool lines = view.vector.field.kind != protocol::FieldChoice::Kind::none;
+  const bool medium = view.scalars && !view.scalars->empty();
+  return !lines && medium ? view.scalars->front().stride : view.vector.stride;
+}
+
+}  // namespace
+
+protocol::FrameInfo frame_info(const Frame& frame, const protocol::View& view) {
+  protocol::FrameInfo info;
+  info.method = method_text(view.method.name);
+  info.compositing = compositing_text(view.method.compositing);
+  info.stride = stride_of(view);
+  info.width = frame.width;
+  info.height = frame.height;
+  const engine::WorkReport& work = frame.work;
+  info.samples = work.samples;
+  info.culled = work.culled;
+  info.skipped_vector = work.skipped_vector;
+  info.skipped_scalar = work.skipped_scalar;
+  info.skipped_both = work.skipped_both;
+  info.occluded = work.occluded;
+  info.pixel_updates = work.pixel_updates;
+  info.exponentials = work.exponentials;
+  info.tiles = work.tiles;
+  info.tiles_stopped = work.tiles_stopped;
+  info.fields = work.fields;
+  info.bytes = work.bytes;
+  info.variant = work.variant;
+  return info;
+}
+
+}  // namespace windsplat::frame

@@ -1,0 +1,28 @@
+// Linear premultiplied RGBA -> encoded bytes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/base/error.hpp"
+
+namespace windsplat::image {
+
+using Bytes = std::vector<std::uint8_t>;
+
+// 8-bit sRGB, 3 bytes a pixel, of the image over a linear background.
+Bytes tone_map(std::span<const float> rgba, int width, int height,
+               const std::array<float, 3>& background);
+
+enum class Subsampling { s444, s420 };
+
+// quality 1..100.
+Result<Bytes> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height, int quality,
+                          Subsampling subsampling);
+Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int height);
+// NPY 1.0, '<f4', shape (height, width, 4).
+Result<Bytes> encode_npy(std::span<const float> rgba, int width, int height);
+
+}  // namespace windsplat::image

@@ -1,0 +1,20 @@
+// What HTTP allows and this server does not, told before a body is read.
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "server/net/exchange.hpp"
+
+namespace windsplat::net {
+
+// The header as received, with its final empty line: folded lines and bare line ends are refused.
+std::optional<Response> check_header_bytes(std::string_view header);
+
+// Method, Host, Transfer-Encoding, Content-Length and Expect of a parsed header. `version` is 11
+// for HTTP/1.1.
+std::optional<Response> check_request(const Request& request, unsigned version);
+
+Response body_too_large();
+
+}  // namespace windsplat::net

@@ -1,0 +1,132 @@
+// The service itself: what it is, whether it lives, and what it offers by name.
+#include "server/net/resources.hpp"
+
+#include <exception>
+#include <utility>
+
+#include "protocol/codec.hpp"
+#include "server/base/log.hpp"
+#include "server/data/digest.hpp"
+#include "server/net/negotiate.hpp"
+#include "server/net/problem.hpp"
+#include "server/net/view_schema.hpp"
+#include "server/scene/build.hpp"
+#include "server/scene/colormap.hpp"
+
+namespace windsplat::net {
+namespace {
+
+constexpr int legend_colors = 64;
+
+Response health(int status, const char* state) {
+  Response response;
+  response.status = status;
+  response.content_type = "application/json";
+  response.headers = {{"Cache-Control", "no-store"}};
+  response.body = Body::of(std::string("{\"status\":\"") + state + "\"}");
+  return response;
+}
+
+// Always an answer: a fault of ours becomes a 500, its words go to the log.
+Response describe_guarded(Services& services, const std::string& id, const CancelToken& cancel) {
+  if (cancel.cancelled()) {
+    return problem_response(make_error(ErrorKind::cancelled, "nobody waits for the answer"));
+  }
+  try {
+    const auto description = services.catalogue.describe(id);
+    return description ? json_response(protocol::encode_dataset(*description))
+                       : problem_response(description.error());
+  } catch (const std::exception& fault) {
+    log::error("a description failed", {{"dataset", id}, {"fault", fault.what()}});
+    return problem_response(make_error(ErrorKind::internal, "the dataset cannot be described"));
+  }
+}
+
+}  // namespace
+
+Response json_response(std::string json) {
+  Response response;
+  response.content_type = "application/json";
+  response.headers = {{"Cache-Control", "no-store"}};
+  response.body = Body::of(std::move(json));
+  return response;
+}
+
+std::string etag_of(std::string_view text) {
+  const std::string first = data::digest_of(text);
+  // The second half goes on from the first, so that the two do not fail together.
+  return '"' + first + data::digest_of(first + std::string(text)) + '"';
+}
+
+Response tagged_response(const Request& request, std::string_view content_type,
+                         std::string_view content) {
+  Response response;
+  const std::string etag = etag_of(content);
+  response.headers = {{"Cache-Control", "no-cache"}, {"ETag", etag}};
+  if (matches_etag(request.header("If-None-Match"), etag)) {
+    response.status = 304;
+    return response;
+  }
+  response.content_type = content_type;
+  response.body = Body::of(std::string(content));
+  return response;
+}
+
+Response get_livez() { return health(200, "live"); }
+
+Response get_readyz(const Services& services) {
+  return services.draining ? health(503, "draining") : health(200, "ready");
+}
+
+Response get_service(const Services& services) {
+  protocol::ServiceDescription service;
+  service.version = WINDSPLAT_VERSION;
+  const std::string& base = services.options.base_path;
+  service.links = {{"page", base},
+                   {"datasets", base + "v1/datasets"},
+                   {"frames", base + "v1/frames"},
+                   {"colormaps", base + "v1/colormaps"},
+                   {"presets", base + "v1/presets"},
+                   {"stream", base + "v1/stream"},
+                   {"viewSchema", base + "view.schema.json"},
+                   {"livez", base + "livez"},
+                   {"readyz", base + "readyz"}};
+  return json_response(protocol::encode_service(service));
+}
+
+Response get_color_maps() {
+  std::vector<protocol::ColorMapDescription> maps;
+  for (const scene::ColorMap& map : scene::color_maps()) {
+    maps.push_back({map.name, map.kind, scene::color_map_srgb(map.name, legend_colors)});
+  }
+  return json_response(protocol::encode_color_maps(maps));
+}
+
+Response get_presets() { return json_response(protocol::encode_presets(scene::preset_names())); }
+
+Response get_view_schema(const Request& request) {
+  return tagged_response(request, "application/schema+json", view_schema_json());
+}
+
+Response get_datasets(const Services& services) {
+  const auto list = services.catalogue.list();
+  if (!list) return problem_response(list.error());
+  return json_response(protocol::encode_dataset_list(*list));
+}
+
+void get_dataset(Services& services, const std::string& id, const Request& request, Reply reply) {
+  if (const auto dataset = services.catalogue.find(id); !dataset) {
+    reply(problem_response(make_error(ErrorKind::not_found, dataset.error().message)));
+    return;
+  }
+  const auto shared_reply = std::make_shared<Reply>(std::move(reply));
+  const CancelToken cancel = request.cancel;
+  const auto queued =
+      services.renderer.submit({RenderService::Kind::request, request.peer, cancel,
+                                [&services, id, cancel, shared_reply](std::int64_t /*queue_us*/) {
+                                  (*shared_reply)(describe_guarded(services, id, cancel));
+                                }});
+  if (!queued) (*shared_reply)(problem_response(queued.error()));
+}
+
+}  // namespace windsplat::net

@@ -1,0 +1,68 @@
+// The TCP stream of HTTP and WebSocket sessions: deadlines by Beast, received bytes counted. Only
+// the files of those two sessions may include this: it brings all of Beast with it.
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core/basic_stream.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/rate_policy.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <chrono>
+#include <cstddef>
+#include <exception>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include "server/base/log.hpp"
+
+namespace windsplat::net {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+using ErrorCode = boost::system::error_code;
+
+// Limits nothing; tells how many bytes came since it was last asked to forget. A message that never
+// ends shows here, where the WebSocket layer reports nothing.
+class WireMeter {
+ public:
+  [[nodiscard]] std::size_t bytes_read() const { return bytes_read_; }
+  void forget() { bytes_read_ = 0; }
+
+ private:
+  friend class beast::rate_policy_access;
+  static constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
+
+  [[nodiscard]] std::size_t available_read_bytes() const { return all; }
+  [[nodiscard]] std::size_t available_write_bytes() const { return all; }
+  void transfer_read_bytes(std::size_t bytes) { bytes_read_ += bytes; }
+  void transfer_write_bytes(std::size_t /*bytes*/) {}
+  void on_timer() {}
+
+  std::size_t bytes_read_ = 0;
+};
+
+using TcpStream = beast::basic_stream<asio::ip::tcp, asio::any_io_executor, WireMeter>;
+using UpgradeRequest = beast::http::request<beast::http::empty_body>;
+
+// Time for a peer to take `bytes`: a fixed part and 64 KiB/s.
+inline std::chrono::milliseconds write_deadline(std::size_t bytes, int fixed_s) {
+  return std::chrono::seconds(fixed_s) + std::chrono::milliseconds(bytes / 64);
+}
+
+// A completion handler of a session: keeps it alive, and ends it alone when something throws.
+template <class Session, class Body>
+auto guarded(std::shared_ptr<Session> session, Body body) {
+  return [session = std::move(session), body = std::move(body)](auto&&... results) mutable {
+    try {
+      body(std::forward<decltype(results)>(results)...);
+    } catch (const std::exception& fault) {
+      log::error("a connection failed", {{"fault", fault.what()}});
+      session->abort();
+    }
+  };
+}
+
+}  // namespace windsplat::net

@@ -1,0 +1,144 @@
+// Percent-decoding by Boost.URL; numbers by from_chars, whole text or nothing.
+#include "server/net/target.hpp"
+
+#include <algorithm>
+#include <boost/url/parse.hpp>
+#include <boost/url/url_view.hpp>
+#include <charconv>
+#include <cmath>
+
+namespace windsplat::net {
+namespace {
+
+std::vector<std::string> segments_of(std::string_view path) {
+  std::vector<std::string> segments;
+  for (const std::string_view part : split_list(path, '/')) {
+    if (!part.empty()) segments.emplace_back(part);
+  }
+  return segments;
+}
+
+// "http://host/path" is as good as "/path" (RFC 9112, 3.2.2).
+std::string_view origin_form(std::string_view target) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (target.substr(0, scheme.size()) != scheme) continue;
+    const std::size_t slash = target.find('/', scheme.size());
+    return slash == std::string_view::npos ? std::string_view("/") : target.substr(slash);
+  }
+  return target;
+}
+
+}  // namespace
+
+std::string normal_base_path(std::string_view path) {
+  std::string base = "/";
+  for (const std::string& segment : segments_of(path)) base += segment + '/';
+  return base;
+}
+
+Result<void> parse_target(std::string_view target, std::string_view base_path, Request& request) {
+  if (target == "*") {
+    request.path = {"*"};
+    request.below_base = false;
+    return {};
+  }
+  const auto url = boost::urls::parse_origin_form(origin_form(target));
+  if (!url) {
+    return make_error(ErrorKind::malformed,
+                      "the request target '" + printable(target) + "' is no path");
+  }
+  for (const auto& segment : url->segments()) request.path.emplace_back(segment);
+  request.ends_in_slash = !request.path.empty() && request.path.back().empty();
+  if (request.ends_in_slash) request.path.pop_back();
+  if (url->has_query()) {
+    for (const auto& parameter : url->params()) {
+      request.query.emplace_back(parameter.key, parameter.value);
+    }
+  }
+  const std::vector<std::string> base = segments_of(base_path);
+  request.below_base = request.path.size() >= base.size() &&
+                       std::equal(base.begin(), base.end(), request.path.begin());
+  if (request.below_base) {
+    request.path.erase(request.path.begin(),
+                       request.path.begin() + static_cast<std::ptrdiff_t>(base.size()));
+  }
+  return {};
+}
+
+void QueryReader::fail(ErrorKind kind, std::string message) {
+  if (!fault_) fault_ = make_error(kind, std::move(message));
+}
+
+const std::string* QueryReader::find(std::string_view key) {
+  asked_.push_back(key);
+  const std::string* value = nullptr;
+  for (const auto& [name, text] : query_) {
+    if (name != key) continue;
+    if (value != nullptr) fail(ErrorKind::malformed, "the query says '" + name + "' twice");
+    value = &text;
+  }
+  return value;
+}
+
+std::optional<std::string> QueryReader::text(std::string_view key) {
+  const std::string* value = find(key);
+  return value == nullptr ? std::nullopt : std::optional(*value);
+}
+
+std::optional<double> QueryReader::number(std::string_view key, double min, double max) {
+  const std::string* text = find(key);
+  if (text == nullptr) return std::nullopt;
+  double value = 0;
+  const char* end = text->data() + text->size();
+  const auto [stop, fault] = std::from_chars(text->data(), end, value);
+  if (fault != std::errc() || stop != end || !std::isfinite(value)) {
+    fail(ErrorKind::malformed,
+         "the query's '" + std::string(key) + "' is not a number: " + printable(*text, 40));
+    return std::nullopt;
+  }
+  if (value < min || value > max) {
+    std::string limits = std::to_string(min) + " to " + std::to_string(max);
+    fail(ErrorKind::invalid, "the query's '" + std::string(key) + "' must be " + limits);
+    return std::nullopt;
+  }
+  return value;
+}
+
+std::optional<std::string> QueryReader::integer(std::string_view key) {
+  const std::string* text = find(key);
+  if (text == nullptr) return std::nullopt;
+  const std::size_t sign = !text->empty() && (*text)[0] == '-' ? 1 : 0;
+  const bool digits = text->size() > sign && text->size() <= 18 &&
+                      text->find_first_not_of("0123456789", sign) == std::string::npos;
+  if (!digits) {
+    fail(ErrorKind::malformed,
+         "the query's '" + std::string(key) + "' is not a whole number: " + printable(*text, 40));
+    return std::nullopt;
+  }
+  std::int64_t value = 0;
+  std::from_chars(text->data(), text->data() + text->size(), value);
+  return std::to_string(value);  // without the zeros in front that JSON does not allow
+}
+
+std::optional<int> QueryReader::integer(std::string_view key, int min, int max) {
+  const auto text = integer(key);
+  if (!text) return std::nullopt;
+  const long long value = std::stoll(*text);  // at most 18 characters
+  if (value >= min && value <= max) return static_cast<int>(value);
+  fail(ErrorKind::invalid, "the query's '" + std::string(key) + "' must be " + std::to_string(min) +
+                               " to " + std::to_string(max));
+  return std::nullopt;
+}
+
+Result<void> QueryReader::finish() const {
+  if (fault_) return *fault_;
+  for (const auto& [name, value] : query_) {
+    if (std::find(asked_.begin(), asked_.end(), name) == asked_.end()) {
+      return make_error(ErrorKind::malformed,
+                        "the query's '" + printable(name, 40) + "' is unknown here");
+    }
+  }
+  return {};
+}
+
+}  // namespace windsplat::net

@@ -1,0 +1,10 @@
+// protocol/view.schema.json, embedded: embed_schema.cmake writes the definition.
+#pragma once
+
+#include <string_view>
+
+namespace windsplat::net {
+
+std::string_view view_schema_json();
+
+}  // namespace windsplat::net

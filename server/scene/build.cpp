@@ -1,0 +1,160 @@
+// Completed view + dataset -> Scene: tables, camera, placement and the fields that are shown.
+#include "server/scene/build.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "server/scene/camera.hpp"
+#include "server/scene/colormap.hpp"
+#include "server/scene/rates.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+using protocol::View;
+
+constexpr int table_entries = 256;
+constexpr double reference_height = 720;  // pixels, for which a view gives r1 and r2
+
+// A reversed range turns the map about.
+ColorTable make_table(const std::string& map, const protocol::Range& range) {
+  ColorTable table;
+  table.range = range;
+  table.entries = color_map_linear(map, table_entries);
+  if (range[0] > range[1]) {
+    std::swap(table.range[0], table.range[1]);
+    std::reverse(table.entries.begin(), table.entries.end());
+  }
+  return table;
+}
+
+LineColor line_color(protocol::ColorBy by) {
+  switch (by) {
+    case protocol::ColorBy::world_z:
+      return LineColor::world_z;
+    case protocol::ColorBy::screen_z:
+      return LineColor::screen_z;
+    case protocol::ColorBy::rise:
+      return LineColor::rise;
+    case protocol::ColorBy::magnitude:
+      return LineColor::magnitude;
+    case protocol::ColorBy::constant:
+      return LineColor::constant;
+  }
+  return LineColor::constant;
+}
+
+// Line radii in pixels of this picture. A line thinner than the pixel filter keeps the filter's
+// width and gives up opacity instead: with the half width h = (r1 + r2) / 2,
+// r1 = max(0, h - 1/2), r2 = max(1, h + 1/2), opacity times min(1, 2 h).
+void set_radii(const protocol::VectorView& from, int height, VectorLayer& layer) {
+  const double scale = height / reference_height;
+  layer.r1 = from.r1 * scale;
+  layer.r2 = from.r2 * scale;
+  layer.opacity = from.opacity;
+  if (layer.r2 >= 1) return;
+  const double half = 0.5 * (layer.r1 + layer.r2);
+  layer.r1 = std::max(0.0, half - 0.5);
+  layer.r2 = std::max(1.0, half + 0.5);
+  layer.opacity *= std::min(1.0, 2.0 * half);
+}
+
+void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
+  layer.color_by = line_color(from.color.by.value());
+  layer.color = make_table(from.color.map, from.color.range.value());
+  if (layer.color_by == LineColor::constant) {
+    layer.color.range = {0, 1};
+    layer.color.entries.assign(table_entries, parse_color(from.color.constant).value());
+  }
+  layer.rise_weight = from.color.rise_weight;
+  layer.head_desaturation = from.head_desaturation;
+  layer.magnitude_range = from.magnitude_range.value();
+  layer.min_magnitude = from.min_magnitude.value();
+  layer.magnitude_intensity = from.magnitude_intensity;
+}
+
+Result<VectorLayer> make_vector_layer(const View& view, const Lattice& lattice,
+                                      data::Dataset& dataset) {
+  const protocol::VectorView& from = view.vector;
+  const data::DatasetInfo& info = dataset.info();
+  VectorLayer layer;
+  layer.scale = {from.scale[0], from.scale[1], from.scale[2]};
+  if (from.space == protocol::VectorSpace::world) {
+    auto rates =
+        world_rates(info.grid, *info.find(from.field.name), view.geometry.vertical, lattice);
+    if (!rates) return rates.error();
+    layer.rate_x = std::move(rates->x);
+    layer.rate_y = rates->y;
+    layer.rate_z = std::move(rates->z);
+  }
+  layer.length = from.length.value();
+  layer.span = from.span;
+  layer.stride = from.stride;
+  set_radii(from, view.image.height, layer);
+  set_colors(from, layer);
+  layer.jitter_center = from.jitter.center;
+  layer.jitter_stride = from.jitter.stride;
+  layer.overlap = from.jitter.overlap;
+  layer.seed = static_cast<std::uint32_t>(from.jitter.seed);
+  layer.epoch = from.jitter.per_step ? static_cast<std::uint32_t>(view.step) : 0U;
+  auto volume = dataset.volume(from.field.name, static_cast<std::size_t>(view.step));
+  if (!volume) return volume.error();
+  layer.field = std::move(*volume);
+  return layer;
+}
+
+bool absorbs(const protocol::ScalarView& scalar) {
+  return std::any_of(scalar.extinction->begin(), scalar.extinction->end(),
+                     [](const auto& point) { return point[1] > 0; });
+}
+
+Result<ScalarLayer> make_scalar_layer(const protocol::ScalarView& from, int step,
+                                      data::Dataset& dataset) {
+  ScalarLayer layer;
+  layer.color = make_table(from.color.map.value(), from.color.range.value());
+  layer.extinction = from.extinction.value();
+  layer.min_optical_depth = from.min_optical_depth;
+  layer.stride = from.stride;
+  auto volume = dataset.volume(from.field, static_cast<std::size_t>(step));
+  if (!volume) return volume.error();
+  layer.field = std::move(*volume);
+  return layer;
+}
+
+}  // namespace
+
+Result<Scene> build_scene(const View& completed, data::Dataset& dataset) {
+  // Checks the view against this dataset; a complete one passes through and loads nothing.
+  auto checked = complete_view(completed, dataset);
+  if (!checked) return checked.error();
+  const View& view = *checked;
+  Scene scene;
+  auto lattice = place_lattice(dataset.info().grid, view.geometry);
+  if (!lattice) return lattice.error();
+  scene.lattice = std::move(*lattice);
+  auto camera = resolve_camera(view, scene.lattice);
+  if (!camera) return camera.error();
+  scene.camera = *camera;
+  const auto depths = view_depths(scene.camera, scene.lattice);
+  const double depth = depths[1] - depths[0];
+  scene.depth_cue = {view.depth_cue.strength, depths[0] + view.depth_cue.near * depth,
+                     depths[0] + view.depth_cue.far * depth};
+  const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
+  if (lines && view.vector.opacity > 0) {
+    auto layer = make_vector_layer(view, scene.lattice, dataset);
+    if (!layer) return layer.error();
+    scene.vector = std::move(*layer);
+  }
+  for (const protocol::ScalarView& scalar : *view.scalars) {
+    if (!absorbs(scalar)) continue;
+    auto layer = make_scalar_layer(scalar, view.step, dataset);
+    if (!layer) return layer.error();
+    scene.scalars.push_back(std::move(*layer));
+  }
+  scene.stop_transmittance = view.method.stop_transmittance;
+  scene.background = parse_color(view.image.background).value();
+  return scene;
+}
+
+}  // namespace windsplat::scene

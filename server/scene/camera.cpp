@@ -1,0 +1,138 @@
+// View -> Camera, and the way back: from angles and zoom to an eye that frames the box.
+#include "server/scene/camera.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "server/scene/build.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+constexpr double margin = 1.04;         // the picture is this much wider than the box
+constexpr double distance_max = 5e5;    // world units: well inside what a view may say
+constexpr double parallel_sine = 1e-6;  // smallest angle between up and the view, as its sine
+constexpr double near_min = 1e-4;
+constexpr double near_max = 1e-2;
+
+glm::dvec3 to_glm(const protocol::Vec3& v) { return {v[0], v[1], v[2]}; }
+protocol::Vec3 from_glm(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
+
+std::array<glm::dvec3, 8> corners(const Lattice& lattice) {
+  std::array<glm::dvec3, 8> points;
+  for (std::size_t n = 0; n < 8; ++n) {
+    points[n] = {(n & 1U) != 0 ? lattice.box_max.x : lattice.box_min.x,
+                 (n & 2U) != 0 ? lattice.box_max.y : lattice.box_min.y,
+                 (n & 4U) != 0 ? lattice.box_max.z : lattice.box_min.z};
+  }
+  return points;
+}
+
+// Nothing nearer than half a cell is worth a line that fills the picture.
+double near_plane(const Lattice& lattice) {
+  double cell = near_max;
+  for (int a = 0; a < 3; ++a) {
+    const double length = lattice.box_max[a] - lattice.box_min[a];
+    cell = std::min(cell, 0.5 * length / lattice.dims[static_cast<std::size_t>(a)]);
+  }
+  return std::max(cell, near_min);
+}
+
+}  // namespace
+
+OrbitFrame orbit_frame(double azimuth, double elevation) {
+  const double a = azimuth * degree;
+  const double e = std::clamp(elevation, -90.0, 90.0) * degree;
+  OrbitFrame frame{};
+  const glm::dvec3 north(-std::sin(a), std::cos(a), 0);  // horizontal part of forward
+  frame.right = {std::cos(a), std::sin(a), 0};
+  frame.forward = north * std::cos(e) - glm::dvec3(0, 0, std::sin(e));
+  frame.up = glm::cross(frame.right, frame.forward);
+  return frame;
+}
+
+Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dvec3& target,
+                  double fov_y, const protocol::ImageView& image) {
+  const double aspect = static_cast<double>(image.width) / image.height;
+  const double slope_y = std::tan(0.5 * fov_y * degree) / margin;
+  const double slope_x = slope_y * aspect;
+  const double diagonal = glm::length(lattice.box_max - lattice.box_min);
+  Framing framing{0, 0};
+  for (const glm::dvec3& corner : corners(lattice)) {
+    const glm::dvec3 p = corner - target;
+    const double x = std::abs(glm::dot(p, frame.right));
+    const double y = std::abs(glm::dot(p, frame.up));
+    const double depth = glm::dot(p, frame.forward);
+    // The corner stands distance + depth before the eye and must lie within both slopes.
+    const double needed = std::max({x / slope_x, y / slope_y, 0.01 * diagonal}) - depth;
+    framing.distance = std::max(framing.distance, needed);
+    framing.height = std::max({framing.height, 2.0 * margin * y, 2.0 * margin * x / aspect});
+  }
+  framing.distance = std::min(framing.distance, distance_max);
+  framing.height = std::min(framing.height, distance_max);
+  return framing;
+}
+
+void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double elevation,
+           double zoom) {
+  const OrbitFrame frame = orbit_frame(azimuth, elevation);
+  const glm::dvec3 target = 0.5 * (lattice.box_min + lattice.box_max);
+  const Framing framing = frame_box(lattice, frame, target, view.camera.fov_y, view.image);
+  const double distance = std::min(framing.distance / zoom, distance_max);
+  view.camera.target = from_glm(target);
+  view.camera.eye = from_glm(target - frame.forward * distance);
+  view.camera.height = std::clamp(framing.height / zoom, 1e-6, distance_max);
+  const bool upright = std::abs(elevation) < 89.9;
+  view.camera.up = upright ? protocol::Vec3{0, 0, 1} : from_glm(frame.up);
+}
+
+Result<Camera> resolve_camera(const protocol::View& completed, const Lattice& lattice) {
+  const protocol::CameraView& from = completed.camera;
+  Camera camera;
+  camera.perspective = from.projection == protocol::Projection::perspective;
+  camera.eye = to_glm(from.eye.value());
+  const glm::dvec3 view_line = to_glm(from.target.value()) - camera.eye;
+  const double distance = glm::length(view_line);
+  if (!(distance > 1e-9)) {
+    return make_error_at(ErrorKind::invalid, "/camera/eye", "lies on the target");
+  }
+  camera.forward = view_line / distance;
+  const glm::dvec3 up = to_glm(from.up);
+  const double up_length = glm::length(up);
+  if (!(up_length > 1e-9)) {
+    return make_error_at(ErrorKind::invalid, "/camera/up", "has no length");
+  }
+  const glm::dvec3 right = glm::cross(camera.forward, up / up_length);
+  const double sine = glm::length(right);
+  if (!(sine > parallel_sine)) {
+    return make_error_at(ErrorKind::invalid, "/camera/up", "is parallel to the view");
+  }
+  camera.right = right / sine;
+  camera.up = glm::cross(camera.right, camera.forward);
+  camera.half_height =
+      camera.perspective ? std::tan(0.5 * from.fov_y * degree) : 0.5 * from.height.value();
+  camera.near = near_plane(lattice);
+  camera.width = completed.image.width;
+  camera.height = completed.image.height;
+  return camera;
+}
+
+std::array<double, 2> view_depths(const Camera& camera, const Lattice& lattice) {
+  double nearest = 0;
+  double farthest = 0;
+  bool first = true;
+  for (const glm::dvec3& corner : corners(lattice)) {
+    const double depth = glm::dot(corner - camera.eye, camera.forward);
+    nearest = first ? depth : std::min(nearest, depth);
+    farthest = first ? depth : std::max(farthest, depth);
+    first = false;
+  }
+  if (camera.perspective) nearest = std::max(nearest, camera.near);
+  return {nearest, std::max(farthest, nearest + 1e-6)};
+}
+
+}  // namespace windsplat::scene

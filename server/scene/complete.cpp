@@ -1,0 +1,238 @@
+// View -> the same view with every default of its dataset filled in. What the user said stays as it
+// was said; a complete view passes through unchanged and loads nothing.
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "server/scene/build.hpp"
+#include "server/scene/camera.hpp"
+#include "server/scene/colormap.hpp"
+#include "server/scene/defaults.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+using protocol::ColorBy;
+using protocol::FieldChoice;
+using protocol::Range;
+using protocol::View;
+
+Error invalid(std::string pointer, std::string detail) {
+  return make_error_at(ErrorKind::invalid, std::move(pointer), std::move(detail));
+}
+
+std::string quoted(const std::string& text) {
+  std::string out(1, '"');
+  out += printable(text);
+  out += '"';
+  return out;
+}
+
+// Fields that are known by name to exist, and their ranges at the first step, so that a picture
+// keeps its colours over time.
+Result<const data::FieldInfo*> find_field(const data::DatasetInfo& info, const std::string& name,
+                                          data::FieldKind kind, const std::string& pointer) {
+  const data::FieldInfo* field = info.find(name);
+  if (field == nullptr) {
+    return invalid(pointer, "dataset " + quoted(info.id) + " has no field " + quoted(name));
+  }
+  if (field->kind != kind) {
+    const bool scalar = field->kind == data::FieldKind::scalar;
+    return invalid(pointer, "field " + quoted(field->name) + " is a " +
+                                (scalar ? "scalar, not a vector" : "vector, not a scalar"));
+  }
+  return field;
+}
+
+Result<void> check_map(const std::string& name, const std::string& pointer) {
+  if (!has_color_map(name)) {
+    return invalid(pointer, "no colour map is called " + quoted(name));
+  }
+  return {};
+}
+
+Result<void> check_color(const std::string& text, const std::string& pointer) {
+  if (!parse_color(text)) {
+    return invalid(pointer, quoted(text) + " is not of the form #rrggbb");
+  }
+  return {};
+}
+
+Result<void> check_color_range(const std::optional<Range>& range, const std::string& pointer) {
+  if (range && (*range)[0] == (*range)[1]) return invalid(pointer, "its two ends are equal");
+  return {};
+}
+
+Result<void> choose_vector_field(View& view, const data::DatasetInfo& info) {
+  FieldChoice& choice = view.vector.field;
+  if (choice.kind == FieldChoice::Kind::named) {
+    auto field = find_field(info, choice.name, data::FieldKind::vector, "/vector/field");
+    if (!field) return field.error();
+    return {};
+  }
+  if (choice.kind == FieldChoice::Kind::none) return {};
+  const data::FieldInfo* first = info.first(data::FieldKind::vector);
+  choice = first == nullptr ? FieldChoice{FieldChoice::Kind::none, ""}
+                            : FieldChoice{FieldChoice::Kind::named, first->name};
+  return {};
+}
+
+Result<void> complete_magnitudes(View& view, const Lattice& lattice, data::Dataset& dataset) {
+  protocol::VectorView& vector = view.vector;
+  std::shared_ptr<const data::Volume> volume;
+  const bool wanted = !vector.magnitude_range || !vector.min_magnitude;
+  if (wanted && vector.field.kind == FieldChoice::Kind::named) {
+    auto loaded = dataset.volume(vector.field.name, 0);
+    if (!loaded) return loaded.error();
+    volume = std::move(*loaded);
+  }
+  if (!vector.magnitude_range) {
+    vector.magnitude_range = volume ? default_magnitude_range(*volume) : Range{0, 1};
+  }
+  const Range& range = *vector.magnitude_range;
+  if (!(range[0] < range[1])) return invalid("/vector/magnitudeRange", "does not ascend");
+  if (!vector.min_magnitude) {
+    vector.min_magnitude = volume ? default_min_magnitude(vector, *volume, lattice) : 0.0;
+  }
+  return {};
+}
+
+Result<void> check_vector(const protocol::VectorView& vector) {
+  if (auto ok = check_map(vector.color.map, "/vector/color/map"); !ok) return ok;
+  if (auto ok = check_color(vector.color.constant, "/vector/color/constant"); !ok) return ok;
+  if (auto ok = check_color_range(vector.color.range, "/vector/color/range"); !ok) return ok;
+  if (vector.r1 > vector.r2) return invalid("/vector/r1", "is greater than r2");
+  return {};
+}
+
+// What the colour's value spans.
+Result<Range> default_color_range(const View& view, const Lattice& lattice,
+                                  const std::array<double, 2>& depths, data::Dataset& dataset) {
+  const protocol::VectorView& vector = view.vector;
+  const bool lines = vector.field.kind == FieldChoice::Kind::named;
+  switch (*vector.color.by) {
+    case ColorBy::world_z: {
+      if (!lines) return Range{lattice.box_min.z, lattice.box_max.z};
+      auto volume = dataset.volume(vector.field.name, 0);
+      if (!volume) return volume.error();
+      return default_height_range(vector, **volume, lattice);
+    }
+    case ColorBy::screen_z:
+      return Range{depths[0], depths[1]};
+    case ColorBy::magnitude:
+      return default_magnitude_colors(vector);
+    case ColorBy::rise:
+    case ColorBy::constant:
+      break;
+  }
+  return Range{0, 1};
+}
+
+void complete_camera(View& view, const Lattice& lattice) {
+  protocol::CameraView& camera = view.camera;
+  if (camera.eye && camera.target && camera.height) return;
+  View framed = view;
+  orbit(framed, lattice, default_azimuth, default_elevation, 1);
+  if (!camera.target) camera.target = framed.camera.target;
+  const glm::dvec3 target((*camera.target)[0], (*camera.target)[1], (*camera.target)[2]);
+  const OrbitFrame frame = orbit_frame(default_azimuth, default_elevation);
+  const Framing framing = frame_box(lattice, frame, target, camera.fov_y, view.image);
+  if (!camera.eye) {
+    const glm::dvec3 eye = target - frame.forward * framing.distance;
+    camera.eye = protocol::Vec3{eye.x, eye.y, eye.z};
+  }
+  if (!camera.height) camera.height = std::max(framing.height, 1e-6);
+}
+
+Result<void> check_extinction(const protocol::ScalarView& scalar, const std::string& pointer) {
+  if (!scalar.extinction) return {};
+  for (std::size_t n = 0; n < scalar.extinction->size(); ++n) {
+    const auto& point = (*scalar.extinction)[n];
+    const std::string at = pointer + "/extinction/" + std::to_string(n);
+    if (!std::isfinite(point[0]) || !(point[1] >= 0)) return invalid(at, "is not an extinction");
+    if (n > 0 && point[0] < (*scalar.extinction)[n - 1][0]) {
+      return invalid(at, "its value is less than the one before it");
+    }
+  }
+  return {};
+}
+
+Result<void> complete_scalar(protocol::ScalarView& scalar, const std::string& pointer,
+                             const Lattice& lattice, data::Dataset& dataset) {
+  auto found =
+      find_field(dataset.info(), scalar.field, data::FieldKind::scalar, pointer + "/field");
+  if (!found) return found.error();
+  const data::FieldInfo& field = **found;
+  if (!scalar.color.map) scalar.color.map = scalar_style(field).map;
+  if (auto ok = check_map(*scalar.color.map, pointer + "/color/map"); !ok) return ok;
+  if (auto ok = check_color_range(scalar.color.range, pointer + "/color/range"); !ok) return ok;
+  if (auto ok = check_extinction(scalar, pointer); !ok) return ok;
+  if (scalar.color.range && scalar.extinction) return {};
+  auto volume = dataset.volume(scalar.field, 0);
+  if (!volume) return volume.error();
+  const Range range = default_scalar_range(field, **volume);
+  if (!scalar.color.range) scalar.color.range = range;
+  if (!scalar.extinction) scalar.extinction = default_extinction(field, range, lattice);
+  return {};
+}
+
+Result<void> complete_scalars(View& view, const Lattice& lattice, data::Dataset& dataset) {
+  if (!view.scalars) {
+    view.scalars.emplace();
+    for (const std::string& name : default_scalars(dataset.info())) {
+      protocol::ScalarView scalar;
+      scalar.field = name;
+      view.scalars->push_back(std::move(scalar));
+    }
+  }
+  for (std::size_t n = 0; n < view.scalars->size(); ++n) {
+    auto ok =
+        complete_scalar((*view.scalars)[n], "/scalars/" + std::to_string(n), lattice, dataset);
+    if (!ok) return ok;
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<View> complete_view(const View& view, data::Dataset& dataset) {
+  const data::DatasetInfo& info = dataset.info();
+  View full = view;
+  if (full.dataset.empty()) full.dataset = info.id;
+  if (full.step < 0 || static_cast<std::size_t>(full.step) >= info.steps.size()) {
+    return invalid("/step", "dataset " + quoted(info.id) + " has steps 0 to " +
+                                std::to_string(info.steps.size() - 1));
+  }
+  if (auto ok = check_color(full.image.background, "/image/background"); !ok) return ok.error();
+  if (auto ok = check_vector(full.vector); !ok) return ok.error();
+  if (full.depth_cue.near >= full.depth_cue.far) {
+    return invalid("/depthCue/near", "is not less than far");
+  }
+  auto lattice = place_lattice(info.grid, full.geometry);
+  if (!lattice) return lattice.error();
+  complete_camera(full, *lattice);
+  auto camera = resolve_camera(full, *lattice);
+  if (!camera) return camera.error();
+  if (auto ok = choose_vector_field(full, info); !ok) return ok.error();
+  protocol::VectorView& vector = full.vector;
+  if (!vector.length) vector.length = default_length(*lattice, vector.stride);
+  if (auto ok = complete_magnitudes(full, *lattice, dataset); !ok) return ok.error();
+  if (!vector.color.by) vector.color.by = default_color_by(info.grid);
+  if (!vector.color.range) {
+    auto range = default_color_range(full, *lattice, view_depths(*camera, *lattice), dataset);
+    if (!range) return range.error();
+    vector.color.range = *range;
+  }
+  if (auto ok = complete_scalars(full, *lattice, dataset); !ok) return ok.error();
+  return full;
+}
+
+Result<View> default_view(data::Dataset& dataset) {
+  View view;
+  view.dataset = dataset.info().id;
+  return complete_view(view, dataset);
+}
+
+}  // namespace windsplat::scene

@@ -1,0 +1,298 @@
+// Fields -> ranges, maps and opacity for a first picture.
+#include "server/scene/defaults.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <limits>
+#include <string_view>
+
+#include "server/scene/camera.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+constexpr std::size_t quantile_samples_max = std::size_t{1} << 15U;
+constexpr double length_spacings = 5.0;
+constexpr double coverage = 3.0;     // of the box's picture by lines
+constexpr double line_share = 0.75;  // of the full length, over the lines that are drawn
+constexpr double value_max = 1e38;   // a view's numbers end here
+
+// A kind of scalar: words that tell it, as part of its standard or long name or its own name, and
+// short names that must match whole. Earlier kinds are better media.
+struct Kind {
+  std::vector<std::string_view> words;
+  std::vector<std::string_view> names;
+  ScalarStyle style;
+};
+
+const std::vector<Kind>& kinds() {
+  static const std::vector<Kind> all = {
+      {{"cloud", "condens"},
+       {"cl", "cc", "clt", "clw", "cli", "clwc", "ciwc", "qc", "qi", "tcc", "cldtot"},
+       {"clouds", 0.12, 12, true}},
+      {{"energy"}, {}, {"inferno", 0.30, 6, false}},
+      {{"smoke", "dust", "aerosol", "ash", "concentration", "tracer"},
+       {},
+       {"sunset", 0.05, 12, false}},
+      {{"rain", "snow", "precip", "hail", "graupel"}, {"qr", "qs", "qg"}, {"ice", 0.05, 12, false}},
+      {{"vortic", "helicity"}, {}, {"plasma", 0.10, 10, false}},
+      {{"humidity", "water", "vapor", "vapour", "moist"},
+       {"q", "qv", "hus", "hur", "rh", "r", "shum", "rhum"},
+       {"ice", 0.45, 8, false}},
+      {{"fraction", "density", "ozone"}, {"rho"}, {"moss", 0.25, 8, false}},
+  };
+  return all;
+}
+
+const ScalarStyle body_style = {"grays", 0.0, 6, false};
+const ScalarStyle other_style = {"magma", 0.30, 8, false};
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+bool is_body(const data::FieldInfo& field) {
+  constexpr std::array<std::string_view, 6> names = {"wall",  "walls",     "obstacle",
+                                                     "solid", "conductor", "building"};
+  return std::find(names.begin(), names.end(), lower(field.name)) != names.end();
+}
+
+// Index of the field's kind; kinds().size() if it is of none. Thresholds of cloud cover and the
+// like in the sky are masses or shares: a temperature, height or wind in a cloud is not the cloud.
+std::size_t kind_of(const data::FieldInfo& field) {
+  const std::string name = lower(field.name);
+  const std::string text = name + " " + lower(field.standard_name) + " " + lower(field.long_name);
+  for (const char* other : {"temperature", "pressure", "altitude", "height", "flux", "speed"}) {
+    if (text.find(other) != std::string::npos) return kinds().size();
+  }
+  for (std::size_t n = 0; n < kinds().size(); ++n) {
+    for (const std::string_view word : kinds()[n].words) {
+      if (text.find(word) != std::string::npos) return n;
+    }
+    for (const std::string_view whole : kinds()[n].names) {
+      if (name == whole) return n;
+    }
+  }
+  return kinds().size();
+}
+
+// Calls body(index, value) for at most 2^15 unmasked samples spread evenly over the volume; the
+// value of a vector is its magnitude.
+template <class Body>
+void for_some_samples(const data::Volume& volume, const Body& body) {
+  const std::size_t samples = volume.samples();
+  const std::size_t count = std::min(samples, quantile_samples_max);
+  for (std::size_t n = 0; n < count; ++n) {
+    // Steps of the golden ratio meet no period of the lattice.
+    const double turn = static_cast<double>(n) * 0.6180339887498949;
+    const double share = turn - std::floor(turn);
+    const std::size_t at =
+        samples <= quantile_samples_max
+            ? n
+            : std::min(samples - 1, static_cast<std::size_t>(share * static_cast<double>(samples)));
+    double value = static_cast<double>(volume.component(0)[at]);
+    if (volume.components > 1) {
+      const double v = static_cast<double>(volume.component(1)[at]);
+      const double w = volume.components > 2 ? static_cast<double>(volume.component(2)[at]) : 0.0;
+      value = std::hypot(value, v, w);
+    }
+    if (std::isfinite(value)) body(at, value);
+  }
+}
+
+protocol::Range pick(std::vector<double>& values, double low, double high) {
+  if (values.empty()) return {0, 0};
+  const auto at = [&values](double quantile) {
+    const auto n = static_cast<std::ptrdiff_t>(quantile * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), values.begin() + n, values.end());
+    return values[static_cast<std::size_t>(n)];
+  };
+  const double lower = at(low);
+  return {lower, at(high)};
+}
+
+// Steps to round numbers to that a person will read, for values up to `most`, which is > 0.
+double readable_grain(double most) { return std::pow(10.0, std::floor(std::log10(most))) / 20.0; }
+
+// A range that a view may hold and a table may divide by.
+protocol::Range sound_range(double low, double high) {
+  low = std::clamp(low, -value_max, value_max);
+  high = std::clamp(high, -value_max, value_max);
+  const double width_min = std::max(1e-30, 1e-6 * std::abs(low));
+  if (!(high - low >= width_min)) {
+    const double width = low == 0 ? 1.0 : 0.1 * std::abs(low);
+    high = low + std::max(width, width_min);
+  }
+  return {low, high};
+}
+
+}  // namespace
+
+double nice_above(double value) {
+  const double power = std::pow(10.0, std::floor(std::log10(value)));
+  for (const double digits : {1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0}) {
+    if (digits * power >= value * (1.0 - 1e-9)) return digits * power;
+  }
+  return 10.0 * power;
+}
+
+protocol::Range quantiles(const data::Volume& volume, double low, double high) {
+  std::vector<double> values;
+  for_some_samples(volume, [&](std::size_t, double value) { values.push_back(value); });
+  return pick(values, low, high);
+}
+
+protocol::Range default_magnitude_range(const data::Volume& volume) {
+  double top = quantiles(volume, 0.0, 0.98)[1];
+  // A flow that is still nearly everywhere is measured by its strongest part.
+  if (!(top > 1e-3 * static_cast<double>(volume.range[1]))) {
+    top = static_cast<double>(volume.range[1]);
+  }
+  if (!(top > 1e-29) || !std::isfinite(top)) return {0, 1};
+  return {0, std::min(nice_above(top), value_max)};
+}
+
+double default_min_magnitude(const protocol::VectorView& vector, const data::Volume& volume,
+                             const Lattice& lattice) {
+  const double top = (*vector.magnitude_range)[1];
+  const double least = std::max(0.0, top) / 100.0;
+  // Seen from where a view begins, in a picture of the usual size.
+  const OrbitFrame frame = orbit_frame(default_azimuth, default_elevation);
+  const protocol::ImageView image;
+  const Framing framing = frame_box(lattice, frame, {0, 0, 0}, 35, image);
+  const double pixel = framing.height / image.height;
+  const glm::dvec3 edge = lattice.box_max - lattice.box_min;
+  const double area =
+      edge.x * edge.y * std::abs(frame.forward.z) + edge.x * edge.z * std::abs(frame.forward.y);
+  const double line = line_share * *vector.length * (vector.r1 + vector.r2) * pixel;
+  double lines = static_cast<double>(volume.samples());
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double strides = std::ceil(static_cast<double>(volume.dims[a]) / vector.stride);
+    lines *= strides / volume.dims[a];
+  }
+  const double shown = coverage * area / (line * lines);
+  if (!(shown < 1)) return least;
+  const double threshold = quantiles(volume, 1.0 - shown, 1.0)[0];
+  const double grain = readable_grain(top);
+  return std::max(least, std::min(std::round(threshold / grain) * grain, 0.9 * top));
+}
+
+protocol::Range default_height_range(const protocol::VectorView& vector, const data::Volume& volume,
+                                     const Lattice& lattice) {
+  constexpr double below = 0.25;  // of the width
+  const std::size_t layer =
+      static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
+  std::vector<double> heights;
+  for_some_samples(volume, [&](std::size_t at, double magnitude) {
+    if (magnitude >= *vector.min_magnitude) heights.push_back(lattice.positions[2][at / layer]);
+  });
+  protocol::Range range = pick(heights, 0.02, 0.98);
+  const double box = lattice.box_max.z - lattice.box_min.z;
+  if (!(range[1] - range[0] > 0.1 * box)) range = {lattice.box_min.z, lattice.box_max.z};
+  const double grain = readable_grain(box);
+  return {std::floor((range[0] - below * (range[1] - range[0])) / grain) * grain,
+          std::ceil(range[1] / grain) * grain};
+}
+
+protocol::Range default_magnitude_colors(const protocol::VectorView& vector) {
+  const protocol::Range& drawn = *vector.magnitude_range;
+  const double grain = readable_grain(std::max(std::abs(drawn[0]), std::abs(drawn[1])));
+  const double below = std::floor(0.7 * *vector.min_magnitude / grain) * grain;
+  const double low = std::max(drawn[0], below);
+  return low < drawn[1] ? protocol::Range{low, drawn[1]} : drawn;
+}
+
+ScalarStyle scalar_style(const data::FieldInfo& field) {
+  if (is_body(field)) return body_style;
+  const std::size_t kind = kind_of(field);
+  return kind < kinds().size() ? kinds()[kind].style : other_style;
+}
+
+std::vector<std::string> default_scalars(const data::DatasetInfo& info) {
+  const data::FieldInfo* best = nullptr;
+  std::size_t best_kind = kinds().size();
+  const data::FieldInfo* body = nullptr;
+  for (const data::FieldInfo& field : info.fields) {
+    if (field.kind != data::FieldKind::scalar) continue;
+    if (is_body(field)) {
+      if (body == nullptr) body = &field;
+      continue;
+    }
+    const std::size_t kind = kind_of(field);
+    if (kind < best_kind) {
+      best = &field;
+      best_kind = kind;
+    }
+  }
+  const bool has_vector = info.first(data::FieldKind::vector) != nullptr;
+  if (best == nullptr && !has_vector) best = info.first(data::FieldKind::scalar);
+  std::vector<std::string> names;
+  if (best != nullptr) names.push_back(best->name);
+  if (body != nullptr && body != best) names.push_back(body->name);
+  return names;
+}
+
+protocol::Range default_scalar_range(const data::FieldInfo& field, const data::Volume& volume) {
+  const ScalarStyle style = scalar_style(field);
+  const auto least = static_cast<double>(volume.range[0]);
+  const auto most = static_cast<double>(volume.range[1]);
+  if (style.fraction && least >= -1e-6) {
+    if (field.units == "%" && most <= 100.5) return {0, 100};
+    if (field.units == "1" && most <= 1.0001) return {0, 1};
+  }
+  if (is_body(field)) return {0, 2};
+  const protocol::Range middle = quantiles(volume, 0.01, 0.995);
+  if (least >= 0 && middle[0] <= 0.5 * middle[1]) {
+    const double top = middle[1] > 1e-3 * most ? middle[1] : most;
+    if (!(top > 1e-29)) return {0, 1};
+    return sound_range(0, nice_above(top));
+  }
+  if (!(middle[1] > middle[0])) return sound_range(least, most);
+  // Both ends outward to a twentieth of the width's nice number.
+  const double grain = nice_above(middle[1] - middle[0]) / 20.0;
+  return sound_range(std::floor(middle[0] / grain) * grain, std::ceil(middle[1] / grain) * grain);
+}
+
+std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& field,
+                                                      const protocol::Range& range,
+                                                      const Lattice& lattice) {
+  const ScalarStyle style = scalar_style(field);
+  double shortest = std::numeric_limits<double>::infinity();
+  for (int a = 0; a < 3; ++a) {
+    shortest = std::min(shortest, lattice.box_max[a] - lattice.box_min[a]);
+  }
+  const double top = nice_above(style.opacity / shortest);
+  const double clear = range[0] + style.clear_below * (range[1] - range[0]);
+  if (style.clear_below <= 0) return {{range[0], 0}, {range[1], top}};
+  return {{range[0], 0}, {clear, 0}, {range[1], top}};
+}
+
+double default_length(const Lattice& lattice, int stride) {
+  double sum = 0;
+  int axes = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const bool wanted = a < 2 || axes == 0;  // the vertical only where there is nothing else
+    if (!wanted || lattice.dims[a] < 2) continue;
+    const int index = static_cast<int>(a);
+    sum += (lattice.box_max[index] - lattice.box_min[index]) / lattice.dims[a];
+    ++axes;
+  }
+  const double spacing = axes == 0 ? 0.2 : sum / axes;
+  const double length = length_spacings * spacing * stride;
+  const double grain = std::pow(10.0, std::floor(std::log10(length)) - 1.0);
+  return std::clamp(std::round(length / grain) * grain, 1e-9, 10.0);
+}
+
+protocol::ColorBy default_color_by(const data::Grid& grid) {
+  const data::Axis& z = grid.axes[2];
+  const bool own_kind = z.kind != data::AxisKind::cartesian;
+  return own_kind && z.coordinates.size() >= 4 ? protocol::ColorBy::world_z
+                                               : protocol::ColorBy::magnitude;
+}
+
+}  // namespace windsplat::scene

@@ -1,0 +1,112 @@
+// Dataset -> its description: axes, world box, fields with their ranges, steps, sizes.
+#include "server/scene/describe.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "server/scene/build.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+const char* axis_kind_name(data::AxisKind kind) {
+  switch (kind) {
+    case data::AxisKind::longitude:
+      return "longitude";
+    case data::AxisKind::latitude:
+      return "latitude";
+    case data::AxisKind::pressure:
+      return "pressure";
+    case data::AxisKind::height:
+      return "height";
+    case data::AxisKind::depth:
+      return "depth";
+    case data::AxisKind::level:
+      return "level";
+    case data::AxisKind::cartesian:
+      return "cartesian";
+  }
+  return "cartesian";
+}
+
+protocol::FieldDescription describe_field(const data::FieldInfo& field) {
+  protocol::FieldDescription out;
+  out.name = field.name;
+  out.kind = field.kind == data::FieldKind::vector ? "vector" : "scalar";
+  out.components = field.components;
+  out.units = field.units;
+  out.standard_name = field.standard_name;
+  out.long_name = field.long_name;
+  out.dtype = field.dtype;
+  return out;
+}
+
+// Range and masked count over `steps` steps from the first. A range stays absent when no sample
+// is unmasked.
+Result<void> add_range(data::Dataset& dataset, std::size_t steps,
+                       protocol::FieldDescription& field) {
+  std::int64_t masked = 0;
+  for (std::size_t step = 0; step < steps; ++step) {
+    auto volume = dataset.volume(field.name, step);
+    if (!volume) return volume.error();
+    const data::Volume& v = **volume;
+    masked += v.masked;
+    if (v.masked >= static_cast<std::int64_t>(v.samples())) continue;
+    const auto low = static_cast<double>(v.range[0]);
+    const auto high = static_cast<double>(v.range[1]);
+    field.range = field.range ? protocol::Range{std::min((*field.range)[0], low),
+                                                std::max((*field.range)[1], high)}
+                              : protocol::Range{low, high};
+  }
+  field.masked = masked;
+  return {};
+}
+
+}  // namespace
+
+Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf ranges) {
+  const data::DatasetInfo& info = dataset.info();
+  protocol::DatasetDescription out;
+  out.id = info.id;
+  out.title = info.title;
+  out.source = info.source;
+  out.format = info.format;
+  out.state = "ready";
+  out.dims = info.grid.dims();
+  auto lattice = place_lattice(info.grid, protocol::GeometryView{});
+  if (!lattice) return lattice.error();
+  for (std::size_t a = 0; a < 3; ++a) {
+    const data::Axis& axis = info.grid.axes[a];
+    const int index = static_cast<int>(a);
+    out.axes[a] = {axis.name,        axis.standard_name,   axis.units, axis_kind_name(axis.kind),
+                   axis.coordinates, lattice->positions[a]};
+    out.world_min[a] = lattice->box_min[index];
+    out.world_max[a] = lattice->box_max[index];
+  }
+  const std::size_t steps = ranges == RangesOf::all_steps ? info.steps.size() : 1;
+  std::uint64_t components = 0;
+  for (const data::FieldInfo& field : info.fields) {
+    protocol::FieldDescription description = describe_field(field);
+    if (ranges != RangesOf::none) {
+      description.range_of = ranges == RangesOf::all_steps ? "all" : "step";
+      if (auto ok = add_range(dataset, steps, description); !ok) return ok.error();
+    }
+    components += field.components.size();
+    out.fields.push_back(std::move(description));
+  }
+  for (const data::LeftOut& left : info.left_out) out.left_out.emplace_back(left.name, left.reason);
+  for (const data::TimeStep& step : info.steps) out.steps.push_back({step.value, step.text});
+  out.time_units = info.time_units;
+  out.resident_bytes = dataset.resident_bytes();
+  out.bytes_when_resident = components * info.grid.samples() * sizeof(float) * info.steps.size();
+  out.default_view.dataset = info.id;
+  if (ranges != RangesOf::none) {
+    auto view = default_view(dataset);
+    if (!view) return view.error();
+    out.default_view = std::move(*view);
+  }
+  return out;
+}
+
+}  // namespace windsplat::scene

@@ -1,0 +1,159 @@
+// Grid + geometry -> Lattice: coordinates become raw positions, raw positions cells, cells a box
+// whose longest edge is 2.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "server/scene/build.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+using data::Axis;
+using data::AxisKind;
+using protocol::VerticalPlacement;
+
+constexpr double box_edge = 2.0;         // of the longest edge, world units
+constexpr double vertical_share = 0.15;  // of the longest horizontal edge, for another unit
+
+bool all_positive(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return v > 0; });
+}
+
+bool is_angle(const Axis& axis) {
+  return axis.kind == AxisKind::longitude || axis.kind == AxisKind::latitude;
+}
+
+bool same_unit(const Axis& a, const Axis& b) {
+  if (is_angle(a) || is_angle(b)) return is_angle(a) && is_angle(b);
+  return a.units == b.units;
+}
+
+// Positions before scaling, growing with the index. Auto: a pressure axis by log p (where every
+// level is above zero, as log p needs), any other by its own coordinate. Index 0 is the bottom, so
+// coordinates that descend (pressure, depth, model levels) are negated.
+Result<std::vector<double>> raw_positions(const Axis& axis, bool vertical,
+                                          VerticalPlacement placement) {
+  const std::vector<double>& at = axis.coordinates;
+  std::vector<double> raw(at.size());
+  const bool log_fits = axis.kind == AxisKind::pressure && all_positive(at);
+  if (vertical && placement == VerticalPlacement::logp && !log_fits) {
+    return make_error_at(ErrorKind::invalid, "/geometry/vertical",
+                         "logp needs a vertical axis of positive pressures; \"" +
+                             printable(axis.name) + "\" is none");
+  }
+  if (vertical && placement == VerticalPlacement::index) {
+    for (std::size_t i = 0; i < raw.size(); ++i) raw[i] = static_cast<double>(i);
+    return raw;
+  }
+  const bool by_log = vertical && log_fits && placement != VerticalPlacement::linear;
+  const double sign = at.size() > 1 && at.back() < at.front() ? -1.0 : 1.0;
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    raw[i] = sign * (by_log ? std::log(at[i]) : at[i]);
+  }
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    const bool ascends = i == 0 || raw[i] > raw[i - 1];
+    if (!std::isfinite(raw[i]) || !ascends) {
+      return make_error(ErrorKind::bad_data, "the coordinates of axis \"" + printable(axis.name) +
+                                                 "\" are not finite and strictly monotonic");
+    }
+  }
+  return raw;
+}
+
+// Cell edges lie midway between samples; the first and last cell reach as far beyond their sample
+// as towards its neighbour. One sample: a cell of width 1, resized later.
+std::vector<double> cell_edges(const std::vector<double>& raw) {
+  if (raw.size() == 1) return {raw[0] - 0.5, raw[0] + 0.5};
+  std::vector<double> edges(raw.size() + 1);
+  for (std::size_t i = 1; i < raw.size(); ++i) edges[i] = 0.5 * raw[i - 1] + 0.5 * raw[i];
+  edges.front() = raw.front() - 0.5 * (raw[1] - raw[0]);
+  edges.back() = raw.back() + 0.5 * (raw[raw.size() - 1] - raw[raw.size() - 2]);
+  return edges;
+}
+
+struct RawAxis {
+  std::vector<double> positions;
+  std::vector<double> edges;
+  double length = 1;  // after proportion, before the even scale
+  [[nodiscard]] bool thin() const { return positions.size() == 1; }
+  [[nodiscard]] double raw_length() const { return edges.back() - edges.front(); }
+};
+
+double smallest_cell(const RawAxis& axis) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i + 1 < axis.edges.size(); ++i) {
+    smallest = std::min(smallest, axis.edges[i + 1] - axis.edges[i]);
+  }
+  return smallest * (axis.length / axis.raw_length());
+}
+
+// Lengths of the axes to one another; a dimension of 1 gets the smallest cell of the others.
+void proportion(const data::Grid& grid, VerticalPlacement placement, std::array<RawAxis, 3>& axes) {
+  const auto& [x, y, z] = grid.axes;
+  for (RawAxis& axis : axes) axis.length = axis.raw_length();
+  if (!axes[0].thin() && !axes[1].thin() && !same_unit(x, y)) axes[1].length = axes[0].length;
+  double horizontal = 0;
+  for (std::size_t a = 0; a < 2; ++a) {
+    if (!axes[a].thin()) horizontal = std::max(horizontal, axes[a].length);
+  }
+  // A vertical by index has no unit to share; log p has none either.
+  const Axis& reference = axes[0].thin() ? y : x;
+  const bool shared = same_unit(z, reference) && placement != VerticalPlacement::index &&
+                      z.kind != AxisKind::pressure;
+  if (horizontal > 0 && !shared) axes[2].length = vertical_share * horizontal;
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const RawAxis& axis : axes) {
+    if (!axis.thin()) smallest = std::min(smallest, smallest_cell(axis));
+  }
+  if (!std::isfinite(smallest)) smallest = 1;
+  for (RawAxis& axis : axes) {
+    if (axis.thin()) axis.length = smallest;
+  }
+}
+
+}  // namespace
+
+Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryView& geometry) {
+  std::array<RawAxis, 3> axes;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (grid.axes[a].coordinates.empty()) {
+      return make_error(ErrorKind::bad_data, "an axis has no coordinates");
+    }
+    auto raw = raw_positions(grid.axes[a], a == 2, geometry.vertical);
+    if (!raw) return raw.error();
+    axes[a].positions = std::move(*raw);
+    axes[a].edges = cell_edges(axes[a].positions);
+  }
+  proportion(grid, geometry.vertical, axes);
+  double longest = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    axes[a].length *= geometry.scale[a];
+    longest = std::max(longest, axes[a].length);
+  }
+  Lattice lattice;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const RawAxis& axis = axes[a];
+    const double world_length = axis.length / longest * box_edge;
+    const double scale = world_length / axis.raw_length();
+    const double centre = 0.5 * axis.edges.front() + 0.5 * axis.edges.back();
+    if (!std::isfinite(scale) || scale <= 0) {
+      return make_error_at(ErrorKind::invalid, "/geometry/scale/" + std::to_string(a),
+                           "leaves the box without a finite length along axis \"" +
+                               printable(grid.axes[a].name) + "\"");
+    }
+    const int index = static_cast<int>(a);
+    lattice.dims[a] = static_cast<int>(axis.positions.size());
+    for (std::size_t i = 0; i < axis.positions.size(); ++i) {
+      lattice.positions[a].push_back((axis.positions[i] - centre) * scale);
+      lattice.spacing[a].push_back((axis.edges[i + 1] - axis.edges[i]) * scale);
+    }
+    lattice.box_min[index] = -0.5 * world_length;
+    lattice.box_max[index] = 0.5 * world_length;
+  }
+  return lattice;
+}
+
+}  // namespace windsplat::scene

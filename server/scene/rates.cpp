@@ -1,0 +1,134 @@
+// Grid, units and placement -> rates of motion in the world.
+#include "server/scene/rates.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <string_view>
+
+#include "server/data/units.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+using data::Axis;
+using data::AxisKind;
+
+constexpr double earth_radius_m = 6371000.0;
+constexpr double metres_per_degree = earth_radius_m * std::numbers::pi / 180.0;
+constexpr double scale_height_m = 7400.0;
+constexpr double ground_pressure_pa = 100000.0;
+constexpr double cosine_min = 1e-3;  // at the poles themselves a meridian has no width
+
+Error no_motion(const Axis& axis, std::string_view what) {
+  return make_error_at(ErrorKind::invalid, "/vector/space",
+                       "world: no known motion along axis \"" + printable(axis.name) + "\" (" +
+                           printable(axis.units) + ") of " + printable(what));
+}
+
+// An axis of plain numbers is in metres; a unit that is no length has no answer.
+std::optional<double> metres(const Axis& axis) {
+  if (axis.units.empty() && axis.kind == AxisKind::cartesian) return 1.0;
+  return data::metres_in(axis.units);
+}
+
+// A rate of change of pressure (omega), in Pa/s per unit; empty if the unit is none.
+std::optional<double> pressure_rate(std::string_view unit) {
+  for (const std::string_view ending : {"/s", " s-1", " s^-1", " s**-1", "*s-1", ".s-1"}) {
+    if (unit.size() > ending.size() && unit.substr(unit.size() - ending.size()) == ending) {
+      return data::pascals_in(unit.substr(0, unit.size() - ending.size()));
+    }
+  }
+  return std::nullopt;
+}
+
+// d(world)/d(coordinate) at each of at least two samples, across its neighbours: exact where the
+// world is linear in the coordinate or (by_log) in its logarithm.
+std::vector<double> slopes(const Axis& axis, const std::vector<double>& world, bool by_log) {
+  const std::vector<double>& at = axis.coordinates;
+  const std::size_t count = at.size();
+  std::vector<double> out(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t below = k == 0 ? 0 : k - 1;
+    const std::size_t above = std::min(k + 1, count - 1);
+    const double rise = world[above] - world[below];
+    out[k] =
+        by_log ? rise / std::log(at[above] / at[below]) / at[k] : rise / (at[above] - at[below]);
+  }
+  return out;
+}
+
+// Coordinate units per second per unit of the component.
+Result<double> vertical_speed(const Axis& axis, double coordinate, std::string_view unit) {
+  const std::optional<double> omega = pressure_rate(unit);
+  switch (axis.kind) {
+    case AxisKind::pressure: {
+      if (!omega) return -coordinate / scale_height_m;
+      if (const auto unit_pa = data::pascals_in(axis.units)) return *omega / *unit_pa;
+      break;
+    }
+    case AxisKind::height:
+    case AxisKind::cartesian: {
+      const auto unit_m = metres(axis);
+      if (!unit_m) break;
+      if (!omega) return 1.0 / *unit_m;
+      const double pressure = ground_pressure_pa * std::exp(-coordinate * *unit_m / scale_height_m);
+      return -*omega * scale_height_m / pressure / *unit_m;
+    }
+    case AxisKind::depth:
+      if (const auto unit_m = metres(axis); unit_m && !omega) return -1.0 / *unit_m;
+      break;
+    default:
+      break;
+  }
+  return no_motion(axis, "a component in " + std::string(unit));
+}
+
+// World units per second per unit of a component along a straight axis.
+Result<double> axis_rate(const Axis& axis, const std::vector<double>& world) {
+  if (world.size() < 2) return 0.0;
+  const double raw = std::abs(axis.coordinates.back() - axis.coordinates.front());
+  const bool angle = axis.kind == AxisKind::longitude || axis.kind == AxisKind::latitude;
+  const auto unit_m = angle ? std::optional(metres_per_degree) : metres(axis);
+  if (!unit_m) return no_motion(axis, "a horizontal component");
+  return (world.back() - world.front()) / raw / *unit_m;
+}
+
+}  // namespace
+
+Result<Rates> world_rates(const data::Grid& grid, const data::FieldInfo& field,
+                          protocol::VerticalPlacement placement, const Lattice& lattice) {
+  const auto& [x, y, z] = grid.axes;
+  Rates rates;
+  const auto along_y = axis_rate(y, lattice.positions[1]);
+  if (!along_y) return along_y.error();
+  rates.y = *along_y;
+  const auto rate_x = axis_rate(x, lattice.positions[0]);
+  if (!rate_x) return rate_x.error();
+  const double along_x = *rate_x;
+  rates.x.assign(y.coordinates.size(), along_x);
+  if (x.kind == AxisKind::longitude && y.kind == AxisKind::latitude) {
+    for (std::size_t j = 0; j < rates.x.size(); ++j) {
+      const double cosine = std::cos(y.coordinates[j] * std::numbers::pi / 180.0);
+      rates.x[j] = along_x / std::max(cosine, cosine_min);
+    }
+  }
+  rates.z.assign(z.coordinates.size(), 0.0);
+  if (field.components.size() < 3 || rates.z.size() < 2) return rates;
+  const std::string& unit =
+      field.component_units.size() > 2 ? field.component_units[2] : field.units;
+  const bool by_log =
+      z.kind == AxisKind::pressure && placement != protocol::VerticalPlacement::linear &&
+      std::all_of(z.coordinates.begin(), z.coordinates.end(), [](double p) { return p > 0; });
+  const std::vector<double> slope = slopes(z, lattice.positions[2], by_log);
+  for (std::size_t k = 0; k < rates.z.size(); ++k) {
+    auto speed = vertical_speed(z, z.coordinates[k], unit);
+    if (!speed) return speed.error();
+    rates.z[k] = slope[k] * *speed;
+  }
+  return rates;
+}
+
+}  // namespace windsplat::scene

@@ -1,0 +1,104 @@
+// A Scene: the immutable, fully resolved input of the engine. Plain values and shared fields; a
+// frame is a pure function of it. Lengths are world units, colours linear RGB, pixels have their
+// centre at +0.5 with row 0 on top.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/data/dataset.hpp"
+
+namespace windsplat::scene {
+
+// right, up and forward are orthonormal; forward points from the eye to the target.
+struct Camera {
+  bool perspective = true;
+  glm::dvec3 eye{0, -3, 0};
+  glm::dvec3 right{1, 0, 0};
+  glm::dvec3 up{0, 0, 1};
+  glm::dvec3 forward{0, 1, 0};
+  // Half the picture's height: tan(fovY / 2) in perspective, world units in orthographic.
+  double half_height = 0.3;
+  double near = 1e-3;  // world units; nothing nearer is drawn (perspective only)
+  int width = 1;
+  int height = 1;
+};
+
+// A rectilinear lattice in the world. positions[a][i] is the place of sample i along axis a,
+// ascending; spacing[a][i] the width of its cell. The box reaches half a cell beyond the samples.
+struct Lattice {
+  std::array<int, 3> dims{1, 1, 1};
+  std::array<std::vector<double>, 3> positions;
+  std::array<std::vector<double>, 3> spacing;
+  glm::dvec3 box_min{-1, -1, -1};
+  glm::dvec3 box_max{1, 1, 1};
+};
+
+// 256 linear RGB entries over range; a value maps to its linear interpolation, clamped at the ends.
+struct ColorTable {
+  std::array<double, 2> range{0, 1};
+  std::vector<std::array<float, 3>> entries;
+};
+
+enum class LineColor { world_z, screen_z, rise, magnitude, constant };
+
+// The vector kernel (Crawfis & Max, "Vector Kernels"; formulas in ARCHITECTURE.md, "Lines").
+struct VectorLayer {
+  std::shared_ptr<const data::Volume> field;
+  glm::dvec3 scale{1, 1, 1};  // times each component before anything else
+  // When lines follow trajectories in the picture (space = world): world units per second per unit
+  // of each component, by y index for x (meridians converge), constant for y, by z index for z.
+  // Empty: components are drawn as they stand.
+  std::vector<double> rate_x;
+  double rate_y = 1;
+  std::vector<double> rate_z;
+  double length = 0.03;  // world units at magnitude_range[1]; magnitudes beyond are drawn no longer
+  double span = 7;
+  int stride = 1;
+  double r1 = 0.6;  // pixels of this picture (already scaled with its height)
+  double r2 = 1.4;
+  double opacity = 0.8;
+  double head_desaturation = 0.7;
+  LineColor color_by = LineColor::world_z;
+  ColorTable color;
+  double rise_weight = 0.2;
+  std::array<double, 2> magnitude_range{0, 1};
+  double min_magnitude = 0;
+  double magnitude_intensity = 0.6;
+  double jitter_center = 0.5;
+  double jitter_stride = 0.3;
+  bool overlap = true;
+  std::uint32_t seed = 1;
+  std::uint32_t epoch = 0;
+};
+
+struct ScalarLayer {
+  std::shared_ptr<const data::Volume> field;
+  ColorTable color;
+  std::vector<std::array<double, 2>> extinction;  // (value, extinction per world unit)
+  double min_optical_depth = 1e-4;
+  int stride = 1;
+};
+
+struct DepthCue {
+  double strength = 0;  // intensity at `far` is 1 - strength
+  double near = 0;      // view distances, world units
+  double far = 1;
+};
+
+struct Scene {
+  Camera camera;
+  Lattice lattice;
+  std::optional<VectorLayer> vector;
+  std::vector<ScalarLayer> scalars;
+  DepthCue depth_cue;
+  double stop_transmittance = 1.5e-4;
+  std::array<float, 3> background{0, 0, 0};  // linear; not part of the rendered image
+};
+
+}  // namespace windsplat::scene

@@ -1,0 +1,357 @@
+// Inputs of a session: messages, descriptions, frames and times -> changes of its state.
+#include "server/session/session.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "protocol/limits.hpp"
+
+namespace windsplat::session {
+namespace {
+
+namespace limits = protocol::limits;
+
+constexpr int close_drain = 1001;
+constexpr int close_bad_message = 4400;
+constexpr int close_idle = 4410;
+
+constexpr std::size_t openings_max = 4;
+constexpr std::size_t stills_max = 2;
+// Changes kept apart until they are proved; more count as proved.
+constexpr std::size_t changes_max = 32;
+constexpr std::size_t change_bytes_max = limits::message_bytes_max;
+
+std::string json_string(const std::string& text) {
+  std::string out(1, '"');
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  out += '"';
+  return out;
+}
+
+// Another dataset: what was said of the old one goes; the picture's size and budget stay.
+std::string open_patch(const std::string& dataset) {
+  return "{\"dataset\":" + json_string(dataset) +
+         ",\"step\":null,\"camera\":null,\"geometry\":null,\"vector\":null,\"scalars\":null,"
+         "\"depthCue\":null,\"method\":null}";
+}
+
+// The size of a still: the message's, else the view's, times its scale.
+Result<void> size_still(const protocol::StillMessage& message, protocol::View& view) {
+  const auto scaled = [&](int edge) {
+    return static_cast<std::int64_t>(std::ceil(edge * message.scale));
+  };
+  const std::int64_t width = scaled(message.width.value_or(view.image.width));
+  const std::int64_t height = scaled(message.height.value_or(view.image.height));
+  const std::string size = std::to_string(width) + " x " + std::to_string(height) + " pixels";
+  if (std::max(width, height) > limits::image_edge_max) {
+    return make_error_at(ErrorKind::too_large, "/scale",
+                         "makes the picture " + size + "; no edge may be longer than " +
+                             std::to_string(limits::image_edge_max));
+  }
+  if (width * height > limits::image_pixels_max) {
+    return make_error_at(
+        ErrorKind::too_large, "/scale",
+        "makes the picture " + size + "; the limit is " + std::to_string(limits::image_pixels_max));
+  }
+  view.image.width = static_cast<int>(width);
+  view.image.height = static_cast<int>(height);
+  return {};
+}
+
+}  // namespace
+
+Session::Session(Options options, Check check, Micros now)
+    : options_(options), check_(std::move(check)), heard_at_(now), changed_at_(now) {}
+
+// --- inputs -------------------------------------------------------------------------------------
+
+Effects Session::on_message(const protocol::ClientMessage& message, Micros now) {
+  if (closed_) return {};
+  heard_at_ = now;
+  std::visit([&](const auto& body) { follow(body, now); }, message);
+  return finish(now);
+}
+
+Effects Session::on_refused(const Error& error, const protocol::MessageTag& tag, Micros now) {
+  if (closed_) return {};
+  heard_at_ = now;
+  refuse(error, tag.id, tag.rev);
+  return finish(now);
+}
+
+Effects Session::on_binary(Micros now) {
+  if (!closed_) close(close_bad_message, "a client sends text messages only");
+  return finish(now);
+}
+
+Effects Session::on_drain(Micros now) {
+  if (!closed_) close(close_drain, "the server is shutting down");
+  return finish(now);
+}
+
+Effects Session::on_time(Micros now) { return finish(now); }
+
+Effects Session::on_written(Micros now) {
+  writing_ = false;
+  return finish(now);
+}
+
+Effects Session::on_described(std::uint32_t id, Result<protocol::DatasetDescription> description,
+                              Micros now) {
+  const auto opening = std::find_if(openings_.begin(), openings_.end(),
+                                    [&](const Opening& known) { return known.id == id; });
+  if (closed_ || opening == openings_.end()) return {};
+  const std::uint64_t version = opening->version;
+  openings_.erase(opening);
+  if (description) {
+    effects_.emplace_back(SendText{protocol::OpenedMessage{id, std::move(*description)}});
+  } else {
+    refuse(description.error(), id, std::nullopt);
+    undo(version, now);
+  }
+  return finish(now);
+}
+
+Effects Session::on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros now) {
+  if (closed_ || !render_ || render_->ticket != ticket) return {};
+  const Render render = *render_;
+  render_.reset();
+  if (!drawn) {
+    if (drawn.error().kind == ErrorKind::cancelled) {
+      ++stats_.cancelled;
+    } else if (!render.unwanted) {
+      render_failed(render, drawn.error(), now);
+    }
+    return finish(now);
+  }
+  if (!drawn->loaded && render.purpose != Purpose::still) {
+    levels_.learn(render.encoding.level, render.width, render.height,
+                  drawn->render_us + drawn->encode_us, now);
+  }
+  if (render.unwanted) {
+    ++stats_.dropped;
+  } else {
+    send_frame(render, std::move(*drawn));
+  }
+  return finish(now);
+}
+
+// --- messages -----------------------------------------------------------------------------------
+
+void Session::follow(const protocol::OpenMessage& message, Micros now) {
+  if (openings_.size() >= openings_max) {
+    refuse(make_error(ErrorKind::busy, "too many datasets are being opened at once"), message.id,
+           std::nullopt);
+    return;
+  }
+  protocol::View bare;
+  bare.dataset = message.dataset;
+  if (const auto known = check_(bare); !known) {
+    refuse(known.error(), message.id, std::nullopt);
+    return;
+  }
+  Opening opening{message.id, 0};
+  if (view_.dataset != message.dataset) {
+    std::string patch = open_patch(message.dataset);
+    auto next = document_.patched(patch);
+    if (!next) {
+      refuse(next.error(), message.id, std::nullopt);
+      return;
+    }
+    player_.stop();
+    abandon_render();
+    change(std::move(*next), std::nullopt, std::move(patch), now);
+    opening.version = version_;
+  }
+  openings_.push_back(opening);
+  effects_.emplace_back(
+      SendText{protocol::ProgressMessage{message.id, "loading", 0, std::nullopt}});
+  effects_.emplace_back(Describe{message.id, message.dataset});
+}
+
+void Session::follow(const protocol::PatchMessage& message, Micros now) {
+  auto next = document_.patched(message.patch_json);
+  if (!next) {
+    refuse(next.error(), std::nullopt, message.rev);
+    return;
+  }
+  const protocol::View view = next->view();
+  // A client may say how large its canvas is before it names a dataset.
+  if (!view.dataset.empty()) {
+    if (const auto drawable = check_(view); !drawable) {
+      refuse(drawable.error(), std::nullopt, message.rev);
+      return;
+    }
+  }
+  if (view.dataset != view_.dataset) player_.stop();
+  if (view.step != view_.step) player_.move_to(view.step, now);
+  t_ = message.t;
+  rev_ = message.rev;
+  change(std::move(*next), message.rev, message.patch_json, now);
+}
+
+void Session::follow(const protocol::StillMessage& message, Micros /*now*/) {
+  Still still{message, view_, rev_, t_};
+  if (view_.dataset.empty()) {
+    refuse(make_error(ErrorKind::not_found, "no dataset is open"), message.id, std::nullopt);
+  } else if (stills_.size() >= stills_max) {
+    refuse(make_error(ErrorKind::busy, "earlier stills are not finished yet"), message.id,
+           std::nullopt);
+  } else if (const auto fits = size_still(message, still.view); !fits) {
+    refuse(fits.error(), message.id, std::nullopt);
+  } else {
+    if (stills_.empty()) still_turn_ = false;
+    stills_.push_back(std::move(still));
+    effects_.emplace_back(
+        SendText{protocol::ProgressMessage{message.id, "still", 0, std::nullopt}});
+  }
+}
+
+void Session::follow(const protocol::PlayMessage& message, Micros now) {
+  if (view_.dataset.empty()) {
+    refuse(make_error(ErrorKind::not_found, "no dataset is open"), std::nullopt, std::nullopt);
+    return;
+  }
+  const auto steps = check_(view_);
+  if (!steps) {
+    refuse(steps.error(), std::nullopt, std::nullopt);
+  } else if (message.to >= *steps) {
+    refuse(make_error_at(ErrorKind::invalid, "/to",
+                         "must be at most " + std::to_string(*steps - 1) + ", the last step"),
+           std::nullopt, std::nullopt);
+  } else {
+    player_.start(message, view_.step, now);
+  }
+}
+
+void Session::follow(const protocol::PauseMessage& /*message*/, Micros /*now*/) { player_.stop(); }
+
+void Session::follow(const protocol::AckMessage& message, Micros /*now*/) {
+  if (message.seq > sent_seq_) {
+    refuse(make_error_at(ErrorKind::invalid, "/seq",
+                         "is a frame never sent; the newest is " + std::to_string(sent_seq_)),
+           std::nullopt, std::nullopt);
+    return;
+  }
+  acked_seq_ = std::max(acked_seq_, message.seq);
+}
+
+void Session::follow(const protocol::VisibilityMessage& message, Micros /*now*/) {
+  hidden_ = message.hidden;
+  if (hidden_) abandon_render();
+}
+
+// --- changes of the view ------------------------------------------------------------------------
+
+void Session::change(protocol::ViewDocument next, std::optional<std::uint32_t> rev,
+                     std::string patch_json, Micros now) {
+  show(std::move(next), now);
+  changes_.push_back({version_, rev, std::move(patch_json)});
+  const auto bytes = [&] {
+    std::size_t sum = 0;
+    for (const Change& kept : changes_) sum += kept.patch_json.size();
+    return sum;
+  };
+  while (changes_.size() > changes_max || (changes_.size() > 1 && bytes() > change_bytes_max)) {
+    settle_oldest();
+  }
+}
+
+void Session::show(protocol::ViewDocument next, Micros now) {
+  document_ = std::move(next);
+  view_ = document_.view();
+  ++version_;
+  changed_at_ = now;
+  if (render_ && render_->purpose == Purpose::final) abandon_render();
+}
+
+void Session::settle_oldest() {
+  if (auto next = proved_.patched(changes_.front().patch_json)) proved_ = std::move(*next);
+  proved_rev_ = changes_.front().rev.value_or(proved_rev_);
+  changes_.pop_front();
+}
+
+void Session::settle(std::uint64_t version) {
+  if (version == version_) {  // as after most frames: no need to go through the changes
+    proved_ = document_;
+    proved_rev_ = rev_;
+    changes_.clear();
+  }
+  while (!changes_.empty() && changes_.front().version <= version) settle_oldest();
+}
+
+void Session::undo(std::uint64_t version, Micros now) {
+  const auto refused = std::find_if(changes_.begin(), changes_.end(),
+                                    [&](const Change& kept) { return kept.version == version; });
+  if (refused == changes_.end()) return;
+  changes_.erase(refused);
+  protocol::ViewDocument next = proved_;
+  rev_ = proved_rev_;
+  for (const Change& kept : changes_) {
+    if (auto patched = next.patched(kept.patch_json)) next = std::move(*patched);
+    rev_ = kept.rev.value_or(rev_);
+  }
+  show(std::move(next), now);
+}
+
+void Session::render_failed(const Render& render, const Error& error, Micros now) {
+  if (render.purpose == Purpose::still) {
+    refuse(error, render.still_id, std::nullopt);
+    return;
+  }
+  auto fault = std::find_if(changes_.begin(), changes_.end(),
+                            [&](const Change& kept) { return kept.version == render.version; });
+  // A view that was put together anew after an undo belongs to no change: its newest one goes next,
+  // until what is left was drawn before.
+  if (fault == changes_.end() && render.version == version_ && !changes_.empty()) {
+    fault = std::prev(changes_.end());
+  }
+  if (fault != changes_.end()) {
+    // Time that ran into a step which cannot be shown stands still.
+    if (!fault->rev) player_.stop();
+    refuse(error, std::nullopt, fault->rev);
+    undo(fault->version, now);
+    return;
+  }
+  // Nothing to go back to: say so and wait for a change.
+  refuse(error, std::nullopt, render.rev);
+  player_.stop();
+  drawn_version_ = render.version;
+  drawn_final_ = true;
+}
+
+void Session::refuse(const Error& error, std::optional<std::uint32_t> id,
+                     std::optional<std::uint32_t> rev) {
+  effects_.emplace_back(SendText{protocol::ErrorMessage{id, rev, protocol::problem_from(error)}});
+}
+
+void Session::close(int code, std::string reason) {
+  abandon_render();
+  if (render_ && !render_->unwanted) effects_.emplace_back(CancelRender{render_->ticket});
+  effects_.emplace_back(Close{code, std::move(reason)});
+  closed_ = true;
+}
+
+void Session::abandon_render() {
+  if (!render_ || render_->unwanted || render_->purpose == Purpose::still) return;
+  render_->unwanted = true;
+  effects_.emplace_back(CancelRender{render_->ticket});
+}
+
+Effects Session::finish(Micros now) {
+  if (!closed_ && now - heard_at_ >= options_.idle_timeout_us) {
+    close(close_idle, "nothing was heard for too long");
+  }
+  if (!closed_) {
+    advance_step(now);
+    start_next(now);
+  }
+  return std::exchange(effects_, {});
+}
+
+}  // namespace windsplat::session

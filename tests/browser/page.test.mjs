@@ -1,0 +1,533 @@
+// The page in a real browser, shown by the real daemon: what a user sees and does.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import {
+  control,
+  Daemon,
+  drag,
+  finalPicture,
+  freePort,
+  launch,
+  openPage,
+  patience,
+  pictureBox,
+  pixels,
+  shot,
+  somePicture,
+  state,
+} from "./support.mjs";
+
+let browser;
+let daemon;
+
+before(async () => {
+  browser = await launch();
+  daemon = await new Daemon(await freePort()).start();
+});
+
+after(async () => {
+  await browser?.close();
+  await daemon?.kill();
+});
+
+function assertDrawn(stats) {
+  assert.ok(stats.covered > 0.02, `only ${stats.covered} of the picture is drawn`);
+  assert.ok(stats.deviation > 3, `the picture is flat: deviation ${stats.deviation}`);
+  assert.ok(stats.colors > 100, `only ${stats.colors} colours`);
+}
+
+async function withPage(run, path = "", options = {}) {
+  const page = await openPage(browser, daemon.url + path, options);
+  try {
+    await run(page);
+    assert.deepEqual(page.faults, [], "the browser's console is clean");
+  } finally {
+    await page.context().close();
+  }
+}
+
+test("the climate sample is there within 3 s of load, and soon its final picture", async (t) => {
+  const page = await openPage(browser, daemon.url);
+  const loaded = Date.now();
+  await somePicture(page, 3000 * patience);
+  t.diagnostic(`first picture ${Date.now() - loaded} ms after load`);
+  await finalPicture(page);
+  t.diagnostic(`final picture ${Date.now() - loaded} ms after load`);
+  assert.equal(await page.locator("#dataset").inputValue(), "climate");
+  const stats = await pixels(page);
+  assertDrawn(stats);
+  const box = await pictureBox(page);
+  assert.deepEqual([stats.width, stats.height], [Math.round(box.width), Math.round(box.height)]);
+  assert.equal(await page.locator("#mark").textContent(), "final");
+  assert.match(await page.locator("#hud-times").textContent(), /render [\d.]+ · encode [\d.]+/);
+  assert.equal(await page.locator("#status").textContent(), "live");
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test("a drag turns the volume at once and ends in a final picture", () =>
+  withPage(async (page) => {
+    await finalPicture(page);
+    const before = await state(page);
+    const first = await pixels(page);
+    await drag(page, 160, 60);
+    await finalPicture(page);
+    const after = await state(page);
+    // The volume follows the hand: to the right is the eye going west, down is going up.
+    assert.ok(Number(after.azimuth) < Number(before.azimuth) - 10, `${after.azimuth}`);
+    assert.ok(Number(after.elevation) > Number(before.elevation) + 5, `${after.elevation}`);
+    assert.ok(
+      Number(after.seq) >= Number(before.seq) + 2,
+      "moving frames came before the final one",
+    );
+    const second = await pixels(page);
+    assertDrawn(second);
+    assert.notEqual(second.hash, first.hash);
+    await shot(page, "dragged");
+  }));
+
+test("the right button moves the volume, the wheel brings it nearer", () =>
+  withPage(async (page) => {
+    await finalPicture(page);
+    const before = await state(page);
+    const box = await pictureBox(page);
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await page.mouse.wheel(0, -300);
+    await page.waitForFunction(
+      (d) => Number(document.querySelector("#picture").dataset.distance) < d,
+      0.8 * Number(before.distance),
+    );
+    await page.mouse.down({ button: "right" });
+    await page.mouse.move(box.x + box.width / 2 + 80, box.y + box.height / 2, { steps: 4 });
+    await page.mouse.up({ button: "right" });
+    await finalPicture(page);
+    const after = await state(page);
+    assert.equal(after.azimuth, before.azimuth);
+    assert.equal(after.elevation, before.elevation);
+    assertDrawn(await pixels(page));
+  }));
+
+test("every dataset of the picker can be shown", () =>
+  withPage(async (page) => {
+    await finalPicture(page);
+    const ids = await page.locator("#dataset option").evaluateAll((all) => all.map((o) => o.value));
+    assert.ok(
+      ["climate", "efield", "tornado"].every((id) => ids.includes(id)),
+      `${ids}`,
+    );
+    const hashes = new Set([(await pixels(page)).hash]);
+    for (const id of ids.filter((one) => one !== "climate")) {
+      await page.locator("#dataset").selectOption(id);
+      await page.waitForFunction((want) => location.hash.includes(`%22${want}%22`), id);
+      await finalPicture(page);
+      const stats = await pixels(page);
+      assertDrawn(stats);
+      hashes.add(stats.hash);
+      assert.ok((await page.locator(".legend-entry").count()) >= 1);
+      await shot(page, `dataset-${id}`);
+    }
+    assert.equal(hashes.size, ids.length, "each looks different");
+  }));
+
+test("playing moves the step, the slider and the time; pausing keeps the step", () =>
+  withPage(async (page) => {
+    await finalPicture(page);
+    const firstTime = await page.locator("#time-label").textContent();
+    const first = await pixels(page);
+    await page.locator("#time-fps").selectOption("2"); // slow enough not to be round again
+    await page.locator("#time-play").click();
+    await page.waitForFunction(() => Number(document.querySelector("#picture").dataset.step) >= 2);
+    assert.equal(await page.locator("#time-play").getAttribute("aria-label"), "Pause");
+    await page.locator("#time-play").click();
+    await finalPicture(page);
+    const { step } = await state(page);
+    assert.ok(Number(step) >= 1);
+    assert.equal(await page.locator("#time-slider").inputValue(), step);
+    assert.match(
+      await page.locator("#time-step").textContent(),
+      new RegExp(`^step ${step} of \\d+$`),
+    );
+    assert.notEqual(await page.locator("#time-label").textContent(), firstTime);
+    assert.notEqual((await pixels(page)).hash, first.hash);
+    await page.locator("#time-first").click();
+    await page.waitForFunction(() => document.querySelector("#picture").dataset.step === "0");
+    await finalPicture(page);
+    assert.equal((await pixels(page)).hash, first.hash, "the first step looks as before");
+  }));
+
+test("another colour map changes the picture and the legend", () =>
+  withPage(async (page) => {
+    await finalPicture(page);
+    const legend = page.locator(".legend-lines");
+    const strip = () => legend.locator(".legend-strip").evaluate((e) => e.style.background);
+    const before = { hash: (await pixels(page)).hash, strip: await strip() };
+    assert.match(before.strip, /linear-gradient/);
+    assert.ok((await legend.locator(".legend-tick").count()) >= 2, "the legend has ticks");
+    await control(page, "map").selectOption("magma");
+    await page.waitForFunction(() => location.hash.includes("magma"));
+    await finalPicture(page);
+    assert.notEqual((await pixels(page)).hash, before.hash);
+    assert.notEqual(await strip(), before.strip);
+    await control(page, "tells").selectOption({
+      label: await page
+        .locator("#panel option", {
+          hasText: /^magnitude/,
+        })
+        .first()
+        .textContent(),
+    });
+    await page.waitForFunction(() =>
+      /magnitude/.test(document.querySelector(".legend-lines .legend-name").textContent),
+    );
+    assert.match(await legend.locator(".legend-units").textContent(), /^m s⁻¹$/);
+    await shot(page, "magnitude");
+  }));
+
+test("lines and medium can be switched off and on", () =>
+  withPage(async (page) => {
+    await finalPicture(page);
+    const all = await pixels(page);
+    const switches = page
+      .locator("#panel .lil-controller.lil-boolean", {
+        has: page.locator(".lil-name", { hasText: /^shown$/ }),
+      })
+      .locator("input");
+    await switches.nth(0).uncheck();
+    await page.waitForFunction(() => document.querySelector(".legend-lines") === null);
+    await finalPicture(page);
+    const medium = await pixels(page);
+    assert.notEqual(medium.hash, all.hash);
+    assertDrawn(medium);
+    await switches.nth(0).check();
+    await switches.nth(1).uncheck();
+    await page.waitForFunction(() => document.querySelector(".legend-medium") === null);
+    await finalPicture(page);
+    const lines = await pixels(page);
+    assert.notEqual(lines.hash, medium.hash);
+    await switches.nth(1).check();
+    await page.waitForFunction(() => document.querySelector(".legend-medium") !== null);
+    await finalPicture(page);
+    assert.equal((await pixels(page)).hash, all.hash, "all as before");
+  }));
+
+test("a link restores the same pixels in another window", () =>
+  withPage(async (page) => {
+    await finalPicture(page);
+    await drag(page, -90, 25);
+    await control(page, "map").selectOption("plasma");
+    await finalPicture(page);
+    await page.waitForFunction(() => /plasma/.test(location.hash) && /camera/.test(location.hash));
+    const here = await pixels(page);
+    await withPage(async (other) => {
+      await finalPicture(other);
+      const there = await pixels(other);
+      assert.equal(there.hash, here.hash);
+      const { azimuth } = await state(page);
+      assert.equal((await state(other)).azimuth, azimuth);
+    }, new URL(page.url()).hash);
+  }));
+
+test("a page that was here before comes back on reload and in a second tab", () =>
+  withPage(async (page) => {
+    await finalPicture(page);
+    await page.reload({ waitUntil: "load" });
+    await finalPicture(page);
+    assertDrawn(await pixels(page));
+    const second = await page.context().newPage();
+    await second.goto(page.url(), { waitUntil: "load" });
+    await finalPicture(second);
+    assertDrawn(await pixels(second));
+  }));
+
+test("a link to nowhere is told and the default shown", () =>
+  withPage(async (page) => {
+    await finalPicture(page);
+    await page.locator("#alert").waitFor();
+    assert.match(await page.locator("#alert-text").textContent(), /nowhere/);
+    assert.equal(await page.locator("#dataset").inputValue(), "climate");
+    assertDrawn(await pixels(page));
+    await page.locator("#alert-close").click();
+    assert.equal(await page.locator("#alert").isVisible(), false);
+  }, '#!{"dataset":"nowhere"}'));
+
+test("a link with a value out of range names it and shows the rest by default", () =>
+  withPage(async (page) => {
+    await finalPicture(page);
+    await page.locator("#alert").waitFor();
+    assert.match(await page.locator("#alert-text").textContent(), /\/vector\/length/);
+    assert.equal(await page.locator("#dataset").inputValue(), "climate");
+    assertDrawn(await pixels(page));
+  }, '#!{"dataset":"climate","vector":{"length":-5}}'));
+
+test("a killed server: the picture stays, dimmed, and comes back by itself", async () => {
+  const own = await new Daemon(await freePort()).start();
+  const page = await openPage(browser, own.url);
+  await finalPicture(page);
+  await drag(page, 70, -20);
+  await finalPicture(page);
+  const before = await pixels(page);
+  await own.kill("SIGKILL");
+  await page.waitForFunction(() => document.documentElement.dataset.connection === "waiting");
+  assert.equal((await pixels(page)).hash, before.hash, "the last picture stays");
+  assert.match(
+    await page.locator("#picture").evaluate((e) => getComputedStyle(e).filter),
+    /brightness/,
+  );
+  assert.match(await page.locator("#status").textContent(), /lost/);
+  await shot(page, "lost");
+  await own.start();
+  await page.waitForFunction(() => document.documentElement.dataset.connection === "live", null, {
+    timeout: 20_000 * patience,
+  });
+  await finalPicture(page);
+  assert.equal((await pixels(page)).hash, before.hash, "the same view as before");
+  // The browser itself reports the connections that failed; nothing else may be there.
+  const others = page.faults.filter((text) => !/WebSocket|ERR_CONNECTION_REFUSED/.test(text));
+  assert.deepEqual(others, []);
+  await page.context().close();
+  await own.kill();
+});
+
+test("a server that comes back with other datasets shows one, without a storm", async () => {
+  const own = await new Daemon(await freePort()).start("tornado");
+  const page = await openPage(browser, own.url);
+  let messages = 0;
+  page.on("websocket", (socket) => socket.on("framesent", () => (messages += 1)));
+  await finalPicture(page);
+  await own.kill("SIGKILL");
+  await own.start("efield");
+  await page.waitForFunction(() => document.querySelector("#dataset").value === "efield", null, {
+    timeout: 20_000 * patience,
+  });
+  await finalPicture(page);
+  assertDrawn(await pixels(page));
+  messages = 0;
+  await page.waitForTimeout(1000);
+  assert.ok(messages < 10, `${messages} messages in a second of rest`);
+  await page.context().close();
+  await own.kill();
+});
+
+test("one finger turns, two fingers move and pinch", () =>
+  withPage(
+    async (page) => {
+      await finalPicture(page);
+      const cdp = await page.context().newCDPSession(page);
+      const box = await pictureBox(page);
+      const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+      const touch = async (path) => {
+        const points = (at) => at.map(([dx, dy], id) => ({ x: x + dx, y: y + dy, id }));
+        await cdp.send("Input.dispatchTouchEvent", {
+          type: "touchStart",
+          touchPoints: points(path[0]),
+        });
+        for (const at of path.slice(1)) {
+          await cdp.send("Input.dispatchTouchEvent", {
+            type: "touchMove",
+            touchPoints: points(at),
+          });
+          await page.waitForTimeout(20);
+        }
+        await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+        await finalPicture(page);
+        return state(page);
+      };
+      const start = await state(page);
+      const turned = await touch([[[0, 0]], [[30, 0]], [[60, 0]]]);
+      assert.ok(Number(turned.azimuth) < Number(start.azimuth) - 5);
+      assert.equal(turned.distance, start.distance);
+      const pinched = await touch([
+        [
+          [-40, 0],
+          [40, 0],
+        ],
+        [
+          [-60, 0],
+          [60, 0],
+        ],
+        [
+          [-80, 0],
+          [80, 0],
+        ],
+      ]);
+      assert.ok(
+        Number(pinched.distance) < 0.7 * Number(turned.distance),
+        "twice as wide is half as far",
+      );
+      assert.equal(pinched.azimuth, turned.azimuth, "pinching does not turn");
+      const moved = await touch([
+        [
+          [-40, 0],
+          [40, 0],
+        ],
+        [
+          [-40, 30],
+          [40, 30],
+        ],
+      ]);
+      assert.equal(moved.distance, pinched.distance);
+      assert.equal(moved.azimuth, pinched.azimuth);
+      assert.notEqual(moved.rev, pinched.rev);
+      assertDrawn(await pixels(page));
+    },
+    "",
+    { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true },
+  ));
+
+test("everything by the keyboard", () =>
+  withPage(async (page) => {
+    await finalPicture(page);
+    const start = await state(page);
+    const until = (key, value) =>
+      page.waitForFunction(
+        ([k, v]) => document.querySelector("#picture").dataset[k] === v,
+        [key, value],
+      );
+    await page.keyboard.press("ArrowRight");
+    await until("azimuth", (Number(start.azimuth) - 5).toFixed(1));
+    await page.keyboard.press("ArrowDown");
+    await until("elevation", (Number(start.elevation) + 5).toFixed(1));
+    await page.keyboard.press("+");
+    await page.waitForFunction(
+      (d) => Number(document.querySelector("#picture").dataset.distance) < d,
+      Number(start.distance),
+    );
+    await page.keyboard.press("5");
+    await until("elevation", "90.0");
+    await page.keyboard.press("3");
+    await until("azimuth", "90.0");
+    await until("elevation", "0.0");
+    await page.keyboard.press("o");
+    await finalPicture(page);
+    assert.equal(await control(page, "projection").inputValue(), "orthographic");
+    assertDrawn(await pixels(page));
+    await page.keyboard.press("o");
+    await page.keyboard.press("0");
+    await finalPicture(page);
+    await until("azimuth", start.azimuth);
+    await page.keyboard.press("]");
+    await until("step", "1");
+    await page.keyboard.press("[");
+    await until("step", "0");
+    await page.keyboard.press("Space");
+    await page.waitForFunction(() => Number(document.querySelector("#picture").dataset.step) >= 1);
+    await page.keyboard.press("Space");
+    assert.equal(await page.locator("#hud-times").isVisible(), true);
+    await page.keyboard.press("\\");
+    assert.equal(await page.locator("#hud-times").isVisible(), false);
+    await page.keyboard.press("?");
+    assert.equal(await page.locator("#help").isVisible(), true);
+    await shot(page, "help");
+    await page.keyboard.press("Escape");
+    assert.equal(await page.locator("#help").isVisible(), false);
+    // Keys in a control are the control's.
+    await page.locator("#time-slider").focus();
+    const { azimuth } = await state(page);
+    await page.keyboard.press("ArrowRight");
+    await finalPicture(page);
+    assert.equal((await state(page)).azimuth, azimuth);
+  }));
+
+test("under a base path", async () => {
+  const own = await new Daemon(await freePort(), "/a/b/").start();
+  const page = await openPage(browser, own.url);
+  await finalPicture(page);
+  assertDrawn(await pixels(page));
+  assert.match(
+    await page
+      .locator(".legend-strip")
+      .first()
+      .evaluate((e) => e.style.background),
+    /gradient/,
+    "the colour maps were found",
+  );
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+  await own.kill();
+});
+
+test("on a dense screen the picture has its pixels", () =>
+  withPage(
+    async (page) => {
+      await finalPicture(page);
+      const box = await pictureBox(page);
+      const stats = await pixels(page);
+      assert.deepEqual(
+        [stats.width, stats.height],
+        [Math.round(2 * box.width), Math.round(2 * box.height)],
+      );
+    },
+    "",
+    { viewport: { width: 900, height: 600 }, deviceScaleFactor: 2 },
+  ));
+
+test("a window that changes its size gets a picture of that size", () =>
+  withPage(async (page) => {
+    await finalPicture(page);
+    await page.setViewportSize({ width: 1000, height: 700 });
+    const box = await pictureBox(page);
+    await page.waitForFunction(
+      (width) => document.querySelector("#picture").width === width,
+      Math.round(box.width),
+    );
+    await finalPicture(page);
+    assertDrawn(await pixels(page));
+  }));
+
+test("every control has a name, and nothing sticks out of a narrow window", async () => {
+  for (const width of [1440, 360]) {
+    await withPage(
+      async (page) => {
+        await finalPicture(page);
+        const overflow = await page.evaluate(
+          () => document.documentElement.scrollWidth - innerWidth,
+        );
+        assert.ok(overflow <= 0, `${overflow} px too wide at ${width}`);
+        const cdp = await page.context().newCDPSession(page);
+        const { nodes } = await cdp.send("Accessibility.getFullAXTree");
+        const roles = new Set([
+          "button",
+          "combobox",
+          "checkbox",
+          "slider",
+          "spinbutton",
+          "textbox",
+          "image",
+          "img",
+          "link",
+          "ColorWell",
+        ]);
+        const nameless = nodes.filter(
+          (node) => !node.ignored && roles.has(node.role?.value) && !node.name?.value,
+        );
+        assert.deepEqual(
+          nameless.map((node) => [node.role.value, node.properties]),
+          [],
+        );
+        assert.ok(nodes.filter((node) => roles.has(node.role?.value)).length > 20);
+      },
+      "",
+      { viewport: { width, height: 800 } },
+    );
+  }
+});
+
+test("screenshots of the usual windows", async () => {
+  const windows = [
+    ["desktop", { viewport: { width: 1440, height: 900 } }],
+    ["desktop-light", { viewport: { width: 1440, height: 900 }, colorScheme: "light" }],
+    ["small", { viewport: { width: 1024, height: 768 } }],
+    ["phone", { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true }],
+  ];
+  for (const [name, options] of windows) {
+    await withPage(
+      async (page) => {
+        await finalPicture(page);
+        await page.locator(".legend-entry").first().waitFor();
+        await shot(page, name);
+      },
+      "",
+      options,
+    );
+  }
+});

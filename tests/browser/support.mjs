@@ -1,0 +1,179 @@
+// What the browser tests share: the daemon, the browser, and a page that is watched for errors.
+import { spawn } from "node:child_process";
+import { mkdirSync } from "node:fs";
+import { createServer } from "node:net";
+import { dirname, join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { chromium } from "playwright-core";
+
+const root = join(dirname(fileURLToPath(import.meta.url)), "..", "..");
+const program = process.env.WINDSPLAT_PROGRAM;
+export const patience = Number(process.env.WINDSPLAT_PATIENCE ?? 1);
+export const screenshots = join(root, "build", "screenshots");
+mkdirSync(screenshots, { recursive: true });
+
+export function freePort() {
+  return new Promise((resolve, reject) => {
+    const server = createServer();
+    server.on("error", reject);
+    server.listen(0, "127.0.0.1", () => {
+      const { port } = server.address();
+      server.close(() => resolve(port));
+    });
+  });
+}
+
+const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+export class Daemon {
+  constructor(port, basePath = "/") {
+    this.port = port;
+    this.basePath = basePath;
+    this.log = "";
+  }
+
+  get url() {
+    return `http://127.0.0.1:${this.port}${this.basePath}`;
+  }
+
+  // Without datasets: the built-in samples.
+  async start(...datasets) {
+    const child = spawn(
+      program,
+      ["serve", "--listen", `127.0.0.1:${this.port}`, "--base-path", this.basePath, ...datasets],
+      { stdio: ["ignore", "pipe", "pipe"] },
+    );
+    this.child = child;
+    this.exited = new Promise((resolve) => child.on("exit", resolve));
+    for (const stream of [child.stdout, child.stderr]) {
+      stream.on("data", (text) => (this.log += text));
+    }
+    const until = Date.now() + 30_000 * patience;
+    while (Date.now() < until && child.exitCode === null) {
+      const answer = await fetch(this.url).catch(() => null);
+      if (answer?.ok) return this;
+      await sleep(50);
+    }
+    throw new Error(`the daemon does not answer at ${this.url}:\n${this.log}`);
+  }
+
+  async kill(signal = "SIGKILL") {
+    this.child.kill(signal);
+    await this.exited;
+  }
+}
+
+export const launch = () =>
+  chromium.launch({
+    executablePath: process.env.WINDSPLAT_CHROMIUM,
+    args: [
+      "--no-sandbox",
+      "--headless=new",
+      "--disable-gpu",
+      "--disable-quic",
+      "--no-first-run",
+      "--disable-background-networking",
+      "--disable-component-update",
+      "--disable-sync",
+    ],
+  });
+
+// A page whose console errors, exceptions and violations of the content policy are collected.
+export async function openPage(browser, url, options = {}) {
+  const context = await browser.newContext({
+    viewport: { width: 1440, height: 900 },
+    colorScheme: "dark",
+    ...options,
+  });
+  const page = await context.newPage();
+  page.setDefaultTimeout(15_000 * patience);
+  page.faults = [];
+  page.on("console", (message) => {
+    if (message.type() === "error") page.faults.push(message.text());
+  });
+  page.on("pageerror", (error) => page.faults.push(String(error)));
+  await page.goto(url, { waitUntil: "load" });
+  return page;
+}
+
+// Any frame at all has been drawn.
+export const somePicture = (page, timeout = 15_000 * patience) =>
+  page.waitForFunction(() => Number(document.querySelector("#picture").dataset.seq) > 0, null, {
+    timeout,
+    polling: 20,
+  });
+
+// The last word on what was asked for has been drawn, in the size of the window.
+export async function finalPicture(page) {
+  await page.waitForFunction(
+    () => {
+      const { rev, wanted, final } = document.querySelector("#picture").dataset;
+      return final === "true" && rev === wanted;
+    },
+    null,
+    { polling: 20 },
+  );
+}
+
+// Statistics of the canvas's pixels: mean and deviation of the brightness (0..255), share of pixels
+// that differ from the most frequent colour, and a hash of all.
+export const pixels = (page) =>
+  page.evaluate(() => {
+    const canvas = document.querySelector("#picture");
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    const words = new Uint32Array(data.buffer);
+    const counts = new Map();
+    let sum = 0;
+    let squares = 0;
+    let hash = 0x811c9dc5;
+    for (let n = 0; n < words.length; n++) {
+      const word = words[n];
+      const brightness = (data[4 * n] + data[4 * n + 1] + data[4 * n + 2]) / 3;
+      sum += brightness;
+      squares += brightness * brightness;
+      hash = Math.imul(hash ^ word, 0x01000193) >>> 0;
+      counts.set(word, (counts.get(word) ?? 0) + 1);
+    }
+    const mean = sum / words.length;
+    let most = 0;
+    for (const count of counts.values()) most = Math.max(most, count);
+    return {
+      width: canvas.width,
+      height: canvas.height,
+      mean,
+      deviation: Math.sqrt(Math.max(0, squares / words.length - mean * mean)),
+      covered: 1 - most / words.length,
+      colors: counts.size,
+      hash,
+    };
+  });
+
+export const state = (page) =>
+  page.evaluate(() => ({ ...document.querySelector("#picture").dataset }));
+
+export const pictureBox = (page) => page.locator("#picture").boundingBox();
+
+export async function drag(page, dx, dy, steps = 12) {
+  const box = await pictureBox(page);
+  const x = box.x + box.width / 2;
+  const y = box.y + box.height / 2;
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  for (let n = 1; n <= steps; n++) {
+    await page.mouse.move(x + (dx * n) / steps, y + (dy * n) / steps);
+    await page.waitForTimeout(16);
+  }
+  await page.mouse.up();
+}
+
+// The select of a control in the panels, by its folder's and its own label.
+export const control = (page, label, tag = "select") =>
+  page
+    .locator("#panel .lil-controller", {
+      has: page.locator(".lil-name", { hasText: new RegExp(`^${label}$`) }),
+    })
+    .first()
+    .locator(tag)
+    .first();
+
+export const shot = (page, name) => page.screenshot({ path: join(screenshots, `${name}.png`) });

@@ -1,0 +1,96 @@
+// What the program says of itself, and what it answers to arguments that are wrong.
+#include <gmock/gmock.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/integration/cli_program.hpp"
+
+namespace cli_test {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+TEST(CliUsage, HelpNamesTheCommandsThatAreThereAndNoOthers) {
+  const Outcome help = run({"--help"});
+  EXPECT_EQ(help.code, 0);
+  for (const char* command : {"serve", "render", "inspect", "synth", "healthcheck"}) {
+    EXPECT_THAT(help.out, HasSubstr(command));
+    const Outcome own = run({command, "--help"});
+    EXPECT_EQ(own.code, 0) << command;
+    EXPECT_EQ(own.err, "") << command;
+  }
+  EXPECT_THAT(help.out, Not(HasSubstr("animate")));
+  EXPECT_THAT(help.out, Not(HasSubstr("study")));
+  EXPECT_THAT(run({"serve", "--help"}).out, HasSubstr("--allow-remote"));
+}
+
+TEST(CliUsage, VersionIsOneLineOnStdout) {
+  const Outcome version = run({"--version"});
+  EXPECT_EQ(version.code, 0);
+  EXPECT_EQ(version.out, "windsplat " WINDSPLAT_VERSION "\n");
+}
+
+TEST(CliUsage, WrongArgumentsExitWith2AndSayWhyOnStderrAlone) {
+  const std::vector<Words> wrong{{},
+                                 {"paint"},
+                                 {"animate", "climate"},
+                                 {"render"},
+                                 {"render", "tornado"},
+                                 {"render", "tornado", "-o", "picture.tiff"},
+                                 {"render", "tornado", "-o", "picture"},
+                                 {"render", "tornado", "-o", "a.png", "--size", "640"},
+                                 {"render", "tornado", "-o", "a.png", "--size", "0x480"},
+                                 {"render", "tornado", "-o", "a.png", "--set", "/step"},
+                                 {"render", "tornado", "-o", "a.png", "--threads", "-1"},
+                                 {"render", "tornado", "-o", "a.png", "--sideways"},
+                                 {"synth", "hurricane", "-o", "a.nc"},
+                                 {"synth", "tornado"},
+                                 {"synth", "tornado", "--dims", "8x8", "-o", "a.nc"},
+                                 {"synth", "tornado", "--dims", "8x8x0", "-o", "a.nc"},
+                                 {"synth", "tornado", "--dims", "99999x8x8", "-o", "a.nc"},
+                                 {"synth", "tornado", "--steps", "0", "-o", "a.nc"},
+                                 {"inspect"},
+                                 {"healthcheck", "not a url"},
+                                 {"serve", "--listen", "8080"},
+                                 {"serve", "--listen", "127.0.0.1:99999"},
+                                 {"serve", "--listen", "example.org:80"},
+                                 {"serve", "--listen", "0.0.0.0:0"},
+                                 {"serve", "--listen", "[::]:0"},
+                                 {"serve", "--base-path", "no-slash"},
+                                 {"serve", "--memory-limit", "lots"},
+                                 {"serve", "--memory-limit", "0"},
+                                 {"serve", "--memory-limit", "99999999T"},
+                                 {"serve", "--max-sessions", "0"},
+                                 {"serve", "--log-format", "xml"}};
+  for (const Words& words : wrong) {
+    const Outcome outcome = run(words);
+    std::string line;
+    for (const std::string& word : words) line += word + ' ';
+    EXPECT_EQ(outcome.code, 2) << line << outcome.err;
+    EXPECT_NE(outcome.err, "") << line;
+    EXPECT_EQ(outcome.out, "") << line;
+  }
+}
+
+// A flag that would do nothing must not be taken.
+TEST(CliUsage, FlagsOfLaterReleasesAreRefused) {
+  for (const char* flag : {"--config", "--token-file", "--tls-cert", "--tls-key", "--data-root"}) {
+    EXPECT_EQ(run({"serve", flag, "x"}).code, 2) << flag;
+  }
+}
+
+TEST(CliUsage, TheEnvironmentGivesOptionsAndTheCommandLineWins) {
+  const Words environment{"WINDSPLAT_LISTEN=nonsense"};
+  const Outcome from_environment = run({"serve"}, environment);
+  EXPECT_EQ(from_environment.code, 2);
+  EXPECT_THAT(from_environment.err, HasSubstr("nonsense"));
+  const Outcome overridden = run({"serve", "--listen", "absurd"}, environment);
+  EXPECT_EQ(overridden.code, 2);
+  EXPECT_THAT(overridden.err, HasSubstr("absurd"));
+  EXPECT_EQ(run({"serve"}, {"WINDSPLAT_LOG_LEVEL=loud"}).code, 2);
+}
+
+}  // namespace
+}  // namespace cli_test

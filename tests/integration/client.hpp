@@ -1,0 +1,95 @@
+// A small client of its own for the tests of the network: plain sockets with deadlines, so that
+// what a well-behaved library would never send can be sent too.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace net_test {
+
+using Headers = std::vector<std::pair<std::string, std::string>>;
+
+inline constexpr int patience_ms = 60'000;  // a test that waits longer has failed
+
+// A TCP connection to this machine.
+class Socket {
+ public:
+  explicit Socket(std::uint16_t port, int receive_buffer_bytes = 0);
+  ~Socket();
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+
+  // As much as the peer takes; false if it has closed.
+  bool send(std::string_view bytes);
+  // What comes next, at least one byte; empty at the end, on a reset or after the deadline.
+  std::string receive(int timeout_ms = patience_ms);
+  // Waits until the peer has closed; false if it does not.
+  bool closed_by_peer(int timeout_ms = patience_ms);
+  void half_close() const;
+
+ private:
+  int handle_ = -1;
+};
+
+struct Answer {
+  int status = 0;                              // 0: there was none
+  std::map<std::string, std::string> headers;  // names in small letters
+  std::string body;
+
+  [[nodiscard]] std::string header(const std::string& name) const;
+};
+
+// Reads one answer. `head`: it has no body whatever its length says.
+Answer read_answer(Socket& socket, bool head = false);
+
+// One request on a connection of its own.
+Answer request(std::uint16_t port, const std::string& method, const std::string& target,
+               const Headers& headers = {}, const std::string& body = "");
+Answer get(std::uint16_t port, const std::string& target, const Headers& headers = {});
+Answer post_view(std::uint16_t port, const std::string& json, const Headers& headers = {});
+// Bytes as they are.
+Answer raw(std::uint16_t port, std::string_view bytes);
+
+enum class Opcode : std::uint8_t { more = 0, text = 1, binary = 2, close = 8, ping = 9, pong = 10 };
+
+struct Message {
+  Opcode kind = Opcode::text;
+  std::string data;
+  int close_code = 0;  // of a close; 0 if it says none
+};
+
+// A WebSocket. Answers pings by itself; acknowledges nothing.
+class StreamClient {
+ public:
+  explicit StreamClient(std::uint16_t port, const Headers& headers = {},
+                        const std::string& target = "/v1/stream", int receive_buffer_bytes = 0);
+
+  [[nodiscard]] const Answer& handshake() const { return handshake_; }
+
+  bool say(std::string_view json) { return send_frame(Opcode::text, json); }
+  bool send_frame(Opcode opcode, std::string_view payload, bool fin = true);
+  // Text, binary or close; none when the connection ended otherwise or nothing came in time.
+  std::optional<Message> next(int timeout_ms = patience_ms);
+  // The next text message of that type, others passed over.
+  std::optional<std::string> next_text(const std::string& type, int timeout_ms = patience_ms);
+  // The next frame, texts passed over (kept in `texts`).
+  std::optional<std::string> next_frame(int timeout_ms = patience_ms);
+  // The code of the close that comes, what comes before it passed over; 0 if none comes.
+  int close_code(int timeout_ms = patience_ms);
+
+  std::vector<std::string> texts;  // every text so far
+  Socket socket;
+
+ private:
+  bool fill(std::size_t bytes, int timeout_ms);
+
+  Answer handshake_;
+  std::string buffer_;
+};
+
+}  // namespace net_test

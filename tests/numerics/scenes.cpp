@@ -1,0 +1,117 @@
+// Scenes made by hand for the numerical tests.
+#include "tests/numerics/scenes.hpp"
+
+#include <glm/geometric.hpp>
+#include <stdexcept>
+
+namespace windsplat::test {
+
+scene::Lattice make_lattice(const std::array<std::vector<double>, 3>& spacing) {
+  scene::Lattice lattice;
+  for (int a = 0; a < 3; ++a) {
+    double total = 0;
+    for (const double s : spacing[a]) total += s;
+    lattice.dims[a] = static_cast<int>(spacing[a].size());
+    lattice.spacing[a] = spacing[a];
+    lattice.box_min[a] = -total / 2;
+    lattice.box_max[a] = total / 2;
+    double edge = -total / 2;
+    for (const double s : spacing[a]) {
+      lattice.positions[a].push_back(edge + s / 2);
+      edge += s;
+    }
+  }
+  return lattice;
+}
+
+scene::Lattice even_lattice(std::array<int, 3> dims, std::array<double, 3> spacing) {
+  std::array<std::vector<double>, 3> all;
+  for (int a = 0; a < 3; ++a) all[a].assign(dims[a], spacing[a]);
+  return make_lattice(all);
+}
+
+std::shared_ptr<const data::Volume> make_volume(
+    const scene::Lattice& lattice, int components,
+    const std::function<float(int, double, double, double)>& value) {
+  auto volume = std::make_shared<data::Volume>();
+  volume->dims = lattice.dims;
+  volume->components = components;
+  for (int c = 0; c < components; ++c) {
+    for (const double z : lattice.positions[2]) {
+      for (const double y : lattice.positions[1]) {
+        for (const double x : lattice.positions[0]) volume->values.push_back(value(c, x, y, z));
+      }
+    }
+  }
+  return volume;
+}
+
+scene::Camera look(const glm::dvec3& target, const glm::dvec3& forward, double distance, int width,
+                   int height, bool perspective, double half_height) {
+  scene::Camera camera;
+  camera.forward = glm::normalize(forward);
+  const glm::dvec3 up =
+      std::abs(camera.forward.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
+  camera.right = glm::normalize(glm::cross(camera.forward, up));
+  camera.up = glm::cross(camera.right, camera.forward);
+  camera.eye = target - distance * camera.forward;
+  camera.width = width;
+  camera.height = height;
+  camera.perspective = perspective;
+  camera.half_height = half_height;
+  return camera;
+}
+
+scene::ColorTable constant_color(std::array<float, 3> rgb) {
+  return {{0, 1}, std::vector<std::array<float, 3>>(256, rgb)};
+}
+
+scene::ColorTable ramp_color(double low, double high, std::array<float, 3> from,
+                             std::array<float, 3> to) {
+  scene::ColorTable table;
+  table.range = {low, high};
+  for (int i = 0; i < 256; ++i) {
+    const float f = static_cast<float>(i) / 255.0F;
+    std::array<float, 3> rgb{};
+    for (int c = 0; c < 3; ++c) rgb[c] = from[c] + f * (to[c] - from[c]);
+    table.entries.push_back(rgb);
+  }
+  return table;
+}
+
+scene::ScalarLayer medium(std::shared_ptr<const data::Volume> field, std::array<float, 3> rgb,
+                          double top) {
+  scene::ScalarLayer layer;
+  layer.field = std::move(field);
+  layer.color = constant_color(rgb);
+  layer.extinction = {{0, 0}, {top, top}};
+  layer.min_optical_depth = 0;
+  return layer;
+}
+
+scene::VectorLayer plain_lines(std::shared_ptr<const data::Volume> field,
+                               std::array<float, 3> rgb) {
+  scene::VectorLayer layer;
+  layer.field = std::move(field);
+  layer.color_by = scene::LineColor::constant;
+  layer.color = constant_color(rgb);
+  layer.head_desaturation = 0;
+  layer.magnitude_intensity = 0;
+  layer.jitter_center = 0;
+  layer.jitter_stride = 0;
+  layer.span = 1e6;
+  return layer;
+}
+
+engine::Rendered render(const scene::Scene& scene, unsigned threads) {
+  ThreadPool pool(threads);
+  auto rendered = engine::render(scene, pool, CancelToken());
+  if (!rendered) throw std::runtime_error(rendered.error().message);
+  return std::move(*rendered);
+}
+
+const float* pixel(const engine::Image& image, int x, int y) {
+  return image.rgba.data() + 4 * (static_cast<std::size_t>(y) * image.width + x);
+}
+
+}  // namespace windsplat::test

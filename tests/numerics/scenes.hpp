@@ -1,0 +1,43 @@
+// Scenes made by hand for the numerical tests.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "server/engine/render.hpp"
+#include "server/scene/scene.hpp"
+
+namespace windsplat::test {
+
+// Samples with the given spacings, centred on the origin.
+scene::Lattice make_lattice(const std::array<std::vector<double>, 3>& spacing);
+scene::Lattice even_lattice(std::array<int, 3> dims, std::array<double, 3> spacing);
+
+// A volume whose component c at world position (x, y, z) is value(c, x, y, z).
+std::shared_ptr<const data::Volume> make_volume(
+    const scene::Lattice& lattice, int components,
+    const std::function<float(int, double, double, double)>& value);
+
+// Looks along `forward` at `target` from `distance` away; any up that is not along the view.
+scene::Camera look(const glm::dvec3& target, const glm::dvec3& forward, double distance, int width,
+                   int height, bool perspective, double half_height);
+
+scene::ColorTable constant_color(std::array<float, 3> rgb);
+scene::ColorTable ramp_color(double low, double high, std::array<float, 3> from,
+                             std::array<float, 3> to);
+
+// A medium of one colour, rho over values as they stand: extinction(v) = v in [0, top].
+scene::ScalarLayer medium(std::shared_ptr<const data::Volume> field, std::array<float, 3> rgb,
+                          double top = 1e30);
+
+// Lines of one colour: no jitter, no dimming, no heads.
+scene::VectorLayer plain_lines(std::shared_ptr<const data::Volume> field, std::array<float, 3> rgb);
+
+engine::Rendered render(const scene::Scene& scene, unsigned threads = 1);
+
+const float* pixel(const engine::Image& image, int x, int y);
+
+}  // namespace windsplat::test

@@ -1,0 +1,268 @@
+// view.schema.json, limits.hpp and the structs of view.hpp say the same.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "protocol/codec.hpp"
+#include "protocol/limits.hpp"
+#include "support.hpp"
+
+namespace windsplat::protocol::testing {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+using Visit = std::function<void(const std::string& pointer, const Json& schema)>;
+
+// Calls `visit` for every property of the schema that is not an object itself, with the JSON
+// pointer it has in a view. Elements of /scalars stand at index 0.
+void walk(const Json& schema, const std::string& pointer, const Visit& visit) {
+  for (const auto& [key, property] : schema.at("properties").items()) {
+    const std::string at = under(pointer, key);
+    if (property.contains("properties")) {
+      walk(property, at, visit);
+      continue;
+    }
+    visit(at, property);
+    if (key == "scalars") walk(property.at("items"), at + "/0", visit);
+  }
+}
+
+Json with_scalar() { return Json{{"scalars", {{{"field", "q"}}}}}; }
+
+// A view with one value set, and whatever else that value needs to make sense.
+Json view_with(const std::string& pointer, const Json& value) {
+  Json view = pointer.starts_with("/scalars/") ? with_scalar() : Json::object();
+  if (pointer == "/vector/r1") view["vector"]["r2"] = limits::radius_max;
+  if (pointer == "/vector/r2") view["vector"]["r1"] = 0;
+  if (pointer == "/depthCue/near") view["depthCue"]["far"] = limits::depth_cue_max;
+  if (pointer == "/depthCue/far") view["depthCue"]["near"] = -limits::depth_cue_max;
+  if (pointer == "/image/width") view["image"]["height"] = 1;
+  if (pointer == "/image/height") view["image"]["width"] = 1;
+  view[Json::json_pointer(pointer)] = value;
+  return view;
+}
+
+bool accepted(const Json& view) { return ViewDocument::parse(view.dump()).has_value(); }
+
+std::string first_pointer(const Json& view) {
+  const auto document = ViewDocument::parse(view.dump());
+  return document || document.error().at.empty() ? "" : document.error().at.front().pointer;
+}
+
+bool may_be_null(const Json& schema) {
+  return schema.value("type", Json()) == "null" ||
+         (schema.contains("type") && schema["type"].is_array()) ||
+         (schema.contains("enum") && schema["enum"].back().is_null());
+}
+
+TEST(Schema, StaticDefaultsAreThoseOfTheStructs) {
+  View view;
+  view.scalars = std::vector<ScalarView>(1);
+  view.scalars->front().field = "q";
+  const Json encoded = Json::parse(encode_view(view));
+  int compared = 0;
+  walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
+    const Json::json_pointer pointer(at);
+    if (schema.contains("default")) {
+      ASSERT_TRUE(encoded.contains(pointer)) << at;
+      EXPECT_EQ(encoded.at(pointer), schema["default"]) << at;
+      ++compared;
+    } else if (at == "/vector/field") {
+      EXPECT_FALSE(encoded.contains(pointer)) << "null would mean no lines";
+    } else if (at != "/scalars" && at != "/scalars/0/field") {
+      ASSERT_TRUE(encoded.contains(pointer)) << at;
+      EXPECT_TRUE(encoded.at(pointer).is_null()) << at << " has no static default";
+    }
+  });
+  EXPECT_GE(compared, 35);
+}
+
+TEST(Schema, TheDefaultViewIsValidAndSaysWhatNothingSays) {
+  const auto said = ViewDocument::parse(encode_view(View{}));
+  ASSERT_TRUE(said.has_value()) << said.error().message;
+  EXPECT_EQ(encode_view(said->view()), encode_view(ViewDocument{}.view()));
+}
+
+TEST(Schema, EncodedViewsHoldExactlyTheSchemasKeys) {
+  View view;
+  view.vector.field = {FieldChoice::Kind::named, "wind"};
+  view.scalars = std::vector<ScalarView>(1);
+  view.scalars->front().field = "q";
+  const Json encoded = Json::parse(encode_view(view));
+  EXPECT_THAT(schema_complaints("view.schema.json", "", encoded), IsEmpty());
+  walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json&) {
+    EXPECT_TRUE(encoded.contains(Json::json_pointer(at))) << at;
+  });
+}
+
+// The bound itself passes and the next number beyond it does not: the codec's range is the
+// schema's.
+TEST(Schema, RangesOfNumbersAreTheCodecs) {
+  int bounds = 0;
+  walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
+    const bool integer = schema.value("type", Json()) == "integer";
+    for (const auto& [keyword, outward] : {std::pair{"minimum", -1.0}, std::pair{"maximum", 1.0}}) {
+      if (!schema.contains(keyword)) continue;
+      ++bounds;
+      const auto bound = schema[keyword].get<double>();
+      const double beyond = integer ? bound + outward : std::nextafter(bound, outward * 1e300);
+      // near < far leaves no partner for the greatest near and the least far.
+      const bool lonely =
+          (at == "/depthCue/near" && outward > 0) || (at == "/depthCue/far" && outward < 0);
+      EXPECT_EQ(first_pointer(view_with(at, schema[keyword])), lonely ? "/depthCue/near" : "")
+          << at << " " << keyword;
+      EXPECT_EQ(first_pointer(view_with(at, beyond)), at) << at << " " << keyword;
+    }
+  });
+  EXPECT_GE(bounds, 50);
+}
+
+TEST(Schema, RangesInsideArraysAreTheCodecs) {
+  int bounds = 0;
+  walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
+    if (!schema.contains("items") || !schema["items"].contains("minimum")) return;
+    const auto count = schema.at("minItems").get<std::size_t>();
+    EXPECT_EQ(count, schema.at("maxItems").get<std::size_t>()) << at;
+    for (std::size_t i = 0; i < count; ++i) {
+      for (const auto& [keyword, outward] :
+           {std::pair{"minimum", -1e300}, std::pair{"maximum", 1e300}}) {
+        const auto bound = schema["items"].at(keyword).get<double>();
+        Json value = Json::array();
+        for (std::size_t k = 0; k < count; ++k) value.push_back(0.25 * static_cast<double>(k + 1));
+        if (count == 2) value[1 - i] = i == 0 ? 9e37 : -9e37;  // keeps a range ascending
+        if (count == 2 && (i == 0) == (outward > 0)) continue;
+        value[i] = bound;
+        EXPECT_TRUE(accepted(view_with(at, value))) << at << " " << keyword;
+        value[i] = std::nextafter(bound, outward);
+        EXPECT_EQ(first_pointer(view_with(at, value)), at + "/" + std::to_string(i)) << keyword;
+        ++bounds;
+      }
+    }
+    for (const std::size_t wrong : {std::size_t{0}, count - 1, count + 1}) {
+      EXPECT_EQ(first_pointer(view_with(at, Json(std::vector<double>(wrong, 1.0)))), at);
+    }
+  });
+  EXPECT_GE(bounds, 30);
+}
+
+TEST(Schema, LimitsOfTheViewAreThoseOfTheLimitsFile) {
+  const Json schema = read_protocol_json("view.schema.json");
+  const auto at = [&](const char* pointer) {
+    return schema.at(Json::json_pointer(pointer)).get<double>();
+  };
+  const std::string camera = "/properties/camera/properties";
+  EXPECT_EQ(at("/properties/step/maximum"), static_cast<double>(limits::step_max));
+  EXPECT_EQ(at((camera + "/fovY/minimum").c_str()), limits::fov_min);
+  EXPECT_EQ(at((camera + "/fovY/maximum").c_str()), limits::fov_max);
+  EXPECT_EQ(at((camera + "/eye/items/maximum").c_str()), limits::world_max);
+  EXPECT_EQ(at((camera + "/height/minimum").c_str()), limits::view_height_min);
+  EXPECT_EQ(at("/properties/image/properties/width/maximum"), limits::image_edge_max);
+  EXPECT_EQ(at("/properties/image/properties/height/maximum"), limits::image_edge_max);
+  EXPECT_EQ(at("/properties/geometry/properties/scale/items/maximum"), limits::geometry_scale_max);
+  EXPECT_EQ(at("/properties/vector/properties/r1/maximum"), limits::radius_max);
+  EXPECT_EQ(at("/properties/vector/properties/r2/maximum"), limits::radius_max);
+  EXPECT_EQ(at("/properties/vector/properties/span/minimum"), limits::span_min);
+  EXPECT_EQ(at("/properties/vector/properties/span/maximum"), limits::span_max);
+  EXPECT_EQ(at("/properties/vector/properties/stride/maximum"), limits::stride_max);
+  EXPECT_EQ(at("/properties/vector/properties/length/maximum"), limits::line_length_max);
+  EXPECT_EQ(at("/properties/scalars/maxItems"), limits::scalars_max);
+  const std::string scalar = "/properties/scalars/items/properties";
+  EXPECT_EQ(at((scalar + "/extinction/maxItems").c_str()), limits::extinction_points_max);
+  EXPECT_EQ(at((scalar + "/extinction/items/prefixItems/1/maximum").c_str()),
+            limits::extinction_max);
+  EXPECT_EQ(at("/properties/quality/properties/budgetMs/minimum"), limits::budget_ms_min);
+  EXPECT_EQ(at("/properties/quality/properties/budgetMs/maximum"), limits::budget_ms_max);
+  EXPECT_THAT(schema["description"].get<std::string>(),
+              HasSubstr(std::to_string(limits::image_pixels_max)));
+}
+
+TEST(Schema, ListsAreAsLongAsTheLimitsAllow) {
+  const auto media = [](int count) {
+    Json view{{"scalars", Json::array()}};
+    for (int i = 0; i < count; ++i)
+      view["scalars"].push_back({{"field", std::string(1, static_cast<char>('a' + i))}});
+    return view;
+  };
+  EXPECT_TRUE(accepted(media(limits::scalars_max)));
+  EXPECT_EQ(first_pointer(media(limits::scalars_max + 1)), "/scalars");
+  const auto points = [](int count) {
+    Json view = with_scalar();
+    for (int i = 0; i < count; ++i) view["scalars"][0]["extinction"].push_back({i, 1});
+    return view;
+  };
+  EXPECT_TRUE(accepted(points(limits::extinction_points_max)));
+  EXPECT_EQ(first_pointer(points(limits::extinction_points_max + 1)), "/scalars/0/extinction");
+}
+
+TEST(Schema, NamesAreMeasuredInCharactersNotBytes) {
+  std::string longest;
+  for (std::size_t i = 0; i < limits::name_chars_max; ++i) longest += "\xc3\xbc";
+  for (const char* at : {"/dataset", "/vector/field", "/vector/color/map", "/scalars/0/field"}) {
+    EXPECT_TRUE(accepted(view_with(at, longest))) << at;
+    EXPECT_THAT(schema_complaints("view.schema.json", "", view_with(at, longest)), IsEmpty());
+    EXPECT_EQ(first_pointer(view_with(at, longest + "x")), at);
+    EXPECT_FALSE(schema_complaints("view.schema.json", "", view_with(at, longest + "x")).empty());
+  }
+}
+
+// The codec and the schema agree about every key and every kind of value that could stand there.
+TEST(Schema, EveryKeyTakesTheKindsOfValueThatTheSchemaSays) {
+  const std::vector<Json> samples{
+      nullptr,       true,       3,         2.5,    "#123456", "auto",       "q\n",
+      Json::array(), {{"x", 1}}, {0, 0, 1}, {0, 1}, {{0, 1}},  "perspective"};
+  int compared = 0;
+  walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json&) {
+    for (const Json& sample : samples) {
+      const Json view = view_with(at, sample);
+      EXPECT_EQ(accepted(view), schema_complaints("view.schema.json", "", view).empty())
+          << at << " = " << sample;
+      ++compared;
+    }
+  });
+  EXPECT_GE(compared, 500);
+}
+
+TEST(Schema, NullMeansTheDefaultExactlyWhereTheSchemaAllowsIt) {
+  walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
+    const Json view = view_with(at, nullptr);
+    EXPECT_EQ(accepted(view), may_be_null(schema)) << at;
+    if (!may_be_null(schema) || at == "/vector/field") return;
+    Json silent = at.starts_with("/scalars/") ? with_scalar() : Json::object();
+    EXPECT_EQ(ViewDocument::parse(view.dump())->canonical(), silent.dump()) << at;
+  });
+}
+
+TEST(Schema, UnknownKeysAreRefusedInEveryObject) {
+  std::vector<std::string> objects{"", "/scalars/0"};
+  walk(read_protocol_json("view.schema.json"), "",
+       [&](const std::string& at, const Json&) { objects.push_back(at.substr(0, at.rfind('/'))); });
+  for (const std::string& object : objects) {
+    for (const char* key : {"/unknown", "/Step", "/$schema", "/__proto__"}) {
+      EXPECT_EQ(first_pointer(view_with(object + key, 1)), object + key);
+    }
+  }
+}
+
+TEST(Schema, EveryKeyIsDescribedAndClosed) {
+  walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
+    EXPECT_FALSE(schema.value("description", "").empty()) << at;
+  });
+  for (const char* name : {"view.schema.json", "messages.schema.json"}) {
+    const std::function<void(const Json&, const std::string&)> closed = [&](const Json& node,
+                                                                            const std::string& at) {
+      if (node.is_object() && node.contains("properties") && node.contains("type")) {
+        EXPECT_EQ(node.value("additionalProperties", Json()), false) << name << " " << at;
+      }
+      if (!node.is_structured()) return;
+      for (const auto& [key, inner] : node.items()) closed(inner, under(at, key));
+    };
+    closed(read_protocol_json(name), "");
+  }
+}
+
+}  // namespace
+}  // namespace windsplat::protocol::testing

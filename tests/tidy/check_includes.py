@@ -1,0 +1,119 @@
+#!/usr/bin/env python3
+"""Checks that includes follow ARCHITECTURE.md: which folder may see which, and where each outside
+library may be named. Usage: check_includes.py [ROOT]"""
+import pathlib
+import re
+import sys
+
+import tree
+
+# folder -> what it may include besides itself. A name ending in .hpp allows that header alone.
+MAY_INCLUDE = {
+    "server/base": [],
+    "protocol": ["server/base"],
+    "server/data": ["server/base"],
+    "server/scene": ["server/base", "protocol", "server/data"],
+    "server/engine": ["server/base", "server/scene/scene.hpp"],
+    "server/image": ["server/base"],
+    "server/frame": ["server/base", "protocol", "server/data", "server/scene", "server/engine",
+                     "server/image"],
+    "server/session": ["server/base", "protocol", "server/scene"],
+    "server/net": ["server/base", "protocol", "server/data", "server/scene", "server/engine",
+                   "server/image", "server/frame", "server/session"],
+    "server/cli": ["server", "protocol"],
+    "server/main.cpp": ["server", "protocol"],
+}
+
+# outside header -> the files that may name it, or include a header of ours that does
+CONFINED = [
+    ("nlohmann/", r"nlohmann/", r"protocol/codec\w*\.[ch]pp|tests/.*"),
+    ("netCDF", r"netcdf(_\w+)?\.h", r"server/data/.*|tests/.*"),
+    ("an image library", r"(turbojpeg|jpeglib|spng|png)\.h", r"server/image/.*|tests/.*"),
+    ("Beast or Asio", r"boost/(beast|asio)[/.]", r"server/net/.*|tests/.*"),
+    ("CLI11", r"CLI/", r"server/cli/.*|server/main\.cpp"),
+]
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^">]+)[">]')
+
+
+def home_of(path):
+    """The folder of MAY_INCLUDE that a file belongs to."""
+    fitting = [home for home in MAY_INCLUDE if path == home or path.startswith(home + "/")]
+    return max(fitting, key=len, default=None)
+
+
+def is_allowed(home, included):
+    for allowed in [home, *MAY_INCLUDE[home]]:
+        if included == allowed or included.startswith(allowed + "/"):
+            return True
+    return False
+
+
+def resolved(path, included, known):
+    """The included file of ours, named from the project's folder, or by a test beside it."""
+    if included in known:
+        return included
+    beside = f"{path.rpartition('/')[0]}/{included}"
+    return beside if path.startswith("tests/") and beside in known else None
+
+
+def brought_by(headers, known):
+    """path -> the indexes of CONFINED that including it brings, directly or by way of others."""
+    brought = {path: {index for _, _, included in lines
+                      for index, (_, pattern, _) in enumerate(CONFINED)
+                      if re.match(pattern, included)}
+               for path, lines in headers.items()}
+    grown = True
+    while grown:
+        grown = False
+        for path, lines in headers.items():
+            for _, _, included in lines:
+                more = brought.get(resolved(path, included, known), set()) - brought[path]
+                if more:
+                    brought[path] |= more
+                    grown = True
+    return brought
+
+
+def complaints_about(path, number, quote, included, known, brought):
+    where = f"{path}:{number}"
+    ours = resolved(path, included, known)
+    for index, (library, pattern, users) in enumerate(CONFINED):
+        if re.fullmatch(users, path):
+            continue
+        if re.match(pattern, included):
+            yield f"{where}: {included} may not be named here"
+        elif index in brought.get(ours, ()) and re.fullmatch(users, ours):
+            yield f"{where}: {included} brings {library}, which may not come here"
+    if quote != '"':
+        if ours:
+            yield f'{where}: <{included}> is our own: write it between ""'
+        return
+    if not ours:
+        yield f"{where}: {included} is no file of the project; name it from the project's folder"
+        return
+    home = home_of(path)
+    if path.startswith("tests/"):
+        return
+    if home is None:
+        yield f"{where}: no rule tells what this folder may include"
+    elif not is_allowed(home, included):
+        yield f"{where}: {home} may not include {included}"
+
+
+def check(root):
+    includes = {}
+    for path, file in tree.files(root):
+        if path.endswith((".cpp", ".hpp", ".h")) and path.startswith(("server/", "protocol/",
+                                                                      "tests/")):
+            matches = [(number, INCLUDE.match(line))
+                       for number, line in enumerate((tree.text(file) or "").splitlines(), 1)]
+            includes[path] = [(number, *match.groups()) for number, match in matches if match]
+    brought = brought_by(includes, includes.keys())
+    return [complaint for path, lines in includes.items() for line in lines
+            for complaint in complaints_about(path, *line, includes.keys(), brought)]
+
+
+if __name__ == "__main__":
+    default = pathlib.Path(__file__).resolve().parents[2]
+    sys.exit(tree.report("includes", check(pathlib.Path(sys.argv[1] if sys.argv[1:] else default))))

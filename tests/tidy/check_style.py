@@ -1,0 +1,104 @@
+#!/usr/bin/env python3
+"""Checks what HACKING.md says of size and wording: long lines, functions and files, notes of work
+put off, paths of somebody's machine, test folders without a test. Usage: check_style.py [ROOT]"""
+import pathlib
+import re
+import sys
+
+import tree
+
+MAX_LINE = 100
+MAX_FUNCTION_LINES = 80  # "about 70"
+MAX_FILE_LINES = 620     # "about 600"
+
+CODE = (".cpp", ".hpp", ".h", ".ts", ".mjs", ".js", ".py", ".sh", ".cmake")
+# Written by a program, or read by one only.
+GENERATED = re.compile(r"(.*/)?(package-lock\.json|.*\.generated\.\w+|generated/.*)")
+
+# Put together from pieces so that this file may be checked too.
+PUT_OFF = re.compile(r"\b(" + "|".join(["TO" + "DO", "FIX" + "ME", "X" * 3]) + r")\b")
+MACHINE = re.compile(r"(?<![\w./:$}*-])/(home|root|Users|work|workspace)/")
+
+OPENS_SCOPE = re.compile(r"(inline )?(namespace|class|struct|union|enum|extern)\b")
+
+
+def is_code(path, content):
+    return path.endswith(CODE) or content.startswith("#!")
+
+
+def long_functions(path, lines):
+    """Blocks at the depth of a free function or a member of a class, as clang-format sets them.
+
+    A statement runs from its first line to the one that ends in ; { } or :, so that a function is
+    known by its whole signature.
+    """
+    statement, block = [], None
+    for number, line in enumerate(lines, 1):
+        depth = len(line) - len(line.lstrip(" "))
+        if block is not None:
+            if depth == block[1] and line.lstrip().startswith("}"):
+                length = number - block[0] + 1
+                if length > MAX_FUNCTION_LINES:
+                    yield f"{path}:{block[0]}: a function of {length} lines"
+                block = None
+            continue
+        if not line.strip() or line.lstrip().startswith(("#", "//")):
+            statement = []
+            continue
+        statement.append((number, depth, line.strip()))
+        if line.endswith("{"):
+            whole = " ".join(part for _, _, part in statement)
+            if statement[0][1] <= 2 and ")" in whole and not OPENS_SCOPE.match(whole):
+                block = statement[0][:2]
+        if line.endswith((";", "{", "}", ":")):
+            statement = []
+
+
+def complaints_about(path, content):
+    lines = content.splitlines()
+    for number, line in enumerate(lines, 1):
+        if PUT_OFF.search(line):
+            yield f"{path}:{number}: a note of work put off: open an issue instead"
+        if MACHINE.search(line):
+            yield f"{path}:{number}: a path of one machine"
+    if not is_code(path, content):
+        return
+    for number, line in enumerate(lines, 1):
+        if len(line) > MAX_LINE:
+            yield f"{path}:{number}: {len(line)} columns"
+    if len(lines) > MAX_FILE_LINES:
+        yield f"{path}: {len(lines)} lines"
+    if path.endswith((".cpp", ".hpp")):
+        yield from long_functions(path, lines)
+
+
+def empty_test_folders(root, files):
+    """CMake passes over a folder of tests without a source; nobody would miss it."""
+    listing = root / "tests" / "CMakeLists.txt"
+    if listing.exists():
+        for name, folder in re.findall(r"^windsplat_test\((\w+) (\S+)", listing.read_text(), re.M):
+            here = [file for path, file in files
+                    if re.fullmatch(rf"tests/{folder}/[^/]+\.cpp", path)]
+            if not any(re.search(r"^(TYPED_)?TEST(_[FP])?\(", tree.text(file) or "", re.M)
+                       for file in here):
+                yield f"tests/{folder}: no test in it ({name})"
+    for folder in sorted((root / "tests").glob("**/")):
+        inside = folder.relative_to(root).as_posix()
+        if not tree.NOT_OURS & set(folder.parts[len(root.parts):]):
+            if not any(path.startswith(inside + "/") for path, _ in files):
+                yield f"{inside}: an empty folder"
+
+
+def check(root):
+    files = tree.files(root)
+    complaints = list(empty_test_folders(root, files))
+    for path, file in files:
+        content = tree.text(file)
+        if content is not None and not GENERATED.fullmatch(path):
+            complaints += complaints_about(path, content)
+    return complaints
+
+
+if __name__ == "__main__":
+    default = pathlib.Path(__file__).resolve().parents[2]
+    sys.exit(tree.report("style", check(pathlib.Path(sys.argv[1] if sys.argv[1:] else default))))

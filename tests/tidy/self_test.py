@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+"""Plants one violation at a time in a small tree; the checkers must name it, and it alone."""
+import pathlib
+import tempfile
+import unittest
+
+import check_includes
+import check_style
+
+CLEAN = {
+    "server/base/error.hpp": "#pragma once\n#include <string>\n",
+    "server/data/volume.hpp": '#pragma once\n#include "server/base/error.hpp"\n',
+    "server/data/file.cpp": '#include <netcdf.h>\n\n#include "server/data/volume.hpp"\n',
+    "server/scene/scene.hpp": '#pragma once\n#include "server/data/volume.hpp"\n',
+    "server/scene/camera.hpp": "#pragma once\n",
+    "server/engine/bin.cpp": '#include "server/scene/scene.hpp"\n',
+    "server/net/server.hpp": "#pragma once\n",
+    "server/net/listener.cpp": "#include <boost/asio.hpp>\n",
+    "protocol/codec_view.cpp": "#include <nlohmann/json.hpp>\n",
+    "tests/CMakeLists.txt": "windsplat_test(unit_base unit/base unit windsplat_base)\n",
+    "tests/unit/base/error_test.cpp": "TEST(Error, says_why) {\n}\n",
+    "README.md": "Reads /usr/share and /tmp; see https://example.org/home/here.\n",
+}
+
+
+class Planted(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        for path, content in CLEAN.items():
+            self.plant(path, content)
+
+    def plant(self, path, content):
+        file = self.root / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(content)
+
+    def expect(self, checker, *said):
+        complaints = checker.check(self.root)
+        self.assertEqual(len(complaints), len(said), complaints)
+        for complaint, part in zip(complaints, said):
+            self.assertIn(part, complaint)
+
+    def test_clean_tree_passes(self):
+        self.expect(check_includes)
+        self.expect(check_style)
+
+    def test_include_against_the_direction(self):
+        self.plant("server/base/pool.hpp", '#include "server/scene/scene.hpp"\n')
+        self.expect(check_includes, "server/base may not include server/scene/scene.hpp")
+
+    def test_engine_sees_the_scene_types_alone(self):
+        self.plant("server/engine/tile.cpp", '\n#include "server/scene/camera.hpp"\n')
+        self.expect(check_includes, "server/engine/tile.cpp:2: server/engine may not include")
+
+    def test_subfolder_obeys_its_parent(self):
+        self.plant("server/engine/kernels/k.cpp", '#include "server/net/server.hpp"\n')
+        self.expect(check_includes, "server/engine may not include server/net/server.hpp")
+
+    def test_outside_header_out_of_its_folder(self):
+        for path, header in [("protocol/view.cpp", "nlohmann/json.hpp"),
+                             ("server/scene/s.cpp", "netcdf.h"),
+                             ("server/frame/f.cpp", "turbojpeg.h"),
+                             ("server/frame/f.cpp", "spng.h"),
+                             ("server/session/s.cpp", "boost/beast/core.hpp"),
+                             ("server/cli/c.cpp", "boost/asio.hpp"),
+                             ("server/net/n.cpp", "CLI/CLI.hpp")]:
+            with self.subTest(header):
+                self.plant(path, f"#include <{header}>\n")
+                self.expect(check_includes, f"{path}:1: {header} may not be named here")
+                (self.root / path).unlink()
+
+    def test_outside_header_by_way_of_one_of_ours(self):
+        self.plant("protocol/codec_json.hpp", "#include <nlohmann/json.hpp>\n")
+        self.plant("protocol/codec_read.cpp", '#include "protocol/codec_json.hpp"\n')
+        self.expect(check_includes)
+        self.plant("protocol/codec_deep.hpp", '#include "protocol/codec_json.hpp"\n')
+        self.plant("server/scene/s.cpp", '#include "protocol/codec_deep.hpp"\n')
+        self.expect(check_includes, "s.cpp:1: protocol/codec_deep.hpp brings nlohmann/")
+
+    def test_tests_may_use_a_neighbour(self):
+        self.plant("tests/protocol/support.hpp", "#pragma once\n")
+        self.plant("tests/protocol/a_test.cpp", '#include "support.hpp"\n')
+        self.expect(check_includes)
+
+    def test_own_header_in_angle_brackets_or_by_a_short_name(self):
+        self.plant("server/data/a.cpp", "#include <server/data/volume.hpp>\n")
+        self.plant("server/data/b.cpp", '#include "volume.hpp"\n')
+        self.expect(check_includes, "is our own", "is no file of the project")
+
+    def test_new_folder_needs_a_rule(self):
+        self.plant("server/extra/e.cpp", '#include "server/base/error.hpp"\n')
+        self.expect(check_includes, "no rule")
+
+    def test_long_line_function_and_file(self):
+        self.plant("server/base/a.cpp", "//" + "x" * 99 + "\n")
+        body = "  g();\n" * 90
+        self.plant("server/base/b.cpp", "void f(int a,\n       int b) {\n" + body + "}\n")
+        self.plant("server/base/c.cpp", "class C {\n  void f() {\n" + body + "  }\n};\n")
+        self.plant("server/base/d.cpp", "int x;\n" * 700)
+        self.expect(check_style, "a.cpp:1: 101 columns", "b.cpp:1: a function of 93 lines",
+                    "c.cpp:2: a function of 92 lines", "d.cpp: 700 lines")
+
+    def test_short_functions_in_a_long_namespace_pass(self):
+        body = "void f() {\n" + "  g();\n" * 40 + "}\n"
+        self.plant("server/base/a.cpp", "namespace a {\n" + body * 10 + "}  // namespace a\n")
+        self.expect(check_style)
+
+    def test_wording(self):
+        self.plant("server/base/a.cpp", "// TO" + "DO: later\n")
+        self.plant("docs/b.md", "Look into /ho" + "me/me/notes.\n")
+        self.expect(check_style, "docs/b.md:1: a path", "server/base/a.cpp:1: a note")
+
+    def test_folder_of_tests_without_a_test(self):
+        self.plant("tests/unit/base/error_test.cpp", "// nothing yet\n")
+        (self.root / "tests" / "numerics").mkdir()
+        self.expect(check_style, "tests/unit/base: no test in it",
+                    "tests/numerics: an empty folder")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,189 @@
+// Pictures encoded, then decoded again by the libraries' decoders; NPY parsed byte by byte.
+#include <gtest/gtest.h>
+#include <spng.h>
+#include <turbojpeg.h>
+
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/image/encode.hpp"
+
+namespace windsplat::image {
+namespace {
+
+struct Picture {
+  int width = 0;
+  int height = 0;
+  int subsampling = -1;  // JPEG only
+  std::vector<std::uint8_t> rgb;
+};
+
+// Smooth, with every channel on its own course: what JPEG is made for.
+Picture smooth_picture(int width, int height) {
+  Picture picture{width, height, -1, {}};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      picture.rgb.push_back(static_cast<std::uint8_t>(128 + 100 * std::sin(0.02 * x)));
+      picture.rgb.push_back(static_cast<std::uint8_t>(128 + 100 * std::cos(0.03 * y)));
+      picture.rgb.push_back(static_cast<std::uint8_t>(128 + 90 * std::sin(0.01 * (x + y))));
+    }
+  }
+  return picture;
+}
+
+// No two neighbours alike: any pixel out of its place shows.
+Picture busy_picture(int width, int height) {
+  Picture picture{width, height, -1, {}};
+  std::uint32_t state = 12345;
+  for (int i = 0; i < 3 * width * height; ++i) {
+    state = state * 1664525U + 1013904223U;
+    picture.rgb.push_back(static_cast<std::uint8_t>(state >> 24));
+  }
+  return picture;
+}
+
+Picture decode_jpeg(const Bytes& bytes) {
+  Picture picture;
+  tjhandle decoder = tjInitDecompress();
+  int colorspace = 0;
+  EXPECT_EQ(tjDecompressHeader3(decoder, bytes.data(), bytes.size(), &picture.width,
+                                &picture.height, &picture.subsampling, &colorspace),
+            0);
+  picture.rgb.resize(3 * static_cast<std::size_t>(picture.width * picture.height));
+  EXPECT_EQ(tjDecompress2(decoder, bytes.data(), bytes.size(), picture.rgb.data(), 0, 0, 0,
+                          TJPF_RGB, TJFLAG_ACCURATEDCT),
+            0);
+  tjDestroy(decoder);
+  return picture;
+}
+
+Picture decode_png(const Bytes& bytes) {
+  Picture picture;
+  spng_ctx* decoder = spng_ctx_new(0);
+  spng_ihdr header{};
+  EXPECT_EQ(spng_set_png_buffer(decoder, bytes.data(), bytes.size()), 0);
+  EXPECT_EQ(spng_get_ihdr(decoder, &header), 0);
+  EXPECT_EQ(header.bit_depth, 8);
+  EXPECT_EQ(header.color_type, SPNG_COLOR_TYPE_TRUECOLOR);
+  picture.width = static_cast<int>(header.width);
+  picture.height = static_cast<int>(header.height);
+  std::uint8_t intent = 0;
+  EXPECT_EQ(spng_get_srgb(decoder, &intent), 0) << "the picture does not say that it is sRGB";
+  std::size_t size = 0;
+  EXPECT_EQ(spng_decoded_image_size(decoder, SPNG_FMT_RGB8, &size), 0);
+  picture.rgb.resize(size);
+  EXPECT_EQ(spng_decode_image(decoder, picture.rgb.data(), size, SPNG_FMT_RGB8, 0), 0);
+  spng_ctx_free(decoder);
+  return picture;
+}
+
+double root_mean_square(const Picture& a, const Picture& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.rgb.size(); ++i) {
+    const double difference = static_cast<double>(a.rgb[i]) - b.rgb[i];
+    sum += difference * difference;
+  }
+  return std::sqrt(sum / static_cast<double>(a.rgb.size()));
+}
+
+const std::vector<std::pair<int, int>> sizes{{1, 1}, {1, 67}, {67, 1}, {17, 9}, {256, 64}};
+
+TEST(Jpeg, KeepsSizeSubsamplingAndColours) {
+  for (const auto& [width, height] : sizes) {
+    for (const Subsampling subsampling : {Subsampling::s444, Subsampling::s420}) {
+      const Picture picture = smooth_picture(width, height);
+      const auto bytes = encode_jpeg(picture.rgb, width, height, 95, subsampling);
+      ASSERT_TRUE(bytes) << bytes.error().message;
+      const Picture back = decode_jpeg(*bytes);
+      EXPECT_EQ(back.width, width);
+      EXPECT_EQ(back.height, height);
+      EXPECT_EQ(back.subsampling, subsampling == Subsampling::s444 ? TJSAMP_444 : TJSAMP_420);
+      EXPECT_LT(root_mean_square(picture, back), 3) << width << " x " << height;
+    }
+  }
+}
+
+TEST(Jpeg, HigherQualityIsNearerAndLarger) {
+  const Picture picture = busy_picture(64, 64);
+  const auto coarse = encode_jpeg(picture.rgb, 64, 64, 20, Subsampling::s444);
+  const auto fine = encode_jpeg(picture.rgb, 64, 64, 95, Subsampling::s444);
+  ASSERT_TRUE(coarse && fine);
+  EXPECT_LT(root_mean_square(picture, decode_jpeg(*fine)),
+            root_mean_square(picture, decode_jpeg(*coarse)));
+  EXPECT_GT(fine->size(), coarse->size());
+}
+
+TEST(Jpeg, RefusesWhatTheFormatCannotHold) {
+  const std::vector<std::uint8_t> pixel{1, 2, 3};
+  EXPECT_EQ(encode_jpeg(pixel, 1, 1, 0, Subsampling::s444).error().kind, ErrorKind::invalid);
+  EXPECT_EQ(encode_jpeg(pixel, 1, 1, 101, Subsampling::s444).error().kind, ErrorKind::invalid);
+  EXPECT_EQ(encode_jpeg({}, 0, 1, 90, Subsampling::s444).error().kind, ErrorKind::too_large);
+  EXPECT_EQ(encode_jpeg({}, 70000, 1, 90, Subsampling::s420).error().kind, ErrorKind::too_large);
+}
+
+TEST(Png, IsLossless) {
+  for (const auto& [width, height] : sizes) {
+    for (const Picture& picture : {smooth_picture(width, height), busy_picture(width, height)}) {
+      const auto bytes = encode_png(picture.rgb, width, height);
+      ASSERT_TRUE(bytes) << bytes.error().message;
+      const Picture back = decode_png(*bytes);
+      EXPECT_EQ(back.width, width);
+      EXPECT_EQ(back.height, height);
+      EXPECT_EQ(back.rgb, picture.rgb);
+    }
+  }
+}
+
+TEST(Png, CompressesAnEvenPicture) {
+  const std::vector<std::uint8_t> rgb(std::size_t{3} * 256 * 256, 40);
+  const auto bytes = encode_png(rgb, 256, 256);
+  ASSERT_TRUE(bytes);
+  EXPECT_LT(bytes->size(), rgb.size() / 50);
+}
+
+TEST(Png, RefusesAnEmptyPicture) {
+  EXPECT_EQ(encode_png({}, 0, 4).error().kind, ErrorKind::invalid);
+}
+
+// NPY 1.0: "\x93NUMPY", 1, 0, u16 header length, a Python dict ending with a line feed, values from
+// a multiple of 64 on.
+TEST(Npy, HeaderAndValuesAreWhereTheFormatPutsThem) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {1, 67}, {67, 1}, {1280, 720}}) {
+    std::vector<float> rgba(4 * static_cast<std::size_t>(width * height));
+    for (std::size_t i = 0; i < rgba.size(); ++i) rgba[i] = 0.25F * static_cast<float>(i) - 3.0F;
+    const auto bytes = encode_npy(rgba, width, height);
+    ASSERT_TRUE(bytes) << bytes.error().message;
+
+    ASSERT_GT(bytes->size(), 10U);
+    EXPECT_EQ(std::string(bytes->begin() + 1, bytes->begin() + 6), "NUMPY");
+    EXPECT_EQ((*bytes)[0], 0x93);
+    EXPECT_EQ((*bytes)[6], 1);
+    EXPECT_EQ((*bytes)[7], 0);
+    const std::size_t header_bytes = (*bytes)[8] + 256U * (*bytes)[9];
+    const std::size_t values_at = 10 + header_bytes;
+    EXPECT_EQ(values_at % 64, 0U);
+    ASSERT_EQ(bytes->size(), values_at + 4 * rgba.size());
+
+    const std::string header(bytes->begin() + 10, bytes->begin() + static_cast<long>(values_at));
+    EXPECT_EQ(header.back(), '\n');
+    EXPECT_NE(header.find("'descr': '<f4'"), std::string::npos);
+    EXPECT_NE(header.find("'fortran_order': False"), std::string::npos);
+    EXPECT_NE(
+        header.find("'shape': (" + std::to_string(height) + ", " + std::to_string(width) + ", 4)"),
+        std::string::npos);
+    for (const std::size_t i : {std::size_t{0}, rgba.size() / 2, rgba.size() - 1}) {
+      const std::uint8_t* at = bytes->data() + values_at + 4 * i;
+      const std::uint32_t bits =
+          at[0] | at[1] << 8 | at[2] << 16 | static_cast<std::uint32_t>(at[3]) << 24;
+      float value = 0;
+      std::memcpy(&value, &bits, sizeof value);
+      EXPECT_EQ(value, rgba[i]);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace windsplat::image

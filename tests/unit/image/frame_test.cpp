@@ -1,0 +1,184 @@
+// frame::produce on a built-in sample: sizes, levels, formats, report; and what is told of a frame.
+#include "server/frame/frame.hpp"
+
+#include <gtest/gtest.h>
+#include <spng.h>
+
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/data/store.hpp"
+#include "server/frame/frame_info.hpp"
+
+namespace windsplat::frame {
+namespace {
+
+class Produce : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto source = data::open_sample("tornado", {16, 16, 16}, 2);
+    ASSERT_TRUE(source) << source.error().message;
+    dataset = std::make_unique<data::Dataset>(std::move(*source), "tornado", 1ULL << 30);
+    view.dataset = "tornado";
+    view.image.width = 96;
+    view.image.height = 64;
+  }
+
+  Result<Frame> produce_as(Format format, int level = 0) {
+    Encoding encoding;
+    encoding.format = format;
+    encoding.level = level;
+    return produce(view, *dataset, encoding, pool, cancel);
+  }
+
+  std::unique_ptr<data::Dataset> dataset;
+  protocol::View view;
+  ThreadPool pool{2};
+  CancelToken cancel;
+};
+
+TEST_F(Produce, EachFormatIsWhatItsFirstBytesSay) {
+  const auto jpeg = produce_as(Format::jpeg);
+  const auto png = produce_as(Format::png);
+  const auto npy = produce_as(Format::npy);
+  ASSERT_TRUE(jpeg) << jpeg.error().message;
+  ASSERT_TRUE(png && npy);
+  EXPECT_EQ(std::memcmp(jpeg->bytes.data(), "\xff\xd8\xff", 3), 0);
+  EXPECT_EQ(std::memcmp(png->bytes.data(), "\x89PNG\r\n\x1a\n", 8), 0);
+  EXPECT_EQ(std::memcmp(npy->bytes.data(), "\x93NUMPY", 6), 0);
+}
+
+TEST_F(Produce, LevelHalvesBothSidesAndKeepsAtLeastOnePixel) {
+  for (const auto& [level, width, height] :
+       {std::array{0, 96, 64}, {1, 48, 32}, {3, 12, 8}, {6, 1, 1}, {15, 1, 1}}) {
+    const auto frame = produce_as(Format::png, level);
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_EQ(frame->width, width) << level;
+    EXPECT_EQ(frame->height, height) << level;
+    EXPECT_EQ(frame->view.image.width, 96) << "the view told is the one asked for";
+  }
+  EXPECT_EQ(produce_as(Format::png, -1).error().kind, ErrorKind::invalid);
+  EXPECT_EQ(produce_as(Format::png, 16).error().kind, ErrorKind::invalid);
+}
+
+// Coverage is a mean over the picture: resolution must not change how much of it is lit.
+TEST_F(Produce, ALowerLevelShowsTheSamePicture) {
+  view.image.width = 256;
+  view.image.height = 192;
+  const auto mean_opacity = [](const Frame& frame) {
+    const std::size_t values = 4 * static_cast<std::size_t>(frame.width * frame.height);
+    std::vector<float> rgba(values);
+    std::memcpy(rgba.data(), frame.bytes.data() + frame.bytes.size() - 4 * values, 4 * values);
+    double sum = 0;
+    for (std::size_t i = 3; i < values; i += 4) sum += rgba[i];
+    return sum / static_cast<double>(frame.width * frame.height);
+  };
+  const auto whole = produce_as(Format::npy, 0);
+  const auto half = produce_as(Format::npy, 1);
+  ASSERT_TRUE(whole && half);
+  EXPECT_GT(mean_opacity(*whole), 0);
+  EXPECT_NEAR(mean_opacity(*half) / mean_opacity(*whole), 1, 0.1);
+}
+
+TEST_F(Produce, ReportNamesTheFieldsShownAndTheirBytes) {
+  const auto both = produce_as(Format::jpeg);
+  ASSERT_TRUE(both) << both.error().message;
+  const auto& info = dataset->info();
+  const data::FieldInfo* wind = info.first(data::FieldKind::vector);
+  const data::FieldInfo* scalar = info.first(data::FieldKind::scalar);
+  ASSERT_TRUE(wind != nullptr && scalar != nullptr);
+
+  constexpr std::int64_t one_component = std::int64_t{16} * 16 * 16 * 4;
+  protocol::ScalarView medium;
+  medium.field = scalar->name;
+  medium.extinction = {{-1e6, 1.0}, {1e6, 1.0}};
+  protocol::ScalarView clear = medium;
+  clear.extinction = {{-1e6, 0.0}, {1e6, 0.0}};
+
+  view.scalars = {clear, medium, medium};
+  const auto with_medium = produce_as(Format::jpeg);
+  ASSERT_TRUE(with_medium) << with_medium.error().message;
+  EXPECT_EQ(with_medium->work.fields, (std::vector<std::string>{wind->name, scalar->name}));
+  EXPECT_EQ(with_medium->work.bytes,
+            one_component * static_cast<std::int64_t>(wind->components.size() + 1));
+
+  view.vector.field.kind = protocol::FieldChoice::Kind::none;
+  const auto medium_only = produce_as(Format::jpeg);
+  ASSERT_TRUE(medium_only);
+  EXPECT_EQ(medium_only->work.fields, std::vector<std::string>{scalar->name});
+  EXPECT_EQ(medium_only->work.bytes, one_component);
+
+  view.scalars = {clear};
+  const auto nothing = produce_as(Format::jpeg);
+  ASSERT_TRUE(nothing);
+  EXPECT_TRUE(nothing->work.fields.empty());
+  EXPECT_EQ(nothing->work.bytes, 0);
+}
+
+TEST_F(Produce, BackgroundIsOfThePictureButNotOfTheArray) {
+  view.vector.field.kind = protocol::FieldChoice::Kind::none;
+  view.scalars.emplace();
+  view.image.background = "#204060";
+  const auto png = produce_as(Format::png);
+  const auto npy = produce_as(Format::npy);
+  ASSERT_TRUE(png && npy);
+  spng_ctx* decoder = spng_ctx_new(0);
+  std::vector<std::uint8_t> rgb(std::size_t{3} * 96 * 64);
+  ASSERT_EQ(spng_set_png_buffer(decoder, png->bytes.data(), png->bytes.size()), 0);
+  ASSERT_EQ(spng_decode_image(decoder, rgb.data(), rgb.size(), SPNG_FMT_RGB8, 0), 0);
+  spng_ctx_free(decoder);
+  for (std::size_t i = 0; i < rgb.size(); i += 3) {
+    ASSERT_EQ(rgb[i], 0x20);
+    ASSERT_EQ(rgb[i + 1], 0x40);
+    ASSERT_EQ(rgb[i + 2], 0x60);
+  }
+  const std::size_t values_at = npy->bytes.size() - std::size_t{96} * 64 * 16;
+  for (std::size_t i = values_at; i < npy->bytes.size(); ++i) ASSERT_EQ(npy->bytes[i], 0);
+}
+
+TEST_F(Produce, AnyNumberOfThreadsGivesTheSameBytes) {
+  ThreadPool one(1);
+  const auto alone = produce(view, *dataset, {Format::png}, one, cancel);
+  const auto shared = produce_as(Format::png);
+  ASSERT_TRUE(alone && shared);
+  EXPECT_EQ(alone->bytes, shared->bytes);
+}
+
+TEST_F(Produce, WrongViewsAndCancelledFramesAreErrors) {
+  view.step = 2;
+  const auto late = produce_as(Format::jpeg);
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().kind, ErrorKind::invalid);
+  ASSERT_EQ(late.error().at.size(), 1U);
+  EXPECT_EQ(late.error().at[0].pointer, "/step");
+
+  view.step = 0;
+  cancel.cancel();
+  const auto cancelled = produce_as(Format::jpeg);
+  ASSERT_FALSE(cancelled);
+  EXPECT_EQ(cancelled.error().kind, ErrorKind::cancelled);
+}
+
+TEST_F(Produce, FrameInfoTellsTheReport) {
+  const auto frame = produce_as(Format::jpeg, 1);
+  ASSERT_TRUE(frame) << frame.error().message;
+  view.vector.stride = 3;
+  const protocol::FrameInfo info = frame_info(*frame, view);
+  EXPECT_EQ(info.method, "kernel");
+  EXPECT_EQ(info.compositing, "analytic");
+  EXPECT_EQ(info.stride, 3);
+  EXPECT_EQ(info.width, 48);
+  EXPECT_EQ(info.height, 32);
+  EXPECT_EQ(info.error_kind, "none");
+  EXPECT_FALSE(info.error_value || info.jpeg_error || info.slab_thickness);
+  EXPECT_EQ(info.samples, frame->work.samples);
+  EXPECT_GT(info.samples, 0);
+  EXPECT_EQ(info.fields, frame->work.fields);
+  EXPECT_EQ(info.bytes, frame->work.bytes);
+  EXPECT_EQ(info.variant, frame->work.variant);
+}
+
+}  // namespace
+}  // namespace windsplat::frame

@@ -1,0 +1,200 @@
+// The camera: which way is east and up in the picture, orbits, framing, refusals.
+#include "server/scene/camera.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "server/scene/build.hpp"
+#include "tests/unit/scene/fake.hpp"
+
+namespace windsplat::scene {
+namespace {
+
+struct Pixel {
+  double x, y, depth;
+};
+
+// Pixel coordinates of a world point, row 0 on top: written from the Camera's own description.
+Pixel project(const Camera& camera, const glm::dvec3& point) {
+  const glm::dvec3 p = point - camera.eye;
+  const double depth = glm::dot(p, camera.forward);
+  const double half = camera.perspective ? depth * camera.half_height : camera.half_height;
+  return {camera.width / 2.0 + glm::dot(p, camera.right) / half * camera.height / 2.0,
+          camera.height / 2.0 - glm::dot(p, camera.up) / half * camera.height / 2.0, depth};
+}
+
+Scene default_scene(data::Dataset& dataset, const protocol::View& view = {}) {
+  auto complete = complete_view(view, dataset);
+  EXPECT_TRUE(complete);
+  auto scene = build_scene(*complete, dataset);
+  EXPECT_TRUE(scene);
+  return std::move(*scene);
+}
+
+std::unique_ptr<data::Dataset> atmosphere() {
+  return dataset_of(std::make_unique<FakeSource>(atmosphere_grid(),
+                                                 std::vector<data::FieldInfo>{wind_info()}, 1));
+}
+
+TEST(Camera, DefaultPictureHasEastRightNorthFarAndLowPressureHigh) {
+  auto dataset = atmosphere();
+  const Scene scene = default_scene(*dataset);
+  const auto& at = scene.lattice.positions;
+  const glm::dvec3 origin(at[0][1], at[1][1], at[2][1]);
+  const Pixel here = project(scene.camera, origin);
+  const Pixel east = project(scene.camera, {at[0][2], at[1][1], at[2][1]});
+  const Pixel north = project(scene.camera, {at[0][1], at[1][2], at[2][1]});
+  const Pixel lower_pressure = project(scene.camera, {at[0][1], at[1][1], at[2][2]});
+  EXPECT_GT(east.x, here.x + 10);
+  EXPECT_LT(north.y, here.y - 10);
+  EXPECT_GT(north.depth, here.depth);
+  EXPECT_LT(lower_pressure.y, here.y - 10);
+}
+
+TEST(Camera, AxesAreOrthonormalAndRightHanded) {
+  auto dataset = atmosphere();
+  protocol::View view;
+  view.camera.eye = protocol::Vec3{1, -2, 3};
+  view.camera.up = {0.3, 0.1, 5};
+  const Camera camera = default_scene(*dataset, view).camera;
+  EXPECT_NEAR(glm::dot(camera.right, camera.up), 0, 1e-14);
+  EXPECT_NEAR(glm::dot(camera.right, camera.forward), 0, 1e-14);
+  EXPECT_NEAR(glm::length(camera.up), 1, 1e-14);
+  EXPECT_NEAR(glm::length(glm::cross(camera.right, camera.up) + camera.forward), 0, 1e-14);
+  EXPECT_GT(camera.up.z, 0);
+}
+
+TEST(Camera, HalfHeightFollowsTheProjection) {
+  auto dataset = atmosphere();
+  protocol::View view;
+  view.camera.fov_y = 90;
+  EXPECT_NEAR(default_scene(*dataset, view).camera.half_height, 1.0, 1e-12);
+  view.camera.projection = protocol::Projection::orthographic;
+  view.camera.height = 3.0;
+  const Camera camera = default_scene(*dataset, view).camera;
+  EXPECT_FALSE(camera.perspective);
+  EXPECT_NEAR(camera.half_height, 1.5, 1e-12);
+}
+
+TEST(Orbit, AzimuthZeroLooksNorthAndPositiveMovesEast) {
+  auto dataset = atmosphere();
+  const Lattice lattice = *place_lattice(dataset->info().grid, {});
+  protocol::View view;
+  orbit(view, lattice, 0, 0, 1);
+  EXPECT_NEAR((*view.camera.eye)[0], 0, 1e-9);
+  EXPECT_LT((*view.camera.eye)[1], -1);
+  EXPECT_NEAR((*view.camera.eye)[2], 0, 1e-9);
+  orbit(view, lattice, 90, 0, 1);
+  EXPECT_GT((*view.camera.eye)[0], 1);
+  EXPECT_NEAR((*view.camera.eye)[1], 0, 1e-9);
+  orbit(view, lattice, 0, 30, 1);
+  const protocol::Vec3 eye = *view.camera.eye;
+  EXPECT_NEAR(std::atan2(eye[2], -eye[1]), 30 * std::numbers::pi / 180, 1e-12);
+}
+
+TEST(Orbit, StraightDownHasNorthUpAndLeavesAValidCamera) {
+  auto dataset = atmosphere();
+  const Lattice lattice = *place_lattice(dataset->info().grid, {});
+  protocol::View view;
+  orbit(view, lattice, 0, 90, 1);
+  const Scene scene = default_scene(*dataset, view);
+  const Pixel centre = project(scene.camera, {0, 0, 0});
+  EXPECT_LT(project(scene.camera, {0, 0.1, 0}).y, centre.y - 1);
+  EXPECT_GT(project(scene.camera, {0.1, 0, 0}).x, centre.x + 1);
+  orbit(view, lattice, 20, 40, 1);
+  EXPECT_EQ(view.camera.up, (protocol::Vec3{0, 0, 1}));
+}
+
+TEST(Orbit, ZoomOneFramesTheWholeBoxTightlyInEitherProjection) {
+  auto dataset = sample_dataset("climate", {16, 8, 4});
+  for (const auto projection :
+       {protocol::Projection::perspective, protocol::Projection::orthographic}) {
+    for (const std::array<int, 2> size : {std::array<int, 2>{1280, 720}, {300, 900}, {1, 1}}) {
+      for (const double fov : {0.01, 35.0, 120.0}) {
+        protocol::View view;
+        view.camera.projection = projection;
+        view.camera.fov_y = fov;
+        view.image.width = size[0];
+        view.image.height = size[1];
+        const Lattice lattice = *place_lattice(dataset->info().grid, {});
+        orbit(view, lattice, 40, 25, 1);
+        const Camera camera = *resolve_camera(view, lattice);
+        double widest = 0;
+        for (int n = 0; n < 8; ++n) {
+          const glm::dvec3 corner((n & 1) != 0 ? lattice.box_max.x : lattice.box_min.x,
+                                  (n & 2) != 0 ? lattice.box_max.y : lattice.box_min.y,
+                                  (n & 4) != 0 ? lattice.box_max.z : lattice.box_min.z);
+          const Pixel p = project(camera, corner);
+          EXPECT_GT(p.depth, camera.near);
+          widest =
+              std::max({widest, std::abs(2 * p.x / size[0] - 1), std::abs(2 * p.y / size[1] - 1)});
+        }
+        EXPECT_LT(widest, 1.0);
+        if (fov < 100) {
+          EXPECT_GT(widest, 0.9);
+        }
+      }
+    }
+  }
+}
+
+TEST(Orbit, ZoomTwoDrawsTheCentreTwiceAsLarge) {
+  auto dataset = atmosphere();
+  const Lattice lattice = *place_lattice(dataset->info().grid, {});
+  for (const auto projection :
+       {protocol::Projection::perspective, protocol::Projection::orthographic}) {
+    std::array<double, 2> offset{};
+    for (int n = 0; n < 2; ++n) {
+      protocol::View view;
+      view.camera.projection = projection;
+      orbit(view, lattice, 0, 0, 1 + n);
+      const Camera camera = *resolve_camera(view, lattice);
+      offset[static_cast<std::size_t>(n)] = project(camera, {1e-4, 0, 0}).x - 640.0;
+    }
+    EXPECT_NEAR(offset[1] / offset[0], 2.0, 1e-6);
+  }
+}
+
+std::string pointer_of(const Result<protocol::View>& result) {
+  if (result) return "accepted";
+  if (result.error().kind != ErrorKind::invalid || result.error().at.empty()) return "other error";
+  return result.error().at[0].pointer;
+}
+
+TEST(Camera, ImpossibleCamerasAreRefusedByName) {
+  auto dataset = atmosphere();
+  protocol::View view;
+  view.camera.eye = protocol::Vec3{0, 0, 4};
+  EXPECT_EQ(pointer_of(complete_view(view, *dataset)), "/camera/up");
+  view.camera.up = {0, 0, -1e3};
+  EXPECT_EQ(pointer_of(complete_view(view, *dataset)), "/camera/up");
+  view.camera.up = {0, 0, 0};
+  EXPECT_EQ(pointer_of(complete_view(view, *dataset)), "/camera/up");
+  view.camera.up = {0, 1, 0};
+  EXPECT_EQ(pointer_of(complete_view(view, *dataset)), "accepted");
+  view.camera.target = view.camera.eye;
+  EXPECT_EQ(pointer_of(complete_view(view, *dataset)), "/camera/eye");
+}
+
+TEST(DepthCue, ItsEndsAreTheBoxsNearestAndFarthestCorners) {
+  auto dataset = atmosphere();
+  protocol::View view;
+  view.camera.eye = protocol::Vec3{0, -5, 0};
+  view.depth_cue.strength = 0.4;
+  Scene scene = default_scene(*dataset, view);
+  // Looking along y at a box that reaches from -0.75 to 0.75.
+  EXPECT_NEAR(scene.depth_cue.near, 4.25, 1e-12);
+  EXPECT_NEAR(scene.depth_cue.far, 5.75, 1e-12);
+  EXPECT_EQ(scene.depth_cue.strength, 0.4);
+  view.depth_cue.near = 0.5;
+  view.depth_cue.far = 2.0;
+  scene = default_scene(*dataset, view);
+  EXPECT_NEAR(scene.depth_cue.near, 5.0, 1e-12);
+  EXPECT_NEAR(scene.depth_cue.far, 7.25, 1e-12);
+}
+
+}  // namespace
+}  // namespace windsplat::scene

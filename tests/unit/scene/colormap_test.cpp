@@ -1,0 +1,91 @@
+// Colour maps: their ends, their lightness, and colours told as text.
+#include "server/scene/colormap.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace windsplat::scene {
+namespace {
+
+// CIE relative luminance of linear sRGB.
+double luminance(const std::array<float, 3>& c) {
+  return 0.2126 * static_cast<double>(c[0]) + 0.7152 * static_cast<double>(c[1]) +
+         0.0722 * static_cast<double>(c[2]);
+}
+
+TEST(ColorMap, EndsAreThePublishedOnes) {
+  const auto viridis = color_map_srgb("viridis", 256);
+  EXPECT_EQ(viridis.front(), (std::array<unsigned char, 3>{0x44, 0x01, 0x54}));
+  EXPECT_EQ(viridis.back(), (std::array<unsigned char, 3>{0xfd, 0xe7, 0x25}));
+  const auto inferno = color_map_srgb("inferno", 2);
+  EXPECT_EQ(inferno[0], (std::array<unsigned char, 3>{0x00, 0x00, 0x04}));
+  EXPECT_EQ(inferno[1], (std::array<unsigned char, 3>{0xfc, 0xff, 0xa4}));
+}
+
+TEST(ColorMap, PassesThroughItsStops) {
+  // The eleven stops of viridis fall on every tenth of 1001 entries' way.
+  EXPECT_EQ(color_map_srgb("viridis", 11)[5], (std::array<unsigned char, 3>{0x21, 0x91, 0x8c}));
+}
+
+TEST(ColorMap, SequentialMapsGrowLighterAndDivergingOnesPeakInTheMiddle) {
+  ASSERT_GE(color_maps().size(), 10U);
+  for (const ColorMap& map : color_maps()) {
+    const auto entries = color_map_linear(map.name, 64);
+    ASSERT_EQ(entries.size(), 64U);
+    std::size_t lightest = 0;
+    for (std::size_t n = 1; n < entries.size(); ++n) {
+      if (luminance(entries[n]) > luminance(entries[lightest])) lightest = n;
+      if (map.kind == "sequential") {
+        EXPECT_GT(luminance(entries[n]), luminance(entries[n - 1]) - 1e-6) << map.name << " " << n;
+      }
+    }
+    if (map.kind == "diverging") {
+      EXPECT_NEAR(static_cast<double>(lightest), 31.5, 3.0) << map.name;
+    } else {
+      EXPECT_EQ(map.kind, "sequential");
+      EXPECT_EQ(lightest, 63U) << map.name;
+    }
+  }
+}
+
+TEST(ColorMap, GraysAreEvenInPerceivedLightness) {
+  // OKLab's lightness of a gray is the cube root of its linear value.
+  const auto grays = color_map_linear("grays", 5);
+  for (std::size_t n = 0; n < 5; ++n) {
+    const double lightness = static_cast<double>(n) / 4.0;
+    EXPECT_NEAR(static_cast<double>(grays[n][1]), lightness * lightness * lightness, 1e-5);
+    EXPECT_NEAR(static_cast<double>(grays[n][0]), static_cast<double>(grays[n][2]), 1e-4);
+  }
+}
+
+TEST(ColorMap, OneEntryIsTheLowEndAndUnknownNamesAreUnknown) {
+  EXPECT_EQ(color_map_srgb("plasma", 1)[0], (std::array<unsigned char, 3>{0x0d, 0x08, 0x87}));
+  EXPECT_TRUE(has_color_map("coolwarm"));
+  EXPECT_FALSE(has_color_map("jet"));
+  EXPECT_FALSE(has_color_map(""));
+}
+
+TEST(Color, ParsesSixHexDigitsOnly) {
+  const auto orange = parse_color("#ff8000");
+  ASSERT_TRUE(orange);
+  EXPECT_FLOAT_EQ((*orange)[0], 1.0F);
+  EXPECT_NEAR((*orange)[1], std::pow((128.0 / 255.0 + 0.055) / 1.055, 2.4), 1e-6);
+  EXPECT_FLOAT_EQ((*orange)[2], 0.0F);
+  EXPECT_EQ(parse_color("#FF8000"), orange);
+  for (const char* bad : {"", "ff8000", "#ff800", "#ff80000", "#ff80g0", "red"}) {
+    EXPECT_FALSE(parse_color(bad)) << bad;
+  }
+}
+
+TEST(Color, TransferCurveGoesBothWays) {
+  EXPECT_NEAR(static_cast<double>(srgb_from_linear(0.5F)), 0.735357, 1e-5);
+  for (int n = 0; n <= 100; ++n) {
+    const float v = static_cast<float>(n) / 100.0F;
+    EXPECT_NEAR(static_cast<double>(linear_from_srgb(srgb_from_linear(v))), static_cast<double>(v),
+                1e-6);
+  }
+}
+
+}  // namespace
+}  // namespace windsplat::scene

@@ -1,0 +1,275 @@
+// Defaults and refusals: what a view becomes for a dataset, and what is refused by name.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "server/scene/build.hpp"
+#include "server/scene/colormap.hpp"
+#include "server/scene/defaults.hpp"
+#include "tests/unit/scene/fake.hpp"
+
+namespace windsplat::scene {
+namespace {
+
+using protocol::ColorBy;
+using protocol::FieldChoice;
+using protocol::View;
+
+std::unique_ptr<data::Dataset> weather(std::shared_ptr<FakeSource::Reads> reads = nullptr) {
+  return dataset_of(std::make_unique<FakeSource>(
+      atmosphere_grid(),
+      std::vector<data::FieldInfo>{scalar_info("temperature", "K"), wind_info(),
+                                   scalar_info("cloud", "g kg-1")},
+      3, std::move(reads)));
+}
+
+View completed(const View& view, data::Dataset& dataset) {
+  auto full = complete_view(view, dataset);
+  EXPECT_TRUE(full);
+  return std::move(*full);
+}
+
+// Every optional of a view as text, to compare two of them.
+std::string told(const View& view) {
+  const auto vec = [](const protocol::Vec3& v) {
+    return std::to_string(v[0]) + " " + std::to_string(v[1]) + " " + std::to_string(v[2]) + ";";
+  };
+  std::string out = view.dataset + vec(view.camera.eye.value()) + vec(view.camera.target.value()) +
+                    std::to_string(view.camera.height.value()) + view.vector.field.name +
+                    std::to_string(view.vector.length.value()) +
+                    std::to_string(static_cast<int>(view.vector.color.by.value())) +
+                    std::to_string(view.vector.color.range.value()[0]) + " " +
+                    std::to_string(view.vector.color.range.value()[1]) +
+                    std::to_string(view.vector.magnitude_range.value()[1]) +
+                    std::to_string(view.vector.min_magnitude.value());
+  for (const protocol::ScalarView& scalar : view.scalars.value()) {
+    out += scalar.field + scalar.color.map.value() + std::to_string(scalar.color.range.value()[1]);
+    for (const auto& point : scalar.extinction.value()) {
+      out += std::to_string(point[0]) + ":" + std::to_string(point[1]);
+    }
+  }
+  return out;
+}
+
+TEST(CompleteView, FillsEverythingAndIsIdempotent) {
+  for (const std::string& name : data::sample_names()) {
+    auto dataset = sample_dataset(name, {24, 16, 12});
+    const View full = completed(View{}, *dataset);
+    EXPECT_EQ(full.dataset, name);
+    EXPECT_EQ(full.vector.field.kind, FieldChoice::Kind::named);
+    EXPECT_FALSE(full.scalars->empty()) << name;
+    const std::uint64_t loads = dataset->loads();
+    EXPECT_EQ(told(completed(full, *dataset)), told(full));
+    EXPECT_EQ(dataset->loads(), loads);
+  }
+}
+
+TEST(CompleteView, DefaultsAreFitForTheSchema) {
+  for (const std::string& name : data::sample_names()) {
+    auto dataset = sample_dataset(name, {24, 16, 12});
+    const View full = *default_view(*dataset);
+    EXPECT_GT(*full.vector.length, 0.0);
+    EXPECT_LE(*full.vector.length, 10.0);
+    EXPECT_LT((*full.vector.magnitude_range)[0], (*full.vector.magnitude_range)[1]);
+    EXPECT_GE(*full.vector.min_magnitude, 0.0);
+    EXPECT_LT(*full.vector.min_magnitude, (*full.vector.magnitude_range)[1]);
+    EXPECT_LT((*full.vector.color.range)[0], (*full.vector.color.range)[1]);
+    for (const protocol::ScalarView& scalar : *full.scalars) {
+      EXPECT_TRUE(has_color_map(*scalar.color.map));
+      EXPECT_LT((*scalar.color.range)[0], (*scalar.color.range)[1]);
+      EXPECT_LE(scalar.extinction->size(), 64U);
+      EXPECT_EQ(scalar.extinction->front()[1], 0.0);
+      EXPECT_GT(scalar.extinction->back()[1], 0.0);
+    }
+  }
+}
+
+TEST(CompleteView, KeepsWhatTheUserSaid) {
+  auto dataset = weather();
+  View view;
+  view.vector.length = 0.7;
+  view.vector.magnitude_range = protocol::Range{1, 2};
+  view.vector.min_magnitude = 0.25;
+  view.vector.color.by = ColorBy::rise;
+  view.camera.eye = protocol::Vec3{3, 1, 1};
+  protocol::ScalarView scalar;
+  scalar.field = "temperature";
+  scalar.color.map = "ice";
+  scalar.color.range = protocol::Range{300, 200};  // reversed on purpose
+  scalar.extinction = {{200, 0}, {300, 5}};
+  view.scalars = {scalar};
+  const View full = completed(view, *dataset);
+  EXPECT_EQ(full.vector.length, 0.7);
+  EXPECT_EQ(full.vector.magnitude_range, (protocol::Range{1, 2}));
+  EXPECT_EQ(full.vector.min_magnitude, 0.25);
+  EXPECT_EQ(full.vector.color.range, (protocol::Range{0, 1}));
+  EXPECT_EQ(full.camera.eye, (protocol::Vec3{3, 1, 1}));
+  ASSERT_EQ(full.scalars->size(), 1U);
+  EXPECT_EQ((*full.scalars)[0].color.range, (protocol::Range{300, 200}));
+  EXPECT_EQ((*full.scalars)[0].color.map, "ice");
+  EXPECT_EQ(dataset->loads(), 0U);  // every range was told
+}
+
+TEST(CompleteView, RangesComeFromTheFirstStep) {
+  auto dataset = weather();
+  View later;
+  later.step = 2;
+  EXPECT_EQ(told(completed(later, *dataset)), told(completed(View{}, *dataset)));
+}
+
+TEST(CompleteView, ShowsCloudsButNoTemperatureBesideAWind) {
+  auto dataset = weather();
+  const View full = completed(View{}, *dataset);
+  ASSERT_EQ(full.scalars->size(), 1U);
+  EXPECT_EQ((*full.scalars)[0].field, "cloud");
+  EXPECT_EQ(full.vector.field.name, "wind");
+}
+
+TEST(CompleteView, WithoutAVectorTheFirstScalarIsShown) {
+  auto dataset = dataset_of(std::make_unique<FakeSource>(
+      atmosphere_grid(),
+      std::vector<data::FieldInfo>{scalar_info("temperature", "K"), scalar_info("z", "m")}, 1));
+  const View full = completed(View{}, *dataset);
+  EXPECT_EQ(full.vector.field.kind, FieldChoice::Kind::none);
+  ASSERT_EQ(full.scalars->size(), 1U);
+  EXPECT_EQ((*full.scalars)[0].field, "temperature");
+}
+
+TEST(CompleteView, AFieldThatIsTheSameEverywhereStillHasRanges) {
+  for (const double value : {0.0, -3.0, 1e-35, 1e30}) {
+    auto source = std::make_unique<FakeSource>(
+        atmosphere_grid(), std::vector<data::FieldInfo>{wind_info(), scalar_info("cloud", "kg")},
+        1);
+    source->constant = std::make_unique<double>(value);
+    auto dataset = dataset_of(std::move(source));
+    const View full = completed(View{}, *dataset);
+    EXPECT_LT((*full.vector.magnitude_range)[0], (*full.vector.magnitude_range)[1]) << value;
+    const protocol::Range range = *(*full.scalars)[0].color.range;
+    EXPECT_LT(range[0], range[1]) << value;
+    EXPECT_TRUE(std::isfinite(range[0]) && std::isfinite(range[1])) << value;
+  }
+}
+
+TEST(CompleteView, AWhollyMaskedFieldStillHasRanges) {
+  auto source = std::make_unique<FakeSource>(
+      atmosphere_grid(), std::vector<data::FieldInfo>{wind_info(), scalar_info("cloud", "1")}, 1);
+  source->constant = std::make_unique<double>(std::nan(""));
+  auto dataset = dataset_of(std::move(source));
+  const View full = completed(View{}, *dataset);
+  EXPECT_EQ(full.vector.magnitude_range, (protocol::Range{0, 1}));
+  EXPECT_EQ((*full.scalars)[0].color.range, (protocol::Range{0, 1}));
+}
+
+TEST(CompleteView, LinesAreAboutFiveGridSpacingsLong) {
+  auto dataset = sample_dataset("tornado", {32, 32, 32});
+  View view;
+  EXPECT_NEAR(*completed(view, *dataset).vector.length, 5 * 2.0 / 32, 0.02);
+  view.vector.stride = 3;
+  EXPECT_NEAR(*completed(view, *dataset).vector.length, 15 * 2.0 / 32, 0.06);
+}
+
+TEST(CompleteView, AtmospheresAreColouredByHeightOthersByMagnitude) {
+  auto climate = sample_dataset("climate", {24, 16, 12});
+  auto tornado = sample_dataset("tornado", {24, 16, 12});
+  EXPECT_EQ(completed(View{}, *climate).vector.color.by, ColorBy::world_z);
+  EXPECT_EQ(completed(View{}, *tornado).vector.color.by, ColorBy::magnitude);
+}
+
+TEST(CompleteView, RefusesByPointer) {
+  auto dataset = weather();
+  const auto scalar = [](const std::string& field) {
+    protocol::ScalarView out;
+    out.field = field;
+    return out;
+  };
+  using Spoil = std::function<void(View&)>;
+  const std::vector<std::pair<std::string, Spoil>> cases = {
+      {"/step", [](View& v) { v.step = 3; }},
+      {"/step", [](View& v) { v.step = -1; }},
+      {"/vector/field",
+       [](View& v) {
+         v.vector.field = {FieldChoice::Kind::named, "gale"};
+       }},
+      {"/vector/field",
+       [](View& v) {
+         v.vector.field = {FieldChoice::Kind::named, "cloud"};
+       }},
+      {"/vector/color/map", [](View& v) { v.vector.color.map = "jet"; }},
+      {"/vector/color/constant", [](View& v) { v.vector.color.constant = "blue"; }},
+      {"/vector/color/range",
+       [](View& v) {
+         v.vector.color.range = protocol::Range{2, 2};
+       }},
+      {"/vector/magnitudeRange",
+       [](View& v) {
+         v.vector.magnitude_range = protocol::Range{2, 1};
+       }},
+      {"/vector/r1", [](View& v) { v.vector.r1 = 3; }},
+      {"/image/background", [](View& v) { v.image.background = "#12"; }},
+      {"/depthCue/near", [](View& v) { v.depth_cue.near = 1; }},
+      {"/scalars/0/field", [&](View& v) { v.scalars = {scalar("wind")}; }},
+      {"/scalars/1/field",
+       [&](View& v) {
+         v.scalars = {scalar("cloud"), scalar("fog")};
+       }},
+      {"/scalars/0/color/map",
+       [&](View& v) {
+         v.scalars = {scalar("cloud")};
+         (*v.scalars)[0].color.map = "rainbow";
+       }},
+      {"/scalars/0/color/range",
+       [&](View& v) {
+         v.scalars = {scalar("cloud")};
+         (*v.scalars)[0].color.range = protocol::Range{1, 1};
+       }},
+      {"/scalars/0/extinction/1",
+       [&](View& v) {
+         v.scalars = {scalar("cloud")};
+         (*v.scalars)[0].extinction = {{1, 0}, {0, 2}};
+       }},
+  };
+  for (const auto& [pointer, spoil] : cases) {
+    View view;
+    spoil(view);
+    const auto refused = complete_view(view, *dataset);
+    ASSERT_FALSE(refused) << pointer;
+    EXPECT_EQ(refused.error().kind, ErrorKind::invalid) << pointer;
+    ASSERT_FALSE(refused.error().at.empty()) << pointer;
+    EXPECT_EQ(refused.error().at[0].pointer, pointer);
+  }
+}
+
+TEST(CompleteView, StepEdgesInAnOpacityFunctionAreAllowed) {
+  auto dataset = weather();
+  View view;
+  protocol::ScalarView scalar;
+  scalar.field = "cloud";
+  scalar.extinction = {{0, 0}, {5, 0}, {5, 9}};
+  view.scalars = {scalar};
+  EXPECT_TRUE(complete_view(view, *dataset));
+}
+
+TEST(Defaults, NiceNumbersRoundUp) {
+  EXPECT_DOUBLE_EQ(nice_above(0.9), 1.0);
+  EXPECT_DOUBLE_EQ(nice_above(1.0), 1.0);
+  EXPECT_DOUBLE_EQ(nice_above(1.01), 1.2);
+  EXPECT_DOUBLE_EQ(nice_above(61.0), 80.0);
+  EXPECT_DOUBLE_EQ(nice_above(81.0), 100.0);
+  EXPECT_NEAR(nice_above(3.3e-8), 4e-8, 1e-20);
+}
+
+TEST(Defaults, QuantilesAreOfTheUnmaskedMagnitudes) {
+  data::Volume volume;
+  volume.dims = {5, 1, 1};
+  volume.components = 2;
+  volume.values = {3, 0, 6, std::nanf(""), 9, 4, 0, 8, std::nanf(""), 12};
+  data::finish_volume(volume);
+  EXPECT_EQ(quantiles(volume, 0.0, 1.0), (protocol::Range{0, 15}));
+  EXPECT_EQ(quantiles(volume, 0.34, 0.67), (protocol::Range{5, 10}));
+}
+
+}  // namespace
+}  // namespace windsplat::scene

@@ -1,0 +1,155 @@
+// Where samples stand: closed forms of placement, proportion and scale.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/scene/build.hpp"
+#include "tests/unit/scene/fake.hpp"
+
+namespace windsplat::scene {
+namespace {
+
+using data::AxisKind;
+using protocol::GeometryView;
+using protocol::VerticalPlacement;
+
+data::Grid metres(std::vector<double> x, std::vector<double> y, std::vector<double> z) {
+  data::Grid grid;
+  grid.axes = {axis(AxisKind::cartesian, "m", std::move(x)),
+               axis(AxisKind::cartesian, "m", std::move(y)),
+               axis(AxisKind::cartesian, "m", std::move(z))};
+  return grid;
+}
+
+TEST(Lattice, EvenAxesReachHalfACellBeyondTheirSamples) {
+  const auto lattice = place_lattice(metres({0, 1, 2, 3}, {0, 1}, {0, 1}), GeometryView{});
+  ASSERT_TRUE(lattice);
+  // Four cells make the longest edge 2, so a cell is 0.5.
+  EXPECT_EQ(lattice->dims, (std::array<int, 3>{4, 2, 2}));
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(lattice->positions[0][i], -0.75 + 0.5 * static_cast<double>(i), 1e-14);
+    EXPECT_NEAR(lattice->spacing[0][i], 0.5, 1e-14);
+  }
+  EXPECT_NEAR(lattice->positions[1][1], 0.25, 1e-14);
+  EXPECT_NEAR(lattice->box_max.x, 1.0, 1e-14);
+  EXPECT_NEAR(lattice->box_min.y, -0.5, 1e-14);
+  EXPECT_NEAR(lattice->box_max.z, 0.5, 1e-14);
+}
+
+TEST(Lattice, UnevenAxesKeepTheirPlacesAndMeetMidway) {
+  const auto lattice = place_lattice(metres({0, 1, 3, 7}, {0, 1}, {0, 1}), GeometryView{});
+  ASSERT_TRUE(lattice);
+  // Edges -0.5, 0.5, 2, 5, 9: 9.5 long, centred on 4.25.
+  const double scale = 2.0 / 9.5;
+  const std::array<double, 4> at = {0, 1, 3, 7};
+  const std::array<double, 4> width = {1, 1.5, 3, 4};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(lattice->positions[0][i], (at[i] - 4.25) * scale, 1e-14);
+    EXPECT_NEAR(lattice->spacing[0][i], width[i] * scale, 1e-14);
+  }
+}
+
+TEST(Lattice, PressureStandsByItsLogarithmLowPressureHigh) {
+  const auto lattice = place_lattice(atmosphere_grid(), GeometryView{});
+  ASSERT_TRUE(lattice);
+  // ln 2 apart each: three even cells, in a box of 0.15 of the longest horizontal edge.
+  EXPECT_NEAR(lattice->box_max.z - lattice->box_min.z, 0.15 * 2.0, 1e-14);
+  EXPECT_NEAR(lattice->positions[2][0], -0.1, 1e-14);
+  EXPECT_NEAR(lattice->positions[2][1], 0.0, 1e-14);
+  EXPECT_NEAR(lattice->positions[2][2], 0.1, 1e-14);
+}
+
+TEST(Lattice, VerticalPlacementCanBeChosen) {
+  GeometryView geometry;
+  geometry.vertical = VerticalPlacement::linear;
+  auto lattice = place_lattice(atmosphere_grid(), geometry);
+  ASSERT_TRUE(lattice);
+  // By pressure itself: cells of 500, 375, 250 hPa, 1125 in all, in 0.3.
+  EXPECT_NEAR(lattice->spacing[2][0], 0.3 * 500 / 1125, 1e-14);
+  EXPECT_NEAR(lattice->spacing[2][1], 0.3 * 375 / 1125, 1e-14);
+  EXPECT_NEAR(lattice->positions[2][1] - lattice->positions[2][0], 0.3 * 500 / 1125, 1e-14);
+  geometry.vertical = VerticalPlacement::index;
+  data::Grid grid = atmosphere_grid();
+  grid.axes[2].coordinates = {1000, 10, 1};
+  lattice = place_lattice(grid, geometry);
+  ASSERT_TRUE(lattice);
+  EXPECT_NEAR(lattice->positions[2][0], -0.1, 1e-14);
+  EXPECT_NEAR(lattice->positions[2][2], 0.1, 1e-14);
+}
+
+TEST(Lattice, LogPressureNeedsPressures) {
+  GeometryView geometry;
+  geometry.vertical = VerticalPlacement::logp;
+  EXPECT_TRUE(place_lattice(atmosphere_grid(), geometry));
+  const auto refused = place_lattice(metres({0, 1}, {0, 1}, {1, 2}), geometry);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::invalid);
+  EXPECT_EQ(refused.error().at.at(0).pointer, "/geometry/vertical");
+  data::Grid vacuum = atmosphere_grid();
+  vacuum.axes[2].coordinates = {1000, 500, 0};
+  EXPECT_FALSE(place_lattice(vacuum, geometry));
+  EXPECT_TRUE(place_lattice(vacuum, GeometryView{}));  // auto: log p does not reach zero
+}
+
+TEST(Lattice, DepthGrowsDownwards) {
+  data::Grid grid = atmosphere_grid();
+  grid.axes[2] = axis(AxisKind::depth, "m", {100, 50, 0});
+  const auto lattice = place_lattice(grid, GeometryView{});
+  ASSERT_TRUE(lattice);
+  EXPECT_NEAR(lattice->positions[2][0], -0.1, 1e-14);
+  EXPECT_NEAR(lattice->positions[2][2], 0.1, 1e-14);
+}
+
+TEST(Lattice, LongitudeAndLatitudeShareTheirUnit) {
+  const auto lattice = place_lattice(atmosphere_grid(), GeometryView{});
+  ASSERT_TRUE(lattice);
+  EXPECT_NEAR(lattice->box_max.x, 1.0, 1e-14);   // 40 degrees
+  EXPECT_NEAR(lattice->box_max.y, 0.75, 1e-14);  // 30 degrees
+}
+
+TEST(Lattice, ADimensionOfOneIsOneCellThick) {
+  auto lattice = place_lattice(metres({0, 1, 3, 7}, {0, 2}, {5}), GeometryView{});
+  ASSERT_TRUE(lattice);
+  // The smallest cell of the others is 1 m of 9.5 m.
+  EXPECT_NEAR(lattice->spacing[2].at(0), 1.0 * 2.0 / 9.5, 1e-14);
+  EXPECT_NEAR(lattice->positions[2].at(0), 0.0, 1e-14);
+  EXPECT_NEAR(lattice->box_max.z - lattice->box_min.z, 2.0 / 9.5, 1e-14);
+  lattice = place_lattice(metres({3}, {4}, {5}), GeometryView{});
+  ASSERT_TRUE(lattice);
+  for (int a = 0; a < 3; ++a) {
+    EXPECT_NEAR(lattice->box_max[a] - lattice->box_min[a], 2.0, 1e-14);
+  }
+}
+
+TEST(Lattice, ScaleMultipliesBeforeTheLongestEdgeIsSetToTwo) {
+  GeometryView geometry;
+  geometry.scale = {1, 1, 10};
+  const auto lattice = place_lattice(atmosphere_grid(), geometry);
+  ASSERT_TRUE(lattice);
+  // 2 x 1.5 x 0.3 becomes 2 x 1.5 x 3, then everything shrinks by 2 / 3.
+  EXPECT_NEAR(lattice->box_max.x - lattice->box_min.x, 2.0 * 2.0 / 3.0, 1e-12);
+  EXPECT_NEAR(lattice->box_max.y - lattice->box_min.y, 1.5 * 2.0 / 3.0, 1e-12);
+  EXPECT_NEAR(lattice->box_max.z - lattice->box_min.z, 2.0, 1e-12);
+}
+
+TEST(Lattice, SpacingsAMillionfoldApartStayFinite) {
+  const auto lattice =
+      place_lattice(metres({0, 1e-6, 1, 2}, {0, 1e-6, 2e-6}, {0, 1, 1e6}), GeometryView{});
+  ASSERT_TRUE(lattice);
+  for (std::size_t a = 0; a < 3; ++a) {
+    for (std::size_t i = 0; i < lattice->spacing[a].size(); ++i) {
+      EXPECT_TRUE(std::isfinite(lattice->positions[a][i]));
+      EXPECT_GT(lattice->spacing[a][i], 0.0);
+    }
+  }
+  EXPECT_NEAR(lattice->box_max.z - lattice->box_min.z, 2.0, 1e-12);
+}
+
+TEST(Lattice, CoordinatesThatTurnBackAreBadData) {
+  const auto refused = place_lattice(metres({0, 2, 1}, {0, 1}, {0, 1}), GeometryView{});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::bad_data);
+}
+
+}  // namespace
+}  // namespace windsplat::scene

@@ -1,0 +1,176 @@
+// A session with a clock that is turned by hand and surroundings that do as they are told.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/session/session.hpp"
+
+namespace session_test {
+
+using windsplat::Error;
+using windsplat::ErrorKind;
+using windsplat::make_error;
+using windsplat::make_error_at;
+using windsplat::Result;
+using windsplat::protocol::View;
+using namespace windsplat::session;  // NOLINT(google-build-using-namespace)
+namespace protocol = windsplat::protocol;
+
+inline constexpr Micros ms = 1000;
+inline constexpr int steps = 10;
+
+class Driver {
+ public:
+  explicit Driver(Options options = {})
+      : session_(
+            options, [](const View& view) { return check(view); }, now_) {}
+
+  // --- inputs -----------------------------------------------------------------------------------
+
+  void say(const protocol::ClientMessage& message) { take(session_.on_message(message, now_)); }
+  void patch(std::uint32_t rev, std::string json, double t = 0) {
+    say(protocol::PatchMessage{rev, t, std::move(json)});
+  }
+  void ack(std::uint32_t seq) { say(protocol::AckMessage{seq, 0}); }
+  void binary() { take(session_.on_binary(now_)); }
+  void drain() { take(session_.on_drain(now_)); }
+  void refused(const Error& error) { take(session_.on_refused(error, {}, now_)); }
+  void described(std::uint32_t id, Result<protocol::DatasetDescription> description) {
+    take(session_.on_described(id, std::move(description), now_));
+  }
+
+  // Time passes; the session is woken whenever it asked to be.
+  void wait(Micros duration) {
+    const Micros end = now_ + duration;
+    for (int turns = 0;; ++turns) {
+      const auto wake = session_.wake_at();
+      if (!wake || *wake > end) break;
+      ASSERT_LT(turns, 100000) << "the session never sleeps";
+      now_ = std::max(now_, *wake);
+      take(session_.on_time(now_));
+    }
+    now_ = end;
+  }
+
+  // The render that was asked for ends after `cost`; its frame is handed over at once.
+  void finish_render(Micros cost = 10 * ms, bool loaded = false) {
+    ASSERT_TRUE(render) << "nothing is being drawn";
+    wait(cost);
+    const StartRender done = *render;
+    render.reset();
+    if (cancelled) {
+      cancelled = false;
+      take(session_.on_rendered(done.ticket, make_error(ErrorKind::cancelled, ""), now_));
+    } else {
+      take(session_.on_rendered(done.ticket, drawn(done, cost, loaded), now_));
+    }
+    if (write_at_once) written();
+  }
+  void fail_render(const Error& error) {
+    ASSERT_TRUE(render);
+    const StartRender done = *render;
+    render.reset();
+    take(session_.on_rendered(done.ticket, error, now_));
+  }
+  void written() {
+    if (unwritten_) take(session_.on_written(now_));
+    unwritten_ = false;
+  }
+
+  // Draws and acknowledges until nothing is left to do.
+  void settle(Micros cost = 10 * ms) {
+    for (int turns = 0; turns < 50; ++turns) {
+      if (render) finish_render(cost);
+      if (!frames.empty()) ack(frames.back().header.seq);
+      if (!render) wait(200 * ms);
+      if (!render) return;
+    }
+    FAIL() << "there is no end to it";
+  }
+
+  // --- what came out ----------------------------------------------------------------------------
+
+  std::vector<protocol::ErrorMessage> errors() const { return texts_of<protocol::ErrorMessage>(); }
+  template <class T>
+  std::vector<T> texts_of() const {
+    std::vector<T> out;
+    for (const auto& text : texts) {
+      if (const T* body = std::get_if<T>(&text)) out.push_back(*body);
+    }
+    return out;
+  }
+  std::vector<std::uint32_t> steps_shown() const {
+    std::vector<std::uint32_t> out;
+    for (const SendFrame& frame : frames) out.push_back(frame.header.step);
+    return out;
+  }
+  static bool is_final(const SendFrame& frame) {
+    return (frame.header.flags & protocol::flag_final) != 0;
+  }
+  Micros now() const { return now_; }
+
+  std::vector<protocol::ServerMessage> texts;
+  std::vector<SendFrame> frames;
+  std::vector<Describe> describes;
+  std::optional<StartRender> render;  // being drawn
+  bool cancelled = false;             // it was given up
+  int renders = 0;
+  std::optional<Close> closed;
+  bool write_at_once = true;
+
+ private:
+  static Result<int> check(const View& view) {
+    if (view.dataset != "wind" && view.dataset != "sea") {
+      return make_error_at(ErrorKind::not_found, "/dataset", "there is no such dataset");
+    }
+    if (view.step >= steps) return make_error_at(ErrorKind::invalid, "/step", "is beyond the last");
+    return steps;
+  }
+
+  static Drawn drawn(const StartRender& done, Micros cost, bool loaded) {
+    Drawn out;
+    out.payload = std::make_shared<const std::vector<std::uint8_t>>(100);
+    out.info.width = std::max(1, done.view.image.width >> done.encoding.level);
+    out.info.height = std::max(1, done.view.image.height >> done.encoding.level);
+    out.view_json = "{}";
+    out.render_us = cost;
+    out.loaded = loaded;
+    return out;
+  }
+
+  void take(Effects effects) {
+    for (Effect& effect : effects) {
+      ASSERT_FALSE(closed) << "an effect after close";
+      if (auto* text = std::get_if<SendText>(&effect)) texts.push_back(text->message);
+      if (auto* describe = std::get_if<Describe>(&effect)) describes.push_back(*describe);
+      if (auto* start = std::get_if<StartRender>(&effect)) {
+        ASSERT_FALSE(render) << "two renders at a time";
+        render = *start;
+        cancelled = false;
+        ++renders;
+      }
+      if (auto* cancel = std::get_if<CancelRender>(&effect)) {
+        ASSERT_TRUE(render);
+        ASSERT_EQ(cancel->ticket, render->ticket);
+        cancelled = true;
+      }
+      if (auto* frame = std::get_if<SendFrame>(&effect)) {
+        ASSERT_FALSE(unwritten_) << "two frames under way";
+        frames.push_back(*frame);
+        unwritten_ = true;
+      }
+      if (auto* close = std::get_if<Close>(&effect)) closed = *close;
+    }
+  }
+
+  Micros now_ = 1'000'000;
+  bool unwritten_ = false;
+  Session session_;
+};
+
+}  // namespace session_test

@@ -1,0 +1,273 @@
+// Which frames a viewer gets, and when: credit, newest view first, refinement, level of detail.
+#include <gmock/gmock.h>
+
+#include "driver.hpp"
+
+namespace session_test {
+namespace {
+
+using testing::Each;
+using testing::ElementsAre;
+
+std::string azimuth(int n) { return R"({"camera":{"eye":[)" + std::to_string(n) + ",-3,1]}}"; }
+
+TEST(Pacing, a_patch_alone_brings_a_moving_frame_and_then_the_final_one) {
+  Driver driver;
+  driver.patch(7, R"({"dataset":"wind"})", 123.5);
+  driver.finish_render();
+  ASSERT_EQ(driver.frames.size(), 1U);
+  const auto moving = driver.frames[0].header;
+  EXPECT_EQ(moving.seq, 1U);
+  EXPECT_EQ(moving.rev, 7U);
+  EXPECT_EQ(moving.t, 123.5);
+  EXPECT_FALSE(Driver::is_final(driver.frames[0]));
+  EXPECT_EQ(moving.codec, protocol::Codec::jpeg);
+
+  driver.ack(1);
+  driver.wait(100 * ms);
+  EXPECT_FALSE(driver.render) << "too early: the viewer may go on moving";
+  driver.wait(60 * ms);
+  ASSERT_TRUE(driver.render);
+  EXPECT_EQ(driver.render->encoding.level, 0);
+  EXPECT_TRUE(driver.render->encoding.full_chroma);
+  driver.finish_render();
+  ASSERT_EQ(driver.frames.size(), 2U);
+  EXPECT_TRUE(Driver::is_final(driver.frames[1]));
+  EXPECT_EQ(driver.frames[1].header.rev, 7U);
+  EXPECT_GT(driver.frames[1].header.quality, moving.quality);
+
+  driver.ack(2);
+  driver.wait(5000 * ms);
+  EXPECT_FALSE(driver.render) << "nothing is left to draw";
+}
+
+TEST(Pacing, every_frame_is_announced_by_what_was_chosen_for_it) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  const auto chosen = driver.texts_of<protocol::ChosenMessage>();
+  ASSERT_EQ(chosen.size(), driver.frames.size());
+  for (std::size_t n = 0; n < chosen.size(); ++n) {
+    EXPECT_EQ(chosen[n].seq, driver.frames[n].header.seq);
+    EXPECT_EQ(chosen[n].info.width, driver.frames[n].header.width);
+  }
+}
+
+TEST(Pacing, no_third_frame_before_an_acknowledgement) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.finish_render();
+  driver.patch(2, azimuth(1));
+  driver.finish_render();
+  for (int n = 3; n < 20; ++n) {
+    driver.patch(static_cast<std::uint32_t>(n), azimuth(n));
+    driver.wait(50 * ms);
+  }
+  EXPECT_EQ(driver.frames.size(), 2U);
+  EXPECT_FALSE(driver.render) << "a frame that cannot be sent would be old when it can";
+
+  driver.ack(2);  // stands for frame 1 too
+  driver.finish_render();
+  EXPECT_EQ(driver.frames.size(), 3U);
+  EXPECT_EQ(driver.frames[2].header.rev, 19U) << "the newest view, not the next one";
+}
+
+TEST(Pacing, nothing_is_drawn_while_a_frame_is_being_written) {
+  Driver driver;
+  driver.write_at_once = false;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.finish_render();
+  driver.ack(1);
+  driver.patch(2, azimuth(1));
+  driver.patch(3, azimuth(2));
+  EXPECT_FALSE(driver.render);
+  driver.written();
+  ASSERT_TRUE(driver.render);
+  driver.finish_render();
+  EXPECT_EQ(driver.frames.back().header.rev, 3U);
+}
+
+TEST(Pacing, a_steady_flow_of_patches_starves_nobody) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  const std::size_t before = driver.frames.size();
+  std::uint32_t rev = 1;
+  // A hundred patches a second for two seconds; a frame takes 35 ms and is acknowledged at once.
+  Micros busy = 0;
+  for (int n = 0; n < 200; ++n) {
+    driver.patch(++rev, azimuth(n));
+    if (driver.render) {
+      busy += 10 * ms;
+      EXPECT_FALSE(driver.cancelled && !driver.render->encoding.full_chroma)
+          << "moving frames are let finish";
+    }
+    driver.wait(10 * ms);
+    if (busy >= 30 * ms) {
+      busy = 0;
+      driver.finish_render(5 * ms);
+      driver.ack(driver.frames.back().header.seq);
+    }
+  }
+  const std::size_t moved = driver.frames.size() - before;
+  EXPECT_GE(moved, 40U) << "about one a render time";
+  for (std::size_t n = before + 1; n < driver.frames.size(); ++n) {
+    EXPECT_GT(driver.frames[n].header.rev, driver.frames[n - 1].header.rev);
+    EXPECT_FALSE(Driver::is_final(driver.frames[n]));
+  }
+  EXPECT_GE(driver.frames.back().header.rev + 10, rev) << "and never far behind";
+}
+
+TEST(Pacing, after_stopping_only_the_newest_view_is_shown) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.patch(2, azimuth(1));
+  for (std::uint32_t rev = 3; rev <= 30; ++rev) driver.patch(rev, azimuth(static_cast<int>(rev)));
+  const std::size_t before = driver.frames.size();
+  driver.settle();
+  std::vector<std::uint32_t> revs;
+  for (std::size_t n = before; n < driver.frames.size(); ++n) {
+    revs.push_back(driver.frames[n].header.rev);
+  }
+  // The frame under way when the flow began, the newest while moving, the newest for good.
+  EXPECT_THAT(revs, ElementsAre(2U, 30U, 30U));
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+}
+
+TEST(Pacing, a_change_gives_up_the_final_frame_and_a_moving_one_comes_instead) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.finish_render();
+  driver.ack(1);
+  driver.wait(200 * ms);
+  ASSERT_TRUE(driver.render && driver.render->encoding.full_chroma);
+  driver.patch(2, azimuth(1));
+  EXPECT_TRUE(driver.cancelled);
+  driver.finish_render(1 * ms);
+  EXPECT_EQ(driver.frames.size(), 1U) << "what was given up is not sent";
+  ASSERT_TRUE(driver.render);
+  EXPECT_FALSE(driver.render->encoding.full_chroma);
+  driver.finish_render();
+  EXPECT_EQ(driver.frames.back().header.rev, 2U);
+}
+
+TEST(Pacing, a_final_frame_that_was_done_just_before_the_change_is_dropped) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.finish_render();
+  driver.ack(1);
+  driver.wait(200 * ms);
+  ASSERT_TRUE(driver.render);
+  driver.patch(2, azimuth(1));
+  driver.cancelled = false;  // the renderer had finished before it heard
+  driver.finish_render(1 * ms);
+  EXPECT_EQ(driver.frames.size(), 1U);
+  driver.settle();
+  EXPECT_EQ(driver.texts_of<protocol::StatsMessage>().back().dropped, 1U);
+}
+
+TEST(Pacing, a_hidden_client_is_sent_nothing_until_it_is_seen_again) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.say(protocol::VisibilityMessage{true});
+  EXPECT_TRUE(driver.cancelled);
+  driver.finish_render(1 * ms);
+  driver.patch(2, azimuth(1));
+  driver.wait(2000 * ms);
+  EXPECT_FALSE(driver.render);
+  EXPECT_TRUE(driver.frames.empty());
+  driver.say(protocol::VisibilityMessage{false});
+  driver.settle();
+  EXPECT_EQ(driver.frames.back().header.rev, 2U);
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+}
+
+// --- level of detail ----------------------------------------------------------------------------
+
+// Drags for `count` frames whose cost follows the level; the levels drawn.
+std::vector<int> drag(Driver& driver, int count, std::uint32_t& rev,
+                      const std::function<Micros(int level)>& cost) {
+  std::vector<int> levels;
+  for (int n = 0; n < count; ++n) {
+    driver.patch(++rev, azimuth(n));
+    if (!driver.render) continue;
+    const int level = driver.render->encoding.level;
+    levels.push_back(level);
+    driver.finish_render(cost(level));
+    driver.ack(driver.frames.back().header.seq);
+  }
+  return levels;
+}
+
+TEST(Level, is_the_finest_that_keeps_the_budget) {
+  struct Case {
+    const char* budget;
+    Micros full;  // cost of level 0; a level costs a quarter of the next finer one
+    int level;
+  };
+  for (const Case& c :
+       {Case{"null", 20 * ms, 0}, Case{"null", 100 * ms, 1}, Case{"null", 400 * ms, 2},
+        Case{"200", 100 * ms, 0}, Case{"10", 100 * ms, 2}}) {
+    Driver driver;
+    driver.patch(1, R"({"dataset":"wind","quality":{"budgetMs":)" + std::string(c.budget) + "}}");
+    std::uint32_t rev = 1;
+    const auto levels = drag(driver, 40, rev, [&](int level) { return c.full >> (2 * level); });
+    ASSERT_GE(levels.size(), 20U);
+    EXPECT_THAT(std::vector<int>(levels.end() - 10, levels.end()), Each(c.level))
+        << c.budget << " ms, full picture " << c.full / ms << " ms";
+  }
+}
+
+TEST(Level, says_so_in_the_header_and_the_final_frame_is_full) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","image":{"width":800,"height":600}})");
+  std::uint32_t rev = 1;
+  drag(driver, 10, rev, [](int level) { return 400 * ms >> (2 * level); });
+  const auto moving = driver.frames.back().header;
+  ASSERT_GT(moving.level, 0);
+  EXPECT_EQ(moving.width, 800 >> moving.level);
+  EXPECT_EQ(moving.height, 600 >> moving.level);
+  driver.settle(400 * ms);
+  const auto final = driver.frames.back().header;
+  EXPECT_EQ(final.level, 0);
+  EXPECT_EQ(final.width, 800);
+  EXPECT_EQ(final.height, 600);
+}
+
+TEST(Level, one_slow_load_does_not_coarsen_what_follows) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  std::uint32_t rev = 1;
+  drag(driver, 10, rev, [](int /*level*/) { return 10 * ms; });
+  ASSERT_EQ(driver.frames.back().header.level, 0);
+  driver.patch(++rev, R"({"step":3})");
+  driver.finish_render(900 * ms, true);
+  driver.ack(driver.frames.back().header.seq);
+  driver.patch(++rev, azimuth(99));
+  ASSERT_TRUE(driver.render);
+  EXPECT_EQ(driver.render->encoding.level, 0);
+}
+
+TEST(Level, never_makes_a_picture_too_small_to_tell_anything) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","image":{"width":300,"height":200}})");
+  std::uint32_t rev = 1;
+  const auto levels = drag(driver, 10, rev, [](int /*level*/) { return 5000 * ms; });
+  EXPECT_THAT(levels, Each(testing::Le(1)));
+  EXPECT_EQ(levels.back(), 1) << "100 pixels high; 50 would be too few";
+}
+
+TEST(Level, comes_back_when_the_scene_has_become_cheap) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  std::uint32_t rev = 1;
+  drag(driver, 20, rev, [](int level) { return 400 * ms >> (2 * level); });
+  ASSERT_EQ(driver.frames.back().header.level, 2);
+  driver.wait(4000 * ms);
+  drag(driver, 200, rev, [](int level) { return 16 * ms >> (2 * level); });
+  EXPECT_EQ(driver.frames.back().header.level, 0);
+}
+
+}  // namespace
+}  // namespace session_test

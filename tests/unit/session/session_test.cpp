@@ -1,0 +1,440 @@
+// What a session answers: opening, patches that cannot be followed, stills, steps that run, ends.
+#include <gmock/gmock.h>
+
+#include "driver.hpp"
+
+namespace session_test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+protocol::DatasetDescription description(const std::string& id) {
+  protocol::DatasetDescription out;
+  out.id = id;
+  return out;
+}
+
+// --- opening ------------------------------------------------------------------------------------
+
+TEST(Open, describes_the_dataset_and_then_draws_it) {
+  Driver driver;
+  driver.say(protocol::OpenMessage{5, "wind"});
+  ASSERT_EQ(driver.describes.size(), 1U);
+  EXPECT_EQ(driver.describes[0].dataset, "wind");
+  EXPECT_FALSE(driver.render) << "the client's own view may still come";
+  driver.patch(1, R"({"image":{"width":640,"height":480}})");
+  driver.described(5, description("wind"));
+  const auto opened = driver.texts_of<protocol::OpenedMessage>();
+  ASSERT_EQ(opened.size(), 1U);
+  EXPECT_EQ(opened[0].id, 5U);
+  EXPECT_EQ(opened[0].dataset.id, "wind");
+  ASSERT_TRUE(driver.render);
+  EXPECT_EQ(driver.render->view.dataset, "wind");
+  EXPECT_EQ(driver.render->view.image.width, 640);
+}
+
+TEST(Open, an_unknown_dataset_is_an_error_and_the_view_stays) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.say(protocol::OpenMessage{9, "nowhere"});
+  const auto errors = driver.errors();
+  ASSERT_EQ(errors.size(), 1U);
+  EXPECT_EQ(errors[0].id, 9U);
+  EXPECT_EQ(errors[0].problem.status, 404);
+  EXPECT_TRUE(driver.describes.empty());
+  driver.patch(2, R"({"step":1})");
+  ASSERT_TRUE(driver.render);
+  EXPECT_EQ(driver.render->view.dataset, "wind");
+}
+
+TEST(Open, another_dataset_starts_afresh_but_keeps_the_pictures_size) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","step":4,"image":{"width":640,"height":480},
+                      "vector":{"field":"u"}})");
+  driver.settle();
+  driver.say(protocol::OpenMessage{1, "sea"});
+  driver.described(1, description("sea"));
+  ASSERT_TRUE(driver.render);
+  const View& view = driver.render->view;
+  EXPECT_EQ(view.dataset, "sea");
+  EXPECT_EQ(view.step, 0);
+  EXPECT_EQ(view.image.width, 640);
+  EXPECT_EQ(view.vector.field.kind, protocol::FieldChoice::Kind::dataset_default);
+}
+
+TEST(Open, data_that_cannot_be_read_leaves_the_old_view) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","step":2})");
+  driver.settle();
+  driver.say(protocol::OpenMessage{3, "sea"});
+  driver.described(3, make_error(ErrorKind::bad_data, "the file is torn"));
+  ASSERT_EQ(driver.errors().size(), 1U);
+  EXPECT_EQ(driver.errors()[0].id, 3U);
+  driver.settle();
+  EXPECT_EQ(driver.frames.back().header.step, 2U);
+}
+
+// --- patches ------------------------------------------------------------------------------------
+
+TEST(Patch, that_is_invalid_names_its_rev_and_pointer_and_the_old_view_stays) {
+  for (const char* bad :
+       {R"({"image":{"width":0}})", R"({"unknown":1})", R"({"step":-1})", R"({"step":99})",
+        R"({"camera":{"fovY":1e999}})", R"({"dataset":"nowhere"})", R"([1])"}) {
+    Driver driver;
+    driver.patch(1, R"({"dataset":"wind","step":2})");
+    driver.settle();
+    const int renders = driver.renders;
+    driver.patch(2, bad);
+    ASSERT_EQ(driver.errors().size(), 1U) << bad;
+    const auto error = driver.errors()[0];
+    EXPECT_EQ(error.rev, 2U) << bad;
+    EXPECT_FALSE(error.id) << bad;
+    EXPECT_GE(error.problem.status, 400) << bad;
+    driver.wait(1000 * ms);
+    EXPECT_EQ(driver.renders, renders) << bad;
+    driver.patch(3, R"({"camera":{"fovY":20}})");
+    ASSERT_TRUE(driver.render) << bad;
+    EXPECT_EQ(driver.render->view.step, 2) << bad;
+    EXPECT_EQ(driver.render->view.dataset, "wind") << bad;
+  }
+}
+
+TEST(Patch, before_a_dataset_is_named_is_remembered) {
+  Driver driver;
+  driver.patch(1, R"({"image":{"width":320,"height":200}})");
+  EXPECT_FALSE(driver.render);
+  EXPECT_TRUE(driver.errors().empty());
+  driver.patch(2, R"({"dataset":"wind"})");
+  ASSERT_TRUE(driver.render);
+  EXPECT_EQ(driver.render->view.image.width, 320);
+}
+
+TEST(Patch, whose_data_cannot_be_read_leaves_no_trace_and_the_others_stand) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","step":2})");
+  driver.settle();
+  driver.patch(2, R"({"step":3})");
+  driver.patch(3, R"({"camera":{"fovY":20}})");
+  driver.fail_render(make_error(ErrorKind::bad_data, "step 3 is torn"));
+  ASSERT_EQ(driver.errors().size(), 1U);
+  EXPECT_EQ(driver.errors()[0].rev, 2U);
+  EXPECT_THAT(driver.errors()[0].problem.detail, HasSubstr("torn"));
+  driver.settle();
+  EXPECT_EQ(driver.frames.back().header.step, 2U);
+  EXPECT_EQ(driver.frames.back().header.rev, 3U);
+}
+
+// The step that cannot be read is hidden under a later patch before any frame is drawn of it.
+TEST(Patch, a_fault_beneath_later_patches_is_found_and_the_stream_goes_on) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","step":2})");
+  driver.settle();
+  driver.patch(2, R"({"camera":{"fovY":30}})");
+  driver.patch(3, R"({"step":3})");
+  driver.patch(4, R"({"camera":{"fovY":20}})");
+  driver.finish_render();
+  const auto fail_step_3 = [&] {
+    for (int turns = 0; turns < 10 && driver.render && driver.render->view.step == 3; ++turns) {
+      driver.fail_render(make_error(ErrorKind::bad_data, "step 3 is torn"));
+    }
+  };
+  fail_step_3();
+  driver.settle();
+  EXPECT_EQ(driver.frames.back().header.step, 2U) << "what was drawn before";
+  driver.patch(5, R"({"camera":{"fovY":25}})");
+  fail_step_3();
+  driver.settle();
+  EXPECT_EQ(driver.frames.back().header.rev, 5U) << "an innocent patch is followed";
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  bool named = false;
+  for (const auto& error : driver.errors()) {
+    named = named || error.rev == 3U;
+    EXPECT_NE(error.rev, 5U);
+  }
+  EXPECT_TRUE(named) << "the patch at fault is told";
+}
+
+TEST(Patch, that_fails_for_good_is_not_tried_again_and_again) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.patch(2, R"({"step":5})");
+  driver.fail_render(make_error(ErrorKind::out_of_memory, "no room"));
+  ASSERT_TRUE(driver.render) << "the old view, sharp again";
+  driver.fail_render(make_error(ErrorKind::out_of_memory, "no room"));
+  const int renders = driver.renders;
+  driver.wait(3000 * ms);
+  EXPECT_EQ(driver.renders, renders);
+  EXPECT_EQ(driver.errors().size(), 2U);
+}
+
+// --- acknowledgements ---------------------------------------------------------------------------
+
+TEST(Ack, of_a_frame_never_sent_is_an_error_and_counts_for_nothing) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.ack(1);
+  driver.finish_render();
+  driver.patch(2, R"({"step":1})");
+  driver.finish_render();
+  driver.ack(3);
+  driver.ack(4294967295U);
+  EXPECT_EQ(driver.errors().size(), 3U);
+  EXPECT_EQ(driver.errors()[0].problem.errors.at(0).pointer, "/seq");
+  driver.patch(3, R"({"step":2})");
+  EXPECT_FALSE(driver.render) << "no credit was gained";
+  EXPECT_FALSE(driver.closed);
+  driver.ack(1);
+  EXPECT_TRUE(driver.render);
+}
+
+TEST(Ack, may_be_repeated_or_come_late) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.finish_render();
+  driver.patch(2, R"({"step":1})");
+  driver.finish_render();
+  driver.ack(2);
+  driver.ack(2);
+  driver.ack(1);
+  EXPECT_TRUE(driver.errors().empty());
+  driver.patch(3, R"({"step":2})");
+  driver.finish_render();
+  driver.patch(4, R"({"step":3})");
+  driver.finish_render();
+  driver.patch(5, R"({"step":4})");
+  EXPECT_FALSE(driver.render) << "two are out, however often old ones were acknowledged";
+}
+
+// --- stills -------------------------------------------------------------------------------------
+
+TEST(Still, is_drawn_at_its_size_and_announced_by_its_id) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","step":3})");
+  driver.settle();
+  driver.texts.clear();
+  protocol::StillMessage still;
+  still.id = 77;
+  still.width = 1000;
+  still.height = 500;
+  still.scale = 2;
+  driver.say(still);
+  ASSERT_TRUE(driver.render);
+  EXPECT_EQ(driver.render->view.image.width, 2000);
+  EXPECT_EQ(driver.render->view.image.height, 1000);
+  EXPECT_EQ(driver.render->encoding.level, 0);
+  driver.finish_render(500 * ms);
+  const auto header = driver.frames.back().header;
+  EXPECT_EQ(header.codec, protocol::Codec::png);
+  EXPECT_EQ(header.width, 2000);
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  const auto progress = driver.texts_of<protocol::ProgressMessage>();
+  ASSERT_EQ(progress.size(), 2U);
+  EXPECT_EQ(progress[1].id, 77U);
+  EXPECT_EQ(progress[1].done, 1);
+  EXPECT_EQ(driver.texts_of<protocol::ChosenMessage>().back().seq, header.seq);
+}
+
+TEST(Still, waits_for_credit_and_gets_its_turn_while_the_view_moves) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.finish_render();
+  driver.ack(1);
+  driver.patch(2, R"({"step":1})");
+  protocol::StillMessage still;
+  still.id = 1;
+  still.format = "jpeg";
+  driver.say(still);
+  for (std::uint32_t rev = 3; rev < 8; ++rev) {
+    driver.patch(rev, R"({"step":)" + std::to_string(rev) + "}");
+    driver.finish_render();
+    driver.ack(driver.frames.back().header.seq);
+  }
+  int stills = 0;
+  for (const SendFrame& frame : driver.frames) stills += frame.header.quality == 95 ? 1 : 0;
+  EXPECT_EQ(stills, 1);
+}
+
+TEST(Still, too_large_too_many_or_of_nothing_is_an_error) {
+  Driver driver;
+  protocol::StillMessage still;
+  still.id = 1;
+  driver.say(still);
+  driver.patch(1, R"({"dataset":"wind","image":{"width":4000,"height":4000}})");
+  still.scale = 4;
+  still.id = 2;
+  driver.say(still);
+  still.scale = 1;
+  for (std::uint32_t id = 3; id < 9; ++id) {
+    still.id = id;
+    driver.say(still);
+  }
+  std::vector<std::pair<std::uint32_t, int>> answers;
+  for (const auto& error : driver.errors()) {
+    answers.emplace_back(error.id.value_or(0), error.problem.status);
+  }
+  EXPECT_THAT(answers, ElementsAre(std::pair(1U, 404), std::pair(2U, 413), std::pair(5U, 429),
+                                   std::pair(6U, 429), std::pair(7U, 429), std::pair(8U, 429)));
+}
+
+// --- steps that run -----------------------------------------------------------------------------
+
+protocol::PlayMessage play(int from, int to, double fps, bool loop, bool drop) {
+  return {from, to, fps, loop, drop};
+}
+
+// Draws each frame in `cost` and acknowledges it, for `duration`.
+void run(Driver& driver, Micros duration, Micros cost) {
+  const Micros end = driver.now() + duration;
+  while (driver.now() < end) {
+    if (driver.render) {
+      driver.finish_render(cost);
+      driver.ack(driver.frames.back().header.seq);
+    } else {
+      driver.wait(5 * ms);
+    }
+  }
+}
+
+TEST(Play, shows_every_step_in_time_when_there_is_time) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.frames.clear();
+  driver.say(play(0, 3, 10, true, true));
+  run(driver, 850 * ms, 20 * ms);
+  EXPECT_THAT(driver.steps_shown(), ElementsAre(1U, 2U, 3U, 0U, 1U, 2U, 3U, 0U));
+}
+
+TEST(Play, with_drop_skips_what_is_late) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.frames.clear();
+  driver.say(play(0, 9, 20, false, true));
+  run(driver, 700 * ms, 120 * ms);  // 50 ms a step, 120 ms a frame
+  std::vector<std::uint32_t> shown;
+  for (const SendFrame& frame : driver.frames) {
+    if (!Driver::is_final(frame)) shown.push_back(frame.header.step);
+  }
+  ASSERT_GE(shown.size(), 3U);
+  for (std::size_t n = 1; n < shown.size(); ++n) EXPECT_GT(shown[n], shown[n - 1]);
+  EXPECT_LT(shown.size(), 7U) << "some must be left out";
+  EXPECT_EQ(shown.back(), 9U) << "the last is where it ends, and on time";
+}
+
+TEST(Play, without_drop_leaves_none_out_however_long_it_takes) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.frames.clear();
+  driver.say(play(0, 5, 20, false, false));
+  run(driver, 900 * ms, 120 * ms);
+  driver.settle();
+  std::vector<std::uint32_t> moving;
+  for (const SendFrame& frame : driver.frames) {
+    if (!Driver::is_final(frame)) moving.push_back(frame.header.step);
+  }
+  EXPECT_THAT(moving, ElementsAre(1U, 2U, 3U, 4U, 5U));
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+}
+
+TEST(Play, pause_stops_at_the_step_reached_and_makes_it_final) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.say(play(0, 9, 10, true, true));
+  run(driver, 350 * ms, 10 * ms);
+  driver.say(protocol::PauseMessage{});
+  driver.frames.clear();
+  driver.settle();
+  EXPECT_THAT(driver.steps_shown(), ElementsAre(3U));
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  driver.patch(2, R"({"camera":{"fovY":20}})");
+  ASSERT_TRUE(driver.render);
+  EXPECT_EQ(driver.render->view.step, 3) << "the view keeps the step that time has reached";
+}
+
+TEST(Play, goes_on_from_the_step_that_the_user_picks) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.say(play(0, 9, 10, true, true));
+  driver.patch(2, R"({"step":7})");
+  driver.frames.clear();
+  run(driver, 250 * ms, 5 * ms);
+  EXPECT_THAT(driver.steps_shown(), ElementsAre(7U, 8U, 9U));
+}
+
+TEST(Play, beyond_the_last_step_or_of_nothing_is_an_error) {
+  Driver driver;
+  driver.say(play(0, 3, 10, true, true));
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.say(play(0, steps, 10, true, true));
+  ASSERT_EQ(driver.errors().size(), 2U);
+  EXPECT_EQ(driver.errors()[1].problem.errors.at(0).pointer, "/to");
+}
+
+TEST(Play, a_step_that_cannot_be_read_stops_it) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.say(play(0, 9, 10, true, true));
+  driver.wait(110 * ms);
+  driver.fail_render(make_error(ErrorKind::bad_data, "torn"));
+  driver.settle();
+  driver.wait(1000 * ms);
+  EXPECT_EQ(driver.errors().size(), 1U);
+  EXPECT_EQ(driver.frames.back().header.step, 0U);
+}
+
+// --- ends ---------------------------------------------------------------------------------------
+
+TEST(End, a_binary_message_closes_with_4400) {
+  Driver driver;
+  driver.binary();
+  ASSERT_TRUE(driver.closed);
+  EXPECT_EQ(driver.closed->code, 4400);
+}
+
+TEST(End, a_drain_closes_with_1001_and_gives_up_the_render) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.drain();
+  ASSERT_TRUE(driver.closed);
+  EXPECT_EQ(driver.closed->code, 1001);
+  EXPECT_TRUE(driver.cancelled);
+  driver.patch(2, R"({"step":1})");
+  driver.finish_render();
+  EXPECT_TRUE(driver.frames.empty());
+}
+
+TEST(End, silence_closes_with_4410_and_any_message_keeps_it_open) {
+  Options options;
+  options.idle_timeout_us = 60'000 * ms;
+  Driver driver(options);
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.wait(50'000 * ms);
+  driver.ack(1);
+  driver.wait(50'000 * ms);
+  driver.refused(make_error(ErrorKind::malformed, "no JSON"));
+  driver.wait(59'000 * ms);
+  EXPECT_FALSE(driver.closed);
+  driver.wait(2'000 * ms);
+  ASSERT_TRUE(driver.closed);
+  EXPECT_EQ(driver.closed->code, 4410);
+}
+
+TEST(End, text_that_is_no_message_is_answered_and_nothing_else_happens) {
+  Driver driver;
+  driver.refused(make_error(ErrorKind::malformed, "no JSON"));
+  ASSERT_EQ(driver.errors().size(), 1U);
+  EXPECT_EQ(driver.errors()[0].problem.status, 400);
+  EXPECT_FALSE(driver.closed);
+}
+
+}  // namespace
+}  // namespace session_test

@@ -1,0 +1,27 @@
+# web/ -> gzipped files inside the binary: target windsplat_web defines net::web_assets().
+# Runs again only when a source of the page changes; needs node (18 or later) and npm.
+find_program(WINDSPLAT_NODE NAMES node nodejs)
+if(NOT WINDSPLAT_NODE)
+  message(FATAL_ERROR "The page needs node and npm to be built: say ./scripts/setup web")
+endif()
+
+file(GLOB_RECURSE web_sources CONFIGURE_DEPENDS
+  ${CMAKE_CURRENT_LIST_DIR}/src/* ${CMAKE_CURRENT_LIST_DIR}/scripts/*.mjs)
+list(APPEND web_sources
+  ${CMAKE_CURRENT_LIST_DIR}/index.html
+  ${CMAKE_CURRENT_LIST_DIR}/package.json
+  ${CMAKE_CURRENT_LIST_DIR}/package-lock.json
+  ${PROJECT_SOURCE_DIR}/protocol/view.schema.json
+  ${PROJECT_SOURCE_DIR}/protocol/messages.schema.json)
+
+set(web_out ${PROJECT_BINARY_DIR}/web)
+add_custom_command(
+  OUTPUT ${web_out}/web_assets.S ${web_out}/web_assets.cpp
+  COMMAND ${WINDSPLAT_NODE} ${CMAKE_CURRENT_LIST_DIR}/scripts/embed.mjs ${web_out}
+  DEPENDS ${web_sources}
+  COMMENT "Building the page"
+  VERBATIM)
+
+add_library(windsplat_web STATIC ${web_out}/web_assets.cpp ${web_out}/web_assets.S)
+target_include_directories(windsplat_web PUBLIC ${PROJECT_SOURCE_DIR})
+target_link_libraries(windsplat_net PUBLIC windsplat_web)

@@ -1,0 +1,90 @@
+// The built page -> an assembly file that includes the gzipped files, and a C++ file that lists
+// them, for web/embed.cmake.
+// Usage: node scripts/embed.mjs OUTDIR
+import { execFileSync } from "node:child_process";
+import { createHash } from "node:crypto";
+import { mkdirSync, readdirSync, readFileSync, writeFileSync } from "node:fs";
+import { dirname, extname, join, resolve } from "node:path";
+import { fileURLToPath } from "node:url";
+import { gzipSync } from "node:zlib";
+import { installModules } from "./install.mjs";
+
+const scripts = dirname(fileURLToPath(import.meta.url));
+const contentTypes = {
+  ".html": "text/html; charset=utf-8",
+  ".js": "text/javascript; charset=utf-8",
+  ".css": "text/css; charset=utf-8",
+  ".svg": "image/svg+xml",
+};
+
+// No name, no time in the header (gzip -9n): the same page gives the same bytes.
+function pack(dist, outdir) {
+  return readdirSync(dist)
+    .sort()
+    .map((name, index) => {
+      const gzip = gzipSync(readFileSync(join(dist, name)), { level: 9 });
+      const path = join(outdir, `asset_${index}.gz`);
+      writeFileSync(path, gzip);
+      return {
+        name,
+        path,
+        size: gzip.length,
+        symbol: `windsplat_web_asset_${index}`,
+        digest: createHash("sha256").update(gzip).digest("hex"),
+        type: contentTypes[extname(name)],
+        immutable: /-[0-9a-f]{10}\.\w+$/.test(name),
+      };
+    });
+}
+
+// The digests make the file change whenever what it includes does.
+const assembly = (assets) => `/* Made by web/scripts/embed.mjs. */
+    .section .rodata
+${assets
+  .map(
+    (asset) => `/* ${asset.name} ${asset.digest} */
+    .global ${asset.symbol}
+    .hidden ${asset.symbol}
+    .balign 16
+${asset.symbol}:
+    .incbin "${asset.path}"
+`,
+  )
+  .join("")}    .section .note.GNU-stack, "", %progbits
+`;
+
+const declaration = (asset) => `extern const std::uint8_t ${asset.symbol}[${asset.size}];\n`;
+
+const entry = ({ name, type, symbol, immutable }) =>
+  `      {"${name}", "${type}", ${symbol}, ${immutable}},\n`;
+
+const listing = (assets) => `// Made by web/scripts/embed.mjs from web/dist.
+#include <array>
+
+#include "server/net/web_assets.hpp"
+
+extern "C" {
+${assets.map(declaration).join("")}}
+
+namespace windsplat::net {
+
+std::span<const WebAsset> web_assets() {
+  static const std::array<WebAsset, ${assets.length}> assets = {{
+${assets.map(entry).join("")}  }};
+  return assets;
+}
+
+}  // namespace windsplat::net
+`;
+
+const outdir = resolve(process.argv[2]);
+const dist = join(outdir, "dist");
+mkdirSync(dist, { recursive: true });
+installModules();
+// In a process of its own: its modules are there only now.
+execFileSync(process.execPath, [join(scripts, "build.mjs"), "--quiet", "--outdir", dist], {
+  stdio: "inherit",
+});
+const assets = pack(dist, outdir);
+writeFileSync(join(outdir, "web_assets.S"), assembly(assets));
+writeFileSync(join(outdir, "web_assets.cpp"), listing(assets));

@@ -1,0 +1,237 @@
+// One WebSocket to /v1/stream that is made again whenever it is lost.
+// Bytes in -> typed messages and frames out to `events`; messages in -> text out.
+// Sockets, timers and chance are handed in, so that tests can play the network.
+import {
+  encodeClientMessage,
+  parseFrame,
+  parseServerMessage,
+  subprotocol,
+  WireError,
+  type ClientMessage,
+  type Frame,
+  type HelloMessage,
+  type ServerMessage,
+} from "./protocol";
+
+export interface MessageLike {
+  data: unknown;
+}
+
+export interface CloseLike {
+  code: number;
+  reason: string;
+}
+
+export interface SocketLike {
+  binaryType: string;
+  readyState: number;
+  send(text: string): void;
+  close(code?: number, reason?: string): void;
+  onmessage: ((event: MessageLike) => void) | null;
+  onclose: ((event: CloseLike) => void) | null;
+}
+
+export interface Clock {
+  setTimeout(run: () => void, ms: number): number;
+  clearTimeout(timer: number): void;
+  random(): number; // 0..1
+}
+
+export type ConnectionState =
+  | { name: "connecting"; attempt: number }
+  | { name: "live" }
+  | { name: "waiting"; attempt: number; delayMs: number; reason: string }
+  | { name: "asleep"; reason: string } // idle for long: wakes when someone looks or acts
+  | { name: "stopped" };
+
+export interface ConnectionEvents {
+  state(state: ConnectionState): void;
+  hello(hello: HelloMessage): void;
+  message(message: ServerMessage): void;
+  frame(frame: Frame): void;
+}
+
+const helloDeadlineMs = 10_000;
+const delayFirstMs = 625;
+const delayLastMs = 12_500;
+const socketOpen = 1;
+const idleCode = 4410;
+
+// Milliseconds before attempt n (from 0): doubling, spread by a fifth to either side so that the
+// viewers of a restarted server do not come back in one moment; always within 500..15000.
+export function reconnectDelayMs(attempt: number, random: number): number {
+  const base = Math.min(delayLastMs, delayFirstMs * 2 ** Math.min(attempt, 30));
+  return Math.round(base * (0.8 + 0.4 * random));
+}
+
+const closeReasons: Record<number, string> = {
+  1001: "the server is shutting down",
+  1006: "no answer from the server",
+  1008: "the server refused this page (origin or token)",
+  1009: "a message was too big for the server",
+  1013: "the server is full",
+  4400: "the server did not understand a message",
+  4408: "the server did not say hello",
+  4410: "the session was idle",
+};
+
+export function closeReason(code: number, reason: string): string {
+  const known = closeReasons[code];
+  if (known !== undefined) return known;
+  return reason === "" ? `the connection was closed (${code})` : reason;
+}
+
+export class Connection {
+  private socket: SocketLike | null = null;
+  private greeted = false;
+  private attempt = 0;
+  private retryTimer: number | null = null;
+  private helloTimer: number | null = null;
+  private stopped = true;
+  private asleep = false;
+  private fault: string | null = null;
+
+  constructor(
+    private readonly url: string,
+    private readonly openSocket: (url: string, protocol: string) => SocketLike,
+    private readonly clock: Clock,
+    private readonly events: ConnectionEvents,
+  ) {}
+
+  get live(): boolean {
+    return this.greeted;
+  }
+
+  start(): void {
+    this.stopped = false;
+    this.connect();
+  }
+
+  stop(): void {
+    this.stopped = true;
+    this.asleep = false;
+    this.clearTimers();
+    this.drop(1000, "");
+    this.events.state({ name: "stopped" });
+  }
+
+  // Whether the message went out; while the connection is lost nothing is kept, as the whole view
+  // is said anew after the next hello.
+  send(message: ClientMessage): boolean {
+    if (!this.greeted || this.socket?.readyState !== socketOpen) return false;
+    this.socket.send(encodeClientMessage(message));
+    return true;
+  }
+
+  // The network is back: do not sit out the delay.
+  retryNow(): void {
+    if (this.retryTimer !== null || this.asleep) this.connect();
+  }
+
+  // Someone is there again.
+  wake(): void {
+    if (this.asleep) this.connect();
+  }
+
+  private connect(): void {
+    this.clearTimers();
+    this.asleep = false;
+    this.events.state({ name: "connecting", attempt: this.attempt });
+    const socket = this.openSocket(this.url, subprotocol);
+    this.socket = socket;
+    socket.binaryType = "arraybuffer";
+    this.helloTimer = this.clock.setTimeout(() => {
+      if (this.socket === socket) this.fail(4408, "the server did not say hello");
+    }, helloDeadlineMs);
+    socket.onmessage = (event) => {
+      if (this.socket === socket) this.receive(event.data);
+    };
+    socket.onclose = (event) => {
+      if (this.socket === socket) this.lost(event.code, event.reason);
+    };
+  }
+
+  private receive(data: unknown): void {
+    try {
+      if (typeof data === "string") {
+        this.receiveText(data);
+      } else if (data instanceof ArrayBuffer) {
+        if (!this.greeted) throw new WireError("a frame before hello");
+        this.events.frame(parseFrame(data));
+        this.attempt = 0;
+      } else {
+        throw new WireError("a message of an unknown kind");
+      }
+    } catch (error) {
+      if (!(error instanceof WireError)) throw error;
+      this.fail(4400, `the server sent ${error.message}`);
+    }
+  }
+
+  private receiveText(text: string): void {
+    const message = parseServerMessage(text);
+    if (message.type === "hello") {
+      if (this.greeted) throw new WireError("hello twice");
+      this.greeted = true;
+      this.clearTimers();
+      this.events.state({ name: "live" });
+      this.events.hello(message);
+      return;
+    }
+    if (!this.greeted) throw new WireError(`"${message.type}" before hello`);
+    this.events.message(message);
+  }
+
+  // A peer that breaks the protocol is left at once; what it still sends is not looked at.
+  private fail(code: number, reason: string): void {
+    this.fault = reason;
+    // A close reason has at most 123 bytes.
+    this.drop(code, reason.replace(/[^ -~]/g, "?").slice(0, 100));
+    this.lost(code, reason);
+  }
+
+  private drop(code: number, reason: string): void {
+    const socket = this.socket;
+    this.socket = null;
+    this.greeted = false;
+    if (socket === null) return;
+    socket.onmessage = null;
+    socket.onclose = null;
+    socket.close(code, reason);
+  }
+
+  private lost(code: number, reason: string): void {
+    this.clearTimers();
+    this.socket = null;
+    this.greeted = false;
+    if (this.stopped) return;
+    if (code === idleCode) {
+      this.asleep = true;
+      this.events.state({ name: "asleep", reason: closeReason(code, reason) });
+      return;
+    }
+    if (code === 1008) this.attempt = Math.max(this.attempt, 5); // asking again will hardly help
+    const delayMs = reconnectDelayMs(this.attempt, this.clock.random());
+    this.attempt += 1;
+    const why = this.fault ?? closeReason(code, reason);
+    this.fault = null;
+    this.retryTimer = this.clock.setTimeout(() => this.connect(), delayMs);
+    this.events.state({ name: "waiting", attempt: this.attempt, delayMs, reason: why });
+  }
+
+  private clearTimers(): void {
+    if (this.retryTimer !== null) this.clock.clearTimeout(this.retryTimer);
+    if (this.helloTimer !== null) this.clock.clearTimeout(this.helloTimer);
+    this.retryTimer = null;
+    this.helloTimer = null;
+  }
+}
+
+// ws(s)://... of the stream beside the page, wherever it is mounted.
+export function streamUrl(baseUri: string): string {
+  const url = new URL("v1/stream", baseUri);
+  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  url.hash = "";
+  url.search = "";
+  return url.href;
+}

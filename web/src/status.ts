@@ -1,0 +1,105 @@
+// What the page says in words: connection, loading with a bar, and errors. An error stays until it
+// is dismissed or what caused it has succeeded; lesser news never overwrites it.
+import type { ConnectionState } from "./connection";
+import type { Problem } from "./protocol";
+import { byId } from "./dom";
+
+const barDelayMs = 200; // what is faster than this needs no bar
+
+export function problemText(problem: Problem): string {
+  const details = problem.errors?.map((e) =>
+    e.pointer === "" ? e.detail : `${e.pointer}: ${e.detail}`,
+  );
+  // The detail repeats the first value's text in many cases; the list says it better.
+  if (details !== undefined && details.length > 0) return details.join("; ");
+  return problem.detail === "" ? problem.title : problem.detail;
+}
+
+export class Status {
+  private readonly line = byId("status", HTMLElement);
+  private readonly light = byId("light", HTMLElement);
+  private readonly latency = byId("latency", HTMLElement);
+  private readonly alert = byId("alert", HTMLElement);
+  private readonly alertText = byId("alert-text", HTMLElement);
+  private readonly loading = byId("loading", HTMLElement);
+  private readonly bar = byId("loading-bar", HTMLProgressElement);
+  private readonly loadingText = byId("loading-text", HTMLElement);
+  private alertTopic = "";
+  private barTimer: number | undefined;
+  private countdown: number | undefined;
+
+  constructor() {
+    byId("alert-close", HTMLButtonElement).addEventListener("click", () => this.clearError());
+  }
+
+  // A word for screen readers and the status line.
+  say(text: string): void {
+    if (this.line.textContent !== text) this.line.textContent = text;
+  }
+
+  connection(state: ConnectionState): void {
+    window.clearInterval(this.countdown);
+    document.documentElement.dataset.connection = state.name;
+    this.light.title = state.name;
+    if (state.name === "live") {
+      this.say("live");
+    } else if (state.name === "connecting") {
+      this.latency.textContent = "";
+      this.say(state.attempt === 0 ? "connecting…" : `connecting again (${state.attempt})…`);
+    } else if (state.name === "asleep") {
+      this.latency.textContent = "";
+      this.say("resting; move the volume to go on");
+    } else if (state.name === "waiting") {
+      this.loaded();
+      const until = performance.now() + state.delayMs;
+      const tell = () => {
+        const left = Math.max(0, Math.ceil((until - performance.now()) / 1000));
+        this.latency.textContent = `again in ${left} s`;
+      };
+      this.say(`connection lost: ${state.reason}`);
+      tell();
+      this.countdown = window.setInterval(tell, 1000);
+    }
+  }
+
+  responded(ms: number): void {
+    this.latency.textContent = `${ms.toFixed(0)} ms`;
+  }
+
+  // `topic` names what would have to succeed for the error to be over.
+  error(topic: string, text: string): void {
+    this.alertTopic = topic;
+    this.alertText.textContent = text;
+    this.alert.hidden = false;
+  }
+
+  clearError(topic?: string): void {
+    if (topic !== undefined && topic !== this.alertTopic) return;
+    this.alert.hidden = true;
+    this.alertText.textContent = "";
+  }
+
+  // The error outlives the success of what it was about (something else took its place).
+  holdError(): void {
+    this.alertTopic = "";
+  }
+
+  startLoading(text: string): void {
+    window.clearTimeout(this.barTimer);
+    this.loadingText.textContent = text;
+    this.bar.removeAttribute("value"); // unknown how far
+    this.barTimer = window.setTimeout(() => (this.loading.hidden = false), barDelayMs);
+    this.say(text);
+  }
+
+  progress(phase: string, done: number, etaMs: number | null): void {
+    this.bar.value = done;
+    const left = etaMs === null ? "" : `, ${Math.ceil(etaMs / 1000)} s left`;
+    this.loadingText.textContent = `${phase}: ${Math.round(100 * done)} %${left}`;
+  }
+
+  loaded(): void {
+    window.clearTimeout(this.barTimer);
+    this.loading.hidden = true;
+  }
+}

@@ -1,0 +1,81 @@
+// Numbers as people read them: round ticks of a range, and text of a value.
+
+// About `count` round values (1, 2 or 5 times a power of ten apart) within [low, high].
+export function niceTicks(low: number, high: number, count: number): number[] {
+  if (!Number.isFinite(low) || !Number.isFinite(high) || low === high) return [];
+  const least = Math.min(low, high);
+  const most = Math.max(low, high);
+  const rough = (most - least) / Math.max(1, count);
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map((digit) => digit * power).find((s) => s >= rough * 0.999)!;
+  const ticks: number[] = [];
+  // Counted in steps, not added up: no 0.30000000000000004.
+  const slack = 1e-9;
+  for (let n = Math.ceil(least / step - slack); n <= most / step + slack; n++) {
+    ticks.push(Number((n * step).toPrecision(12)));
+  }
+  return ticks;
+}
+
+export function formatNumber(value: number, digits = 4): string {
+  if (!Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  if (size !== 0 && (size < 1e-3 || size >= 1e6)) {
+    return value
+      .toExponential(digits - 2)
+      .replace(/\.?0+e/, "e")
+      .replace("e+", "e");
+  }
+  return String(Number(value.toPrecision(digits)));
+}
+
+export function formatBytes(bytes: number): string {
+  if (bytes < 1000) return `${bytes} B`;
+  if (bytes < 1e6) return `${(bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0)} kB`;
+  return bytes < 1e9 ? `${(bytes / 1e6).toFixed(1)} MB` : `${(bytes / 1e9).toFixed(2)} GB`;
+}
+
+export interface LegendTick {
+  at: number; // 0..1 along the strip
+  text: string;
+}
+
+// Ticks of a strip from range[0] (left) to range[1] (right).
+export function linearTicks(range: readonly [number, number], count = 5): LegendTick[] {
+  const [low, high] = range;
+  return niceTicks(low, high, count).map((value) => ({
+    at: (value - low) / (high - low),
+    text: formatNumber(value),
+  }));
+}
+
+// How round a number is: 1, 10, 100 before 5, then 2, then anything else.
+function roughness(value: number): number {
+  if (value === 0) return 0;
+  const mantissa = Number(
+    (Math.abs(value) / 10 ** Math.floor(Math.log10(Math.abs(value)))).toFixed(6),
+  );
+  const order = [1, 5, 2].indexOf(mantissa);
+  return order < 0 ? 3 : order;
+}
+
+// Ticks of a strip over world heights, labelled by the vertical axis's own coordinates: samples
+// that lie within the range, the roundest first, no two nearer than `gap`.
+export function axisTicks(
+  range: readonly [number, number],
+  places: number[],
+  coordinates: number[],
+  gap = 0.16,
+): LegendTick[] {
+  const [low, high] = range;
+  const samples = coordinates
+    .map((value, n) => ({ value, at: (places[n]! - low) / (high - low) }))
+    .filter(({ at }) => at >= -1e-6 && at <= 1 + 1e-6)
+    .sort((a, b) => roughness(a.value) - roughness(b.value));
+  const ticks: LegendTick[] = [];
+  for (const { value, at } of samples) {
+    if (ticks.some((tick) => Math.abs(tick.at - at) < gap)) continue;
+    ticks.push({ at, text: formatNumber(value) });
+  }
+  return ticks.sort((a, b) => a.at - b.at);
+}

@@ -1,0 +1,310 @@
+// The connection against a socket and a clock that the test plays.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import {
+  Connection,
+  reconnectDelayMs,
+  streamUrl,
+  type CloseLike,
+  type ConnectionState,
+  type MessageLike,
+  type SocketLike,
+} from "../src/connection";
+import type { Frame, HelloMessage, ServerMessage } from "../src/protocol";
+
+class FakeSocket implements SocketLike {
+  binaryType = "blob";
+  readyState = 1;
+  sent: string[] = [];
+  closed: { code?: number; reason?: string } | null = null;
+  onmessage: ((event: MessageLike) => void) | null = null;
+  onclose: ((event: CloseLike) => void) | null = null;
+
+  constructor(
+    readonly url: string,
+    readonly protocol: string,
+  ) {}
+
+  send(text: string): void {
+    this.sent.push(text);
+  }
+
+  close(code?: number, reason?: string): void {
+    this.closed = { code, reason };
+    this.readyState = 3;
+  }
+
+  says(data: unknown): void {
+    this.onmessage?.({ data });
+  }
+
+  dies(code = 1006, reason = ""): void {
+    this.readyState = 3;
+    this.onclose?.({ code, reason });
+  }
+}
+
+class FakeClock {
+  now = 0;
+  chance = 0.5;
+  private timers = new Map<number, { at: number; run: () => void }>();
+  private next = 1;
+
+  setTimeout(run: () => void, ms: number): number {
+    this.timers.set(this.next, { at: this.now + ms, run });
+    return this.next++;
+  }
+
+  clearTimeout(timer: number): void {
+    this.timers.delete(timer);
+  }
+
+  random(): number {
+    return this.chance;
+  }
+
+  get waiting(): number {
+    return this.timers.size;
+  }
+
+  advance(ms: number): void {
+    const until = this.now + ms;
+    for (;;) {
+      const due = [...this.timers]
+        .filter(([, timer]) => timer.at <= until)
+        .sort((a, b) => a[1].at - b[1].at)[0];
+      if (due === undefined) break;
+      this.timers.delete(due[0]);
+      this.now = due[1].at;
+      due[1].run();
+    }
+    this.now = until;
+  }
+}
+
+interface Row {
+  kind: string;
+  document: { type?: string };
+  hex: string;
+}
+const vectors = (name: string): Row[] =>
+  JSON.parse(readFileSync(`../protocol/vectors/valid/${name}.json`, "utf8")) as Row[];
+const hello = JSON.stringify(
+  vectors("server_messages").find((row) => row.document.type === "hello")!.document,
+);
+const stats = '{"type": "stats", "frames": 1, "dropped": 0, "cancelled": 0, "bytes": 2}';
+
+function frameBytes(payload = 3): ArrayBuffer {
+  const header = Buffer.from(vectors("frame_headers")[0]!.hex.replaceAll(" ", ""), "hex");
+  const bytes = new Uint8Array(64 + payload);
+  bytes.set(header);
+  new DataView(bytes.buffer).setUint32(52, payload, true);
+  return bytes.buffer;
+}
+
+function setUp() {
+  const clock = new FakeClock();
+  const sockets: FakeSocket[] = [];
+  const seen = {
+    states: [] as ConnectionState[],
+    hellos: [] as HelloMessage[],
+    messages: [] as ServerMessage[],
+    frames: [] as Frame[],
+  };
+  const connection = new Connection(
+    "ws://x/v1/stream",
+    (url, protocol) => {
+      const socket = new FakeSocket(url, protocol);
+      sockets.push(socket);
+      return socket;
+    },
+    clock,
+    {
+      state: (state) => seen.states.push(state),
+      hello: (message) => seen.hellos.push(message),
+      message: (message) => seen.messages.push(message),
+      frame: (frame) => seen.frames.push(frame),
+    },
+  );
+  const last = () => sockets[sockets.length - 1]!;
+  const state = () => seen.states[seen.states.length - 1]!;
+  return { clock, sockets, seen, connection, last, state };
+}
+
+test("says the subprotocol, is live after hello, passes on messages and frames", () => {
+  const { connection, last, seen, state } = setUp();
+  connection.start();
+  assert.equal(last().protocol, "windsplat.v1");
+  assert.equal(last().binaryType, "arraybuffer");
+  assert.equal(connection.live, false);
+  last().says(hello);
+  assert.equal(state().name, "live");
+  assert.equal(seen.hellos.length, 1);
+  last().says(stats);
+  last().says(frameBytes());
+  assert.equal(seen.messages[0]!.type, "stats");
+  assert.equal(seen.frames[0]!.header.seq, 7);
+  assert.equal(seen.frames[0]!.picture.byteLength, 3);
+});
+
+test("nothing is sent before hello or after the end", () => {
+  const { connection, last } = setUp();
+  assert.equal(connection.send({ type: "pause" }), false);
+  connection.start();
+  assert.equal(connection.send({ type: "pause" }), false);
+  last().says(hello);
+  assert.equal(connection.send({ type: "ack", seq: 1, decodeMs: 2 }), true);
+  assert.deepEqual(JSON.parse(last().sent[0]!), { type: "ack", seq: 1, decodeMs: 2 });
+  last().dies();
+  assert.equal(connection.send({ type: "pause" }), false);
+});
+
+test("delays double from half a second to 15 s and are spread", () => {
+  for (const chance of [0, 0.5, 1]) {
+    const delays = Array.from({ length: 12 }, (_, n) => reconnectDelayMs(n, chance));
+    delays.forEach((delay, n) => {
+      assert.ok(delay >= 500 && delay <= 15_000, `${delay} at ${n}`);
+      if (n > 0) assert.ok(delay >= delays[n - 1]!);
+    });
+  }
+  assert.equal(reconnectDelayMs(0, 0), 500);
+  assert.equal(reconnectDelayMs(1, 0), 1000);
+  assert.equal(reconnectDelayMs(1e9, 1), 15_000);
+  assert.ok(reconnectDelayMs(3, 1) - reconnectDelayMs(3, 0) > 0.3 * reconnectDelayMs(3, 0.5));
+});
+
+test("comes back after a loss, each time later, and at once after a frame has come", () => {
+  const { clock, connection, last, sockets, state } = setUp();
+  connection.start();
+  for (const delay of [625, 1250, 2500]) {
+    last().dies();
+    const waiting = state();
+    assert.equal(waiting.name, "waiting");
+    assert.equal(waiting.name === "waiting" && waiting.delayMs, delay);
+    const before = sockets.length;
+    clock.advance(delay - 1);
+    assert.equal(sockets.length, before, "not early");
+    clock.advance(1);
+    assert.equal(sockets.length, before + 1);
+  }
+  last().says(hello);
+  last().says(frameBytes());
+  last().dies();
+  const waiting = state();
+  assert.equal(waiting.name === "waiting" && waiting.delayMs, 625);
+});
+
+test("a server that greets and falls over is not asked ever faster", () => {
+  const { clock, connection, last, state } = setUp();
+  connection.start();
+  let before = 0;
+  for (let n = 0; n < 4; n++) {
+    last().says(hello);
+    last().dies();
+    const waiting = state();
+    assert.ok(waiting.name === "waiting" && waiting.delayMs > before);
+    before = waiting.name === "waiting" ? waiting.delayMs : 0;
+    clock.advance(before);
+  }
+});
+
+test("garbage ends the connection, is told, and does not end the page", () => {
+  const garbage: unknown[] = [
+    "",
+    "{",
+    "null",
+    '{"type": "hello"}',
+    '{"type": "launch"}',
+    new ArrayBuffer(0),
+    new ArrayBuffer(64),
+    frameBytes().slice(0, 66),
+    { not: "a message" },
+    hello,
+  ];
+  for (const bad of garbage) {
+    const { clock, connection, last, seen, sockets, state } = setUp();
+    connection.start();
+    const first = last();
+    first.says(hello);
+    first.says(bad);
+    assert.equal(first.closed?.code, 4400, String(bad));
+    assert.equal(connection.live, false);
+    const waiting = state();
+    assert.equal(waiting.name, "waiting");
+    assert.match(waiting.name === "waiting" ? waiting.reason : "", /server sent/);
+    const counts = [seen.messages.length, seen.frames.length];
+    first.says(stats);
+    first.says(frameBytes());
+    assert.deepEqual([seen.messages.length, seen.frames.length], counts, "the rest is not heard");
+    first.dies(1000);
+    clock.advance(1_000);
+    assert.equal(sockets.length, 2, "one new connection, not two");
+    last().says(hello);
+    assert.equal(connection.live, true);
+  }
+});
+
+test("messages and frames before hello break the protocol", () => {
+  for (const early of [stats, frameBytes()]) {
+    const { connection, last } = setUp();
+    connection.start();
+    last().says(early);
+    assert.equal(last().closed?.code, 4400);
+  }
+});
+
+test("a server that never says hello is left", () => {
+  const { clock, connection, last, sockets, state } = setUp();
+  connection.start();
+  clock.advance(9_999);
+  assert.equal(last().closed, null);
+  clock.advance(1);
+  assert.equal(last().closed?.code, 4408);
+  assert.equal(state().name, "waiting");
+  clock.advance(20_000);
+  assert.ok(sockets.length >= 2);
+});
+
+test("a refused origin or token is asked again only seldom", () => {
+  const { connection, last, state } = setUp();
+  connection.start();
+  last().dies(1008);
+  const waiting = state();
+  assert.ok(waiting.name === "waiting" && waiting.delayMs >= 10_000);
+  assert.match(waiting.name === "waiting" ? waiting.reason : "", /origin or token/);
+});
+
+test("after long idling it sleeps until someone is there", () => {
+  const { clock, connection, last, sockets, state } = setUp();
+  connection.start();
+  last().says(hello);
+  last().dies(4410);
+  assert.equal(state().name, "asleep");
+  clock.advance(3_600_000);
+  assert.equal(sockets.length, 1);
+  connection.wake();
+  assert.equal(sockets.length, 2);
+  connection.wake();
+  assert.equal(sockets.length, 2, "once");
+});
+
+test("when the network is back the delay is not sat out", () => {
+  const { connection, last, sockets, clock } = setUp();
+  connection.start();
+  last().dies();
+  connection.retryNow();
+  assert.equal(sockets.length, 2);
+  clock.advance(600_000);
+  assert.ok(sockets.slice(1).filter((socket) => socket.closed === null).length <= 1);
+  connection.stop();
+  connection.retryNow();
+  assert.equal(clock.waiting, 0, "a stopped connection waits for nothing");
+});
+
+test("the stream's address follows the page's base path and scheme", () => {
+  assert.equal(streamUrl("http://h:8080/"), "ws://h:8080/v1/stream");
+  assert.equal(streamUrl("https://h/a/b/"), "wss://h/a/b/v1/stream");
+  assert.equal(streamUrl("http://h/a/b/?x=1#!%7B%7D"), "ws://h/a/b/v1/stream");
+  assert.equal(streamUrl("http://h/a/index.html"), "ws://h/a/v1/stream");
+});

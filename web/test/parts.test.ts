@@ -1,0 +1,457 @@
+// The page's smaller pure parts: numbers, legend, links, media, gestures, picture size, times.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import { FrameRate, networkMs } from "../src/hud";
+import { gesture, MoveQueue } from "../src/input";
+import { legendEntries, sampleHeights, unitText } from "../src/legend_entries";
+import { hashOfView, viewOfHash } from "../src/link";
+import {
+  densityOf,
+  followMedia,
+  mediaOf,
+  rampCurve,
+  thresholdOf,
+  withDensity,
+  type Curve,
+  type Layer,
+} from "../src/media";
+import { patchAt, valueAt } from "../src/panel_kit";
+import type { Dataset, FrameHeader, View } from "../src/protocol";
+import { problemText } from "../src/status";
+import { axisTicks, formatBytes, formatNumber, linearTicks, niceTicks } from "../src/ticks";
+import { readableTime } from "../src/time_bar";
+import { pictureSize } from "../src/viewport";
+import type { Camera } from "../src/camera";
+
+const dataset: Dataset = {
+  id: "gcm",
+  title: "GCM",
+  source: "gcm.nc",
+  format: "netCDF-4",
+  state: "ready",
+  dims: { x: 2, y: 2, z: 4 },
+  axes: {
+    x: {
+      name: "lon",
+      standardName: "longitude",
+      units: "degrees_east",
+      kind: "longitude",
+      coordinates: [0, 1],
+      world: [-0.5, 0.5],
+    },
+    y: {
+      name: "lat",
+      standardName: "latitude",
+      units: "degrees_north",
+      kind: "latitude",
+      coordinates: [0, 1],
+      world: [-0.5, 0.5],
+    },
+    z: {
+      name: "lev",
+      standardName: "air_pressure",
+      units: "hPa",
+      kind: "pressure",
+      coordinates: [1000, 700, 500, 200],
+      world: [-0.12, -0.06, 0.0, 0.12],
+    },
+  },
+  world: { min: [-1, -1, -0.15], max: [1, 1, 0.15] },
+  fields: [
+    {
+      name: "wind",
+      kind: "vector",
+      components: ["u", "v"],
+      units: "m s-1",
+      standardName: "",
+      longName: "",
+      range: [0, 50],
+      masked: 0,
+      rangeOf: "step",
+      dtype: "float32",
+    },
+    {
+      name: "cloud",
+      kind: "scalar",
+      components: ["cloud"],
+      units: "1",
+      standardName: "",
+      longName: "cloud fraction",
+      range: [0, 1],
+      masked: 0,
+      rangeOf: "step",
+      dtype: "float32",
+    },
+  ],
+  leftOut: [],
+  steps: { count: 1, times: [{ value: 0, text: "" }] },
+  timeUnits: "",
+  residentBytes: 0,
+  bytesWhenResident: 0,
+};
+
+const vector = (color: object): View => ({
+  dataset: "gcm",
+  vector: { field: "wind", magnitudeRange: [0, 60], color: { map: "magma", ...color } },
+  scalars: [],
+});
+
+test("ticks are 1, 2 or 5 times a power of ten apart and lie within", () => {
+  assert.deepEqual(niceTicks(0, 1, 5), [0, 0.2, 0.4, 0.6, 0.8, 1]);
+  assert.deepEqual(niceTicks(0, 60, 5), [0, 20, 40, 60]);
+  assert.deepEqual(niceTicks(-0.3, 0.3, 3), [-0.2, 0, 0.2]);
+  assert.deepEqual(niceTicks(200, 310, 5), [200, 250, 300]);
+  assert.deepEqual(niceTicks(1, 0, 5), niceTicks(0, 1, 5));
+  for (const [low, high] of [
+    [0, 1e-12],
+    [-1e30, 3e30],
+    [99.9, 100.1],
+  ] as const) {
+    const ticks = niceTicks(low, high, 5);
+    assert.ok(ticks.length >= 2 && ticks.length <= 11, `${ticks}`);
+    for (const tick of ticks) assert.ok(tick >= low && tick <= high);
+  }
+  for (const [low, high] of [
+    [1, 1],
+    [NaN, 1],
+    [0, Infinity],
+  ] as const) {
+    assert.deepEqual(niceTicks(low, high, 5), []);
+  }
+});
+
+test("a reversed range has its ticks from the other side", () => {
+  assert.deepEqual(
+    linearTicks([0, 10], 2).map((tick) => [tick.at, tick.text]),
+    [
+      [0, "0"],
+      [0.5, "5"],
+      [1, "10"],
+    ],
+  );
+  assert.deepEqual(
+    linearTicks([10, 0], 2).map((tick) => [Math.abs(tick.at), tick.text]),
+    [
+      [1, "0"],
+      [0.5, "5"],
+      [0, "10"],
+    ],
+  );
+});
+
+test("numbers and bytes are short", () => {
+  const rows: [number, string][] = [
+    [0, "0"],
+    [0.30000000000000004, "0.3"],
+    [12345.678, "12350"],
+    [1e-5, "1e-5"],
+    [2.5e7, "2.5e7"],
+    [-0.02, "-0.02"],
+    [NaN, "–"],
+  ];
+  for (const [value, text] of rows) assert.equal(formatNumber(value), text);
+  assert.deepEqual([999, 9200, 92_000, 1.5e6, 3.74e9].map(formatBytes), [
+    "999 B",
+    "9.2 kB",
+    "92 kB",
+    "1.5 MB",
+    "3.74 GB",
+  ]);
+});
+
+test("height is told by the vertical axis's own levels, where the samples stand", () => {
+  const [entry] = legendEntries(dataset, vector({ by: "worldZ", range: [-0.24, 0.15] }));
+  assert.equal(entry!.units, "hPa");
+  assert.match(entry!.title, /pressure/);
+  const at = Object.fromEntries(entry!.ticks.map((tick) => [tick.text, tick.at]));
+  assert.ok(Math.abs(at["1000"]! - (0.24 - 0.12) / 0.39) < 1e-9);
+  assert.ok(Math.abs(at["500"]! - 0.24 / 0.39) < 1e-9);
+  assert.ok(at["1000"]! < at["500"]!, "low pressure is high");
+});
+
+test("round levels win where there is no room for all", () => {
+  const ticks = axisTicks([0, 1], [0.5, 0.52, 0.54], [510, 500, 490], 0.2);
+  assert.deepEqual(
+    ticks.map((tick) => tick.text),
+    ["500"],
+  );
+});
+
+test("stretching the volume moves the levels along", () => {
+  const stretched: View = { ...vector({}), geometry: { scale: [1, 1, 2] } };
+  assert.deepEqual(sampleHeights(dataset, stretched), [-0.24, -0.12, 0, 0.24]);
+  // 20 times as high is higher than wide: 2 x 0.15 x 20 = 6 is now the longest edge.
+  const tower: View = { ...vector({}), geometry: { scale: [1, 1, 20] } };
+  assert.ok(Math.abs(sampleHeights(dataset, tower)![3]! - (0.12 * 20 * 2) / 6) < 1e-12);
+  const index: View = { ...vector({}), geometry: { vertical: "index" } };
+  assert.equal(sampleHeights(dataset, index), null);
+  const [entry] = legendEntries(dataset, {
+    ...vector({ by: "worldZ", range: [-0.1, 0.1] }),
+    geometry: { vertical: "index" },
+  });
+  assert.equal(entry!.units, "world units");
+});
+
+test("each way of colouring has its unit; one colour has no range", () => {
+  const units = (color: object) => legendEntries(dataset, vector(color))[0]!.units;
+  assert.equal(units({ by: "magnitude", range: [0, 60] }), "m s⁻¹");
+  assert.equal(units({ by: "screenZ", range: [1, 3] }), "world units");
+  assert.equal(units({ by: "rise", range: [0, 1] }), "fraction");
+  const [constant] = legendEntries(dataset, vector({ by: "constant", constant: "#ff0000" }));
+  assert.equal(constant!.range, null);
+  assert.equal(constant!.color, "#ff0000");
+  assert.match(constant!.note, /60 m s⁻¹/);
+});
+
+test("powers in units are raised, anything else stays", () => {
+  const rows: [string | undefined, string][] = [
+    ["m s-1", "m s⁻¹"],
+    ["kg m-2 s-1", "kg m⁻² s⁻¹"],
+    ["m2", "m²"],
+    ["m/s", "m/s"],
+    ["%", "%"],
+    ["hPa", "hPa"],
+    ["1", ""],
+    [undefined, ""],
+    ["degrees_north", "degrees_north"],
+    ["W/m2", "W/m²"],
+    ["m10", "m¹⁰"],
+  ];
+  for (const [units, text] of rows) assert.equal(unitText(units), text);
+});
+
+test("the legend shows what is drawn and nothing else", () => {
+  assert.deepEqual(
+    legendEntries(dataset, { dataset: "gcm", vector: { field: null }, scalars: [] }),
+    [],
+  );
+  const both = legendEntries(dataset, {
+    ...vector({ by: "magnitude", range: [0, 1] }),
+    scalars: [
+      {
+        field: "cloud",
+        color: { map: "grays", range: [0, 2] },
+        extinction: [
+          [0, 0],
+          [1, 0],
+          [2, 5],
+        ],
+      },
+    ],
+  });
+  assert.deepEqual(
+    both.map((entry) => entry.kind),
+    ["lines", "medium"],
+  );
+  assert.equal(both[1]!.title, "cloud fraction");
+  assert.deepEqual(both[1]!.extinction, [
+    [0, 0],
+    [0.5, 0],
+    [1, 1],
+  ]);
+});
+
+test("a link gives the same view back, without the window's size", () => {
+  const view: View = {
+    dataset: "a b/ü#%\"'",
+    step: 3,
+    image: { width: 100, height: 50 },
+    camera: { eye: [0, -3.25, 1e-7] },
+    vector: { field: null },
+  };
+  const hash = hashOfView(view);
+  assert.match(hash, /^#!\{[!-~]*\}$/, "plain characters only");
+  const { image: _image, ...rest } = view;
+  assert.deepEqual(viewOfHash(hash), rest);
+  const url = new URL(`http://h/${hash}`);
+  assert.deepEqual(viewOfHash(url.hash), viewOfHash(hash), "an address keeps it");
+  assert.deepEqual(viewOfHash('#!{"dataset":"x","image":{"width":9,"background":"#112233"}}'), {
+    dataset: "x",
+    image: { background: "#112233" },
+  });
+});
+
+test("what is no link is no view", () => {
+  for (const hash of ["", "#", "#x", "#!", "#!{", "#![]", "#!null", "#!7", "#!%", "#!%E0%A4%A"]) {
+    assert.equal(viewOfHash(hash), null, hash);
+  }
+});
+
+test("density scales the opacity curve, threshold moves its foot", () => {
+  const curve: Curve = [
+    [0, 0],
+    [0.2, 0],
+    [0.5, 2],
+    [1, 8],
+  ];
+  assert.equal(densityOf(curve), 8);
+  assert.equal(thresholdOf(curve), 0.2);
+  assert.deepEqual(withDensity(curve, [0, 1], 4), [
+    [0, 0],
+    [0.2, 0],
+    [0.5, 1],
+    [1, 4],
+  ]);
+  assert.equal(
+    thresholdOf([
+      [0, 1],
+      [1, 2],
+    ]),
+    null,
+  );
+  assert.deepEqual(rampCurve([0, 10], 4, 3), [
+    [0, 0],
+    [4, 0],
+    [10, 3],
+  ]);
+  assert.deepEqual(
+    rampCurve([10, 0], 0, 3),
+    [
+      [0, 0],
+      [10, 3],
+    ],
+    "a reversed colour range",
+  );
+  const top = rampCurve([0, 10], 99, 3);
+  for (let n = 1; n < top.length; n++) assert.ok(top[n]![0] > top[n - 1]![0], "values ascend");
+  // From nothing at all there is a way back.
+  const gone = withDensity(curve, [0, 1], 0);
+  assert.equal(densityOf(gone), 0);
+  assert.equal(densityOf(withDensity(gone, [0, 1], 5)), 5);
+});
+
+test("a medium that is switched off keeps its place and settings", () => {
+  const a = { field: "a" };
+  const b = { field: "b", stride: 3 };
+  let layers: Layer[] = followMedia([], [a, b]);
+  layers = layers.map((layer) => (layer.view.field === "a" ? { ...layer, on: false } : layer));
+  assert.deepEqual(mediaOf(layers), [b]);
+  layers = followMedia(layers, [{ ...b, stride: 4 }]);
+  assert.deepEqual(
+    layers.map((layer) => [layer.view.field, layer.on]),
+    [
+      ["a", false],
+      ["b", true],
+    ],
+  );
+  assert.equal(layers[1]!.view.stride, 4);
+  assert.deepEqual(
+    followMedia(layers, [a, b]).map((layer) => [layer.view.field, layer.on]),
+    [
+      ["a", true],
+      ["b", true],
+    ],
+    "back by another way: not twice",
+  );
+  assert.deepEqual(
+    followMedia(layers, []).map((layer) => layer.view.field),
+    ["a"],
+  );
+});
+
+test("pointers read a value and make the patch that sets it", () => {
+  assert.equal(valueAt({ a: { b: 3 } }, "/a/b"), 3);
+  assert.equal(valueAt({ a: null }, "/a/b"), undefined);
+  assert.deepEqual(patchAt("/a/b/c", [1]), { a: { b: { c: [1] } } });
+});
+
+test("two fingers have a centre and a spread", () => {
+  assert.deepEqual(gesture([{ x: 3, y: 4 }]), { x: 3, y: 4, spread: 0 });
+  assert.deepEqual(
+    gesture([
+      { x: 0, y: 0 },
+      { x: 6, y: 8 },
+    ]),
+    { x: 3, y: 4, spread: 5 },
+  );
+});
+
+test("however many moves come, one camera a display frame goes out", () => {
+  let camera: Camera = {
+    projection: "perspective",
+    eye: [0, -1, 0],
+    target: [0, 0, 0],
+    up: [0, 0, 1],
+    fovY: 35,
+    height: 1,
+  };
+  const frames: (() => void)[] = [];
+  let told = 0;
+  const queue = new MoveQueue(
+    {
+      camera: () => camera,
+      setCamera: (next) => {
+        camera = next;
+        told += 1;
+      },
+    },
+    (run) => frames.push(run),
+  );
+  for (let n = 0; n < 50; n++) queue.push((c) => ({ ...c, height: c.height + 1 }));
+  assert.equal(frames.length, 1);
+  frames.pop()!();
+  assert.equal(told, 1);
+  assert.equal(camera.height, 51, "and none of them is lost");
+  queue.push((c) => c);
+  assert.equal(frames.length, 1, "the next display frame is asked for anew");
+});
+
+test("the picture is as sharp as the screen up to what is worth it", () => {
+  assert.deepEqual(pictureSize(800, 600, 1), [800, 600]);
+  assert.deepEqual(pictureSize(800, 600, 2), [1600, 1200]);
+  assert.deepEqual(pictureSize(400, 300, 3), [800, 600]);
+  assert.deepEqual(pictureSize(0, 0, 1), [16, 16]);
+  for (const [w, h, density] of [
+    [3840, 2160, 2],
+    [8000, 100, 1],
+    [1440, 900, 2],
+  ] as const) {
+    const [width, height] = pictureSize(w, h, density);
+    assert.ok(width * height <= 3.71e6 && width <= 4096 && height <= 4096);
+    assert.ok(Math.abs(width / height / (w / h) - 1) < 0.02);
+  }
+});
+
+test("network time is what the server's own times do not explain, told once a patch", () => {
+  const header = { t: 1000, queueUs: 1000, renderUs: 20_000, encodeUs: 4000 } as FrameHeader;
+  assert.equal(networkMs(header, 1040, 0), 15);
+  assert.equal(networkMs(header, 1040, 1000), null);
+  assert.equal(networkMs(header, 1010, 0), 0, "never negative");
+});
+
+test("the frame rate counts the last second", () => {
+  const rate = new FrameRate();
+  for (let now = 0; now < 2000; now += 100) rate.add(now);
+  assert.equal(rate.value(1950), 10);
+  assert.equal(rate.value(9000), 0);
+});
+
+test("times are readable and unknown ones stay as they are", () => {
+  assert.equal(readableTime("2001-01-01T03:00:00Z"), "2001-01-01 03:00Z");
+  assert.equal(readableTime("2001-01-01T03:00:07Z"), "2001-01-01 03:00:07Z");
+  assert.equal(readableTime("step 3"), "step 3");
+});
+
+test("a problem is told by its values at fault", () => {
+  const problem = { type: "about:blank", title: "Bad", status: 422, detail: "d" };
+  assert.equal(problemText(problem), "d");
+  assert.equal(problemText({ ...problem, detail: "" }), "Bad");
+  assert.equal(
+    problemText({ ...problem, errors: [{ pointer: "/step", detail: "too large" }] }),
+    "/step: too large",
+  );
+});
+
+test("the page keeps a strict policy for content and any base path", () => {
+  const page = readFileSync("index.html", "utf8");
+  assert.doesNotMatch(page, /<style|\sstyle=|\son\w+=|javascript:/i);
+  for (const [, script] of page.matchAll(/<script([^>]*)>/g))
+    assert.match(script!, /src="%SCRIPT%"/);
+  for (const [, , address] of page.matchAll(/\b(src|href)="([^"]*)"/g)) {
+    assert.match(address!, /^%[A-Z]+%$/, "relative, hashed names only");
+  }
+  for (const sheet of ["base", "stage", "panel", "small"]) {
+    assert.doesNotMatch(readFileSync(`src/${sheet}.css`, "utf8"), /url\(|@import/);
+  }
+});
