@@ -30,6 +30,8 @@ after(async () => {
   await daemon?.kill();
 });
 
+const phone = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
+
 function assertDrawn(stats) {
   assert.ok(stats.covered > 0.02, `only ${stats.covered} of the picture is drawn`);
   assert.ok(stats.deviation > 3, `the picture is flat: deviation ${stats.deviation}`);
@@ -308,6 +310,28 @@ test("a server that comes back with other datasets shows one, without a storm", 
   await own.kill();
 });
 
+test("the picture keeps its size while a dataset opens", async () => {
+  for (const options of [phone, {}, { viewport: { width: 900, height: 700 } }]) {
+    const context = await browser.newContext(options);
+    await context.addInitScript(() => {
+      window.sizes = new Set();
+      document.addEventListener("DOMContentLoaded", () => {
+        const canvas = document.querySelector("#picture");
+        const sizes = window.sizes;
+        const note = () => sizes.add(`${canvas.clientWidth} x ${canvas.clientHeight}`);
+        new ResizeObserver(note).observe(canvas);
+      });
+    });
+    const page = await context.newPage();
+    await page.goto(daemon.url, { waitUntil: "load" });
+    await finalPicture(page);
+    await page.waitForTimeout(300);
+    const sizes = await page.evaluate(() => [...window.sizes]);
+    assert.equal(sizes.length, 1, sizes.join(", "));
+    await context.close();
+  }
+});
+
 test("one finger turns, two fingers move and pinch", () =>
   withPage(
     async (page) => {
@@ -371,7 +395,7 @@ test("one finger turns, two fingers move and pinch", () =>
       assertDrawn(await pixels(page));
     },
     "",
-    { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true },
+    phone,
   ));
 
 test("everything by the keyboard", () =>
@@ -517,7 +541,7 @@ test("screenshots of the usual windows", async () => {
     ["desktop", { viewport: { width: 1440, height: 900 } }],
     ["desktop-light", { viewport: { width: 1440, height: 900 }, colorScheme: "light" }],
     ["small", { viewport: { width: 1024, height: 768 } }],
-    ["phone", { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true }],
+    ["phone", phone],
   ];
   for (const [name, options] of windows) {
     await withPage(
