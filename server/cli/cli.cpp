@@ -24,7 +24,10 @@ int run_parsed(CLI::App& app, const Action& chosen, int argc, const char* const*
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& stop) {  // --help and --version too
-    return app.exit(stop, std::cout, std::cerr) == 0 ? exit_ok : exit_usage;
+    if (stop.get_exit_code() == 0) return app.exit(stop, std::cout, std::cerr);
+    complain(stop.what());
+    std::cerr << "Run with --help for more information.\n";
+    return exit_usage;
   }
   return chosen();
 }

@@ -101,11 +101,15 @@ TEST(Work, OpaqueTilesStopEarlyAndLookTheSame) {
 }
 
 TEST(Cancel, BeforeAndDuringAFrame) {
+  // Seconds of work, so that even a thread that wakes late cancels in its midst.
   scene::Scene scene;
   scene.lattice = even_lattice({120, 120, 120}, {0.016, 0.016, 0.016});
+  const auto wind = make_volume(scene.lattice, 3, [](int, double, double, double) { return 1.0F; });
+  scene.vector = plain_lines(wind, {1.0F, 0.5F, 0.2F});
+  scene.vector->length = 0.1;
   const auto fog = make_volume(scene.lattice, 1, [](int, double, double, double) { return 0.01F; });
   scene.scalars.push_back(medium(fog, {1.0F, 1.0F, 1.0F}));
-  scene.camera = look({0, 0, 0}, {0.5, 1, -0.3}, 3, 1500, 1500, true, 0.35);
+  scene.camera = look({0, 0, 0}, {0.5, 1, -0.3}, 3, 2000, 2000, true, 0.35);
   ThreadPool pool(2);
   const CancelToken before;
   before.cancel();
