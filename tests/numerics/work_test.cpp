@@ -101,15 +101,15 @@ TEST(Work, OpaqueTilesStopEarlyAndLookTheSame) {
 }
 
 TEST(Cancel, BeforeAndDuringAFrame) {
-  // Seconds of work, so that even a thread that wakes late cancels in its midst.
+  // So much work that a thread that wakes late still cancels in its midst.
   scene::Scene scene;
-  scene.lattice = even_lattice({120, 120, 120}, {0.016, 0.016, 0.016});
+  scene.lattice = even_lattice({80, 80, 80}, {0.024, 0.024, 0.024});
   const auto wind = make_volume(scene.lattice, 3, [](int, double, double, double) { return 1.0F; });
   scene.vector = plain_lines(wind, {1.0F, 0.5F, 0.2F});
   scene.vector->length = 0.1;
   const auto fog = make_volume(scene.lattice, 1, [](int, double, double, double) { return 0.01F; });
   scene.scalars.push_back(medium(fog, {1.0F, 1.0F, 1.0F}));
-  scene.camera = look({0, 0, 0}, {0.5, 1, -0.3}, 3, 2000, 2000, true, 0.35);
+  scene.camera = look({0, 0, 0}, {0.5, 1, -0.3}, 3, 1200, 1200, true, 0.35);
   ThreadPool pool(2);
   const CancelToken before;
   before.cancel();
@@ -117,15 +117,23 @@ TEST(Cancel, BeforeAndDuringAFrame) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::cancelled);
 
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  ASSERT_TRUE(engine::render(scene, pool, CancelToken()));
+  const std::chrono::duration<double> whole = Clock::now() - start;
+
   const CancelToken during;
   std::thread canceller([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(30));
+    std::this_thread::sleep_for(0.2 * whole);
     during.cancel();
   });
+  const auto begin = Clock::now();
   const auto cut_short = engine::render(scene, pool, during);
+  const auto part = Clock::now() - begin;
   canceller.join();
   ASSERT_FALSE(cut_short);
   EXPECT_EQ(cut_short.error().kind, ErrorKind::cancelled);
+  EXPECT_LT(part / whole, 0.75) << "cancelled at a fifth of its time, yet drawn on";
 }
 
 bool all_finite(const engine::Image& image) {
