@@ -1,4 +1,5 @@
-// A flag that one thread raises and the work polls between tiles. Copies share the flag.
+// A flag that one thread raises and the work polls: between tiles, and every few bricks in one.
+// Copies share the flag.
 #pragma once
 
 #include <atomic>

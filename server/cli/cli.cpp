@@ -21,12 +21,17 @@ int run_parsed(CLI::App& app, const Action& chosen, int argc, const char* const*
     std::cerr << app.help();
     return exit_usage;
   }
+  const auto is_meant = [&](const CLI::App* command) { return command->check_name(argv[1]); };
+  if (argv[1][0] != '-' && app.get_subcommands(is_meant).empty()) {
+    complain("there is no command '" + printable(argv[1]) + "'; run with --help for those there");
+    return exit_usage;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& stop) {  // --help and --version too
     if (stop.get_exit_code() == 0) return app.exit(stop, std::cout, std::cerr);
-    complain(stop.what());
-    std::cerr << "Run with --help for more information.\n";
+    complain(printable(stop.what(), 2000));
+    complain("run with --help for more information");
     return exit_usage;
   }
   return chosen();

@@ -135,10 +135,7 @@ int serve(const Arguments& arguments) {
   const auto drain = std::make_shared<Drain>();
   const SignalWatch signals([drain] { (*drain)(); });
   const auto store = std::make_shared<data::Store>(*memory_bytes);
-  if (const auto ok = open_datasets(arguments.datasets, *store); !ok) {
-    answer(ok.error());
-    return exit_bad_data;
-  }
+  if (const auto ok = open_datasets(arguments.datasets, *store); !ok) return answer(ok.error());
   net::Server server(*options, store, std::make_shared<ThreadPool>(arguments.threads));
   if (const auto ok = server.listen(); !ok) return answer(ok.error());
   drain->arm(&server);

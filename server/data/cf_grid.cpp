@@ -37,6 +37,8 @@ bool is_named_by(const FileContents& contents, const std::string FileVariable::*
                      });
 }
 
+constexpr const char* coordinate_variable = "coordinate variable";
+
 // Why a variable is no field whatever the grid; empty if it may be one.
 std::string not_a_field(const FileContents& contents, const std::vector<DimensionRole>& roles,
                         std::size_t v) {
@@ -48,7 +50,7 @@ std::string not_a_field(const FileContents& contents, const std::vector<Dimensio
       roles.begin(), roles.end(),
       [v](const DimensionRole& role) { return role.coordinate == static_cast<int>(v); });
   if (is_coordinate) {
-    return "coordinate variable";
+    return coordinate_variable;
   }
   if (is_named_by(contents, &FileVariable::bounds, variable.name)) {
     return "bounds of a coordinate";
@@ -162,7 +164,8 @@ Result<GridChoice> choose_grid(const FileContents& contents,
         add_to_group(contents, groups, std::move(candidate));
       }
     }
-    if (!reason.empty()) {
+    // A coordinate is not left out: it places the others.
+    if (!reason.empty() && reason != coordinate_variable) {
       choice.left_out.push_back({variable.name, std::move(reason)});
     }
   }

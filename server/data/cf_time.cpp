@@ -308,7 +308,8 @@ std::optional<Scale> parse_scale(std::string_view units, std::string_view calend
   const std::string text = lower(trim(units));
   const auto since = text.find(" since ");
   if (since == std::string::npos) {
-    reason = "its units name no epoch";
+    // Elapsed time ("s") is complete as a number.
+    if (unit_ms(text) == 0) reason = "its units name no epoch";
     return std::nullopt;
   }
   Scale scale;

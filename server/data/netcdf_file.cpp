@@ -118,8 +118,12 @@ LibraryLock::LibraryLock() {
   library_mutex().lock();
   // Files must not choose code to load (open_library makes sure of it), and HDF5 must not write its
   // own account of every missing attribute to stderr, which is a setting of each thread.
+  // A file that could not be written (a full disk) stays open in HDF5, and its own clean-up at the
+  // end of the process crashes on it; everything here closes what it opens.
+  static const bool without_last_words = H5dont_atexit() >= 0;
   static const bool without_plugins = H5PLset_loading_state(0) >= 0;
   thread_local const bool without_noise = H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr) >= 0;
+  static_cast<void>(without_last_words);
   static_cast<void>(without_plugins);
   static_cast<void>(without_noise);
 }
@@ -144,6 +148,10 @@ Result<std::string> plain_path(const std::string& path, bool for_writing) {
   }
   if (!plain.is_absolute()) {
     plain = fs::absolute(plain);
+  }
+  if (for_writing && !fs::is_directory(plain.parent_path(), fault)) {
+    return make_error(ErrorKind::not_found, in_quotes(path) + ": there is no folder " +
+                                                in_quotes(plain.parent_path().native()));
   }
   // The library reads directions behind '#' and rewrites '\' in names.
   if (plain.native().find_first_of("#\\") != std::string::npos ||

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <new>
 #include <string>
 #include <system_error>
@@ -132,6 +133,16 @@ std::vector<OutVariable> plan_variables(const DatasetInfo& info) {
     }
   }
   return out;
+}
+
+// The library says "HDF error" where the disk is full.
+Error with_room_left(Error error, const std::string& path) {
+  std::error_code fault;
+  const auto room = std::filesystem::space(std::filesystem::path(path).parent_path(), fault);
+  if (!fault && error.kind == ErrorKind::internal) {
+    error.message += " (the disk has " + std::to_string(room.available >> 20) + " MiB left)";
+  }
+  return error;
 }
 
 class Writer {
@@ -376,7 +387,8 @@ Result<void> write_netcdf(Source& source, const std::string& path) {
     if (!plain) {
       return plain.error();
     }
-    return Writer(source, *plain).write();
+    auto done = Writer(source, *plain).write();
+    return done ? done : with_room_left(done.error(), *plain);
   } catch (const std::bad_alloc&) {
     return make_error(ErrorKind::out_of_memory, "no memory to write " + cf::in_quotes(path));
   } catch (const std::exception& fault) {

@@ -2,10 +2,12 @@
 #include "server/net/target.hpp"
 
 #include <algorithm>
+#include <array>
 #include <boost/url/parse.hpp>
 #include <boost/url/url_view.hpp>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 
 namespace windsplat::net {
 namespace {
@@ -97,8 +99,10 @@ std::optional<double> QueryReader::number(std::string_view key, double min, doub
     return std::nullopt;
   }
   if (value < min || value > max) {
-    std::string limits = std::to_string(min) + " to " + std::to_string(max);
-    fail(ErrorKind::invalid, "the query's '" + std::string(key) + "' must be " + limits);
+    std::array<char, 100> limits{};
+    std::snprintf(limits.data(), limits.size(), "' must be %g to %g, not ", min, max);
+    fail(ErrorKind::invalid,
+         "the query's '" + std::string(key) + limits.data() + printable(*text, 40));
     return std::nullopt;
   }
   return value;
@@ -126,7 +130,7 @@ std::optional<int> QueryReader::integer(std::string_view key, int min, int max) 
   const long long value = std::stoll(*text);  // at most 18 characters
   if (value >= min && value <= max) return static_cast<int>(value);
   fail(ErrorKind::invalid, "the query's '" + std::string(key) + "' must be " + std::to_string(min) +
-                               " to " + std::to_string(max));
+                               " to " + std::to_string(max) + ", not " + *text);
   return std::nullopt;
 }
 

@@ -58,6 +58,7 @@ export class Daemon {
   }
 
   async kill(signal = "SIGKILL") {
+    if (this.child === undefined) return;
     this.child.kill(signal);
     await this.exited;
   }
@@ -79,12 +80,14 @@ export const launch = () =>
   });
 
 // A page whose console errors, exceptions and violations of the content policy are collected.
-export async function openPage(browser, url, options = {}) {
+// options: playwright's for a context, and `initScript`, a function to run in the page first.
+export async function openPage(browser, url, { initScript, ...options } = {}) {
   const context = await browser.newContext({
     viewport: { width: 1440, height: 900 },
     colorScheme: "dark",
     ...options,
   });
+  if (initScript !== undefined) await context.addInitScript(initScript);
   const page = await context.newPage();
   page.setDefaultTimeout(15_000 * patience);
   page.faults = [];
@@ -103,8 +106,12 @@ export const somePicture = (page, timeout = 15_000 * patience) =>
     polling: 20,
   });
 
-// The last word on what was asked for has been drawn, in the size of the window.
+// The last word on what was asked for has been drawn. What the mouse or fingers did goes out with
+// the next display frame, so two of those pass before anything is believed.
 export async function finalPicture(page) {
+  await page.evaluate(
+    () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))),
+  );
   await page.waitForFunction(
     () => {
       const { rev, wanted, final } = document.querySelector("#picture").dataset;

@@ -1,7 +1,9 @@
 // From a sample to a file, to its description, to its picture; and files and views that are wrong.
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -117,6 +119,30 @@ TEST(CliFiles, AnyNumberOfThreadsGivesTheSameBytes) {
   EXPECT_EQ(png_size(one).first, 160U);
   EXPECT_EQ(one, draw("2"));
   EXPECT_EQ(one, draw("5"));
+}
+
+// No file may grow past a limit: to the libraries, what a full disk is.
+TEST(CliFiles, SynthThatCannotWriteSaysSoLeavesNothingAndDoesNotCrash) {
+  const Folder folder;
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit small{1 << 20, before.rlim_max};
+  std::signal(SIGXFSZ, SIG_IGN);  // inherited: the write fails instead
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  const Outcome outcome =
+      run({"synth", "tornado", "--dims", "96x96x96", "-o", folder.file("large.nc")});
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, SIG_DFL);
+  EXPECT_EQ(outcome.code, 1) << outcome.err;
+  EXPECT_THAT(outcome.err, StartsWith("windsplat: writing netCDF failed"));
+  EXPECT_THAT(outcome.err, HasSubstr("MiB left"));
+  EXPECT_FALSE(std::filesystem::exists(folder.file("large.nc")));
+  EXPECT_FALSE(std::filesystem::exists(folder.file("large.nc.part")));
+
+  const Outcome nowhere =
+      run({"synth", "tornado", "--dims", "8x8x8", "-o", folder.file("absent/x.nc")});
+  EXPECT_EQ(nowhere.code, 1);
+  EXPECT_THAT(nowhere.err, HasSubstr("there is no folder"));
 }
 
 TEST(CliFiles, LaterWordsChangeTheViewOfTheFile) {

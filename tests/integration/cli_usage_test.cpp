@@ -75,6 +75,18 @@ TEST(CliUsage, WrongArgumentsExitWith2AndSayWhyOnStderrAlone) {
   }
 }
 
+// What a user's words bring into a message cannot pose as lines or colours of the program's own.
+TEST(CliUsage, MessagesHoldNoControlCharactersOfTheArguments) {
+  for (const Words& words : std::vector<Words>{
+           {"x\ny\x1b[0m"}, {"serve", "--log-format", "x\nwindsplat: all well\x1b]0;t\a"}}) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_EQ(outcome.err.find_first_of("\x1b\a"), std::string::npos) << outcome.err;
+    EXPECT_THAT(outcome.err, Not(HasSubstr("\nwindsplat: all well"))) << outcome.err;
+  }
+  EXPECT_THAT(run({"paint"}).err, HasSubstr("no command 'paint'"));
+}
+
 // A flag that would do nothing must not be taken.
 TEST(CliUsage, FlagsOfLaterReleasesAreRefused) {
   for (const char* flag : {"--config", "--token-file", "--tls-cert", "--tls-key", "--data-root"}) {

@@ -126,14 +126,21 @@ TEST(CfTime, SpellingsOfTheEpoch) {
   EXPECT_EQ(text_of(1, "days since 9999-12-31"), "+10000-01-01T00:00:00Z");
 }
 
+TEST(CfTime, ElapsedTimeIsCompleteAsANumber) {
+  for (const char* units : {"s", "hours", "days"}) {
+    EXPECT_EQ(reason_of(5, units), "") << units;
+    EXPECT_EQ(decode_time({5}, units, "").steps.at(0).text, "5") << units;
+  }
+}
+
 TEST(CfTime, WhatIsNotUnderstoodStaysANumberWithAReason) {
   EXPECT_EQ(reason_of(5, "months since 2001-01-01"), "a month has no fixed length");
   EXPECT_EQ(reason_of(5.5, "years since 2001-01-01"), "a year has no fixed length");
   for (const char* units :
-       {"", "Month", "hours", "day as %Y%m%d.%f", "days since", "days since yesterday",
-        "days since 2001", "days since 2001-13-01", "days since 2001-02-30",
-        "days since 2001-01-01 25:00", "days since 2001-01-01 00:61", "fortnights since 2001-01-01",
-        "days since 99999999-01-01", "days since 2001-01-01 +99"}) {
+       {"", "Month", "day as %Y%m%d.%f", "days since", "days since yesterday", "days since 2001",
+        "days since 2001-13-01", "days since 2001-02-30", "days since 2001-01-01 25:00",
+        "days since 2001-01-01 00:61", "fortnights since 2001-01-01", "days since 99999999-01-01",
+        "days since 2001-01-01 +99"}) {
     EXPECT_NE(reason_of(5, units), "") << units;
   }
   EXPECT_NE(reason_of(5, "days since 2001-01-01", "martian"), "");
