@@ -29,12 +29,19 @@ struct Camera {
   int height = 1;
 };
 
-// A rectilinear lattice in the world. positions[a][i] is the place of sample i along axis a,
-// ascending; spacing[a][i] the width of its cell. The box reaches half a cell beyond the samples.
+// Where samples stand in the world. Rectilinear: positions[a][i] is the place of sample i along
+// axis a, ascending; spacing[a][i] the width of its cell. The box reaches half a cell beyond them.
+//
+// Curved (a globe, terrain): `places` holds where each sample really stands. A cell's edge along
+// axis a is then half the way from the sample before to the one after (at an end the way to the one
+// neighbour; along an axis of one sample `spacing`, at right angles to the other two), times the
+// stride. positions and spacing remain the unbent lattice: height, where a colour tells it, is
+// positions[2].
 struct Lattice {
   std::array<int, 3> dims{1, 1, 1};
   std::array<std::vector<double>, 3> positions;
   std::array<std::vector<double>, 3> spacing;
+  std::shared_ptr<const std::vector<std::array<float, 3>>> places;  // x fastest; null: rectilinear
   glm::dvec3 box_min{-1, -1, -1};
   glm::dvec3 box_max{1, 1, 1};
 };
@@ -45,7 +52,9 @@ struct ColorTable {
   std::vector<std::array<float, 3>> entries;
 };
 
-enum class LineColor { world_z, screen_z, rise, magnitude, constant };
+// direction: the compass bearing that the vector points to in degrees, 0 along +y (north), 90 along
+// +x (east), below 360. scalar: the value of a second field; a masked one is drawn mid-grey.
+enum class LineColor { world_z, screen_z, rise, magnitude, direction, scalar, constant };
 
 // The vector kernel (Crawfis & Max, "Vector Kernels"; formulas in ARCHITECTURE.md, "Lines").
 struct VectorLayer {
@@ -66,6 +75,7 @@ struct VectorLayer {
   double head_desaturation = 0.7;
   LineColor color_by = LineColor::world_z;
   ColorTable color;
+  std::shared_ptr<const data::Volume> color_field;  // color_by scalar only
   double rise_weight = 0.2;
   std::array<double, 2> magnitude_range{0, 1};
   double min_magnitude = 0;
@@ -75,6 +85,11 @@ struct VectorLayer {
   bool overlap = true;
   std::uint32_t seed = 1;
   std::uint32_t epoch = 0;
+  // Phase motion: a line's opacity is multiplied by W(frac(q + 1/2 - phase)), W(p) = 1 - |2p - 1|,
+  // q from -1/2 at its tail to 1/2 at its head, phase = a hash of the stop + motion_cycles times
+  // min(|V| / magnitude_range[1], 1).
+  bool moving = false;
+  double motion_cycles = 0;
 };
 
 struct ScalarLayer {
@@ -91,12 +106,31 @@ struct DepthCue {
   double far = 1;
 };
 
+// kernel: one kernel after another in visibility order (the paper). slab: slabs of constant view
+// depth that gather partial footprints (Mueller & Crawfis 1998). reference: the integral itself, in
+// double precision, pixel by pixel.
+enum class Method { kernel, slab, reference };
+
+// A line inside its homogeneous piece of medium: ARCHITECTURE.md, "One kernel, composited".
+enum class Compositing { simple, cd_naive, cd, analytic, cd_euler };
+
+// Only the samples of one layer are drawn, and of vectors the part within the layer's plane: the
+// paper's two-dimensional filter.
+struct Slice {
+  int axis = 2;
+  int sample = 0;
+};
+
 struct Scene {
   Camera camera;
   Lattice lattice;
   std::optional<VectorLayer> vector;
   std::vector<ScalarLayer> scalars;
   DepthCue depth_cue;
+  std::optional<Slice> slice;
+  Method method = Method::kernel;
+  Compositing compositing = Compositing::analytic;
+  double slab_thickness = 1;  // in cells along the line of sight
   double stop_transmittance = 1.5e-4;
   std::array<float, 3> background{0, 0, 0};  // linear; not part of the rendered image
 };
