@@ -27,8 +27,31 @@ struct Box {
   std::array<double, 3> high{};
 };
 
+// Of a curved lattice: from where its stops really are.
+Box curved_box(const Pass& pass, const Brick& brick) {
+  Box box;
+  box.low.fill(1e300);
+  box.high.fill(-1e300);
+  const auto offset = [&](int a, int visited) {
+    return pass.step[a] * pass.axis[a].sample[pass.axis[a].visit[visited]];
+  };
+  for (int v = 0; v < brick.v_count; ++v) {
+    for (int u = 0; u < brick.u_count; ++u) {
+      const float* place =
+          pass.places + 3 * (offset(pass.major, brick.slab) + offset(pass.v, brick.v_first + v) +
+                             offset(pass.u, brick.u_first + u));
+      for (int c = 0; c < 3; ++c) {
+        box.low[c] = std::min<double>(box.low[c], place[c]);
+        box.high[c] = std::max<double>(box.high[c], place[c]);
+      }
+    }
+  }
+  return box;
+}
+
 Box stops_box(const PassPlan& plan, const Brick& brick) {
   const Pass& pass = plan.kernel;
+  if (pass.places != nullptr) return curved_box(pass, brick);
   Box box;
   const auto extend = [&](int a, int first, int count) {
     const AxisArrays& axis = plan.axis[a];
@@ -51,7 +74,7 @@ std::array<double, 3> kernel_reach(const Pass& pass, double line_reach, bool spl
     const double cell = pass.cell_max[a];
     const double moved = 0.5 * (pass.line.jitter_center + pass.line.jitter_stride) * cell;
     const double line = pass.has_lines != 0 && line_reach >= 0 ? line_reach + moved : 0;
-    const double splat = splats ? 1.37 * cell : 0;
+    const double splat = splats ? kernels::footprint_radius * cell : 0;
     reach[a] = std::max(line, splat) * 1.0001;
   }
   return reach;
@@ -94,13 +117,20 @@ Span screen_span(const Corners& corners, int across, const kernels::Camera& came
   return {-margin, 2 * half + margin};
 }
 
+// Where kernels may be seen, and how far from the eye.
+struct Projected {
+  Rectangle seen;
+  double depth_first = 0, depth_last = 0;  // view depths of the kernels' reach
+};
+
 class Projector {
  public:
   explicit Projector(const RenderPlan& plan) : camera_(plan.camera), view_(*plan.view) {}
 
-  Rectangle operator()(const PassPlan& plan, const Box& box,
+  Projected operator()(const PassPlan& plan, const Box& box,
                        const std::array<double, 3>& reach) const {
     Corners corners;
+    double nearest = 1e300;
     double farthest = -1e300;
     for (unsigned c = 0; c < 8; ++c) {
       std::array<double, 3> sum{};
@@ -112,6 +142,7 @@ class Projector {
         sum[2] += at * view_.forward[a];
       }
       corners.at[c] = sum;
+      nearest = std::min(nearest, sum[2]);
       farthest = std::max(farthest, sum[2]);
     }
     if (camera_.perspective != 0 && farthest < camera_.near) return {};
@@ -119,9 +150,9 @@ class Projector {
     const Span x = screen_span(corners, 0, camera_, camera_.half_width_px, margin);
     const Span y = screen_span(corners, 1, camera_, camera_.half_height_px, margin);
     if (x.low > x.high || y.low > y.high) return {};
-    Rectangle r{std::max(x.low, 0.0), std::min<double>(x.high, camera_.width), std::max(y.low, 0.0),
-                std::min<double>(y.high, camera_.height)};
-    return r;
+    const Rectangle r{std::max(x.low, 0.0), std::min<double>(x.high, camera_.width),
+                      std::max(y.low, 0.0), std::min<double>(y.high, camera_.height)};
+    return {r, nearest, farthest};
   }
 
  private:
@@ -161,7 +192,7 @@ void add_brick(const RenderPlan& plan, const kernels::Table& table, const Projec
   const bool lines = pass.kernel.has_lines != 0;
   const double longest = lines ? 0.5 * pass.kernel.line.length : -1;
   const bool medium = pass.kernel.has_medium != 0;
-  if (project(pass, box, kernel_reach(pass.kernel, longest, medium)).empty()) {
+  if (project(pass, box, kernel_reach(pass.kernel, longest, medium)).seen.empty()) {
     out.culled += stops;
     return;
   }
@@ -175,9 +206,11 @@ void add_brick(const RenderPlan& plan, const kernels::Table& table, const Projec
       std::min(1.0F, summary.magnitude_max * pass.kernel.line.inverse_full_magnitude);
   const double reach = summary.lines > 0 ? longest * part * 1.00001 : -1;
   brick.line_reach = static_cast<float>(std::max(reach, 0.0));
-  const Rectangle seen = project(pass, box, kernel_reach(pass.kernel, reach, summary.splats > 0));
-  if (seen.empty()) return;
-  set_blocks(seen, plan.camera, brick);
+  const Projected found = project(pass, box, kernel_reach(pass.kernel, reach, summary.splats > 0));
+  if (found.seen.empty()) return;
+  set_blocks(found.seen, plan.camera, brick);
+  brick.depth_first = static_cast<float>(found.depth_first - plan.camera.depth_origin);
+  brick.depth_last = static_cast<float>(found.depth_last - plan.camera.depth_origin);
   out.bricks.push_back(brick);
 }
 
@@ -275,6 +308,11 @@ Bins make_bins(const RenderPlan& plan, const kernels::Table& table, ThreadPool& 
     work.skipped_vector += slab.without_line;
     work.skipped_scalar += slab.without_splat;
     work.skipped_both += slab.without_both;
+  }
+  if (plan.slabs || plan.curved) {
+    // Swept by depth: those that begin first come first.
+    std::stable_sort(bins.bricks.begin(), bins.bricks.end(),
+                     [](const Brick& a, const Brick& b) { return a.depth_first < b.depth_first; });
   }
   list_by_tile(bins);
   return bins;

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "server/base/check.hpp"
+#include "server/engine/partial.hpp"
 
 namespace windsplat::engine {
 
@@ -30,7 +31,8 @@ float ramp_scale(double low, double high) {
   return high > low ? bounded(std::min(1.0 / (high - low), steepest)) : bounded(steepest);
 }
 
-kernels::Camera make_camera(const Camera& from) {
+kernels::Camera make_camera(const Scene& scene) {
+  const Camera& from = scene.camera;
   kernels::Camera to{};
   to.perspective = from.perspective ? 1 : 0;
   to.width = from.width;
@@ -46,14 +48,32 @@ kernels::Camera make_camera(const Camera& from) {
   to.pixel = bounded(pixel);
   to.inverse_pixel = bounded(1.0 / pixel);
   to.near = static_cast<float>(from.near);
+  to.depth_origin = 0;
+  for (int a = 0; a < 3; ++a) {
+    to.world_right[a] = from.right[a];
+    to.world_down[a] = -from.up[a];
+    to.world_forward[a] = from.forward[a];
+    to.eye[a] = from.eye[a];
+    const double middle = 0.5 * (scene.lattice.box_min[a] + scene.lattice.box_max[a]);
+    to.depth_origin += (middle - from.eye[a]) * from.forward[a];
+  }
   return to;
+}
+
+// A slice is one stop of its axis, whatever the stride.
+std::vector<Stop> stops_along(const Scene& scene, int a, int stride) {
+  const auto& spacing = scene.lattice.spacing[a];
+  if (!scene.slice || scene.slice->axis != a) return kernel_stops(spacing, stride);
+  WINDSPLAT_CHECK(scene.slice->sample >= 0 && scene.slice->sample < scene.lattice.dims[a]);
+  return {{scene.slice->sample, 1, spacing[scene.slice->sample]}};
 }
 
 void place_axis(const Scene& scene, int a, int stride, AxisArrays& axis) {
   const Camera& camera = scene.camera;
   const auto& positions = scene.lattice.positions[a];
-  for (const auto& [sample, cell] : kernel_stops(scene.lattice.spacing[a], stride)) {
+  for (const auto& [sample, group, cell] : stops_along(scene, a, stride)) {
     axis.sample.push_back(sample);
+    axis.group.push_back(group);
     const double position = positions[sample];
     const double from_eye = position - camera.eye[a];
     axis.position.push_back(position);
@@ -133,6 +153,9 @@ void style_lines(const Scene& scene, const scene::VectorLayer& from, kernels::Li
   to.jitter_stride = static_cast<float>(from.jitter_stride);
   to.seed = from.seed;
   to.epoch = from.epoch;
+  for (int a = 0; a < 3; ++a) to.keep[a] = scene.slice && scene.slice->axis == a ? 0.0F : 1.0F;
+  to.moving = from.moving ? 1 : 0;
+  to.motion_cycles = from.motion_cycles;
 }
 
 void add_lines(const Scene& scene, PassPlan& pass) {
@@ -149,6 +172,11 @@ void add_lines(const Scene& scene, PassPlan& pass) {
   to.rate_y = pass.rate_x.empty() ? 1.0F : bounded(from.rate_y);
   to.rate_z = pass.rate_z.empty() ? nullptr : pass.rate_z.data();
   style_lines(scene, from, to);
+  if (from.color_by == scene::LineColor::scalar) {
+    WINDSPLAT_CHECK(from.color_field != nullptr);
+    check_volume(*from.color_field, scene.lattice);
+    to.color_values = from.color_field->values.data();
+  }
   pass.line_rgb = flatten(from.color);
   to.color = make_table(from.color, pass.line_rgb);
   pass.kernel.has_lines = 1;
@@ -187,6 +215,68 @@ void add_medium(const Scene& scene, PassPlan& pass) {
   pass.kernel.has_medium = 1;
 }
 
+// How far any cell of a curved lattice reaches along each axis of the world, summed over its edges:
+// no edge is longer than the way between a sample's two neighbours, times the stride.
+void bend_pass(const Scene& scene, PassPlan& pass) {
+  const auto& places = *scene.lattice.places;
+  const auto& dims = scene.lattice.dims;
+  kernels::Pass& to = pass.kernel;
+  WINDSPLAT_CHECK(places.size() == static_cast<std::size_t>(dims[0]) * dims[1] * dims[2]);
+  to.places = places.front().data();
+  std::array<float, 3> widest{};
+  for (int a = 0; a < 3; ++a) {
+    std::array<float, 3> way{};
+    const std::size_t step = to.step[a];
+    const std::size_t row = step * dims[a];
+    for (std::size_t i = 0; i + step < places.size(); ++i) {
+      if (i % row >= row - step) continue;
+      for (int c = 0; c < 3; ++c) {
+        way[c] = std::max(way[c], std::abs(places[i + step][c] - places[i][c]));
+      }
+    }
+    // A cell squeezed to nothing is opened again by its unbent width.
+    for (int c = 0; c < 3; ++c) {
+      widest[c] += dims[a] > 1 ? way[c] * static_cast<float>(pass.stride) : to.cell_max[a];
+    }
+  }
+  const float least = 0.002F * std::max({widest[0], widest[1], widest[2]});
+  for (int c = 0; c < 3; ++c) to.cell_max[c] = 1.01F * widest[c] + least;
+}
+
+// The length of a cell along the line of sight, world units, from the lattice's mean cells.
+double cell_along_view(const Scene& scene) {
+  double cells2 = 0;
+  for (int a = 0; a < 3; ++a) {
+    const auto& spacing = scene.lattice.spacing[a];
+    const double total = std::accumulate(spacing.begin(), spacing.end(), 0.0);
+    const double cells = scene.camera.forward[a] * static_cast<double>(spacing.size()) / total;
+    cells2 += cells * cells;
+  }
+  return 1.0 / std::sqrt(cells2);
+}
+
+// Slabs count in cells of the coarsest medium, or of the lines where there is none. However thin
+// cells are, there are at most slabs_max across the volume.
+void plan_slabs(const Scene& scene, RenderPlan& plan) {
+  constexpr double slabs_max = 16384;
+  plan.slabs = scene.method == scene::Method::slab;
+  int stride = 0;
+  for (const PassPlan& pass : plan.passes) {
+    if (!pass.scalars.empty()) stride = std::max(stride, pass.stride);
+  }
+  if (stride == 0 && !plan.passes.empty()) stride = plan.passes.front().stride;
+  double diagonal2 = 0;
+  for (int a = 0; a < 3; ++a) {
+    const double edge = scene.lattice.box_max[a] - scene.lattice.box_min[a];
+    diagonal2 += edge * edge;
+  }
+  const double thickness = plan.slabs ? scene.slab_thickness : 1.0;
+  plan.slab_depth = std::max(thickness * std::max(stride, 1) * cell_along_view(scene),
+                             std::sqrt(diagonal2) / slabs_max);
+  if (!plan.slabs) return;
+  for (PassPlan& pass : plan.passes) pass.kernel.partial = partial_footprints().data();
+}
+
 void finish_pass(const Scene& scene, int major, PassPlan& pass) {
   const auto& dims = scene.lattice.dims;
   kernels::Pass& to = pass.kernel;
@@ -205,9 +295,13 @@ void finish_pass(const Scene& scene, int major, PassPlan& pass) {
                   axis.world.data(),
                   axis.cell.data(),
                   axis.sample.data(),
+                  axis.group.data(),
                   axis.visit.data()};
     to.cell_max[a] = *std::max_element(axis.cell.begin(), axis.cell.end());
+    to.dims[a] = dims[a];
   }
+  to.compositing = static_cast<int>(scene.compositing);
+  if (scene.lattice.places) bend_pass(scene, pass);
   if (pass.vector != nullptr) add_lines(scene, pass);
   if (!pass.scalars.empty()) add_medium(scene, pass);
 }
@@ -220,6 +314,9 @@ std::string describe(const Scene& scene, const RenderPlan& plan) {
   if (variant.empty()) return "empty";
   variant += scene.camera.perspective ? " perspective" : " orthographic";
   if (vector && scene.vector->head_desaturation > 0) variant += " heads";
+  if (vector && scene.vector->moving) variant += " moving";
+  if (plan.slabs) variant += " slabs";
+  if (plan.curved) variant += " curved";
   if (plan.passes.size() > 1) variant += " passes=" + std::to_string(plan.passes.size());
   return variant;
 }
@@ -248,7 +345,7 @@ std::vector<Stop> kernel_stops(const std::vector<double>& spacing, int stride) {
   for (int first = 0; first < dim; first += stride) {
     const int last = std::min(first + stride, dim) - 1;
     const double cell = std::accumulate(spacing.begin() + first, spacing.begin() + last + 1, 0.0);
-    stops.push_back({first + (last - first) / 2, cell});
+    stops.push_back({first + (last - first) / 2, last - first + 1, cell});
   }
   return stops;
 }
@@ -284,7 +381,9 @@ RenderPlan make_plan(const Scene& scene) {
   WINDSPLAT_CHECK(scene.camera.half_height > 0);
   RenderPlan plan;
   plan.view = &scene.camera;
-  plan.camera = make_camera(scene.camera);
+  plan.camera = make_camera(scene);
+  plan.compositing = static_cast<int>(scene.compositing);
+  plan.curved = scene.lattice.places != nullptr;
   plan.stop_transmittance = static_cast<float>(scene.stop_transmittance);
   if (scene.vector) {
     plan.passes.emplace_back();
@@ -301,6 +400,7 @@ RenderPlan make_plan(const Scene& scene) {
   plan.perspective_medium = scene.camera.perspective && !scene.scalars.empty();
   const int major = major_axis(scene.camera, scene.lattice);
   for (PassPlan& pass : plan.passes) finish_pass(scene, major, pass);
+  if (scene.method == scene::Method::slab || plan.curved) plan_slabs(scene, plan);
   plan.variant = describe(scene, plan);
   return plan;
 }

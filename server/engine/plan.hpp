@@ -20,6 +20,7 @@ int major_axis(const scene::Camera& camera, const scene::Lattice& lattice);
 // that are left, and has the middle one's place (the lower of two).
 struct Stop {
   int sample = 0;
+  int group = 1;    // samples
   double cell = 0;  // world units: what it stands for, from one end to the other
 };
 std::vector<Stop> kernel_stops(const std::vector<double>& spacing, int stride);
@@ -40,6 +41,7 @@ struct AxisArrays {
   std::vector<float> world;
   std::vector<float> cell;
   std::vector<int> sample;
+  std::vector<int> group;
   std::vector<int> visit;
   std::vector<std::array<int, 2>> bricks;  // first and count of each brick in `visit`
 };
@@ -67,6 +69,10 @@ struct RenderPlan {
   kernels::Camera camera{};
   std::vector<PassPlan> passes;     // the one with lines first
   bool perspective_medium = false;  // pixel rays are needed
+  bool slabs = false;               // the slab method
+  bool curved = false;              // visibility is told by depth alone
+  int compositing = 0;              // scene::Compositing
+  double slab_depth = 1;            // of a slab along the view, world units
   float stop_transmittance = 0;
   std::string variant;
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "server/engine/sweep.hpp"
+
 #if defined(__SSE__)
 #include <xmmintrin.h>
 #endif
@@ -17,7 +19,6 @@ using kernels::block_floats;
 using kernels::block_pixels;
 using kernels::block_side;
 using kernels::Brick;
-using kernels::ray_floats;
 using kernels::Tile;
 using kernels::tile_blocks;
 using kernels::tile_side;
@@ -46,6 +47,7 @@ class FlushDenormals {
 struct Workspace {
   std::vector<float> blocks;
   std::vector<float> rays;
+  SweepSpace sweep;
 };
 
 // What a tile tells the report.
@@ -54,22 +56,16 @@ struct TileWork {
   bool stopped = false;
 };
 
-// Squared world components of every pixel's ray (forward component 1) and the ray's length.
+// The length of every pixel's ray whose forward component is 1.
 void fill_rays(const kernels::Camera& camera, const Tile& tile, std::vector<float>& rays) {
   for (int block = 0; block < tile_blocks * tile_blocks; ++block) {
-    float* ray = rays.data() + static_cast<std::size_t>(block) * ray_floats;
+    float* ray = rays.data() + static_cast<std::size_t>(block) * block_pixels;
     for (int l = 0; l < block_pixels; ++l) {
       const int px = tile.x + block % tile_blocks * block_side + l % block_side;
       const int py = tile.y + block / tile_blocks * block_side + l / block_side;
       const double x = (px + 0.5 - camera.half_width_px) * camera.pixel;
       const double y = (py + 0.5 - camera.half_height_px) * camera.pixel;
-      double length2 = 0;
-      for (int a = 0; a < 3; ++a) {
-        const double d = camera.forward[a] + x * camera.right[a] + y * camera.down[a];
-        ray[a * block_pixels + l] = static_cast<float>(d * d);
-        length2 += d * d;
-      }
-      ray[3 * block_pixels + l] = static_cast<float>(std::sqrt(length2));
+      ray[l] = static_cast<float>(std::sqrt(1 + x * x + y * y));
     }
   }
 }
@@ -89,7 +85,7 @@ void open_tile(const RenderPlan& plan, const Bins& bins, std::size_t index, Work
                 1.0F);
   }
   if (plan.perspective_medium) {
-    space.rays.resize(blocks * ray_floats);
+    space.rays.resize(blocks * block_pixels);
     fill_rays(plan.camera, tile, space.rays);
   }
   tile.blocks = space.blocks.data();
@@ -98,21 +94,6 @@ void open_tile(const RenderPlan& plan, const Bins& bins, std::size_t index, Work
   const int rows = (tile.height + block_side - 1) / block_side;
   std::fill(std::begin(tile.open), std::end(tile.open), 0U);
   std::fill_n(std::begin(tile.open), rows, (2U << static_cast<unsigned>(columns - 1)) - 1U);
-}
-
-bool all_closed(const Tile& tile, const Brick& brick) {
-  const int bx = tile.x / block_side;
-  const int by = tile.y / block_side;
-  const int x0 = std::max(brick.block_x - bx, 0);
-  const int x1 = std::min(brick.block_x_last - bx, tile_blocks - 1);
-  const int y0 = std::max(brick.block_y - by, 0);
-  const int y1 = std::min(brick.block_y_last - by, tile_blocks - 1);
-  const std::uint32_t columns = ((2U << static_cast<unsigned>(x1 - x0)) - 1U)
-                                << static_cast<unsigned>(x0);
-  for (int row = y0; row <= y1; ++row) {
-    if ((tile.open[row] & columns) != 0) return false;
-  }
-  return true;
 }
 
 std::int64_t stops_of(const Brick& brick) {
@@ -172,6 +153,21 @@ std::vector<std::uint32_t> busy_tiles(const Bins& bins) {
 
 }  // namespace
 
+bool all_closed(const Tile& tile, const Brick& brick) {
+  const int bx = tile.x / block_side;
+  const int by = tile.y / block_side;
+  const int x0 = std::max(brick.block_x - bx, 0);
+  const int x1 = std::min(brick.block_x_last - bx, tile_blocks - 1);
+  const int y0 = std::max(brick.block_y - by, 0);
+  const int y1 = std::min(brick.block_y_last - by, tile_blocks - 1);
+  const std::uint32_t columns = ((2U << static_cast<unsigned>(x1 - x0)) - 1U)
+                                << static_cast<unsigned>(x0);
+  for (int row = y0; row <= y1; ++row) {
+    if ((tile.open[row] & columns) != 0) return false;
+  }
+  return true;
+}
+
 void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
                 ThreadPool& pool, const CancelToken& cancel, Image& image, WorkReport& work) {
   const std::vector<std::uint32_t> order = busy_tiles(bins);
@@ -182,7 +178,11 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
     const FlushDenormals flush;
     Tile tile{};
     open_tile(plan, bins, order[i], spaces[worker], tile);
-    draw_tile(plan, bins, table, cancel, order[i], tile, done[i]);
+    if (plan.slabs || plan.curved) {
+      done[i].stopped = sweep_tile(plan, bins, table, cancel, order[i], spaces[worker].sweep, tile);
+    } else {
+      draw_tile(plan, bins, table, cancel, order[i], tile, done[i]);
+    }
     done[i].counters = tile.counters;
     store_tile(tile, image);
   });

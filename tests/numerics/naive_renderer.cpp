@@ -492,6 +492,7 @@ class Renderer {
     const Vec<Real> d{ray[0] / cell_[0], ray[1] / cell_[1], ray[2] / cell_[2]};
     const Real cells = std::sqrt(dot(d, d));
     Real tau = 0;
+    Real closest = centre_[2];  // the view depth at which the ray passes nearest to the sample
     if (medium.drawn) {
       // From the eye in perspective; from the pixel's point of the eye's plane in orthographic.
       Vec<Real> o{};
@@ -501,18 +502,19 @@ class Renderer {
         o[a] = from / cell_[a];
       }
       const Vec<Real> c = cross(o, d);
+      closest = dot(o, d) / dot(d, d);
       const Real r = std::sqrt(dot(c, c)) / cells;
       tau = medium.rho * footprint(r) * std::sqrt(dot(ray, ray)) / (Real(1.4476982547) * cells);
     }
     Real opacity = 0, tf = 0;
     Vec<Real> color{};
-    if (line.drawn) line_at(line, x, y, cells, tau, opacity, tf, color);
+    if (line.drawn) line_at(line, x, y, closest, cells, tau, opacity, tf, color);
     if (tau == 0 && opacity == 0) return;
     add(static_cast<std::size_t>(y) * picture_.width + x, tau, opacity, tf, medium.color, color);
   }
 
-  void line_at(const Line<Real>& line, int x, int y, Real cells, Real tau, Real& opacity, Real& tf,
-               Vec<Real>& color) const {
+  void line_at(const Line<Real>& line, int x, int y, Real closest, Real cells, Real tau,
+               Real& opacity, Real& tf, Vec<Real>& color) const {
     const Real ux = line.x1 - line.x0;
     const Real uy = line.y1 - line.y0;
     const Real px = x + Real(0.5) - line.x0;
@@ -535,7 +537,7 @@ class Renderer {
     const Real grey = line.desaturation * (q + Real(0.5));
     const Real top = std::max({line.color[0], line.color[1], line.color[2]});
     for (int c = 0; c < 3; ++c) color[c] = line.color[c] + grey * (top - line.color[c]);
-    const Real place = std::clamp(Real(0.5) + (z - centre_[2]) * cells, Real(0), Real(1));
+    const Real place = std::clamp(Real(0.5) + (z - closest) * cells, Real(0), Real(1));
     tf = place > 0 ? tau * place : Real(0);
   }
 

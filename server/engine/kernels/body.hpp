@@ -7,21 +7,15 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "server/engine/kernels/body_slabs.hpp"
 #include "server/engine/kernels/table.hpp"
-
-// clang-format off: the order matters, each part uses the one before.
-#include "server/engine/kernels/body_blocks.hpp"
-#include "server/engine/kernels/body_lines.hpp"
-#include "server/engine/kernels/body_math.hpp"
-#include "server/engine/kernels/body_splats.hpp"
-#include "server/engine/kernels/body_stops.hpp"
-// clang-format on
 
 namespace windsplat::engine::kernels {
 
 const Table& WINDSPLAT_KERNEL_TABLE() {
-  static constexpr Table table{WINDSPLAT_KERNEL_NAME, summarise, draw,  prefetch_brick,
-                               refresh_open,          attenuate, jitter};
+  static constexpr Table table{WINDSPLAT_KERNEL_NAME, summarise,    draw,      prepare,
+                               draw_prepared,         gather,       list_hits, close_slab,
+                               prefetch_brick,        refresh_open, attenuate, jitter};
   return table;
 }
 

@@ -1,145 +1,10 @@
-// Part of the kernel body: prepared lines and splats into blocks of pixels, front to back.
+// Part of the kernel body: a brick's prepared lines and splats into a tile's blocks, front to back.
 #pragma once
 
-#include "server/engine/kernels/body_lines.hpp"
-#include "server/engine/kernels/body_splats.hpp"
+#include "server/engine/kernels/body_composite.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {
-
-// Pixel centres of a block, from its corner.
-alignas(64) constexpr float lane_x[block_pixels] = {0.5F, 1.5F, 2.5F, 3.5F, 0.5F, 1.5F, 2.5F, 3.5F,
-                                                    0.5F, 1.5F, 2.5F, 3.5F, 0.5F, 1.5F, 2.5F, 3.5F};
-alignas(64) constexpr float lane_y[block_pixels] = {0.5F, 0.5F, 0.5F, 0.5F, 1.5F, 1.5F, 1.5F, 1.5F,
-                                                    2.5F, 2.5F, 2.5F, 2.5F, 3.5F, 3.5F, 3.5F, 3.5F};
-
-// One line's constants.
-struct Ribbon {
-  float x, y, ux, uy, inverse_u2, w0, depth_ratio;
-  float tail[3], rise[3];
-  float depth, depth_rise;
-  float r2, inverse_ramp, opacity;
-};
-
-struct Splat {
-  float x, y, xx, xy, yy;
-  float weight[3];
-  float strength, cells_depth;
-  float color[3];
-};
-
-struct RibbonLane {
-  float opacity;
-  float f;
-};
-
-template <bool Perspective>
-inline RibbonLane ribbon_lane(const Ribbon& r, float px, float py) {
-  const float dx = px - r.x;
-  const float dy = py - r.y;
-  const float w = clamped((dx * r.ux + dy * r.uy) * r.inverse_u2 + r.w0, 0.0F, 1.0F);
-  const float ex = dx - w * r.ux;
-  const float ey = dy - w * r.uy;
-  const float distance = square_root(ex * ex + ey * ey);
-  const float cover = clamped((r.r2 - distance) * r.inverse_ramp, 0.0F, 1.0F);
-  // 1/z is linear on the screen.
-  const float f = Perspective ? w * r.depth_ratio / (1.0F + w * (r.depth_ratio - 1.0F)) : w;
-  return {cover * r.opacity, f};
-}
-
-struct SplatLane {
-  float tau;
-  float cells_depth;  // cells per unit of view distance along this pixel's ray
-};
-
-template <bool Perspective>
-inline SplatLane splat_lane(const Splat& s, float px, float py, const float* ray, int l) {
-  const float dx = px - s.x;
-  const float dy = py - s.y;
-  const float top = s.xx * (dx * dx) + s.xy * (dx * dy) + s.yy * (dy * dy);
-  // The quadratic form is never negative; its rounded sum may be.
-  const float least = larger(top, 0.0F);
-  if constexpr (Perspective) {
-    const float length2 = s.weight[0] * ray[l] + s.weight[1] * ray[block_pixels + l] +
-                          s.weight[2] * ray[2 * block_pixels + l];
-    const float inverse = 1.0F / square_root(length2);
-    const float r = square_root(least) * inverse;
-    const float tau = s.strength * footprint(r * r, r) * (inverse * ray[3 * block_pixels + l]);
-    return {tau, length2 * inverse};
-  } else {
-    return {s.strength * footprint(least, square_root(least)), s.cells_depth};
-  }
-}
-
-struct Channels {
-  float* transmittance;
-  float* alpha;
-  float* rgb[3];
-};
-
-inline Channels channels_of(float* block) {
-  constexpr std::ptrdiff_t lanes = block_pixels;
-  return {block, block + lanes, {block + 2 * lanes, block + 3 * lanes, block + 4 * lanes}};
-}
-
-template <bool Perspective, bool Head>
-inline void line_block(const Ribbon& r, float x, float y, float* __restrict block) {
-  const Channels to = channels_of(block);
-  for (int l = 0; l < block_pixels; ++l) {
-    const RibbonLane lane = ribbon_lane<Perspective>(r, x + lane_x[l], y + lane_y[l]);
-    const float t = to.transmittance[l];
-    const float a = t * lane.opacity;
-    for (int c = 0; c < 3; ++c) {
-      const float color = Head ? r.tail[c] + lane.f * r.rise[c] : r.tail[c];
-      to.rgb[c][l] += a * color;
-    }
-    to.alpha[l] += a;
-    to.transmittance[l] = t * (1.0F - lane.opacity);
-  }
-}
-
-template <bool Perspective>
-inline void splat_block(const Splat& s, float x, float y, const float* __restrict ray,
-                        float* __restrict block) {
-  const Channels to = channels_of(block);
-  for (int l = 0; l < block_pixels; ++l) {
-    const SplatLane lane = splat_lane<Perspective>(s, x + lane_x[l], y + lane_y[l], ray, l);
-    const Attenuation medium = attenuation(lane.tau);
-    const float t = to.transmittance[l];
-    const float a = t * medium.absorbed;
-    for (int c = 0; c < 3; ++c) to.rgb[c][l] += a * s.color[c];
-    to.alpha[l] += a;
-    to.transmittance[l] = t * medium.transmitted;
-  }
-}
-
-// A line inside its homogeneous cell, at x = tf / tau of the way through it:
-// A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tf) (c_v - c_s).
-template <bool Perspective>
-inline void both_block(const Ribbon& r, const Splat& s, float x, float y,
-                       const float* __restrict ray, float* __restrict block) {
-  const Channels to = channels_of(block);
-  for (int l = 0; l < block_pixels; ++l) {
-    const float px = x + lane_x[l];
-    const float py = y + lane_y[l];
-    const RibbonLane line = ribbon_lane<Perspective>(r, px, py);
-    const SplatLane splat = splat_lane<Perspective>(s, px, py, ray, l);
-    const Attenuation medium = attenuation(splat.tau);
-    const float place =
-        clamped(0.5F + (r.depth + line.f * r.depth_rise) * splat.cells_depth, 0.0F, 1.0F);
-    // tau is finite (the plan bounds extinctions), so that 0 times it is 0.
-    const float before = attenuation(splat.tau * place).transmitted;
-    const float t = to.transmittance[l];
-    const float a = medium.absorbed + line.opacity * medium.transmitted;
-    const float own = line.opacity * before;
-    for (int c = 0; c < 3; ++c) {
-      const float color = r.tail[c] + line.f * r.rise[c];
-      to.rgb[c][l] += t * (s.color[c] * a + own * (color - s.color[c]));
-    }
-    to.alpha[l] += t * a;
-    to.transmittance[l] = t * (medium.transmitted * (1.0F - line.opacity));
-  }
-}
 
 // First and last block of a row or column; none if last < first.
 struct Range {
@@ -185,11 +50,6 @@ inline std::uint32_t range_mask(Range range) {
          << static_cast<unsigned>(range.first);
 }
 
-struct Area {
-  Range rows;
-  Range columns;  // of a splat
-};
-
 inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
   Ribbon out = {r.x[l],
                 r.y[l],
@@ -202,77 +62,47 @@ inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
                 {r.rise[0][l], r.rise[1][l], r.rise[2][l]},
                 r.depth[l],
                 r.depth_rise[l],
+                0,
+                0,
                 line.r2,
                 line.inverse_ramp,
                 line.opacity};
+  if (line.moving != 0) {
+    out.phase = r.phase[l];
+    out.phase_rise = r.phase_rise[l];
+  }
   return out;
 }
 
+template <bool Perspective>
 inline Splat splat_at(const Densities& d, const Splats& s, int l) {
-  Splat out = {s.x[l],        s.y[l],           s.xx[l],
-               s.xy[l],       s.yy[l],          {s.weight[0][l], s.weight[1][l], s.weight[2][l]},
-               s.strength[l], s.cells_depth[l], {d.color[0][l], d.color[1][l], d.color[2][l]}};
+  Splat out = {};
+  out.x = s.x[l];
+  out.y = s.y[l];
+  out.xx = s.xx[l];
+  out.xy = s.xy[l];
+  out.yy = s.yy[l];
+  out.d0 = s.d0[l];
+  out.dx = s.dx[l];
+  out.dy = s.dy[l];
+  if (Perspective) {
+    out.dxx = s.dxx[l];
+    out.dxy = s.dxy[l];
+    out.dyy = s.dyy[l];
+    out.d2_least = s.d2_least[l];
+    out.z = s.z[l];
+  }
+  out.strength = s.strength[l];
+  for (int c = 0; c < 3; ++c) out.color[c] = d.color[c][l];
   return out;
 }
 
-constexpr Range no_range = {0, -1};
-
-// Composites one kernel: its line, its splat or both.
-template <bool Lines, bool Medium, bool Perspective, bool Head>
-inline void draw_kernel(const Ribbon* ribbon, const Splat* splat, const Area& area, Range line_rows,
-                        Tile& tile) {
-  Capsule capsule = {};
-  if (Lines) {
-    capsule = {ribbon->x - static_cast<float>(tile.x), ribbon->y - static_cast<float>(tile.y),
-               ribbon->ux, absolute(ribbon->uy) > 1e-3F ? 1.0F / ribbon->uy : 0.0F, ribbon->r2};
-  }
-  const int columns_in_tile = blocks_of(tile.width);
-  int first = Medium ? area.rows.first : line_rows.first;
-  int last = Medium ? area.rows.last : line_rows.last;
-  if (Lines && Medium && line_rows.last >= line_rows.first) {
-    const bool splat_rows = area.rows.last >= area.rows.first;
-    first = splat_rows && area.rows.first < line_rows.first ? area.rows.first : line_rows.first;
-    last = splat_rows && area.rows.last > line_rows.last ? area.rows.last : line_rows.last;
-  }
-  const std::uint32_t columns = Medium ? range_mask(area.columns) : 0;
-  for (int row = first; row <= last; ++row) {
-    std::uint32_t lines = 0;
-    std::uint32_t splats = 0;
-    if (Lines && row >= line_rows.first && row <= line_rows.last) {
-      lines = range_mask(capsule_in_row(capsule, row, columns_in_tile));
-    }
-    if (Medium && row >= area.rows.first && row <= area.rows.last) splats = columns;
-    const float y = static_cast<float>(tile.y + row * block_side);
-    std::uint32_t left = (lines | splats) & tile.open[row];
-    while (left != 0) {
-      const int column = __builtin_ctz(left);
-      const std::uint32_t bit = left & (~left + 1U);
-      left ^= bit;
-      const float x = static_cast<float>(tile.x + column * block_side);
-      const int index = row * tile_blocks + column;
-      float* block = tile.blocks + static_cast<std::ptrdiff_t>(index) * block_floats;
-      const float* ray = Medium && Perspective
-                             ? tile.rays + static_cast<std::ptrdiff_t>(index) * ray_floats
-                             : nullptr;
-      tile.counters.pixel_updates += block_pixels;
-      if (Lines && Medium && (lines & splats & bit) != 0) {
-        both_block<Perspective>(*ribbon, *splat, x, y, ray, block);
-        tile.counters.exponentials += std::int64_t{2} * block_pixels;
-      } else if (Lines && (!Medium || (lines & bit) != 0)) {
-        line_block<Perspective, Head>(*ribbon, x, y, block);
-      } else if (Medium) {
-        splat_block<Perspective>(*splat, x, y, ray, block);
-        tile.counters.exponentials += block_pixels;
-      }
-    }
-  }
+inline Capsule capsule_of(const Ribbon& ribbon, const Tile& tile) {
+  return {ribbon.x - static_cast<float>(tile.x), ribbon.y - static_cast<float>(tile.y), ribbon.ux,
+          absolute(ribbon.uy) > 1e-3F ? 1.0F / ribbon.uy : 0.0F, ribbon.r2};
 }
 
 // Rows of blocks that each stop's line may touch.
-struct Footing {
-  int line_first[brick_stops], line_last[brick_stops];
-};
-
 void find_line_rows(const LineStyle& line, const Ribbons& r, const Tile& tile, int count,
                     Footing& f) {
   const int rows = blocks_of(tile.height);
@@ -287,29 +117,92 @@ void find_line_rows(const LineStyle& line, const Ribbons& r, const Tile& tile, i
   }
 }
 
-template <bool Lines, bool Medium, bool Perspective, bool Head>
-void draw_stops(const Pass& pass, const Stops& stops, const Ribbons& ribbons,
-                const Densities& densities, const Splats& splats, Tile& tile) {
-  Footing footing;
-  if (Lines) find_line_rows(pass.line, ribbons, tile, stops.count, footing);
-  const auto left = static_cast<float>(tile.x);
-  const auto top = static_cast<float>(tile.y);
-  for (int l = 0; l < stops.count; ++l) {
-    Ribbon ribbon;
-    Splat splat;
-    Range line_rows = no_range;
-    Area area = {no_range, no_range};
-    if (Lines) line_rows = {footing.line_first[l], footing.line_last[l]};
-    if (Lines && line_rows.last >= line_rows.first) ribbon = ribbon_at(pass.line, ribbons, l);
-    if (Medium && densities.rho[l] > 0) {
-      splat = splat_at(densities, splats, l);
-      area.columns =
-          blocks_between(splats.x0[l] - left, splats.x1[l] - left, blocks_of(tile.width));
-      area.rows = blocks_between(splats.y0[l] - top, splats.y1[l] - top, blocks_of(tile.height));
-      if (area.columns.last < area.columns.first) area.rows = no_range;
+// Rows and columns of blocks that each stop's splat may touch.
+void find_splat_blocks(const Densities& densities, const Splats& s, const Tile& tile, int count,
+                       Footing& f) {
+  const int rows = blocks_of(tile.height);
+  const int columns = blocks_of(tile.width);
+  const float left = static_cast<float>(tile.x);
+  const float top = static_cast<float>(tile.y);
+  WINDSPLAT_LANES
+  for (int l = 0; l < count; ++l) {
+    const Range across = blocks_between(s.x0[l] - left, s.x1[l] - left, columns);
+    const Range down = blocks_between(s.y0[l] - top, s.y1[l] - top, rows);
+    const bool drawn = densities.rho[l] > 0 && across.last >= across.first;
+    f.column_first[l] = across.first;
+    f.column_last[l] = across.last;
+    f.row_first[l] = down.first;
+    f.row_last[l] = drawn ? down.last : -1;
+  }
+}
+
+struct Reach {
+  int first, last;        // rows of blocks, of line and splat together
+  std::uint32_t columns;  // of the splat
+};
+
+template <bool Lines, bool Medium>
+inline Reach reach_of(const Footing& f, int l) {
+  Reach reach = {0, -1, 0};
+  if (Lines) {
+    reach.first = f.line_first[l];
+    reach.last = f.line_last[l];
+  }
+  if (Medium && f.row_last[l] >= f.row_first[l]) {
+    reach.columns = range_mask({f.column_first[l], f.column_last[l]});
+    const bool alone = !Lines || reach.last < reach.first;
+    reach.first = alone || f.row_first[l] < reach.first ? f.row_first[l] : reach.first;
+    reach.last = alone || f.row_last[l] > reach.last ? f.row_last[l] : reach.last;
+  }
+  return reach;
+}
+
+// Composites one kernel: its line, its splat or both.
+template <bool Lines, bool Medium, bool Perspective>
+inline void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
+  const Reach reach = reach_of<Lines, Medium>(p.footing, l);
+  if (reach.last < reach.first) return;
+  Ribbon ribbon;
+  Splat splat;
+  Capsule capsule = {};
+  if (Lines && p.footing.line_last[l] >= p.footing.line_first[l]) {
+    ribbon = ribbon_at(p.pass->line, p.ribbons, l);
+    capsule = capsule_of(ribbon, tile);
+  }
+  if (Medium && reach.columns != 0) splat = splat_at<Perspective>(p.densities, p.splats, l);
+  const int columns_in_tile = blocks_of(tile.width);
+  for (int row = reach.first; row <= reach.last; ++row) {
+    std::uint32_t lines = 0;
+    std::uint32_t splats = 0;
+    if (Lines && row >= p.footing.line_first[l] && row <= p.footing.line_last[l]) {
+      lines = range_mask(capsule_in_row(capsule, row, columns_in_tile));
     }
-    if (line_rows.last < line_rows.first && area.rows.last < area.rows.first) continue;
-    draw_kernel<Lines, Medium, Perspective, Head>(&ribbon, &splat, area, line_rows, tile);
+    if (Medium && row >= p.footing.row_first[l] && row <= p.footing.row_last[l]) {
+      splats = reach.columns;
+    }
+    const float y = static_cast<float>(tile.y + row * block_side);
+    std::uint32_t left = (lines | splats) & tile.open[row];
+    while (left != 0) {
+      const int column = __builtin_ctz(left);
+      const std::uint32_t bit = left & (~left + 1U);
+      left ^= bit;
+      const float x = static_cast<float>(tile.x + column * block_side);
+      const int index = row * tile_blocks + column;
+      float* block = tile.blocks + static_cast<std::ptrdiff_t>(index) * block_floats;
+      const float* ray = Medium && Perspective
+                             ? tile.rays + static_cast<std::ptrdiff_t>(index) * block_pixels
+                             : nullptr;
+      tile.counters.pixel_updates += block_pixels;
+      if (Lines && Medium && (lines & splats & bit) != 0) {
+        with.both(ribbon, splat, x, y, ray, block);
+        tile.counters.exponentials += std::int64_t{with.both_exponentials} * block_pixels;
+      } else if (Lines && (!Medium || (lines & bit) != 0)) {
+        with.line(ribbon, x, y, block);
+      } else if (Medium) {
+        with.splat(splat, x, y, ray, block);
+        tile.counters.exponentials += std::int64_t{with.splat_exponentials} * block_pixels;
+      }
+    }
   }
 }
 
@@ -325,6 +218,9 @@ void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, flo
   widest(pass.u, brick.u_first, brick.u_count);
   widest(pass.v, brick.v_first, brick.v_count);
   const float moved = 0.5F * (pass.line.jitter_center + pass.line.jitter_stride);
+  if (pass.places != nullptr) {
+    for (int c = 0; c < 3; ++c) cell[c] = pass.cell_max[c];
+  }
   const float* const frame[3] = {camera.right, camera.down, camera.forward};
   for (int c = 0; c < 3; ++c) {
     float line = brick.line_reach;
@@ -333,6 +229,7 @@ void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, flo
       line += moved * absolute(frame[c][a]) * cell[a];
       square += frame[c][a] * frame[c][a] * cell[a] * cell[a];
     }
+    if (pass.places != nullptr) square *= 3.0F;
     const float splat = pass.has_medium != 0 ? footprint_t * square_root(square) : 0.0F;
     reach[c] = larger(pass.has_lines != 0 ? line : 0.0F, splat) * 1.00001F;
   }
@@ -401,15 +298,20 @@ void keep_drawn(Stops& stops, Winds& winds, Densities& densities) {
   keep_stops(kept, stops);
 }
 
-template <bool Lines, bool Medium, bool Perspective, bool Head>
-void draw_brick(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile) {
-  Stops stops;
+// Everything up to the pixels: what of a brick may touch the tile's open blocks, made ready.
+template <bool Lines, bool Medium, bool Perspective, bool Curved>
+void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
+                   Prepared& out) {
+  Stops& stops = out.stops;
   Winds winds;
-  Densities densities;
-  Ribbons ribbons;
-  Splats splats;
+  Cells cells;
+  out.pass = &pass;
   list_stops(pass, brick, stops);
-  place_stops(pass, brick, stops);
+  if (Curved) {
+    place_curved_stops(camera, pass, stops);
+  } else {
+    place_stops(camera, pass, brick, stops);
+  }
   float reach[3];
   brick_reach(camera, pass, brick, reach);
   const float margin = Lines ? pass.line.r2 : 0.0F;
@@ -417,14 +319,35 @@ void draw_brick(const Camera& camera, const Pass& pass, const Brick& brick, Tile
   if (tile.any_closed != 0) keep_unhidden<Perspective>(camera, reach, margin, tile, stops);
   if (stops.count == 0) return;
   if (Lines) read_winds(pass, stops, winds);
-  if (Medium) read_densities(pass, stops, densities);
-  keep_drawn<Lines, Medium>(stops, winds, densities);
-  if (Lines) prepare_ribbons<Perspective>(camera, pass, stops, winds, ribbons);
-  if (Medium) {
-    color_densities(pass, stops, densities);
-    prepare_splats<Perspective>(camera, pass, stops, densities, splats);
+  if (Medium) read_densities(pass, stops, out.densities);
+  keep_drawn<Lines, Medium>(stops, winds, out.densities);
+  fill_cells<Curved>(camera, pass, stops, cells);
+  if (Lines) {
+    if (Curved) bend_winds(stops, cells, winds);
+    prepare_ribbons<Perspective, Curved>(camera, pass, stops, cells, winds, out.ribbons);
+    find_line_rows(pass.line, out.ribbons, tile, stops.count, out.footing);
   }
-  draw_stops<Lines, Medium, Perspective, Head>(pass, stops, ribbons, densities, splats, tile);
+  if (Medium) {
+    color_densities(pass, stops, out.densities);
+    prepare_splats<Perspective, Curved>(camera, stops, cells, out.densities, out.splats);
+    find_splat_blocks(out.densities, out.splats, tile, stops.count, out.footing);
+  }
+}
+
+template <bool Lines, bool Medium, bool Perspective>
+void prepare_on(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
+                Prepared& out) {
+  if (pass.places != nullptr) {
+    prepare_brick<Lines, Medium, Perspective, true>(camera, pass, brick, tile, out);
+  } else {
+    prepare_brick<Lines, Medium, Perspective, false>(camera, pass, brick, tile, out);
+  }
+}
+
+template <bool Lines, bool Medium, bool Perspective>
+void draw_stops(const Prepared& p, int first, int last, Tile& tile) {
+  const Compositor with = compositor_of<Perspective>(*p.pass);
+  for (int l = first; l < last; ++l) draw_kernel<Lines, Medium, Perspective>(p, with, l, tile);
 }
 
 // Brings a brick's samples closer while the one before it is drawn: rows of a brick are far apart
@@ -449,31 +372,49 @@ void prefetch_brick(const Pass& pass, const Brick& brick) {
 }
 
 template <bool Perspective>
-void draw_projected(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile) {
-  const bool head = pass.has_lines != 0 && pass.line.head_desaturation > 0;
+void prepare_projected(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
+                       Prepared& out) {
   if (pass.has_lines != 0 && pass.has_medium != 0) {
-    if (head) {
-      draw_brick<true, true, Perspective, true>(camera, pass, brick, tile);
-    } else {
-      draw_brick<true, true, Perspective, false>(camera, pass, brick, tile);
-    }
+    prepare_on<true, true, Perspective>(camera, pass, brick, tile, out);
   } else if (pass.has_lines != 0) {
-    if (head) {
-      draw_brick<true, false, Perspective, true>(camera, pass, brick, tile);
-    } else {
-      draw_brick<true, false, Perspective, false>(camera, pass, brick, tile);
-    }
+    prepare_on<true, false, Perspective>(camera, pass, brick, tile, out);
   } else {
-    draw_brick<false, true, Perspective, false>(camera, pass, brick, tile);
+    prepare_on<false, true, Perspective>(camera, pass, brick, tile, out);
+  }
+}
+
+void prepare(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
+             Prepared& out) {
+  if (camera.perspective != 0) {
+    prepare_projected<true>(camera, pass, brick, tile, out);
+  } else {
+    prepare_projected<false>(camera, pass, brick, tile, out);
+  }
+}
+
+template <bool Perspective>
+void draw_projected(const Prepared& p, int first, int last, Tile& tile) {
+  if (p.pass->has_lines != 0 && p.pass->has_medium != 0) {
+    draw_stops<true, true, Perspective>(p, first, last, tile);
+  } else if (p.pass->has_lines != 0) {
+    draw_stops<true, false, Perspective>(p, first, last, tile);
+  } else {
+    draw_stops<false, true, Perspective>(p, first, last, tile);
+  }
+}
+
+void draw_prepared(const Camera& camera, const Prepared& p, int first, int last, Tile& tile) {
+  if (camera.perspective != 0) {
+    draw_projected<true>(p, first, last, tile);
+  } else {
+    draw_projected<false>(p, first, last, tile);
   }
 }
 
 void draw(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile) {
-  if (camera.perspective != 0) {
-    draw_projected<true>(camera, pass, brick, tile);
-  } else {
-    draw_projected<false>(camera, pass, brick, tile);
-  }
+  Prepared prepared;
+  prepare(camera, pass, brick, tile, prepared);
+  if (prepared.stops.count > 0) draw_prepared(camera, prepared, 0, prepared.stops.count, tile);
 }
 
 int refresh_open(Tile& tile, float stop) {
@@ -489,7 +430,7 @@ int refresh_open(Tile& tile, float stop) {
       const float* t =
           tile.blocks + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * block_floats;
       float most = 0;
-      for (int l = 0; l < block_pixels; ++l) most = larger(most, t[l]);
+      for (int l = 0; l < block_pixels; ++l) most = larger(most, absolute(t[l]));
       if (most > stop) continue;
       tile.open[row] ^= bit;
       tile.any_closed = 1;

@@ -1,44 +1,29 @@
 // Part of the kernel body: oriented lines, from a stop's wind to a ribbon on the screen.
 #pragma once
 
-#include "server/engine/kernels/body_stops.hpp"
+#include "server/engine/kernels/body_cells.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {
 
-// One a stop. A ribbon's place along it is f in [0, 1] from its tail end to its head end, as
-// clipped; colour and depth are linear in f.
-struct Ribbons {
-  int drawn[brick_stops];
-  float x[brick_stops], y[brick_stops];    // f = 0, pixels
-  float ux[brick_stops], uy[brick_stops];  // from f = 0 to 1, pixels
-  float inverse_u2[brick_stops];
-  float w0[brick_stops];  // where along itself a line is met at its start: 0; a dot everywhere: 1/2
-  float depth_ratio[brick_stops];  // view distance at f = 0 over that at f = 1
-  float tail[3][brick_stops];      // colour at f = 0
-  float rise[3][brick_stops];      // colour at f = 1 minus that
-  float depth[brick_stops];        // view distance at f = 0 minus the kernel's centre's
-  float depth_rise[brick_stops];
-};
-
-// Segments in the world: the line's centre and extent, clipped to q in [low, high].
+// Segments, clipped to q in [low, high].
 struct Segments {
-  float offset[3][brick_stops];  // of the line's centre from the stop
-  float in_box[3][brick_stops];  // of the line's centre from its kernel's centre
-  float extent[3][brick_stops];  // tail to head
+  float offset[3][brick_stops];  // of the line's centre from the stop, world units
+  float in_box[3][brick_stops];  // of the line's centre from its kernel's centre, cells
+  float extent[3][brick_stops];  // tail to head, world units
+  float along[3][brick_stops];   // the same in cells
   float low[brick_stops], high[brick_stops];
+  float phase[brick_stops];  // of the texture's motion
 };
 
-void move_centres(const Pass& pass, const Stops& stops, Segments& s) {
+template <bool Curved>
+void move_centres(const Pass& pass, const Stops& stops, const Cells& cells, Segments& s) {
   const LineStyle& line = pass.line;
   const Hash3 key = pcg3d({line.seed, line.epoch, 0x9e3779b9U});
   std::uint32_t at[3][brick_stops];
-  float cell[3][brick_stops];
   for (int a = 0; a < 3; ++a) {
-    const Axis& axis = pass.axis[a];
     for (int l = 0; l < stops.count; ++l) {
-      at[a][l] = static_cast<std::uint32_t>(axis.sample[stops.index[a][l]]);
-      cell[a][l] = axis.cell[stops.index[a][l]];
+      at[a][l] = static_cast<std::uint32_t>(pass.axis[a].sample[stops.index[a][l]]);
     }
   }
   WINDSPLAT_LANES
@@ -47,37 +32,76 @@ void move_centres(const Pass& pass, const Stops& stops, Segments& s) {
     const Hash3 centre = pcg3d(kernel);
     const float us[3] = {unit_interval(kernel.x), unit_interval(kernel.y), unit_interval(kernel.z)};
     const float uc[3] = {unit_interval(centre.x), unit_interval(centre.y), unit_interval(centre.z)};
+    float moved[3];
     for (int a = 0; a < 3; ++a) {
-      s.in_box[a][l] = line.jitter_center * (uc[a] - 0.5F) * cell[a][l];
-      s.offset[a][l] = s.in_box[a][l] + line.jitter_stride * (us[a] - 0.5F) * cell[a][l];
+      s.in_box[a][l] = line.jitter_center * (uc[a] - 0.5F);
+      moved[a] = s.in_box[a][l] + line.jitter_stride * (us[a] - 0.5F);
     }
+    float offset[3];
+    to_world<Curved>(cells, l, moved, offset);
+    for (int a = 0; a < 3; ++a) s.offset[a][l] = offset[a];
+    s.phase[l] = unit_interval(pcg3d(centre).x);
   }
 }
 
-// Liang-Barsky against the kernel box: per axis |in_box + q extent| <= half the box.
-void clip_to_box(const Pass& pass, const Stops& stops, Segments& s) {
+// The drawn vector, in the world and in cells; a slice keeps what lies in its plane.
+template <bool Curved>
+void extend_segments(const Pass& pass, const Stops& stops, const Cells& cells, const Winds& winds,
+                     Segments& s) {
+  const LineStyle& line = pass.line;
+  WINDSPLAT_LANES
   for (int l = 0; l < stops.count; ++l) {
-    s.low[l] = -0.5F;
-    s.high[l] = 0.5F;
-  }
-  for (int a = 0; a < 3; ++a) {
-    float half[brick_stops];
-    for (int l = 0; l < stops.count; ++l) {
-      half[l] = pass.line.half_span * pass.axis[a].cell[stops.index[a][l]];
+    const float part = clamped(winds.magnitude[l] * line.inverse_full_magnitude, 0.0F, 1.0F);
+    float extent[3];
+    float along[3];
+    for (int a = 0; a < 3; ++a) {
+      extent[a] = (Curved ? winds.bent[a][l] : winds.direction[a][l]) * (line.length * part);
+      if (!Curved) extent[a] *= line.keep[a];
     }
-    WINDSPLAT_LANES
-    for (int l = 0; l < stops.count; ++l) {
-      const float inverse = 1.0F / divisor(s.extent[a][l]);
-      const float enter = (-half[l] - s.in_box[a][l]) * inverse;
-      const float leave = (half[l] - s.in_box[a][l]) * inverse;
-      s.low[l] = larger(s.low[l], smaller(enter, leave));
-      s.high[l] = smaller(s.high[l], larger(enter, leave));
+    to_grid<Curved>(cells, l, extent, along);
+    if (Curved) {
+      for (int a = 0; a < 3; ++a) along[a] *= line.keep[a];
+      to_world<Curved>(cells, l, along, extent);
+    }
+    for (int a = 0; a < 3; ++a) {
+      s.extent[a][l] = extent[a];
+      s.along[a][l] = along[a];
     }
   }
 }
 
-inline float dot3(const float a[3], float x, float y, float z) {
-  return a[0] * x + a[1] * y + a[2] * z;
+// Liang-Barsky against the kernel box: per axis |in_box + q along| <= half the box.
+void clip_to_box(const Pass& pass, const Stops& stops, Segments& s) {
+  const float half = pass.line.half_span;
+  WINDSPLAT_LANES
+  for (int l = 0; l < stops.count; ++l) {
+    float low = -0.5F;
+    float high = 0.5F;
+    for (int a = 0; a < 3; ++a) {
+      const float inverse = 1.0F / divisor(s.along[a][l]);
+      const float enter = (-half - s.in_box[a][l]) * inverse;
+      const float leave = (half - s.in_box[a][l]) * inverse;
+      low = larger(low, smaller(enter, leave));
+      high = smaller(high, larger(enter, leave));
+    }
+    s.low[l] = low;
+    s.high[l] = high;
+  }
+}
+
+// Where along its texture each line begins: a line at full magnitude runs through motion_cycles.
+void phase_ribbons(const Pass& pass, const Stops& stops, const Winds& winds, const Segments& s,
+                   const float* q_low, const float* q_high, Ribbons& r) {
+  const LineStyle& line = pass.line;
+  for (int l = 0; l < stops.count; ++l) {
+    const float part = clamped(winds.magnitude[l] * line.inverse_full_magnitude, 0.0F, 1.0F);
+    const double cycles = static_cast<double>(s.phase[l]) + line.motion_cycles * part;
+    const double whole = static_cast<double>(static_cast<std::int64_t>(cycles));
+    const double rest = cycles - whole;
+    const double phase = rest < 0 ? rest + 1 : rest;
+    r.phase[l] = static_cast<float>(static_cast<double>(q_low[l]) + 1.5 - phase);
+    r.phase_rise[l] = q_high[l] - q_low[l];
+  }
 }
 
 template <bool Perspective>
@@ -134,10 +158,37 @@ void project_segments(const Camera& camera, const Pass& pass, const Stops& stops
   }
 }
 
+// The compass bearing of a vector in degrees, 0 along y, 90 along x, in [0, 360). atan on [0, 1] by
+// a polynomial (1e-6 radians).
+inline float bearing(float x, float y) {
+  const float ax = absolute(x);
+  const float ay = absolute(y);
+  const float t = smaller(ax, ay) / larger(larger(ax, ay), 1e-30F);
+  const float t2 = t * t;
+  float p = -0.0117212F;
+  p = p * t2 + 0.05265332F;
+  p = p * t2 - 0.11643287F;
+  p = p * t2 + 0.19354346F;
+  p = p * t2 - 0.33262347F;
+  p = p * t2 + 0.99997726F;
+  constexpr float degrees = 57.29577951F;
+  const float from_axis = p * t * degrees;                      // 0 .. 45
+  const float first = ax > ay ? 90.0F - from_axis : from_axis;  // from north towards east
+  const float half = y < 0 ? 180.0F - first : first;
+  const float whole = x < 0 ? 360.0F - half : half;
+  return whole < 360.0F ? whole : 0.0F;
+}
+
+// Height is that of the unbent lattice on a curved one.
+inline float height_of(const Pass& pass, const Stops& stops, const Segments& s, int l) {
+  const float level = pass.axis[2].position[stops.index[2][l]];
+  return pass.places == nullptr ? level + s.offset[2][l] : level;
+}
+
 inline float color_value(const Pass& pass, const Stops& stops, const Winds& winds,
                          const Segments& s, float view_distance, int l) {
   const LineStyle& line = pass.line;
-  const float z = pass.axis[2].position[stops.index[2][l]] + s.offset[2][l];
+  const float z = height_of(pass, stops, s, l);
   switch (line.color_by) {
     case 0:
       return z;
@@ -150,6 +201,10 @@ inline float color_value(const Pass& pass, const Stops& stops, const Winds& wind
     }
     case 3:
       return winds.magnitude[l];
+    case 4:
+      return bearing(winds.direction[0][l], winds.direction[1][l]);
+    case 5:
+      return line.color_values[stops.offset[l]];
     default:
       return 0;
   }
@@ -167,8 +222,9 @@ void color_ribbons(const Camera& camera, const Pass& pass, const Stops& stops, c
         clamped((winds.magnitude[l] - line.intensity_low) * line.intensity_scale, 0.0F, 1.0F);
     const float far = clamped((distance - line.cue_near) * line.cue_scale, 0.0F, 1.0F);
     const float dim = (1.0F - line.intensity * (1.0F - strong)) * (1.0F - line.cue_strength * far);
-    float rgb[3];
-    look_up(line.color, color_value(pass, stops, winds, s, distance, l), rgb);
+    float rgb[3] = {0.5F, 0.5F, 0.5F};
+    const float value = color_value(pass, stops, winds, s, distance, l);
+    if (!is_masked(value)) look_up(line.color, value, rgb);
     for (float& c : rgb) c *= dim;
     const float top = larger(larger(rgb[0], rgb[1]), rgb[2]);
     const float grey = line.head_desaturation * (q_low[l] + 0.5F);
@@ -180,24 +236,20 @@ void color_ribbons(const Camera& camera, const Pass& pass, const Stops& stops, c
   }
 }
 
-template <bool Perspective>
-void prepare_ribbons(const Camera& camera, const Pass& pass, const Stops& stops, const Winds& winds,
-                     Ribbons& ribbons) {
+template <bool Perspective, bool Curved>
+void prepare_ribbons(const Camera& camera, const Pass& pass, const Stops& stops, const Cells& cells,
+                     const Winds& winds, Ribbons& ribbons) {
   Segments segments;
   float q_low[brick_stops];
   float q_high[brick_stops];
-  const LineStyle& line = pass.line;
-  move_centres(pass, stops, segments);
-  WINDSPLAT_LANES
-  for (int l = 0; l < stops.count; ++l) {
-    const float part = clamped(winds.magnitude[l] * line.inverse_full_magnitude, 0.0F, 1.0F);
-    for (int a = 0; a < 3; ++a) {
-      segments.extent[a][l] = winds.direction[a][l] * (line.length * part);
-    }
-  }
+  move_centres<Curved>(pass, stops, cells, segments);
+  extend_segments<Curved>(pass, stops, cells, winds, segments);
   clip_to_box(pass, stops, segments);
   project_segments<Perspective>(camera, pass, stops, winds, segments, q_low, q_high, ribbons);
   color_ribbons(camera, pass, stops, winds, segments, q_low, q_high, ribbons);
+  if (pass.line.moving != 0) {
+    phase_ribbons(pass, stops, winds, segments, q_low, q_high, ribbons);
+  }
 }
 
 }  // namespace

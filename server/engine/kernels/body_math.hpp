@@ -52,7 +52,7 @@ inline Attenuation attenuation(float tau) {
 
 // The splat's footprint (Max 1991) in strides, normalised by its integral over the plane.
 constexpr float footprint_s = 0.48F;
-constexpr float footprint_t = 1.37F;
+constexpr float footprint_t = static_cast<float>(footprint_radius);
 constexpr float footprint_integral = 1.4476982547F;
 
 inline float footprint(float r2, float r) {

@@ -1,32 +1,10 @@
 // Part of the kernel body: splats, from a stop's extinction to its footprint on the screen.
 #pragma once
 
-#include "server/engine/kernels/body_stops.hpp"
+#include "server/engine/kernels/body_cells.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {
-
-// One a stop. With p the pixel minus the projected centre and the cell's edges A = diag(cell):
-// perspective r^2 = (xx px^2 + xy px py + yy py^2) / sum_a weight_a ray_a^2, the ray unnormalised;
-// orthographic the same with the (constant) divisor already divided out.
-struct Splats {
-  float x[brick_stops], y[brick_stops];  // projected centre, pixels
-  float xx[brick_stops], xy[brick_stops], yy[brick_stops];
-  float weight[3][brick_stops];
-  float strength[brick_stops];     // optical depth at the centre; perspective: times |d|
-  float cells_depth[brick_stops];  // orthographic: cells per unit of view distance
-  float x0[brick_stops], x1[brick_stops], y0[brick_stops], y1[brick_stops];  // silhouette, pixels
-};
-
-inline void cross3(const float a[3], const float b[3], float out[3]) {
-  out[0] = a[1] * b[2] - a[2] * b[1];
-  out[1] = a[2] * b[0] - a[0] * b[2];
-  out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-inline float dot3(const float a[3], const float b[3]) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 // Half the silhouette's width along one screen axis and its middle, as coordinates at unit
 // distance, from M = v v^T - t^2 A A^T (NaN and infinity when the splat reaches the eye's plane).
@@ -47,43 +25,71 @@ inline Extent silhouette(float v, float z, float s11, float s13, float s33) {
   return {low, high};
 }
 
-void perspective_splats(const Camera& camera, const Pass& pass, const Stops& stops, Splats& s) {
-  float cell[3][brick_stops];
-  float from_eye[3][brick_stops];
-  for (int a = 0; a < 3; ++a) {
-    for (int l = 0; l < stops.count; ++l) {
-      cell[a][l] = pass.axis[a].cell[stops.index[a][l]];
-      from_eye[a][l] = pass.axis[a].from_eye[stops.index[a][l]];
-    }
-  }
+// What of the cell a view direction meets: its squares along the camera's axes times t^2, and the
+// screen's axes in cells a pixel.
+struct Facing {
+  float s11, s22, s33, s13, s23;
+  float right[3], down[3], forward[3];  // cells per pixel; forward per world unit
+  float edges2;                         // squared lengths of the three edges together
+};
+
+template <bool Curved>
+inline Facing face(const Camera& camera, const Cells& cells, int l) {
   constexpr float t2 = footprint_t * footprint_t;
+  Facing f = {};
+  for (int a = 0; a < 3; ++a) {
+    float edge[3] = {0, 0, 0};
+    for (int c = 0; c < 3; ++c) {
+      if (Curved || c == a) edge[c] = cells.edge[a][c][l];
+    }
+    const float r = Curved ? dot3(camera.right, edge) : camera.right[a] * edge[a];
+    const float d = Curved ? dot3(camera.down, edge) : camera.down[a] * edge[a];
+    const float w = Curved ? dot3(camera.forward, edge) : camera.forward[a] * edge[a];
+    f.s11 += t2 * r * r;
+    f.s22 += t2 * d * d;
+    f.s33 += t2 * w * w;
+    f.s13 += t2 * r * w;
+    f.s23 += t2 * d * w;
+    f.edges2 += Curved ? dot3(edge, edge) : edge[a] * edge[a];
+  }
+  to_grid<Curved>(cells, l, camera.right, f.right);
+  to_grid<Curved>(cells, l, camera.down, f.down);
+  to_grid<Curved>(cells, l, camera.forward, f.forward);
+  for (int a = 0; a < 3; ++a) {
+    f.right[a] *= camera.pixel;
+    f.down[a] *= camera.pixel;
+  }
+  return f;
+}
+
+template <bool Curved>
+void perspective_splats(const Camera& camera, const Stops& stops, const Cells& cells, Splats& s) {
   WINDSPLAT_LANES
   for (int l = 0; l < stops.count; ++l) {
-    float o[3], right[3], down[3], ox[3], oy[3];
-    float s11 = 0, s22 = 0, s33 = 0, s13 = 0, s23 = 0;
-    for (int a = 0; a < 3; ++a) {
-      const float inverse = 1.0F / cell[a][l];
-      o[a] = from_eye[a][l] * inverse;
-      right[a] = camera.right[a] * inverse * camera.pixel;
-      down[a] = camera.down[a] * inverse * camera.pixel;
-      s.weight[a][l] = inverse * inverse;
-      const float square = t2 * cell[a][l] * cell[a][l];
-      s11 += camera.right[a] * camera.right[a] * square;
-      s22 += camera.down[a] * camera.down[a] * square;
-      s33 += camera.forward[a] * camera.forward[a] * square;
-      s13 += camera.right[a] * camera.forward[a] * square;
-      s23 += camera.down[a] * camera.forward[a] * square;
-    }
-    cross3(o, right, ox);
-    cross3(o, down, oy);
+    const Facing f = face<Curved>(camera, cells, l);
+    const float from_eye[3] = {cells.from_eye[0][l], cells.from_eye[1][l], cells.from_eye[2][l]};
+    float o[3], ox[3], oy[3];
+    to_grid<Curved>(cells, l, from_eye, o);
+    cross3(o, f.right, ox);
+    cross3(o, f.down, oy);
     s.xx[l] = dot3(ox, ox);
     s.xy[l] = 2.0F * dot3(ox, oy);
     s.yy[l] = dot3(oy, oy);
-    const float scale = camera.inverse_pixel / stops.z[l];
+    const float nearness = 1.0F / stops.z[l];
+    s.d0[l] = dot3(o, o) * nearness * nearness;
+    s.dx[l] = 2.0F * dot3(o, f.right) * nearness;
+    s.dy[l] = 2.0F * dot3(o, f.down) * nearness;
+    s.dxx[l] = dot3(f.right, f.right);
+    s.dxy[l] = 2.0F * dot3(f.right, f.down);
+    s.dyy[l] = dot3(f.down, f.down);
+    s.d2_least[l] = 1.0F / f.edges2;
+    s.z[l] = stops.z[l];
+    s.half_depth[l] = square_root(f.s33);
+    const float scale = camera.inverse_pixel * nearness;
     s.x[l] = camera.half_width_px + stops.x[l] * scale;
     s.y[l] = camera.half_height_px + stops.y[l] * scale;
-    const Extent across = silhouette(stops.x[l], stops.z[l], s11, s13, s33);
-    const Extent along = silhouette(stops.y[l], stops.z[l], s22, s23, s33);
+    const Extent across = silhouette(stops.x[l], stops.z[l], f.s11, f.s13, f.s33);
+    const Extent along = silhouette(stops.y[l], stops.z[l], f.s22, f.s23, f.s33);
     s.x0[l] = camera.half_width_px + across.low * camera.inverse_pixel;
     s.x1[l] = camera.half_width_px + across.high * camera.inverse_pixel;
     s.y0[l] = camera.half_height_px + along.low * camera.inverse_pixel;
@@ -91,31 +97,27 @@ void perspective_splats(const Camera& camera, const Pass& pass, const Stops& sto
   }
 }
 
-void orthographic_splats(const Camera& camera, const Pass& pass, const Stops& stops, Splats& s) {
+template <bool Curved>
+void orthographic_splats(const Camera& camera, const Stops& stops, const Cells& cells, Splats& s) {
+  WINDSPLAT_LANES
   for (int l = 0; l < stops.count; ++l) {
-    float right[3], down[3], forward[3], ox[3], oy[3];
-    float s11 = 0, s22 = 0;
-    for (int a = 0; a < 3; ++a) {
-      const float cell = pass.axis[a].cell[stops.index[a][l]];
-      const float inverse = 1.0F / cell;
-      right[a] = camera.right[a] * inverse * camera.pixel;
-      down[a] = camera.down[a] * inverse * camera.pixel;
-      forward[a] = camera.forward[a] * inverse;
-      s11 += camera.right[a] * camera.right[a] * cell * cell;
-      s22 += camera.down[a] * camera.down[a] * cell * cell;
-    }
-    const float length2 = dot3(forward, forward);
+    const Facing f = face<Curved>(camera, cells, l);
+    float ox[3], oy[3];
+    const float length2 = dot3(f.forward, f.forward);
     const float inverse2 = 1.0F / length2;
-    cross3(right, forward, ox);
-    cross3(down, forward, oy);
+    cross3(f.right, f.forward, ox);
+    cross3(f.down, f.forward, oy);
     s.xx[l] = dot3(ox, ox) * inverse2;
     s.xy[l] = 2.0F * dot3(ox, oy) * inverse2;
     s.yy[l] = dot3(oy, oy) * inverse2;
-    s.cells_depth[l] = square_root(length2);
+    s.d0[l] = length2;
+    s.dx[l] = -dot3(f.right, f.forward) * inverse2;
+    s.dy[l] = -dot3(f.down, f.forward) * inverse2;
+    s.half_depth[l] = square_root(f.s33);
     s.x[l] = camera.half_width_px + stops.x[l] * camera.inverse_pixel;
     s.y[l] = camera.half_height_px + stops.y[l] * camera.inverse_pixel;
-    const float wide = footprint_t * square_root(s11) * camera.inverse_pixel;
-    const float tall = footprint_t * square_root(s22) * camera.inverse_pixel;
+    const float wide = square_root(f.s11) * camera.inverse_pixel;
+    const float tall = square_root(f.s22) * camera.inverse_pixel;
     s.x0[l] = s.x[l] - wide;
     s.x1[l] = s.x[l] + wide;
     s.y0[l] = s.y[l] - tall;
@@ -123,17 +125,17 @@ void orthographic_splats(const Camera& camera, const Pass& pass, const Stops& st
   }
 }
 
-template <bool Perspective>
-void prepare_splats(const Camera& camera, const Pass& pass, const Stops& stops,
+template <bool Perspective, bool Curved>
+void prepare_splats(const Camera& camera, const Stops& stops, const Cells& cells,
                     const Densities& densities, Splats& s) {
   constexpr float normalise = 1.0F / footprint_integral;
   if (Perspective) {
-    perspective_splats(camera, pass, stops, s);
+    perspective_splats<Curved>(camera, stops, cells, s);
     for (int l = 0; l < stops.count; ++l) s.strength[l] = densities.rho[l] * normalise;
   } else {
-    orthographic_splats(camera, pass, stops, s);
+    orthographic_splats<Curved>(camera, stops, cells, s);
     for (int l = 0; l < stops.count; ++l) {
-      s.strength[l] = densities.rho[l] * normalise / s.cells_depth[l];
+      s.strength[l] = densities.rho[l] * normalise / square_root(s.d0[l]);
     }
   }
 }

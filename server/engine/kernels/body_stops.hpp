@@ -2,31 +2,18 @@
 #pragma once
 
 #include "server/engine/kernels/body_math.hpp"
+#include "server/engine/kernels/prepared.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {
 
 constexpr float magnitude_least = 1.17549435e-38F;  // denormal vectors count as zero
 
-// Stops of a brick in visibility order, or those of them that are left after culling.
-struct Stops {
-  int count;
-  int index[3][brick_stops];         // along each axis, into the pass' arrays
-  std::int64_t offset[brick_stops];  // of its sample in the fields
-  float x[brick_stops];              // right, down and forward of the eye, world units
-  float y[brick_stops];
-  float z[brick_stops];
-};
-
 // What a stop's line needs of the field.
 struct Winds {
-  float magnitude[brick_stops];  // of the raw data; negative: no line
-  float direction[3][brick_stops];
-};
-
-struct Densities {
-  float rho[brick_stops];  // per world length; zero: no splat
-  float color[3][brick_stops];
+  float magnitude[brick_stops];     // of the raw data; negative: no line
+  float direction[3][brick_stops];  // along the cell's own axes
+  float bent[3][brick_stops];       // the same in the world, on a curved lattice only
 };
 
 void list_stops(const Pass& pass, const Brick& brick, Stops& stops) {
@@ -52,7 +39,7 @@ void list_stops(const Pass& pass, const Brick& brick, Stops& stops) {
 }
 
 // Camera coordinates, summed in double so that an eye far away or close by loses nothing.
-void place_stops(const Pass& pass, const Brick& brick, Stops& stops) {
+void place_stops(const Camera& camera, const Pass& pass, const Brick& brick, Stops& stops) {
   const int* us = pass.axis[pass.u].visit + brick.u_first;
   const int* vs = pass.axis[pass.v].visit + brick.v_first;
   const int slab = pass.axis[pass.major].visit[brick.slab];
@@ -65,11 +52,13 @@ void place_stops(const Pass& pass, const Brick& brick, Stops& stops) {
     const double* from_v = pass.axis[pass.v].camera + 3 * static_cast<std::ptrdiff_t>(vs[j]);
     const double base[3] = {from_slab[0] + from_v[0], from_slab[1] + from_v[1],
                             from_slab[2] + from_v[2]};
+    const double middle = base[2] - camera.depth_origin;
     const int row = j * brick.u_count;
     for (int i = 0; i < brick.u_count; ++i) {
       stops.x[row + i] = static_cast<float>(base[0] + along_u[0][i]);
       stops.y[row + i] = static_cast<float>(base[1] + along_u[1][i]);
       stops.z[row + i] = static_cast<float>(base[2] + along_u[2][i]);
+      stops.depth[row + i] = static_cast<float>(middle + along_u[2][i]);
     }
   }
 }
@@ -233,6 +222,7 @@ void keep_stops(const int* kept, Stops& stops) {
     stops.x[n] = stops.x[l];
     stops.y[n] = stops.y[l];
     stops.z[n] = stops.z[l];
+    stops.depth[n] = stops.depth[l];
     n += kept[l];
   }
   stops.count = n;

@@ -12,9 +12,8 @@ constexpr int tile_side = 64;                          // pixels
 constexpr int tile_blocks = tile_side / block_side;    // blocks along a tile's side
 constexpr int block_channels = 5;                      // transmittance, alpha, red, green, blue
 constexpr int block_floats = block_channels * block_pixels;
-constexpr int ray_channels = 4;  // squared world components of the pixel ray, its length
-constexpr int ray_floats = ray_channels * block_pixels;
-constexpr int brick_side = 8;  // stops
+constexpr double footprint_radius = 1.37;  // of a splat, cells
+constexpr int brick_side = 8;              // stops
 constexpr int brick_stops = brick_side * brick_side;
 
 // One axis of a pass: its kernel stops, in world order.
@@ -25,6 +24,7 @@ struct Axis {
   const float* position;  // a stop: world coordinate
   const float* cell;      // a stop: stride times spacing, world units
   const int* sample;      // a stop: index of its sample in the field
+  const int* group;       // a stop: samples that it stands for
   const int* visit;       // stops in visibility order: bricks outward from the eye's cell
 };
 
@@ -53,10 +53,14 @@ struct LineStyle {
   float cue_near, cue_scale, cue_strength;
   int color_by;  // scene::LineColor
   ColorTable color;
+  const float* color_values;  // of the field that the colour tells; null: another measure does
   float rise_weight;
   float box_low_z, inverse_box_height;
   float jitter_center, jitter_stride;
   std::uint32_t seed, epoch;
+  float keep[3];  // times the drawn extent: 0 along a slice's axis
+  int moving;     // phase motion
+  double motion_cycles;
 };
 
 // Piecewise linear in the value: y[p] + slope[p] (v - x[p]) from x[p] on, y[0] below x[0].
@@ -89,6 +93,9 @@ struct Camera {
   float pixel;  // size at unit distance (perspective) or in the world
   float inverse_pixel;
   float near;
+  double world_right[3], world_down[3], world_forward[3];  // the same axes, unrounded
+  double eye[3];
+  double depth_origin;  // view depth of the volume's middle, from which slabs count
 };
 
 // Kernel stops of one stride, with what is drawn at them.
@@ -100,8 +107,17 @@ struct Pass {
   int has_medium;
   LineStyle line;
   Medium medium;
-  float cell_max[3];  // the widest cell along each axis
+  float cell_max[3];     // the widest cell along each axis; curved: the farthest any reaches
+  int dims[3];           // of the fields
+  const float* places;   // 3 a sample, world units, where the lattice is curved; else null
+  int compositing;       // scene::Compositing
+  const float* partial;  // partial_columns x partial_rows, see partial.hpp; the slab method only
 };
+
+// F(b^2, v): the part of a splat's footprint that lies before v half chords beyond its middle, on a
+// ray that passes at b strides. Rows: b^2 from 0 to t^2; columns: v from -1 to 1.
+constexpr int partial_rows = 65;
+constexpr int partial_columns = 129;
 
 // A brick of 8 x 8 x 1 stops, as ranges of the visit lists.
 struct Brick {
@@ -110,6 +126,7 @@ struct Brick {
   std::int32_t v_first, v_count;
   std::int32_t pass;
   float line_reach;               // half the longest line here, world units
+  float depth_first, depth_last;  // of its kernels from the camera's depth origin, world units
   std::int16_t block_x, block_y;  // blocks of the picture that it may touch, both ends included
   std::int16_t block_x_last, block_y_last;
 };
@@ -129,7 +146,8 @@ struct Counters {
   std::int64_t occluded;
 };
 
-// One tile's pixels as blocks of 4 x 4: see block_channels. Rays exist for perspective media.
+// One tile's pixels as blocks of 4 x 4: see block_channels. Rays, for perspective media: the length
+// of each pixel's ray at unit view depth.
 struct Tile {
   int x, y;           // of its first pixel
   int width, height;  // pixels inside the picture

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "server/engine/kernels/frame_data.hpp"
+#include "server/engine/kernels/prepared.hpp"
 
 namespace windsplat::engine::kernels {
 
@@ -16,6 +17,26 @@ struct Table {
 
   // Composites a brick's kernels into the tile's blocks that are still open, front to back.
   void (*draw)(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile);
+
+  // The first half of draw: what of the brick may touch the tile's open blocks.
+  void (*prepare)(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
+                  Prepared& prepared);
+
+  // The second half, for the stops from first to before last.
+  void (*draw_prepared)(const Camera& camera, const Prepared& prepared, int first, int last,
+                        Tile& tile);
+
+  // The slab method: adds the parts of the splats that lie in the slab.
+  void (*gather)(const Camera& camera, const Prepared& prepared, Slab& slab, Tile& tile);
+
+  // Lists the blocks that lines in the slab may touch; how many. Room for hits_of_brick_max.
+  int (*list_hits)(const Camera& camera, const Prepared& prepared, const Slab& slab,
+                   const Tile& tile, Hit* hits);
+
+  // Composites one block of the slab: its gathered medium with `count` lines, nearest first.
+  // compositing is scene::Compositing.
+  void (*close_slab)(const Camera& camera, int compositing, const Slab& slab, const Hit* hits,
+                     int count, int block, Tile& tile);
 
   // Tells the processor that this brick's samples are wanted soon.
   void (*prefetch)(const Pass& pass, const Brick& brick);

@@ -1,0 +1,100 @@
+// A brick made ready for one tile: its stops with what is drawn at them, as arrays of one entry a
+// stop. Plain data, written and read by the kernels, kept by whoever sweeps a tile by depth.
+#pragma once
+
+#include <cstdint>
+
+#include "server/engine/kernels/frame_data.hpp"
+
+namespace windsplat::engine::kernels {
+
+// Stops of a brick in visibility order, or those of them that are left after culling.
+struct Stops {
+  int count;
+  int index[3][brick_stops];         // along each axis, into the pass' arrays
+  std::int64_t offset[brick_stops];  // of its sample in the fields
+  float x[brick_stops];              // right, down and forward of the eye, world units
+  float y[brick_stops];
+  float z[brick_stops];
+  float depth[brick_stops];  // forward of the camera's depth origin
+};
+
+// A ribbon's place along it is f in [0, 1] from its tail end to its head end, as clipped; colour,
+// depth and phase are linear in f.
+struct Ribbons {
+  int drawn[brick_stops];
+  float x[brick_stops], y[brick_stops];    // f = 0, pixels
+  float ux[brick_stops], uy[brick_stops];  // from f = 0 to 1, pixels
+  float inverse_u2[brick_stops];
+  float w0[brick_stops];  // where along itself a line is met at its start: 0; a dot everywhere: 1/2
+  float depth_ratio[brick_stops];  // view distance at f = 0 over that at f = 1
+  float tail[3][brick_stops];      // colour at f = 0
+  float rise[3][brick_stops];      // colour at f = 1 minus that
+  float depth[brick_stops];        // view distance at f = 0 minus the kernel's centre's
+  float depth_rise[brick_stops];
+  float phase[brick_stops];  // q + 3/2 - phase at f = 0, in [0, 2]; only where lines move
+  float phase_rise[brick_stops];
+};
+
+struct Densities {
+  float rho[brick_stops];  // per world length; zero: no splat
+  float color[3][brick_stops];
+};
+
+// With p = (px, py) the pixel minus the projected centre, the ray through it is d in cells per unit
+// of view depth, and
+//   perspective   r^2 = (xx px^2 + xy px py + yy py^2) / |d|^2
+//                 |d|^2 = d0 + dx px + dy py + dxx px^2 + dxy px py + dyy py^2
+//                 closest to the centre at a view depth of z (-(dx px + dy py) / 2 - dxx px^2 - dxy
+//                 px py - dyy py^2) / |d|^2 beyond the centre's
+//   orthographic  the same with the constant |d|^2 = d0 divided out of xx, xy, yy, and the closest
+//                 point dx px + dy py beyond the centre.
+struct Splats {
+  float x[brick_stops], y[brick_stops];  // projected centre, pixels
+  float xx[brick_stops], xy[brick_stops], yy[brick_stops];
+  float d0[brick_stops], dx[brick_stops], dy[brick_stops];
+  float dxx[brick_stops], dxy[brick_stops], dyy[brick_stops];
+  float d2_least[brick_stops];    // |d|^2 is never less
+  float z[brick_stops];           // view depth of the centre
+  float strength[brick_stops];    // optical depth at the centre; perspective: times |d|
+  float half_depth[brick_stops];  // of the silhouette along the view, world units
+  float x0[brick_stops], x1[brick_stops], y0[brick_stops], y1[brick_stops];  // silhouette, pixels
+};
+
+// Rows and columns of the tile's blocks that each stop's line and splat may touch, both ends
+// included; none if last < first.
+struct Footing {
+  int line_first[brick_stops], line_last[brick_stops];
+  int row_first[brick_stops], row_last[brick_stops];
+  int column_first[brick_stops], column_last[brick_stops];
+};
+
+struct Prepared {
+  const Pass* pass;
+  Stops stops;
+  Ribbons ribbons;
+  Densities densities;
+  Splats splats;
+  Footing footing;
+};
+
+// One slab of view depth and what its medium has gathered in a tile: optical depth, then colour
+// weighted by it, 4 floats a pixel in blocks as the tile's are.
+struct Slab {
+  float front, back;  // view depths from the camera's depth origin, world units
+  float* gathered;
+  std::uint32_t touched[tile_blocks];  // bit set: the block holds something
+};
+
+constexpr int gathered_floats = 4 * block_pixels;
+
+// One line's meeting with one block.
+struct Hit {
+  const Prepared* from;
+  float depth;  // at the block's middle, from the camera's depth origin
+  std::int16_t stop;
+  std::int16_t block;
+};
+constexpr int hits_of_brick_max = brick_stops * tile_blocks * tile_blocks;
+
+}  // namespace windsplat::engine::kernels

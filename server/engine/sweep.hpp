@@ -1,0 +1,44 @@
+// A tile's bricks by view depth: what the slab method does, and what a curved lattice needs, whose
+// samples no order of indexes puts front to back. Bricks are made ready when the sweep reaches them
+// and forgotten once it has passed them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "server/base/cancel.hpp"
+#include "server/engine/bins.hpp"
+#include "server/engine/kernels/prepared.hpp"
+
+namespace windsplat::engine {
+
+// A kernel by its place in depth.
+struct DepthEntry {
+  float depth = 0;
+  std::int32_t slot = 0;
+  std::int32_t stop = 0;
+};
+
+// A worker's own memory, used for one tile after the other.
+struct SweepSpace {
+  std::vector<std::unique_ptr<kernels::Prepared>> slots;
+  std::vector<std::int32_t> free;
+  std::vector<DepthEntry> active;  // a brick: its last depth and its slot
+  std::vector<DepthEntry> order;
+  std::vector<float> gathered;
+  std::vector<kernels::Hit> hits;    // as listed
+  std::vector<kernels::Hit> sorted;  // by block, then depth
+  std::vector<std::uint32_t> first;  // of each block, in `sorted`
+};
+
+// True if every block of the tile that the brick may touch lets no light through any more.
+bool all_closed(const kernels::Tile& tile, const kernels::Brick& brick);
+
+// Draws tile `index`; true if it ended early because it had become opaque. Cancelled, it returns
+// early and the tile is worthless. The bricks of the tile are sorted by their first depth.
+bool sweep_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
+                const CancelToken& cancel, std::size_t index, SweepSpace& space,
+                kernels::Tile& tile);
+
+}  // namespace windsplat::engine
