@@ -322,6 +322,7 @@ void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, T
   if (Medium) read_densities(pass, stops, out.densities);
   keep_drawn<Lines, Medium>(stops, winds, out.densities);
   fill_cells<Curved>(camera, pass, stops, cells);
+  if (Curved) drop_flat_cells<Lines, Medium>(stops, cells, winds, out.densities);
   if (Lines) {
     if (Curved) bend_winds(stops, cells, winds);
     prepare_ribbons<Perspective, Curved>(camera, pass, stops, cells, winds, out.ribbons);

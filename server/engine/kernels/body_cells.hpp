@@ -13,6 +13,7 @@ struct Cells {
   float edge[3][3][brick_stops];     // [axis][world component]
   float inverse[3][3][brick_stops];  // [axis][world component]
   float from_eye[3][brick_stops];    // of the stop, world units
+  int solid[brick_stops];            // of a curved lattice: 0 if the cell spans no volume
 };
 
 template <bool Curved>
@@ -70,41 +71,36 @@ inline bool edge_between(const Pass& pass, const Stops& stops, int a, int l, flo
   return true;
 }
 
-// Where neighbours meet (at a pole), a cell keeps a thousandth of its longest edge, so that it can
-// be inverted.
-inline void open_cell(float edge[3][3], const bool known[3], const float unbent[3]) {
-  float longest = 0;
-  for (int a = 0; a < 3; ++a) {
-    if (known[a]) longest = larger(longest, dot3(edge[a], edge[a]));
-  }
-  longest = square_root(longest);
-  for (int a = 0; a < 3; ++a) {
-    const float* const other = edge[(a + 1) % 3];
-    const float* const next = edge[(a + 2) % 3];
-    float across[3];
-    cross3(other, next, across);
-    const float area = square_root(dot3(across, across));
-    const float length = square_root(dot3(edge[a], edge[a]));
-    const float wanted = known[a] ? 1e-3F * longest : unbent[a];
-    if ((known[a] && length >= wanted) || area <= 0) continue;
-    const float scale = larger(wanted, 1e-6F) / area;
-    for (int c = 0; c < 3; ++c) edge[a][c] = across[c] * scale;
-  }
+// Along an axis of one sample a cell stands at right angles to its other two edges.
+inline void raise_edge(const float unbent, int a, float edge[3][3]) {
+  float across[3];
+  cross3(edge[(a + 1) % 3], edge[(a + 2) % 3], across);
+  const float area = square_root(dot3(across, across));
+  if (area <= 0) return;
+  for (int c = 0; c < 3; ++c) edge[a][c] = across[c] * (unbent / area);
 }
 
+// Where neighbours meet (at a pole) a cell spans no volume, and its stop shows nothing.
 inline void fill_curved_cell(const Pass& pass, const Stops& stops, int l, Cells& cells) {
+  constexpr float flattest = 1e-6F;
   float edge[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
-  float unbent[3];
   bool known[3];
   for (int a = 0; a < 3; ++a) {
-    unbent[a] = pass.axis[a].cell[stops.index[a][l]];
     known[a] = edge_between(pass, stops, a, l, edge[a]);
-    if (!known[a]) edge[a][a] = unbent[a];
+    if (!known[a]) edge[a][a] = pass.axis[a].cell[stops.index[a][l]];
   }
-  open_cell(edge, known, unbent);
+  for (int a = 0; a < 3; ++a) {
+    if (!known[a]) raise_edge(pass.axis[a].cell[stops.index[a][l]], a, edge);
+  }
   float rows[3][3];
-  for (int a = 0; a < 3; ++a) cross3(edge[(a + 1) % 3], edge[(a + 2) % 3], rows[a]);
-  const float inverse = 1.0F / divisor(dot3(edge[0], rows[0]));
+  float upright = 1;
+  for (int a = 0; a < 3; ++a) {
+    cross3(edge[(a + 1) % 3], edge[(a + 2) % 3], rows[a]);
+    upright *= square_root(dot3(edge[a], edge[a]));
+  }
+  const float volume = dot3(edge[0], rows[0]);
+  cells.solid[l] = absolute(volume) > flattest * upright ? 1 : 0;
+  const float inverse = cells.solid[l] != 0 ? 1.0F / volume : 0.0F;
   for (int a = 0; a < 3; ++a) {
     for (int c = 0; c < 3; ++c) {
       cells.edge[a][c][l] = edge[a][c];
@@ -149,6 +145,16 @@ void place_curved_stops(const Camera& camera, const Pass& pass, Stops& stops) {
     stops.y[l] = static_cast<float>(along(camera.world_down));
     stops.z[l] = static_cast<float>(z);
     stops.depth[l] = static_cast<float>(z - camera.depth_origin);
+  }
+}
+
+// Stops without a cell have neither line nor splat.
+template <bool Lines, bool Medium>
+void drop_flat_cells(const Stops& stops, const Cells& cells, Winds& winds, Densities& densities) {
+  for (int l = 0; l < stops.count; ++l) {
+    if (cells.solid[l] != 0) continue;
+    if (Lines) winds.magnitude[l] = -1;
+    if (Medium) densities.rho[l] = 0;
   }
 }
 

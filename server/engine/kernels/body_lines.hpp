@@ -13,6 +13,7 @@ struct Segments {
   float extent[3][brick_stops];  // tail to head, world units
   float along[3][brick_stops];   // the same in cells
   float low[brick_stops], high[brick_stops];
+  float lift[brick_stops];   // of the line's centre from the stop along z, cells
   float phase[brick_stops];  // of the texture's motion
 };
 
@@ -40,6 +41,7 @@ void move_centres(const Pass& pass, const Stops& stops, const Cells& cells, Segm
     float offset[3];
     to_world<Curved>(cells, l, moved, offset);
     for (int a = 0; a < 3; ++a) s.offset[a][l] = offset[a];
+    s.lift[l] = moved[2];
     s.phase[l] = unit_interval(pcg3d(centre).x);
   }
 }
@@ -181,8 +183,8 @@ inline float bearing(float x, float y) {
 
 // Height is that of the unbent lattice on a curved one.
 inline float height_of(const Pass& pass, const Stops& stops, const Segments& s, int l) {
-  const float level = pass.axis[2].position[stops.index[2][l]];
-  return pass.places == nullptr ? level + s.offset[2][l] : level;
+  const Axis& z = pass.axis[2];
+  return z.position[stops.index[2][l]] + s.lift[l] * z.cell[stops.index[2][l]];
 }
 
 inline float color_value(const Pass& pass, const Stops& stops, const Winds& winds,
@@ -196,13 +198,13 @@ inline float color_value(const Pass& pass, const Stops& stops, const Winds& wind
       return view_distance;
     case 2: {
       const float height = (z - line.box_low_z) * line.inverse_box_height;
-      const float rise = 0.5F + 0.5F * winds.direction[2][l];
+      const float rise = 0.5F + 0.5F * winds.direction[2][l] * line.keep[2];
       return (1.0F - line.rise_weight) * height + line.rise_weight * rise;
     }
     case 3:
       return winds.magnitude[l];
     case 4:
-      return bearing(winds.direction[0][l], winds.direction[1][l]);
+      return bearing(winds.direction[0][l] * line.keep[0], winds.direction[1][l] * line.keep[1]);
     case 5:
       return line.color_values[stops.offset[l]];
     default:
