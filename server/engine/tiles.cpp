@@ -133,8 +133,11 @@ void store_tile(const Tile& tile, Image& image) {
       const int lane = y % block_side * block_side + x % block_side;
       const float* from = tile.blocks + static_cast<std::ptrdiff_t>(block) * block_floats + lane;
       for (int c = 0; c < 3; ++c) to[c] = from[static_cast<std::ptrdiff_t>(2 + c) * block_pixels];
-      // A sum of many parts of what was left may pass 1 by a rounding.
-      to[3] = std::min(from[block_pixels], 1.0F);
+      // A sum of many parts of what was left may pass 1 by a rounding; what passes it by more has
+      // diverged, and is to be seen.
+      constexpr float rounding = 1e-4F;
+      const float alpha = from[block_pixels];
+      to[3] = alpha > 1.0F && alpha < 1.0F + rounding ? 1.0F : alpha;
     }
   }
 }

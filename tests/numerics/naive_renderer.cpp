@@ -312,6 +312,11 @@ class Renderer {
       closest = dot(o, d) / dot(d, d);
       const Real r = std::sqrt(dot(c, c)) / cells;
       tau = medium.rho * footprint(r) * std::sqrt(dot(ray, ray)) / (Real(1.4476982547) * cells);
+      // What lies before the near plane does not count, as if the splat were even over one cell.
+      const auto near = static_cast<Real>(scene_.camera.near);
+      if (scene_.camera.perspective) {
+        tau *= std::clamp(Real(0.5) + (closest - near) * cells, Real(0), Real(1));
+      }
     }
     engine::reference::RibbonHit<Real> hit;
     if (line != nullptr) hit = hit_ribbon(*line, x + Real(0.5), y + Real(0.5));

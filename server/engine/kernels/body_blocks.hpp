@@ -75,7 +75,7 @@ inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
 }
 
 template <bool Perspective>
-inline Splat splat_at(const Densities& d, const Splats& s, int l) {
+inline Splat splat_at(const Densities& d, const Splats& s, float near, int l) {
   Splat out = {};
   out.x = s.x[l];
   out.y = s.y[l];
@@ -83,14 +83,20 @@ inline Splat splat_at(const Densities& d, const Splats& s, int l) {
   out.xy = s.xy[l];
   out.yy = s.yy[l];
   out.d0 = s.d0[l];
-  out.dx = s.dx[l];
-  out.dy = s.dy[l];
+  out.bx = s.bx[l];
+  out.by = s.by[l];
   if (Perspective) {
+    out.ex = s.ex[l];
+    out.ey = s.ey[l];
+    out.b0 = s.b0[l];
+    out.dx = s.dx[l];
+    out.dy = s.dy[l];
     out.dxx = s.dxx[l];
     out.dxy = s.dxy[l];
     out.dyy = s.dyy[l];
     out.d2_least = s.d2_least[l];
     out.z = s.z[l];
+    out.near = near;
   }
   out.strength = s.strength[l];
   for (int c = 0; c < 3; ++c) out.color[c] = d.color[c][l];
@@ -169,7 +175,13 @@ inline void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& 
     ribbon = ribbon_at(p.pass->line, p.ribbons, l);
     capsule = capsule_of(ribbon, tile);
   }
-  if (Medium && reach.columns != 0) splat = splat_at<Perspective>(p.densities, p.splats, l);
+  bool near = false;
+  if (Medium && reach.columns != 0) {
+    splat = splat_at<Perspective>(p.densities, p.splats, p.near, l);
+    near = Perspective && splat.z - 2.0F * p.splats.half_depth[l] < p.near;
+  }
+  const SplatFunction splat_function = near ? with.near_splat : with.splat;
+  const BothFunction both_function = near ? with.near_both : with.both;
   const int columns_in_tile = blocks_of(tile.width);
   for (int row = reach.first; row <= reach.last; ++row) {
     std::uint32_t lines = 0;
@@ -194,12 +206,12 @@ inline void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& 
                              : nullptr;
       tile.counters.pixel_updates += block_pixels;
       if (Lines && Medium && (lines & splats & bit) != 0) {
-        with.both(ribbon, splat, x, y, ray, block);
+        both_function(ribbon, splat, x, y, ray, block);
         tile.counters.exponentials += std::int64_t{with.both_exponentials} * block_pixels;
       } else if (Lines && (!Medium || (lines & bit) != 0)) {
         with.line(ribbon, x, y, block);
       } else if (Medium) {
-        with.splat(splat, x, y, ray, block);
+        splat_function(splat, x, y, ray, block);
         tile.counters.exponentials += std::int64_t{with.splat_exponentials} * block_pixels;
       }
     }
@@ -306,6 +318,7 @@ void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, T
   Winds winds;
   Cells cells;
   out.pass = &pass;
+  out.near = camera.near;
   list_stops(pass, brick, stops);
   if (Curved) {
     place_curved_stops(camera, pass, stops);

@@ -35,9 +35,9 @@ struct Ribbon {
 };
 
 struct Splat {
-  float x, y, xx, xy, yy;
-  float d0, dx, dy, dxx, dxy, dyy, d2_least;
-  float z, strength;
+  float x, y, ex, ey, xx, xy, yy;
+  float b0, bx, by, d0, dx, dy, dxx, dxy, dyy, d2_least;
+  float z, near, strength;
   float color[3];
 };
 
@@ -74,26 +74,33 @@ struct SplatLane {
   float behind;  // how far beyond the centre's view depth the ray is closest to it
 };
 
-template <bool Perspective>
+// From: the rays' beginning. `eye`: far before the splat. `near_plane`: the splat reaches it, and
+// the part of it that lies before counts no more, as if the splat were even over one cell.
+enum class From { eye, near_plane };
+
+template <bool Perspective, From Start>
 inline SplatLane splat_lane(const Splat& s, float px, float py, float ray) {
   const float dx = px - s.x;
   const float dy = py - s.y;
-  const float x2 = dx * dx;
-  const float xy = dx * dy;
-  const float y2 = dy * dy;
   // The quadratic form is never negative; its rounded sum may be.
-  const float top = larger(s.xx * x2 + s.xy * xy + s.yy * y2, 0.0F);
-  const float linear = s.dx * dx + s.dy * dy;
+  const float top = larger(s.xx * (dx * dx) + s.xy * (dx * dy) + s.yy * (dy * dy), 0.0F);
   if constexpr (Perspective) {
-    const float bent = s.dxx * x2 + s.dxy * xy + s.dyy * y2;
-    const float length2 = larger(s.d0 + (linear + bent), s.d2_least);
+    const float ex = px - s.ex;
+    const float ey = py - s.ey;
+    const float bent = s.dxx * (ex * ex) + s.dxy * (ex * ey) + s.dyy * (ey * ey);
+    const float length2 = larger(s.d0 + (s.dx * ex + s.dy * ey + bent), s.d2_least);
     const float inverse = 1.0F / square_root(length2);
     const float inverse2 = inverse * inverse;
     const float r2 = top * inverse2;
     const float tau = s.strength * footprint(r2, square_root(r2)) * (inverse * ray);
-    return {r2, tau, length2 * inverse, -s.z * (0.5F * linear + bent) * inverse2};
+    const float cells = length2 * inverse;
+    const float behind = (s.b0 + s.bx * ex + s.by * ey - s.z * bent) * inverse2;
+    const float beyond = 0.5F + ((s.z - s.near) + behind) * cells;
+    const float kept = Start == From::near_plane ? tau * clamped(beyond, 0.0F, 1.0F) : tau;
+    return {r2, kept, cells, behind};
   } else {
-    return {top, s.strength * footprint(top, square_root(top)), square_root(s.d0), linear};
+    const float behind = s.bx * dx + s.by * dy;
+    return {top, s.strength * footprint(top, square_root(top)), square_root(s.d0), behind};
   }
 }
 
@@ -153,14 +160,14 @@ void line_block(const Ribbon& ribbon, float x, float y, float* __restrict block)
   }
 }
 
-template <bool Perspective, int Compositing>
+template <bool Perspective, int Compositing, From Start>
 void splat_block(const Splat& splat, float x, float y, const float* __restrict ray,
                  float* __restrict block) {
   const Splat s = splat;
   const Channels to = channels_of(block);
   for (int l = 0; l < block_pixels; ++l) {
     const float length = Perspective ? ray[l] : 1.0F;
-    const SplatLane lane = splat_lane<Perspective>(s, x + lane_x[l], y + lane_y[l], length);
+    const SplatLane lane = splat_lane<Perspective, Start>(s, x + lane_x[l], y + lane_y[l], length);
     const Attenuation medium = attenuation_by<Compositing>(lane.tau);
     const float t = to.transmittance[l];
     const float a = t * medium.absorbed;
@@ -173,7 +180,7 @@ void splat_block(const Splat& splat, float x, float y, const float* __restrict r
 
 // A line inside its homogeneous cell, at x = tf / tau of the way through it:
 // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tf) (c_v - c_s).
-template <bool Perspective, int Compositing, int Style>
+template <bool Perspective, int Compositing, int Style, From Start>
 void both_block(const Ribbon& ribbon, const Splat& splat, float x, float y,
                 const float* __restrict ray, float* __restrict block) {
   const Ribbon r = ribbon;
@@ -183,15 +190,17 @@ void both_block(const Ribbon& ribbon, const Splat& splat, float x, float y,
     const float px = x + lane_x[l];
     const float py = y + lane_y[l];
     const RibbonLane line = ribbon_lane<Perspective, Style>(r, px, py);
-    const SplatLane lane = splat_lane<Perspective>(s, px, py, Perspective ? ray[l] : 1.0F);
+    const SplatLane lane = splat_lane<Perspective, Start>(s, px, py, Perspective ? ray[l] : 1.0F);
     const Attenuation medium = attenuation_by<Compositing>(lane.tau);
     const float past = (r.depth + line.f * r.depth_rise) - lane.behind;
     const float place = clamped(0.5F + past * lane.cells, 0.0F, 1.0F);
     const float t = to.transmittance[l];
     if (Compositing == compositing_cd_naive) {
-      // The paper's first form: front part, line and back part one over the other.
-      const float front = place * medium.absorbed;
-      const float back = (1.0F - place) * medium.absorbed;
+      // The paper's first form: front part, line and back part one over the other, where the ray
+      // meets the line at all.
+      const float met = line.opacity > 0 ? place : 1.0F;
+      const float front = met * medium.absorbed;
+      const float back = (1.0F - met) * medium.absorbed;
       const float own = (1.0F - front) * line.opacity;
       const float rest = (1.0F - front) * (1.0F - line.opacity);
       const float absorbed = front + rest * back;
@@ -219,8 +228,8 @@ void both_block(const Ribbon& ribbon, const Splat& splat, float x, float y,
 // The functions that a pass composites with, chosen once a brick.
 struct Compositor {
   LineFunction line;
-  SplatFunction splat;
-  BothFunction both;
+  SplatFunction splat, near_splat;
+  BothFunction both, near_both;
   int splat_exponentials;  // a pixel
   int both_exponentials;
 };
@@ -232,15 +241,22 @@ inline int style_of(const LineStyle& line) {
 
 template <bool Perspective, int Compositing>
 inline Compositor compositor_with(int style) {
+  constexpr From near = Perspective ? From::near_plane : From::eye;
   constexpr bool euler = Compositing == compositing_cd_euler;
   constexpr int splat = euler ? 0 : 1;
   constexpr int both = Compositing == compositing_analytic ? 2 : splat;
-  Compositor c = {line_block<Perspective, style_plain>, splat_block<Perspective, Compositing>,
-                  both_block<Perspective, Compositing, style_head>, splat, both};
+  Compositor c = {line_block<Perspective, style_plain>,
+                  splat_block<Perspective, Compositing, From::eye>,
+                  splat_block<Perspective, Compositing, near>,
+                  both_block<Perspective, Compositing, style_head, From::eye>,
+                  both_block<Perspective, Compositing, style_head, near>,
+                  splat,
+                  both};
   if (style == style_head) c.line = line_block<Perspective, style_head>;
   if (style == style_moving) {
     c.line = line_block<Perspective, style_moving>;
-    c.both = both_block<Perspective, Compositing, style_moving>;
+    c.both = both_block<Perspective, Compositing, style_moving, From::eye>;
+    c.near_both = both_block<Perspective, Compositing, style_moving, near>;
   }
   return c;
 }

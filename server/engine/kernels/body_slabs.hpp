@@ -32,7 +32,8 @@ void gather_block(const Splat& splat, const float* __restrict partial, float fro
   float tau[block_pixels];
   for (int l = 0; l < block_pixels; ++l) {
     const float length = Perspective ? ray[l] : 1.0F;
-    const SplatLane lane = splat_lane<Perspective>(s, x + lane_x[l], y + lane_y[l], length);
+    const SplatLane lane =
+        splat_lane<Perspective, From::eye>(s, x + lane_x[l], y + lane_y[l], length);
     // Half the chord in cells, and with it the slab's faces in half chords from the middle.
     const float chord2 = larger(t2 - lane.r2, 1e-6F);
     const float scale = lane.cells / square_root(chord2);
@@ -63,15 +64,19 @@ inline float* touch(Slab& slab, int row, int column) {
   return at;
 }
 
+// What lies before the near plane does not count.
 template <bool Perspective>
-void gather_on(const Prepared& p, Slab& slab, Tile& tile) {
+void gather_on(const Camera& camera, const Prepared& p, Slab& slab, Tile& tile) {
+  const auto near = static_cast<float>(static_cast<double>(camera.near) - camera.depth_origin);
+  const float front = Perspective ? larger(slab.front, near) : slab.front;
   const float back = slab.back;
+  if (back <= front) return;
   for (int l = 0; l < p.stops.count; ++l) {
     const float middle = p.stops.depth[l];
     const float half = p.splats.half_depth[l];
     if (p.footing.row_last[l] < p.footing.row_first[l]) continue;
-    if (middle + half <= slab.front || middle - half >= back) continue;
-    const Splat splat = splat_at<Perspective>(p.densities, p.splats, l);
+    if (middle + half <= front || middle - half >= back) continue;
+    const Splat splat = splat_at<Perspective>(p.densities, p.splats, p.near, l);
     const std::uint32_t columns = range_mask({p.footing.column_first[l], p.footing.column_last[l]});
     for (int row = p.footing.row_first[l]; row <= p.footing.row_last[l]; ++row) {
       std::uint32_t left = columns & tile.open[row];
@@ -82,7 +87,7 @@ void gather_on(const Prepared& p, Slab& slab, Tile& tile) {
             Perspective
                 ? tile.rays + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * block_pixels
                 : nullptr;
-        gather_block<Perspective>(splat, p.pass->partial, slab.front - middle, back - middle,
+        gather_block<Perspective>(splat, p.pass->partial, front - middle, back - middle,
                                   static_cast<float>(tile.x + column * block_side),
                                   static_cast<float>(tile.y + row * block_side), ray,
                                   touch(slab, row, column));
@@ -95,9 +100,9 @@ void gather_on(const Prepared& p, Slab& slab, Tile& tile) {
 void gather(const Camera& camera, const Prepared& p, Slab& slab, Tile& tile) {
   if (p.pass->has_medium == 0) return;
   if (camera.perspective != 0) {
-    gather_on<true>(p, slab, tile);
+    gather_on<true>(camera, p, slab, tile);
   } else {
-    gather_on<false>(p, slab, tile);
+    gather_on<false>(camera, p, slab, tile);
   }
 }
 

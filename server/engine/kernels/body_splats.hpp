@@ -75,19 +75,31 @@ void perspective_splats(const Camera& camera, const Stops& stops, const Cells& c
     s.xx[l] = dot3(ox, ox);
     s.xy[l] = 2.0F * dot3(ox, oy);
     s.yy[l] = dot3(oy, oy);
-    const float nearness = 1.0F / stops.z[l];
-    s.d0[l] = dot3(o, o) * nearness * nearness;
-    s.dx[l] = 2.0F * dot3(o, f.right) * nearness;
-    s.dy[l] = 2.0F * dot3(o, f.down) * nearness;
+    const float scale = camera.inverse_pixel / stops.z[l];
+    s.x[l] = camera.half_width_px + stops.x[l] * scale;
+    s.y[l] = camera.half_height_px + stops.y[l] * scale;
+    // The nearest point of the picture; its ray, forward component 1, in cells.
+    s.ex[l] = clamped(s.x[l], 0.0F, 2.0F * camera.half_width_px);
+    s.ey[l] = clamped(s.y[l], 0.0F, 2.0F * camera.half_height_px);
+    const bool inside = s.ex[l] == s.x[l] && s.ey[l] == s.y[l];
+    float d[3];
+    for (int a = 0; a < 3; ++a) {
+      const float there = f.forward[a] + (s.ex[l] - camera.half_width_px) * f.right[a] +
+                          (s.ey[l] - camera.half_height_px) * f.down[a];
+      d[a] = inside ? o[a] / stops.z[l] : there;
+    }
+    s.d0[l] = dot3(d, d);
+    s.dx[l] = 2.0F * dot3(d, f.right);
+    s.dy[l] = 2.0F * dot3(d, f.down);
     s.dxx[l] = dot3(f.right, f.right);
     s.dxy[l] = 2.0F * dot3(f.right, f.down);
     s.dyy[l] = dot3(f.down, f.down);
+    s.b0[l] = inside ? 0.0F : dot3(o, d) - stops.z[l] * s.d0[l];
+    s.bx[l] = dot3(o, f.right) - stops.z[l] * s.dx[l];
+    s.by[l] = dot3(o, f.down) - stops.z[l] * s.dy[l];
     s.d2_least[l] = 1.0F / f.edges2;
     s.z[l] = stops.z[l];
     s.half_depth[l] = square_root(f.s33);
-    const float scale = camera.inverse_pixel * nearness;
-    s.x[l] = camera.half_width_px + stops.x[l] * scale;
-    s.y[l] = camera.half_height_px + stops.y[l] * scale;
     const Extent across = silhouette(stops.x[l], stops.z[l], f.s11, f.s13, f.s33);
     const Extent along = silhouette(stops.y[l], stops.z[l], f.s22, f.s23, f.s33);
     s.x0[l] = camera.half_width_px + across.low * camera.inverse_pixel;
@@ -111,8 +123,8 @@ void orthographic_splats(const Camera& camera, const Stops& stops, const Cells& 
     s.xy[l] = 2.0F * dot3(ox, oy) * inverse2;
     s.yy[l] = dot3(oy, oy) * inverse2;
     s.d0[l] = length2;
-    s.dx[l] = -dot3(f.right, f.forward) * inverse2;
-    s.dy[l] = -dot3(f.down, f.forward) * inverse2;
+    s.bx[l] = -dot3(f.right, f.forward) * inverse2;
+    s.by[l] = -dot3(f.down, f.forward) * inverse2;
     s.half_depth[l] = square_root(f.s33);
     s.x[l] = camera.half_width_px + stops.x[l] * camera.inverse_pixel;
     s.y[l] = camera.half_height_px + stops.y[l] * camera.inverse_pixel;

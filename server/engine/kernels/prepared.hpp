@@ -41,17 +41,21 @@ struct Densities {
   float color[3][brick_stops];
 };
 
-// With p = (px, py) the pixel minus the projected centre, the ray through it is d in cells per unit
-// of view depth, and
+// With p = (px, py) the pixel minus the projected centre and e = (ex, ey) the pixel minus a point
+// of the picture near it, the ray through the pixel is d in cells per unit of view depth, and
 //   perspective   r^2 = (xx px^2 + xy px py + yy py^2) / |d|^2
-//                 |d|^2 = d0 + dx px + dy py + dxx px^2 + dxy px py + dyy py^2
-//                 closest to the centre at a view depth of z (-(dx px + dy py) / 2 - dxx px^2 - dxy
-//                 px py - dyy py^2) / |d|^2 beyond the centre's
+//                 |d|^2 = d0 + dx ex + dy ey + bent, bent = dxx ex^2 + dxy ex ey + dyy ey^2
+//                 closest to the centre at a view depth of (b0 + bx ex + by ey - z bent) / |d|^2
+//                 beyond the centre's
 //   orthographic  the same with the constant |d|^2 = d0 divided out of xx, xy, yy, and the closest
-//                 point dx px + dy py beyond the centre.
+//                 point bx ex + by ey beyond the centre.
+// The second point is the centre itself wherever that is in the picture. Centres far outside it (of
+// kernels that the eye stands in) would cost every digit.
 struct Splats {
-  float x[brick_stops], y[brick_stops];  // projected centre, pixels
+  float x[brick_stops], y[brick_stops];    // projected centre, pixels
+  float ex[brick_stops], ey[brick_stops];  // the point of the picture near it, pixels
   float xx[brick_stops], xy[brick_stops], yy[brick_stops];
+  float b0[brick_stops], bx[brick_stops], by[brick_stops];
   float d0[brick_stops], dx[brick_stops], dy[brick_stops];
   float dxx[brick_stops], dxy[brick_stops], dyy[brick_stops];
   float d2_least[brick_stops];    // |d|^2 is never less
@@ -71,6 +75,7 @@ struct Footing {
 
 struct Prepared {
   const Pass* pass;
+  float near;  // the camera's near plane, a view depth
   Stops stops;
   Ribbons ribbons;
   Densities densities;
