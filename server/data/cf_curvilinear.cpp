@@ -1,4 +1,5 @@
-// Mean changes of longitude and latitude along two dimensions decide which is which.
+// Mean changes of longitude and latitude along two dimensions decide which is which; the values are
+// kept in the order of the volumes.
 #include "server/data/cf_curvilinear.hpp"
 
 #include <algorithm>
@@ -68,6 +69,56 @@ int position_on(const FileContents& contents, int a, int b, bool longitude) {
   return -1;
 }
 
+// 2-D values as the file has them, its slower dimension first.
+struct Table {
+  std::vector<double> values;
+  int slow = -1;  // dimension ids
+  std::size_t columns = 0;
+};
+
+// In the volumes' order: x fastest, from west to east and from south to north.
+std::vector<double> in_order(const Table& table, int x, std::array<std::size_t, 2> lengths,
+                             const std::array<bool, 2>& turned) {
+  std::vector<double> out(table.values.size());
+  for (std::size_t j = 0; j < lengths[1]; ++j) {
+    for (std::size_t i = 0; i < lengths[0]; ++i) {
+      const std::size_t at_x = turned[0] ? lengths[0] - 1 - i : i;
+      const std::size_t at_y = turned[1] ? lengths[1] - 1 - j : j;
+      const bool x_slow = table.slow == x;
+      out[j * lengths[0] + i] =
+          table.values[(x_slow ? at_x : at_y) * table.columns + (x_slow ? at_y : at_x)];
+    }
+  }
+  return out;
+}
+
+// Longitudes go on beyond 360 where that is the short way to the neighbour: along the first column,
+// then along every row.
+void unwrap(std::vector<double>& longitude, std::size_t width) {
+  const auto follow = [&](std::size_t from, std::size_t to) {
+    longitude[to] = longitude[from] + difference(longitude[from], longitude[to], true);
+  };
+  for (std::size_t n = width; n < longitude.size(); n += width) follow(n - width, n);
+  for (std::size_t n = 0; n < longitude.size(); ++n) {
+    if (n % width != 0) follow(n - 1, n);
+  }
+}
+
+// Null where a longitude or latitude is missing.
+std::shared_ptr<const Columns> columns_of(const std::array<Table, 2>& tables, int x,
+                                          std::array<std::size_t, 2> lengths,
+                                          const std::array<bool, 2>& turned) {
+  auto columns = std::make_shared<Columns>();
+  columns->longitude = in_order(tables[0], x, lengths, turned);
+  columns->latitude = in_order(tables[1], x, lengths, turned);
+  const auto finite = [](const std::vector<double>& values) {
+    return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  };
+  if (!finite(columns->longitude) || !finite(columns->latitude)) return nullptr;
+  unwrap(columns->longitude, lengths[0]);
+  return columns;
+}
+
 }  // namespace
 
 Result<Bearing> find_bearing(const netcdf::File& file, const std::vector<DimensionRole>& roles,
@@ -80,6 +131,7 @@ Result<Bearing> find_bearing(const netcdf::File& file, const std::vector<Dimensi
       roles.at(static_cast<std::size_t>(y)).coordinate >= 0) {
     return bearing;
   }
+  std::array<Table, 2> tables;        // of longitude, of latitude
   std::array<Change, 2> along_x_y{};  // of longitude, of latitude: fast is along x, slow along y
   for (const bool longitude : {true, false}) {
     const int v = position_on(contents, x, y, longitude);
@@ -105,6 +157,7 @@ Result<Bearing> find_bearing(const netcdf::File& file, const std::vector<Dimensi
       std::swap(change.slow, change.fast);
     }
     along_x_y.at(longitude ? 0 : 1) = change;
+    tables.at(longitude ? 0 : 1) = {std::move(*values), dims[0], columns};
   }
   bearing.is_curvilinear = true;
   const bool swapped = std::abs(along_x_y[0].slow) > std::abs(along_x_y[0].fast) &&
@@ -114,6 +167,10 @@ Result<Bearing> find_bearing(const netcdf::File& file, const std::vector<Dimensi
   }
   bearing.turned = {(swapped ? along_x_y[0].slow : along_x_y[0].fast) < 0,
                     (swapped ? along_x_y[1].fast : along_x_y[1].slow) < 0};
+  const auto length = [&](std::size_t axis) {
+    return contents.dimensions[static_cast<std::size_t>(choice.space.at(axis))].length;
+  };
+  bearing.columns = columns_of(tables, choice.space[0], {length(0), length(1)}, bearing.turned);
   return bearing;
 }
 

@@ -1,8 +1,9 @@
-// Files whose longitude and latitude are 2-D: samples are placed by index, and the coordinates tell
-// which dimension runs east and which north. File and choice in, a choice with its directions out.
+// Files whose longitude and latitude are 2-D: the coordinates tell which dimension runs east, which
+// north, and where each column stands. File and choice in, a choice with its directions out.
 #pragma once
 
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "server/base/error.hpp"
@@ -15,6 +16,7 @@ namespace windsplat::data::cf {
 struct Bearing {
   bool is_curvilinear = false;               // 2-D coordinates were found
   std::array<bool, 2> turned{false, false};  // x and y: the file's order runs west or south
+  std::shared_ptr<const Columns> columns;    // turned likewise; null where some are missing
 };
 
 // Where x and y have no coordinates of their own and 2-D longitudes and latitudes lie on them:

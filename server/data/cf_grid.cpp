@@ -59,7 +59,7 @@ std::string not_a_field(const FileContents& contents, const std::vector<Dimensio
     return "description of the map projection";
   }
   if (variable.dims.size() >= 2 && is_position(variable)) {
-    return "coordinate of more than one dimension: it only tells which way rows and columns run";
+    return "coordinate of more than one dimension: tells where rows and columns run";
   }
   if (is_named_by(contents, &FileVariable::coordinates, variable.name)) {
     return "auxiliary coordinate";

@@ -25,9 +25,17 @@ struct Axis {
   std::vector<double> coordinates;  // one a sample, strictly monotonic, in `units`
 };
 
+// Where each column of a grid stands whose longitudes and latitudes are 2-D: degrees, x fastest,
+// all finite; longitudes continue from neighbour to neighbour, beyond 360 if need be.
+struct Columns {
+  std::vector<double> longitude;
+  std::vector<double> latitude;
+};
+
 // x, y, z: always three axes; a dimension the data lacks has one coordinate.
 struct Grid {
   std::array<Axis, 3> axes;
+  std::shared_ptr<const Columns> columns;  // null: the axes say it all
   [[nodiscard]] std::array<int, 3> dims() const;
   [[nodiscard]] std::size_t samples() const;
 };

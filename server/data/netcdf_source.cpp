@@ -174,6 +174,7 @@ class NetcdfSource final : public Source {
         turned_.at(which) = bearing->turned.at(which);
       }
     }
+    info_.grid.columns = std::move(bearing->columns);
     return {};
   }
 

@@ -167,6 +167,9 @@ struct Dataset::State {
   std::shared_ptr<Budget> budget;
   std::uint64_t owner = 0;
   std::mutex source_mutex;
+  std::mutex kept_mutex;
+  std::string kept_key;
+  std::any kept_value;
   std::atomic<std::uint64_t> loads{0};
 
   Result<VolumePtr> load(std::size_t field, std::size_t step) {
@@ -221,6 +224,17 @@ Result<std::shared_ptr<const Volume>> Dataset::volume(const std::string& field, 
   const std::uint64_t bytes = info.grid.samples() * found->components.size() * sizeof(float);
   return state_->budget->get({state_->owner, index, step}, bytes,
                              [&] { return state_->load(index, step); });
+}
+
+std::any Dataset::kept(const std::string& key) const {
+  const std::lock_guard lock(state_->kept_mutex);
+  return state_->kept_key == key ? state_->kept_value : std::any();
+}
+
+void Dataset::keep(std::string key, std::any value) {
+  const std::lock_guard lock(state_->kept_mutex);
+  state_->kept_key = std::move(key);
+  state_->kept_value = std::move(value);
 }
 
 std::uint64_t Dataset::resident_bytes() const { return state_->budget->bytes_of(state_->owner); }

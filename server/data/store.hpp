@@ -2,6 +2,7 @@
 // shared by all sessions, the least recently used evicted beyond the memory limit.
 #pragma once
 
+#include <any>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -27,6 +28,11 @@ class Dataset {
   // The field at the step; loads it if it is not resident. What a caller holds stays valid.
   // Errors: not_found (no such field or step), bad_data, out_of_memory.
   Result<std::shared_ptr<const Volume>> volume(const std::string& field, std::size_t step);
+
+  // What a caller derived from this dataset and would be slow to derive again: one value, replaced
+  // by the next. Empty unless it was kept under this key.
+  [[nodiscard]] std::any kept(const std::string& key) const;
+  void keep(std::string key, std::any value);
 
   [[nodiscard]] std::uint64_t resident_bytes() const;
   [[nodiscard]] std::uint64_t loads() const;  // how many volumes were ever read from the source

@@ -21,10 +21,14 @@ std::int64_t microseconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration_cast<std::chrono::microseconds>(to - from).count();
 }
 
-void name_field(const data::Volume& volume, const std::string& name, engine::WorkReport& work) {
+void name_field(const std::string& name, std::int64_t bytes, engine::WorkReport& work) {
   if (std::find(work.fields.begin(), work.fields.end(), name) != work.fields.end()) return;
   work.fields.push_back(name);
-  work.bytes += static_cast<std::int64_t>(volume.bytes());
+  work.bytes += bytes;
+}
+
+void name_field(const data::Volume& volume, const std::string& name, engine::WorkReport& work) {
+  name_field(name, static_cast<std::int64_t>(volume.bytes()), work);
 }
 
 // The engine knows volumes, not names: the scene's layers are the view's, in its order, without
@@ -33,7 +37,12 @@ void name_fields(const scene::Scene& scene, const protocol::View& completed,
                  engine::WorkReport& work) {
   work.fields.clear();
   work.bytes = 0;
-  if (scene.vector) name_field(*scene.vector->field, completed.vector.field.name, work);
+  if (scene.vector) {
+    name_field(*scene.vector->field, completed.vector.field.name, work);
+    if (scene.vector->color_field) {
+      name_field(*scene.vector->color_field, completed.vector.color.field.value(), work);
+    }
+  }
   auto layer = scene.scalars.begin();
   for (const protocol::ScalarView& scalar : completed.scalars.value()) {
     if (layer == scene.scalars.end()) break;
@@ -42,6 +51,11 @@ void name_fields(const scene::Scene& scene, const protocol::View& completed,
     ++layer;
   }
   WINDSPLAT_CHECK(layer == scene.scalars.end());
+  if (const auto& heights = completed.geometry.height_field) {
+    const auto& dims = scene.lattice.dims;
+    const std::int64_t samples = std::int64_t{dims[0]} * dims[1] * dims[2];
+    name_field(*heights, samples * static_cast<std::int64_t>(sizeof(float)), work);
+  }
 }
 
 Result<engine::Rendered> render_scene(const scene::Scene& scene, ThreadPool& pool,

@@ -65,6 +65,10 @@ Result<int> Catalogue::check(const protocol::View& view) const {
     if (!scalar.color.range) scalar.color.range = protocol::Range{0, 1};
     if (!scalar.extinction) scalar.extinction.emplace(1, std::array<double, 2>{0, 0});
   }
+  // Bending the grid takes a while and perhaps a field: nobody may wait for that here.
+  if (auto ok = scene::check_geometry(full.geometry, (*dataset)->info()); !ok) return ok.error();
+  full.geometry.mapping = protocol::GeometryMapping::flat;
+  full.geometry.height_field.reset();
   const auto completed = scene::complete_view(full, **dataset);
   if (!completed) return completed.error();
   return static_cast<int>((*dataset)->info().steps.size());

@@ -95,16 +95,17 @@ std::string picture_etag(const protocol::View& view, const data::Dataset& datase
 Result<protocol::View> resolve(const Picture& picture, data::Dataset& dataset) {
   auto view = scene::complete_view(picture.view, dataset);
   if (!view || (picture.preset.empty() && !picture.orbit)) return view;
-  const auto lattice = scene::place_lattice(dataset.info().grid, view->geometry);
-  if (!lattice) return lattice.error();
+  const auto placed = scene::place_dataset(view->geometry, dataset);
+  if (!placed) return placed.error();
+  const scene::Lattice& lattice = (*placed)->lattice;
   if (!picture.preset.empty()) {
-    if (const auto ok = scene::apply_preset(*view, *lattice, picture.preset); !ok) {
+    if (const auto ok = scene::apply_preset(*view, lattice, picture.preset); !ok) {
       return ok.error();
     }
   }
   if (picture.orbit) {
     const Orbit& orbit = *picture.orbit;
-    scene::orbit(*view, *lattice, orbit.azimuth, orbit.elevation, orbit.zoom);
+    scene::orbit(*view, lattice, orbit.azimuth, orbit.elevation, orbit.zoom);
   }
   return scene::complete_view(*view, dataset);
 }

@@ -106,15 +106,14 @@ void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
   layer.magnitude_intensity = from.magnitude_intensity;
 }
 
-Result<VectorLayer> make_vector_layer(const View& view, const Lattice& lattice,
+Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
                                       data::Dataset& dataset) {
   const protocol::VectorView& from = view.vector;
-  const data::DatasetInfo& info = dataset.info();
   VectorLayer layer;
   layer.scale = {from.scale[0], from.scale[1], from.scale[2]};
   if (from.space == protocol::VectorSpace::world) {
-    auto rates =
-        world_rates(info.grid, *info.find(from.field.name), view.geometry.vertical, lattice);
+    auto rates = world_rates(placed.grid, *dataset.info().find(from.field.name), view.geometry,
+                             placed.lattice);
     if (!rates) return rates.error();
     layer.rate_x = std::move(rates->x);
     layer.rate_y = rates->y;
@@ -132,6 +131,11 @@ Result<VectorLayer> make_vector_layer(const View& view, const Lattice& lattice,
   layer.moving = from.motion == protocol::MotionMode::phase;
   if (layer.moving) layer.motion_cycles = from.motion_rate * (view.step + from.motion_time);
   layer.epoch = from.jitter.per_step ? static_cast<std::uint32_t>(view.step) : 0U;
+  if (layer.color_by == LineColor::scalar) {
+    auto values = dataset.volume(from.color.field.value(), static_cast<std::size_t>(view.step));
+    if (!values) return values.error();
+    layer.color_field = std::move(*values);
+  }
   auto volume = dataset.volume(from.field.name, static_cast<std::size_t>(view.step));
   if (!volume) return volume.error();
   layer.field = std::move(*volume);
@@ -164,9 +168,10 @@ Result<Scene> build_scene(const View& completed, data::Dataset& dataset) {
   if (!checked) return checked.error();
   const View& view = *checked;
   Scene scene;
-  auto lattice = place_lattice(dataset.info().grid, view.geometry);
-  if (!lattice) return lattice.error();
-  scene.lattice = std::move(*lattice);
+  const auto placed = place_dataset(view.geometry, dataset);
+  if (!placed) return placed.error();
+  scene.lattice = (*placed)->lattice;
+  scene.slice = slice_of(view.geometry);
   auto camera = resolve_camera(view, scene.lattice);
   if (!camera) return camera.error();
   scene.camera = *camera;
@@ -176,7 +181,7 @@ Result<Scene> build_scene(const View& completed, data::Dataset& dataset) {
                      depths[0] + view.depth_cue.far * depth};
   const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
   if (lines && view.vector.opacity > 0) {
-    auto layer = make_vector_layer(view, scene.lattice, dataset);
+    auto layer = make_vector_layer(view, **placed, dataset);
     if (!layer) return layer.error();
     scene.vector = std::move(*layer);
   }

@@ -1,6 +1,8 @@
 // View + dataset -> Scene: defaults filled in, fields loaded, camera and tables resolved.
 #pragma once
 
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,8 +24,41 @@ Result<protocol::View> default_view(data::Dataset& dataset);
 // A completed view made ready for the engine. Loads only the fields that the view shows.
 Result<Scene> build_scene(const protocol::View& completed, data::Dataset& dataset);
 
-// Where samples stand in the world (INTERFACE: "World").
-Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryView& geometry);
+// The values of geometry.heightField.
+struct Heights {
+  std::string name;
+  std::string units;
+  std::shared_ptr<const data::Volume> values;
+};
+
+// Where samples stand in the world (ARCHITECTURE: "The world"). `heights` replace the vertical
+// coordinate. Errors: bad_data (coordinates that do not ascend), invalid with a pointer into
+// /geometry (a mapping, placement or height field that this grid does not allow).
+Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryView& geometry,
+                              const Heights* heights = nullptr);
+
+// The same for a dataset, and its grid as placed: heights are its vertical axis. Loads the height
+// field if there is one; a bent lattice is remembered by the dataset.
+struct Placed {
+  data::Grid grid;
+  Lattice lattice;
+};
+Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView& geometry,
+                                                    data::Dataset& dataset);
+
+// Mean width of the lattice's cells along an axis, world units.
+double cell_size(const Lattice& lattice, std::size_t axis);
+
+// A field of that kind by its name. Errors: invalid at `pointer`.
+Result<const data::FieldInfo*> find_field(const data::DatasetInfo& info, const std::string& name,
+                                          data::FieldKind kind, const std::string& pointer);
+
+// The view's layer of the grid, if it shows but one.
+std::optional<Slice> slice_of(const protocol::GeometryView& geometry);
+
+// What can be said of a geometry without loading or placing anything: the height field is a scalar,
+// the grid has what the mapping needs, the slice lies within it.
+Result<void> check_geometry(const protocol::GeometryView& geometry, const data::DatasetInfo& info);
 
 // An orbit about the volume's centre, degrees; azimuth 0 looks north, positive moves the eye
 // eastward; zoom 1 frames the whole box. Sets camera.eye, target and height of a view.

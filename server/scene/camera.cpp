@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <vector>
 
 #include "server/scene/build.hpp"
 
@@ -18,6 +19,8 @@ constexpr double distance_max = 5e5;    // world units: well inside what a view 
 constexpr double parallel_sine = 1e-6;  // smallest angle between up and the view, as its sine
 constexpr double near_min = 1e-4;
 constexpr double near_max = 1e-2;
+constexpr std::size_t outline_samples = 8192;  // of each end of a bent lattice
+constexpr double aside_min = 0.05;             // world units: nearer, a box is about the origin
 
 glm::dvec3 to_glm(const protocol::Vec3& v) { return {v[0], v[1], v[2]}; }
 protocol::Vec3 from_glm(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
@@ -32,12 +35,41 @@ std::array<glm::dvec3, 8> corners(const Lattice& lattice) {
   return points;
 }
 
+// What must be in the picture: the box's corners, of a bent lattice samples all over it.
+std::vector<glm::dvec3> outline(const Lattice& lattice) {
+  if (!lattice.places) {
+    const auto points = corners(lattice);
+    return {points.begin(), points.end()};
+  }
+  const auto& places = *lattice.places;
+  const std::size_t layer =
+      static_cast<std::size_t>(lattice.dims[0]) * static_cast<std::size_t>(lattice.dims[1]);
+  std::vector<glm::dvec3> points;
+  // Bottom and top level alone: what lies between them is seldom farther out.
+  for (const std::size_t first : {std::size_t{0}, places.size() - layer}) {
+    const std::size_t step = std::max<std::size_t>(1, layer / outline_samples);
+    for (std::size_t n = 0; n < layer; n += step) {
+      const std::array<float, 3>& p = places[first + n];
+      points.emplace_back(p[0], p[1], p[2]);
+    }
+  }
+  return points;
+}
+
+// Half a cell: how far beyond its samples a bent lattice reaches.
+double outline_reach(const Lattice& lattice) {
+  double reach = 0;
+  for (std::size_t a = 0; lattice.places && a < 3; ++a) {
+    reach = std::max(reach, 0.5 * cell_size(lattice, a));
+  }
+  return reach;
+}
+
 // Nothing nearer than half a cell is worth a line that fills the picture.
 double near_plane(const Lattice& lattice) {
   double cell = near_max;
   for (int a = 0; a < 3; ++a) {
-    const double length = lattice.box_max[a] - lattice.box_min[a];
-    cell = std::min(cell, 0.5 * length / lattice.dims[static_cast<std::size_t>(a)]);
+    cell = std::min(cell, 0.5 * cell_size(lattice, static_cast<std::size_t>(a)));
   }
   return std::max(cell, near_min);
 }
@@ -62,10 +94,11 @@ Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dv
   const double slope_x = slope_y * aspect;
   const double diagonal = glm::length(lattice.box_max - lattice.box_min);
   Framing framing{0, 0};
-  for (const glm::dvec3& corner : corners(lattice)) {
+  const double reach = outline_reach(lattice);
+  for (const glm::dvec3& corner : outline(lattice)) {
     const glm::dvec3 p = corner - target;
-    const double x = std::abs(glm::dot(p, frame.right));
-    const double y = std::abs(glm::dot(p, frame.up));
+    const double x = std::abs(glm::dot(p, frame.right)) + reach;
+    const double y = std::abs(glm::dot(p, frame.up)) + reach;
     const double depth = glm::dot(p, frame.forward);
     // The corner stands distance + depth before the eye and must lie within both slopes.
     const double needed = std::max({x / slope_x, y / slope_y, 0.01 * diagonal}) - depth;
@@ -75,6 +108,12 @@ Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dv
   framing.distance = std::min(framing.distance, distance_max);
   framing.height = std::min(framing.height, distance_max);
   return framing;
+}
+
+double front_azimuth(const Lattice& lattice) {
+  const glm::dvec3 centre = 0.5 * (lattice.box_min + lattice.box_max);
+  if (std::hypot(centre.x, centre.y) < aside_min) return default_azimuth;
+  return std::atan2(centre.x, -centre.y) / degree;
 }
 
 void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double elevation,
@@ -125,10 +164,11 @@ std::array<double, 2> view_depths(const Camera& camera, const Lattice& lattice) 
   double nearest = 0;
   double farthest = 0;
   bool first = true;
-  for (const glm::dvec3& corner : corners(lattice)) {
+  const double reach = outline_reach(lattice);
+  for (const glm::dvec3& corner : outline(lattice)) {
     const double depth = glm::dot(corner - camera.eye, camera.forward);
-    nearest = first ? depth : std::min(nearest, depth);
-    farthest = first ? depth : std::max(farthest, depth);
+    nearest = first ? depth - reach : std::min(nearest, depth - reach);
+    farthest = first ? depth + reach : std::max(farthest, depth + reach);
     first = false;
   }
   if (camera.perspective) nearest = std::max(nearest, camera.near);

@@ -12,6 +12,9 @@ namespace windsplat::scene {
 inline constexpr double default_azimuth = 0;     // degrees: from the south, looking north
 inline constexpr double default_elevation = 35;  // degrees above the horizon
 
+// The azimuth from which a view begins: default_azimuth, or opposite a part of the globe.
+double front_azimuth(const Lattice& lattice);
+
 // Right, up and forward of an orbit's eye; forward points at the target. Azimuth 0 looks north,
 // positive azimuth moves the eye eastward, elevation is above the horizon; degrees. Straight up or
 // down (within 0.1 degrees), up is where forward points at the same azimuth from the side.
@@ -20,7 +23,8 @@ struct OrbitFrame {
 };
 OrbitFrame orbit_frame(double azimuth, double elevation);
 
-// What shows the whole box with a small margin when looking along `frame` at `target`.
+// What shows the whole box (of a bent lattice: its samples) with a small margin when looking along
+// `frame` at `target`.
 struct Framing {
   double distance;  // from eye to target, world units
   double height;    // of the picture at the target, world units, orthographic

@@ -30,22 +30,6 @@ std::string quoted(const std::string& text) {
   return out;
 }
 
-// Fields that are known by name to exist, and their ranges at the first step, so that a picture
-// keeps its colours over time.
-Result<const data::FieldInfo*> find_field(const data::DatasetInfo& info, const std::string& name,
-                                          data::FieldKind kind, const std::string& pointer) {
-  const data::FieldInfo* field = info.find(name);
-  if (field == nullptr) {
-    return invalid(pointer, "dataset " + quoted(info.id) + " has no field " + quoted(name));
-  }
-  if (field->kind != kind) {
-    const bool scalar = field->kind == data::FieldKind::scalar;
-    return invalid(pointer, "field " + quoted(field->name) + " is a " +
-                                (scalar ? "scalar, not a vector" : "vector, not a scalar"));
-  }
-  return field;
-}
-
 Result<void> check_map(const std::string& name, const std::string& pointer) {
   if (!has_color_map(name)) {
     return invalid(pointer, "no colour map is called " + quoted(name));
@@ -91,7 +75,8 @@ Result<void> check_color_field(const protocol::VectorColorView& color,
   return {};
 }
 
-Result<void> complete_magnitudes(View& view, const Lattice& lattice, data::Dataset& dataset) {
+Result<void> complete_magnitudes(View& view, const Lattice& lattice,
+                                 const std::optional<Slice>& slice, data::Dataset& dataset) {
   protocol::VectorView& vector = view.vector;
   std::shared_ptr<const data::Volume> volume;
   const bool wanted = !vector.magnitude_range || !vector.min_magnitude;
@@ -106,7 +91,7 @@ Result<void> complete_magnitudes(View& view, const Lattice& lattice, data::Datas
   const Range& range = *vector.magnitude_range;
   if (!(range[0] < range[1])) return invalid("/vector/magnitudeRange", "does not ascend");
   if (!vector.min_magnitude) {
-    vector.min_magnitude = volume ? default_min_magnitude(vector, *volume, lattice) : 0.0;
+    vector.min_magnitude = volume ? default_min_magnitude(vector, *volume, lattice, slice) : 0.0;
   }
   return {};
 }
@@ -126,7 +111,7 @@ Result<Range> default_color_range(const View& view, const Lattice& lattice,
   const bool lines = vector.field.kind == FieldChoice::Kind::named;
   switch (*vector.color.by) {
     case ColorBy::world_z: {
-      if (!lines) return Range{lattice.box_min.z, lattice.box_max.z};
+      if (!lines) return height_range(lattice);
       auto volume = dataset.volume(vector.field.name, 0);
       if (!volume) return volume.error();
       return default_height_range(vector, **volume, lattice);
@@ -138,6 +123,7 @@ Result<Range> default_color_range(const View& view, const Lattice& lattice,
     case ColorBy::direction:
       return Range{0, 360};
     case ColorBy::scalar: {
+      if (!lines) break;
       const std::string& name = vector.color.field.value();
       auto volume = dataset.volume(name, 0);
       if (!volume) return volume.error();
@@ -154,10 +140,11 @@ void complete_camera(View& view, const Lattice& lattice) {
   protocol::CameraView& camera = view.camera;
   if (camera.eye && camera.target && camera.height) return;
   View framed = view;
-  orbit(framed, lattice, default_azimuth, default_elevation, 1);
+  const double azimuth = front_azimuth(lattice);
+  orbit(framed, lattice, azimuth, default_elevation, 1);
   if (!camera.target) camera.target = framed.camera.target;
   const glm::dvec3 target((*camera.target)[0], (*camera.target)[1], (*camera.target)[2]);
-  const OrbitFrame frame = orbit_frame(default_azimuth, default_elevation);
+  const OrbitFrame frame = orbit_frame(azimuth, default_elevation);
   const Framing framing = frame_box(lattice, frame, target, camera.fov_y, view.image);
   if (!camera.eye) {
     const glm::dvec3 eye = target - frame.forward * framing.distance;
@@ -180,7 +167,8 @@ Result<void> check_extinction(const protocol::ScalarView& scalar, const std::str
 }
 
 Result<void> complete_scalar(protocol::ScalarView& scalar, const std::string& pointer,
-                             const Lattice& lattice, data::Dataset& dataset) {
+                             const Lattice& lattice, const std::optional<Slice>& slice,
+                             data::Dataset& dataset) {
   auto found =
       find_field(dataset.info(), scalar.field, data::FieldKind::scalar, pointer + "/field");
   if (!found) return found.error();
@@ -194,11 +182,12 @@ Result<void> complete_scalar(protocol::ScalarView& scalar, const std::string& po
   if (!volume) return volume.error();
   const Range range = default_scalar_range(field, **volume);
   if (!scalar.color.range) scalar.color.range = range;
-  if (!scalar.extinction) scalar.extinction = default_extinction(field, range, lattice);
+  if (!scalar.extinction) scalar.extinction = default_extinction(field, range, lattice, slice);
   return {};
 }
 
-Result<void> complete_scalars(View& view, const Lattice& lattice, data::Dataset& dataset) {
+Result<void> complete_scalars(View& view, const Lattice& lattice, const std::optional<Slice>& slice,
+                              data::Dataset& dataset) {
   if (!view.scalars) {
     view.scalars.emplace();
     for (const std::string& name : default_scalars(dataset.info())) {
@@ -208,8 +197,8 @@ Result<void> complete_scalars(View& view, const Lattice& lattice, data::Dataset&
     }
   }
   for (std::size_t n = 0; n < view.scalars->size(); ++n) {
-    auto ok =
-        complete_scalar((*view.scalars)[n], "/scalars/" + std::to_string(n), lattice, dataset);
+    auto ok = complete_scalar((*view.scalars)[n], "/scalars/" + std::to_string(n), lattice, slice,
+                              dataset);
     if (!ok) return ok;
   }
   return {};
@@ -230,15 +219,18 @@ Result<View> complete_view(const View& view, data::Dataset& dataset) {
   if (full.depth_cue.near >= full.depth_cue.far) {
     return invalid("/depthCue/near", "is not less than far");
   }
-  auto lattice = place_lattice(info.grid, full.geometry);
-  if (!lattice) return lattice.error();
+  if (auto ok = check_geometry(full.geometry, info); !ok) return ok.error();
+  const auto placed = place_dataset(full.geometry, dataset);
+  if (!placed) return placed.error();
+  const Lattice* const lattice = &(*placed)->lattice;
+  const std::optional<Slice> slice = slice_of(full.geometry);
   complete_camera(full, *lattice);
   auto camera = resolve_camera(full, *lattice);
   if (!camera) return camera.error();
   if (auto ok = choose_vector_field(full, info); !ok) return ok.error();
   protocol::VectorView& vector = full.vector;
-  if (!vector.length) vector.length = default_length(*lattice, vector.stride);
-  if (auto ok = complete_magnitudes(full, *lattice, dataset); !ok) return ok.error();
+  if (!vector.length) vector.length = default_length(*lattice, vector.stride, slice);
+  if (auto ok = complete_magnitudes(full, *lattice, slice, dataset); !ok) return ok.error();
   if (auto ok = check_color_field(vector.color, info); !ok) return ok.error();
   if (!vector.color.by) vector.color.by = default_color_by(info.grid);
   if (!vector.color.range) {
@@ -246,7 +238,7 @@ Result<View> complete_view(const View& view, data::Dataset& dataset) {
     if (!range) return range.error();
     vector.color.range = *range;
   }
-  if (auto ok = complete_scalars(full, *lattice, dataset); !ok) return ok.error();
+  if (auto ok = complete_scalars(full, *lattice, slice, dataset); !ok) return ok.error();
   return full;
 }
 

@@ -8,6 +8,7 @@
 #include <limits>
 #include <string_view>
 
+#include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
 
 namespace windsplat::scene {
@@ -81,20 +82,46 @@ std::size_t kind_of(const data::FieldInfo& field) {
   return kinds().size();
 }
 
-// Calls body(index, value) for at most 2^15 unmasked samples spread evenly over the volume; the
-// value of a vector is its magnitude.
+// The samples that are shown, by their place in the volume.
+class SampleOrder {
+ public:
+  SampleOrder(const std::array<int, 3>& dims, const std::optional<Slice>& slice) {
+    for (const int length : dims) all_ *= static_cast<std::size_t>(length);
+    if (!slice) return;
+    const auto axis = static_cast<std::size_t>(slice->axis);
+    length_ = static_cast<std::size_t>(dims.at(axis));
+    for (std::size_t a = 0; a < axis; ++a) stride_ *= static_cast<std::size_t>(dims[a]);
+    sample_ = static_cast<std::size_t>(slice->sample);
+  }
+  [[nodiscard]] std::size_t count() const { return all_ / length_; }
+  [[nodiscard]] std::size_t operator[](std::size_t n) const {
+    return (n / stride_ * length_ + sample_) * stride_ + n % stride_;
+  }
+
+ private:
+  std::size_t all_ = 1;
+  std::size_t length_ = 1;  // of the axis that the slice is across
+  std::size_t stride_ = 1;
+  std::size_t sample_ = 0;
+};
+
+// Calls body(index, value) for at most 2^15 unmasked samples spread evenly over the volume or over
+// its slice; the value of a vector is its magnitude.
 template <class Body>
-void for_some_samples(const data::Volume& volume, const Body& body) {
-  const std::size_t samples = volume.samples();
+void for_some_samples(const data::Volume& volume, const std::optional<Slice>& slice,
+                      const Body& body) {
+  const SampleOrder order(volume.dims, slice);
+  const std::size_t samples = order.count();
   const std::size_t count = std::min(samples, quantile_samples_max);
   for (std::size_t n = 0; n < count; ++n) {
     // Steps of the golden ratio meet no period of the lattice.
     const double turn = static_cast<double>(n) * 0.6180339887498949;
     const double share = turn - std::floor(turn);
     const std::size_t at =
-        samples <= quantile_samples_max
-            ? n
-            : std::min(samples - 1, static_cast<std::size_t>(share * static_cast<double>(samples)));
+        order[samples <= quantile_samples_max
+                  ? n
+                  : std::min(samples - 1,
+                             static_cast<std::size_t>(share * static_cast<double>(samples)))];
     double value = static_cast<double>(volume.component(0)[at]);
     if (volume.components > 1) {
       const double v = static_cast<double>(volume.component(1)[at]);
@@ -141,10 +168,17 @@ double nice_above(double value) {
   return 10.0 * power;
 }
 
-protocol::Range quantiles(const data::Volume& volume, double low, double high) {
+protocol::Range quantiles(const data::Volume& volume, double low, double high,
+                          const std::optional<Slice>& slice) {
   std::vector<double> values;
-  for_some_samples(volume, [&](std::size_t, double value) { values.push_back(value); });
+  for_some_samples(volume, slice, [&](std::size_t, double value) { values.push_back(value); });
   return pick(values, low, high);
+}
+
+protocol::Range height_range(const Lattice& lattice) {
+  const std::vector<double>& at = lattice.positions[2];
+  const std::vector<double>& width = lattice.spacing[2];
+  return {at.front() - 0.5 * width.front(), at.back() + 0.5 * width.back()};
 }
 
 protocol::Range default_magnitude_range(const data::Volume& volume) {
@@ -158,7 +192,7 @@ protocol::Range default_magnitude_range(const data::Volume& volume) {
 }
 
 double default_min_magnitude(const protocol::VectorView& vector, const data::Volume& volume,
-                             const Lattice& lattice) {
+                             const Lattice& lattice, const std::optional<Slice>& slice) {
   const double top = (*vector.magnitude_range)[1];
   const double least = std::max(0.0, top) / 100.0;
   // Seen from where a view begins, in a picture of the usual size.
@@ -167,17 +201,22 @@ double default_min_magnitude(const protocol::VectorView& vector, const data::Vol
   const Framing framing = frame_box(lattice, frame, {0, 0, 0}, 35, image);
   const double pixel = framing.height / image.height;
   const glm::dvec3 edge = lattice.box_max - lattice.box_min;
+  // A slice is looked at from where it is seen.
+  const std::array<double, 3> sides = {edge.y * edge.z, edge.x * edge.z, edge.x * edge.y};
   const double area =
-      edge.x * edge.y * std::abs(frame.forward.z) + edge.x * edge.z * std::abs(frame.forward.y);
+      slice ? sides.at(static_cast<std::size_t>(slice->axis))
+            : sides[2] * std::abs(frame.forward.z) + sides[1] * std::abs(frame.forward.y);
   const double line = line_share * *vector.length * (vector.r1 + vector.r2) * pixel;
   double lines = static_cast<double>(volume.samples());
   for (std::size_t a = 0; a < 3; ++a) {
-    const double strides = std::ceil(static_cast<double>(volume.dims[a]) / vector.stride);
+    const bool across = slice && slice->axis == static_cast<int>(a);
+    const double strides =
+        across ? 1.0 : std::ceil(static_cast<double>(volume.dims[a]) / vector.stride);
     lines *= strides / volume.dims[a];
   }
   const double shown = coverage * area / (line * lines);
   if (!(shown < 1)) return least;
-  const double threshold = quantiles(volume, 1.0 - shown, 1.0)[0];
+  const double threshold = quantiles(volume, 1.0 - shown, 1.0, slice)[0];
   const double grain = readable_grain(top);
   return std::max(least, std::min(std::round(threshold / grain) * grain, 0.9 * top));
 }
@@ -188,12 +227,13 @@ protocol::Range default_height_range(const protocol::VectorView& vector, const d
   const std::size_t layer =
       static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
   std::vector<double> heights;
-  for_some_samples(volume, [&](std::size_t at, double magnitude) {
+  for_some_samples(volume, std::nullopt, [&](std::size_t at, double magnitude) {
     if (magnitude >= *vector.min_magnitude) heights.push_back(lattice.positions[2][at / layer]);
   });
   protocol::Range range = pick(heights, 0.02, 0.98);
-  const double box = lattice.box_max.z - lattice.box_min.z;
-  if (!(range[1] - range[0] > 0.1 * box)) range = {lattice.box_min.z, lattice.box_max.z};
+  const protocol::Range whole = height_range(lattice);
+  const double box = whole[1] - whole[0];
+  if (!(range[1] - range[0] > 0.1 * box)) range = whole;
   const double grain = readable_grain(box);
   return {std::floor((range[0] - below * (range[1] - range[0])) / grain) * grain,
           std::ceil(range[1] / grain) * grain};
@@ -260,11 +300,13 @@ protocol::Range default_scalar_range(const data::FieldInfo& field, const data::V
 
 std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& field,
                                                       const protocol::Range& range,
-                                                      const Lattice& lattice) {
+                                                      const Lattice& lattice,
+                                                      const std::optional<Slice>& slice) {
   const ScalarStyle style = scalar_style(field);
   double shortest = std::numeric_limits<double>::infinity();
-  for (int a = 0; a < 3; ++a) {
-    shortest = std::min(shortest, lattice.box_max[a] - lattice.box_min[a]);
+  for (std::size_t a = 0; a < 3; ++a) {
+    const bool across = slice && slice->axis == static_cast<int>(a);
+    shortest = std::min(shortest, cell_size(lattice, a) * (across ? 1 : lattice.dims[a]));
   }
   const double top = nice_above(style.opacity / shortest);
   const double clear = range[0] + style.clear_below * (range[1] - range[0]);
@@ -272,14 +314,14 @@ std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& fie
   return {{range[0], 0}, {clear, 0}, {range[1], top}};
 }
 
-double default_length(const Lattice& lattice, int stride) {
+double default_length(const Lattice& lattice, int stride, const std::optional<Slice>& slice) {
   double sum = 0;
   int axes = 0;
   for (std::size_t a = 0; a < 3; ++a) {
     const bool wanted = a < 2 || axes == 0;  // the vertical only where there is nothing else
-    if (!wanted || lattice.dims[a] < 2) continue;
-    const int index = static_cast<int>(a);
-    sum += (lattice.box_max[index] - lattice.box_min[index]) / lattice.dims[a];
+    const bool across = slice && slice->axis == static_cast<int>(a);
+    if (!wanted || across || lattice.dims[a] < 2) continue;
+    sum += cell_size(lattice, a);
     ++axes;
   }
   const double spacing = axes == 0 ? 0.2 : sum / axes;

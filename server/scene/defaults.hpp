@@ -2,6 +2,7 @@
 // which scalar is a medium worth looking through.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,16 +18,21 @@ double nice_above(double value);
 
 // Low and high quantiles (0..1) of a scalar's values or a vector's magnitude, masked samples left
 // out; from at most 2^15 samples spread evenly. {0, 0} when everything is masked.
-protocol::Range quantiles(const data::Volume& volume, double low, double high);
+protocol::Range quantiles(const data::Volume& volume, double low, double high,
+                          const std::optional<Slice>& slice = std::nullopt);
 
 // [0, top]: top so that a few per cent of the lines reach their full length.
 protocol::Range default_magnitude_range(const data::Volume& volume);
 
 // The magnitude that so many lines exceed as cover the box's picture about `coverage` times when
 // each is as long and wide as the view says: fewer leave it bare, more hide the flow behind their
-// nearest layer. At least a hundredth of the range's top.
+// nearest layer. At least a hundredth of the range's top. Of a slice only its own lines and
+// area count.
 double default_min_magnitude(const protocol::VectorView& vector, const data::Volume& volume,
-                             const Lattice& lattice);
+                             const Lattice& lattice, const std::optional<Slice>& slice);
+
+// World heights of the lowest and the highest cell's edge.
+protocol::Range height_range(const Lattice& lattice);
 
 // Magnitudes from a little below the weakest line that is drawn to the range's top.
 protocol::Range default_magnitude_colors(const protocol::VectorView& vector);
@@ -51,13 +57,14 @@ std::vector<std::string> default_scalars(const data::DatasetInfo& info);
 
 protocol::Range default_scalar_range(const data::FieldInfo& field, const data::Volume& volume);
 
-// Dense parts are nearly opaque through the box's shortest edge.
+// Dense parts are nearly opaque through the box's shortest edge; a slice through itself.
 std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& field,
                                                       const protocol::Range& range,
-                                                      const Lattice& lattice);
+                                                      const Lattice& lattice,
+                                                      const std::optional<Slice>& slice);
 
-// About five grid spacings a stride.
-double default_length(const Lattice& lattice, int stride);
+// About five grid spacings a stride, in a slice of those within it.
+double default_length(const Lattice& lattice, int stride, const std::optional<Slice>& slice);
 
 // By height where the vertical is an axis of its own kind (winds in an atmosphere), else magnitude.
 protocol::ColorBy default_color_by(const data::Grid& grid);

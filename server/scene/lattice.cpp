@@ -1,10 +1,11 @@
 // Grid + geometry -> Lattice: coordinates become raw positions, raw positions cells, cells a box
-// whose longest edge is 2.
+// whose longest edge is 2. What is bent goes on to bend.cpp.
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "server/scene/bend.hpp"
 #include "server/scene/build.hpp"
 
 namespace windsplat::scene {
@@ -77,13 +78,15 @@ std::vector<double> cell_edges(const std::vector<double>& raw) {
 struct RawAxis {
   std::vector<double> positions;
   std::vector<double> edges;
-  double length = 1;  // after proportion, before the even scale
-  [[nodiscard]] bool thin() const { return positions.size() == 1; }
-  [[nodiscard]] double raw_length() const { return edges.back() - edges.front(); }
+  std::array<double, 2> extent{0, 1};  // from the first edge to the last, or as the caller says
+  bool thin = false;                   // one sample, and nothing says how long it is
+  double length = 1;                   // after proportion, before the even scale
+  [[nodiscard]] double raw_length() const { return extent[1] - extent[0]; }
 };
 
 double smallest_cell(const RawAxis& axis) {
   double smallest = std::numeric_limits<double>::infinity();
+  if (axis.positions.size() < 2) return smallest;
   for (std::size_t i = 0; i + 1 < axis.edges.size(); ++i) {
     smallest = std::min(smallest, axis.edges[i + 1] - axis.edges[i]);
   }
@@ -94,29 +97,44 @@ double smallest_cell(const RawAxis& axis) {
 void proportion(const data::Grid& grid, VerticalPlacement placement, std::array<RawAxis, 3>& axes) {
   const auto& [x, y, z] = grid.axes;
   for (RawAxis& axis : axes) axis.length = axis.raw_length();
-  if (!axes[0].thin() && !axes[1].thin() && !same_unit(x, y)) axes[1].length = axes[0].length;
+  if (!axes[0].thin && !axes[1].thin && !same_unit(x, y)) axes[1].length = axes[0].length;
   double horizontal = 0;
   for (std::size_t a = 0; a < 2; ++a) {
-    if (!axes[a].thin()) horizontal = std::max(horizontal, axes[a].length);
+    if (!axes[a].thin) horizontal = std::max(horizontal, axes[a].length);
   }
   // A vertical by index has no unit to share; log p has none either.
-  const Axis& reference = axes[0].thin() ? y : x;
+  const Axis& reference = axes[0].thin ? y : x;
   const bool shared = same_unit(z, reference) && placement != VerticalPlacement::index &&
                       z.kind != AxisKind::pressure;
   if (horizontal > 0 && !shared) axes[2].length = vertical_share * horizontal;
   double smallest = std::numeric_limits<double>::infinity();
   for (const RawAxis& axis : axes) {
-    if (!axis.thin()) smallest = std::min(smallest, smallest_cell(axis));
+    if (!axis.thin) smallest = std::min(smallest, smallest_cell(axis));
   }
   if (!std::isfinite(smallest)) smallest = 1;
   for (RawAxis& axis : axes) {
-    if (axis.thin()) axis.length = smallest;
+    if (axis.thin) axis.length = smallest;
   }
 }
 
 }  // namespace
 
-Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryView& geometry) {
+Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryView& geometry,
+                              const Heights* heights) {
+  if (geometry.mapping == protocol::GeometryMapping::flat && heights == nullptr) {
+    return place_straight(grid, geometry, std::nullopt);
+  }
+  return bend_lattice(grid, geometry, heights);
+}
+
+double cell_size(const Lattice& lattice, std::size_t axis) {
+  double length = 0;
+  for (const double width : lattice.spacing.at(axis)) length += width;
+  return length / lattice.dims.at(axis);
+}
+
+Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryView& geometry,
+                               const std::optional<std::array<double, 2>>& vertical_extent) {
   std::array<RawAxis, 3> axes;
   for (std::size_t a = 0; a < 3; ++a) {
     if (grid.axes[a].coordinates.empty()) {
@@ -126,6 +144,10 @@ Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryVi
     if (!raw) return raw.error();
     axes[a].positions = std::move(*raw);
     axes[a].edges = cell_edges(axes[a].positions);
+    const bool stretched = a == 2 && vertical_extent.has_value();
+    axes[a].extent =
+        stretched ? *vertical_extent : std::array{axes[a].edges.front(), axes[a].edges.back()};
+    axes[a].thin = axes[a].positions.size() == 1 && !stretched;
   }
   proportion(grid, geometry.vertical, axes);
   double longest = 0;
@@ -138,7 +160,7 @@ Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryVi
     const RawAxis& axis = axes[a];
     const double world_length = axis.length / longest * box_edge;
     const double scale = world_length / axis.raw_length();
-    const double centre = 0.5 * axis.edges.front() + 0.5 * axis.edges.back();
+    const double centre = 0.5 * axis.extent[0] + 0.5 * axis.extent[1];
     if (!std::isfinite(scale) || scale <= 0) {
       return make_error_at(ErrorKind::invalid, "/geometry/scale/" + std::to_string(a),
                            "leaves the box without a finite length along axis \"" +

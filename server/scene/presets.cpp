@@ -18,7 +18,7 @@ std::vector<std::string> preset_names() { return {names.begin(), names.end()}; }
 Result<void> apply_preset(protocol::View& completed, const Lattice& lattice,
                           const std::string& preset) {
   if (preset == "default") {
-    orbit(completed, lattice, default_azimuth, default_elevation, 1);
+    orbit(completed, lattice, front_azimuth(lattice), default_elevation, 1);
   } else if (preset == "winds") {
     completed.scalars.emplace();
   } else if (preset == "clouds") {

@@ -86,6 +86,11 @@ Result<double> vertical_speed(const Axis& axis, double coordinate, std::string_v
   return no_motion(axis, "a component in " + std::string(unit));
 }
 
+// How wide a degree of longitude is beside one of latitude.
+double row_width(double latitude) {
+  return std::max(std::cos(latitude * std::numbers::pi / 180.0), cosine_min);
+}
+
 // World units per second per unit of a component along a straight axis.
 Result<double> axis_rate(const Axis& axis, const std::vector<double>& world) {
   if (world.size() < 2) return 0.0;
@@ -96,31 +101,80 @@ Result<double> axis_rate(const Axis& axis, const std::vector<double>& world) {
   return (world.back() - world.front()) / raw / *unit_m;
 }
 
-}  // namespace
-
-Result<Rates> world_rates(const data::Grid& grid, const data::FieldInfo& field,
-                          protocol::VerticalPlacement placement, const Lattice& lattice) {
+// World units per second per unit of a component towards east (by row) and north.
+Result<void> straight_rates(const data::Grid& grid, const Lattice& lattice, Rates& rates) {
   const auto& [x, y, z] = grid.axes;
-  Rates rates;
   const auto along_y = axis_rate(y, lattice.positions[1]);
   if (!along_y) return along_y.error();
   rates.y = *along_y;
-  const auto rate_x = axis_rate(x, lattice.positions[0]);
-  if (!rate_x) return rate_x.error();
-  const double along_x = *rate_x;
-  rates.x.assign(y.coordinates.size(), along_x);
+  const auto along_x = axis_rate(x, lattice.positions[0]);
+  if (!along_x) return along_x.error();
+  rates.x.assign(y.coordinates.size(), *along_x);
   if (x.kind == AxisKind::longitude && y.kind == AxisKind::latitude) {
-    for (std::size_t j = 0; j < rates.x.size(); ++j) {
-      const double cosine = std::cos(y.coordinates[j] * std::numbers::pi / 180.0);
-      rates.x[j] = along_x / std::max(cosine, cosine_min);
-    }
+    for (std::size_t j = 0; j < rates.x.size(); ++j) rates.x[j] /= row_width(y.coordinates[j]);
   }
+  return {};
+}
+
+void sphere_rates(const Lattice& lattice, Rates& rates) {
+  const auto radius = [&lattice](std::size_t n) {
+    const std::array<float, 3>& p = (*lattice.places)[n];
+    return std::hypot(static_cast<double>(p[0]), static_cast<double>(p[1]),
+                      static_cast<double>(p[2]));
+  };
+  rates.y = 0.5 * (radius(0) + radius(lattice.places->size() - 1)) / earth_radius_m;
+  rates.x.assign(static_cast<std::size_t>(lattice.dims[1]), rates.y);
+}
+
+// The scale of a map of degrees, from its first and last column.
+void map_rates(const data::Grid& grid, const Lattice& lattice, Rates& rates) {
+  const data::Columns& columns = *grid.columns;
+  const auto width = static_cast<std::size_t>(lattice.dims[0]);
+  const auto scale = [&](const std::vector<double>& degrees, std::size_t a) {
+    const auto [low, high] = std::minmax_element(degrees.begin(), degrees.end());
+    const auto at = [&](auto place) {
+      return static_cast<double>(
+          (*lattice.places)[static_cast<std::size_t>(place - degrees.begin())][a]);
+    };
+    return *high > *low ? (at(high) - at(low)) / (*high - *low) / metres_per_degree : 0.0;
+  };
+  rates.y = scale(columns.latitude, 1);
+  const double along_x = scale(columns.longitude, 0);
+  for (std::size_t row = 0; row < columns.latitude.size(); row += width) {
+    double sum = 0;
+    for (std::size_t i = 0; i < width; ++i) sum += columns.latitude[row + i];
+    rates.x.push_back(along_x / row_width(sum / static_cast<double>(width)));
+  }
+}
+
+Result<void> horizontal_rates(const data::Grid& grid, protocol::GeometryMapping mapping,
+                              const Lattice& lattice, Rates& rates) {
+  switch (mapping) {
+    case protocol::GeometryMapping::flat:
+      return straight_rates(grid, lattice, rates);
+    case protocol::GeometryMapping::curvilinear:
+      map_rates(grid, lattice, rates);
+      break;
+    case protocol::GeometryMapping::sphere:
+      sphere_rates(lattice, rates);
+      break;
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Rates> world_rates(const data::Grid& grid, const data::FieldInfo& field,
+                          const protocol::GeometryView& geometry, const Lattice& lattice) {
+  Rates rates;
+  if (auto ok = horizontal_rates(grid, geometry.mapping, lattice, rates); !ok) return ok.error();
+  const data::Axis& z = grid.axes[2];
   rates.z.assign(z.coordinates.size(), 0.0);
   if (field.components.size() < 3 || rates.z.size() < 2) return rates;
   const std::string& unit =
       field.component_units.size() > 2 ? field.component_units[2] : field.units;
   const bool by_log =
-      z.kind == AxisKind::pressure && placement != protocol::VerticalPlacement::linear &&
+      z.kind == AxisKind::pressure && geometry.vertical != protocol::VerticalPlacement::linear &&
       std::all_of(z.coordinates.begin(), z.coordinates.end(), [](double p) { return p > 0; });
   const std::vector<double> slope = slopes(z, lattice.positions[2], by_log);
   for (std::size_t k = 0; k < rates.z.size(); ++k) {

@@ -23,8 +23,11 @@ struct Rates {
 // near 253 K): w in m/s moves dp/dt = -w p / H along a pressure axis; omega in Pa/s is dp/dt there
 // and dz/dt = -omega H / p along a height axis; depth falls as w rises. An axis of one sample has
 // no measure: nothing moves along it.
+// On the sphere a line's direction is told along the local east, north and up, so that a metre is
+// as long anywhere: the shell's middle radius over R; on a curvilinear map degrees are taken as on
+// a flat one, at each row's mean latitude. With heights the vertical axis is theirs (see Placed).
 // Errors: invalid at /vector/space when a third component has no known rate along its axis.
 Result<Rates> world_rates(const data::Grid& grid, const data::FieldInfo& field,
-                          protocol::VerticalPlacement placement, const Lattice& lattice);
+                          const protocol::GeometryView& geometry, const Lattice& lattice);
 
 }  // namespace windsplat::scene

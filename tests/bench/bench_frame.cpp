@@ -61,7 +61,8 @@ scene::Scene make_scene(const Workload& workload) {
   protocol::View view = value_or_give_up(scene::default_view(dataset));
   view.image.width = workload.width;
   view.image.height = workload.height;
-  const auto lattice = value_or_give_up(scene::place_lattice(dataset.info().grid, view.geometry));
+  const auto placed = value_or_give_up(scene::place_dataset(view.geometry, dataset));
+  const scene::Lattice& lattice = placed->lattice;
   if (auto applied = scene::apply_preset(view, lattice, workload.preset); !applied) {
     give_up(applied.error());
   }

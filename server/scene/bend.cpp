@@ -1,0 +1,406 @@
+// Columns and levels -> places; places -> mean cells and the box.
+#include "server/scene/bend.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "server/base/check.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+using data::AxisKind;
+using protocol::GeometryMapping;
+
+constexpr double degree = std::numbers::pi / 180.0;
+constexpr double shell_share = 0.15;  // of the inner radius
+
+Error no_heights(const std::string& detail) {
+  return make_error_at(ErrorKind::invalid, "/geometry/heightField", detail);
+}
+
+// Longitude and latitude of every column, degrees, x fastest.
+data::Columns columns_of(const data::Grid& grid) {
+  if (grid.columns) return *grid.columns;
+  data::Columns columns;
+  for (const double latitude : grid.axes[1].coordinates) {
+    for (const double longitude : grid.axes[0].coordinates) {
+      columns.longitude.push_back(longitude);
+      columns.latitude.push_back(latitude);
+    }
+  }
+  return columns;
+}
+
+// As many even coordinates as the axis has, over what the columns span.
+void span_evenly(const std::vector<double>& values, data::Axis& axis, AxisKind kind) {
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const std::size_t count = axis.coordinates.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const double share = count < 2 ? 0.5 : static_cast<double>(i) / static_cast<double>(count - 1);
+    axis.coordinates[i] = *low + share * (*high - *low);
+  }
+  axis.kind = kind;
+}
+
+// World units per degree and the degree at the origin, along one axis of an even lattice.
+struct Affine {
+  double scale = 0;
+  double centre = 0;
+  [[nodiscard]] double operator()(double value) const { return (value - centre) * scale; }
+};
+
+Affine map_of(const data::Axis& axis, const std::vector<double>& world) {
+  const std::vector<double>& raw = axis.coordinates;
+  Affine map;
+  if (raw.size() > 1) map.scale = (world.back() - world.front()) / (raw.back() - raw.front());
+  map.centre = 0.5 * (raw.front() + raw.back());
+  return map;
+}
+
+// What every sample's height is in the straight lattice's world, masked ones at their level's mean.
+class Elevations {
+ public:
+  Elevations(const Lattice& straight, const Heights* heights,
+             const std::optional<std::array<double, 2>>& extent)
+      : levels_(straight.positions[2]) {
+    if (heights == nullptr) return;
+    values_ = heights->values->component(0);
+    layer_ =
+        static_cast<std::size_t>(straight.dims[0]) * static_cast<std::size_t>(straight.dims[1]);
+    if (!extent) return;
+    map_.scale = (straight.box_max.z - straight.box_min.z) / ((*extent)[1] - (*extent)[0]);
+    map_.centre = 0.5 * ((*extent)[0] + (*extent)[1]);
+  }
+  [[nodiscard]] double at(std::size_t level, std::size_t column) const {
+    if (values_ == nullptr) return levels_[level];
+    const auto value = static_cast<double>(values_[level * layer_ + column]);
+    return std::isfinite(value) ? map_(value) : levels_[level];
+  }
+
+ private:
+  const std::vector<double>& levels_;
+  const float* values_ = nullptr;
+  std::size_t layer_ = 0;
+  Affine map_;
+};
+
+// Bottom and top of the box, raw heights: half a mean cell beyond the extreme samples. Empty where
+// there is but one level at one height.
+std::optional<std::array<double, 2>> extent_of(const Heights& heights, const data::Axis& means) {
+  double low = static_cast<double>(heights.values->range[0]);
+  double high = static_cast<double>(heights.values->range[1]);
+  const std::vector<double>& at = means.coordinates;
+  if (at.size() > 1) {
+    low -= 0.5 * (at[1] - at[0]);
+    high += 0.5 * (at[at.size() - 1] - at[at.size() - 2]);
+  }
+  if (!(high > low)) return std::nullopt;
+  return std::array{low, high};
+}
+
+// Edge vectors of every sample's cell, as scene.hpp defines them.
+class Cells {
+ public:
+  explicit Cells(const Lattice& lattice) : lattice_(lattice) {
+    stride_ = {
+        1, static_cast<std::size_t>(lattice.dims[0]),
+        static_cast<std::size_t>(lattice.dims[0]) * static_cast<std::size_t>(lattice.dims[1])};
+  }
+  [[nodiscard]] glm::dvec3 place(std::size_t n) const {
+    const std::array<float, 3>& p = (*lattice_.places)[n];
+    return {p[0], p[1], p[2]};
+  }
+  // index: that of sample n along axis a, which has more than one sample.
+  [[nodiscard]] glm::dvec3 edge(std::size_t n, std::size_t a, int index) const {
+    const bool first = index == 0;
+    const bool last = index + 1 == lattice_.dims[a];
+    const glm::dvec3 across = place(last ? n : n + stride_[a]) - place(first ? n : n - stride_[a]);
+    return first || last ? across : 0.5 * across;
+  }
+
+ private:
+  const Lattice& lattice_;
+  std::array<std::size_t, 3> stride_{};
+};
+
+// Calls body(n, index) for every sample.
+template <class Body>
+void for_samples(const std::array<int, 3>& dims, const Body& body) {
+  std::size_t n = 0;
+  std::array<int, 3> at{};
+  for (at[2] = 0; at[2] < dims[2]; ++at[2]) {
+    for (at[1] = 0; at[1] < dims[1]; ++at[1]) {
+      for (at[0] = 0; at[0] < dims[0]; ++at[0]) body(n++, at);
+    }
+  }
+}
+
+// spacing[a]: the mean length of the cells' edges by their index along axis a; positions follow,
+// centred on 0.
+void measure(Lattice& lattice, std::size_t a) {
+  const Cells cells(lattice);
+  std::vector<double> sums(static_cast<std::size_t>(lattice.dims[a]), 0.0);
+  for_samples(lattice.dims, [&](std::size_t n, const std::array<int, 3>& at) {
+    sums[static_cast<std::size_t>(at[a])] += glm::length(cells.edge(n, a, at[a]));
+  });
+  double samples = 1;
+  for (std::size_t b = 0; b < 3; ++b) samples *= b == a ? 1.0 : lattice.dims[b];
+  double length = 0;
+  for (double& sum : sums) {
+    sum /= samples;
+    length += sum;
+  }
+  double edge = -0.5 * length;
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    lattice.positions[a][i] = edge + 0.5 * sums[i];
+    edge += sums[i];
+  }
+  lattice.spacing[a] = std::move(sums);
+}
+
+// An axis of one sample is as thick as the thinnest of the others.
+void thin_axes(Lattice& lattice) {
+  double thinnest = std::numeric_limits<double>::infinity();
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (lattice.dims[a] > 1) thinnest = std::min(thinnest, cell_size(lattice, a));
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (lattice.dims[a] == 1 && std::isfinite(thinnest)) lattice.spacing[a] = {thinnest};
+  }
+}
+
+// The box of all cells, each the parallelepiped of its edges. Along an axis of one sample a cell is
+// taken to reach as far in every direction.
+void set_box(Lattice& lattice) {
+  const Cells cells(lattice);
+  glm::dvec3 low(std::numeric_limits<double>::infinity());
+  glm::dvec3 high(-std::numeric_limits<double>::infinity());
+  for_samples(lattice.dims, [&](std::size_t n, const std::array<int, 3>& at) {
+    glm::dvec3 reach(0);
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (lattice.dims[a] > 1) {
+        reach += 0.5 * glm::abs(cells.edge(n, a, at[a]));
+      } else {
+        reach = glm::max(reach, glm::dvec3(0.5 * lattice.spacing[a][0]));
+      }
+    }
+    low = glm::min(low, cells.place(n) - reach);
+    high = glm::max(high, cells.place(n) + reach);
+  });
+  lattice.box_min = low;
+  lattice.box_max = high;
+}
+
+// Moves and scales everything so that the box is centred on the origin and its longest edge is 2.
+void settle(Lattice& lattice, std::vector<std::array<float, 3>>& places) {
+  const glm::dvec3 centre = 0.5 * (lattice.box_min + lattice.box_max);
+  const glm::dvec3 edge = lattice.box_max - lattice.box_min;
+  const double scale = 2.0 / std::max({edge.x, edge.y, edge.z});
+  for (auto& place : places) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto value = static_cast<double>(place[a]) - centre[static_cast<int>(a)];
+      place[a] = static_cast<float>(value * scale);
+    }
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    for (double& at : lattice.positions[a]) at = (at - centre[static_cast<int>(a)]) * scale;
+    for (double& width : lattice.spacing[a]) width *= scale;
+  }
+  lattice.box_min = -0.5 * scale * edge;
+  lattice.box_max = 0.5 * scale * edge;
+}
+
+// Radii of a shell that ends at 1, by the share of its height.
+struct Shell {
+  double inner = 1;
+  [[nodiscard]] double radius(double share) const { return inner + share * (1.0 - inner); }
+};
+
+// One level alone is as thick as its columns are apart, and no thicker than a shell of many.
+Shell shell_of(const Lattice& straight, const data::Grid& even, double vertical_scale,
+               bool one_height) {
+  Shell shell{1.0 / (1.0 + shell_share * vertical_scale)};
+  if (straight.dims[2] > 1 || !one_height) return shell;
+  for (std::size_t a = 0; a < 2; ++a) {
+    const std::vector<double>& at = even.axes[a].coordinates;
+    if (at.size() < 2) continue;
+    const double step = (at.back() - at.front()) / static_cast<double>(at.size() - 1) * degree;
+    shell.inner = std::max(shell.inner, 1.0 - step);
+  }
+  return shell;
+}
+
+using Places = std::vector<std::array<float, 3>>;
+
+Places on_sphere(const Lattice& straight, const data::Columns& columns,
+                 const Elevations& elevations, const Shell& shell) {
+  const double bottom = straight.box_min.z;
+  const double height = straight.box_max.z - bottom;
+  std::vector<glm::dvec3> up;
+  up.reserve(columns.longitude.size());
+  for (std::size_t c = 0; c < columns.longitude.size(); ++c) {
+    const double longitude = columns.longitude[c] * degree;
+    const double latitude = columns.latitude[c] * degree;
+    up.emplace_back(std::cos(latitude) * std::sin(longitude),
+                    -std::cos(latitude) * std::cos(longitude), std::sin(latitude));
+  }
+  Places places;
+  places.reserve(up.size() * straight.positions[2].size());
+  for (std::size_t k = 0; k < straight.positions[2].size(); ++k) {
+    for (std::size_t c = 0; c < up.size(); ++c) {
+      const glm::dvec3 p = up[c] * shell.radius((elevations.at(k, c) - bottom) / height);
+      places.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
+    }
+  }
+  return places;
+}
+
+// columns: null where they stand along the axes.
+Places on_map(const Lattice& straight, const data::Grid& even, const data::Columns* columns,
+              const Elevations& elevations) {
+  Affine map_x = map_of(even.axes[0], straight.positions[0]);
+  Affine map_y = map_of(even.axes[1], straight.positions[1]);
+  if (map_x.scale == 0) map_x.scale = map_y.scale;
+  if (map_y.scale == 0) map_y.scale = map_x.scale;
+  const auto width = static_cast<std::size_t>(straight.dims[0]);
+  const std::size_t layer = width * static_cast<std::size_t>(straight.dims[1]);
+  Places places;
+  places.reserve(layer * straight.positions[2].size());
+  for (std::size_t k = 0; k < straight.positions[2].size(); ++k) {
+    for (std::size_t c = 0; c < layer; ++c) {
+      const double x =
+          columns == nullptr ? straight.positions[0][c % width] : map_x(columns->longitude[c]);
+      const double y =
+          columns == nullptr ? straight.positions[1][c / width] : map_y(columns->latitude[c]);
+      places.push_back(
+          {static_cast<float>(x), static_cast<float>(y), static_cast<float>(elevations.at(k, c))});
+    }
+  }
+  return places;
+}
+
+// Levels as distances from the shell's middle.
+void set_radii(const Shell& shell, Lattice& lattice) {
+  const double height = lattice.box_max.z - lattice.box_min.z;
+  for (std::size_t k = 0; k < lattice.positions[2].size(); ++k) {
+    const double share = (lattice.positions[2][k] - lattice.box_min.z) / height;
+    lattice.positions[2][k] = shell.radius(share) - shell.radius(0.5);
+    lattice.spacing[2][k] *= (1.0 - shell.inner) / height;
+  }
+}
+
+Result<void> check_cells(const Lattice& lattice) {
+  for (const std::vector<double>& spacing : lattice.spacing) {
+    for (const double width : spacing) {
+      if (!(width > 0) || !std::isfinite(width)) {
+        return make_error(ErrorKind::bad_data, "neighbouring columns stand at the same place");
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> check_mapping(const data::Grid& grid, GeometryMapping mapping) {
+  if (mapping == GeometryMapping::flat || grid.columns) return {};
+  const auto& [x, y, z] = grid.axes;
+  const bool along_axes = x.kind == AxisKind::longitude && y.kind == AxisKind::latitude;
+  if (mapping == GeometryMapping::sphere && along_axes) return {};
+  return make_error_at(ErrorKind::invalid, "/geometry/mapping",
+                       mapping == GeometryMapping::sphere
+                           ? "sphere needs longitudes and latitudes, which this dataset lacks"
+                           : "curvilinear needs longitudes and latitudes that are 2-D and have no "
+                             "gaps, which this dataset lacks");
+}
+
+Result<data::Grid> grid_with_heights(const data::Grid& grid, const Heights& heights) {
+  const std::array<int, 3> dims = grid.dims();
+  WINDSPLAT_CHECK(heights.values->dims == dims && heights.values->components == 1);
+  const std::size_t layer = static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]);
+  data::Grid out = grid;
+  data::Axis& axis = out.axes[2];
+  axis.name = heights.name;
+  axis.standard_name.clear();
+  axis.units = heights.units;
+  axis.kind = AxisKind::height;
+  for (std::size_t k = 0; k < axis.coordinates.size(); ++k) {
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::size_t c = 0; c < layer; ++c) {
+      const auto value = static_cast<double>(heights.values->component(0)[k * layer + c]);
+      if (!std::isfinite(value)) continue;
+      sum += value;
+      ++count;
+    }
+    if (count == 0) return no_heights("level " + std::to_string(k) + " has no heights");
+    axis.coordinates[k] = sum / static_cast<double>(count);
+    if (k > 0 && !(axis.coordinates[k] > axis.coordinates[k - 1])) {
+      return no_heights("level " + std::to_string(k) + " is on average not above the one below it");
+    }
+  }
+  return out;
+}
+
+Result<Lattice> bend_lattice(const data::Grid& grid, const protocol::GeometryView& geometry,
+                             const Heights* heights) {
+  const bool flat = geometry.mapping == GeometryMapping::flat;
+  const bool sphere = geometry.mapping == GeometryMapping::sphere;
+  data::Grid even = grid;
+  protocol::GeometryView straight_geometry = geometry;
+  std::optional<std::array<double, 2>> extent;
+  if (heights != nullptr) {
+    auto raised = grid_with_heights(grid, *heights);
+    if (!raised) return raised.error();
+    even = std::move(*raised);
+    straight_geometry.vertical = protocol::VerticalPlacement::linear;
+    extent = extent_of(*heights, even.axes[2]);
+  }
+  std::optional<data::Columns> columns;
+  if (!flat) {
+    if (auto ok = check_mapping(grid, geometry.mapping); !ok) return ok.error();
+    columns = columns_of(grid);
+    span_evenly(columns->longitude, even.axes[0], AxisKind::longitude);
+    span_evenly(columns->latitude, even.axes[1], AxisKind::latitude);
+  }
+  if (sphere) straight_geometry.scale = {1, 1, 1};
+  auto straight = place_straight(even, straight_geometry, extent);
+  if (!straight) return straight.error();
+  const Elevations elevations(*straight, heights, extent);
+  const bool one_height = !extent;
+  const Shell shell = shell_of(*straight, even, geometry.scale[2], one_height);
+  auto places = std::make_shared<Places>(
+      sphere ? on_sphere(*straight, *columns, elevations, shell)
+             : on_map(*straight, even, columns ? &*columns : nullptr, elevations));
+  Lattice lattice = *straight;
+  lattice.places = places;
+  const auto measure_columns = [&lattice] {
+    for (std::size_t a = 0; a < 2; ++a) {
+      if (lattice.dims[a] > 1) measure(lattice, a);
+    }
+    thin_axes(lattice);
+  };
+  if (sphere) {
+    set_radii(shell, lattice);
+    measure_columns();
+    set_box(lattice);
+    lattice.box_min = glm::max(lattice.box_min, glm::dvec3(-1));
+    lattice.box_max = glm::min(lattice.box_max, glm::dvec3(1));
+  } else {
+    thin_axes(lattice);
+    set_box(lattice);
+    settle(lattice, *places);
+    if (!flat) measure_columns();
+  }
+  if (auto ok = check_cells(lattice); !ok) return ok.error();
+  return lattice;
+}
+
+}  // namespace windsplat::scene

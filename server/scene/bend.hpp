@@ -1,0 +1,35 @@
+// Lattices whose samples do not stand in straight rows: terrain, curvilinear maps, the globe. Grid
+// and heights in, a place for every sample out.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "protocol/view.hpp"
+#include "server/base/error.hpp"
+#include "server/data/dataset.hpp"
+#include "server/scene/build.hpp"
+#include "server/scene/scene.hpp"
+
+namespace windsplat::scene {
+
+// The rectilinear lattice of the axes alone. vertical_extent: raw coordinates of the bottom and top
+// of the box instead of the outermost cells' edges.
+Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryView& geometry,
+                               const std::optional<std::array<double, 2>>& vertical_extent);
+
+// For a mapping other than flat, for heights, or for both. The box is that of all cells; off the
+// sphere it is centred on the origin and its longest edge is 2. On the sphere the outermost edge
+// has the radius 1 and the shell is 0.15 times geometry.scale[2] of its inner radius thick;
+// longitude 0 lies towards -y, where azimuth 0 looks from, longitude 90 towards +x.
+Result<Lattice> bend_lattice(const data::Grid& grid, const protocol::GeometryView& geometry,
+                             const Heights* heights);
+
+// Errors: invalid at /geometry/mapping when the grid lacks the longitudes and latitudes for it.
+Result<void> check_mapping(const data::Grid& grid, protocol::GeometryMapping mapping);
+
+// The grid with the mean heights of its levels as vertical axis. Errors: invalid at
+// /geometry/heightField (a level without heights, or not above the one below it).
+Result<data::Grid> grid_with_heights(const data::Grid& grid, const Heights& heights);
+
+}  // namespace windsplat::scene

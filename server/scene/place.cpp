@@ -1,0 +1,107 @@
+// A view's geometry and a dataset -> what is wrong with it, or where its samples stand.
+#include <array>
+#include <utility>
+
+#include "protocol/codec.hpp"
+#include "server/scene/bend.hpp"
+#include "server/scene/build.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+using PlacedPtr = std::shared_ptr<const Placed>;
+
+Error invalid(std::string pointer, std::string detail) {
+  return make_error_at(ErrorKind::invalid, std::move(pointer), std::move(detail));
+}
+
+std::string quoted(const std::string& text) {
+  std::string out(1, '"');
+  out += printable(text);
+  out += '"';
+  return out;
+}
+
+// All that a placement follows from besides the dataset.
+std::string key_of(const protocol::GeometryView& geometry) {
+  protocol::View view;
+  view.geometry = geometry;
+  view.geometry.slice.reset();
+  return protocol::encode_view(view);
+}
+
+}  // namespace
+
+Result<const data::FieldInfo*> find_field(const data::DatasetInfo& info, const std::string& name,
+                                          data::FieldKind kind, const std::string& pointer) {
+  const data::FieldInfo* field = info.find(name);
+  if (field == nullptr) {
+    return invalid(pointer, "dataset " + quoted(info.id) + " has no field " + quoted(name));
+  }
+  if (field->kind != kind) {
+    const bool scalar = field->kind == data::FieldKind::scalar;
+    return invalid(pointer, "field " + quoted(field->name) + " is a " +
+                                (scalar ? "scalar, not a vector" : "vector, not a scalar"));
+  }
+  return field;
+}
+
+std::optional<Slice> slice_of(const protocol::GeometryView& geometry) {
+  if (!geometry.slice) return std::nullopt;
+  return Slice{static_cast<int>(geometry.slice->axis), geometry.slice->index};
+}
+
+Result<void> check_geometry(const protocol::GeometryView& geometry, const data::DatasetInfo& info) {
+  if (geometry.height_field) {
+    auto field =
+        find_field(info, *geometry.height_field, data::FieldKind::scalar, "/geometry/heightField");
+    if (!field) return field.error();
+  }
+  if (auto ok = check_mapping(info.grid, geometry.mapping); !ok) return ok;
+  if (const auto slice = slice_of(geometry)) {
+    const auto axis = static_cast<std::size_t>(slice->axis);
+    const int last = info.grid.dims().at(axis) - 1;
+    if (slice->sample < 0 || slice->sample > last) {
+      constexpr std::array<const char*, 3> names = {"x", "y", "z"};
+      return invalid("/geometry/slice/index", "dataset " + quoted(info.id) + " has layers 0 to " +
+                                                  std::to_string(last) + " across " +
+                                                  names.at(axis));
+    }
+  }
+  return {};
+}
+
+Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView& geometry,
+                                                    data::Dataset& dataset) {
+  const data::DatasetInfo& info = dataset.info();
+  const bool bent =
+      geometry.mapping != protocol::GeometryMapping::flat || geometry.height_field.has_value();
+  const std::string key = bent ? key_of(geometry) : std::string();
+  if (bent) {
+    const std::any kept = dataset.kept(key);
+    if (const auto* placed = std::any_cast<PlacedPtr>(&kept)) return *placed;
+  }
+  auto placed = std::make_shared<Placed>();
+  placed->grid = info.grid;
+  std::optional<Heights> heights;
+  if (geometry.height_field) {
+    auto field =
+        find_field(info, *geometry.height_field, data::FieldKind::scalar, "/geometry/heightField");
+    if (!field) return field.error();
+    auto values = dataset.volume(*geometry.height_field, 0);
+    if (!values) return values.error();
+    heights = Heights{(*field)->name, (*field)->units, std::move(*values)};
+    auto raised = grid_with_heights(info.grid, *heights);
+    if (!raised) return raised.error();
+    placed->grid = std::move(*raised);
+  }
+  auto lattice = place_lattice(info.grid, geometry, heights ? &*heights : nullptr);
+  if (!lattice) return lattice.error();
+  placed->lattice = std::move(*lattice);
+  PlacedPtr out = std::move(placed);
+  if (bent) dataset.keep(key, out);
+  return out;
+}
+
+}  // namespace windsplat::scene
