@@ -113,8 +113,9 @@ class ObjectReader {
     }
   }
   template <class E, std::size_t N>
-  void choice(const char* key, E& out, const std::array<Name<E>, N>& names) {
-    if (const Json* value = child(key)) {
+  void choice(const char* key, E& out, const std::array<Name<E>, N>& names,
+              Presence presence = Presence::optional) {
+    if (const Json* value = child(key, presence)) {
       if (const auto index = read_name(*value, at(key), texts(names))) out = names[*index].value;
     }
   }

@@ -18,17 +18,31 @@ constexpr std::array<Name<VerticalPlacement>, 4> vertical_names{
      {VerticalPlacement::linear, "linear"},
      {VerticalPlacement::logp, "logp"},
      {VerticalPlacement::index, "index"}}};
-constexpr std::array<Name<GeometryMapping>, 1> mapping_names{{{GeometryMapping::flat, "flat"}}};
+constexpr std::array<Name<GeometryMapping>, 3> mapping_names{
+    {{GeometryMapping::flat, "flat"},
+     {GeometryMapping::curvilinear, "curvilinear"},
+     {GeometryMapping::sphere, "sphere"}}};
+constexpr std::array<Name<GridAxis>, 3> axis_names{
+    {{GridAxis::x, "x"}, {GridAxis::y, "y"}, {GridAxis::z, "z"}}};
 constexpr std::array<Name<VectorSpace>, 2> space_names{
     {{VectorSpace::components, "components"}, {VectorSpace::world, "world"}}};
-constexpr std::array<Name<ColorBy>, 5> color_by_names{{{ColorBy::world_z, "worldZ"},
+constexpr std::array<Name<ColorBy>, 7> color_by_names{{{ColorBy::world_z, "worldZ"},
                                                        {ColorBy::screen_z, "screenZ"},
                                                        {ColorBy::rise, "rise"},
                                                        {ColorBy::magnitude, "magnitude"},
+                                                       {ColorBy::direction, "direction"},
+                                                       {ColorBy::scalar, "scalar"},
                                                        {ColorBy::constant, "constant"}}};
-constexpr std::array<Name<MotionMode>, 1> motion_names{{{MotionMode::still, "still"}}};
-constexpr std::array<Name<MethodName>, 1> method_names{{{MethodName::kernel, "kernel"}}};
-constexpr std::array<Name<Compositing>, 1> compositing_names{{{Compositing::analytic, "analytic"}}};
+constexpr std::array<Name<MotionMode>, 2> motion_names{
+    {{MotionMode::still, "still"}, {MotionMode::phase, "phase"}}};
+constexpr std::array<Name<MethodName>, 3> method_names{{{MethodName::kernel, "kernel"},
+                                                        {MethodName::slab, "slab"},
+                                                        {MethodName::reference, "reference"}}};
+constexpr std::array<Name<Compositing>, 5> compositing_names{{{Compositing::simple, "simple"},
+                                                              {Compositing::cd_naive, "cd-naive"},
+                                                              {Compositing::cd, "cd"},
+                                                              {Compositing::analytic, "analytic"},
+                                                              {Compositing::cd_euler, "cd-euler"}}};
 
 constexpr NumberRange fraction{0, 1};
 constexpr NumberRange world{-limits::world_max, limits::world_max};
@@ -73,12 +87,25 @@ ImageView read_image(const Json& json, const std::string& pointer, Faults& fault
   return image;
 }
 
+SliceView read_slice(const Json& json, const std::string& pointer, Faults& faults) {
+  SliceView slice;
+  ObjectReader reader(json, pointer, faults);
+  reader.choice("axis", slice.axis, axis_names, Presence::required);
+  reader.integer("index", slice.index, {0, limits::slice_index_max}, Presence::required);
+  reader.finish();
+  return slice;
+}
+
 GeometryView read_geometry(const Json& json, const std::string& pointer, Faults& faults) {
   GeometryView geometry;
   ObjectReader reader(json, pointer, faults);
   reader.numbers("scale", geometry.scale, {limits::geometry_scale_min, limits::geometry_scale_max});
   reader.choice("vertical", geometry.vertical, vertical_names);
   reader.choice("mapping", geometry.mapping, mapping_names);
+  reader.text("heightField", geometry.height_field, 1);
+  if (const Json* slice = reader.child("slice", Presence::optional, Null::is_default)) {
+    geometry.slice = read_slice(*slice, reader.at("slice"), faults);
+  }
   reader.finish();
   return geometry;
 }
@@ -96,6 +123,7 @@ VectorColorView read_vector_color(const Json& json, const std::string& pointer, 
   ObjectReader reader(json, pointer, faults);
   reader.choice("by", color.by, color_by_names);
   reader.text("map", color.map, 1);
+  reader.text("field", color.field, 1);
   reader.numbers("range", color.range, field_value);
   reader.number("riseWeight", color.rise_weight, fraction);
   reader.color("constant", color.constant);
@@ -108,6 +136,7 @@ void read_motion(const Json& json, const std::string& pointer, Faults& faults, V
   ObjectReader reader(json, pointer, faults);
   reader.choice("mode", vector.motion, motion_names);
   reader.number("rate", vector.motion_rate, {-limits::motion_rate_max, limits::motion_rate_max});
+  reader.number("time", vector.motion_time, {-limits::motion_time_max, limits::motion_time_max});
   reader.finish();
 }
 
@@ -270,6 +299,8 @@ MethodView read_method(const Json& json, const std::string& pointer, Faults& fau
   ObjectReader reader(json, pointer, faults);
   reader.choice("name", method.name, method_names);
   reader.choice("compositing", method.compositing, compositing_names);
+  reader.number("slabThickness", method.slab_thickness,
+                {limits::slab_thickness_min, limits::slab_thickness_max});
   reader.number("stopTransmittance", method.stop_transmittance, fraction);
   reader.finish();
   return method;
@@ -304,9 +335,26 @@ Json numbers_or_null(const std::optional<std::array<double, N>>& values) {
   return values ? numbers_to_json(*values) : Json(nullptr);
 }
 
+Json text_or_null(const std::optional<std::string>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json geometry_to_json(const GeometryView& geometry) {
+  Json slice;
+  if (geometry.slice) {
+    slice = {{"axis", name_of(geometry.slice->axis, axis_names)}, {"index", geometry.slice->index}};
+  }
+  return Json{{"scale", numbers_to_json(geometry.scale)},
+              {"vertical", name_of(geometry.vertical, vertical_names)},
+              {"mapping", name_of(geometry.mapping, mapping_names)},
+              {"heightField", text_or_null(geometry.height_field)},
+              {"slice", std::move(slice)}};
+}
+
 Json vector_to_json(const VectorView& vector) {
   Json color{{"by", nullptr},
              {"map", vector.color.map},
+             {"field", text_or_null(vector.color.field)},
              {"range", numbers_or_null(vector.color.range)},
              {"riseWeight", canonical_number(vector.color.rise_weight)},
              {"constant", vector.color.constant}};
@@ -326,7 +374,8 @@ Json vector_to_json(const VectorView& vector) {
            {"magnitudeIntensity", canonical_number(vector.magnitude_intensity)},
            {"motion",
             {{"mode", name_of(vector.motion, motion_names)},
-             {"rate", canonical_number(vector.motion_rate)}}},
+             {"rate", canonical_number(vector.motion_rate)},
+             {"time", canonical_number(vector.motion_time)}}},
            {"jitter",
             {{"center", canonical_number(vector.jitter.center)},
              {"stride", canonical_number(vector.jitter.stride)},
@@ -345,13 +394,13 @@ Json scalar_to_json(const ScalarView& scalar) {
     extinction = Json::array();
     for (const auto& point : *scalar.extinction) extinction.push_back(numbers_to_json(point));
   }
-  Json map;
-  if (scalar.color.map) map = *scalar.color.map;
-  return Json{{"field", scalar.field},
-              {"color", {{"map", std::move(map)}, {"range", numbers_or_null(scalar.color.range)}}},
-              {"extinction", std::move(extinction)},
-              {"minOpticalDepth", canonical_number(scalar.min_optical_depth)},
-              {"stride", scalar.stride}};
+  return Json{
+      {"field", scalar.field},
+      {"color",
+       {{"map", text_or_null(scalar.color.map)}, {"range", numbers_or_null(scalar.color.range)}}},
+      {"extinction", std::move(extinction)},
+      {"minOpticalDepth", canonical_number(scalar.min_optical_depth)},
+      {"stride", scalar.stride}};
 }
 
 }  // namespace
@@ -398,10 +447,7 @@ Json view_to_json(const View& view) {
        {{"width", view.image.width},
         {"height", view.image.height},
         {"background", view.image.background}}},
-      {"geometry",
-       {{"scale", numbers_to_json(view.geometry.scale)},
-        {"vertical", name_of(view.geometry.vertical, vertical_names)},
-        {"mapping", name_of(view.geometry.mapping, mapping_names)}}},
+      {"geometry", geometry_to_json(view.geometry)},
       {"vector", vector_to_json(view.vector)},
       {"scalars", std::move(scalars)},
       {"depthCue",
@@ -411,6 +457,7 @@ Json view_to_json(const View& view) {
       {"method",
        {{"name", name_of(view.method.name, method_names)},
         {"compositing", name_of(view.method.compositing, compositing_names)},
+        {"slabThickness", canonical_number(view.method.slab_thickness)},
         {"stopTransmittance", canonical_number(view.method.stop_transmittance)}}},
       {"quality", {{"budgetMs", number_or_null(view.quality.budget_ms)}, {"maxError", nullptr}}}};
 }

@@ -109,6 +109,7 @@ struct FrameInfo {
   std::int64_t samples = 0, culled = 0, skipped_vector = 0, skipped_scalar = 0, skipped_both = 0;
   std::int64_t occluded = 0, pixel_updates = 0, exponentials = 0;
   std::int64_t tiles = 0, tiles_stopped = 0;
+  double skipped_bound = 0, stop_bound = 0;  // linear; what is not finite is told as unknown
   std::vector<std::string> fields;
   std::int64_t bytes = 0;
   std::string variant;

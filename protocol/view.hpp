@@ -16,12 +16,13 @@ using Range = std::array<double, 2>;
 
 enum class Projection { perspective, orthographic };
 enum class VerticalPlacement { automatic, linear, logp, index };
-enum class GeometryMapping { flat };
+enum class GeometryMapping { flat, curvilinear, sphere };
+enum class GridAxis { x, y, z };
 enum class VectorSpace { components, world };
-enum class ColorBy { world_z, screen_z, rise, magnitude, constant };
-enum class MotionMode { still };
-enum class MethodName { kernel };
-enum class Compositing { analytic };
+enum class ColorBy { world_z, screen_z, rise, magnitude, direction, scalar, constant };
+enum class MotionMode { still, phase };
+enum class MethodName { kernel, slab, reference };
+enum class Compositing { simple, cd_naive, cd, analytic, cd_euler };
 
 struct CameraView {
   Projection projection = Projection::perspective;
@@ -38,10 +39,18 @@ struct ImageView {
   std::string background = "#000000";  // sRGB
 };
 
+// One layer of the grid.
+struct SliceView {
+  GridAxis axis = GridAxis::z;
+  int index = 0;  // grid samples
+};
+
 struct GeometryView {
   Vec3 scale{1, 1, 1};
   VerticalPlacement vertical = VerticalPlacement::automatic;
   GeometryMapping mapping = GeometryMapping::flat;
+  std::optional<std::string> height_field;  // empty: the vertical coordinate places the samples
+  std::optional<SliceView> slice;           // empty: the whole grid
 };
 
 // A field chosen by name, by the dataset's default (key absent), or none at all (null).
@@ -55,6 +64,7 @@ struct FieldChoice {
 struct VectorColorView {
   std::optional<ColorBy> by;
   std::string map = "viridis";
+  std::optional<std::string> field;  // `scalar` only
   std::optional<Range> range;        // of what `by` measures
   double rise_weight = 0.2;          // 0..1, `rise` only: 0 height alone, 1 rise alone
   std::string constant = "#ffffff";  // sRGB, `constant` only
@@ -85,7 +95,8 @@ struct VectorView {
   double magnitude_intensity =
       0.6;  // 0: every line equally bright; 1: brightness follows magnitude
   MotionMode motion = MotionMode::still;
-  double motion_rate = 1.0;
+  double motion_rate = 1.0;  // cycles a step at the top of magnitude_range
+  double motion_time = 0.0;  // steps, added to the step
   JitterView jitter;
 };
 
@@ -112,6 +123,7 @@ struct DepthCueView {
 struct MethodView {
   MethodName name = MethodName::kernel;
   Compositing compositing = Compositing::analytic;
+  double slab_thickness = 1;  // grid cells along the line of sight, `slab` only
   double stop_transmittance = 1.5e-4;
 };
 

@@ -101,6 +101,7 @@ Result<void> render(const Arguments& arguments) {
   frame::Encoding encoding;
   encoding.format = *format;
   encoding.quality = file_quality;
+  encoding.allow_reference = true;
   ThreadPool pool(arguments.threads);
   const auto picture = frame::produce(view, **dataset, encoding, pool, CancelToken());
   if (!picture) return picture.error();

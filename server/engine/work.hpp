@@ -19,7 +19,9 @@ struct WorkReport {
   std::int64_t pixel_updates = 0;
   std::int64_t exponentials = 0;
   std::int64_t tiles = 0;
-  std::int64_t tiles_stopped = 0;   // ended early by stop transmittance
+  std::int64_t tiles_stopped = 0;  // ended early by stop transmittance
+  double skipped_bound = 0;  // mean over the picture of the alphas left out by tolerances, at most
+  double stop_bound = 0;     // largest change of a pixel by tiles that ended early, at most
   std::vector<std::string> fields;  // filled by who knows their names
   std::int64_t bytes = 0;           // of the fields touched
   std::string variant;              // what the plan chose, for example "vector+scalar perspective"

@@ -44,6 +44,14 @@ void name_fields(const scene::Scene& scene, const protocol::View& completed,
   WINDSPLAT_CHECK(layer == scene.scalars.end());
 }
 
+Result<engine::Rendered> render_scene(const scene::Scene& scene, ThreadPool& pool,
+                                      const CancelToken& cancel) {
+  if (scene.method == scene::Method::reference) {
+    return make_error_at(ErrorKind::invalid, "/method/name", "reference is not built in");
+  }
+  return engine::render(scene, pool, cancel);
+}
+
 Result<image::Bytes> encode(const engine::Image& picture, const std::array<float, 3>& background,
                             const Encoding& encoding) {
   const int width = picture.width;
@@ -62,6 +70,11 @@ Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const 
     return make_error(ErrorKind::invalid, "a frame's level is 0 to " + std::to_string(level_max) +
                                               ", not " + std::to_string(encoding.level));
   }
+  if (view.method.name == protocol::MethodName::reference && !encoding.allow_reference) {
+    return make_error_at(ErrorKind::invalid, "/method/name",
+                         "reference takes too long to share a server: draw it with "
+                         "`windsplat render`");
+  }
   const Clock::time_point start = Clock::now();
   Result<protocol::View> completed = scene::complete_view(view, dataset);
   if (!completed) return completed.error();
@@ -73,7 +86,7 @@ Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const 
   drawn.image.height = std::max(1, drawn.image.height >> encoding.level);
   const Result<scene::Scene> scene = scene::build_scene(drawn, dataset);
   if (!scene) return scene.error();
-  Result<engine::Rendered> rendered = engine::render(*scene, pool, cancel);
+  Result<engine::Rendered> rendered = render_scene(*scene, pool, cancel);
   if (!rendered) return rendered.error();
   const Clock::time_point rendered_at = Clock::now();
 

@@ -21,6 +21,9 @@ struct Encoding {
   Format format = Format::jpeg;
   int quality = 90;
   image::Subsampling subsampling = image::Subsampling::s444;
+  // Whether the reference may be drawn, which takes seconds to minutes: by a command line that has
+  // the machine to itself, not where others wait for the renderer.
+  bool allow_reference = false;
   int level = 0;  // rendered at 1/2^level of the view's width and height, at least one pixel
 };
 
@@ -36,7 +39,7 @@ struct Frame {
 
 // `view` need not be completed. The report's fields and bytes are those of the volumes shown.
 // Errors: those of the scene and the engine (invalid, out_of_memory, cancelled, ...); invalid for a
-// level outside 0..15.
+// level outside 0..15, and at /method/name for a reference that is not allowed.
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
                       ThreadPool& pool, const CancelToken& cancel);
 

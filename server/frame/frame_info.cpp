@@ -8,14 +8,26 @@ const char* method_text(protocol::MethodName name) {
   switch (name) {
     case protocol::MethodName::kernel:
       return "kernel";
+    case protocol::MethodName::slab:
+      return "slab";
+    case protocol::MethodName::reference:
+      return "reference";
   }
   return "";
 }
 
 const char* compositing_text(protocol::Compositing compositing) {
   switch (compositing) {
+    case protocol::Compositing::simple:
+      return "simple";
+    case protocol::Compositing::cd_naive:
+      return "cd-naive";
+    case protocol::Compositing::cd:
+      return "cd";
     case protocol::Compositing::analytic:
       return "analytic";
+    case protocol::Compositing::cd_euler:
+      return "cd-euler";
   }
   return "";
 }
@@ -34,6 +46,9 @@ protocol::FrameInfo frame_info(const Frame& frame, const protocol::View& view) {
   info.method = method_text(view.method.name);
   info.compositing = compositing_text(view.method.compositing);
   info.stride = stride_of(view);
+  if (view.method.name == protocol::MethodName::slab) {
+    info.slab_thickness = view.method.slab_thickness;
+  }
   info.width = frame.width;
   info.height = frame.height;
   const engine::WorkReport& work = frame.work;
@@ -47,6 +62,8 @@ protocol::FrameInfo frame_info(const Frame& frame, const protocol::View& view) {
   info.exponentials = work.exponentials;
   info.tiles = work.tiles;
   info.tiles_stopped = work.tiles_stopped;
+  info.skipped_bound = work.skipped_bound;
+  info.stop_bound = work.stop_bound;
   info.fields = work.fields;
   info.bytes = work.bytes;
   info.variant = work.variant;

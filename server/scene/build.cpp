@@ -39,10 +39,42 @@ LineColor line_color(protocol::ColorBy by) {
       return LineColor::rise;
     case protocol::ColorBy::magnitude:
       return LineColor::magnitude;
+    case protocol::ColorBy::direction:
+      return LineColor::direction;
+    case protocol::ColorBy::scalar:
+      return LineColor::scalar;
     case protocol::ColorBy::constant:
       return LineColor::constant;
   }
   return LineColor::constant;
+}
+
+Method engine_method(protocol::MethodName name) {
+  switch (name) {
+    case protocol::MethodName::kernel:
+      return Method::kernel;
+    case protocol::MethodName::slab:
+      return Method::slab;
+    case protocol::MethodName::reference:
+      return Method::reference;
+  }
+  return Method::kernel;
+}
+
+Compositing engine_compositing(protocol::Compositing compositing) {
+  switch (compositing) {
+    case protocol::Compositing::simple:
+      return Compositing::simple;
+    case protocol::Compositing::cd_naive:
+      return Compositing::cd_naive;
+    case protocol::Compositing::cd:
+      return Compositing::cd;
+    case protocol::Compositing::analytic:
+      return Compositing::analytic;
+    case protocol::Compositing::cd_euler:
+      return Compositing::cd_euler;
+  }
+  return Compositing::analytic;
 }
 
 // Line radii in pixels of this picture. A line thinner than the pixel filter keeps the filter's
@@ -97,6 +129,8 @@ Result<VectorLayer> make_vector_layer(const View& view, const Lattice& lattice,
   layer.jitter_stride = from.jitter.stride;
   layer.overlap = from.jitter.overlap;
   layer.seed = static_cast<std::uint32_t>(from.jitter.seed);
+  layer.moving = from.motion == protocol::MotionMode::phase;
+  if (layer.moving) layer.motion_cycles = from.motion_rate * (view.step + from.motion_time);
   layer.epoch = from.jitter.per_step ? static_cast<std::uint32_t>(view.step) : 0U;
   auto volume = dataset.volume(from.field.name, static_cast<std::size_t>(view.step));
   if (!volume) return volume.error();
@@ -152,6 +186,9 @@ Result<Scene> build_scene(const View& completed, data::Dataset& dataset) {
     if (!layer) return layer.error();
     scene.scalars.push_back(std::move(*layer));
   }
+  scene.method = engine_method(view.method.name);
+  scene.compositing = engine_compositing(view.method.compositing);
+  scene.slab_thickness = view.method.slab_thickness;
   scene.stop_transmittance = view.method.stop_transmittance;
   scene.background = parse_color(view.image.background).value();
   return scene;

@@ -79,6 +79,18 @@ Result<void> choose_vector_field(View& view, const data::DatasetInfo& info) {
   return {};
 }
 
+Result<void> check_color_field(const protocol::VectorColorView& color,
+                               const data::DatasetInfo& info) {
+  const std::string pointer = "/vector/color/field";
+  if (color.field) {
+    auto field = find_field(info, *color.field, data::FieldKind::scalar, pointer);
+    if (!field) return field.error();
+  } else if (color.by == ColorBy::scalar) {
+    return invalid(pointer, "is needed for colour by scalar: the name of a scalar field");
+  }
+  return {};
+}
+
 Result<void> complete_magnitudes(View& view, const Lattice& lattice, data::Dataset& dataset) {
   protocol::VectorView& vector = view.vector;
   std::shared_ptr<const data::Volume> volume;
@@ -123,6 +135,14 @@ Result<Range> default_color_range(const View& view, const Lattice& lattice,
       return Range{depths[0], depths[1]};
     case ColorBy::magnitude:
       return default_magnitude_colors(vector);
+    case ColorBy::direction:
+      return Range{0, 360};
+    case ColorBy::scalar: {
+      const std::string& name = vector.color.field.value();
+      auto volume = dataset.volume(name, 0);
+      if (!volume) return volume.error();
+      return default_scalar_range(*dataset.info().find(name), **volume);
+    }
     case ColorBy::rise:
     case ColorBy::constant:
       break;
@@ -219,6 +239,7 @@ Result<View> complete_view(const View& view, data::Dataset& dataset) {
   protocol::VectorView& vector = full.vector;
   if (!vector.length) vector.length = default_length(*lattice, vector.stride);
   if (auto ok = complete_magnitudes(full, *lattice, dataset); !ok) return ok.error();
+  if (auto ok = check_color_field(vector.color, info); !ok) return ok.error();
   if (!vector.color.by) vector.color.by = default_color_by(info.grid);
   if (!vector.color.range) {
     auto range = default_color_range(full, *lattice, view_depths(*camera, *lattice), dataset);

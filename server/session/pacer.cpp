@@ -1,6 +1,7 @@
 // Pacing of a session: which frame to draw next, and when.
 #include <algorithm>
 #include <limits>
+#include <string>
 #include <utility>
 
 #include "protocol/limits.hpp"
@@ -17,6 +18,12 @@ constexpr int still_quality = 95;
 std::uint32_t clamped_us(std::int64_t us) {
   constexpr std::int64_t most = std::numeric_limits<std::uint32_t>::max();
   return static_cast<std::uint32_t>(std::clamp<std::int64_t>(us, 0, most));
+}
+
+protocol::MethodCode method_code(const std::string& name) {
+  if (name == "slab") return protocol::MethodCode::slab;
+  if (name == "reference") return protocol::MethodCode::reference;
+  return protocol::MethodCode::kernel;
 }
 
 }  // namespace
@@ -130,6 +137,7 @@ void Session::send_frame(const Render& render, Drawn drawn) {
   header.height = static_cast<std::uint16_t>(drawn.info.height);
   header.codec = render.encoding.codec;
   header.quality = static_cast<std::uint8_t>(render.encoding.quality);
+  header.method = method_code(drawn.info.method);
   header.level = static_cast<std::uint8_t>(render.encoding.level);
   header.error = std::numeric_limits<float>::quiet_NaN();
   header.jpeg_error = std::numeric_limits<float>::quiet_NaN();

@@ -184,7 +184,7 @@ TEST(CliFiles, BadViewsExitWith2AndNameThePlace) {
       {{"--set", "/vector/nonsense=1"}, "/vector/nonsense"},
       {{"--set", "/camera/fovY=180"}, "/camera/fovY"},
       {{"--set", "/camera/eye=[0,0]"}, "/camera/eye"},
-      {{"--set", "/method/name=slab"}, "/method/name"},
+      {{"--set", "/method/name=splat"}, "/method/name"},
       {{"--set", "/vector/field=nosuch"}, "/vector/field"},
       {{"--size", "1000000000x1000000000"}, "/image/width"},
       {{"--step", "2"}, "/step"},

@@ -225,7 +225,7 @@ TEST_F(Rest, bad_views_are_refused_with_the_pointer) {
                 "/image/width"},
            Case{R"({"dataset":"small","colour":1})", 422, "/colour"},
            Case{R"({"dataset":"small","vector":{"field":"nope"}})", 422, "/vector/field"},
-           Case{R"({"dataset":"small","method":{"name":"slab"}})", 422, "/method/name"},
+           Case{R"({"dataset":"small","method":{"name":"splat"}})", 422, "/method/name"},
            Case{R"({"dataset":"small","camera":{"fovY":NaN}})", 400, ""},
            Case{R"({"dataset":"small","camera":{"fovY":1e999}})", 422, ""},
            Case{R"({"dataset":"small","dataset":"small"})", 400, ""},

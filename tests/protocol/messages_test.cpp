@@ -273,6 +273,8 @@ TEST(Shapes, FrameInfoTellsEveryCount) {
   info.pixel_updates = 6;
   info.exponentials = 7;
   info.tiles_stopped = 8;
+  info.skipped_bound = 0.25;
+  info.stop_bound = 0.125;
   const std::string json = encode_frame_info(info);
   expect_shape("frameInfo", json);
   EXPECT_EQ(Json::parse(json), Json::parse(R"({"method":"kernel","compositing":"analytic",
@@ -280,6 +282,7 @@ TEST(Shapes, FrameInfoTellsEveryCount) {
       "error":{"value":0.002,"kind":"measured"},"jpegError":null,
       "work":{"samples":972800,"culled":1,"skippedVector":2,"skippedScalar":3,"skippedBoth":4,
               "occluded":5,"pixelUpdates":6,"exponentials":7,"tiles":300,"tilesStopped":8,
+              "skippedBound":0.25,"stopBound":0.125,
               "fields":["wind"],"bytes":3891200,"variant":"vector perspective"}})"));
 }
 
@@ -287,10 +290,12 @@ TEST(Shapes, NumbersThatAreNotFiniteAreNull) {
   FrameInfo info = frame_info();
   info.error_value = std::numeric_limits<double>::quiet_NaN();
   info.jpeg_error = std::numeric_limits<double>::infinity();
+  info.skipped_bound = std::numeric_limits<double>::infinity();
   const std::string json = encode_frame_info(info);
   expect_shape("frameInfo", json);
   EXPECT_TRUE(Json::parse(json)["error"]["value"].is_null());
   EXPECT_TRUE(Json::parse(json)["jpegError"].is_null());
+  EXPECT_TRUE(Json::parse(json)["work"]["skippedBound"].is_null());
 }
 
 TEST(Shapes, TextThatIsNoUtf8IsMendedNotThrown) {

@@ -123,8 +123,9 @@ TEST(ViewDocument, SaysTheLimitAndTheValueInWords) {
             "must be a whole number from 0 to 2147483647, not 3000000000");
   const auto angle = ViewDocument::parse(R"({"camera": {"fovY": 180}})");
   EXPECT_EQ(angle.error().message, "/camera/fovY: must be a number from 0.001 to 179, not 180");
-  const auto method = ViewDocument::parse(R"({"method": {"name": "slab"}})");
-  EXPECT_EQ(method.error().at[0].detail, R"(must be "kernel", not "slab")");
+  const auto method = ViewDocument::parse(R"({"method": {"name": "splat"}})");
+  EXPECT_EQ(method.error().at[0].detail,
+            R"(must be one of "kernel", "slab", "reference", not "splat")");
 }
 
 TEST(ViewDocument, AnAnswerDoesNotRepeatAGiantOrHostileKey) {
