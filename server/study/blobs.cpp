@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
 
 #include "server/base/check.hpp"
 
@@ -40,10 +42,10 @@ std::array<double, 3> flow(double x, double y, double z) {
   return {-swirl * cy, swirl * cx, 0.5 * std::exp(-2 * r2) + 0.15 * std::sin(3 * x)};
 }
 
-data::Axis edge(const char* name) {
+data::Axis edge(std::string name) {
   data::Axis axis;
-  axis.name = name;
-  axis.units = "m";
+  axis.name = std::move(name);
+  axis.units = std::string(1, 'm');
   axis.kind = data::AxisKind::cartesian;
   for (int i = 0; i < blob_samples; ++i) {
     axis.coordinates.push_back((2.0 * i + 1) / blob_samples - 1);
@@ -51,10 +53,10 @@ data::Axis edge(const char* name) {
   return axis;
 }
 
-data::FieldInfo field(const char* name, data::FieldKind kind, std::vector<std::string> components,
-                      const char* units) {
+data::FieldInfo field(std::string name, data::FieldKind kind, std::vector<std::string> components,
+                      const std::string& units) {
   data::FieldInfo info;
-  info.name = name;
+  info.name = std::move(name);
   info.kind = kind;
   info.units = units;
   info.component_units.assign(components.size(), units);

@@ -132,6 +132,7 @@ Knobs own_knobs(const Subject& subject) {
   const bool lines = subject.view.vector.field.kind == protocol::FieldChoice::Kind::named;
   if (!lines && !subject.view.scalars->empty()) knobs.stride = subject.view.scalars->front().stride;
   knobs.span = subject.view.vector.span;
+  knobs.slab_thickness = subject.view.method.slab_thickness;
   knobs.stop_transmittance = subject.view.method.stop_transmittance;
   knobs.width = subject.view.image.width;
   return knobs;
