@@ -34,12 +34,10 @@ struct Size {
 };
 
 // Linear sRGB primaries and D65.
-constexpr std::array<Color, 3> xyz_from_rgb{{{10135552.0 / 24577794, 8788810.0 / 24577794,
-                                              4435075.0 / 24577794},
-                                             {2613072.0 / 12288897, 8788810.0 / 12288897,
-                                              887015.0 / 12288897},
-                                             {1425312.0 / 73733382, 8788810.0 / 73733382,
-                                              70074185.0 / 73733382}}};
+constexpr std::array<Color, 3> xyz_from_rgb{
+    {{10135552.0 / 24577794, 8788810.0 / 24577794, 4435075.0 / 24577794},
+     {2613072.0 / 12288897, 8788810.0 / 12288897, 887015.0 / 12288897},
+     {1425312.0 / 73733382, 8788810.0 / 73733382, 70074185.0 / 73733382}}};
 
 Color times(const std::array<Color, 3>& matrix, const Color& v) {
   Color out{};
@@ -147,9 +145,9 @@ struct Sensitivity {
   double a, b;
 };
 constexpr std::array<std::array<Sensitivity, 2>, 3> sensitivity{
-    {{{{1, 0.0047}, {0, 1e-5}}},           // achromatic
-     {{{1, 0.0053}, {0, 1e-5}}},           // red-green
-     {{{34.1, 0.04}, {13.5, 0.025}}}}};    // blue-yellow
+    {{{{1, 0.0047}, {0, 1e-5}}},         // achromatic
+     {{{1, 0.0053}, {0, 1e-5}}},         // red-green
+     {{{34.1, 0.04}, {13.5, 0.025}}}}};  // blue-yellow
 
 Plane seen(const Plane& in, Size size, const std::array<Sensitivity, 2>& terms) {
   constexpr double pi = std::numbers::pi;
@@ -195,8 +193,8 @@ Features features(const Plane& luminance, Size size) {
   const double sum = sum_of(smooth);
   for (double& v : smooth) v /= sum;
   const auto edge = balanced(sampled(radius, [&](double k) { return -k * gauss(k); }));
-  const auto point = balanced(
-      sampled(radius, [&](double k) { return (k * k / (sigma * sigma) - 1) * gauss(k); }));
+  const auto point =
+      balanced(sampled(radius, [&](double k) { return (k * k / (sigma * sigma) - 1) * gauss(k); }));
   const auto strength = [&](const std::vector<double>& kernel) {
     Plane x = convolve(luminance, size, kernel, smooth);
     const Plane y = convolve(luminance, size, smooth, kernel);
@@ -217,9 +215,9 @@ Seen look_at(std::span<const std::uint8_t> rgb, Size size) {
   for (Plane& plane : opponent) plane.resize(pixels);
   Plane luminance(pixels);
   for (std::size_t i = 0; i < pixels; ++i) {
-    const Color color = ycxcz_from_linear({linear_from_code(rgb[3 * i]),
-                                           linear_from_code(rgb[3 * i + 1]),
-                                           linear_from_code(rgb[3 * i + 2])});
+    const Color color =
+        ycxcz_from_linear({linear_from_code(rgb[3 * i]), linear_from_code(rgb[3 * i + 1]),
+                           linear_from_code(rgb[3 * i + 2])});
     for (std::size_t c = 0; c < 3; ++c) opponent[c][i] = color[c];
     luminance[i] = (color[0] + 16) / 116;
   }
@@ -243,8 +241,8 @@ double redistributed(double e, double e_max) {
 
 }  // namespace
 
-double mean_flip(std::span<const std::uint8_t> reference_rgb, std::span<const std::uint8_t> test_rgb,
-                 int width, int height) {
+double mean_flip(std::span<const std::uint8_t> reference_rgb,
+                 std::span<const std::uint8_t> test_rgb, int width, int height) {
   WINDSPLAT_CHECK(reference_rgb.size() == test_rgb.size() && width > 0 && height > 0);
   WINDSPLAT_CHECK(reference_rgb.size() == 3 * static_cast<std::size_t>(width) * height);
   const Seen a = look_at(reference_rgb, {width, height});

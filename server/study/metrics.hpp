@@ -26,8 +26,8 @@ bool within_unit(std::span<const float> rgba, double slack);
 // Mean of LDR-FLIP (Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG
 // 2020) of two sRGB pictures, 3 bytes a pixel, at 67 pixels a degree: 0 alike, 1 as far apart as
 // can be.
-double mean_flip(std::span<const std::uint8_t> reference_rgb, std::span<const std::uint8_t> test_rgb,
-                 int width, int height);
+double mean_flip(std::span<const std::uint8_t> reference_rgb,
+                 std::span<const std::uint8_t> test_rgb, int width, int height);
 
 // A picture made larger or smaller: bilinear between pixel centres, constant beyond the outer ones.
 std::vector<float> resample(std::span<const float> rgba, int width, int height, int to_width,

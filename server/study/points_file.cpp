@@ -44,8 +44,7 @@ std::string line_of(const std::string& key, const Measurement& m) {
 // Empty for what is no point.
 std::optional<std::pair<std::string, Measurement>> read_line(const std::string& line) {
   std::string key = line.substr(0, line.find(','));
-  if (key.size() != key_digits ||
-      key.find_first_not_of("0123456789abcdef") != std::string::npos) {
+  if (key.size() != key_digits || key.find_first_not_of("0123456789abcdef") != std::string::npos) {
     return std::nullopt;
   }
   std::array<double, numbers> values{};
@@ -133,7 +132,9 @@ Result<void> write_whole(const std::filesystem::path& path, const std::string& b
   }
   std::error_code fault;
   std::filesystem::rename(beside, path, fault);
-  if (fault) return make_error(ErrorKind::internal, "cannot write '" + printable(path.native()) + "': " + fault.message());
+  if (fault)
+    return make_error(ErrorKind::internal,
+                      "cannot write '" + printable(path.native()) + "': " + fault.message());
   return {};
 }
 

@@ -12,8 +12,8 @@ namespace windsplat::study {
 
 namespace {
 
-constexpr int side = 48;           // pixels
-constexpr double seen_cells = 4;   // of the widest, along the picture's side
+constexpr int side = 48;            // pixels
+constexpr double seen_cells = 4;    // of the widest, along the picture's side
 constexpr double margin_cells = 2;  // a footprint reaches 1.37 beyond its sample
 
 // The stretch of a ray inside the box, empty where it passes by.

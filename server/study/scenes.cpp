@@ -142,9 +142,9 @@ Result<scene::Scene> scene_at(const Subject& subject, const Setting& setting) {
   const Knobs& knobs = setting.knobs;
   protocol::View view = subject.view;
   view.image.width = knobs.width;
-  view.image.height = std::max(
-      1, static_cast<int>(std::lround(static_cast<double>(subject.view.image.height) * knobs.width /
-                                      subject.view.image.width)));
+  view.image.height =
+      std::max(1, static_cast<int>(std::lround(static_cast<double>(subject.view.image.height) *
+                                               knobs.width / subject.view.image.width)));
   auto scene = scene::build_scene(view, *subject.dataset);
   if (!scene) return scene.error();
   scene->method = setting.method;

@@ -134,15 +134,15 @@ Result<Stiffness> measure_one(scene::Compositing compositing, double tau,
   alphas.clear();
   for (int i = 0; i < pixels; ++i) alphas.push_back(rgba[4 * static_cast<std::size_t>(i) + 3]);
   out.bounded = outside(out.min, out.max) <= unit_slack;
-  out.diverges = outside(out.layers_min, out.layers_max) >
-                 2 * std::max(outside(out.min, out.max), unit_slack);
+  out.diverges =
+      outside(out.layers_min, out.layers_max) > 2 * std::max(outside(out.min, out.max), unit_slack);
   return out;
 }
 
 }  // namespace
 
 const std::vector<double>& stiffness() {
-  static const std::vector<double> taus{1e-30, 1e-6, 1e-3, 0.1, 0.5, 1, 1.5,
+  static const std::vector<double> taus{1e-30, 1e-6, 1e-3, 0.1, 0.5, 1,   1.5,
                                         2,     3,    10,   50,  1e4, 1e30};
   return taus;
 }

@@ -19,8 +19,8 @@ struct Stiffness {
   double error = 0;  // largest of any channel and line depth, against the exact kernel
   double min = 0;    // over channels and depths
   double max = 0;
-  bool bounded = true;   // within [0, 1] but for 1e-3
-  bool monotone = true;  // alpha no less than at the next smaller tau, at every depth of the line
+  bool bounded = true;    // within [0, 1] but for 1e-3
+  bool monotone = true;   // alpha no less than at the next smaller tau, at every depth of the line
   double layers_min = 0;  // the same of stiff_layers such kernels behind each other
   double layers_max = 0;
   bool diverges = false;  // the layers go further beyond [0, 1] than twice what one kernel does

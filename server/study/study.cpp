@@ -44,8 +44,8 @@ std::string words_of(const Setting& setting) {
   std::string text = name_of(setting.method);
   text += ' ';
   text += name_of(setting.compositing);
-  for (const Knob knob : {Knob::stride, Knob::span, Knob::slab_thickness, Knob::stop_transmittance,
-                          Knob::width}) {
+  for (const Knob knob :
+       {Knob::stride, Knob::span, Knob::slab_thickness, Knob::stop_transmittance, Knob::width}) {
     char number[40];
     std::snprintf(number, sizeof number, " %.17g", value_of(setting.knobs, knob));
     text += number;
@@ -125,9 +125,8 @@ class Study {
     const std::filesystem::path path = truth_path(subject);
     if (auto kept = read_truth(path, scene.width, scene.height)) return std::move(*kept);
     tell(subject, "reference");
-    const auto truth_scene =
-        scene_at(subject, {scene::Method::reference, scene::Compositing::analytic,
-                           own_knobs(subject)});
+    const auto truth_scene = scene_at(
+        subject, {scene::Method::reference, scene::Compositing::analytic, own_knobs(subject)});
     if (!truth_scene) return truth_scene.error();
     const Clock::time_point start = Clock::now();
     auto truth = options_.truth(*truth_scene);
@@ -163,8 +162,8 @@ class Study {
 
   // The truth, every compositing of method kernel, and method slab, at the view's own knobs.
   Result<void> draw_pictures(const Subject& subject, const Picture& truth, SceneReport& scene) {
-    const auto base = scene_at(subject, {scene::Method::kernel, scene::Compositing::analytic,
-                                         own_knobs(subject)});
+    const auto base = scene_at(
+        subject, {scene::Method::kernel, scene::Compositing::analytic, own_knobs(subject)});
     if (!base) return base.error();
     const auto& background = base->background;
     const std::vector<std::uint8_t> true_rgb =

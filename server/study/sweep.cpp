@@ -24,7 +24,7 @@ class Planner {
 
   // A curve from the subject's own knobs with one of them changed.
   template <class T>
-  void curve(Method method, Compositing compositing, Knob knob, T Knobs::* member,
+  void curve(Method method, Compositing compositing, Knob knob, T Knobs::*member,
              const std::vector<T>& values) {
     Curve curve;
     curve.method = method;

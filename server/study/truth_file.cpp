@@ -35,10 +35,9 @@ std::optional<Picture> read_truth(const std::filesystem::path& path, int width, 
 }
 
 Result<void> write_truth(const std::filesystem::path& path, const Picture& picture) {
-  std::vector<double> numbers{static_cast<double>(picture.width),
-                              static_cast<double>(picture.height),
-                              static_cast<double>(picture.pieces),
-                              static_cast<double>(picture.evaluations)};
+  std::vector<double> numbers{
+      static_cast<double>(picture.width), static_cast<double>(picture.height),
+      static_cast<double>(picture.pieces), static_cast<double>(picture.evaluations)};
   numbers.insert(numbers.end(), picture.rgba.begin(), picture.rgba.end());
   std::string bytes(numbers.size() * sizeof(double), '\0');
   std::memcpy(bytes.data(), numbers.data(), bytes.size());
