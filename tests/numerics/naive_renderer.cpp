@@ -4,18 +4,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <tuple>
+
+#include "server/engine/reference/kernels.hpp"
 
 namespace windsplat::naive {
 
 namespace {
 
-using scene::ColorTable;
-using scene::LineColor;
-using scene::ScalarLayer;
+using engine::reference::AxisStop;
+using engine::reference::LayerGroup;
+using engine::reference::ScreenBox;
+using engine::reference::Stop;
+using engine::reference::View;
 using scene::Scene;
-using scene::VectorLayer;
 
 template <class Real>
 using Vec = std::array<Real, 3>;
@@ -42,29 +44,20 @@ std::tuple<bool, int, bool, int> place_in_bricks(int stop, int eye, int count) {
 }
 
 struct AxisStops {
-  std::vector<int> sample;
-  std::vector<double> cell;
+  std::vector<AxisStop> stops;
   int eye = 0;
   std::vector<int> order;  // stops, first drawn first
 };
 
-AxisStops stops_along(const Scene& scene, int a, int stride) {
+AxisStops order_axis(const Scene& scene, int a, const std::vector<AxisStop>& stops) {
   AxisStops axis;
-  const int dim = scene.lattice.dims[a];
-  // A stop stands for `stride` samples, the last one for those that are left.
-  for (int done = 0; done < dim;) {
-    const int group = std::min(stride, dim - done);
-    axis.sample.push_back(done + (group - 1) / 2);
-    double width = 0;
-    for (int n = 0; n < group; ++n) width += scene.lattice.spacing[a][done++];
-    axis.cell.push_back(width);
-  }
-  const int count = static_cast<int>(axis.sample.size());
+  axis.stops = stops;
+  const int count = static_cast<int>(stops.size());
   if (scene.camera.perspective) {
     // The stop whose cell, bounded midway to its neighbours, holds the eye.
     for (int i = 1; i < count; ++i) {
-      const double border = (scene.lattice.positions[a][axis.sample[i - 1]] +
-                             scene.lattice.positions[a][axis.sample[i]]) /
+      const double border = (scene.lattice.positions[a][stops[i - 1].sample] +
+                             scene.lattice.positions[a][stops[i].sample]) /
                             2;
       if (scene.camera.eye[a] >= border) axis.eye = i;
     }
@@ -80,23 +73,17 @@ AxisStops stops_along(const Scene& scene, int a, int stride) {
 
 // Layers of one stride.
 struct Group {
-  int stride = 1;
-  const VectorLayer* lines = nullptr;
-  std::vector<const ScalarLayer*> media;
+  LayerGroup layers;
   std::array<AxisStops, 3> axis;
 };
 
-std::vector<Group> group_layers(const Scene& scene) {
+std::vector<Group> order_groups(const Scene& scene) {
   std::vector<Group> groups;
-  if (scene.vector) groups.push_back({scene.vector->stride, &*scene.vector, {}, {}});
-  for (const ScalarLayer& layer : scene.scalars) {
-    auto same = std::find_if(groups.begin(), groups.end(),
-                             [&](const Group& g) { return g.stride == layer.stride; });
-    if (same == groups.end()) same = groups.insert(same, {layer.stride, nullptr, {}, {}});
-    same->media.push_back(&layer);
-  }
-  for (Group& group : groups) {
-    for (int a = 0; a < 3; ++a) group.axis[a] = stops_along(scene, a, group.stride);
+  for (LayerGroup& layers : engine::reference::group_layers(scene)) {
+    Group group;
+    for (int a = 0; a < 3; ++a) group.axis[a] = order_axis(scene, a, layers.axis[a]);
+    group.layers = std::move(layers);
+    groups.push_back(std::move(group));
   }
   return groups;
 }
@@ -131,8 +118,8 @@ std::vector<Slab> order_slabs(const std::vector<Group>& groups, int major) {
   std::vector<Slab> slabs;
   for (int g = 0; g < static_cast<int>(groups.size()); ++g) {
     const AxisStops& axis = groups[g].axis[major];
-    for (int i = 0; i < static_cast<int>(axis.sample.size()); ++i) {
-      const int ahead = axis.sample[i] - axis.sample[axis.eye];
+    for (int i = 0; i < static_cast<int>(axis.stops.size()); ++i) {
+      const int ahead = axis.stops[i].sample - axis.stops[axis.eye].sample;
       slabs.push_back({ahead < 0, std::abs(ahead), g, i});
     }
   }
@@ -142,62 +129,35 @@ std::vector<Slab> order_slabs(const std::vector<Group>& groups, int major) {
 
 // ---- what is at a stop ----
 
-std::uint32_t pcg_step(std::uint32_t v) { return v * 1664525U + 1013904223U; }
+template <class Real>
+using Line = engine::reference::BasicRibbon<Real>;
 
-std::array<std::uint32_t, 3> pcg3d(std::array<std::uint32_t, 3> v) {
-  for (auto& c : v) c = pcg_step(c);
-  for (int round = 0; round < 2; ++round) {
-    v[0] += v[1] * v[2];
-    v[1] += v[2] * v[0];
-    v[2] += v[0] * v[1];
-    if (round == 0) {
-      for (auto& c : v) c ^= c >> 16U;
-    }
-  }
-  return v;
+template <class Real>
+Vec<Real> cast(const std::array<double, 3>& v) {
+  return {static_cast<Real>(v[0]), static_cast<Real>(v[1]), static_cast<Real>(v[2])};
 }
 
 template <class Real>
-Vec<Real> table_color(const ColorTable& table, Real value) {
-  const auto last = static_cast<Real>(table.entries.size() - 1);
-  const double width = table.range[1] - table.range[0];
-  Real place = 0;
-  if (width > 0) {
-    place = static_cast<Real>((static_cast<double>(value) - table.range[0]) / width) * last;
-  } else if (static_cast<double>(value) > table.range[0]) {
-    place = last;
-  }
-  place = std::clamp(place, Real(0), last);
-  const auto i = static_cast<std::size_t>(place);
-  const auto& a = table.entries[i];
-  const auto& b = table.entries[std::min(i + 1, table.entries.size() - 1)];
-  const Real f = place - static_cast<Real>(i);
-  return {a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2])};
+Line<Real> cast(const engine::reference::Ribbon& from) {
+  Line<Real> line;
+  line.a = cast<Real>(from.a);
+  line.b = cast<Real>(from.b);
+  line.x0 = static_cast<Real>(from.x0);
+  line.y0 = static_cast<Real>(from.y0);
+  line.x1 = static_cast<Real>(from.x1);
+  line.y1 = static_cast<Real>(from.y1);
+  line.q0 = static_cast<Real>(from.q0);
+  line.q1 = static_cast<Real>(from.q1);
+  line.color = cast<Real>(from.color);
+  line.r1 = static_cast<Real>(from.r1);
+  line.r2 = static_cast<Real>(from.r2);
+  line.opacity = static_cast<Real>(from.opacity);
+  line.desaturation = static_cast<Real>(from.desaturation);
+  line.perspective = from.perspective;
+  line.moving = from.moving;
+  line.phase = static_cast<Real>(from.phase);
+  return line;
 }
-
-double extinction(const ScalarLayer& layer, double value) {
-  const auto& points = layer.extinction;
-  if (value < points.front()[0]) return points.front()[1];
-  double rho = points.back()[1];
-  for (std::size_t p = 0; p + 1 < points.size(); ++p) {
-    const double x0 = points[p][0];
-    const double x1 = points[p + 1][0];
-    if (value >= x0 && value < x1) {
-      rho = points[p][1] + (points[p + 1][1] - points[p][1]) * (value - x0) / (x1 - x0);
-    }
-  }
-  return rho;
-}
-
-template <class Real>
-struct Line {
-  bool drawn = false;
-  Vec<Real> a{}, b{};                   // ends in camera axes: right, down, forward
-  Real x0 = 0, y0 = 0, x1 = 0, y1 = 0;  // projected
-  Real q0 = 0, q1 = 0;
-  Vec<Real> color{};
-  Real r1 = 0, r2 = 0, opacity = 0, desaturation = 0;
-};
 
 template <class Real>
 struct Medium {
@@ -210,21 +170,21 @@ template <class Real>
 class Renderer {
  public:
   explicit Renderer(const Scene& scene)
-      : scene_(scene), picture_{scene.camera.width, scene.camera.height, {}} {
+      : scene_(scene),
+        view_(engine::reference::make_view(scene.camera)),
+        picture_{scene.camera.width, scene.camera.height, {}},
+        right_(cast<Real>(view_.right)),
+        down_(cast<Real>(view_.down)),
+        forward_(cast<Real>(view_.forward)),
+        pixel_(static_cast<Real>(view_.pixel)) {
     const auto& c = scene.camera;
-    for (int a = 0; a < 3; ++a) {
-      right_[a] = static_cast<Real>(c.right[a]);
-      down_[a] = static_cast<Real>(-c.up[a]);
-      forward_[a] = static_cast<Real>(c.forward[a]);
-    }
-    pixel_ = static_cast<Real>(2 * c.half_height / c.height);
     const std::size_t pixels = static_cast<std::size_t>(c.width) * c.height;
     picture_.rgba.assign(4 * pixels, 0);
     transmittance_.assign(pixels, 1);
   }
 
   Picture<Real> run() {
-    const std::vector<Group> groups = group_layers(scene_);
+    const std::vector<Group> groups = order_groups(scene_);
     const int major = major_axis(scene_);
     const int u = major == 0 ? 1 : 0;
     const int v = major == 2 ? 1 : 2;
@@ -260,212 +220,58 @@ class Renderer {
     }
   }
 
-  void kernel(const Group& group, const std::array<int, 3>& stop) {
-    std::array<int, 3> sample{};
-    for (int a = 0; a < 3; ++a) {
-      sample[a] = group.axis[a].sample[stop[a]];
-      cell_[a] = static_cast<Real>(group.axis[a].cell[stop[a]]);
-      world_[a] = scene_.lattice.positions[a][sample[a]];
-      from_eye_[a] = static_cast<Real>(world_[a] - scene_.camera.eye[a]);
-    }
-    const double z = (world_[0] - scene_.camera.eye[0]) * scene_.camera.forward[0] +
-                     (world_[1] - scene_.camera.eye[1]) * scene_.camera.forward[1] +
-                     (world_[2] - scene_.camera.eye[2]) * scene_.camera.forward[2];
-    if (scene_.camera.perspective && z < scene_.camera.near) return;
-    centre_ = {dot(right_, from_eye_), dot(down_, from_eye_), dot(forward_, from_eye_)};
-    const std::size_t index = static_cast<std::size_t>(sample[0]) +
-                              static_cast<std::size_t>(scene_.lattice.dims[0]) *
-                                  (static_cast<std::size_t>(sample[1]) +
-                                   static_cast<std::size_t>(scene_.lattice.dims[1]) *
-                                       static_cast<std::size_t>(sample[2]));
+  void kernel(const Group& group, const std::array<int, 3>& stops) {
+    stop_ =
+        engine::reference::make_stop(scene_, view_,
+                                     {group.axis[0].stops[stops[0]], group.axis[1].stops[stops[1]],
+                                      group.axis[2].stops[stops[2]]});
+    if (!stop_.has_cell || (view_.perspective && stop_.centre[2] < view_.near)) return;
+    cell_ = cast<Real>(stop_.cell);
+    from_eye_ = cast<Real>(stop_.from_eye);
+    centre_ = cast<Real>(stop_.centre);
+    for (int a = 0; a < 3; ++a) inverse_[a] = cast<Real>(stop_.inverse[a]);
     Line<Real> line;
+    bool drawn = false;
+    if (group.layers.lines != nullptr) {
+      const auto ribbon = engine::reference::make_ribbon(scene_, view_, *group.layers.lines, stop_);
+      drawn = ribbon.has_value();
+      if (drawn) line = cast<Real>(*ribbon);
+    }
     Medium<Real> medium;
-    if (group.lines != nullptr) line = make_line(*group.lines, sample, index);
-    if (!group.media.empty()) medium = make_medium(group, index);
-    if (line.drawn || medium.drawn) composite(line, medium);
+    if (!group.layers.media.empty()) medium = make_medium(group);
+    if (drawn || medium.drawn) composite(drawn ? &line : nullptr, medium);
   }
 
-  Line<Real> make_line(const VectorLayer& layer, const std::array<int, 3>& sample,
-                       std::size_t index) {
-    Line<Real> line;
-    std::array<double, 3> data{};
-    for (int c = 0; c < layer.field->components; ++c) data[c] = layer.field->component(c)[index];
-    if (std::isnan(data[0])) return line;
-    const double m = std::hypot(data[0], data[1], data[2]);
-    if (m < layer.min_magnitude || m == 0) return line;
-    std::array<double, 3> d{};
-    for (int c = 0; c < 3; ++c) d[c] = data[c] / m * layer.scale[c];
-    if (!layer.rate_x.empty()) {
-      d[0] *= layer.rate_x[sample[1]];
-      d[1] *= layer.rate_y;
-      d[2] *= layer.rate_z[sample[2]];
-    }
-    const double norm = std::hypot(d[0], d[1], d[2]);
-    if (norm == 0) return line;
-    const double length = layer.length * std::clamp(m / layer.magnitude_range[1], 0.0, 1.0);
-    // Jitter, then the box about the moved kernel.
-    const auto key = pcg3d({layer.seed, layer.epoch, 0x9e3779b9U});
-    const auto h = pcg3d({static_cast<std::uint32_t>(sample[0]) + key[0],
-                          static_cast<std::uint32_t>(sample[1]) + key[1],
-                          static_cast<std::uint32_t>(sample[2]) + key[2]});
-    const auto h2 = pcg3d(h);
-    Vec<Real> offset{}, extent{};
-    Real low = Real(-0.5), high = Real(0.5);
-    for (int a = 0; a < 3; ++a) {
-      const double us = static_cast<double>(h[a] >> 8U) / 16777216.0 - 0.5;
-      const double uc = static_cast<double>(h2[a] >> 8U) / 16777216.0 - 0.5;
-      const Real inside = static_cast<Real>(layer.jitter_center * uc) * cell_[a];
-      offset[a] = inside + static_cast<Real>(layer.jitter_stride * us) * cell_[a];
-      extent[a] = static_cast<Real>(d[a] / norm * length);
-      const Real half = static_cast<Real>((layer.overlap ? layer.span : 1.0) / 2) * cell_[a];
-      if (std::abs(extent[a]) > Real(1e-30)) {
-        const Real p = (-half - inside) / extent[a];
-        const Real q = (half - inside) / extent[a];
-        low = std::max(low, std::min(p, q));
-        high = std::min(high, std::max(p, q));
-      } else if (std::abs(inside) > half) {
-        return line;
-      }
-    }
-    const Vec<Real> p{centre_[0] + dot(right_, offset), centre_[1] + dot(down_, offset),
-                      centre_[2] + dot(forward_, offset)};
-    const Vec<Real> v{dot(right_, extent), dot(down_, extent), dot(forward_, extent)};
-    offset_ = offset;
-    return finish_line(layer, line, p, v, low, high, m, d[2] / norm);
-  }
-
-  Line<Real> finish_line(const VectorLayer& layer, Line<Real> line, const Vec<Real>& p,
-                         const Vec<Real>& v, Real low, Real high, double m, double rise) {
-    const auto near = static_cast<Real>(scene_.camera.near);
-    if (scene_.camera.perspective) {
-      if (v[2] > 0) low = std::max(low, (near - p[2]) / v[2]);
-      if (v[2] < 0) high = std::min(high, (near - p[2]) / v[2]);
-      if (v[2] == 0 && p[2] < near) return line;
-    }
-    if (low > high) return line;
-    line.drawn = true;
-    line.q0 = low;
-    line.q1 = high;
-    for (int c = 0; c < 3; ++c) {
-      line.a[c] = p[c] + low * v[c];
-      line.b[c] = p[c] + high * v[c];
-    }
-    if (scene_.camera.perspective) {
-      line.a[2] = std::max(line.a[2], near);
-      line.b[2] = std::max(line.b[2], near);
-    }
-    project(line.a, line.x0, line.y0);
-    project(line.b, line.x1, line.y1);
-    line.r1 = static_cast<Real>(layer.r1);
-    line.r2 = static_cast<Real>(layer.r2);
-    line.opacity = static_cast<Real>(layer.opacity);
-    line.desaturation = static_cast<Real>(layer.head_desaturation);
-    line.color = line_color(layer, p[2], m, rise);
-    return line;
-  }
-
-  void project(const Vec<Real>& p, Real& x, Real& y) const {
-    const Real z = scene_.camera.perspective ? p[2] : Real(1);
-    x = picture_.width / Real(2) + p[0] / (z * pixel_);
-    y = picture_.height / Real(2) + p[1] / (z * pixel_);
-  }
-
-  Vec<Real> line_color(const VectorLayer& layer, Real view_distance, double m, double rise) {
-    const double z = world_[2] + static_cast<double>(offset_[2]);
-    const double height =
-        (z - scene_.lattice.box_min.z) / (scene_.lattice.box_max.z - scene_.lattice.box_min.z);
-    double value = 0;
-    if (layer.color_by == LineColor::world_z) value = z;
-    if (layer.color_by == LineColor::screen_z) value = static_cast<double>(view_distance);
-    if (layer.color_by == LineColor::magnitude) value = m;
-    if (layer.color_by == LineColor::rise) {
-      value = (1 - layer.rise_weight) * height + layer.rise_weight * (0.5 + 0.5 * rise);
-    }
-    Vec<Real> color = table_color(layer.color, static_cast<Real>(value));
-    const auto part = [](double at, double from, double to) {
-      return std::clamp((at - from) / (to - from), 0.0, 1.0);
-    };
-    const double strong = part(m, layer.magnitude_range[0], layer.magnitude_range[1]);
-    const double far =
-        part(static_cast<double>(view_distance), scene_.depth_cue.near, scene_.depth_cue.far);
-    const double dim =
-        (1 - layer.magnitude_intensity * (1 - strong)) * (1 - scene_.depth_cue.strength * far);
-    for (Real& c : color) c *= static_cast<Real>(dim);
-    return color;
-  }
-
-  Medium<Real> make_medium(const Group& group, std::size_t index) const {
-    Medium<Real> medium;
+  // A splat below every layer's tolerance, over all view directions, is left out.
+  Medium<Real> make_medium(const Group& group) const {
+    const auto density = engine::reference::make_density(group.layers.media, stop_);
+    if (density.rho <= 0) return {};
     double tolerance = 1e300;
-    for (const ScalarLayer* layer : group.media) {
+    for (const auto* layer : group.layers.media) {
       tolerance = std::min(tolerance, layer->min_optical_depth);
-      const double value = layer->field->values[index];
-      if (std::isnan(value)) continue;
-      const auto rho = static_cast<Real>(std::min(extinction(*layer, value), 1e30));
-      if (rho <= 0) continue;
-      medium.rho += rho;
-      const Vec<Real> color = table_color(layer->color, static_cast<Real>(value));
-      for (int c = 0; c < 3; ++c) medium.color[c] += rho * color[c];
     }
-    if (medium.rho <= 0) return {};
-    for (Real& c : medium.color) c /= medium.rho;
-    const Real widest = std::max({cell_[0], cell_[1], cell_[2]});
-    medium.drawn = static_cast<double>(medium.rho * widest) / 1.4476982547 >= tolerance;
-    return medium;
+    double widest = 0;
+    for (const auto& edge : stop_.edge) widest = std::max(widest, std::sqrt(dot(edge, edge)));
+    return {density.rho * widest / engine::reference::footprint_integral >= tolerance,
+            static_cast<Real>(density.rho), cast<Real>(density.color)};
   }
 
-  struct Box {
-    Real x0, x1, y0, y1;
-  };
-
-  // The silhouette of the ellipsoid of radius t cells: M = v v^T - t^2 A A^T.
-  Box splat_box() const {
-    const Real t2 = Real(1.37 * 1.37);
-    const auto s = [&](const Vec<Real>& p, const Vec<Real>& q) {
-      Real sum = 0;
-      for (int a = 0; a < 3; ++a) sum += p[a] * q[a] * cell_[a] * cell_[a];
-      return t2 * sum;
-    };
-    const Real w = picture_.width;
-    const Real h = picture_.height;
-    if (!scene_.camera.perspective) {
-      const Real x = w / 2 + centre_[0] / pixel_;
-      const Real y = h / 2 + centre_[1] / pixel_;
-      const Real dx = std::sqrt(s(right_, right_)) / pixel_;
-      const Real dy = std::sqrt(s(down_, down_)) / pixel_;
-      return {x - dx, x + dx, y - dy, y + dy};
-    }
-    const Real m33 = centre_[2] * centre_[2] - s(forward_, forward_);
-    if (m33 <= 0) return {0, w, 0, h};
-    const auto range = [&](int c, const Vec<Real>& axis, Real middle, Real& low, Real& high) {
-      const Real m11 = centre_[c] * centre_[c] - s(axis, axis);
-      const Real m13 = centre_[c] * centre_[2] - s(axis, forward_);
-      const Real root = std::sqrt(std::max(m13 * m13 - m11 * m33, Real(0)));
-      low = middle + (m13 - root) / m33 / pixel_;
-      high = middle + (m13 + root) / m33 / pixel_;
-    };
-    Box box{};
-    range(0, right_, w / 2, box.x0, box.x1);
-    range(1, down_, h / 2, box.y0, box.y1);
-    return box;
-  }
-
-  Box kernel_box(const Line<Real>& line, const Medium<Real>& medium) const {
-    Box box{Real(1e30), Real(-1e30), Real(1e30), Real(-1e30)};
-    if (medium.drawn) box = splat_box();
-    if (line.drawn) {
-      box.x0 = std::min(box.x0, std::min(line.x0, line.x1) - line.r2);
-      box.x1 = std::max(box.x1, std::max(line.x0, line.x1) + line.r2);
-      box.y0 = std::min(box.y0, std::min(line.y0, line.y1) - line.r2);
-      box.y1 = std::max(box.y1, std::max(line.y0, line.y1) + line.r2);
+  ScreenBox kernel_box(const Line<Real>* line, const Medium<Real>& medium) const {
+    ScreenBox box{1e30, -1e30, 1e30, -1e30};
+    if (medium.drawn) box = engine::reference::splat_box(view_, stop_);
+    if (line != nullptr) {
+      box.x0 = std::min<double>(box.x0, std::min(line->x0, line->x1) - line->r2);
+      box.x1 = std::max<double>(box.x1, std::max(line->x0, line->x1) + line->r2);
+      box.y0 = std::min<double>(box.y0, std::min(line->y0, line->y1) - line->r2);
+      box.y1 = std::max<double>(box.y1, std::max(line->y0, line->y1) + line->r2);
     }
     return box;
   }
 
-  void composite(const Line<Real>& line, const Medium<Real>& medium) {
-    const Box box = kernel_box(line, medium);
-    const auto bound = [](Real v, int size) {
-      return static_cast<int>(std::clamp(v, Real(0), static_cast<Real>(size)));
+  void composite(const Line<Real>* line, const Medium<Real>& medium) {
+    const ScreenBox box = kernel_box(line, medium);
+    const auto bound = [](double v, int size) {
+      return static_cast<int>(std::clamp<double>(v, 0, size));
     };
     const int x0 = bound(std::floor(box.x0 - 1), picture_.width);
     const int x1 = bound(std::ceil(box.x1 + 1), picture_.width);
@@ -482,14 +288,14 @@ class Renderer {
     return r < t ? (t - r) * (t - r) / (t * (t - s)) : Real(0);
   }
 
-  void pixel(const Line<Real>& line, const Medium<Real>& medium, int x, int y) {
+  void pixel(const Line<Real>* line, const Medium<Real>& medium, int x, int y) {
     const Real X = (x + Real(0.5) - picture_.width / Real(2)) * pixel_;
     const Real Y = (y + Real(0.5) - picture_.height / Real(2)) * pixel_;
     Vec<Real> ray = forward_;  // forward component 1
     if (scene_.camera.perspective) {
       for (int a = 0; a < 3; ++a) ray[a] += X * right_[a] + Y * down_[a];
     }
-    const Vec<Real> d{ray[0] / cell_[0], ray[1] / cell_[1], ray[2] / cell_[2]};
+    const Vec<Real> d = to_cells(ray);
     const Real cells = std::sqrt(dot(d, d));
     Real tau = 0;
     if (medium.drawn) {
@@ -498,45 +304,25 @@ class Renderer {
       for (int a = 0; a < 3; ++a) {
         Real from = from_eye_[a];
         if (!scene_.camera.perspective) from -= X * right_[a] + Y * down_[a];
-        o[a] = from / cell_[a];
+        o[a] = from;
       }
-      const Vec<Real> c = cross(o, d);
+      const Vec<Real> c = cross(to_cells(o), d);
       const Real r = std::sqrt(dot(c, c)) / cells;
       tau = medium.rho * footprint(r) * std::sqrt(dot(ray, ray)) / (Real(1.4476982547) * cells);
     }
-    Real opacity = 0, tf = 0;
-    Vec<Real> color{};
-    if (line.drawn) line_at(line, x, y, cells, tau, opacity, tf, color);
-    if (tau == 0 && opacity == 0) return;
-    add(static_cast<std::size_t>(y) * picture_.width + x, tau, opacity, tf, medium.color, color);
+    Real tf = 0;
+    engine::reference::RibbonHit<Real> hit;
+    if (line != nullptr) hit = hit_ribbon(*line, x + Real(0.5), y + Real(0.5));
+    if (tau == 0 && hit.opacity == 0) return;
+    const Real place = std::clamp(Real(0.5) + (hit.depth - centre_[2]) * cells, Real(0), Real(1));
+    if (hit.opacity > 0 && place > 0) tf = tau * place;
+    add(static_cast<std::size_t>(y) * picture_.width + x, tau, hit.opacity, tf, medium.color,
+        hit.color);
   }
 
-  void line_at(const Line<Real>& line, int x, int y, Real cells, Real tau, Real& opacity, Real& tf,
-               Vec<Real>& color) const {
-    const Real ux = line.x1 - line.x0;
-    const Real uy = line.y1 - line.y0;
-    const Real px = x + Real(0.5) - line.x0;
-    const Real py = y + Real(0.5) - line.y0;
-    const Real eps = Real(1e-6) * line.r2;
-    const Real w = Real(0.5) + std::clamp(((px - ux / 2) * ux + (py - uy / 2) * uy) /
-                                              std::max(ux * ux + uy * uy, eps * eps),
-                                          Real(-0.5), Real(0.5));
-    const Real distance = std::hypot(px - w * ux, py - w * uy);
-    if (distance >= line.r2) return;
-    opacity =
-        line.opacity * (distance <= line.r1 ? Real(1) : (line.r2 - distance) / (line.r2 - line.r1));
-    Real f = w;
-    if (scene_.camera.perspective) {
-      const Real inverse_z = (1 - w) / line.a[2] + w / line.b[2];
-      f = w / line.b[2] / inverse_z;
-    }
-    const Real q = line.q0 + f * (line.q1 - line.q0);
-    const Real z = line.a[2] + f * (line.b[2] - line.a[2]);
-    const Real grey = line.desaturation * (q + Real(0.5));
-    const Real top = std::max({line.color[0], line.color[1], line.color[2]});
-    for (int c = 0; c < 3; ++c) color[c] = line.color[c] + grey * (top - line.color[c]);
-    const Real place = std::clamp(Real(0.5) + (z - centre_[2]) * cells, Real(0), Real(1));
-    tf = place > 0 ? tau * place : Real(0);
+  Vec<Real> to_cells(const Vec<Real>& v) const {
+    if (!scene_.lattice.places) return {v[0] / cell_[0], v[1] / cell_[1], v[2] / cell_[2]};
+    return {dot(inverse_[0], v), dot(inverse_[1], v), dot(inverse_[2], v)};
   }
 
   // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tf) (c_v - c_s), `over` front to back.
@@ -552,13 +338,15 @@ class Renderer {
   }
 
   const Scene& scene_;
+  View view_;
   Picture<Real> picture_;
   std::vector<Real> transmittance_;
   Vec<Real> right_{}, down_{}, forward_{};
   Real pixel_ = 1;
   // The kernel at hand.
-  Vec<Real> cell_{}, from_eye_{}, centre_{}, offset_{};
-  std::array<double, 3> world_{};
+  Stop stop_;
+  Vec<Real> cell_{}, from_eye_{}, centre_{};
+  std::array<Vec<Real>, 3> inverse_{};
 };
 
 }  // namespace

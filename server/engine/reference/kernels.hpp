@@ -1,0 +1,164 @@
+// Scene -> where kernels stop, and the line and the splat of each stop, in double precision. The
+// reference and the naive renderer of the tests both draw these.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "server/scene/scene.hpp"
+
+namespace windsplat::engine::reference {
+
+using Vec = std::array<double, 3>;
+
+inline double dot(const Vec& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+inline Vec cross(const Vec& a, const Vec& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+// The splat's footprint (Max 1991): g and its integral over the plane, radii in cells.
+constexpr double footprint_s = 0.48;
+constexpr double footprint_t = 1.37;
+constexpr double footprint_integral = 1.4476982547;
+
+// The camera's axes in the world; pixel: a pixel's size, at unit distance in perspective.
+struct View {
+  Vec eye{}, right{}, down{}, forward{};
+  double pixel = 1;
+  double near = 0;
+  double half_width = 0, half_height = 0;  // pixels
+  bool perspective = true;
+};
+View make_view(const scene::Camera& camera);
+
+// A stop along one axis, for `samples` samples of which it has the middle one's place (the lower of
+// two); cell: their spacings together, world units. A slice has one stop along its axis.
+struct AxisStop {
+  int sample = 0;
+  int samples = 1;
+  double cell = 0;
+};
+std::vector<AxisStop> axis_stops(const scene::Scene& scene, int axis, int stride);
+
+// Layers of one stride share their stops.
+struct LayerGroup {
+  int stride = 1;
+  const scene::VectorLayer* lines = nullptr;
+  std::vector<const scene::ScalarLayer*> media;
+  std::array<std::vector<AxisStop>, 3> axis;
+};
+std::vector<LayerGroup> group_layers(const scene::Scene& scene);  // the one with lines first
+
+struct Stop {
+  std::array<int, 3> sample{};
+  std::size_t index = 0;         // of its sample in a field
+  Vec from_eye{};                // world axes
+  Vec centre{};                  // the same along right, down, forward
+  std::array<Vec, 3> edge{};     // of its cell: the columns of A, world units
+  std::array<Vec, 3> inverse{};  // the rows of A^-1
+  Vec cell{};                    // of the unbent lattice
+  bool has_cell = true;          // its edges span a volume: not so at a globe's pole
+
+  [[nodiscard]] Vec to_cells(const Vec& v) const {
+    return {dot(inverse[0], v), dot(inverse[1], v), dot(inverse[2], v)};
+  }
+};
+// A stop without a cell has neither line nor splat.
+Stop make_stop(const scene::Scene& scene, const View& view, const std::array<AxisStop, 3>& stops);
+
+// A line as it is seen: ends in camera axes (right, down, forward) and on the screen in pixels, q
+// at both ends (from -1/2 at the whole line's tail to 1/2 at its head), straight linear colour.
+template <class Real>
+struct BasicRibbon {
+  std::array<Real, 3> a{}, b{};
+  Real x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  Real q0 = 0, q1 = 0;
+  std::array<Real, 3> color{};
+  Real r1 = 0, r2 = 0, opacity = 0, desaturation = 0;
+  bool perspective = false;
+  bool moving = false;
+  Real phase = 0;
+};
+using Ribbon = BasicRibbon<double>;
+
+// What a pixel at (x, y) sees of a ribbon; opacity 0: nothing.
+template <class Real>
+struct RibbonHit {
+  Real opacity = 0;
+  Real depth = 0;
+  std::array<Real, 3> color{};
+};
+
+template <class Real>
+RibbonHit<Real> hit_ribbon(const BasicRibbon<Real>& line, Real x, Real y) {
+  const Real ux = line.x1 - line.x0;
+  const Real uy = line.y1 - line.y0;
+  const Real px = x - line.x0;
+  const Real py = y - line.y0;
+  const Real eps = Real(1e-6) * line.r2;
+  const Real w = Real(0.5) + std::clamp(((px - ux / 2) * ux + (py - uy / 2) * uy) /
+                                            std::max(ux * ux + uy * uy, eps * eps),
+                                        Real(-0.5), Real(0.5));
+  const Real distance = std::hypot(px - w * ux, py - w * uy);
+  RibbonHit<Real> hit;
+  if (distance >= line.r2) return hit;
+  hit.opacity =
+      line.opacity * (distance <= line.r1 ? Real(1) : (line.r2 - distance) / (line.r2 - line.r1));
+  Real f = w;
+  if (line.perspective) {
+    const Real inverse_z = (1 - w) / line.a[2] + w / line.b[2];
+    f = w / line.b[2] / inverse_z;
+  }
+  const Real q = line.q0 + f * (line.q1 - line.q0);
+  hit.depth = line.a[2] + f * (line.b[2] - line.a[2]);
+  if (line.moving) {
+    const Real turn = q + Real(0.5) - line.phase;
+    hit.opacity *= 1 - std::abs(2 * (turn - std::floor(turn)) - 1);
+  }
+  const Real grey = line.desaturation * (q + Real(0.5));
+  const Real top = std::max({line.color[0], line.color[1], line.color[2]});
+  for (int c = 0; c < 3; ++c) hit.color[c] = line.color[c] + grey * (top - line.color[c]);
+  return hit;
+}
+
+// Empty: masked, below min_magnitude, without a direction, outside its box or before the near
+// plane. On a curved lattice a vector's components are along its cell's edges.
+std::optional<Ribbon> make_ribbon(const scene::Scene& scene, const View& view,
+                                  const scene::VectorLayer& layer, const Stop& stop);
+
+// rho per world unit and straight linear colour, of all layers together; rho 0: no splat.
+struct Density {
+  double rho = 0;
+  Vec color{};
+};
+Density make_density(const std::vector<const scene::ScalarLayer*>& layers, const Stop& stop);
+
+// Where on the screen something may be seen, pixels.
+struct ScreenBox {
+  double x0 = 0, x1 = 0, y0 = 0, y1 = 0;
+};
+// The silhouette of a splat: of the ellipsoid whose radius is 1.37 cells. All of the screen if it
+// reaches the eye's plane.
+ScreenBox splat_box(const View& view, const Stop& stop);
+ScreenBox ribbon_box(const Ribbon& line);
+
+// A splat along rays.
+struct Splat {
+  Vec from_eye{};
+  std::array<Vec, 3> inverse{};
+  double rho = 0;
+  Vec color{};
+};
+
+struct Kernels {
+  std::vector<Splat> splats;
+  std::vector<ScreenBox> splat_boxes;
+  std::vector<Ribbon> ribbons;
+};
+Kernels list_kernels(const scene::Scene& scene, const View& view);
+
+}  // namespace windsplat::engine::reference

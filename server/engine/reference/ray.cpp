@@ -1,0 +1,147 @@
+// The rule on one piece: samples -> light and a bound of its error.
+#include "server/engine/reference/ray.hpp"
+
+#include <numbers>
+
+#include "server/base/check.hpp"
+
+namespace windsplat::engine::reference {
+
+namespace {
+
+// P_n and its derivative at x in [-1, 1].
+struct Legendre {
+  double value = 1;
+  double slope = 0;
+};
+
+Legendre legendre(int n, double x) {
+  if (n == 0) return {1, 0};
+  double before = 1;
+  double here = x;
+  for (int k = 1; k < n; ++k) {
+    const double next = ((2 * k + 1) * x * here - k * before) / (k + 1);
+    before = here;
+    here = next;
+  }
+  return {here, n * (x * here - before) / (x * x - 1)};
+}
+
+// z(w) = w^2 (3 - 2 w) maps [0, 1] onto itself; x^(3/2) at either end becomes smooth in w.
+double graded(double w) { return w * w * (3 - 2 * w); }
+double grading(double w) { return 6 * w * (1 - w); }
+
+}  // namespace
+
+Rule make_rule(int nodes) {
+  WINDSPLAT_CHECK(nodes >= 2 && nodes <= rule_nodes_max);
+  Rule rule;
+  rule.nodes = nodes;
+  std::array<double, rule_nodes_max> x{};  // in (-1, 1)
+  std::array<double, rule_nodes_max> gauss{};
+  for (int j = 0; j < nodes; ++j) {
+    x[j] = -std::cos(std::numbers::pi * (j + 0.75) / (nodes + 0.5));
+    for (int step = 0; step < 20; ++step) {
+      const Legendre p = legendre(nodes, x[j]);
+      x[j] -= p.value / p.slope;
+    }
+    const double slope = legendre(nodes, x[j]).slope;
+    gauss[j] = 1 / ((1 - x[j] * x[j]) * slope * slope);
+    const double w = 0.5 * (1 + x[j]);
+    rule.node[j] = graded(w);
+    rule.weight[j] = gauss[j] * grading(w);
+  }
+  for (int k = 0; k < nodes; ++k) {
+    // The interpolant through node k alone is gauss_k sum_n (2 n + 1) P_n(x_k) P_n, and the
+    // integral of (2 n + 1) P_n up to x is P_{n+1} - P_{n-1}.
+    for (int j = 0; j < nodes; ++j) {
+      double sum = 0.5 * (1 + x[j]);
+      for (int n = 1; n < nodes; ++n) {
+        const double rise = legendre(n + 1, x[j]).value - legendre(n - 1, x[j]).value;
+        sum += 0.5 * legendre(n, x[k]).value * rise;
+      }
+      rule.before[j][k] = gauss[k] * sum * grading(0.5 * (1 + x[k]));
+    }
+    for (int m = 0; m < 2; ++m) {
+      const int n = nodes - 1 - m;
+      rule.highest[m][k] = (2 * n + 1) * rule.weight[k] * legendre(n, x[k]).value;
+    }
+  }
+  return rule;
+}
+
+namespace {
+
+// Gauss' rule sees twice the degree that its nodes interpolate, so where coefficients decay
+// geometrically its error is the square of the interpolant's; where they do not, as large as it.
+double unseen(const Rule& rule, const std::array<double, rule_nodes_max>& f) {
+  constexpr double safety = 8;
+  double last = 0;
+  double before = 0;
+  double most = 0;
+  for (int j = 0; j < rule.nodes; ++j) {
+    last += rule.highest[0][j] * f[j];
+    before += rule.highest[1][j] * f[j];
+    most = std::max(most, rule.weight[j] * std::abs(f[j]));
+  }
+  const double high = std::max(std::abs(last), std::abs(before));
+  return high == 0 ? 0 : high * std::min(1.0, safety * high / most);
+}
+
+}  // namespace
+
+PieceLight piece_light(const Rule& rule, double length, const Samples& samples) {
+  PieceLight piece;
+  std::array<double, rule_nodes_max> seen{};  // transmittance down to each node
+  double tau = 0;
+  double densest = 0;
+  int thick = 0;  // the node that gives the piece its colour
+  for (int j = 0; j < rule.nodes; ++j) {
+    tau += rule.weight[j] * samples.extinction[j];
+    double front = 0;
+    for (int k = 0; k < rule.nodes; ++k) front += rule.before[j][k] * samples.extinction[k];
+    seen[j] = std::exp(-length * std::max(front, 0.0));
+    if (samples.extinction[j] * seen[j] > densest) {
+      densest = samples.extinction[j] * seen[j];
+      thick = j;
+    }
+  }
+  if (tau <= 0) return piece;
+  tau *= length;
+  piece.transmitted = std::exp(-tau);
+  piece.alpha = -std::expm1(-tau);
+  // What the rule does not see of tau changes the absorbed part by e^-tau times as much.
+  const double tau_error = length * unseen(rule, samples.extinction);
+  const double absorbed_error = std::min(piece.transmitted * tau_error, 1.0);
+  // The light of one colour is exact; only what departs from it is left to the rule.
+  for (int c = 0; c < 3; ++c) {
+    const auto& emission = samples.emission[c];
+    const double dense = samples.extinction[thick];
+    const double color = dense > 0 ? emission[thick] / dense : 0;
+    std::array<double, rule_nodes_max> rest{};
+    double sum = 0;
+    double spread = 0;  // no mixture of the colours here is farther from this one
+    double brightest = std::abs(color);
+    for (int j = 0; j < rule.nodes; ++j) {
+      const double rho = samples.extinction[j];
+      const double departs = emission[j] - color * rho;
+      rest[j] = departs * seen[j];
+      sum += rule.weight[j] * rest[j];
+      if (rho > 0) {
+        spread = std::max(spread, std::abs(departs) / rho);
+        brightest = std::max(brightest, std::abs(emission[j]) / rho);
+      }
+    }
+    // The transmittances under the integral err with tau, too.
+    const double by_tau = spread * piece.alpha * std::min(tau_error, 1.0);
+    const double by_rule = length * unseen(rule, rest) + by_tau;
+    const double by_color = spread * piece.alpha;
+    const bool resolved = by_rule < by_color;
+    piece.rgb[c] = color * piece.alpha + (resolved ? length * sum : 0);
+    piece.error = std::max(piece.error, std::min(by_rule, by_color) + brightest * absorbed_error);
+  }
+  piece.error = std::max(piece.error, absorbed_error);
+  return piece;
+}
+
+}  // namespace windsplat::engine::reference

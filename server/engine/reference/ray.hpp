@@ -1,0 +1,133 @@
+// The light along one ray: a medium given as a function of depth, and sheets (lines) in it.
+//
+// A piece of the ray is integrated by Gauss' rule on nodes that crowd quadratically towards both
+// ends, because the splat kernel ends like distance^(3/2); optical depths at the nodes come from
+// the same nodes (collocation). A piece whose error bound is too large is bisected.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace windsplat::engine::reference {
+
+constexpr int rule_nodes_max = 8;
+
+// Nodes in (0, 1) of a piece, none at its ends; weights sum to 1.
+struct Rule {
+  int nodes = 0;
+  std::array<double, rule_nodes_max> node{};
+  std::array<double, rule_nodes_max> weight{};
+  // The share of node k in the integral up to node j.
+  std::array<std::array<double, rule_nodes_max>, rule_nodes_max> before{};
+  // The integrand's last two Legendre coefficients: their size bounds what the rule cannot see.
+  std::array<std::array<double, rule_nodes_max>, 2> highest{};
+};
+
+// 2 to 8 nodes. Order of the global error in the piece's length h for a smooth medium: h^4 with 6.
+Rule make_rule(int nodes = 6);
+
+// A medium at the nodes of a piece: extinction and emission (extinction times straight colour) per
+// unit of depth.
+struct Samples {
+  std::array<double, rule_nodes_max> extinction{};
+  std::array<std::array<double, rule_nodes_max>, 3> emission{};
+};
+
+// What has come together so far, front to back: premultiplied colour.
+struct Light {
+  std::array<double, 3> rgb{};
+  double alpha = 0;
+  double transmittance = 1;
+};
+
+// A sheet across the ray.
+struct Sheet {
+  double depth = 0;
+  double opacity = 0;
+  std::array<double, 3> color{};
+};
+
+struct RayCount {
+  std::int64_t pieces = 0;
+  std::int64_t evaluations = 0;
+};
+
+// One piece of the medium alone, in front of a black background. error: a bound of |dI| + |dA|.
+struct PieceLight {
+  double alpha = 0;
+  double transmitted = 1;
+  std::array<double, 3> rgb{};
+  double error = 0;
+};
+PieceLight piece_light(const Rule& rule, double length, const Samples& samples);
+
+// Behind this much of nothing, nothing is seen.
+constexpr double transmittance_least = 1e-16;
+
+inline void cross_sheet(const Sheet& sheet, Light& light) {
+  const double seen = light.transmittance * sheet.opacity;
+  for (int c = 0; c < 3; ++c) light.rgb[c] += seen * sheet.color[c];
+  light.alpha += seen;
+  light.transmittance *= 1 - sheet.opacity;
+}
+
+// From `from` to `to`, to an error of about `tolerance`; infinite: one piece, never bisected.
+// medium(const double* depth, int count, Samples&) fills the first `count` of each.
+template <class Medium>
+void integrate_piece(const Rule& rule, const Medium& medium, double from, double to,
+                     double tolerance, Light& light, RayCount& count) {
+  if (light.transmittance < transmittance_least) return;
+  std::array<double, rule_nodes_max> depth{};
+  for (int j = 0; j < rule.nodes; ++j) depth[j] = from + (to - from) * rule.node[j];
+  Samples samples;
+  medium(depth.data(), rule.nodes, samples);
+  count.evaluations += rule.nodes;
+  const PieceLight piece = piece_light(rule, to - from, samples);
+  const double middle = 0.5 * (from + to);
+  // No shorter than depths can be told apart.
+  const bool divisible = middle > from && middle < to;
+  if (light.transmittance * piece.error > tolerance && divisible) {
+    integrate_piece(rule, medium, from, middle, 0.5 * tolerance, light, count);
+    integrate_piece(rule, medium, middle, to, 0.5 * tolerance, light, count);
+    return;
+  }
+  ++count.pieces;
+  for (int c = 0; c < 3; ++c) light.rgb[c] += light.transmittance * piece.rgb[c];
+  light.alpha += light.transmittance * piece.alpha;
+  light.transmittance *= piece.transmitted;
+}
+
+// A whole ray: `breaks` are the depths where the medium begins, ends or is not smooth, `sheets` cut
+// it too; both ascend. medium.begin(from, to) is called before each piece, in ascending order.
+template <class Medium>
+Light integrate_ray(const Rule& rule, Medium& medium, const std::vector<double>& breaks,
+                    const std::vector<Sheet>& sheets, double tolerance, RayCount& count) {
+  Light light;
+  const std::size_t cuts = breaks.size() + sheets.size();
+  const double share = tolerance / static_cast<double>(std::max<std::size_t>(cuts, 1));
+  std::size_t b = 0;
+  std::size_t s = 0;
+  double from = 0;
+  for (std::size_t done = 0; done < cuts; ++done) {
+    const bool sheet = s < sheets.size() && (b == breaks.size() || sheets[s].depth <= breaks[b]);
+    const double to = sheet ? sheets[s].depth : breaks[b];
+    // Before the first break and after the last one there is no medium.
+    if (b > 0 && b < breaks.size() && to > from) {
+      medium.begin(from, to);
+      integrate_piece(rule, medium, from, to, share, light, count);
+    }
+    if (light.transmittance < transmittance_least) break;
+    if (sheet) {
+      cross_sheet(sheets[s++], light);
+    } else {
+      ++b;
+    }
+    from = to;
+  }
+  return light;
+}
+
+}  // namespace windsplat::engine::reference
