@@ -2,6 +2,7 @@
 // printed and stand in any page.
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <vector>
 
@@ -36,6 +37,12 @@ struct LogAxis {
 bool drawable(double v) { return std::isfinite(v) && v > 0; }
 
 std::string number(double v) { return format_number("%.1f", v); }
+
+std::string joined(std::initializer_list<std::string_view> parts) {
+  std::string text;
+  for (const std::string_view part : parts) text += part;
+  return text;
+}
 
 std::string attribute(const char* name, double value) {
   std::string text(1, ' ');
@@ -122,8 +129,8 @@ class Plot {
   }
 
   std::string svg() {
-    text_ = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + number(width);
-    text_ += " " + number(height);
+    text_ = joined({"<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 ", number(width), " ",
+                    number(height)});
     text_ += "\" font-family=\"sans-serif\" font-size=\"12\" role=\"img\">\n";
     text_ += "<title>" + escaped(scene_.name) + ": error against run time</title>\n";
     text_ += "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n";
@@ -202,9 +209,9 @@ class Plot {
     std::string path;
     for (const Point* point : on_front) {
       if (path.empty()) {
-        path = "M" + number(x_of(*point)) + " " + number(y_of(*point));
+        path = joined({"M", number(x_of(*point)), " ", number(y_of(*point))});
       } else {
-        path += "H" + number(x_of(*point)) + "V" + number(y_of(*point));
+        path += joined({"H", number(x_of(*point)), "V", number(y_of(*point))});
       }
       text_ += "<circle" + attribute("cx", x_of(*point)) + attribute("cy", y_of(*point)) +
                " r=\"7\" fill=\"none\" stroke=\"#111111\" stroke-width=\"1.3\"/>\n";
