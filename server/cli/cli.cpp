@@ -52,6 +52,7 @@ int run(int argc, const char* const* argv) {
     add_inspect(app, chosen);
     add_synth(app, chosen);
     add_healthcheck(app, chosen);
+    add_study(app, chosen);
     return run_parsed(app, chosen, argc, argv);
   } catch (const std::bad_alloc&) {
     complain("the machine has no memory left");

@@ -28,6 +28,7 @@ void add_render(CLI::App& app, Action& chosen);
 void add_inspect(CLI::App& app, Action& chosen);
 void add_synth(CLI::App& app, Action& chosen);
 void add_healthcheck(CLI::App& app, Action& chosen);
+void add_study(CLI::App& app, Action& chosen);
 
 // --threads N, or WINDSPLAT_THREADS; 0, the default, means one a hardware thread.
 void add_threads_option(CLI::App& command, unsigned& threads);

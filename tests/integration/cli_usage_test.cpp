@@ -16,14 +16,13 @@ using testing::StartsWith;
 TEST(CliUsage, HelpNamesTheCommandsThatAreThereAndNoOthers) {
   const Outcome help = run({"--help"});
   EXPECT_EQ(help.code, 0);
-  for (const char* command : {"serve", "render", "inspect", "synth", "healthcheck"}) {
+  for (const char* command : {"serve", "render", "inspect", "synth", "healthcheck", "study"}) {
     EXPECT_THAT(help.out, HasSubstr(command));
     const Outcome own = run({command, "--help"});
     EXPECT_EQ(own.code, 0) << command;
     EXPECT_EQ(own.err, "") << command;
   }
   EXPECT_THAT(help.out, Not(HasSubstr("animate")));
-  EXPECT_THAT(help.out, Not(HasSubstr("study")));
   EXPECT_THAT(run({"serve", "--help"}).out, HasSubstr("--allow-remote"));
 }
 

@@ -17,6 +17,8 @@ MAY_INCLUDE = {
     "server/image": ["server/base"],
     "server/frame": ["server/base", "protocol", "server/data", "server/scene", "server/engine",
                      "server/image"],
+    "server/study": ["server/base", "protocol", "server/data", "server/scene", "server/engine",
+                     "server/image", "server/frame"],
     "server/session": ["server/base", "protocol", "server/scene"],
     "server/net": ["server/base", "protocol", "server/data", "server/scene", "server/engine",
                    "server/image", "server/frame", "server/session"],

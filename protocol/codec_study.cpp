@@ -1,0 +1,94 @@
+// StudyDocument -> JSON.
+#include "protocol/codec_json.hpp"
+#include "protocol/study.hpp"
+
+namespace windsplat::protocol {
+
+namespace {
+
+Json point_json(const StudyPoint& point) {
+  Json knobs = Json::object();
+  for (const auto& [name, value] : point.knobs) knobs[name] = canonical_number(value);
+  return Json{{"method", point.method}, {"compositing", point.compositing},
+              {"knobs", knobs},         {"rmse", point.rmse},
+              {"max", point.max},       {"psnr", point.psnr},
+              {"flip", point.flip},     {"ms", point.ms},
+              {"msMin", point.ms_min},  {"msMax", point.ms_max},
+              {"pareto", point.pareto}, {"stable", point.stable}};
+}
+
+Json scene_json(const StudyScene& scene) {
+  Json points = Json::array();
+  for (const StudyPoint& point : scene.points) points.push_back(point_json(point));
+  Json curves = Json::array();
+  for (const StudyCurve& curve : scene.curves) {
+    curves.push_back(Json{{"method", curve.method},
+                          {"compositing", curve.compositing},
+                          {"knob", curve.knob},
+                          {"order", curve.order},
+                          {"points", curve.points}});
+  }
+  Json jpeg = Json::array();
+  for (const StudyEncoding& encoding : scene.jpeg) {
+    jpeg.push_back(Json{{"quality", encoding.quality},
+                        {"rmse", encoding.rmse},
+                        {"psnr", encoding.psnr},
+                        {"flip", encoding.flip},
+                        {"bytes", encoding.bytes}});
+  }
+  const StudyReference& reference = scene.reference;
+  return Json{{"name", scene.name},
+              {"view", view_to_json(scene.view)},
+              {"reference",
+               {{"kind", reference.kind},
+                {"estimate", reference.estimate},
+                {"seconds", reference.seconds},
+                {"width", reference.width},
+                {"height", reference.height},
+                {"pieces", reference.pieces},
+                {"evaluations", reference.evaluations}}},
+              {"points", std::move(points)},
+              {"curves", std::move(curves)},
+              {"rippleFloor", scene.ripple_floor},
+              {"jpeg", std::move(jpeg)}};
+}
+
+Json stability_json(const StudyStability& one) {
+  return Json{{"compositing", one.compositing},
+              {"tau", one.tau},
+              {"error", one.error},
+              {"min", one.min},
+              {"max", one.max},
+              {"bounded", one.bounded},
+              {"monotone", one.monotone},
+              {"layersMin", one.layers_min},
+              {"layersMax", one.layers_max},
+              {"diverges", one.diverges}};
+}
+
+}  // namespace
+
+std::string encode_study(const StudyDocument& study) {
+  Json scenes = Json::array();
+  for (const StudyScene& scene : study.scenes) scenes.push_back(scene_json(scene));
+  Json stability = Json::array();
+  for (const StudyStability& one : study.stability) stability.push_back(stability_json(one));
+  const Json document{{"machine",
+                       {{"processor", study.processor},
+                        {"system", study.system},
+                        {"compiler", study.compiler},
+                        {"windsplat", study.version},
+                        {"kernels", study.kernels},
+                        {"hardwareThreads", study.hardware_threads},
+                        {"threads", study.threads}}},
+                      {"quick", study.quick},
+                      {"seconds", study.seconds},
+                      {"runs", study.runs},
+                      {"measured", study.measured},
+                      {"skipped", study.skipped},
+                      {"scenes", std::move(scenes)},
+                      {"stability", std::move(stability)}};
+  return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace windsplat::protocol

@@ -1,0 +1,78 @@
+// A study's report as typed values -> study.json. Numbers that are not finite become null.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "protocol/view.hpp"
+
+namespace windsplat::protocol {
+
+struct StudyPoint {
+  std::string method;
+  std::string compositing;
+  std::vector<std::pair<std::string, double>> knobs;  // named as in the view
+  double rmse = 0, max = 0, psnr = 0, flip = 0;
+  double ms = 0, ms_min = 0, ms_max = 0;
+  bool pareto = false;
+  bool stable = true;
+};
+
+struct StudyCurve {
+  std::string method;
+  std::string compositing;
+  std::string knob;
+  double order = 0;                 // null below three stable points
+  std::vector<std::size_t> points;  // indices of the scene's points, in the knob's order
+};
+
+struct StudyEncoding {
+  int quality = 0;
+  double rmse = 0, psnr = 0, flip = 0;
+  std::size_t bytes = 0;
+};
+
+struct StudyReference {
+  std::string kind;     // "integral", or "extrapolated" from method slab
+  double estimate = 0;  // RMS of an extrapolated reference's own error
+  double seconds = 0;
+  int width = 0, height = 0;
+  std::int64_t pieces = 0, evaluations = 0;
+};
+
+struct StudyScene {
+  std::string name;
+  View view;
+  StudyReference reference;
+  std::vector<StudyPoint> points;
+  std::vector<StudyCurve> curves;
+  double ripple_floor = 0;
+  std::vector<StudyEncoding> jpeg;
+};
+
+struct StudyStability {
+  std::string compositing;
+  double tau = 0;
+  double error = 0, min = 0, max = 0;
+  bool bounded = true, monotone = true;
+  double layers_min = 0, layers_max = 0;
+  bool diverges = false;
+};
+
+struct StudyDocument {
+  std::string processor, system, compiler, version, kernels;
+  unsigned hardware_threads = 0, threads = 0;
+  bool quick = false;
+  double seconds = 0;
+  int runs = 0;  // timed, a point
+  std::size_t measured = 0, skipped = 0;
+  std::vector<StudyScene> scenes;
+  std::vector<StudyStability> stability;
+};
+
+// Indented by two, for people too.
+std::string encode_study(const StudyDocument& study);
+
+}  // namespace windsplat::protocol

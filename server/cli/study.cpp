@@ -1,0 +1,201 @@
+// windsplat study: error against run time of every method, into a folder.
+#include "server/study/study.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "protocol/codec.hpp"
+#include "protocol/limits.hpp"
+#include "server/base/cancel.hpp"
+#include "server/base/thread_pool.hpp"
+#include "server/cli/command.hpp"
+#include "server/cli/signals.hpp"
+#include "server/data/store.hpp"
+#include "server/engine/reference/reference.hpp"
+#include "server/study/report.hpp"
+
+namespace windsplat::cli {
+namespace {
+
+constexpr std::uint64_t resident_bytes_max = 8ULL << 30;
+constexpr int exit_interrupted = 130;  // as shells say it of SIGINT
+constexpr int bar_width = 28;
+
+struct Arguments {
+  std::string dataset;
+  bool standard = false;
+  std::vector<std::string> scenes;
+  std::string view_file;
+  std::string size;
+  bool quick = false;
+  bool no_reference = false;
+  unsigned threads = 0;
+  std::string output;
+};
+
+// A bar with the time that is left where somebody watches, else a line a scene.
+class Reporter {
+ public:
+  explicit Reporter(bool terminal) : terminal_(terminal) {}
+
+  void operator()(const study::Progress& progress) {
+    if (!terminal_) {
+      if (progress.doing == "done") complain("study: " + printable(progress.scene) + " done");
+      return;
+    }
+    const int full = static_cast<int>(progress.done * bar_width);
+    std::string line = "\r\x1b[K[";
+    line.append(static_cast<std::size_t>(full), '#');
+    line.append(static_cast<std::size_t>(bar_width - full), '.');
+    line += "] " + std::to_string(static_cast<int>(100 * progress.done)) + " %";
+    if (progress.done > 0.02) {
+      const double spent =
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+      const auto left = static_cast<int>(spent / progress.done * (1 - progress.done) + 0.5);
+      line += ", " + std::to_string(left / 60) + (left % 60 < 10 ? ":0" : ":");
+      line += std::to_string(left % 60) + " left";
+    }
+    line += "  " + printable(progress.scene, 40) + " " + printable(progress.doing, 40);
+    std::fwrite(line.data(), 1, line.size(), stderr);
+    std::fflush(stderr);
+    shown_ = true;
+  }
+
+  void finish() const {
+    if (shown_) std::fputs("\r\x1b[K", stderr);
+  }
+
+ private:
+  bool terminal_;
+  bool shown_ = false;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+Result<study::Subject> given_subject(const Arguments& arguments, data::Store& store) {
+  std::string text = "{}";
+  if (!arguments.view_file.empty()) {
+    auto file = read_text_file(arguments.view_file, protocol::limits::message_bytes_max);
+    if (!file) return file.error();
+    text = std::move(*file);
+  }
+  const auto document = protocol::ViewDocument::parse(text);
+  if (!document) return document.error();
+  study::PictureSize size = arguments.quick ? study::PictureSize{80, 60} : study::PictureSize{};
+  if (!arguments.size.empty()) {
+    const auto wanted = parse_extent(arguments.size, 2);
+    if (!wanted || (*wanted)[0] > protocol::limits::image_edge_max ||
+        (*wanted)[1] > protocol::limits::image_edge_max) {
+      return make_error(ErrorKind::malformed, "--size '" + printable(arguments.size) +
+                                                  "' is not of the form 160x120, or too large");
+    }
+    size = {static_cast<int>((*wanted)[0]), static_cast<int>((*wanted)[1])};
+  }
+  auto dataset = store.add(arguments.dataset);
+  if (!dataset) return dataset.error();
+  protocol::View view = document->view();
+  view.dataset = (*dataset)->info().id;
+  return study::make_subject(view.dataset, *dataset, view, size);
+}
+
+Result<std::vector<study::Subject>> subjects_of(const Arguments& arguments, data::Store& store) {
+  std::vector<study::Subject> subjects;
+  if (!arguments.dataset.empty()) {
+    if (arguments.standard || !arguments.scenes.empty()) {
+      return make_error(ErrorKind::malformed,
+                        "a DATASET and --standard or --scene exclude each other");
+    }
+    auto subject = given_subject(arguments, store);
+    if (!subject) return subject.error();
+    subjects.push_back(std::move(*subject));
+    return subjects;
+  }
+  if (!arguments.view_file.empty() || !arguments.size.empty()) {
+    return make_error(ErrorKind::malformed, "--view and --size need a DATASET");
+  }
+  const auto names = arguments.scenes.empty() ? study::standard_names() : arguments.scenes;
+  for (const std::string& name : names) {
+    auto subject = study::standard_subject(name, arguments.quick);
+    if (!subject) return subject.error();
+    subjects.push_back(std::move(*subject));
+  }
+  return subjects;
+}
+
+study::Truth integral(ThreadPool& pool, const CancelToken& cancel) {
+  return [&pool, cancel](const scene::Scene& scene) -> Result<study::Picture> {
+    auto picture = engine::reference::render(scene, pool, cancel);
+    if (!picture) return picture.error();
+    return study::Picture{picture->width, picture->height, std::move(picture->rgba),
+                          picture->pieces, picture->evaluations};
+  };
+}
+
+std::string summary(const study::Report& report, const std::string& folder) {
+  std::string text = std::to_string(report.measured) + " points measured";
+  text += ", " + std::to_string(report.skipped) + " skipped (measured before), in ";
+  text += study::format_number("%.1f", report.seconds) + " s: ";
+  text += printable(folder) + "/index.html\n";
+  return text;
+}
+
+int study_command(const Arguments& arguments) {
+  const CancelToken cancel;
+  const SignalWatch watch([&cancel] { cancel.cancel(); });
+  data::Store store(resident_bytes_max);
+  const auto subjects = subjects_of(arguments, store);
+  if (!subjects) return answer(subjects.error());
+  ThreadPool pool(arguments.threads);
+  study::Options options;
+  options.folder = arguments.output;
+  options.quick = arguments.quick;
+  if (!arguments.no_reference) options.truth = integral(pool, cancel);
+  Reporter reporter(isatty(STDERR_FILENO) == 1);
+  const auto report =
+      study::run_study(*subjects, options, pool, cancel,
+                       [&reporter](const study::Progress& progress) { reporter(progress); });
+  reporter.finish();
+  if (!report) {
+    if (report.error().kind != ErrorKind::cancelled) return answer(report.error());
+    complain("study: interrupted; the same command goes on from there");
+    return exit_interrupted;
+  }
+  const auto written = study::write_report(*report, arguments.output);
+  if (!written) return answer(written.error());
+  const auto said = write_stdout(summary(*report, arguments.output));
+  return said ? exit_ok : answer(said.error());
+}
+
+}  // namespace
+
+void add_study(CLI::App& app, Action& chosen) {
+  CLI::App* command = app.add_subcommand(
+      "study", "Measure error against run time of every method; writes a report into a folder");
+  const auto arguments = std::make_shared<Arguments>();
+  command->add_option("dataset", arguments->dataset, "A sample's name or a file")
+      ->type_name("DATASET");
+  command->add_flag("--standard", arguments->standard, "The standard scenes (without a DATASET)");
+  command->add_option("--scene", arguments->scenes, "Only this standard scene; may be repeated")
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(study::standard_names()));
+  command->add_option("--view", arguments->view_file, "A view of DATASET as JSON")->type_name("F");
+  command->add_option("--size", arguments->size, "Pixels of DATASET's pictures, default 160x120")
+      ->type_name("WxH");
+  command->add_flag("--quick", arguments->quick, "Small pictures and few points");
+  command->add_flag("--no-reference", arguments->no_reference,
+                    "Take no integral: extrapolate the truth from method slab");
+  command->add_option("-o", arguments->output, "The report's folder; what it holds is not redone")
+      ->required()
+      ->type_name("DIR");
+  add_threads_option(*command, arguments->threads);
+  command->callback(
+      [&chosen, arguments] { chosen = [arguments] { return study_command(*arguments); }; });
+}
+
+}  // namespace windsplat::cli

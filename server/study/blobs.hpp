@@ -1,0 +1,16 @@
+// The data of the study's standard scenes: smooth blobs in a swirl, 24 samples an edge.
+#pragma once
+
+#include <memory>
+
+#include "server/data/dataset.hpp"
+
+namespace windsplat::study {
+
+inline constexpr int blob_samples = 24;  // along each axis
+
+// Scalar "density" in [0, 1] (Gaussian blobs) and vector "flow" (a helix about z that leans with
+// height, magnitude up to about 1) on the cube [-1, 1]^3.
+std::unique_ptr<data::Source> make_blobs();
+
+}  // namespace windsplat::study

@@ -1,0 +1,48 @@
+// The system's own words -> Machine.
+#include "server/study/machine.hpp"
+
+#include <sys/utsname.h>
+
+#include <fstream>
+#include <thread>
+
+#include "server/base/error.hpp"
+#include "server/engine/kernels/dispatch.hpp"
+
+namespace windsplat::study {
+
+namespace {
+
+std::string processor() {
+  std::ifstream in("/proc/cpuinfo");
+  for (std::string line; std::getline(in, line);) {
+    const std::size_t colon = line.find(": ");
+    if (line.starts_with("model name") && colon != std::string::npos) {
+      return printable(line.substr(colon + 2));
+    }
+  }
+  return "unknown";
+}
+
+}  // namespace
+
+Machine this_machine(unsigned threads) {
+  Machine machine;
+  machine.processor = processor();
+  utsname names{};
+  if (uname(&names) == 0) {
+    machine.system = names.sysname;
+    machine.system += ' ';
+    machine.system += names.release;
+    machine.system += ' ';
+    machine.system += names.machine;
+  }
+  machine.compiler = __VERSION__;
+  machine.version = WINDSPLAT_VERSION;
+  if (const auto table = engine::kernels::chosen_table()) machine.kernels = (*table)->name;
+  machine.hardware_threads = std::thread::hardware_concurrency();
+  machine.threads = threads;
+  return machine;
+}
+
+}  // namespace windsplat::study

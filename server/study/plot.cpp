@@ -1,0 +1,323 @@
+// A scene's points and curves -> one SVG, its axes logarithmic. Drawn on white, so that it may be
+// printed and stand in any page.
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <limits>
+#include <vector>
+
+#include "server/study/report.hpp"
+
+namespace windsplat::study {
+
+namespace {
+
+// Pixels of the drawing.
+constexpr double width = 920;
+constexpr double height = 520;
+constexpr double left = 70;
+constexpr double right = 620;
+constexpr double top = 40;
+constexpr double bottom = 460;
+constexpr double legend_left = 640;
+constexpr double legend_step = 17;
+
+struct LogAxis {
+  double low = 1;  // of the values
+  double high = 10;
+  double from = 0;  // pixels
+  double to = 1;
+
+  [[nodiscard]] double at(double value) const {
+    const double share = std::log(value / low) / std::log(high / low);
+    return from + std::clamp(share, 0.0, 1.0) * (to - from);
+  }
+};
+
+bool drawable(double v) { return std::isfinite(v) && v > 0; }
+
+std::string number(double v) { return format_number("%.1f", v); }
+
+std::string joined(std::initializer_list<std::string_view> parts) {
+  std::string text;
+  for (const std::string_view part : parts) text += part;
+  return text;
+}
+
+std::string attribute(const char* name, double value) {
+  std::string text(1, ' ');
+  text += name;
+  text += "=\"";
+  text += number(value);
+  text += '"';
+  return text;
+}
+
+std::string line(double x1, double y1, double x2, double y2, const std::string& style) {
+  std::string text = "<line" + attribute("x1", x1);
+  text += attribute("y1", y1) + attribute("x2", x2) + attribute("y2", y2);
+  text += " style=\"" + style + "\"/>\n";
+  return text;
+}
+
+std::string label(double x, double y, const std::string& words, const std::string& extra = "") {
+  std::string text = "<text" + attribute("x", x);
+  text += attribute("y", y) + extra + ">" + escaped(words) + "</text>\n";
+  return text;
+}
+
+// Values of 1, 2 and 5 times powers of ten within the axis; few decades get all three.
+std::vector<double> ticks(const LogAxis& axis) {
+  const double decades = std::log10(axis.high / axis.low);
+  std::vector<double> out;
+  for (double power = std::floor(std::log10(axis.low)); power <= std::log10(axis.high); ++power) {
+    for (const double factor : {1.0, 2.0, 5.0}) {
+      if (factor > 1 && decades > 2.5) break;
+      const double value = factor * std::pow(10, power);
+      if (value >= axis.low * 0.999 && value <= axis.high * 1.001) out.push_back(value);
+    }
+  }
+  return out;
+}
+
+// Room around the values, at least half a decade.
+LogAxis make_axis(double low, double high, double from, double to) {
+  if (!(low <= high)) low = high = 1;
+  const double spread = std::max(std::log10(high / low), 0.5);
+  const double margin = std::pow(10, 0.06 * spread + 0.5 * (spread - std::log10(high / low)));
+  return {low / margin, high * margin, from, to};
+}
+
+const char* dash_of(Knob knob) {
+  switch (knob) {
+    case Knob::stride:
+      return "7,4";
+    case Knob::span:
+      return "2,3";
+    case Knob::slab_thickness:
+      return "none";
+    case Knob::stop_transmittance:
+      return "9,3,2,3";
+    case Knob::width:
+      return "4,4";
+  }
+  return "none";
+}
+
+class Plot {
+ public:
+  explicit Plot(const SceneReport& scene) : scene_(scene) {
+    constexpr double none = std::numeric_limits<double>::infinity();
+    double ms_low = none;
+    double ms_high = 0;
+    double error_low = none;
+    double error_high = 0;
+    for (const Point& point : scene.points) {
+      const Measurement& m = point.measured;
+      if (drawable(m.ms_min)) ms_low = std::min(ms_low, m.ms_min);
+      if (drawable(m.ms)) ms_high = std::max(ms_high, m.ms);
+      if (!m.stable || !drawable(m.rmse)) continue;
+      error_low = std::min(error_low, m.rmse);
+      error_high = std::max(error_high, m.rmse);
+    }
+    if (drawable(scene.ripple_floor)) {
+      error_low = std::min(error_low, scene.ripple_floor);
+      error_high = std::max(error_high, scene.ripple_floor);
+    }
+    x_ = make_axis(ms_low, ms_high, left, right);
+    y_ = make_axis(error_low, error_high, bottom, top);
+  }
+
+  std::string svg() {
+    text_ = joined({"<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 ", number(width), " ",
+                    number(height)});
+    text_ += "\" font-family=\"sans-serif\" font-size=\"12\" role=\"img\">\n";
+    text_ += "<title>" + escaped(scene_.name) + ": error against run time</title>\n";
+    text_ += "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n";
+    frame();
+    floor();
+    for (const Curve& curve : scene_.curves) draw(curve);
+    front();
+    for (const Point& point : scene_.points) mark(point);
+    legend();
+    text_ += "</svg>\n";
+    return std::move(text_);
+  }
+
+ private:
+  // Where a point stands; what has no error that can be drawn stands on the upper edge.
+  [[nodiscard]] double x_of(const Point& p) const { return x_.at(p.measured.ms); }
+  [[nodiscard]] double y_of(const Point& p) const {
+    const double rmse = p.measured.rmse;
+    if (rmse <= 0) return bottom;
+    return drawable(rmse) ? y_.at(rmse) : top;
+  }
+
+  void frame() {
+    for (const double tick : ticks(x_)) {
+      text_ += line(x_.at(tick), top, x_.at(tick), bottom, "stroke:#e4e4e8");
+      text_ += label(x_.at(tick), bottom + 17, format_number("%g", tick),
+                     " text-anchor=\"middle\" fill=\"#555555\"");
+    }
+    for (const double tick : ticks(y_)) {
+      text_ += line(left, y_.at(tick), right, y_.at(tick), "stroke:#e4e4e8");
+      text_ += label(left - 7, y_.at(tick) + 4, format_number("%.0e", tick),
+                     " text-anchor=\"end\" fill=\"#555555\"");
+    }
+    text_ += "<rect" + attribute("x", left) + attribute("y", top) +
+             attribute("width", right - left) + attribute("height", bottom - top) +
+             " fill=\"none\" stroke=\"#777777\"/>\n";
+    text_ += label(left, top - 14, scene_.name, " font-size=\"16\" font-weight=\"bold\"");
+    text_ += label((left + right) / 2, bottom + 40, "run time, ms (median, least to most)",
+                   " text-anchor=\"middle\"");
+    text_ += "<text transform=\"translate(18 " + number((top + bottom) / 2) +
+             ") rotate(-90)\" text-anchor=\"middle\">error, RMS of linear RGBA</text>\n";
+  }
+
+  void floor() {
+    if (!drawable(scene_.ripple_floor)) return;
+    const double y = y_.at(scene_.ripple_floor);
+    text_ += line(left, y, right, y, "stroke:#888888;stroke-dasharray:3,3");
+    text_ += label(right - 5, y - 4, "ripple floor", " text-anchor=\"end\" fill=\"#777777\"");
+  }
+
+  void draw(const Curve& curve) {
+    const std::string color = color_of(curve.method, curve.compositing);
+    std::string path;
+    bool pen_down = false;
+    for (const std::size_t i : curve.points) {
+      const Point& point = scene_.points[i];
+      const bool shown = point.measured.stable && drawable(point.measured.rmse);
+      if (shown) {
+        path += pen_down ? 'L' : 'M';
+        path += number(x_of(point)) + " " + number(y_of(point)) + " ";
+      }
+      pen_down = shown;
+    }
+    if (path.empty()) return;
+    text_ += "<path d=\"" + path + "\" fill=\"none\" stroke=\"" + color +
+             "\" stroke-width=\"1.6\" stroke-dasharray=\"" + dash_of(curve.knob) + "\"/>\n";
+  }
+
+  void front() {
+    std::vector<const Point*> on_front;
+    for (const Point& point : scene_.points) {
+      if (point.pareto) on_front.push_back(&point);
+    }
+    std::sort(on_front.begin(), on_front.end(),
+              [](const Point* a, const Point* b) { return a->measured.ms < b->measured.ms; });
+    std::string path;
+    for (const Point* point : on_front) {
+      if (path.empty()) {
+        path = joined({"M", number(x_of(*point)), " ", number(y_of(*point))});
+      } else {
+        path += joined({"H", number(x_of(*point)), "V", number(y_of(*point))});
+      }
+      text_ += "<circle" + attribute("cx", x_of(*point)) + attribute("cy", y_of(*point)) +
+               " r=\"7\" fill=\"none\" stroke=\"#111111\" stroke-width=\"1.3\"/>\n";
+    }
+    if (path.empty()) return;
+    text_ += "<path d=\"" + path +
+             "\" fill=\"none\" stroke=\"#111111\" stroke-width=\"0.8\" opacity=\"0.55\"/>\n";
+  }
+
+  void mark(const Point& point) {
+    const Measurement& m = point.measured;
+    const std::string color = color_of(point.setting.method, point.setting.compositing);
+    const double x = x_of(point);
+    const double y = y_of(point);
+    const double spread_high = std::min(m.ms_max, x_.high);
+    if (drawable(m.ms_min)) {
+      text_ += line(x_.at(m.ms_min), y, x_.at(spread_high), y,
+                    "stroke:" + color + ";opacity:0.35;stroke-width:3");
+    }
+    if (m.stable && std::isfinite(m.rmse)) {
+      text_ += "<circle" + attribute("cx", x) + attribute("cy", y) + " r=\"3.4\" fill=\"" + color +
+               "\"><title>" + escaped(describe(point)) + "</title></circle>\n";
+      return;
+    }
+    text_ += line(x - 5, y - 5, x + 5, y + 5, "stroke:" + color + ";stroke-width:2.2");
+    text_ += line(x - 5, y + 5, x + 5, y - 5, "stroke:" + color + ";stroke-width:2.2");
+  }
+
+  static std::string describe(const Point& point) {
+    std::string text = name_of(point.setting.method);
+    text += ' ';
+    text += name_of(point.setting.compositing);
+    for (const Knob knob :
+         {Knob::stride, Knob::span, Knob::slab_thickness, Knob::stop_transmittance, Knob::width}) {
+      if (knob == Knob::slab_thickness && point.setting.method != scene::Method::slab) continue;
+      text += ", ";
+      text += name_of(knob);
+      text += ' ' + format_number("%g", value_of(point.setting.knobs, knob));
+    }
+    text += ": " + format_number("%.2e", point.measured.rmse);
+    text += " in " + format_number("%.3g", point.measured.ms) + " ms";
+    return text;
+  }
+
+  void legend() {
+    double y = top + 4;
+    for (const Curve& curve : scene_.curves) {
+      if (curve.points.size() < 2) continue;
+      entry(curve, y);
+    }
+    for (const Curve& curve : scene_.curves) {
+      if (curve.points.size() < 2) entry(curve, y);
+    }
+    y += 6;
+    const char* const says = "ring: on the Pareto front; cross: unstable";
+    text_ += label(legend_left, y, says, " fill=\"#555555\" font-size=\"11\"");
+  }
+
+  void entry(const Curve& curve, double& y) {
+    const std::string color = color_of(curve.method, curve.compositing);
+    const bool single = curve.points.size() < 2;
+    if (single) {
+      text_ += "<circle" + attribute("cx", legend_left + 12) + attribute("cy", y - 4) +
+               " r=\"3.4\" fill=\"" + color + "\"/>\n";
+    } else {
+      text_ +=
+          line(legend_left, y - 4, legend_left + 26, y - 4,
+               "stroke:" + color + ";stroke-width:1.8;stroke-dasharray:" + dash_of(curve.knob));
+    }
+    std::string words = name_of(curve.method);
+    words += ' ';
+    words += name_of(curve.compositing);
+    if (!single) {
+      words += ", ";
+      words += name_of(curve.knob);
+      if (std::isfinite(curve.order)) words += ": slope " + format_number("%.2f", curve.order);
+    }
+    text_ += label(legend_left + 33, y, words, " font-size=\"11\"");
+    y += legend_step;
+  }
+
+  const SceneReport& scene_;
+  LogAxis x_;
+  LogAxis y_;
+  std::string text_;
+};
+
+}  // namespace
+
+const char* color_of(scene::Method method, scene::Compositing compositing) {
+  const bool slab = method == scene::Method::slab;
+  switch (compositing) {
+    case scene::Compositing::analytic:
+      return slab ? "#1f5fbf" : "#d1421f";
+    case scene::Compositing::cd:
+      return slab ? "#17a2b8" : "#e39a1d";
+    case scene::Compositing::cd_naive:
+      return slab ? "#6f5bd0" : "#b0478f";
+    case scene::Compositing::simple:
+      return slab ? "#3f8f4f" : "#8a6b3a";
+    case scene::Compositing::cd_euler:
+      return slab ? "#5a7f99" : "#6b6b6b";
+  }
+  return "#000000";
+}
+
+std::string plot_svg(const SceneReport& scene) { return Plot(scene).svg(); }
+
+}  // namespace windsplat::study

@@ -1,0 +1,141 @@
+// Measurements <-> lines of text, numbers with all their digits.
+#include "server/study/points_file.hpp"
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+#include <vector>
+
+namespace windsplat::study {
+
+namespace {
+
+constexpr const char* heading = "key,rmse,max,psnr,flip,ms,msMin,msMax,stable\n";
+constexpr std::size_t key_digits = 16;
+constexpr std::size_t numbers = 8;
+
+Error cannot(const char* what, const std::filesystem::path& path) {
+  std::string message = std::string(what) + " '";
+  message += printable(path.native());
+  message += "'";
+  if (errno != 0) {
+    message += ": ";
+    message += std::generic_category().message(errno);
+  }
+  return make_error(ErrorKind::internal, std::move(message));
+}
+
+std::string line_of(const std::string& key, const Measurement& m) {
+  std::string line = key;
+  for (const double v :
+       {m.rmse, m.max, m.psnr, m.flip, m.ms, m.ms_min, m.ms_max, m.stable ? 1.0 : 0.0}) {
+    std::array<char, 40> text{};
+    std::snprintf(text.data(), text.size(), ",%.17g", v);
+    line += text.data();
+  }
+  line += '\n';
+  return line;
+}
+
+// Empty for what is no point.
+std::optional<std::pair<std::string, Measurement>> read_line(const std::string& line) {
+  std::string key = line.substr(0, line.find(','));
+  if (key.size() != key_digits || key.find_first_not_of("0123456789abcdef") != std::string::npos) {
+    return std::nullopt;
+  }
+  std::array<double, numbers> values{};
+  const char* at = line.c_str() + key.size();
+  for (double& value : values) {
+    if (*at != ',') return std::nullopt;
+    char* end = nullptr;
+    value = std::strtod(at + 1, &end);
+    if (end == at + 1) return std::nullopt;
+    at = end;
+  }
+  if (*at != '\0') return std::nullopt;
+  const auto [rmse, max, psnr, flip, ms, ms_min, ms_max, stable] = values;
+  return std::pair{std::move(key),
+                   Measurement{rmse, max, psnr, flip, ms, ms_min, ms_max, stable == 1.0}};
+}
+
+}  // namespace
+
+std::string key_of(const std::string& text) {
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const char c : text) {
+    hash ^= static_cast<unsigned char>(c);
+    hash *= 0x100000001b3U;
+  }
+  std::array<char, key_digits + 1> digits{};
+  std::snprintf(digits.data(), digits.size(), "%016llx", static_cast<unsigned long long>(hash));
+  return digits.data();
+}
+
+Result<PointsFile> PointsFile::open(const std::filesystem::path& path) {
+  PointsFile file(path);
+  std::string text;
+  if (std::ifstream in(path, std::ios::binary); in) {
+    std::stringstream whole;
+    whole << in.rdbuf();
+    text = whole.str();
+  }
+  std::string good = heading;
+  for (std::size_t start = text.find('\n') + 1; start != 0 && start < text.size();) {
+    const std::size_t end = text.find('\n', start);
+    if (end == std::string::npos) break;
+    const std::string line = text.substr(start, end - start);
+    if (const auto point = read_line(line)) {
+      file.points_.insert_or_assign(point->first, point->second);
+      good += line;
+      good += '\n';
+    }
+    start = end + 1;
+  }
+  if (good != text) {
+    if (const auto written = write_whole(path, good); !written) return written.error();
+  }
+  return file;
+}
+
+std::optional<Measurement> PointsFile::find(const std::string& key) const {
+  const auto at = points_.find(key);
+  if (at == points_.end()) return std::nullopt;
+  return at->second;
+}
+
+Result<void> PointsFile::append(const std::string& key, const Measurement& measured) {
+  errno = 0;
+  std::ofstream out(path_, std::ios::binary | std::ios::app);
+  out << line_of(key, measured) << std::flush;
+  if (!out) return cannot("cannot write", path_);
+  points_.insert_or_assign(key, measured);
+  return {};
+}
+
+Result<void> write_whole(const std::filesystem::path& path, const std::string& bytes) {
+  errno = 0;
+  std::filesystem::path beside = path;
+  beside += ".part";
+  {
+    std::ofstream out(beside, std::ios::binary | std::ios::trunc);
+    out << bytes << std::flush;
+    if (!out) {
+      const Error error = cannot("cannot write", path);
+      std::error_code ignored;
+      std::filesystem::remove(beside, ignored);
+      return error;
+    }
+  }
+  std::error_code fault;
+  std::filesystem::rename(beside, path, fault);
+  if (fault)
+    return make_error(ErrorKind::internal,
+                      "cannot write '" + printable(path.native()) + "': " + fault.message());
+  return {};
+}
+
+}  // namespace windsplat::study

@@ -1,0 +1,42 @@
+// DIR/points.csv: every finished point of a study, one line each, appended as soon as it is
+// measured, so that a study that was interrupted goes on where it stopped.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "server/base/error.hpp"
+#include "server/study/types.hpp"
+
+namespace windsplat::study {
+
+// 16 hexadecimal digits of a text that says all a result depends on (FNV-1a, 64 bits).
+std::string key_of(const std::string& text);
+
+class PointsFile {
+ public:
+  // Reads what is there. A line that was cut off or is no point is left out, and the file is
+  // written anew without it. Errors: internal (the file cannot be read or written).
+  static Result<PointsFile> open(const std::filesystem::path& path);
+
+  [[nodiscard]] std::optional<Measurement> find(const std::string& key) const;
+  [[nodiscard]] std::size_t size() const { return points_.size(); }
+
+  // Errors: internal (the file cannot be written).
+  Result<void> append(const std::string& key, const Measurement& measured);
+
+ private:
+  explicit PointsFile(std::filesystem::path path) : path_(std::move(path)) {}
+
+  std::filesystem::path path_;
+  std::map<std::string, Measurement> points_;
+};
+
+// Written beside its place and renamed into it, so that a reader sees the old file or the new one.
+// Errors: internal.
+Result<void> write_whole(const std::filesystem::path& path, const std::string& bytes);
+
+}  // namespace windsplat::study

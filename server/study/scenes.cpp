@@ -1,0 +1,165 @@
+// Names -> subjects -> scenes.
+#include "server/study/scenes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "server/base/check.hpp"
+#include "server/scene/build.hpp"
+#include "server/study/blobs.hpp"
+
+namespace windsplat::study {
+
+namespace {
+
+constexpr std::uint64_t resident_bytes_max = 4ULL << 30;
+constexpr std::array<const char*, 5> blob_names{"soft", "dense", "stiff", "vectors", "scalar"};
+constexpr std::array<const char*, 3> sample_scenes{"climate", "tornado", "efield"};
+constexpr double azimuth = 30;    // oblique, along no axis and no diagonal
+constexpr double elevation = 25;  // degrees
+
+bool is_one_of(const std::string& name, const auto& names) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// The largest optical depth along a row of samples, for an extinction that equals the density.
+Result<double> deepest_row(data::Dataset& dataset) {
+  const auto volume = dataset.volume("density", 0);
+  if (!volume) return volume.error();
+  constexpr std::size_t n = blob_samples;
+  double deepest = 0;
+  for (std::size_t z = 0; z < n; ++z) {
+    for (std::size_t x = 0; x < n; ++x) {
+      double sum = 0;
+      for (std::size_t y = 0; y < n; ++y) sum += (*volume)->values[(z * n + y) * n + x];
+      deepest = std::max(deepest, sum * 2 / n);
+    }
+  }
+  return deepest;
+}
+
+Result<void> set_medium(const std::string& name, data::Dataset& dataset, protocol::View& view) {
+  protocol::ScalarView medium;
+  medium.field = "density";
+  medium.color.map = "magma";
+  medium.color.range = {0.0, 1.2};
+  medium.min_optical_depth = 0;
+  if (name == "stiff") {
+    constexpr double cell = 2.0 / blob_samples;
+    constexpr double depth_of_cell = 20;
+    medium.extinction = {{{0.45, 0.0}, {0.4501, depth_of_cell / cell}}};
+  } else {
+    const auto deepest = deepest_row(dataset);
+    if (!deepest) return deepest.error();
+    const double depth = name == "dense" ? 10 : 1;
+    medium.extinction = {{{0.0, 0.0}, {1.0, depth / *deepest}}};
+  }
+  view.scalars.emplace().push_back(medium);
+  return {};
+}
+
+Result<Subject> blob_subject(const std::string& name, bool quick) {
+  auto dataset = std::make_shared<data::Dataset>(make_blobs(), "blobs", resident_bytes_max);
+  protocol::View view;
+  view.dataset = "blobs";
+  view.image.background = "#101418";
+  view.scalars.emplace();
+  if (name == "scalar") {
+    view.vector.field = {protocol::FieldChoice::Kind::none, ""};
+  } else {
+    view.vector.field = {protocol::FieldChoice::Kind::named, "flow"};
+    view.vector.min_magnitude = 0.15;
+    view.vector.magnitude_range = {0.0, 1.0};
+    view.vector.color.by = protocol::ColorBy::magnitude;
+    view.vector.color.range = {0.0, 1.0};
+    view.vector.length = 0.3;
+  }
+  if (name != "vectors") {
+    if (const auto set = set_medium(name, *dataset, view); !set) return set.error();
+  }
+  const int side = quick ? 64 : 128;
+  return make_subject(name, std::move(dataset), view, {side, side});
+}
+
+}  // namespace
+
+std::vector<std::string> standard_names() {
+  std::vector<std::string> names(blob_names.begin(), blob_names.end());
+  names.insert(names.end(), sample_scenes.begin(), sample_scenes.end());
+  return names;
+}
+
+Result<Subject> standard_subject(const std::string& name, bool quick) {
+  if (is_one_of(name, blob_names)) return blob_subject(name, quick);
+  if (!is_one_of(name, sample_scenes)) {
+    std::string message = "there is no standard scene '" + printable(name) + "'; there are";
+    for (const std::string& known : standard_names()) {
+      message += ' ';
+      message += known;
+    }
+    return make_error(ErrorKind::not_found, std::move(message));
+  }
+  auto source = data::open_sample(name);
+  if (!source) return source.error();
+  auto dataset = std::make_shared<data::Dataset>(std::move(*source), name, resident_bytes_max);
+  protocol::View view;
+  view.dataset = name;
+  return make_subject(name, std::move(dataset), view,
+                      quick ? PictureSize{80, 60} : PictureSize{160, 120});
+}
+
+Result<Subject> make_subject(const std::string& name, std::shared_ptr<data::Dataset> dataset,
+                             const protocol::View& view, PictureSize size) {
+  protocol::View wanted = view;
+  wanted.image.width = size.width;
+  wanted.image.height = size.height;
+  const bool has_camera = view.camera.eye.has_value();
+  auto completed = scene::complete_view(wanted, *dataset);
+  if (!completed) return completed.error();
+  if (!has_camera) {
+    const auto lattice = scene::place_lattice(dataset->info().grid, completed->geometry);
+    if (!lattice) return lattice.error();
+    scene::orbit(*completed, *lattice, azimuth, elevation, 1);
+  }
+  return Subject{name, std::move(*completed), std::move(dataset)};
+}
+
+Knobs own_knobs(const Subject& subject) {
+  Knobs knobs;
+  knobs.stride = subject.view.vector.stride;
+  const bool lines = subject.view.vector.field.kind == protocol::FieldChoice::Kind::named;
+  if (!lines && !subject.view.scalars->empty()) knobs.stride = subject.view.scalars->front().stride;
+  knobs.span = subject.view.vector.span;
+  knobs.slab_thickness = subject.view.method.slab_thickness;
+  knobs.stop_transmittance = subject.view.method.stop_transmittance;
+  knobs.width = subject.view.image.width;
+  return knobs;
+}
+
+Result<scene::Scene> scene_at(const Subject& subject, const Setting& setting) {
+  const Knobs& knobs = setting.knobs;
+  protocol::View view = subject.view;
+  view.image.width = knobs.width;
+  view.image.height =
+      std::max(1, static_cast<int>(std::lround(static_cast<double>(subject.view.image.height) *
+                                               knobs.width / subject.view.image.width)));
+  auto scene = scene::build_scene(view, *subject.dataset);
+  if (!scene) return scene.error();
+  scene->method = setting.method;
+  scene->compositing = setting.compositing;
+  scene->slab_thickness = knobs.slab_thickness;
+  scene->stop_transmittance = knobs.stop_transmittance;
+  // Layers of several strides keep their ratio.
+  const int own = own_knobs(subject).stride;
+  const auto strided = [&](int stride) { return std::max(1, stride * knobs.stride / own); };
+  if (scene->vector) {
+    scene->vector->stride = strided(scene->vector->stride);
+    scene->vector->span = knobs.span;
+  }
+  for (scene::ScalarLayer& layer : scene->scalars) layer.stride = strided(layer.stride);
+  return scene;
+}
+
+}  // namespace windsplat::study

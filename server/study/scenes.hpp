@@ -1,0 +1,44 @@
+// What is studied: a dataset and a view of it, by name; and scenes of it at any setting.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "protocol/view.hpp"
+#include "server/data/store.hpp"
+#include "server/study/types.hpp"
+
+namespace windsplat::study {
+
+struct Subject {
+  std::string name;
+  protocol::View view;  // complete; its image is the size of the study's pictures
+  std::shared_ptr<data::Dataset> dataset;
+};
+
+struct PictureSize {
+  int width = 160;
+  int height = 120;
+};
+
+// soft, dense and stiff (lines in a medium of optical depth 1, of 10, and of many in each cell
+// behind a step edge), vectors, scalar, climate, tornado, efield.
+std::vector<std::string> standard_names();
+
+// Pictures of 128 x 128 for the blobs and 160 x 120 for the samples; half of both when `quick`.
+// Errors: not_found for any other name; those of the samples.
+Result<Subject> standard_subject(const std::string& name, bool quick);
+
+// Any dataset seen as a view says, but for the picture's size. Errors: those of complete_view.
+Result<Subject> make_subject(const std::string& name, std::shared_ptr<data::Dataset> dataset,
+                             const protocol::View& view, PictureSize size);
+
+// The knobs that the subject's view has.
+Knobs own_knobs(const Subject& subject);
+
+// The subject at a setting: its picture knobs.width wide and its lines scaled with it. Stride and
+// span are those of every layer that the view shows. Errors: those of build_scene.
+Result<scene::Scene> scene_at(const Subject& subject, const Setting& setting);
+
+}  // namespace windsplat::study

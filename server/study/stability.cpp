@@ -1,0 +1,163 @@
+// A cell or a row of cells behind each other, its line leaning almost along the view so that the
+// pixels of one row meet it at different depths of the cell.
+#include "server/study/stability.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include "server/engine/render.hpp"
+#include "server/study/sweep.hpp"
+
+namespace windsplat::study {
+
+namespace {
+
+constexpr double footprint_integral = 1.4476982547;  // C of ARCHITECTURE.md, "The medium"
+constexpr int pixels = 9;                            // of the row, from the line's tail to its head
+constexpr double width = 2e-4;                       // of the row, in cells: g = 1 over all of it
+constexpr double line_opacity = 0.6;
+constexpr std::array<float, 3> medium_color{0.8F, 0.3F, 0.1F};
+constexpr std::array<float, 3> line_color{0.1F, 0.9F, 0.7F};
+
+std::shared_ptr<const data::Volume> make_volume(int layers, std::vector<float> sample) {
+  auto volume = std::make_shared<data::Volume>();
+  volume->dims = {1, layers, 1};
+  volume->components = static_cast<int>(sample.size());
+  for (const float v : sample) volume->values.insert(volume->values.end(), layers, v);
+  data::finish_volume(*volume);
+  return volume;
+}
+
+scene::ColorTable one_color(const std::array<float, 3>& rgb) {
+  return {{0, 1}, std::vector<std::array<float, 3>>(256, rgb)};
+}
+
+// Cells of edge 1 in a row along y, the way of the view.
+scene::Scene make_scene(int layers, double tau, scene::Compositing compositing) {
+  scene::Scene scene;
+  scene.compositing = compositing;
+  // Nothing is left out, not even behind a transmittance that a false compositing makes negative.
+  scene.stop_transmittance = -1e30;
+  scene.lattice.dims = {1, layers, 1};
+  for (int a = 0; a < 3; ++a) {
+    const int n = scene.lattice.dims[a];
+    scene.lattice.spacing[a].assign(n, 1.0);
+    for (int i = 0; i < n; ++i) scene.lattice.positions[a].push_back(i + 0.5 - 0.5 * n);
+    scene.lattice.box_min[a] = -0.5 * n;
+    scene.lattice.box_max[a] = 0.5 * n;
+  }
+  scene.camera.perspective = false;
+  scene.camera.eye = {0, -layers - 1.0, 0};
+  scene.camera.width = pixels;
+  scene.camera.height = 1;
+  scene.camera.half_height = 0.5 * width / pixels;
+
+  scene::VectorLayer lines;
+  lines.field = make_volume(layers, {static_cast<float>(width), 1.0F, 0.0F});
+  lines.length = std::hypot(width, 1.0);
+  lines.magnitude_range = {0, lines.length};
+  lines.span = 2;
+  lines.r1 = 0.6;
+  lines.r2 = 1.4;
+  lines.opacity = line_opacity;
+  lines.head_desaturation = 0;
+  lines.color_by = scene::LineColor::constant;
+  lines.color = one_color(line_color);
+  lines.magnitude_intensity = 0;
+  lines.jitter_center = 0;
+  lines.jitter_stride = 0;
+  scene.vector = std::move(lines);
+
+  scene::ScalarLayer medium;
+  medium.field = make_volume(layers, {1.0F});
+  medium.color = one_color(medium_color);
+  medium.extinction = {{0, tau * footprint_integral}};
+  medium.min_optical_depth = 0;
+  scene.scalars.push_back(std::move(medium));
+  return scene;
+}
+
+// The exact kernel, its line at the fraction x of the cell's depth.
+std::array<double, 4> exact(double tau, double x) {
+  const double alpha = -std::expm1(-tau) + line_opacity * std::exp(-tau);
+  std::array<double, 4> out{0, 0, 0, alpha};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double between = static_cast<double>(line_color[c]) - medium_color[c];
+    out[c] = medium_color[c] * alpha + line_opacity * std::exp(-tau * x) * between;
+  }
+  return out;
+}
+
+double outside(double low, double high) { return std::max({0.0, -low, high - 1}); }
+
+void take(const std::vector<float>& rgba, double& low, double& high) {
+  low = std::numeric_limits<double>::infinity();
+  high = -low;
+  for (const float v : rgba) {
+    if (std::isnan(v)) {  // as far out as can be
+      low = -std::numeric_limits<double>::infinity();
+      high = -low;
+      return;
+    }
+    low = std::min<double>(low, v);
+    high = std::max<double>(high, v);
+  }
+}
+
+Result<Stiffness> measure_one(scene::Compositing compositing, double tau,
+                              std::vector<float>& alphas, ThreadPool& pool,
+                              const CancelToken& cancel) {
+  const auto one = engine::render(make_scene(1, tau, compositing), pool, cancel);
+  if (!one) return one.error();
+  const auto many = engine::render(make_scene(stiff_layers, tau, compositing), pool, cancel);
+  if (!many) return many.error();
+  Stiffness out;
+  out.compositing = compositing;
+  out.tau = tau;
+  const std::vector<float>& rgba = one->image.rgba;
+  take(rgba, out.min, out.max);
+  take(many->image.rgba, out.layers_min, out.layers_max);
+  for (int i = 0; i < pixels; ++i) {
+    // The line's way through the cell and the row's width are one: pixel i meets it at x.
+    const auto truth = exact(tau, (i + 0.5) / pixels);
+    for (std::size_t c = 0; c < 4; ++c) {
+      const double apart = std::abs(rgba[4 * static_cast<std::size_t>(i) + c] - truth[c]);
+      if (!(apart <= out.error)) out.error = apart;
+    }
+    const float alpha = rgba[4 * static_cast<std::size_t>(i) + 3];
+    // Rounding may undo what grows by less than a float tells.
+    if (!alphas.empty() && !(alpha >= alphas[i] - 1e-6F)) out.monotone = false;
+  }
+  alphas.clear();
+  for (int i = 0; i < pixels; ++i) alphas.push_back(rgba[4 * static_cast<std::size_t>(i) + 3]);
+  out.bounded = outside(out.min, out.max) <= unit_slack;
+  out.diverges =
+      outside(out.layers_min, out.layers_max) > 2 * std::max(outside(out.min, out.max), unit_slack);
+  return out;
+}
+
+}  // namespace
+
+const std::vector<double>& stiffness() {
+  static const std::vector<double> taus{1e-30, 1e-6, 1e-3, 0.1, 0.5, 1,   1.5,
+                                        2,     3,    10,   50,  1e4, 1e30};
+  return taus;
+}
+
+Result<std::vector<Stiffness>> stiffness_sweep(ThreadPool& pool, const CancelToken& cancel) {
+  std::vector<Stiffness> all;
+  for (const scene::Compositing compositing : compositings) {
+    std::vector<float> alphas;
+    for (const double tau : stiffness()) {
+      const auto one = measure_one(compositing, tau, alphas, pool, cancel);
+      if (!one) return one.error();
+      all.push_back(*one);
+    }
+  }
+  return all;
+}
+
+}  // namespace windsplat::study

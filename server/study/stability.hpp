@@ -1,0 +1,36 @@
+// The stiffness sweep: one kernel with a line through its medium, drawn by the engine itself, over
+// optical depths from next to nothing to beyond all measure.
+#pragma once
+
+#include <vector>
+
+#include "server/base/cancel.hpp"
+#include "server/base/thread_pool.hpp"
+#include "server/study/types.hpp"
+
+namespace windsplat::study {
+
+// 1e-30 .. 1e30, the last standing for infinity: no float tells exp(-1e30) from exp(-inf).
+const std::vector<double>& stiffness();
+
+struct Stiffness {
+  scene::Compositing compositing = scene::Compositing::analytic;
+  double tau = 0;
+  double error = 0;  // largest of any channel and line depth, against the exact kernel
+  double min = 0;    // over channels and depths
+  double max = 0;
+  bool bounded = true;    // within [0, 1] but for 1e-3
+  bool monotone = true;   // alpha no less than at the next smaller tau, at every depth of the line
+  double layers_min = 0;  // the same of stiff_layers such kernels behind each other
+  double layers_max = 0;
+  bool diverges = false;  // the layers go further beyond [0, 1] than twice what one kernel does
+};
+
+inline constexpr int stiff_layers = 16;
+
+// Every compositing of method kernel at every optical depth of stiffness(). Exact for one kernel
+// (medium c_s, line c_v of opacity a at the fraction x of the cell's depth):
+// A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tau x) (c_v - c_s).
+Result<std::vector<Stiffness>> stiffness_sweep(ThreadPool& pool, const CancelToken& cancel);
+
+}  // namespace windsplat::study

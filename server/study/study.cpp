@@ -1,0 +1,250 @@
+// For each subject: its truth, every point of its sweep, its ripple floor, its encodings and its
+// pictures. What the folder holds is not measured again.
+#include "server/study/study.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
+
+#include "protocol/codec.hpp"
+#include "server/study/metrics.hpp"
+#include "server/study/points_file.hpp"
+#include "server/study/truth_file.hpp"
+
+namespace windsplat::study {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int results_version = 1;     // a new number whenever results change for the same setting
+constexpr double truth_weight = 12;    // points that take as long as one truth
+constexpr double pictures_weight = 2;  // and as the rest of a scene
+constexpr int amplification = 10;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// All that a scene's numbers depend on, but for the setting.
+std::string identity(const Subject& subject, const Machine& machine, bool integral) {
+  std::string text = "windsplat " + machine.version;
+  text += " results " + std::to_string(results_version);
+  text += integral ? " integral " : " extrapolated ";
+  text += subject.dataset->info().digest;
+  text += ' ';
+  text += protocol::encode_view(subject.view);
+  return text;
+}
+
+std::string words_of(const Setting& setting) {
+  std::string text = name_of(setting.method);
+  text += ' ';
+  text += name_of(setting.compositing);
+  for (const Knob knob :
+       {Knob::stride, Knob::span, Knob::slab_thickness, Knob::stop_transmittance, Knob::width}) {
+    char number[40];
+    std::snprintf(number, sizeof number, " %.17g", value_of(setting.knobs, knob));
+    text += number;
+  }
+  return text;
+}
+
+class Study {
+ public:
+  Study(const std::vector<Subject>& subjects, const Options& options, ThreadPool& pool,
+        const CancelToken& cancel, const Listener& listen, PointsFile points)
+      : subjects_(subjects),
+        options_(options),
+        pool_(pool),
+        cancel_(cancel),
+        listen_(listen),
+        points_(std::move(points)) {
+    report_.machine = this_machine(pool.size());
+    report_.quick = options.quick;
+  }
+
+  Result<Report> run() {
+    const Clock::time_point start = Clock::now();
+    weigh();
+    for (const Subject& subject : subjects_) {
+      if (const auto done = study_scene(subject); !done) return done.error();
+    }
+    auto stability = stiffness_sweep(pool_, cancel_);
+    if (!stability) return stability.error();
+    report_.stability = std::move(*stability);
+    report_.seconds = seconds_since(start);
+    return std::move(report_);
+  }
+
+ private:
+  std::string point_key(const Subject& subject, const Setting& setting) const {
+    std::string text = identity(subject, report_.machine, bool(options_.truth));
+    text += ' ';
+    text += words_of(setting);
+    text += " runs " + std::to_string(timed_runs);
+    text += " threads " + std::to_string(pool_.size());
+    text += ' ';
+    text += report_.machine.kernels;
+    return key_of(text);
+  }
+
+  std::filesystem::path truth_path(const Subject& subject) const {
+    std::string name = "truth-";
+    name += key_of(identity(subject, report_.machine, true));
+    name += ".f64";
+    return options_.folder / name;
+  }
+
+  // How much there is to do.
+  void weigh() {
+    for (const Subject& subject : subjects_) {
+      for (const Setting& setting : plan_sweep(subject, options_.quick).settings) {
+        if (!points_.find(point_key(subject, setting))) left_ += 1;
+      }
+      if (options_.truth && !std::filesystem::exists(truth_path(subject))) left_ += truth_weight;
+      left_ += pictures_weight;
+    }
+  }
+
+  void tell(const Subject& subject, const std::string& doing) const {
+    if (listen_) listen_({subject.name, doing, left_ > 0 ? std::min(1.0, done_ / left_) : 1.0});
+  }
+
+  Result<Picture> find_truth(const Subject& subject, SceneReport& scene) {
+    scene.integral = bool(options_.truth);
+    if (!scene.integral) {
+      auto made = extrapolate(subject, pool_, cancel_);
+      if (!made) return made.error();
+      scene.truth_estimate = made->estimate;
+      return std::move(made->picture);
+    }
+    const std::filesystem::path path = truth_path(subject);
+    if (auto kept = read_truth(path, scene.width, scene.height)) return std::move(*kept);
+    tell(subject, "reference");
+    const auto truth_scene = scene_at(
+        subject, {scene::Method::reference, scene::Compositing::analytic, own_knobs(subject)});
+    if (!truth_scene) return truth_scene.error();
+    const Clock::time_point start = Clock::now();
+    auto truth = options_.truth(*truth_scene);
+    if (!truth) return truth.error();
+    scene.truth_seconds = seconds_since(start);
+    if (const auto kept = write_truth(path, *truth); !kept) return kept.error();
+    done_ += truth_weight;
+    return std::move(*truth);
+  }
+
+  Result<void> measure_points(const Subject& subject, const Picture& truth, SceneReport& scene) {
+    Sweep sweep = plan_sweep(subject, options_.quick);
+    scene.curves = std::move(sweep.curves);
+    for (const Setting& setting : sweep.settings) {
+      const std::string key = point_key(subject, setting);
+      if (const auto known = points_.find(key)) {
+        ++report_.skipped;
+        scene.points.push_back({setting, *known, false});
+        continue;
+      }
+      tell(subject, std::string(name_of(setting.method)) + " " + name_of(setting.compositing));
+      const auto measured = measure(subject, setting, truth, pool_, cancel_);
+      if (!measured) return measured.error();
+      if (const auto kept = points_.append(key, *measured); !kept) return kept.error();
+      scene.points.push_back({setting, *measured, false});
+      ++report_.measured;
+      ++done_;
+    }
+    mark_pareto(scene.points);
+    for (Curve& curve : scene.curves) find_order(scene.points, curve);
+    return {};
+  }
+
+  // The truth, every compositing of method kernel, and method slab, at the view's own knobs.
+  Result<void> draw_pictures(const Subject& subject, const Picture& truth, SceneReport& scene) {
+    const auto base = scene_at(
+        subject, {scene::Method::kernel, scene::Compositing::analytic, own_knobs(subject)});
+    if (!base) return base.error();
+    const auto& background = base->background;
+    const std::vector<std::uint8_t> true_rgb =
+        displayed(to_floats(truth), truth.width, truth.height, background);
+    scene.pictures.push_back({"reference", true_rgb, {}});
+    std::vector<std::pair<scene::Method, scene::Compositing>> wanted{
+        {scene::Method::slab, scene::Compositing::analytic}};
+    for (const scene::Compositing compositing : compositings) {
+      wanted.emplace_back(scene::Method::kernel, compositing);
+      if (subject.view.scalars->empty()) break;
+    }
+    for (const auto& [method, compositing] : wanted) {
+      const auto image = draw(subject, {method, compositing, own_knobs(subject)}, pool_, cancel_);
+      if (!image) return image.error();
+      Shown shown;
+      shown.title = name_of(method);
+      shown.title += ' ';
+      shown.title += name_of(compositing);
+      shown.rgb = displayed(image->rgba, image->width, image->height, background);
+      for (std::size_t i = 0; i < shown.rgb.size(); ++i) {
+        const int apart = std::abs(static_cast<int>(shown.rgb[i]) - true_rgb[i]);
+        shown.difference_rgb.push_back(
+            static_cast<std::uint8_t>(std::min(255, amplification * apart)));
+      }
+      scene.pictures.push_back(std::move(shown));
+    }
+    return {};
+  }
+
+  Result<void> study_scene(const Subject& subject) {
+    SceneReport scene;
+    scene.name = subject.name;
+    scene.view = subject.view;
+    scene.width = subject.view.image.width;
+    scene.height = subject.view.image.height;
+    const auto truth = find_truth(subject, scene);
+    if (!truth) return truth.error();
+    scene.pieces = truth->pieces;
+    scene.evaluations = truth->evaluations;
+    if (const auto done = measure_points(subject, *truth, scene); !done) return done.error();
+    tell(subject, "pictures");
+    const auto ripple = ripple_floor(subject, pool_, cancel_);
+    if (!ripple) return ripple.error();
+    scene.ripple_floor = *ripple;
+    auto encoded = measure_encoding(subject, pool_, cancel_);
+    if (!encoded) return encoded.error();
+    scene.encoded = std::move(*encoded);
+    if (const auto drawn = draw_pictures(subject, *truth, scene); !drawn) return drawn.error();
+    done_ += pictures_weight;
+    tell(subject, "done");
+    report_.scenes.push_back(std::move(scene));
+    return {};
+  }
+
+  const std::vector<Subject>& subjects_;
+  const Options& options_;
+  ThreadPool& pool_;
+  const CancelToken& cancel_;
+  const Listener& listen_;
+  PointsFile points_;
+  Report report_;
+  double left_ = 0;
+  double done_ = 0;
+};
+
+}  // namespace
+
+Result<Report> run_study(const std::vector<Subject>& subjects, const Options& options,
+                         ThreadPool& pool, const CancelToken& cancel, const Listener& listen) {
+  std::error_code fault;
+  std::filesystem::create_directories(options.folder, fault);
+  if (fault) {
+    std::string message = "cannot make the folder '";
+    message += printable(options.folder.native());
+    message += "': ";
+    message += fault.message();
+    return make_error(ErrorKind::internal, std::move(message));
+  }
+  auto points = PointsFile::open(options.folder / "points.csv");
+  if (!points) return points.error();
+  return Study(subjects, options, pool, cancel, listen, std::move(*points)).run();
+}
+
+}  // namespace windsplat::study
