@@ -102,9 +102,9 @@ export function workLines(work: ChosenMessage["work"]): [string, string, string]
   const drawn = work.samples - work.culled - work.skippedBoth;
   return [
     `${many(drawn)} of ${many(work.samples)} samples · culled ${many(work.culled)}` +
-      ` · skipped ${many(work.skippedBoth)}`,
-    `skipped ${many(work.skippedVector)} lines, ${many(work.skippedScalar)} splats` +
       ` · occluded ${many(work.occluded)}`,
+    `skipped ${many(work.skippedVector)} lines, ${many(work.skippedScalar)} splats,` +
+      ` ${many(work.skippedBoth)} both`,
     `${many(work.pixelUpdates)} pixel updates · ${many(work.exponentials)} exponentials` +
       ` · ${work.variant}`,
   ];

@@ -157,6 +157,7 @@ export class PanelKit {
   note(folder: GUI, text: () => string): void {
     const element = make("p", "panel-note");
     folder.$children.append(element);
+    element.hidden = true;
     const write = () => {
       const words = text();
       if (element.textContent === words) return;

@@ -118,8 +118,8 @@ function addShape(parent: GUI, kit: PanelKit, per: string): GUI {
   kit.number(folder, "bright by |v|", keyAccess("/vector/magnitudeIntensity"));
   addMagnitudes(folder, kit, per);
   kit.choice(folder, "direction", keyAccess("/vector/space"), {
-    "as the components stand": "components",
-    "along the picture's space": "world",
+    "by components": "components",
+    "in world space": "world",
   });
   (["x", "y", "z"] as const).forEach((axis, index) => {
     kit.number(

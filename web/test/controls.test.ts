@@ -208,7 +208,7 @@ test("the HUD names method and compositing, and says what was left out", () => {
   for (const part of [
     "90.0 k of 97.3 k samples",
     "culled 1.0 k",
-    "skipped 6.3 k",
+    "6.3 k both",
     "111 lines",
     "22.2 k splats",
     "occluded 0",
