@@ -20,6 +20,7 @@ import {
   type SocketLike,
 } from "./connection";
 import { debounced } from "./dom";
+import { Flow } from "./flow";
 import type { Gizmo } from "./gizmo";
 import type { Hud } from "./hud";
 import type { Legend } from "./legend";
@@ -56,6 +57,7 @@ const firstChoice = "climate"; // of the samples, the one that shows most
 const chosenKept = 8; // `chosen` messages whose frames may still come
 const hashDelayMs = 400;
 const presenceMs = 60_000;
+const globe: Box = { min: [-1, -1, -1], max: [1, 1, 1] }; // of a grid that is bent to a sphere
 
 const round = (v: number): number => Number(v.toFixed(6));
 const roundAll = (v: Vec3): Vec3 => [round(v[0]), round(v[1]), round(v[2])];
@@ -75,6 +77,7 @@ export class App {
   private refusedRev = 0; // of the newest patch that was refused
   private restored = new Set<number>(); // revs of the view that took a refused one's place
   private answeredT = 0; // t of the newest patch that a frame has answered
+  private readonly flowing: Flow;
   private readonly saveHash = debounced(() => this.writeHash(), hashDelayMs);
 
   constructor(
@@ -96,6 +99,19 @@ export class App {
         },
       },
     );
+    this.flowing = new Flow({
+      now: () => performance.now(),
+      setTimeout: clock.setTimeout,
+      clearTimeout: clock.clearTimeout,
+      hidden: () => document.hidden,
+      wanted: () => this.linesMove(),
+      time: () => this.view().vector?.motion?.time ?? 0,
+      send: (time) => {
+        const outgoing = this.state.change({ vector: { motion: { time } } });
+        this.send(outgoing);
+        return outgoing.rev;
+      },
+    });
   }
 
   start(parts: AppParts): void {
@@ -170,7 +186,8 @@ export class App {
     const camera = this.camera();
     if (camera === null) return;
     const world = this.dataset().world as Box;
-    const box = scaledBox(world, this.view().geometry?.scale ?? [1, 1, 1]);
+    const { mapping, scale } = this.view().geometry ?? {};
+    const box = mapping === "sphere" ? globe : scaledBox(world, scale ?? [1, 1, 1]);
     const [width, height] = this.parts.viewport.size();
     this.setCamera(frameBox(camera, box, angles, width / height));
   }
@@ -219,6 +236,22 @@ export class App {
     this.saveHash();
   }
 
+  // Lets the lines flow or halts them where they are.
+  flow(on: boolean): void {
+    if (on) {
+      if (!this.linesMove()) this.change({ vector: { motion: { mode: "phase" } } });
+      this.flowing.start();
+    } else {
+      this.flowing.stop();
+      this.saveHash();
+    }
+    this.refresh();
+  }
+
+  isFlowing(): boolean {
+    return this.flowing.running;
+  }
+
   playSettings(): void {
     if (this.playing) this.play();
   }
@@ -246,12 +279,18 @@ export class App {
     return { ...said, image: { ...said.image, width, height } };
   }
 
+  private linesMove(): boolean {
+    const { vector } = this.view();
+    return vector?.field !== null && vector?.motion?.mode === "phase";
+  }
+
   private send({ rev, patch }: Outgoing): void {
     this.connection.send({ type: "patch", rev, t: performance.now(), patch });
     this.saveHash();
   }
 
   private replace(view: View): void {
+    this.flowing.stop();
     for (const outgoing of this.state.replace(view)) this.send(outgoing);
     this.refresh();
   }
@@ -262,6 +301,7 @@ export class App {
     this.openId += 1;
     this.opening = true;
     this.playing = false;
+    this.flowing.stop();
     this.parts.status.startLoading(`opening ${id}…`);
     for (const one of outgoing) this.send(one);
     this.connection.send({ type: "open", id: this.openId, dataset: id });
@@ -354,6 +394,7 @@ export class App {
       this.refusedRev = message.rev;
       // What was refused is taken back, so that controls and link tell what is drawn.
       this.state.refuse(message.rev);
+      this.flowing.refused(message.rev);
       // The defaults themselves were refused: to ask for them again would never end.
       if (!this.opening && !this.restored.has(message.rev)) this.restoreDataset();
       this.refresh();
@@ -397,6 +438,7 @@ export class App {
     const { hud, status } = this.parts;
     this.connection.send({ type: "ack", seq: header.seq, decodeMs: frame.decodeMs });
     this.state.settle(header.rev);
+    this.flowing.answered(header.rev);
     const chosen = this.chosen.get(header.seq) ?? null;
     this.chosen.delete(header.seq);
     if (chosen !== null) this.drawn = chosen;
@@ -492,12 +534,15 @@ export class App {
 
   // Also said now and then while the page is seen: a viewer who only looks is not idle.
   private tellVisibility(): void {
-    if (!document.hidden) this.connection.wake();
+    if (!document.hidden) {
+      this.connection.wake();
+      this.flowing.seen();
+    }
     this.connection.send({ type: "visibility", hidden: document.hidden });
   }
 
   private writeHash(): void {
-    if (this.playing) return;
+    if (this.playing || this.flowing.running) return;
     const hash = hashOfView(this.state.document);
     if (window.location.hash !== hash) window.history.replaceState(null, "", hash);
   }

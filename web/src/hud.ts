@@ -66,7 +66,7 @@ export class Hud {
     const kind = header.errorMeasured ? "measured" : header.errorEstimated ? "estimated" : "";
     this.headline.textContent = [
       `${formatBytes(header.payloadBytes)} ${header.codec}`,
-      chosen === null ? header.method : `${header.method} ${chosen.compositing}`,
+      chosen === null ? header.method : methodText(chosen),
       `${header.width}×${header.height}`,
       ...(header.cached ? ["cached"] : []),
       ...(kind === "" ? [] : [`error ${formatNumber(header.error, 2)} ${kind}`]),
@@ -75,7 +75,7 @@ export class Hud {
     this.times.textContent =
       `queue ${ms(header.queueUs / 1e3)} · render ${ms(header.renderUs / 1e3)} · ` +
       `encode ${ms(header.encodeUs / 1e3)} · net ${net} · decode ${ms(frame.decodeMs)} ms`;
-    this.work.textContent = chosen === null ? "" : workText(chosen);
+    this.work.textContent = chosen === null ? "" : workLines(chosen.work).join("\n");
     this.showRate();
   }
 
@@ -85,13 +85,27 @@ export class Hud {
   }
 }
 
-function workText(chosen: ChosenMessage): string {
-  const { work } = chosen;
+// The method, and what is particular to it.
+export function methodText({ method, compositing, slabThickness }: ChosenMessage): string {
+  const slabs = slabThickness === null ? "" : ` of ${formatNumber(slabThickness, 3)} cells`;
+  return method === "reference" ? method : `${method}${slabs} ${compositing}`;
+}
+
+const many = (n: number): string => {
+  if (n < 1000) return String(n);
+  if (n < 1e6) return `${(n / 1e3).toFixed(1)} k`;
+  return n < 1e9 ? `${(n / 1e6).toFixed(1)} M` : `${(n / 1e9).toFixed(1)} G`;
+};
+
+// What was drawn and what was left out, and what it cost.
+export function workLines(work: ChosenMessage["work"]): [string, string, string] {
   const drawn = work.samples - work.culled - work.skippedBoth;
-  const many = (n: number) =>
-    n >= 1e6 ? `${(n / 1e6).toFixed(1)} M` : `${(n / 1e3).toFixed(1)} k`;
-  return (
-    `${many(drawn)} of ${many(work.samples)} kernels · ${many(work.pixelUpdates)} pixel updates` +
-    ` · ${work.variant}`
-  );
+  return [
+    `${many(drawn)} of ${many(work.samples)} samples · culled ${many(work.culled)}` +
+      ` · occluded ${many(work.occluded)}`,
+    `skipped ${many(work.skippedVector)} lines, ${many(work.skippedScalar)} splats,` +
+      ` ${many(work.skippedBoth)} both`,
+    `${many(work.pixelUpdates)} pixel updates · ${many(work.exponentials)} exponentials` +
+      ` · ${work.variant}`,
+  ];
 }

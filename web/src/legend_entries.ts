@@ -1,7 +1,7 @@
 // What the legend says of a drawn view: title, unit, range and ticks of each colour strip.
 // Pure: (complete view, dataset) -> entries.
 import type { Dataset, Field, ScalarView, View } from "./protocol";
-import { axisTicks, formatNumber, linearTicks, type LegendTick } from "./ticks";
+import { axisTicks, compassTicks, formatNumber, linearTicks, type LegendTick } from "./ticks";
 
 export interface LegendEntry {
   kind: "lines" | "medium";
@@ -38,8 +38,8 @@ export function unitText(units: string | undefined): string {
 
 // World heights of the samples under a view's geometry: known where only the box was stretched.
 export function sampleHeights(dataset: Dataset, view: View): number[] | null {
-  const vertical = view.geometry?.vertical ?? "auto";
-  if (vertical !== "auto") return null;
+  const { vertical = "auto", mapping = "flat", heightField = null } = view.geometry ?? {};
+  if (vertical !== "auto" || mapping !== "flat" || heightField !== null) return null;
   const scale = view.geometry?.scale ?? [1, 1, 1];
   const edges = dataset.world.max.map((most, axis) => most - dataset.world.min[axis]!);
   const longest = Math.max(...edges.map((edge, axis) => edge * scale[axis]!));
@@ -98,6 +98,21 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
       return { ...entry, title: `${name}: distance from the eye`, units: "world units" };
     case "rise":
       return { ...entry, title: `${name}: height and rise`, units: "fraction" };
+    case "direction":
+      return {
+        ...entry,
+        title: `${name}: direction`,
+        units: "towards",
+        ticks: compassTicks(range),
+      };
+    case "scalar": {
+      const scalar = fieldNamed(dataset, color.field ?? "");
+      return {
+        ...entry,
+        title: `${name}: ${fieldTitle(scalar, color.field ?? "")}`,
+        units: unitText(scalar?.units),
+      };
+    }
     case "constant":
       return { ...entry, range: null, map: null, color: color.constant ?? "#ffffff", ticks: [] };
     default:

@@ -50,6 +50,8 @@ const panels = new Panels(panelBox, host, {
   reset: () => app.resetAll(),
   camera: () => app.camera(),
   setCamera: (camera) => app.setCamera(camera),
+  flowing: () => app.isFlowing(),
+  flow: (on) => app.flow(on),
 });
 
 const help = byId("help", HTMLDialogElement);

@@ -3,9 +3,9 @@
 import GUI, { type Controller } from "lil-gui";
 import { viewHelp } from "../generated/view_help";
 import type { ColorMaps } from "./color_maps";
+import { controlStates, type ControlStates, type Options } from "./controls";
 import { make } from "./dom";
-import { unitText } from "./legend_entries";
-import type { Dataset, Field, View } from "./protocol";
+import type { Dataset, View } from "./protocol";
 import type { Patch } from "./view_state";
 
 export interface PanelHost {
@@ -13,17 +13,6 @@ export interface PanelHost {
   change(patch: Patch): void;
   dataset(): Dataset;
   maps: ColorMaps;
-}
-
-// What a picker of fields offers: text -> name.
-export function fieldOptions(dataset: Dataset, kind: Field["kind"]): Record<string, string> {
-  const fields = dataset.fields.filter((field) => field.kind === kind);
-  return Object.fromEntries(
-    fields.map((field) => {
-      const unit = unitText(field.units);
-      return [unit === "" ? field.name : `${field.name} (${unit})`, field.name];
-    }),
-  );
 }
 
 export interface NumberLook {
@@ -94,12 +83,20 @@ export class PanelKit {
     return this.bind(folder.add(model, "value"), label, model, access);
   }
 
-  choice(folder: GUI, label: string, access: Access<string>, options: Record<string, string>) {
+  // A value that is not offered is still shown while the view has it.
+  choice(folder: GUI, label: string, access: Access<string>, options: Options): Controller {
+    const withOwn = (value: string): Options =>
+      Object.values(options).includes(value) ? options : { ...options, [value]: value };
     const model = { value: access.get(this.host.view()) ?? Object.values(options)[0] ?? "" };
-    const all = Object.values(options).includes(model.value)
-      ? options
-      : { ...options, [model.value]: model.value };
-    return this.bind(folder.add(model, "value", all), label, model, access);
+    const controller = folder.add(model, "value", withOwn(model.value));
+    let offered = model.value;
+    this.onRefresh(() => {
+      const value = access.get(this.host.view());
+      if (value === undefined || value === null || value === offered) return;
+      offered = value;
+      controller.options(withOwn(value));
+    });
+    return this.bind(controller, label, model, access);
   }
 
   color(folder: GUI, label: string, access: Access<string>): Controller {
@@ -127,11 +124,11 @@ export class PanelKit {
   }
 
   // Two boxes for the ends of a range; both are sent, as the wire takes arrays whole.
-  range(folder: GUI, label: string, access: Access<[number, number]>, units: string): void {
+  range(folder: GUI, label: string, access: Access<[number, number]>, units: string): Controller[] {
     const ends = ["from", "to"] as const;
-    ends.forEach((end, index) => {
+    return ends.map((end, index) => {
       const unit = units === "" ? "" : ` (${units})`;
-      this.number(
+      return this.number(
         folder,
         `${label} ${end}${unit}`,
         {
@@ -154,6 +151,42 @@ export class PanelKit {
     const controller = folder.add({ run }, "run").name(label);
     controller.domElement.title = title;
     return controller;
+  }
+
+  // Words below the controls before them, of the view as it is.
+  note(folder: GUI, text: () => string): void {
+    const element = make("p", "panel-note");
+    folder.$children.append(element);
+    element.hidden = true;
+    const write = () => {
+      const words = text();
+      if (element.textContent === words) return;
+      element.textContent = words;
+      element.hidden = words === "";
+    };
+    this.onRefresh(write);
+    write();
+  }
+
+  // Shown only while they count.
+  showWhen(counts: (states: ControlStates) => boolean, ...parts: (Controller | GUI)[]): void {
+    this.follow(counts, (on) => parts.forEach((part) => part.show(on)));
+  }
+
+  // Out of use while they do not count.
+  enableWhen(counts: (states: ControlStates) => boolean, ...controllers: Controller[]): void {
+    this.follow(counts, (on) => controllers.forEach((controller) => controller.enable(on)));
+  }
+
+  private follow(counts: (states: ControlStates) => boolean, apply: (on: boolean) => void): void {
+    let last: boolean | null = null;
+    const run = () => {
+      const on = counts(controlStates(this.host.view()));
+      if (on !== last) apply(on);
+      last = on;
+    };
+    this.onRefresh(run);
+    run();
   }
 
   private bind<T>(

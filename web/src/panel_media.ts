@@ -1,5 +1,6 @@
 // The media's panel: up to four scalar fields, each with its switch, field, colours and opacity.
 import type GUI from "lil-gui";
+import { fieldOptions } from "./controls";
 import { unitText } from "./legend_entries";
 import {
   curveOf,
@@ -11,7 +12,7 @@ import {
   withDensity,
   type Layer,
 } from "./media";
-import { fieldOptions, PanelKit, type Access } from "./panel_kit";
+import { PanelKit, type Access } from "./panel_kit";
 import type { ScalarView } from "./protocol";
 
 const layersMax = 4;
@@ -134,6 +135,16 @@ class MediaPanel {
         set: (stride) => this.update(index, { stride }),
       },
       { min: 1, max: 16, step: 1 },
+    );
+    controls.number(
+      folder,
+      "min optical depth",
+      {
+        pointer: "/scalars/minOpticalDepth",
+        get: () => layer().minOpticalDepth,
+        set: (minOpticalDepth) => this.update(index, { minOpticalDepth }),
+      },
+      { min: 0, max: 0.05, step: 0.0001 },
     );
     controls.action(folder, "Remove", "Take this medium out of the view", () => {
       this.layers.splice(index, 1);

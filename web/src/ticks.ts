@@ -49,6 +49,23 @@ export function linearTicks(range: readonly [number, number], count = 5): Legend
   }));
 }
 
+const quarters = ["N", "E", "S", "W"] as const;
+
+// Ticks of a strip over compass bearings, degrees from north by east. Where less than two quarters
+// lie within, degrees.
+export function compassTicks(range: readonly [number, number]): LegendTick[] {
+  const [low, high] = range;
+  const first = Math.ceil(Math.min(low, high) / 90 - 1e-9);
+  const last = Math.floor(Math.max(low, high) / 90 + 1e-9);
+  if (last - first < 1 || last - first > 8) {
+    return linearTicks(range).map(({ at, text }) => ({ at, text: `${text}°` }));
+  }
+  return Array.from({ length: last - first + 1 }, (_, n) => ({
+    at: (90 * (first + n) - low) / (high - low),
+    text: quarters[(((first + n) % 4) + 4) % 4]!,
+  }));
+}
+
 // How round a number is: 1, 10, 100 before 5, then 2, then anything else.
 function roughness(value: number): number {
   if (value === 0) return 0;

@@ -1,0 +1,403 @@
+// The panel's controls in a real browser: what each sends, what the link keeps of it, what it hides,
+// and, for what every server draws, that the picture changes.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import {
+  control,
+  Daemon,
+  finalPicture,
+  freePort,
+  launch,
+  openPage,
+  pixels,
+  shot,
+  somePicture,
+} from "./support.mjs";
+
+let browser;
+let daemon;
+
+before(async () => {
+  browser = await launch();
+  daemon = await new Daemon(await freePort()).start();
+});
+
+after(async () => {
+  await browser?.close();
+  await daemon?.kill();
+});
+
+// Runs in the page before its own scripts: keeps the patches that go out, with the time.
+const watchPatches = () => {
+  window.patches = [];
+  const send = WebSocket.prototype.send;
+  WebSocket.prototype.send = function (text) {
+    const message = JSON.parse(text);
+    if (message.type === "patch") window.patches.push({ at: performance.now(), ...message });
+    return send.call(this, text);
+  };
+};
+
+async function withPage(run, path = "", options = {}) {
+  const page = await openPage(browser, daemon.url + path, { initScript: watchPatches, ...options });
+  try {
+    await finalPicture(page);
+    await run(page);
+    assert.deepEqual(page.faults, [], "the browser's console is clean");
+  } finally {
+    await page.context().close();
+  }
+}
+
+async function unfold(page, ...titles) {
+  for (const title of titles) {
+    const button = page
+      .locator("#panel .lil-title")
+      .filter({ hasText: new RegExp(`^${title}$`) })
+      .first();
+    if ((await button.getAttribute("aria-expanded")) !== "true") await button.click();
+  }
+}
+
+async function choose(page, label, text) {
+  const select = control(page, label);
+  const options = await select.locator("option").allTextContents();
+  const wanted = options.find((option) => text.test(option));
+  assert.ok(wanted, `${label} offers ${options.join(", ")}`);
+  await select.selectOption({ label: wanted });
+}
+
+async function type(page, label, value) {
+  const input = control(page, label, "input");
+  await input.fill(String(value));
+  await input.press("Enter");
+}
+
+const isShown = (page, label, tag) => control(page, label, tag).isVisible();
+
+// The newest patch that holds something at this path, from there on.
+const lastPatch = (page, ...path) =>
+  page.evaluate((keys) => {
+    const inner = (value) => keys.reduce((v, key) => v?.[key], value);
+    return window.patches.map(({ patch }) => inner(patch)).findLast((v) => v !== undefined);
+  }, path);
+
+// The link says this, sooner or later.
+async function linkSays(page, ...pathAndValue) {
+  const wanted = pathAndValue.pop();
+  await page.waitForFunction(
+    ([keys, value]) => {
+      const view = JSON.parse(decodeURIComponent(location.hash.slice(2)) || "{}");
+      const found = keys.reduce((v, key) => v?.[key], view);
+      return JSON.stringify(found) === JSON.stringify(value);
+    },
+    [pathAndValue, wanted],
+  );
+}
+
+// Number boxes and sliders: folder, label, value, where it goes.
+const numbers = [
+  ["Lines", "length", 0.08, "vector", "length"],
+  ["Lines", "opacity", 0.4, "vector", "opacity"],
+  ["Lines", "every n-th sample", 2, "vector", "stride"],
+  ["Line shape", "core radius r1", 0.9, "vector", "r1"],
+  ["Line shape", "edge radius r2", 2.5, "vector", "r2"],
+  ["Line shape", "white of the head", 0.1, "vector", "headDesaturation"],
+  ["Line shape", "bright by \\|v\\|", 0, "vector", "magnitudeIntensity"],
+  ["Kernels and jitter", "span \\(strides\\)", 3, "vector", "span"],
+  ["Kernels and jitter", "jitter of centre", 0.9, "vector", "jitter", "center"],
+  ["Kernels and jitter", "jitter of stride", 0.8, "vector", "jitter", "stride"],
+  ["Kernels and jitter", "pattern", 17, "vector", "jitter", "seed"],
+  ["Camera and depth", "depth cue", 0.9, "depthCue", "strength"],
+  ["Camera and depth", "darkens from", 0.3, "depthCue", "near"],
+  ["Camera and depth", "darkest at", 0.6, "depthCue", "far"],
+  ["Method", "stop transmittance", 0.04, "method", "stopTransmittance"],
+  ["Quality", "moving budget \\(ms\\)", 60, "quality", "budgetMs"],
+];
+
+test("every number goes out under its key and into the link", () =>
+  withPage(async (page) => {
+    await unfold(page, ...new Set(numbers.map(([folder]) => folder)));
+    for (const [, label, value, ...path] of numbers) {
+      await type(page, label, value);
+      assert.equal(await lastPatch(page, ...path), value, label);
+    }
+    for (const [, , value, ...path] of numbers) await linkSays(page, ...path, value);
+  }));
+
+// Of these the picture tells, whatever method the server has.
+const visible = [
+  ["Lines", "length", 0.1],
+  ["Lines", "opacity", 0.2],
+  ["Lines", "every n-th sample", 3],
+  ["Line shape", "edge radius r2", 4],
+  ["Line shape", "white of the head", 0],
+  ["Kernels and jitter", "jitter of centre", 0],
+  ["Kernels and jitter", "pattern", 5],
+  ["Camera and depth", "depth cue", 1],
+];
+
+test("what the lines' numbers change is seen", () =>
+  withPage(async (page) => {
+    await unfold(page, ...new Set(visible.map(([folder]) => folder)));
+    let { hash } = await pixels(page);
+    for (const [, label, value] of visible) {
+      await type(page, label, value);
+      await finalPicture(page);
+      const next = (await pixels(page)).hash;
+      assert.notEqual(next, hash, label);
+      hash = next;
+    }
+  }));
+
+test("near and far of the depth cue cannot cross", () =>
+  withPage(async (page) => {
+    await unfold(page, "Camera and depth");
+    await type(page, "darkens from", 1.5);
+    const { near, far } = await lastPatch(page, "depthCue");
+    assert.equal(near, 1.5);
+    assert.ok(far > near);
+    await finalPicture(page);
+    assert.equal(await page.locator("#alert").isVisible(), false);
+    await type(page, "depth cue", 0);
+    assert.equal(await control(page, "darkens from", "input").isDisabled(), true);
+    await type(page, "depth cue", 0.5);
+    assert.equal(await control(page, "darkens from", "input").isDisabled(), false);
+  }));
+
+test("a medium's stride and least optical depth go out with it", () =>
+  withPage(async (page) => {
+    const first = await pixels(page);
+    await type(page, "min optical depth", 0.02);
+    assert.equal((await lastPatch(page, "scalars"))[0].minOpticalDepth, 0.02);
+    await finalPicture(page);
+    assert.notEqual((await pixels(page)).hash, first.hash);
+  }));
+
+test("lines that are off take their controls with them", () =>
+  withPage(async (page) => {
+    const shown = control(page, "shown", "input");
+    await shown.uncheck();
+    await page.waitForFunction(() => document.querySelector(".legend-lines") === null);
+    assert.equal(await isShown(page, "length", "input"), false);
+    assert.equal(await isShown(page, "tells"), false);
+    await shown.check();
+    assert.equal(await isShown(page, "length", "input"), true);
+    assert.equal(await isShown(page, "tells"), true);
+  }));
+
+test("kernels that do not overlap have no span, no jitter no pattern", () =>
+  withPage(async (page) => {
+    await unfold(page, "Kernels and jitter");
+    const disabled = (label) => control(page, label, "input").isDisabled();
+    assert.deepEqual(
+      [await disabled("span \\(strides\\)"), await disabled("pattern")],
+      [false, false],
+    );
+    await control(page, "kernels overlap", "input").uncheck();
+    assert.equal(await lastPatch(page, "vector", "jitter", "overlap"), false);
+    assert.equal(await disabled("span \\(strides\\)"), true);
+    await type(page, "jitter of centre", 0);
+    await type(page, "jitter of stride", 0);
+    assert.equal(await disabled("pattern"), true);
+    assert.equal(await disabled("new each step"), true);
+  }));
+
+test("the slab's thickness is asked for only of slabs, and each compositing is explained", () =>
+  withPage(async (page) => {
+    await unfold(page, "Method");
+    const note = (text) => page.locator("#panel .panel-note", { hasText: text });
+    assert.equal(await isShown(page, "slab thickness", "input"), false);
+    assert.deepEqual(await control(page, "method").locator("option").allTextContents(), [
+      "kernel",
+      "slab",
+    ]);
+    await choose(page, "method", /^slab$/);
+    assert.equal(await lastPatch(page, "method", "name"), "slab");
+    assert.equal(await isShown(page, "slab thickness", "input"), true);
+    await type(page, "slab thickness", 2);
+    assert.equal(await lastPatch(page, "method", "slabThickness"), 2);
+    await choose(page, "method", /^kernel$/);
+    for (const [option, word, hint] of [
+      [/^cd \(/, "cd", /no seams/],
+      [/^cd-naive/, "cd-naive", /seams about/],
+      [/^cd-euler/, "cd-euler", /unstable/],
+      [/^simple/, "simple", /in front/],
+      [/^analytic/, "analytic", /exactly/],
+    ]) {
+      await choose(page, "compositing", option);
+      assert.equal(await lastPatch(page, "method", "compositing"), word);
+      await note(hint).waitFor();
+    }
+  }));
+
+test("a slice is chosen by axis and layer, and taken away again", () =>
+  withPage(async (page) => {
+    await unfold(page, "Geometry");
+    assert.equal(await isShown(page, "layer", "input"), false);
+    const { x, y, z } = await page.evaluate(() => {
+      const [a, b, c] = document.querySelector("#facts").textContent.match(/\d+/g).map(Number);
+      return { x: a, y: b, z: c };
+    });
+    for (const [axis, samples] of Object.entries({ x, y, z })) {
+      await choose(page, "slice", new RegExp(`^across ${axis}`));
+      const middle = Math.floor((samples - 1) / 2);
+      assert.deepEqual(await lastPatch(page, "geometry", "slice"), { axis, index: middle });
+      await type(page, "layer", 10_000);
+      assert.deepEqual(await lastPatch(page, "geometry", "slice"), { axis, index: samples - 1 });
+    }
+    await choose(page, "slice", /^off/);
+    assert.equal(await lastPatch(page, "geometry", "slice"), null);
+  }));
+
+test("a globe is offered where there are longitudes, and the vertical axis yields to heights", () =>
+  withPage(async (page) => {
+    await unfold(page, "Geometry");
+    await choose(page, "shape", /^sphere/);
+    assert.equal(await lastPatch(page, "geometry", "mapping"), "sphere");
+    await choose(page, "shape", /^flat/);
+    await type(page, "vertical stretch", 3);
+    assert.deepEqual(await lastPatch(page, "geometry", "scale"), [1, 1, 3]);
+    await type(page, "stretch in x", 2);
+    assert.deepEqual(await lastPatch(page, "geometry", "scale"), [2, 1, 3]);
+    const heights = await control(page, "heights from").locator("option").allTextContents();
+    assert.ok(heights.length >= 2, `${heights}`);
+    await control(page, "heights from").selectOption({ label: heights[1] });
+    assert.match(await lastPatch(page, "geometry", "heightField"), /./);
+    await page.locator("#dataset").selectOption("tornado");
+    await page.waitForFunction(() => location.hash.includes("%22tornado%22"));
+    await finalPicture(page);
+    await unfold(page, "Geometry");
+    assert.equal(await isShown(page, "shape"), false);
+  }));
+
+test("colour tells a direction by the compass, and a scalar by its name", () =>
+  withPage(async (page) => {
+    assert.equal(await isShown(page, "scalar"), false);
+    await choose(page, "tells", /^direction$/);
+    assert.equal(await lastPatch(page, "vector", "color", "by"), "direction");
+    assert.equal(await isShown(page, "scalar"), false);
+    await choose(page, "tells", /^a scalar field$/);
+    assert.equal(await isShown(page, "scalar"), true);
+    const { by, field, range } = await lastPatch(page, "vector", "color");
+    assert.deepEqual([by, range], ["scalar", null]);
+    const offered = await control(page, "scalar").locator("option").allTextContents();
+    assert.ok(offered.some((text) => text.startsWith(field)));
+    await choose(page, "tells", /^height and rise$/);
+    assert.equal(await isShown(page, "share of rise", "input"), true);
+    await choose(page, "tells", /^nothing/);
+    assert.equal(await isShown(page, "share of rise", "input"), false);
+    assert.equal(await isShown(page, "map"), false, "one colour needs no map");
+    await linkSays(page, "vector", "color", "by", "constant");
+  }));
+
+// --- the flow: only its patches, which go out whatever the server draws ----------------------
+
+const moves = (page) =>
+  page.evaluate(() =>
+    window.patches
+      .filter(({ patch }) => patch.vector?.motion?.time !== undefined)
+      .map(({ at, rev, patch }) => ({ at, rev, time: patch.vector.motion.time })),
+  );
+
+test("lines flow at the pace of the frames, and the link waits until they rest", () =>
+  withPage(async (page) => {
+    await unfold(page, "Motion");
+    assert.equal(await isShown(page, "cycles a step", "input"), false);
+    const flow = control(page, "let lines flow", "input");
+    await flow.check();
+    assert.equal(await lastPatch(page, "vector", "motion", "mode"), "phase");
+    assert.equal(await isShown(page, "cycles a step", "input"), true);
+    await page.waitForFunction(
+      () => window.patches.filter(({ patch }) => patch.vector?.motion?.time > 0).length >= 8,
+    );
+    const hash = await page.evaluate(() => location.hash);
+    assert.ok(!/%22time%22/.test(hash), "not while it flows");
+    await flow.uncheck();
+    const sent = await moves(page);
+    for (let n = 1; n < sent.length; n++) {
+      assert.ok(sent[n].time > sent[n - 1].time, "time runs on");
+      assert.ok(sent[n].at - sent[n - 1].at > 60, "no more than 15 a second");
+    }
+    await page.waitForTimeout(300);
+    assert.equal((await moves(page)).length, sent.length, "a stop is a stop");
+    await linkSays(page, "vector", "motion", "time", sent.at(-1).time);
+    await finalPicture(page);
+  }));
+
+test("a hidden page does not let its lines flow; still lines do not", () =>
+  withPage(async (page) => {
+    await unfold(page, "Motion");
+    await control(page, "let lines flow", "input").check();
+    await page.waitForFunction(
+      () => window.patches.filter(({ patch }) => patch.vector?.motion?.time > 0).length >= 3,
+    );
+    const hide = (hidden) =>
+      page.evaluate((value) => {
+        Object.defineProperty(document, "hidden", { value, configurable: true });
+        document.dispatchEvent(new Event("visibilitychange"));
+      }, hidden);
+    await hide(true);
+    const before = (await moves(page)).length;
+    await page.waitForTimeout(500);
+    assert.equal((await moves(page)).length, before);
+    await hide(false);
+    await page.waitForFunction(
+      (count) =>
+        window.patches.filter(({ patch }) => patch.vector?.motion?.time > 0).length >= count + 3,
+      before,
+    );
+    await choose(page, "texture", /^still$/);
+    await page.waitForFunction(() => {
+      const last = window.patches.at(-1).patch.vector?.motion;
+      return last?.mode === "still";
+    });
+    await page.waitForTimeout(300);
+    assert.equal(await control(page, "let lines flow", "input").isChecked(), false);
+    assert.equal(await lastPatch(page, "vector", "motion", "mode"), "still");
+  }));
+
+test("screenshots of the open panel", async () => {
+  const folders = [
+    "Line shape",
+    "Kernels and jitter",
+    "Motion",
+    "Geometry",
+    "Camera and depth",
+    "Method",
+    "Quality",
+  ];
+  const windows = [
+    ["hd", { viewport: { width: 1280, height: 720 } }],
+    ["narrow", { viewport: { width: 360, height: 800 }, hasTouch: true, isMobile: true }],
+  ];
+  for (const [name, options] of windows) {
+    await withPage(
+      async (page) => {
+        await somePicture(page);
+        await shot(page, `panel-${name}`);
+        await unfold(page, ...folders);
+        const wide = await page.evaluate(() => {
+          const panel = document.querySelector("#panel");
+          return panel.scrollWidth - panel.clientWidth;
+        });
+        assert.ok(wide <= 0, `the panel is ${wide} px too wide`);
+        for (const [part, title] of [
+          ["lines", "Line shape"],
+          ["geometry", "Geometry"],
+          ["method", "Method"],
+        ]) {
+          await page
+            .locator("#panel .lil-title")
+            .filter({ hasText: new RegExp(`^${title}$`) })
+            .first()
+            .evaluate((element) => element.scrollIntoView());
+          await page.waitForTimeout(250); // the folders' own opening
+          await shot(page, `panel-${name}-${part}`);
+        }
+      },
+      "",
+      options,
+    );
+  }
+});

@@ -1,0 +1,221 @@
+// What the panel offers of a dataset, what counts under a view, and what legend and HUD say of it.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import {
+  colorByPatch,
+  compositingHints,
+  compositingOptions,
+  controlStates,
+  depthCuePatch,
+  heightOptions,
+  mappingOptions,
+  methodHints,
+  methodOptions,
+  sliceIndexMax,
+  sliceOptions,
+  slicePatch,
+  sliceText,
+} from "../src/controls";
+import { methodText, workLines } from "../src/hud";
+import { legendEntries, sampleHeights } from "../src/legend_entries";
+import type { ChosenMessage, Dataset, Field, View } from "../src/protocol";
+import { compassTicks } from "../src/ticks";
+
+const axis = (name: string, kind: Dataset["axes"]["x"]["kind"], coordinates: number[]) => ({
+  name,
+  kind,
+  standardName: "",
+  units: kind === "pressure" ? "hPa" : "",
+  coordinates,
+  world: coordinates.map((_, n) => n / 10),
+});
+
+const field = (name: string, kind: Field["kind"], units: string, standardName = ""): Field => ({
+  name,
+  kind,
+  components: [name],
+  units,
+  standardName,
+  longName: "",
+  range: [0, 1],
+  masked: 0,
+  rangeOf: "step",
+  dtype: "float32",
+});
+
+const dataset = {
+  id: "gcm",
+  dims: { x: 4, y: 1, z: 5 },
+  axes: {
+    x: axis("lon", "longitude", [0, 90, 180, 270]),
+    y: axis("lat", "latitude", [0]),
+    z: axis("lev", "pressure", [1000, 850, 700, 500, 200]),
+  },
+  world: { min: [-1, -1, -1], max: [1, 1, 1] },
+  fields: [
+    field("wind", "vector", "m s-1"),
+    field("cloud", "scalar", "1"),
+    field("zg", "scalar", "m", "geopotential_height"),
+  ],
+} as unknown as Dataset;
+
+const box = {
+  ...dataset,
+  axes: { ...dataset.axes, x: axis("x", "cartesian", [0, 1, 2, 3]) },
+} as Dataset;
+
+test("a globe is offered to longitudes and latitudes alone, a curved map to who says so", () => {
+  assert.deepEqual(Object.values(mappingOptions(dataset)), ["flat", "sphere"]);
+  assert.deepEqual(Object.values(mappingOptions(box)), ["flat"]);
+  const curved = { ...box, defaultView: { geometry: { mapping: "curvilinear" } } } as Dataset;
+  assert.deepEqual(Object.values(mappingOptions(curved)), ["flat", "curvilinear"]);
+});
+
+test("heights come from the axis or a scalar, those in metres first", () => {
+  assert.deepEqual(Object.values(heightOptions(dataset)), ["", "zg", "cloud"]);
+});
+
+test("a slice begins in the middle of an axis that has layers, and tells where it lies", () => {
+  assert.deepEqual(Object.values(sliceOptions(dataset)), ["all", "x", "z"]);
+  assert.equal(sliceIndexMax(dataset, "x"), 3);
+  assert.deepEqual(slicePatch(dataset, "z"), { geometry: { slice: { axis: "z", index: 2 } } });
+  assert.deepEqual(slicePatch(dataset, "all"), { geometry: { slice: null } });
+  const view: View = { geometry: { slice: { axis: "z", index: 3 } } };
+  assert.match(sliceText(dataset, view), /3 of 0 to 4: lev 500 hPa/);
+  assert.equal(sliceText(dataset, {}), "");
+});
+
+test("colour by another quantity forgets the range, and a scalar is named", () => {
+  assert.deepEqual(colorByPatch(dataset, {}, "direction"), {
+    vector: { color: { by: "direction", range: null } },
+  });
+  assert.deepEqual(colorByPatch(dataset, {}, "scalar"), {
+    vector: { color: { by: "scalar", range: null, field: "cloud" } },
+  });
+  const named: View = { vector: { color: { field: "zg" } } };
+  assert.deepEqual(colorByPatch(dataset, named, "scalar"), {
+    vector: { color: { by: "scalar", range: null } },
+  });
+});
+
+test("the ends of the depth cue stay in order", () => {
+  const ends = (patch: unknown) => (patch as { depthCue: { near: number; far: number } }).depthCue;
+  assert.deepEqual(ends(depthCuePatch({}, "near", 0.5)), { near: 0.5, far: 1 });
+  for (const [end, value] of [
+    ["near", 1.5],
+    ["far", -0.5],
+    ["near", 1],
+  ] as const) {
+    const next = ends(depthCuePatch({ depthCue: { near: 0, far: 1 } }, end, value));
+    assert.equal(next[end], value);
+    assert.ok(next.near < next.far);
+  }
+});
+
+test("what a choice makes meaningless does not count", () => {
+  const whole: View = {
+    vector: { field: "wind", color: { by: "rise" }, jitter: { center: 0, stride: 0.3 } },
+    depthCue: { strength: 0.3 },
+  };
+  const plain = controlStates(whole);
+  assert.deepEqual(
+    [plain.lines, plain.ranged, plain.rise, plain.colorField, plain.span, plain.pattern],
+    [true, true, true, false, true, true],
+  );
+  assert.deepEqual(
+    [plain.motion, plain.slab, plain.vertical, plain.slice, plain.fovY, plain.depthCue],
+    [false, false, true, false, true, true],
+  );
+  const off = (view: View) => controlStates({ ...whole, ...view });
+  assert.equal(off({ vector: { field: null, motion: { mode: "phase" } } }).motion, false);
+  assert.equal(off({ vector: { field: null } }).depthCue, false);
+  assert.equal(off({ vector: { jitter: { center: 0, stride: 0 } } }).pattern, false);
+  assert.equal(off({ vector: { jitter: { overlap: false } } }).span, false);
+  assert.equal(off({ vector: { color: { by: "scalar" } } }).colorField, true);
+  assert.equal(off({ vector: { color: { by: "constant" } } }).ranged, false);
+  assert.equal(off({ vector: { motion: { mode: "phase" } } }).motion, true);
+  assert.equal(off({ method: { name: "slab" } }).slab, true);
+  assert.equal(off({ geometry: { heightField: "zg" } }).vertical, false);
+  assert.equal(off({ geometry: { slice: { axis: "x", index: 0 } } }).slice, true);
+  assert.equal(off({ camera: { projection: "orthographic" } }).fovY, false);
+  assert.equal(off({ depthCue: { strength: 0 } }).depthCue, false);
+});
+
+test("every method and compositing that is offered is explained; the reference is not offered", () => {
+  assert.deepEqual(Object.values(methodOptions), ["kernel", "slab"]);
+  for (const method of Object.values(methodOptions)) assert.ok(methodHints[method]);
+  const offered = Object.values(compositingOptions);
+  assert.deepEqual([...offered].sort(), ["analytic", "cd", "cd-euler", "cd-naive", "simple"]);
+  for (const one of offered) assert.ok(compositingHints[one]);
+  assert.match(compositingHints["cd-euler"]!, /unstable/);
+  assert.match(compositingHints["cd-naive"]!, /seams/);
+});
+
+test("bearings are told by the compass, wherever the range begins", () => {
+  const told = (low: number, high: number) =>
+    compassTicks([low, high]).map(({ at, text }) => `${text}${at.toFixed(2)}`);
+  assert.deepEqual(told(0, 360), ["N0.00", "E0.25", "S0.50", "W0.75", "N1.00"]);
+  assert.deepEqual(told(360, 0), ["N1.00", "E0.75", "S0.50", "W0.25", "N0.00"]);
+  assert.deepEqual(told(-180, 180), ["S0.00", "W0.25", "N0.50", "E0.75", "S1.00"]);
+  assert.deepEqual(told(45, 225), ["E0.25", "S0.75"]);
+  for (const { text } of compassTicks([10, 60])) assert.match(text, /^\d+°$/);
+});
+
+const colored = (color: object): View => ({
+  dataset: "gcm",
+  vector: { field: "wind", magnitudeRange: [0, 60], color: { map: "magma", ...color } },
+  scalars: [],
+});
+
+test("the legend tells direction by the compass and a scalar by its name and unit", () => {
+  const [direction] = legendEntries(dataset, colored({ by: "direction", range: [0, 360] }));
+  assert.equal(direction!.title, "wind: direction");
+  assert.equal(direction!.ticks.map((tick) => tick.text).join(""), "NESWN");
+  const [scalar] = legendEntries(
+    dataset,
+    colored({ by: "scalar", field: "zg", range: [0, 16000] }),
+  );
+  assert.equal(scalar!.title, "wind: zg");
+  assert.equal(scalar!.units, "m");
+  assert.deepEqual(scalar!.range, [0, 16000]);
+});
+
+test("levels stand where the axis says only while nothing bends the grid", () => {
+  assert.notEqual(sampleHeights(dataset, {}), null);
+  assert.equal(sampleHeights(dataset, { geometry: { mapping: "sphere" } }), null);
+  assert.equal(sampleHeights(dataset, { geometry: { heightField: "zg" } }), null);
+});
+
+test("the HUD names method and compositing, and says what was left out", () => {
+  const chosen = { method: "kernel", compositing: "cd", slabThickness: null } as ChosenMessage;
+  assert.equal(methodText(chosen), "kernel cd");
+  assert.equal(
+    methodText({ ...chosen, method: "slab", slabThickness: 0.5 }),
+    "slab of 0.5 cells cd",
+  );
+  const work = {
+    samples: 97_280,
+    culled: 1000,
+    skippedVector: 111,
+    skippedScalar: 22_200,
+    skippedBoth: 6280,
+    occluded: 0,
+    pixelUpdates: 3_300_000,
+    exponentials: 1_234_000_000,
+    variant: "over",
+  } as ChosenMessage["work"];
+  const words = workLines(work).join(" · ");
+  for (const part of [
+    "90.0 k of 97.3 k samples",
+    "culled 1.0 k",
+    "6.3 k both",
+    "111 lines",
+    "22.2 k splats",
+    "occluded 0",
+    "3.3 M pixel updates",
+    "1.2 G exponentials",
+    "over",
+  ]) {
+    assert.ok(words.includes(part), `${part} in ${words}`);
+  }
+});

@@ -1,0 +1,146 @@
+// The flow of the lines: its pace, what it waits for, and what ends it.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { Flow, flowFps, laterTime } from "../src/flow";
+
+// A page whose clock stands still until it is moved.
+class Page {
+  clock = 0;
+  isHidden = false;
+  isWanted = true;
+  at = 0;
+  sent: number[] = []; // ms at which a move went out
+  rev = 0;
+  private timers = new Map<number, { due: number; run: () => void }>();
+  private lastTimer = 0;
+  readonly flow = new Flow({
+    now: () => this.clock,
+    setTimeout: (run, ms) => {
+      this.timers.set(++this.lastTimer, { due: this.clock + ms, run });
+      return this.lastTimer;
+    },
+    clearTimeout: (timer) => this.timers.delete(timer),
+    hidden: () => this.isHidden,
+    wanted: () => this.isWanted,
+    time: () => this.at,
+    send: (time) => {
+      this.at = time;
+      this.sent.push(this.clock);
+      return ++this.rev;
+    },
+  });
+
+  get waiting(): number {
+    return this.timers.size;
+  }
+
+  // Frames of what was asked for come back after `frameMs`; null: never.
+  run(ms: number, frameMs: number | null): void {
+    const end = this.clock + ms;
+    const frames: { due: number; rev: number }[] = [];
+    let seen = this.rev;
+    for (; this.clock < end; this.clock++) {
+      for (const [timer, { due, run }] of [...this.timers]) {
+        if (due > this.clock) continue;
+        this.timers.delete(timer);
+        run();
+      }
+      if (frameMs !== null && this.rev > seen) {
+        seen = this.rev;
+        frames.push({ due: this.clock + frameMs, rev: seen });
+      }
+      while (frames.length > 0 && frames[0]!.due <= this.clock) {
+        this.flow.answered(frames.shift()!.rev);
+      }
+    }
+  }
+}
+
+test("lines flow one step of time a second, whatever the frame rate", () => {
+  for (const frameMs of [5, 60, 150]) {
+    const page = new Page();
+    page.flow.start();
+    page.run(4000, frameMs);
+    assert.ok(Math.abs(page.at - 4) < 0.3, `${page.at} steps after 4 s of ${frameMs} ms frames`);
+  }
+});
+
+test("quick frames are asked for 15 times a second and no more", () => {
+  const page = new Page();
+  page.flow.start();
+  page.run(2000, 5);
+  assert.ok(page.sent.length <= 2 * flowFps + 1, `${page.sent.length}`);
+  assert.ok(page.sent.length >= 2 * flowFps - 4, `${page.sent.length}`);
+});
+
+test("slow frames are waited for: never two moves under way", () => {
+  const page = new Page();
+  page.flow.start();
+  page.run(3000, 400);
+  for (let n = 1; n < page.sent.length; n++) {
+    assert.ok(page.sent[n]! - page.sent[n - 1]! >= 400);
+  }
+  assert.ok(page.sent.length >= 6 && page.sent.length <= 8, `${page.sent.length}`);
+  const silent = new Page();
+  silent.flow.start();
+  silent.run(5000, null);
+  assert.equal(silent.sent.length, 1, "without an answer nothing more is asked for");
+  assert.equal(silent.waiting, 0);
+});
+
+test("a hidden page asks for nothing and goes on without a jump", () => {
+  const page = new Page();
+  page.flow.start();
+  page.run(1000, 5);
+  page.isHidden = true;
+  const [moves, at] = [page.sent.length, page.at];
+  page.run(10_000, 5);
+  assert.equal(page.sent.length, moves);
+  assert.equal(page.waiting, 0, "no timer runs for nobody");
+  page.isHidden = false;
+  page.flow.seen();
+  page.run(1000, 5);
+  assert.ok(page.at > at + 0.5 && page.at < at + 1.5, `${at} -> ${page.at}`);
+});
+
+test("a stop, a refusal and lines that stand still end the flow", () => {
+  const stops: ((page: Page) => void)[] = [
+    (page) => page.flow.stop(),
+    (page) => page.flow.refused(page.rev),
+    (page) => (page.isWanted = false),
+  ];
+  for (const stop of stops) {
+    const page = new Page();
+    page.flow.start();
+    page.run(500, 5);
+    const moves = page.sent.length;
+    assert.ok(moves > 3);
+    stop(page);
+    page.run(1000, 5);
+    assert.equal(page.flow.running, false);
+    assert.equal(page.sent.length, moves);
+    assert.equal(page.waiting, 0);
+  }
+  const page = new Page();
+  page.flow.start();
+  page.run(500, 5);
+  page.flow.refused(page.rev + 1);
+  assert.equal(page.flow.running, true, "another's refusal is not the flow's");
+});
+
+test("a flow that was stopped while a frame was due begins anew at once", () => {
+  const page = new Page();
+  page.flow.start();
+  page.run(500, null);
+  page.flow.stop();
+  page.flow.start();
+  page.run(500, 5);
+  assert.ok(page.sent.length > 4, `${page.sent.length}`);
+});
+
+test("a stall does not make the time jump, and it stays within the wire's limit", () => {
+  assert.equal(laterTime(2, 100), 2.1);
+  assert.equal(laterTime(2, 60_000), 2.25);
+  assert.equal(laterTime(2, -50), 2);
+  assert.equal(laterTime(999_999.99, 200), 0);
+});
