@@ -131,18 +131,20 @@ void fill_cells(const Camera& camera, const Pass& pass, const Stops& stops, Cell
   }
 }
 
+inline double dot3(const double a[3], const double b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
 // Camera coordinates of stops that stand where the field says.
 void place_curved_stops(const Camera& camera, const Pass& pass, Stops& stops) {
-  for (int l = 0; l < stops.count; ++l) {
+  const int count = stops.count;
+  for (int l = 0; l < count; ++l) {
     const float* place = pass.places + 3 * stops.offset[l];
     double at[3];
     for (int c = 0; c < 3; ++c) at[c] = static_cast<double>(place[c]) - camera.eye[c];
-    const auto along = [&](const double axis[3]) {
-      return at[0] * axis[0] + at[1] * axis[1] + at[2] * axis[2];
-    };
-    const double z = along(camera.world_forward);
-    stops.x[l] = static_cast<float>(along(camera.world_right));
-    stops.y[l] = static_cast<float>(along(camera.world_down));
+    const double z = dot3(camera.world_forward, at);
+    stops.x[l] = static_cast<float>(dot3(camera.world_right, at));
+    stops.y[l] = static_cast<float>(dot3(camera.world_down, at));
     stops.z[l] = static_cast<float>(z);
     stops.depth[l] = static_cast<float>(z - camera.depth_origin);
   }
