@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <limits>
@@ -130,7 +131,7 @@ class Progress {
     line.append(static_cast<std::size_t>(cells - full), '.');
     line.append(" ").append(std::to_string(done)).append("/").append(std::to_string(total_));
     if (done > 0) {
-      const auto left = static_cast<std::int64_t>(spent / done * (total_ - done) + 0.5);
+      const auto left = std::llround(spent / done * (total_ - done));
       line.append(", ").append(std::to_string(left)).append(" s left    ");
     }
     std::fwrite(line.data(), 1, line.size(), stderr);
