@@ -49,6 +49,7 @@ int run(int argc, const char* const* argv) {
     Action chosen;
     add_serve(app, chosen);
     add_render(app, chosen);
+    add_animate(app, chosen);
     add_inspect(app, chosen);
     add_synth(app, chosen);
     add_healthcheck(app, chosen);

@@ -25,6 +25,7 @@ using Action = std::function<int()>;
 // Each adds its subcommand; when that is the one chosen, `chosen` is set to run it.
 void add_serve(CLI::App& app, Action& chosen);
 void add_render(CLI::App& app, Action& chosen);
+void add_animate(CLI::App& app, Action& chosen);
 void add_inspect(CLI::App& app, Action& chosen);
 void add_synth(CLI::App& app, Action& chosen);
 void add_healthcheck(CLI::App& app, Action& chosen);

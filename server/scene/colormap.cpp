@@ -56,6 +56,8 @@ const std::vector<Stops>& tables() {
       {"tealrose",
        "diverging",
        {0x0b6e6e, 0x4ba39b, 0xa3d1c8, 0xf1efe9, 0xeab9bf, 0xd0748c, 0x9a2f5c}},
+      // North, east, south, west and north again.
+      {"compass", "cyclic", {0x4a7fe8, 0xe0559f, 0xe3b23c, 0x35b07e, 0x4a7fe8}},
   };
   return all;
 }

@@ -11,7 +11,7 @@ namespace windsplat::scene {
 
 struct ColorMap {
   std::string name;
-  std::string kind;  // "sequential", "diverging"
+  std::string kind;  // "sequential", "diverging", "cyclic"
 };
 
 const std::vector<ColorMap>& color_maps();

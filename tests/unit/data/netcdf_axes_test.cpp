@@ -364,6 +364,37 @@ TEST(NetcdfAxes, CurvilinearCoordinatesTellWhichDimensionRunsWhere) {
   // South-west corner: i = 0, j = 3; then eastwards by i, northwards by falling j.
   EXPECT_EQ(volume->values, (std::vector<float>{3, 7, 11, 2, 6, 10, 1, 5, 9, 0, 4, 8}));
   EXPECT_NE(reason_for(info, "longs").find("more than one dimension"), std::string::npos);
+  // Every column stands where the file says, in the volume's order; the date line is no jump.
+  ASSERT_NE(info.grid.columns, nullptr);
+  const Columns& columns = *info.grid.columns;
+  ASSERT_EQ(columns.longitude.size(), 12U);
+  const double turns = columns.longitude[0] - (175 + 0.25 * 3);
+  EXPECT_NEAR(std::remainder(turns, 360), 0, 1e-9);
+  for (int n = 0; n < 12; ++n) {
+    const int i = n % 3;
+    const int j = 3 - n / 3;
+    const auto at = static_cast<std::size_t>(n);
+    EXPECT_NEAR(columns.longitude[at], turns + 175 + 4.0 * i + 0.25 * j, 1e-9) << n;
+    EXPECT_NEAR(columns.latitude[at], 50 - 3.0 * j + 0.5 * i, 1e-9) << n;
+  }
+}
+
+TEST(NetcdfAxes, CurvilinearCoordinatesWithGapsTellDirectionsAlone) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "g.nc");
+    const int y = file.dimension("y", 2);
+    const int x = file.dimension("x", 3);
+    file.text(file.variable("lon", NC_DOUBLE, {y, x}, {0, 1, 2, 0, std::nan(""), 2}), "units",
+              "degrees_east");
+    file.text(file.variable("lat", NC_DOUBLE, {y, x}, {0, 0, 0, 1, 1, 1}), "units",
+              "degrees_north");
+    file.variable("f", NC_FLOAT, {y, x}, counting(6));
+  }
+  auto source = open_good(folder / "g.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().grid.dims(), (std::array<int, 3>{3, 2, 1}));
+  EXPECT_EQ(source->info().grid.columns, nullptr);
 }
 
 }  // namespace

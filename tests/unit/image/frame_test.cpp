@@ -11,6 +11,7 @@
 
 #include "server/data/store.hpp"
 #include "server/frame/frame_info.hpp"
+#include "tests/unit/scene/fake.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -159,6 +160,60 @@ TEST_F(Produce, WrongViewsAndCancelledFramesAreErrors) {
   const auto cancelled = produce_as(Format::jpeg);
   ASSERT_FALSE(cancelled);
   EXPECT_EQ(cancelled.error().kind, ErrorKind::cancelled);
+}
+
+// Who waits for the renderer with others is refused what takes minutes.
+TEST_F(Produce, TheReferenceIsDrawnOnlyWhereItIsAllowed) {
+  view.method.name = protocol::MethodName::reference;
+  const auto refused = produce_as(Format::png);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::invalid);
+  ASSERT_EQ(refused.error().at.size(), 1U);
+  EXPECT_EQ(refused.error().at[0].pointer, "/method/name");
+  EXPECT_EQ(dataset->loads(), 0U);
+}
+
+// Fields of colour and of heights are among those touched, each once however often it is used.
+TEST(ProduceFields, OfColourAndHeightAreToldOnce) {
+  auto source = std::make_unique<scene::FakeSource>(
+      scene::atmosphere_grid(),
+      std::vector<data::FieldInfo>{scene::wind_info(), scene::scalar_info("z", "m"),
+                                   scene::scalar_info("q", "1")},
+      1);
+  auto dataset = scene::dataset_of(std::move(source));
+  protocol::View view;
+  view.image.width = 32;
+  view.image.height = 32;
+  view.scalars.emplace();
+  ThreadPool pool(1);
+  const auto fields = [&] {
+    const auto frame = produce(view, *dataset, Encoding{}, pool, CancelToken());
+    EXPECT_TRUE(frame) << frame.error().message;
+    EXPECT_EQ(frame->work.bytes, 36 * 4 * static_cast<std::int64_t>(frame->work.fields.size() + 2));
+    return frame->work.fields;
+  };
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(fields(), Names{"wind"});
+  view.vector.color.by = protocol::ColorBy::scalar;
+  view.vector.color.field = "q";
+  EXPECT_EQ(fields(), (Names{"wind", "q"}));
+  view.geometry.height_field = "z";
+  EXPECT_EQ(fields(), (Names{"wind", "q", "z"}));
+  view.vector.color.field = "z";
+  EXPECT_EQ(fields(), (Names{"wind", "z"}));
+}
+
+TEST_F(Produce, FrameInfoNamesMethodsAndSlabs) {
+  const auto frame = produce_as(Format::jpeg);
+  ASSERT_TRUE(frame);
+  view.method.compositing = protocol::Compositing::cd_naive;
+  view.method.slab_thickness = 0.5;
+  EXPECT_FALSE(frame_info(*frame, view).slab_thickness);
+  view.method.name = protocol::MethodName::slab;
+  const protocol::FrameInfo info = frame_info(*frame, view);
+  EXPECT_EQ(info.method, "slab");
+  EXPECT_EQ(info.compositing, "cd-naive");
+  EXPECT_EQ(info.slab_thickness, 0.5);
 }
 
 TEST_F(Produce, FrameInfoTellsTheReport) {

@@ -42,11 +42,27 @@ TEST(ColorMap, SequentialMapsGrowLighterAndDivergingOnesPeakInTheMiddle) {
     }
     if (map.kind == "diverging") {
       EXPECT_NEAR(static_cast<double>(lightest), 31.5, 3.0) << map.name;
+    } else if (map.kind == "cyclic") {
+      EXPECT_EQ(entries.front(), entries.back()) << map.name;
     } else {
       EXPECT_EQ(map.kind, "sequential");
       EXPECT_EQ(lightest, 63U) << map.name;
     }
   }
+}
+
+TEST(ColorMap, TheCompassTellsItsFourQuartersApartAndHasNoSeam) {
+  const auto compass = color_map_srgb("compass", 361);
+  EXPECT_EQ(compass[0], compass[360]);
+  const auto distance = [&](std::size_t a, std::size_t b) {
+    int sum = 0;
+    for (std::size_t c = 0; c < 3; ++c) sum += std::abs(int{compass[a][c]} - int{compass[b][c]});
+    return sum;
+  };
+  for (std::size_t a = 0; a < 360; a += 90) {
+    for (std::size_t b = 0; b < a; b += 90) EXPECT_GT(distance(a, b), 100) << a << " " << b;
+  }
+  for (std::size_t n = 0; n < 360; ++n) EXPECT_LE(distance(n, n + 1), 9) << n;
 }
 
 TEST(ColorMap, GraysAreEvenInPerceivedLightness) {

@@ -1,6 +1,7 @@
 // A small dataset whose fields are known, and which counts what is read from it.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -81,6 +82,10 @@ class FakeSource final : public data::Source {
     volume.components = static_cast<int>(info_.fields[field].components.size());
     for (int c = 0; c < volume.components; ++c) {
       for (std::size_t n = 0; n < volume.samples(); ++n) {
+        if (values) {
+          volume.values.push_back(static_cast<float>(values(info_.fields[field].name, n)));
+          continue;
+        }
         const double ramp = static_cast<double>(n) + 100.0 * c + 1000.0 * static_cast<double>(step);
         volume.values.push_back(static_cast<float>(constant ? *constant : ramp));
       }
@@ -90,6 +95,7 @@ class FakeSource final : public data::Source {
   }
 
   std::unique_ptr<double> constant;
+  std::function<double(const std::string& field, std::size_t n)> values;
 
  private:
   data::DatasetInfo info_;

@@ -1,0 +1,246 @@
+// windsplat animate: dataset + view + steps -> a numbered picture a frame.
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "server/base/cancel.hpp"
+#include "server/base/thread_pool.hpp"
+#include "server/cli/command.hpp"
+#include "server/cli/picture.hpp"
+
+namespace windsplat::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int per_step_max = 1000;
+constexpr std::size_t digits_max = 9;
+
+struct Arguments {
+  ViewArguments view;
+  std::string steps;
+  std::string output;
+  int per_step = 1;
+  unsigned threads = 0;
+};
+
+struct Steps {
+  int first = 0;
+  int last = 0;
+  int stride = 1;
+  [[nodiscard]] int count() const { return (last - first) / stride + 1; }
+};
+
+// "A:B" or "A:B:S".
+std::optional<Steps> parse_steps(std::string_view text) {
+  Steps steps;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  int parts = 0;
+  for (int* number : {&steps.first, &steps.last, &steps.stride}) {
+    if (parts > 0) {
+      if (at == end) break;
+      if (*at++ != ':') return std::nullopt;
+    }
+    const auto [next, fault] = std::from_chars(at, end, *number);
+    if (fault != std::errc()) return std::nullopt;
+    at = next;
+    ++parts;
+  }
+  const bool ordered = steps.first >= 0 && steps.last >= steps.first && steps.stride >= 1;
+  if (at != end || parts < 2 || !ordered) return std::nullopt;
+  return steps;
+}
+
+// A file's name around a number that is filled up with zeros.
+struct Pattern {
+  std::string before;
+  std::string after;
+  std::size_t digits = 0;
+
+  [[nodiscard]] std::string name(int number) const {
+    const std::string text = std::to_string(number);
+    std::string out = before;
+    if (text.size() < digits) out.append(digits - text.size(), '0');
+    return out.append(text).append(after);
+  }
+};
+
+// Exactly one %d or %04d or the like; %% is a percent sign.
+std::optional<Pattern> parse_pattern(std::string_view text) {
+  Pattern pattern;
+  bool numbered = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    std::string& part = numbered ? pattern.after : pattern.before;
+    if (text[i] != '%') {
+      part += text[i];
+      continue;
+    }
+    if (text.substr(i + 1, 1) == "%") {
+      part += text[++i];
+      continue;
+    }
+    const std::size_t end = text.find_first_not_of("0123456789", i + 1);
+    if (numbered || end == std::string_view::npos || text[end] != 'd') return std::nullopt;
+    const std::string_view width = text.substr(i + 1, end - i - 1);
+    if (!width.empty()) {
+      const auto [next, fault] =
+          std::from_chars(width.data(), width.data() + width.size(), pattern.digits);
+      const bool in_range = pattern.digits >= 1 && pattern.digits <= digits_max;
+      if (width[0] != '0' || fault != std::errc() || !in_range) return std::nullopt;
+    }
+    numbered = true;
+    i = end;
+  }
+  if (!numbered) return std::nullopt;
+  return pattern;
+}
+
+// One line of stderr that is written over, if that is a terminal; colour unless NO_COLOR is set.
+class Progress {
+ public:
+  explicit Progress(int total) : total_(total) {
+    const char* no_color = std::getenv("NO_COLOR");
+    colored_ = no_color == nullptr || *no_color == '\0';
+  }
+  ~Progress() {
+    if (shown_) std::fputc('\n', stderr);
+  }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void show(int done) {
+    if (!terminal_) return;
+    constexpr int cells = 30;
+    const int full = static_cast<int>(std::int64_t{cells} * done / total_);
+    const double spent = std::chrono::duration<double>(Clock::now() - start_).count();
+    std::string line(1, '\r');
+    if (colored_) line += "\x1b[32m";
+    line.append(static_cast<std::size_t>(full), '#');
+    if (colored_) line += "\x1b[0m";
+    line.append(static_cast<std::size_t>(cells - full), '.');
+    line.append(" ").append(std::to_string(done)).append("/").append(std::to_string(total_));
+    if (done > 0) {
+      const auto left = std::llround(spent / done * (total_ - done));
+      line.append(", ").append(std::to_string(left)).append(" s left    ");
+    }
+    std::fwrite(line.data(), 1, line.size(), stderr);
+    shown_ = true;
+  }
+
+ private:
+  int total_;
+  bool terminal_ = isatty(STDERR_FILENO) == 1;
+  bool colored_ = false;
+  bool shown_ = false;
+  Clock::time_point start_ = Clock::now();
+};
+
+// What is to be drawn, checked before the first picture is.
+struct Plan {
+  Steps steps;
+  Pattern pattern;
+  frame::Format format = frame::Format::jpeg;
+  int per_step = 1;
+};
+
+Result<Plan> plan_of(const Arguments& arguments, int step_count, const protocol::View& view) {
+  Plan plan;
+  const auto pattern = parse_pattern(arguments.output);
+  if (!pattern) {
+    return make_error(ErrorKind::invalid, "-o '" + printable(arguments.output) +
+                                              "' needs exactly one number, like f_%04d.jpg");
+  }
+  plan.pattern = *pattern;
+  const auto format = format_of(plan.pattern.name(0));
+  if (!format) return format.error();
+  plan.format = *format;
+  plan.steps.last = step_count - 1;
+  if (!arguments.steps.empty()) {
+    const auto steps = parse_steps(arguments.steps);
+    if (!steps) {
+      return make_error(ErrorKind::malformed, "--steps '" + printable(arguments.steps) +
+                                                  "' is not of the form 0:239 or 0:239:2");
+    }
+    plan.steps = *steps;
+  }
+  if (plan.steps.last >= step_count) {
+    return make_error(ErrorKind::invalid,
+                      "--steps: the last step is " + std::to_string(step_count - 1));
+  }
+  plan.per_step = arguments.per_step;
+  if (plan.per_step > 1 && view.vector.motion == protocol::MotionMode::still) {
+    return make_error(ErrorKind::invalid,
+                      "--per-step: nothing moves between steps unless the view has "
+                      "/vector/motion/mode=phase");
+  }
+  if (plan.steps.count() > std::numeric_limits<int>::max() / plan.per_step) {
+    return make_error(ErrorKind::invalid, "--per-step: too many frames");
+  }
+  return plan;
+}
+
+Result<void> animate(const Arguments& arguments) {
+  const auto document = assemble_view(arguments.view);
+  if (!document) return document.error();
+  const auto dataset = open_dataset(arguments.view.dataset);
+  if (!dataset) return dataset.error();
+  protocol::View view = document->view();
+  view.dataset = (*dataset)->info().id;
+  const auto plan = plan_of(arguments, static_cast<int>((*dataset)->info().steps.size()), view);
+  if (!plan) return plan.error();
+
+  const frame::Encoding encoding = file_encoding(plan->format);
+  ThreadPool pool(arguments.threads);
+  const int total = plan->steps.count() * plan->per_step;
+  Progress progress(total);
+  for (int n = 0; n < total; ++n) {
+    progress.show(n);
+    view.step = plan->steps.first + n / plan->per_step * plan->steps.stride;
+    if (plan->per_step > 1) {
+      view.vector.motion_time = static_cast<double>(n % plan->per_step) / plan->per_step;
+    }
+    const auto picture = frame::produce(view, **dataset, encoding, pool, CancelToken());
+    if (!picture) return picture.error();
+    if (auto done = write_output(plan->pattern.name(n), picture->bytes); !done) return done;
+  }
+  progress.show(total);
+  return {};
+}
+
+}  // namespace
+
+void add_animate(CLI::App& app, Action& chosen) {
+  CLI::App* command = app.add_subcommand("animate", "Draw a picture a time step");
+  const auto arguments = std::make_shared<Arguments>();
+  add_view_options(*command, arguments->view);
+  command
+      ->add_option("--steps", arguments->steps, "First and last step, and a stride; default: all")
+      ->type_name("A:B[:S]");
+  command->add_option("--per-step", arguments->per_step, "Frames a step, for motion by phase")
+      ->check(CLI::Range(1, per_step_max))
+      ->type_name("N")
+      ->capture_default_str();
+  command->add_option("-o", arguments->output, "f_%04d.jpg, .png or .npy; frames count from 0")
+      ->required()
+      ->type_name("PATTERN");
+  add_threads_option(*command, arguments->threads);
+  command->callback([&chosen, arguments] {
+    chosen = [arguments] {
+      const auto done = animate(*arguments);
+      return done ? exit_ok : answer(done.error());
+    };
+  });
+}
+
+}  // namespace windsplat::cli

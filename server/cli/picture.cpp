@@ -1,0 +1,91 @@
+// Arguments -> view, format and dataset of a picture.
+#include "server/cli/picture.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <utility>
+
+#include "protocol/limits.hpp"
+#include "server/cli/command.hpp"
+
+namespace windsplat::cli {
+namespace {
+
+constexpr std::uint64_t resident_bytes_max = 8ULL << 30;
+constexpr int file_quality = 95;  // JPEG: a file is kept, so it costs bytes rather than detail
+
+}  // namespace
+
+void add_view_options(CLI::App& command, ViewArguments& arguments) {
+  command.add_option("dataset", arguments.dataset, "A sample's name or a file")
+      ->required()
+      ->type_name("DATASET");
+  command.add_option("--view", arguments.view_file, "A view as JSON; DATASET replaces its dataset")
+      ->type_name("F");
+  command.add_option("--size", arguments.size, "Pixels, for example 1280x720")->type_name("WxH");
+  command.add_option("--set", arguments.settings, "Change one key of the view; may be repeated")
+      ->allow_extra_args(false)
+      ->type_name("/json/pointer=value");
+}
+
+Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments) {
+  std::string text = "{}";
+  if (!arguments.view_file.empty()) {
+    auto file = read_text_file(arguments.view_file, protocol::limits::message_bytes_max);
+    if (!file) return file.error();
+    text = std::move(*file);
+  }
+  auto document = protocol::ViewDocument::parse(text);
+
+  std::vector<std::pair<std::string, std::string>> changes;
+  if (!arguments.step.empty()) changes.emplace_back("/step", arguments.step);
+  if (!arguments.size.empty()) {
+    const auto size = parse_extent(arguments.size, 2);
+    if (!size) {
+      return make_error(ErrorKind::malformed,
+                        "--size '" + printable(arguments.size) + "' is not of the form 1280x720");
+    }
+    changes.emplace_back("/image/width", std::to_string((*size)[0]));
+    changes.emplace_back("/image/height", std::to_string((*size)[1]));
+  }
+  for (const std::string& setting : arguments.settings) {
+    const std::size_t equals = setting.find('=');
+    if (equals == std::string::npos) {
+      return make_error(ErrorKind::malformed, "--set '" + printable(setting) +
+                                                  "' is not of the form /json/pointer=value");
+    }
+    changes.emplace_back(setting.substr(0, equals), setting.substr(equals + 1));
+  }
+  for (const auto& [pointer, value] : changes) {
+    if (!document) break;
+    document = protocol::set_at(*document, pointer, value);
+  }
+  return document;
+}
+
+Result<frame::Format> format_of(const std::string& output) {
+  const std::size_t dot = output.find_last_of("./");
+  std::string extension = dot == std::string::npos ? "" : output.substr(dot);
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".png") return frame::Format::png;
+  if (extension == ".jpg" || extension == ".jpeg") return frame::Format::jpeg;
+  if (extension == ".npy") return frame::Format::npy;
+  return make_error(ErrorKind::invalid,
+                    "-o '" + printable(output) + "': its name must end in .png, .jpg or .npy");
+}
+
+frame::Encoding file_encoding(frame::Format format) {
+  frame::Encoding encoding;
+  encoding.format = format;
+  encoding.quality = file_quality;
+  encoding.allow_reference = true;
+  return encoding;
+}
+
+Result<std::shared_ptr<data::Dataset>> open_dataset(const std::string& sample_or_path) {
+  // The store keeps nothing that its datasets need after it.
+  return data::Store(resident_bytes_max).add(sample_or_path);
+}
+
+}  // namespace windsplat::cli

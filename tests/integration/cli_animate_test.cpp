@@ -1,0 +1,104 @@
+// `windsplat animate`: which files it writes, and that each is the picture of its step and time.
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <set>
+#include <string>
+
+#include "tests/integration/cli_program.hpp"
+
+namespace cli_test {
+namespace {
+
+using testing::HasSubstr;
+
+const Words small{"--size", "80x60"};
+
+Outcome run_with(Words words, const Words& more) {
+  words.insert(words.end(), small.begin(), small.end());
+  words.insert(words.end(), more.begin(), more.end());
+  return run(words);
+}
+
+std::size_t files_like(const Folder& folder, const std::string& ending) {
+  std::size_t count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.file(""))) {
+    count += entry.path().extension() == ending ? 1U : 0U;
+  }
+  return count;
+}
+
+TEST(CliAnimate, EveryFrameIsWhatRenderDrawsOfItsStep) {
+  const Folder folder;
+  const std::string path = folder.file("four.nc");
+  ASSERT_EQ(run({"synth", "climate", "--dims", "24x12x6", "--steps", "4", "-o", path}).code, 0);
+  const Outcome made = run_with({"animate", path, "-o", folder.file("f_%03d.png")}, {});
+  EXPECT_EQ(made.code, 0);
+  EXPECT_EQ(made.out + made.err, "") << "no bar where stderr is no terminal";
+  EXPECT_EQ(files_like(folder, ".png"), 4U);
+  std::set<std::string> pictures;
+  for (const char* step : {"0", "1", "2", "3"}) {
+    const std::string one = folder.file("one.png");
+    ASSERT_EQ(run_with({"render", path, "-o", one}, {"--step", step}).code, 0);
+    const std::string frame = read_file(folder.file(std::string("f_00") + step + ".png"));
+    EXPECT_EQ(frame, read_file(one)) << step;
+    pictures.insert(frame);
+  }
+  EXPECT_EQ(pictures.size(), 4U) << "the steps differ";
+}
+
+TEST(CliAnimate, StepsMayBeginLaterAndLeaveSomeOut) {
+  const Folder folder;
+  const std::string path = folder.file("four.nc");
+  ASSERT_EQ(run({"synth", "climate", "--dims", "24x12x6", "--steps", "4", "-o", path}).code, 0);
+  const Outcome made =
+      run_with({"animate", path, "-o", folder.file("100%% %d.jpg")}, {"--steps", "1:3:2"});
+  EXPECT_EQ(made.code, 0) << made.err;
+  EXPECT_EQ(files_like(folder, ".jpg"), 2U);
+  const std::string last = folder.file("last.jpg");
+  ASSERT_EQ(run_with({"render", path, "-o", last}, {"--step", "3"}).code, 0);
+  EXPECT_EQ(read_file(folder.file("100% 1.jpg")), read_file(last));
+}
+
+// k of N frames a step stands at the time k / N.
+TEST(CliAnimate, FramesBetweenStepsHaveTheirTimes) {
+  const Folder folder;
+  const std::string path = synth(folder, "tornado", "12x12x12");
+  const Words phase{"--set", "/vector/motion/mode=phase"};
+  Words more = phase;
+  more.insert(more.end(), {"--steps", "0:1", "--per-step", "4"});
+  const Outcome made = run_with({"animate", path, "-o", folder.file("f_%d.png")}, more);
+  EXPECT_EQ(made.code, 0) << made.err;
+  EXPECT_EQ(files_like(folder, ".png"), 8U);
+  const std::string one = folder.file("one.npy.png");
+  more = phase;
+  more.insert(more.end(), {"--step", "1", "--set", "/vector/motion/time=0.75"});
+  ASSERT_EQ(run_with({"render", path, "-o", one}, more).code, 0);
+  EXPECT_EQ(read_file(folder.file("f_7.png")), read_file(one));
+}
+
+TEST(CliAnimate, StopsAtTheFirstErrorAndNamesIt) {
+  const Folder folder;
+  const std::string path = synth(folder, "tornado", "8x8x8");
+  const Outcome refused =
+      run_with({"animate", path, "-o", folder.file("f_%d.png")}, {"--set", "/vector/field=nope"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("/vector/field"));
+  EXPECT_EQ(files_like(folder, ".png"), 0U);
+  const Outcome nowhere = run_with({"animate", path, "-o", folder.file("no/f_%d.png")}, {});
+  EXPECT_EQ(nowhere.code, 1);
+  EXPECT_THAT(nowhere.err, HasSubstr("f_0.png"));
+}
+
+TEST(CliAnimate, NothingIsDrawnTwiceForNothing) {
+  const Folder folder;
+  const std::string path = synth(folder, "tornado", "8x8x8");
+  const Outcome refused =
+      run_with({"animate", path, "-o", folder.file("f_%d.png")}, {"--per-step", "3"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("/vector/motion/mode=phase"));
+  EXPECT_EQ(files_like(folder, ".png"), 0U);
+}
+
+}  // namespace
+}  // namespace cli_test
