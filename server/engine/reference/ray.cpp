@@ -121,6 +121,12 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
   piece.alpha = -std::expm1(-tau);
   // What the rule does not see of tau changes the absorbed part by e^-tau times as much.
   const double tau_error = length * unseen(rule, samples.extinction);
+  // Light that is absorbed between the nodes, where the rule does not look.
+  double looked_at = 0;
+  for (int j = 0; j < rule.nodes; ++j) {
+    looked_at += length * rule.weight[j] * samples.extinction[j] * seen[j];
+  }
+  const double overlooked = std::abs(looked_at - piece.alpha);
   const double absorbed_error = std::min(piece.transmitted * tau_error, 1.0);
   double brightest = 0;
   // The light of one colour is exact; only what departs from it is left to the rule.
@@ -144,7 +150,7 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
     }
     // The transmittances under the integral err with tau, too.
     const double by_tau = spread * piece.alpha * std::min(tau_error, 1.0);
-    const double by_rule = length * unseen(rule, rest) + by_tau;
+    const double by_rule = length * unseen(rule, rest) + by_tau + spread * overlooked;
     const double by_color = spread * piece.alpha;
     const bool resolved = by_rule < by_color;
     piece.rgb[c] = color * piece.alpha + (resolved ? length * sum : 0);
