@@ -78,6 +78,7 @@ class SceneMaker {
     layer.scale = {1, between(0.5, 2), between(0.5, 3)};
     layer.color = ramp_color(-0.6, 0.6, {0.1F, 0.3F, 0.9F}, {1.0F, 0.8F, 0.1F});
     layer.color_by = static_cast<scene::LineColor>(whole(0, 4));
+    if (layer.color_by == scene::LineColor::direction) layer.color_by = scene::LineColor::constant;
     if (layer.color_by == scene::LineColor::screen_z) layer.color.range = {0, 4};
     if (layer.color_by == scene::LineColor::rise) layer.color.range = {0, 1};
     layer.magnitude_range = {0.2, 1.8};
