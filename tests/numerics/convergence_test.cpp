@@ -94,7 +94,7 @@ TEST(ReferenceRule, ConvergesWithTwiceItsNodes) {
   for (const int nodes : {2, 3}) {
     std::vector<double> width;
     std::vector<double> error;
-    for (int pieces = 4; pieces <= 32; pieces *= 2) {
+    for (const int pieces : {16, 32, 64, 128}) {
       width.push_back(1.0 / pieces);
       error.push_back(uniform_error(nodes, pieces));
     }
@@ -108,13 +108,13 @@ TEST(ReferenceRule, ErrorStaysBelowItsTolerance) {
   const Light exact = truth(haze, some_lines());
   std::int64_t before = 0;
   for (const double tolerance : {1e-3, 1e-5, 1e-7, 1e-9, 1e-11}) {
-    for (const int nodes : {2, 4, 8}) {
+    for (const int nodes : {4, 6, 8}) {
       reference::RayCount count;
       Haze medium;
       const Light light = reference::integrate_ray(reference::make_rules(nodes), medium, {0, 1},
                                                    some_lines(), tolerance, count);
       EXPECT_LT(distance(light, exact), tolerance) << nodes;
-      if (nodes == 2) {
+      if (nodes == 4) {
         EXPECT_GT(count.pieces, before);
         before = count.pieces;
       }

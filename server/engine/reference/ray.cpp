@@ -121,6 +121,13 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
   piece.alpha = -std::expm1(-tau);
   // What the rule does not see of tau changes the absorbed part by e^-tau times as much.
   const double tau_error = length * unseen(rule, samples.extinction);
+  // Light that is absorbed between the nodes, where the rule does not look.
+  double looked_at = 0;
+  for (int j = 0; j < rule.nodes; ++j) {
+    looked_at += length * rule.weight[j] * samples.extinction[j] * seen[j];
+  }
+  const double overlooked = std::abs(looked_at - piece.alpha);
+  const bool resolved = overlooked < 0.1 * piece.alpha;
   const double absorbed_error = std::min(piece.transmitted * tau_error, 1.0);
   double brightest = 0;
   // The light of one colour is exact; only what departs from it is left to the rule.
@@ -144,9 +151,9 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
     }
     // The transmittances under the integral err with tau, too.
     const double by_tau = spread * piece.alpha * std::min(tau_error, 1.0);
-    const double by_rule = length * unseen(rule, rest) + by_tau;
-    const double by_color = spread * piece.alpha;
-    const bool resolved = by_rule < by_color;
+    const double by_rule = length * unseen(rule, rest) + by_tau + spread * overlooked;
+    // Where the nodes do see the light, no mixture of theirs is farther from the truth than this.
+    const double by_color = (resolved ? 2.5 : 1) * spread * piece.alpha;
     piece.rgb[c] = color * piece.alpha + (resolved ? length * sum : 0);
     piece.error =
         std::max(piece.error, std::min(by_rule, by_color) + own_brightest * absorbed_error);

@@ -33,7 +33,8 @@ constexpr unsigned break_after = 2;
 // The rule for each combination of ends.
 using Rules = std::array<Rule, 4>;
 
-// 2 to 8 nodes. With n of them and no breaks the global error of a smooth medium is of order 2 n.
+// 2 to 8 nodes; to bisect by the error bound, at least 4. With n of them and no breaks the global
+// error of a smooth medium is of order 2 n.
 Rules make_rules(int nodes = 8);
 
 // A medium at the nodes of a piece: extinction and emission (extinction times straight colour) per
