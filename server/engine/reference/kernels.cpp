@@ -127,15 +127,19 @@ Vec table_color(const ColorTable& table, double value) {
   return color;
 }
 
+// As in the engine: opaque over any distance, and still finite when added up.
+constexpr double extinction_max = 1e30;
+
 double extinction(const ScalarLayer& layer, double value) {
   const auto& points = layer.extinction;
-  if (value < points.front()[0]) return points.front()[1];
-  double rho = points.back()[1];
+  const auto at = [&](std::size_t p) { return std::min(points[p][1], extinction_max); };
+  if (value < points.front()[0]) return at(0);
+  double rho = at(points.size() - 1);
   for (std::size_t p = 0; p + 1 < points.size(); ++p) {
     const double x0 = points[p][0];
     const double x1 = points[p + 1][0];
     if (value >= x0 && value < x1) {
-      rho = points[p][1] + (points[p + 1][1] - points[p][1]) * (value - x0) / (x1 - x0);
+      rho = at(p) + (at(p + 1) - at(p)) * (value - x0) / (x1 - x0);
     }
   }
   return rho;
@@ -435,12 +439,11 @@ std::optional<Ribbon> make_ribbon(const Scene& scene, const View& view, const Ve
 }
 
 Density make_density(const std::vector<const ScalarLayer*>& layers, const Stop& stop) {
-  constexpr double extinction_max = 1e30;  // as the engine: opaque over any distance
   Density density;
   for (const ScalarLayer* layer : layers) {
     const auto value = static_cast<double>(layer->field->values[stop.index]);
     if (std::isnan(value)) continue;
-    const double rho = std::min(extinction(*layer, value), extinction_max);
+    const double rho = extinction(*layer, value);
     if (rho <= 0) continue;
     density.rho += rho;
     density.color = plus(density.color, rho, table_color(layer->color, value));

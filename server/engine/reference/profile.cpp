@@ -16,8 +16,6 @@ namespace {
 
 constexpr double s = footprint_s;
 constexpr double t = footprint_t;
-constexpr int inner_cells = 32;
-constexpr int outer_cells = 128;
 // The ends of a = sqrt(t^2 - r^2) for r from t down to s.
 const double outer_end = std::sqrt(t * t - s * s);
 
@@ -59,7 +57,10 @@ double kernel_3d(double r) {
   return x < s ? inner_by(std::sqrt(s * s - x * x)) : outer_by(std::sqrt(t * t - x * x));
 }
 
-Profile::Profile() : cells_(inner_cells + outer_cells) {
+Profile::Profile()
+    : cells_(inner_cells + outer_cells),
+      inner_scale_(inner_cells / s),
+      outer_scale_(outer_cells / outer_end) {
   for (int i = 0; i < inner_cells; ++i) {
     const double width = s / inner_cells;
     fit(inner_by, i * width, width, cells_[i].c);
@@ -68,22 +69,6 @@ Profile::Profile() : cells_(inner_cells + outer_cells) {
     const double width = outer_end / outer_cells;
     fit(outer_by, i * width, width, cells_[inner_cells + i].c);
   }
-}
-
-double Profile::operator()(double r2) const {
-  const bool inside = r2 < s * s;
-  const double square = (inside ? s * s : t * t) - r2;
-  if (square <= 0) return 0;
-  const double scale = inside ? inner_cells / s : outer_cells / outer_end;
-  const double place = std::sqrt(square) * scale;
-  const int last = inside ? inner_cells - 1 : outer_cells - 1;
-  const int cell = std::min(static_cast<int>(place), last);
-  const double x = place - cell;
-  const double* c = cells_[(inside ? 0 : inner_cells) + cell].c;
-  const double x2 = x * x;
-  const double low = (c[0] + c[1] * x) + (c[2] + c[3] * x) * x2;
-  const double high = (c[4] + c[5] * x) + (c[6] + c[7] * x) * x2;
-  return low + high * (x2 * x2);
 }
 
 }  // namespace windsplat::engine::reference

@@ -27,14 +27,20 @@ Legendre legendre(int n, double x) {
   return {here, n * (x * here - before) / (x * x - 1)};
 }
 
-// z(w) = w^2 (3 - 2 w) maps [0, 1] onto itself; x^(3/2) at either end becomes smooth in w.
-double graded(double w) { return w * w * (3 - 2 * w); }
-double grading(double w) { return 6 * w * (1 - w); }
+// How w in [0, 1] becomes a place in the piece: x^(3/2) at a graded end becomes smooth in w.
+struct Place {
+  double at = 0;
+  double slope = 0;
+};
 
-}  // namespace
+Place graded(double w, unsigned breaks) {
+  if (breaks == (break_before | break_after)) return {w * w * (3 - 2 * w), 6 * w * (1 - w)};
+  if (breaks == break_before) return {w * w, 2 * w};
+  if (breaks == break_after) return {w * (2 - w), 2 * (1 - w)};
+  return {w, 1};
+}
 
-Rule make_rule(int nodes) {
-  WINDSPLAT_CHECK(nodes >= 2 && nodes <= rule_nodes_max);
+Rule make_rule(int nodes, unsigned breaks) {
   Rule rule;
   rule.nodes = nodes;
   std::array<double, rule_nodes_max> x{};  // in (-1, 1)
@@ -48,8 +54,8 @@ Rule make_rule(int nodes) {
     const double slope = legendre(nodes, x[j]).slope;
     gauss[j] = 1 / ((1 - x[j] * x[j]) * slope * slope);
     const double w = 0.5 * (1 + x[j]);
-    rule.node[j] = graded(w);
-    rule.weight[j] = gauss[j] * grading(w);
+    rule.node[j] = graded(w, breaks).at;
+    rule.weight[j] = gauss[j] * graded(w, breaks).slope;
   }
   for (int k = 0; k < nodes; ++k) {
     // The interpolant through node k alone is gauss_k sum_n (2 n + 1) P_n(x_k) P_n, and the
@@ -60,7 +66,7 @@ Rule make_rule(int nodes) {
         const double rise = legendre(n + 1, x[j]).value - legendre(n - 1, x[j]).value;
         sum += 0.5 * legendre(n, x[k]).value * rise;
       }
-      rule.before[j][k] = gauss[k] * sum * grading(0.5 * (1 + x[k]));
+      rule.before[j][k] = gauss[k] * sum * graded(0.5 * (1 + x[k]), breaks).slope;
     }
     for (int m = 0; m < 2; ++m) {
       const int n = nodes - 1 - m;
@@ -69,8 +75,6 @@ Rule make_rule(int nodes) {
   }
   return rule;
 }
-
-namespace {
 
 // Gauss' rule sees twice the degree that its nodes interpolate, so where coefficients decay
 // geometrically its error is the square of the interpolant's; where they do not, as large as it.
@@ -89,6 +93,11 @@ double unseen(const Rule& rule, const std::array<double, rule_nodes_max>& f) {
 }
 
 }  // namespace
+
+Rules make_rules(int nodes) {
+  WINDSPLAT_CHECK(nodes >= 2 && nodes <= rule_nodes_max);
+  return {make_rule(nodes, 0), make_rule(nodes, 1), make_rule(nodes, 2), make_rule(nodes, 3)};
+}
 
 PieceLight piece_light(const Rule& rule, double length, const Samples& samples) {
   PieceLight piece;
@@ -112,7 +121,15 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
   piece.alpha = -std::expm1(-tau);
   // What the rule does not see of tau changes the absorbed part by e^-tau times as much.
   const double tau_error = length * unseen(rule, samples.extinction);
+  // Light that is absorbed between the nodes, where the rule does not look.
+  double looked_at = 0;
+  for (int j = 0; j < rule.nodes; ++j) {
+    looked_at += length * rule.weight[j] * samples.extinction[j] * seen[j];
+  }
+  const double overlooked = std::abs(looked_at - piece.alpha);
+  const bool resolved = overlooked < 0.1 * piece.alpha;
   const double absorbed_error = std::min(piece.transmitted * tau_error, 1.0);
+  double brightest = 0;
   // The light of one colour is exact; only what departs from it is left to the rule.
   for (int c = 0; c < 3; ++c) {
     const auto& emission = samples.emission[c];
@@ -120,8 +137,8 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
     const double color = dense > 0 ? emission[thick] / dense : 0;
     std::array<double, rule_nodes_max> rest{};
     double sum = 0;
+    double own_brightest = std::abs(color);
     double spread = 0;  // no mixture of the colours here is farther from this one
-    double brightest = std::abs(color);
     for (int j = 0; j < rule.nodes; ++j) {
       const double rho = samples.extinction[j];
       const double departs = emission[j] - color * rho;
@@ -129,18 +146,23 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
       sum += rule.weight[j] * rest[j];
       if (rho > 0) {
         spread = std::max(spread, std::abs(departs) / rho);
-        brightest = std::max(brightest, std::abs(emission[j]) / rho);
+        own_brightest = std::max(own_brightest, std::abs(emission[j]) / rho);
       }
     }
     // The transmittances under the integral err with tau, too.
     const double by_tau = spread * piece.alpha * std::min(tau_error, 1.0);
-    const double by_rule = length * unseen(rule, rest) + by_tau;
-    const double by_color = spread * piece.alpha;
-    const bool resolved = by_rule < by_color;
+    const double by_rule = length * unseen(rule, rest) + by_tau + spread * overlooked;
+    // Where the nodes do see the light, no mixture of theirs is farther from the truth than this.
+    const double by_color = (resolved ? 2.5 : 1) * spread * piece.alpha;
     piece.rgb[c] = color * piece.alpha + (resolved ? length * sum : 0);
-    piece.error = std::max(piece.error, std::min(by_rule, by_color) + brightest * absorbed_error);
+    piece.error =
+        std::max(piece.error, std::min(by_rule, by_color) + own_brightest * absorbed_error);
+    brightest = std::max(brightest, own_brightest);
   }
   piece.error = std::max(piece.error, absorbed_error);
+  // Below the rounding of its own light a piece cannot be better: bisecting it would never end.
+  constexpr double rounding = 1e-15;
+  if (piece.error <= rounding * piece.alpha * std::max(brightest, 1.0)) piece.error = 0;
   return piece;
 }
 

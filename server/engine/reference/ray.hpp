@@ -1,8 +1,8 @@
 // The light along one ray: a medium given as a function of depth, and sheets (lines) in it.
 //
-// A piece of the ray is integrated by Gauss' rule on nodes that crowd quadratically towards both
-// ends, because the splat kernel ends like distance^(3/2); optical depths at the nodes come from
-// the same nodes (collocation). A piece whose error bound is too large is bisected.
+// A piece of the ray is integrated by Gauss' rule; optical depths at its nodes come from the same
+// nodes (collocation). Towards a break of the medium nodes crowd quadratically, because the splat
+// kernel ends like distance^(3/2). A piece whose error bound is too large is bisected.
 #pragma once
 
 #include <algorithm>
@@ -26,8 +26,16 @@ struct Rule {
   std::array<std::array<double, rule_nodes_max>, 2> highest{};
 };
 
-// 2 to 8 nodes. Order of the global error in the piece's length h for a smooth medium: h^4 with 6.
-Rule make_rule(int nodes = 6);
+// Which ends of a piece are breaks of the medium, as bits.
+constexpr unsigned break_before = 1;
+constexpr unsigned break_after = 2;
+
+// The rule for each combination of ends.
+using Rules = std::array<Rule, 4>;
+
+// 2 to 8 nodes; to bisect by the error bound, at least 4. With n of them and no breaks the global
+// error of a smooth medium is of order 2 n.
+Rules make_rules(int nodes = 8);
 
 // A medium at the nodes of a piece: extinction and emission (extinction times straight colour) per
 // unit of depth.
@@ -77,8 +85,9 @@ inline void cross_sheet(const Sheet& sheet, Light& light) {
 // From `from` to `to`, to an error of about `tolerance`; infinite: one piece, never bisected.
 // medium(const double* depth, int count, Samples&) fills the first `count` of each.
 template <class Medium>
-void integrate_piece(const Rule& rule, const Medium& medium, double from, double to,
-                     double tolerance, Light& light, RayCount& count) {
+void integrate_piece(const Rules& rules, const Medium& medium, double from, double to,
+                     unsigned breaks, double tolerance, Light& light, RayCount& count) {
+  const Rule& rule = rules[breaks];
   if (light.transmittance < transmittance_least) return;
   std::array<double, rule_nodes_max> depth{};
   for (int j = 0; j < rule.nodes; ++j) depth[j] = from + (to - from) * rule.node[j];
@@ -90,8 +99,9 @@ void integrate_piece(const Rule& rule, const Medium& medium, double from, double
   // No shorter than depths can be told apart.
   const bool divisible = middle > from && middle < to;
   if (light.transmittance * piece.error > tolerance && divisible) {
-    integrate_piece(rule, medium, from, middle, 0.5 * tolerance, light, count);
-    integrate_piece(rule, medium, middle, to, 0.5 * tolerance, light, count);
+    integrate_piece(rules, medium, from, middle, breaks & break_before, 0.5 * tolerance, light,
+                    count);
+    integrate_piece(rules, medium, middle, to, breaks & break_after, 0.5 * tolerance, light, count);
     return;
   }
   ++count.pieces;
@@ -103,7 +113,7 @@ void integrate_piece(const Rule& rule, const Medium& medium, double from, double
 // A whole ray: `breaks` are the depths where the medium begins, ends or is not smooth, `sheets` cut
 // it too; both ascend. medium.begin(from, to) is called before each piece, in ascending order.
 template <class Medium>
-Light integrate_ray(const Rule& rule, Medium& medium, const std::vector<double>& breaks,
+Light integrate_ray(const Rules& rules, Medium& medium, const std::vector<double>& breaks,
                     const std::vector<Sheet>& sheets, double tolerance, RayCount& count) {
   Light light;
   const std::size_t cuts = breaks.size() + sheets.size();
@@ -111,13 +121,15 @@ Light integrate_ray(const Rule& rule, Medium& medium, const std::vector<double>&
   std::size_t b = 0;
   std::size_t s = 0;
   double from = 0;
+  bool after_sheet = false;
   for (std::size_t done = 0; done < cuts; ++done) {
     const bool sheet = s < sheets.size() && (b == breaks.size() || sheets[s].depth <= breaks[b]);
     const double to = sheet ? sheets[s].depth : breaks[b];
     // Before the first break and after the last one there is no medium.
     if (b > 0 && b < breaks.size() && to > from) {
       medium.begin(from, to);
-      integrate_piece(rule, medium, from, to, share, light, count);
+      const unsigned ends = (after_sheet ? 0 : break_before) | (sheet ? 0 : break_after);
+      integrate_piece(rules, medium, from, to, ends, share, light, count);
     }
     if (light.transmittance < transmittance_least) break;
     if (sheet) {
@@ -125,6 +137,7 @@ Light integrate_ray(const Rule& rule, Medium& medium, const std::vector<double>&
     } else {
       ++b;
     }
+    after_sheet = sheet;
     from = to;
   }
   return light;

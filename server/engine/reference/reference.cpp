@@ -177,7 +177,7 @@ struct Frame {
   const Kernels& kernels;
   const ScreenGrid& splats;
   const ScreenGrid& ribbons;
-  const Rule& rule;
+  const Rules& rules;
   double tolerance = 0;
 };
 
@@ -193,7 +193,7 @@ class Painter {
     for (const std::uint32_t id : frame_.splats.at(x, y)) medium_.add(frame_.kernels.splats[id]);
     const std::vector<double>& breaks = medium_.finish();
     gather_sheets(x, y, px, py);
-    return integrate_ray(frame_.rule, medium_, breaks, sheets_, frame_.tolerance, count);
+    return integrate_ray(frame_.rules, medium_, breaks, sheets_, frame_.tolerance, count);
   }
 
  private:
@@ -243,9 +243,9 @@ Result<Picture> render(const scene::Scene& scene, ThreadPool& pool, const Cancel
   for (std::size_t i = 0; i < kernels.ribbons.size(); ++i) {
     ribbons.add(ribbon_box(kernels.ribbons[i]), static_cast<std::uint32_t>(i));
   }
-  const Rule rule = make_rule();
+  const Rules rules = make_rules();
   const Profile profile;
-  const Frame frame{view, kernels, splats, ribbons, rule, options.tolerance};
+  const Frame frame{view, kernels, splats, ribbons, rules, options.tolerance};
   std::vector<Painter> painters(pool.size(), Painter(frame, profile));
   Picture picture;
   picture.width = width;
