@@ -27,6 +27,9 @@ namespace {
 constexpr std::uint64_t resident_bytes_max = 8ULL << 30;
 constexpr int exit_interrupted = 130;  // as shells say it of SIGINT
 constexpr int bar_width = 28;
+// Of the integral: a hundredth of the least error that a picture of floats in few layers has.
+constexpr double truth_tolerance = 1e-7;
+constexpr double quick_tolerance = 1e-5;
 
 struct Arguments {
   std::string dataset;
@@ -128,9 +131,11 @@ Result<std::vector<study::Subject>> subjects_of(const Arguments& arguments, data
   return subjects;
 }
 
-study::Truth integral(ThreadPool& pool, const CancelToken& cancel) {
-  return [&pool, cancel](const scene::Scene& scene) -> Result<study::Picture> {
-    auto picture = engine::reference::render(scene, pool, cancel);
+study::Truth integral(double tolerance, ThreadPool& pool, const CancelToken& cancel) {
+  return [tolerance, &pool, cancel](const scene::Scene& scene) -> Result<study::Picture> {
+    engine::reference::Options precision;
+    precision.tolerance = tolerance;
+    auto picture = engine::reference::render(scene, pool, cancel, precision);
     if (!picture) return picture.error();
     return study::Picture{picture->width, picture->height, std::move(picture->rgba),
                           picture->pieces, picture->evaluations};
@@ -155,7 +160,8 @@ int study_command(const Arguments& arguments) {
   study::Options options;
   options.folder = arguments.output;
   options.quick = arguments.quick;
-  if (!arguments.no_reference) options.truth = integral(pool, cancel);
+  const double tolerance = arguments.quick ? quick_tolerance : truth_tolerance;
+  if (!arguments.no_reference) options.truth = integral(tolerance, pool, cancel);
   Reporter reporter(isatty(STDERR_FILENO) == 1);
   const auto report =
       study::run_study(*subjects, options, pool, cancel,

@@ -38,8 +38,11 @@ std::array<double, 3> flow(double x, double y, double z) {
   const double cx = x - 0.25 * std::sin(2 * z);  // the axis leans
   const double cy = y - 0.25 * std::cos(2 * z);
   const double r2 = cx * cx + cy * cy;
-  const double swirl = 1.6 * std::exp(-1.2 * r2);
-  return {-swirl * cy, swirl * cx, 0.5 * std::exp(-2 * r2) + 0.15 * std::sin(3 * x)};
+  // Gusts: the fastest samples are spread over the volume.
+  const double wave = std::sin(6 * x + 1) * std::sin(6 * y + 2) * std::sin(6 * z + 3);
+  const double gust = 0.25 + 0.75 * wave * wave;
+  const double swirl = 1.6 * gust * std::exp(-1.2 * r2);
+  return {-swirl * cy, swirl * cx, 0.7 * gust * std::exp(-2 * r2)};
 }
 
 data::Axis edge(std::string name) {

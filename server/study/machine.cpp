@@ -37,7 +37,11 @@ Machine this_machine(unsigned threads) {
     machine.system += ' ';
     machine.system += names.machine;
   }
-  machine.compiler = __VERSION__;
+#ifdef __clang__
+  machine.compiler = __VERSION__;  // it names itself
+#else
+  machine.compiler = "g++ " __VERSION__;
+#endif
   machine.version = WINDSPLAT_VERSION;
   if (const auto table = engine::kernels::chosen_table()) machine.kernels = (*table)->name;
   machine.hardware_threads = std::thread::hardware_concurrency();

@@ -20,7 +20,7 @@ constexpr const char* style =
     "th{background:#f0f0f4}td:first-child,th:first-child{text-align:left}"
     "tr.front td{background:#fff6dd}tr.bad td{color:#b00020}"
     ".plot{background:#fff;border:1px solid #e0e0e6;max-width:920px}"
-    ".pictures{display:flex;flex-wrap:wrap;gap:14px}"
+    ".pictures{display:flex;flex-wrap:wrap;gap:14px 28px}.pair{display:flex;gap:6px}"
     "figure{margin:0}figcaption{font-size:13px;color:#555}"
     "img{display:block;image-rendering:pixelated;background:#000}"
     "details{margin:.6em 0}pre{white-space:pre-wrap;font-size:12px;background:#f0f0f4;padding:.8em}"
@@ -53,20 +53,20 @@ Result<std::string> figure(const std::vector<std::uint8_t>& rgb, const SceneRepo
 }
 
 Result<std::string> pictures(const SceneReport& scene) {
-  std::string text;
+  std::string text = "<div class=\"pictures\">\n";
   for (const Shown& shown : scene.pictures) {
-    text += "<div class=\"pictures\">";
+    text += "<div class=\"pair\">";
     const auto picture = figure(shown.rgb, scene, shown.title);
     if (!picture) return picture.error();
     text += *picture;
     if (!shown.difference_rgb.empty()) {
-      const auto apart =
-          figure(shown.difference_rgb, scene, "its difference from the reference, ten times");
+      const auto apart = figure(shown.difference_rgb, scene, "difference x 10");
       if (!apart) return apart.error();
       text += *apart;
     }
     text += "</div>\n";
   }
+  text += "</div>\n";
   return text;
 }
 

@@ -147,6 +147,8 @@ class Study {
         scene.points.push_back({setting, *known, false});
         continue;
       }
+      // Small pictures end before the engine asks.
+      if (cancel_.cancelled()) return make_error(ErrorKind::cancelled, "the study was interrupted");
       tell(subject, std::string(name_of(setting.method)) + " " + name_of(setting.compositing));
       const auto measured = measure(subject, setting, truth, pool_, cancel_);
       if (!measured) return measured.error();

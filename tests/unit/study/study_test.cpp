@@ -1,0 +1,224 @@
+// A whole study with a stand-in for the integral: what it keeps, skips and reports.
+#include "server/study/study.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "server/study/points_file.hpp"
+#include "server/study/report.hpp"
+
+namespace windsplat::study {
+namespace {
+
+using Json = nlohmann::json;
+
+class Folder {
+ public:
+  Folder() {
+    std::string name = (std::filesystem::temp_directory_path() / "windsplat-study-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) ADD_FAILURE() << "cannot make a folder";
+    path = name;
+  }
+  ~Folder() { std::filesystem::remove_all(path); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  std::filesystem::path path;
+};
+
+std::string read(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+// An even grey; counts how often it was asked.
+Truth grey(int& asked) {
+  return [&asked](const scene::Scene& scene) -> Result<Picture> {
+    ++asked;
+    Picture picture{scene.camera.width, scene.camera.height, {}, 7, 70};
+    picture.rgba.assign(4 * static_cast<std::size_t>(picture.width) * picture.height, 0.25);
+    return picture;
+  };
+}
+
+std::vector<Subject> vectors_only() { return {standard_subject("vectors", true).value()}; }
+
+Result<Report> study(const Folder& folder, Truth truth, const CancelToken& cancel = {},
+                     const Listener& listen = {}) {
+  ThreadPool pool(1);
+  return run_study(vectors_only(), {folder.path, true, std::move(truth)}, pool, cancel, listen);
+}
+
+TEST(Study, ASecondRunSkipsEveryPointAndTellsTheSameNumbers) {
+  const Folder folder;
+  int asked = 0;
+  const Report first = study(folder, grey(asked)).value();
+  EXPECT_GT(first.measured, 4U);
+  EXPECT_EQ(first.skipped, 0U);
+  const Report second = study(folder, grey(asked)).value();
+  EXPECT_EQ(asked, 1);
+  EXPECT_EQ(second.measured, 0U);
+  EXPECT_EQ(second.skipped, first.measured);
+  EXPECT_EQ(report_csv(second), report_csv(first));
+  EXPECT_EQ(second.scenes[0].pieces, 7);
+}
+
+TEST(Study, AnInterruptedOneGoesOnWhereItStopped) {
+  const Folder folder;
+  int asked = 0;
+  const CancelToken cancel;
+  int points = 0;
+  const auto stopped = study(folder, grey(asked), cancel, [&](const Progress& progress) {
+    if (progress.doing != "reference" && ++points == 3) cancel.cancel();
+  });
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().kind, ErrorKind::cancelled);
+  const Report resumed = study(folder, grey(asked)).value();
+  EXPECT_EQ(resumed.skipped, 2U);
+  EXPECT_EQ(asked, 1);
+}
+
+TEST(Study, ProgressNeverGoesBackAndEndsAtOne) {
+  const Folder folder;
+  int asked = 0;
+  double last = 0;
+  ASSERT_TRUE(study(folder, grey(asked), {}, [&](const Progress& progress) {
+    EXPECT_GE(progress.done, last);
+    EXPECT_LE(progress.done, 1);
+    last = progress.done;
+  }));
+  EXPECT_DOUBLE_EQ(last, 1);
+}
+
+TEST(Study, AnotherTruthIsAnotherPoint) {
+  const Folder folder;
+  int asked = 0;
+  ASSERT_TRUE(study(folder, grey(asked)));
+  const Report extrapolated = study(folder, {}).value();
+  EXPECT_EQ(extrapolated.skipped, 0U);
+  EXPECT_FALSE(extrapolated.scenes[0].integral);
+  EXPECT_TRUE(std::isfinite(extrapolated.scenes[0].truth_estimate));
+}
+
+TEST(Study, WritesJsonOfTheShapeThatProgramsRelyOn) {
+  const Folder folder;
+  int asked = 0;
+  const Report report = study(folder, grey(asked)).value();
+  ASSERT_TRUE(write_report(report, folder.path));
+  const Json json = Json::parse(read(folder.path / "study.json"));
+  for (const char* key : {"processor", "system", "compiler", "windsplat", "threads"}) {
+    EXPECT_TRUE(json.at("machine").contains(key)) << key;
+  }
+  const Json& scene = json.at("scenes").at(0);
+  EXPECT_EQ(scene.at("name"), "vectors");
+  EXPECT_EQ(scene.at("view").at("dataset"), "blobs");
+  EXPECT_EQ(scene.at("reference").at("kind"), "integral");
+  EXPECT_EQ(scene.at("reference").at("pieces"), 7);
+  ASSERT_EQ(scene.at("points").size(), report.scenes[0].points.size());
+  for (const Json& point : scene.at("points")) {
+    for (const char* key : {"rmse", "max", "psnr", "flip", "ms", "msMin", "msMax"}) {
+      EXPECT_TRUE(point.at(key).is_number()) << key;
+    }
+    EXPECT_TRUE(point.at("pareto").is_boolean());
+    EXPECT_TRUE(point.at("stable").is_boolean());
+    EXPECT_TRUE(point.at("method").is_string());
+    EXPECT_TRUE(point.at("compositing").is_string());
+    EXPECT_TRUE(point.at("knobs").contains("stride"));
+    EXPECT_EQ(point.at("knobs").contains("slabThickness"), point.at("method") == "slab");
+  }
+  EXPECT_EQ(json.at("stability").size(), compositings.size() * stiffness().size());
+  EXPECT_EQ(json.at("stability").at(0).at("tau"), 1e-30);
+}
+
+TEST(Study, WritesOneLineAPointAndAPageThatNeedsNothingElse) {
+  const Folder folder;
+  int asked = 0;
+  const Report report = study(folder, grey(asked)).value();
+  ASSERT_TRUE(write_report(report, folder.path));
+  const std::string csv = read(folder.path / "study.csv");
+  EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')),
+            1 + report.scenes[0].points.size());
+  const std::string page = read(folder.path / "index.html");
+  EXPECT_NE(page.find("<svg"), std::string::npos);
+  EXPECT_NE(page.find("data:image/png;base64,"), std::string::npos);
+  EXPECT_EQ(page.find("<script"), std::string::npos);
+  EXPECT_EQ(page.find("<link"), std::string::npos);
+  EXPECT_EQ(page.find("src=\"http"), std::string::npos);
+  EXPECT_TRUE(std::filesystem::exists(folder.path / "plot-vectors.svg"));
+}
+
+TEST(PointsFile, KeepsEveryDigitAndValuesThatAreNotFinite) {
+  const Folder folder;
+  const std::filesystem::path path = folder.path / "points.csv";
+  const Measurement m{1.0 / 3, NAN, INFINITY, 1e-300, 0.1, 0.05, 2.0 / 7, false};
+  ASSERT_TRUE(PointsFile::open(path).value().append(key_of("a"), m));
+  const auto found = PointsFile::open(path).value().find(key_of("a"));
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->rmse, 1.0 / 3);
+  EXPECT_TRUE(std::isnan(found->max));
+  EXPECT_EQ(found->psnr, INFINITY);
+  EXPECT_EQ(found->flip, 1e-300);
+  EXPECT_EQ(found->ms_max, 2.0 / 7);
+  EXPECT_FALSE(found->stable);
+  EXPECT_FALSE(PointsFile::open(path).value().find(key_of("b")));
+}
+
+// A line that a crash cut off anywhere is measured again, and what follows it is not spoilt.
+TEST(PointsFile, LeavesOutALineThatWasCutOff) {
+  const Folder folder;
+  const std::filesystem::path path = folder.path / "points.csv";
+  {
+    PointsFile file = PointsFile::open(path).value();
+    ASSERT_TRUE(file.append(key_of("a"), {0.5, 0.5, 6, 0.1, 1, 1, 1, true}));
+    ASSERT_TRUE(file.append(key_of("b"), {0.25, 0.5, 6, 0.1, 1, 1, 1, true}));
+  }
+  const std::string whole = read(path);
+  const std::size_t last = whole.rfind('\n', whole.size() - 2) + 1;
+  for (std::size_t cut = last; cut < whole.size(); ++cut) {
+    std::ofstream(path, std::ios::binary | std::ios::trunc) << whole.substr(0, cut);
+    PointsFile file = PointsFile::open(path).value();
+    EXPECT_TRUE(file.find(key_of("a"))) << cut;
+    EXPECT_FALSE(file.find(key_of("b"))) << cut;
+    ASSERT_TRUE(file.append(key_of("c"), {0.125, 0.5, 6, 0.1, 1, 1, 1, true}));
+    const PointsFile again = PointsFile::open(path).value();
+    EXPECT_EQ(again.size(), 2U) << cut;
+    EXPECT_EQ(again.find(key_of("c"))->rmse, 0.125) << cut;
+  }
+}
+
+TEST(Key, IsFnv1a) {
+  EXPECT_EQ(key_of(""), "cbf29ce484222325");
+  EXPECT_EQ(key_of("a"), "af63dc4c8601ec8c");
+}
+
+// Two curves of one colour each; the mark of what is unstable is a cross, not a disc.
+TEST(Plot, DrawsDiscsRingsAndCrosses) {
+  SceneReport scene;
+  scene.name = "a<b";
+  scene.ripple_floor = 1e-3;
+  for (int i = 0; i < 4; ++i) {
+    Point point;
+    point.measured = {std::pow(10, -i), 0.1, 20, 0.1, 1.0 + i, 1.0 + i, 2.0 + i, i != 0};
+    scene.points.push_back(point);
+  }
+  mark_pareto(scene.points);
+  const std::string svg = plot_svg(scene);
+  const auto count = [&](const std::string& what) {
+    int n = 0;
+    for (std::size_t at = svg.find(what); at != std::string::npos; at = svg.find(what, at + 1)) ++n;
+    return n;
+  };
+  EXPECT_EQ(count("r=\"3.4\""), 3);
+  EXPECT_EQ(count("r=\"7\""), 3);
+  EXPECT_EQ(count("stroke-width:2.2"), 2);
+  EXPECT_EQ(count("ripple floor"), 1);
+  EXPECT_EQ(svg.find("a<b"), std::string::npos);
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace windsplat::study

@@ -1,0 +1,163 @@
+// What is swept, how a point is measured against a truth, and the floor of splats.
+#include "server/study/sweep.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/study/metrics.hpp"
+
+namespace windsplat::study {
+namespace {
+
+using scene::Compositing;
+using scene::Method;
+
+bool has(const Sweep& sweep, Method method, Compositing compositing) {
+  return std::any_of(sweep.settings.begin(), sweep.settings.end(), [&](const Setting& s) {
+    return s.method == method && s.compositing == compositing;
+  });
+}
+
+TEST(Sweep, MeasuresEveryCompositingAndNoSettingTwice) {
+  const Subject subject = standard_subject("soft", false).value();
+  const Sweep sweep = plan_sweep(subject, false);
+  for (const Compositing compositing : compositings) {
+    EXPECT_TRUE(has(sweep, Method::kernel, compositing)) << name_of(compositing);
+    EXPECT_TRUE(has(sweep, Method::slab, compositing)) << name_of(compositing);
+  }
+  for (std::size_t i = 0; i < sweep.settings.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) EXPECT_FALSE(sweep.settings[i] == sweep.settings[j]);
+  }
+}
+
+TEST(Sweep, ACurveDiffersInItsKnobAlone) {
+  const Subject subject = standard_subject("dense", false).value();
+  const Sweep sweep = plan_sweep(subject, false);
+  for (const Curve& curve : sweep.curves) {
+    for (const std::size_t i : curve.points) {
+      const Setting& setting = sweep.settings[i];
+      EXPECT_EQ(setting.method, curve.method);
+      EXPECT_EQ(setting.compositing, curve.compositing);
+      int others = 0;
+      const Knobs own = own_knobs(subject);
+      for (const Knob knob : {Knob::stride, Knob::span, Knob::slab_thickness,
+                              Knob::stop_transmittance, Knob::width}) {
+        if (knob != curve.knob && value_of(setting.knobs, knob) != value_of(own, knob)) ++others;
+      }
+      EXPECT_EQ(others, 0) << name_of(curve.knob);
+    }
+  }
+}
+
+TEST(Sweep, LeavesOutWhatASceneHasNot) {
+  const Sweep vectors = plan_sweep(standard_subject("vectors", false).value(), false);
+  EXPECT_FALSE(has(vectors, Method::kernel, Compositing::cd));
+  const Sweep scalar = plan_sweep(standard_subject("scalar", false).value(), false);
+  for (const Curve& curve : scalar.curves) EXPECT_NE(curve.knob, Knob::span);
+}
+
+TEST(Scene, TurnsTheKnobsItIsToldAndScalesLinesWithThePicture) {
+  const Subject subject = standard_subject("soft", false).value();
+  Setting setting{Method::slab, Compositing::cd, own_knobs(subject)};
+  setting.knobs.stride = 2;
+  setting.knobs.span = 3;
+  setting.knobs.slab_thickness = 0.5;
+  setting.knobs.stop_transmittance = 0.25;
+  setting.knobs.width = subject.view.image.width / 2;
+  const scene::Scene scene = scene_at(subject, setting).value();
+  EXPECT_EQ(scene.method, Method::slab);
+  EXPECT_EQ(scene.compositing, Compositing::cd);
+  EXPECT_EQ(scene.vector->stride, 2);
+  EXPECT_EQ(scene.scalars.at(0).stride, 2);
+  EXPECT_EQ(scene.vector->span, 3);
+  EXPECT_EQ(scene.slab_thickness, 0.5);
+  EXPECT_EQ(scene.stop_transmittance, 0.25);
+  EXPECT_EQ(scene.camera.width, subject.view.image.width / 2);
+  EXPECT_EQ(scene.camera.height, subject.view.image.height / 2);
+  const scene::Scene whole =
+      scene_at(subject, {Method::kernel, Compositing::cd, own_knobs(subject)}).value();
+  EXPECT_EQ(scene.camera.half_height, whole.camera.half_height);
+  EXPECT_EQ(scene.camera.eye, whole.camera.eye);
+}
+
+// soft and dense are named for the optical depth of their deepest row of samples.
+TEST(Scene, HasTheOpticalDepthItsNameSays) {
+  for (const auto& [name, depth] : {std::pair{"soft", 1.0}, std::pair{"dense", 10.0}}) {
+    const Subject subject = standard_subject(name, true).value();
+    const scene::Scene scene =
+        scene_at(subject, {Method::kernel, Compositing::analytic, own_knobs(subject)}).value();
+    const data::Volume& volume = *scene.scalars.at(0).field;
+    const double per_value = scene.scalars[0].extinction.back()[1];
+    double deepest = 0;
+    const int n = volume.dims[0];
+    for (int z = 0; z < n; ++z) {
+      for (int x = 0; x < n; ++x) {
+        double sum = 0;
+        for (int y = 0; y < n; ++y) sum += volume.values[(z * n + y) * n + x] * per_value;
+        deepest = std::max(deepest, sum * scene.lattice.spacing[1][0]);
+      }
+    }
+    EXPECT_NEAR(deepest, depth, 1e-6 * depth) << name;
+  }
+}
+
+// A truth that is the setting's own picture but for a known amount in one channel.
+TEST(Measure, IsTheDistanceFromTheTruthItIsGiven) {
+  const Subject subject = standard_subject("soft", true).value();
+  const Setting setting{Method::kernel, Compositing::analytic, own_knobs(subject)};
+  ThreadPool pool(1);
+  const engine::Image own = draw(subject, setting, pool, CancelToken()).value();
+  Picture truth{own.width, own.height, {own.rgba.begin(), own.rgba.end()}};
+  const Measurement same = measure(subject, setting, truth, pool, CancelToken()).value();
+  EXPECT_EQ(same.rmse, 0);
+  EXPECT_EQ(same.flip, 0);
+  EXPECT_TRUE(same.stable);
+  EXPECT_GT(same.ms_min, 0);
+  EXPECT_LE(same.ms_min, same.ms);
+  EXPECT_LE(same.ms, same.ms_max);
+  for (std::size_t i = 1; i < truth.rgba.size(); i += 4) truth.rgba[i] += 0.1;
+  const Measurement off = measure(subject, setting, truth, pool, CancelToken()).value();
+  EXPECT_NEAR(off.rmse, 0.05, 1e-9);
+  EXPECT_NEAR(off.max, 0.1, 1e-9);
+  EXPECT_GT(off.flip, 0);
+}
+
+TEST(Measure, ASmallerPictureIsComparedAtTheTruthsSize) {
+  const Subject subject = standard_subject("soft", true).value();
+  Setting setting{Method::kernel, Compositing::analytic, own_knobs(subject)};
+  ThreadPool pool(1);
+  const engine::Image own = draw(subject, setting, pool, CancelToken()).value();
+  const Picture truth{own.width, own.height, {own.rgba.begin(), own.rgba.end()}};
+  setting.knobs.width /= 2;
+  const engine::Image half = draw(subject, setting, pool, CancelToken()).value();
+  ASSERT_EQ(half.width * 2, own.width);
+  const auto larger = resample(half.rgba, half.width, half.height, own.width, own.height);
+  EXPECT_NEAR(measure(subject, setting, truth, pool, CancelToken()).value().rmse,
+              difference(larger, truth.rgba).rmse, 1e-12);
+}
+
+// Overlapping footprints ripple by 1 % peak to peak on axis to 4 % at 45 degrees, of tau = 1: an
+// error of alpha below 4 % / e, and not nothing.
+TEST(Ripple, IsBetweenNothingAndWhatTheFootprintAllows) {
+  ThreadPool pool(1);
+  const double floor =
+      ripple_floor(standard_subject("scalar", true).value(), pool, CancelToken()).value();
+  EXPECT_GT(floor, 1e-6);
+  EXPECT_LT(floor, 0.5 * 0.039 / std::exp(1.0));
+}
+
+TEST(Encoding, ErrsLessAndTakesMoreBytesTheHigherItsQuality) {
+  ThreadPool pool(1);
+  const auto all =
+      measure_encoding(standard_subject("dense", true).value(), pool, CancelToken()).value();
+  ASSERT_GT(all.size(), 2U);
+  for (std::size_t i = 1; i < all.size(); ++i) {
+    EXPECT_LT(all[i].rmse, all[i - 1].rmse);
+    EXPECT_GT(all[i].bytes, all[i - 1].bytes);
+  }
+}
+
+}  // namespace
+}  // namespace windsplat::study
