@@ -1,5 +1,5 @@
-// The panel's controls in a real browser: what each sends, what the link keeps of it, what it hides,
-// and, for what every server draws, that the picture changes.
+// The panel's controls in a real browser: what each sends, what the link keeps of it, what it
+// hides, and, for what every server draws, that the picture changes.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import {
