@@ -1,8 +1,9 @@
-// The panel's controls in a real browser: what each sends, what the link keeps of it, what it hides,
-// and, for what every server draws, that the picture changes.
+// The panel's controls in a real browser: what each sends, what the link keeps of it, what it
+// hides, and, for what every server draws, that the picture changes.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import {
+  choose,
   control,
   Daemon,
   finalPicture,
@@ -12,6 +13,9 @@ import {
   pixels,
   shot,
   somePicture,
+  type,
+  unfold,
+  watchPatches,
 } from "./support.mjs";
 
 let browser;
@@ -27,17 +31,6 @@ after(async () => {
   await daemon?.kill();
 });
 
-// Runs in the page before its own scripts: keeps the patches that go out, with the time.
-const watchPatches = () => {
-  window.patches = [];
-  const send = WebSocket.prototype.send;
-  WebSocket.prototype.send = function (text) {
-    const message = JSON.parse(text);
-    if (message.type === "patch") window.patches.push({ at: performance.now(), ...message });
-    return send.call(this, text);
-  };
-};
-
 async function withPage(run, path = "", options = {}) {
   const page = await openPage(browser, daemon.url + path, { initScript: watchPatches, ...options });
   try {
@@ -47,30 +40,6 @@ async function withPage(run, path = "", options = {}) {
   } finally {
     await page.context().close();
   }
-}
-
-async function unfold(page, ...titles) {
-  for (const title of titles) {
-    const button = page
-      .locator("#panel .lil-title")
-      .filter({ hasText: new RegExp(`^${title}$`) })
-      .first();
-    if ((await button.getAttribute("aria-expanded")) !== "true") await button.click();
-  }
-}
-
-async function choose(page, label, text) {
-  const select = control(page, label);
-  const options = await select.locator("option").allTextContents();
-  const wanted = options.find((option) => text.test(option));
-  assert.ok(wanted, `${label} offers ${options.join(", ")}`);
-  await select.selectOption({ label: wanted });
-}
-
-async function type(page, label, value) {
-  const input = control(page, label, "input");
-  await input.fill(String(value));
-  await input.press("Enter");
 }
 
 const isShown = (page, label, tag) => control(page, label, tag).isVisible();

@@ -183,4 +183,42 @@ export const control = (page, label, tag = "select") =>
     .locator(tag)
     .first();
 
+// Runs in a page before its own scripts (initScript): keeps the patches that go out, with the time.
+export const watchPatches = () => {
+  window.patches = [];
+  const send = WebSocket.prototype.send;
+  WebSocket.prototype.send = function (text) {
+    const message = JSON.parse(text);
+    if (message.type === "patch") window.patches.push({ at: performance.now(), ...message });
+    return send.call(this, text);
+  };
+};
+
+// Opens folders of the panel.
+export async function unfold(page, ...titles) {
+  for (const title of titles) {
+    const button = page
+      .locator("#panel .lil-title")
+      .filter({ hasText: new RegExp(`^${title}$`) })
+      .first();
+    if ((await button.getAttribute("aria-expanded")) !== "true") await button.click();
+  }
+}
+
+// The first option whose text matches.
+export async function choose(page, label, text) {
+  const select = control(page, label);
+  const options = await select.locator("option").allTextContents();
+  const wanted = options.find((option) => text.test(option));
+  if (wanted === undefined) throw new Error(`${label} offers ${options.join(", ")}`);
+  await select.selectOption({ label: wanted });
+}
+
+// Into the number box of a control.
+export async function type(page, label, value) {
+  const input = control(page, label, "input");
+  await input.fill(String(value));
+  await input.press("Enter");
+}
+
 export const shot = (page, name) => page.screenshot({ path: join(screenshots, `${name}.png`) });

@@ -58,7 +58,6 @@ export class Flow {
 
   // Someone looks again.
   seen(): void {
-    this.movedAt = null;
     this.plan();
   }
 

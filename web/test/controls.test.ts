@@ -141,7 +141,7 @@ test("what a choice makes meaningless does not count", () => {
   assert.equal(off({ depthCue: { strength: 0 } }).depthCue, false);
 });
 
-test("every method and compositing that is offered is explained; the reference is not offered", () => {
+test("every method and compositing offered is explained; the reference is not offered", () => {
   assert.deepEqual(Object.values(methodOptions), ["kernel", "slab"]);
   for (const method of Object.values(methodOptions)) assert.ok(methodHints[method]);
   const offered = Object.values(compositingOptions);

@@ -86,6 +86,10 @@ test("slow frames are waited for: never two moves under way", () => {
   silent.run(5000, null);
   assert.equal(silent.sent.length, 1, "without an answer nothing more is asked for");
   assert.equal(silent.waiting, 0);
+  silent.flow.seen();
+  silent.flow.answered(silent.rev - 1);
+  silent.run(1000, null);
+  assert.equal(silent.sent.length, 1, "nor because someone looks or an older frame comes");
 });
 
 test("a hidden page asks for nothing and goes on without a jump", () => {
