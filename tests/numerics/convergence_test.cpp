@@ -314,8 +314,12 @@ void expect_cells(Compositing compositing, double rho) {
   }
 }
 
-TEST(EngineCell, AnalyticIsTheExactCell) {
-  for (const double rho : {0.01, 0.7, 3.0, 60.0}) expect_cells(Compositing::analytic, rho);
+TEST(EngineCell, EveryCompositingIsItsFormula) {
+  for (const Compositing by :
+       {Compositing::simple, Compositing::cd_naive, Compositing::cd, Compositing::analytic}) {
+    for (const double rho : {0.01, 0.7, 3.0, 60.0}) expect_cells(by, rho);
+  }
+  for (const double rho : {0.01, 0.7, 3.0}) expect_cells(Compositing::cd_euler, rho);
 }
 
 }  // namespace

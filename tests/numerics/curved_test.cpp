@@ -77,7 +77,6 @@ TEST(Curved, StraightPlacesDrawWhatTheRectilinearLatticeDoes) {
     const engine::Rendered flat = render(scene);
     bend(scene.lattice, [](const glm::dvec3& p) { return p; });
     const engine::Rendered curved = render(scene);
-    std::printf("samples %ld culled %ld upd %ld both %ld occ %ld var %s\n", curved.work.samples, curved.work.culled, curved.work.pixel_updates, curved.work.skipped_both, curved.work.occluded, curved.work.variant.c_str());
     double most = 0;
     for (std::size_t i = 0; i < flat.image.rgba.size(); ++i) {
       most = std::max<double>(most, std::abs(flat.image.rgba[i] - curved.image.rgba[i]));
@@ -108,12 +107,10 @@ TEST(Curved, BentLatticesApproachTheReference) {
       for (const double thickness : {1.0, 0.5, 0.25}) {
         scene.slab_thickness = thickness;
         const double error = rms(render(scene).image, truth);
-        std::printf("lines %d slab %g: %g\n", lines, thickness, error);
         EXPECT_LT(error, last);
         last = error;
       }
       scene.method = scene::Method::kernel;
-      std::printf("kernel %g\n", rms(render(scene).image, truth));
     }
   }
 }

@@ -33,7 +33,7 @@ class SceneMaker {
     const glm::dvec3 forward{between(-1, 1), between(-1, 1), between(-1, 1)};
     const glm::dvec3 target{between(-.3, .3), between(-.2, .2), between(-.2, .2)};
     const double distance = eye_inside ? 0.0 : between(1.5, 4.0);
-    const double wide = perspective ? (eye_inside ? 0.7 : between(0.25, 0.5)) : between(0.4, 0.9);
+    const double wide = perspective ? (eye_inside ? 1.3 : between(0.25, 0.5)) : between(0.4, 0.9);
     scene.camera = look(target, forward, distance, width, height, perspective, wide);
     scene.camera.near = 0.01;
     scene.depth_cue = {0.4, distance - 0.5, distance + 0.5};

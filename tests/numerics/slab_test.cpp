@@ -85,21 +85,18 @@ TEST(Slab, HalvingTheThicknessQuartersTheError) {
     for (const double thickness : {2.0, 1.0, 0.5}) {
       scene.slab_thickness = thickness;
       const double error = rms(render(scene).image, truth.image);
-      std::printf("slab %g rms %g\n", thickness, error);
       if (last > 0) {
         EXPECT_NEAR(std::log2(last / error), 2.0, 0.3);
       }
       last = error;
     }
-    scene.method = Method::kernel;
-    std::printf("kernel rms %g\n", rms(render(scene).image, truth.image));
   }
 }
 
 TEST(Slab, TurningByAMicroradianHardlyChangesAMedium) {
   for (const bool perspective : {false, true}) {
-    for (int step = 0; step < 24; ++step) {
-      const double azimuth = step * 3.14159265358979 / 12;
+    for (int step = 0; step < 4; ++step) {
+      const double azimuth = (2 * step + (perspective ? 1 : 0)) * 3.14159265358979 / 8;
       Scene scene = blobs(20, 256, azimuth, perspective);
       scene.method = Method::slab;
       const engine::Rendered before = render(scene, 2);
