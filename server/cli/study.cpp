@@ -29,7 +29,7 @@ constexpr int exit_interrupted = 130;  // as shells say it of SIGINT
 constexpr int bar_width = 28;
 // Of the integral: a hundredth of the least error that a picture of floats in few layers has.
 constexpr double truth_tolerance = 1e-7;
-constexpr double quick_tolerance = 1e-5;
+constexpr double quick_tolerance = 1e-6;
 
 struct Arguments {
   std::string dataset;

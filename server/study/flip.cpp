@@ -106,9 +106,10 @@ double hyab(const Color& a, const Color& b) {
 // Rows, then columns, each by a kernel of odd length; the border repeats its outermost pixels.
 Plane convolve(const Plane& in, Size size, const std::vector<double>& along_x,
                const std::vector<double>& along_y) {
-  const auto [width, height] = size;
+  const int width = size.width;
+  const int height = size.height;
   const auto pass = [&](const Plane& from, const std::vector<double>& kernel, bool rows) {
-    const int radius = static_cast<int>(kernel.size() / 2);
+    const auto radius = static_cast<int>(kernel.size() / 2);
     Plane to(from.size());
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
@@ -116,7 +117,7 @@ Plane convolve(const Plane& in, Size size, const std::vector<double>& along_x,
         for (int k = -radius; k <= radius; ++k) {
           const int sx = rows ? std::clamp(x + k, 0, width - 1) : x;
           const int sy = rows ? y : std::clamp(y + k, 0, height - 1);
-          sum += kernel[static_cast<std::size_t>(k + radius)] *
+          sum += kernel[static_cast<std::size_t>(k) + static_cast<std::size_t>(radius)] *
                  from[static_cast<std::size_t>(sy) * width + sx];
         }
         to[static_cast<std::size_t>(y) * width + x] = sum;

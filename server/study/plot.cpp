@@ -70,7 +70,8 @@ std::string label(double x, double y, const std::string& words, const std::strin
 std::vector<double> ticks(const LogAxis& axis) {
   const double decades = std::log10(axis.high / axis.low);
   std::vector<double> out;
-  for (double power = std::floor(std::log10(axis.low)); power <= std::log10(axis.high); ++power) {
+  const int last = static_cast<int>(std::floor(std::log10(axis.high)));
+  for (int power = static_cast<int>(std::floor(std::log10(axis.low))); power <= last; ++power) {
     for (const double factor : {1.0, 2.0, 5.0}) {
       if (factor > 1 && decades > 2.5) break;
       const double value = factor * std::pow(10, power);

@@ -22,7 +22,7 @@ constexpr double line_opacity = 0.6;
 constexpr std::array<float, 3> medium_color{0.8F, 0.3F, 0.1F};
 constexpr std::array<float, 3> line_color{0.1F, 0.9F, 0.7F};
 
-std::shared_ptr<const data::Volume> make_volume(int layers, std::vector<float> sample) {
+std::shared_ptr<const data::Volume> make_volume(int layers, const std::vector<float>& sample) {
   auto volume = std::make_shared<data::Volume>();
   volume->dims = {1, layers, 1};
   volume->components = static_cast<int>(sample.size());

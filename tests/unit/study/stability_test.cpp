@@ -24,7 +24,7 @@ TEST(Stability, AnalyticIsExactBoundedAndMonotoneAtEveryStiffness) {
   const auto sweep = sweep_of(Compositing::analytic);
   ASSERT_EQ(sweep.size(), stiffness().size());
   for (const Stiffness& s : sweep) {
-    EXPECT_LT(s.error, 2e-4) << s.tau;  // half a pixel's step of x at most from the pixel's centre
+    EXPECT_LT(s.error, 1e-6) << s.tau;
     EXPECT_TRUE(s.bounded) << s.tau;
     EXPECT_TRUE(s.monotone) << s.tau;
     EXPECT_FALSE(s.diverges) << s.tau;
