@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -61,7 +62,7 @@ class Reporter {
     if (progress.done > 0.02) {
       const double spent =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-      const auto left = static_cast<int>(spent / progress.done * (1 - progress.done) + 0.5);
+      const auto left = std::lround(spent / progress.done * (1 - progress.done));
       line += ", " + std::to_string(left / 60) + (left % 60 < 10 ? ":0" : ":");
       line += std::to_string(left % 60) + " left";
     }

@@ -117,7 +117,7 @@ Plane convolve(const Plane& in, Size size, const std::vector<double>& along_x,
         for (int k = -radius; k <= radius; ++k) {
           const int sx = rows ? std::clamp(x + k, 0, width - 1) : x;
           const int sy = rows ? y : std::clamp(y + k, 0, height - 1);
-          sum += kernel[static_cast<std::size_t>(k) + static_cast<std::size_t>(radius)] *
+          sum += kernel[static_cast<std::size_t>(radius) + k] *
                  from[static_cast<std::size_t>(sy) * width + sx];
         }
         to[static_cast<std::size_t>(y) * width + x] = sum;
