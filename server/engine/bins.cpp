@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 namespace windsplat::engine {
 
@@ -168,7 +169,34 @@ struct SlabBricks {
   std::int64_t without_line = 0;
   std::int64_t without_splat = 0;
   std::int64_t without_both = 0;
+  double left_out = 0;  // alphas of what tolerances left out, summed over pixels, at most
 };
+
+// The sum over the picture of the alphas that a brick's weak lines and thin splats would have, at
+// most: a line covers its length times r1 + r2 and two half discs, a splat spreads its extinction
+// times its volume. All are taken at the brick's nearest.
+double left_out(const RenderPlan& plan, const PassPlan& pass, const BrickSummary& summary,
+                double nearest) {
+  if (summary.weak_lines == 0 && summary.thin_medium <= 0) return 0;
+  const kernels::Camera& camera = plan.camera;
+  const kernels::LineStyle& line = pass.kernel.line;
+  const double pixels = static_cast<double>(camera.width) * camera.height;
+  double scale = camera.inverse_pixel;  // pixels per world unit
+  double oblique = 1;                   // a ray's length at unit depth, at most
+  if (camera.perspective != 0) {
+    scale /= std::max<double>(nearest, camera.near);
+    oblique = std::hypot(1.0, std::hypot(camera.half_width_px, camera.half_height_px) *
+                                  static_cast<double>(camera.pixel));
+  }
+  const double r1 = line.r1;
+  const double r2 = line.r2;
+  const double discs = std::numbers::pi * (r1 * r1 + r1 * r2 + r2 * r2) / 3;
+  const double length = line.length * static_cast<double>(summary.weak_parts) * scale * oblique;
+  const double lines = line.opacity * (length * (r1 + r2) + summary.weak_lines * discs);
+  const double splats = static_cast<double>(summary.thin_medium) * scale * scale * oblique;
+  const double most = (summary.weak_lines > 0 ? summary.weak_lines * pixels : 0);
+  return std::min(lines, most) + splats;
+}
 
 void set_blocks(const Rectangle& r, const kernels::Camera& camera, Brick& brick) {
   const auto block = [](double pixel, int size) {
@@ -192,7 +220,8 @@ void add_brick(const RenderPlan& plan, const kernels::Table& table, const Projec
   const bool lines = pass.kernel.has_lines != 0;
   const double longest = lines ? 0.5 * pass.kernel.line.length : -1;
   const bool medium = pass.kernel.has_medium != 0;
-  if (project(pass, box, kernel_reach(pass.kernel, longest, medium)).seen.empty()) {
+  const Projected whole = project(pass, box, kernel_reach(pass.kernel, longest, medium));
+  if (whole.seen.empty()) {
     out.culled += stops;
     return;
   }
@@ -201,6 +230,7 @@ void add_brick(const RenderPlan& plan, const kernels::Table& table, const Projec
   out.without_line += summary.without_line;
   out.without_splat += summary.without_splat;
   out.without_both += summary.without_both;
+  out.left_out += left_out(plan, pass, summary, whole.depth_first);
   if (summary.lines == 0 && summary.splats == 0) return;
   const double part =
       std::min(1.0F, summary.magnitude_max * pass.kernel.line.inverse_full_magnitude);
@@ -301,6 +331,7 @@ Bins make_bins(const RenderPlan& plan, const kernels::Table& table, ThreadPool& 
     found[i] = slab_bricks(plan, table, slabs[i].pass, slabs[i].slab);
   });
   if (cancel.cancelled()) return {};
+  double left_out = 0;
   for (const SlabBricks& slab : found) {
     bins.bricks.insert(bins.bricks.end(), slab.bricks.begin(), slab.bricks.end());
     work.samples += slab.samples;
@@ -308,7 +339,11 @@ Bins make_bins(const RenderPlan& plan, const kernels::Table& table, ThreadPool& 
     work.skipped_vector += slab.without_line;
     work.skipped_scalar += slab.without_splat;
     work.skipped_both += slab.without_both;
+    left_out += slab.left_out;
   }
+  // A pixel changes by no more than all of its light.
+  work.skipped_bound =
+      std::min(1.0, left_out / (static_cast<double>(plan.camera.width) * plan.camera.height));
   if (plan.slabs || plan.curved) {
     // Swept by depth: those that begin first come first.
     std::stable_sort(bins.bricks.begin(), bins.bricks.end(),

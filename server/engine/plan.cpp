@@ -146,9 +146,9 @@ void style_lines(const Scene& scene, const scene::VectorLayer& from, kernels::Li
   to.cue_strength = static_cast<float>(scene.depth_cue.strength);
   to.color_by = static_cast<int>(from.color_by);
   to.rise_weight = static_cast<float>(from.rise_weight);
-  to.box_low_z = static_cast<float>(scene.lattice.box_min.z);
-  to.inverse_box_height =
-      static_cast<float>(1.0 / (scene.lattice.box_max.z - scene.lattice.box_min.z));
+  const std::array<double, 2> heights = scene::height_range(scene.lattice);
+  to.box_low_z = static_cast<float>(heights[0]);
+  to.inverse_box_height = static_cast<float>(1.0 / (heights[1] - heights[0]));
   to.jitter_center = static_cast<float>(from.jitter_center);
   to.jitter_stride = static_cast<float>(from.jitter_stride);
   to.seed = from.seed;

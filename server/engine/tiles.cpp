@@ -54,6 +54,7 @@ struct Workspace {
 struct TileWork {
   kernels::Counters counters{};
   bool stopped = false;
+  bool closed_blocks = false;
 };
 
 // The length of every pixel's ray whose forward component is 1.
@@ -187,6 +188,7 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
       draw_tile(plan, bins, table, cancel, order[i], tile, done[i]);
     }
     done[i].counters = tile.counters;
+    done[i].closed_blocks = tile.any_closed != 0;
     store_tile(tile, image);
   });
   work.tiles = static_cast<std::int64_t>(order.size());
@@ -195,6 +197,8 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
     work.pixel_updates += tile.counters.pixel_updates;
     work.exponentials += tile.counters.exponentials;
     work.tiles_stopped += tile.stopped ? 1 : 0;
+    // What is behind at most this much light is left out.
+    if (tile.closed_blocks) work.stop_bound = static_cast<double>(plan.stop_transmittance);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/base/check.hpp"
+#include "server/engine/reference/reference.hpp"
 #include "server/engine/render.hpp"
 #include "server/scene/build.hpp"
 
@@ -60,10 +61,14 @@ void name_fields(const scene::Scene& scene, const protocol::View& completed,
 
 Result<engine::Rendered> render_scene(const scene::Scene& scene, ThreadPool& pool,
                                       const CancelToken& cancel) {
-  if (scene.method == scene::Method::reference) {
-    return make_error_at(ErrorKind::invalid, "/method/name", "reference is not built in");
-  }
-  return engine::render(scene, pool, cancel);
+  if (scene.method != scene::Method::reference) return engine::render(scene, pool, cancel);
+  auto truth = engine::reference::render(scene, pool, cancel);
+  if (!truth) return truth.error();
+  engine::Rendered rendered;
+  rendered.image = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};
+  rendered.work.variant = "reference double";
+  rendered.work.exponentials = truth->evaluations;
+  return rendered;
 }
 
 Result<image::Bytes> encode(const engine::Image& picture, const std::array<float, 3>& background,

@@ -31,9 +31,6 @@ protocol::Range default_magnitude_range(const data::Volume& volume);
 double default_min_magnitude(const protocol::VectorView& vector, const data::Volume& volume,
                              const Lattice& lattice, const std::optional<Slice>& slice);
 
-// World heights of the lowest and the highest cell's edge.
-protocol::Range height_range(const Lattice& lattice);
-
 // Magnitudes from a little below the weakest line that is drawn to the range's top.
 protocol::Range default_magnitude_colors(const protocol::VectorView& vector);
 

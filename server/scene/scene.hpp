@@ -46,6 +46,9 @@ struct Lattice {
   glm::dvec3 box_max{1, 1, 1};
 };
 
+// World heights of the lowest and the highest cell's edge.
+std::array<double, 2> height_range(const Lattice& lattice);
+
 // 256 linear RGB entries over range; a value maps to its linear interpolation, clamped at the ends.
 struct ColorTable {
   std::array<double, 2> range{0, 1};

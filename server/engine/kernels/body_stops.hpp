@@ -102,8 +102,8 @@ void fetch_winds(const Pass& pass, const Stops& stops, Winds& winds, float* rate
 }
 
 // Unit directions as drawn, and magnitudes; a masked sample, one below tolerance or one without a
-// direction gets a negative magnitude.
-void read_winds(const Pass& pass, const Stops& stops, Winds& winds) {
+// direction gets a negative magnitude. left_out, if there: the magnitudes below tolerance, else 0.
+void read_winds(const Pass& pass, const Stops& stops, Winds& winds, float* left_out = nullptr) {
   const LineStyle& line = pass.line;
   float rate_x[brick_stops];
   float rate_z[brick_stops];
@@ -126,7 +126,13 @@ void read_winds(const Pass& pass, const Stops& stops, Winds& winds) {
     winds.direction[1][l] = y * unit;
     winds.direction[2][l] = z * unit;
     const float directed = length >= magnitude_least ? m : -1.0F;
-    winds.magnitude[l] = m >= least ? directed : -1.0F;
+    winds.magnitude[l] = directed;
+  }
+  for (int l = 0; left_out != nullptr && l < stops.count; ++l) {
+    left_out[l] = winds.magnitude[l] < least ? larger(winds.magnitude[l], 0.0F) : 0.0F;
+  }
+  for (int l = 0; l < stops.count; ++l) {
+    winds.magnitude[l] = winds.magnitude[l] >= least ? winds.magnitude[l] : -1.0F;
   }
 }
 
@@ -138,8 +144,9 @@ inline float cell_longest(const Pass& pass, const Stops& stops, int l) {
 }
 
 // Extinctions of the layers add; a stop whose optical depth stays below tolerance from every side
-// counts as empty.
-void read_densities(const Pass& pass, const Stops& stops, Densities& out) {
+// counts as empty. left_out, if there: the extinctions of those, else 0.
+void read_densities(const Pass& pass, const Stops& stops, Densities& out,
+                    float* left_out = nullptr) {
   const Medium& medium = pass.medium;
   float value[brick_stops];
   float rho[brick_stops];
@@ -166,7 +173,9 @@ void read_densities(const Pass& pass, const Stops& stops, Densities& out) {
   }
   for (int l = 0; l < stops.count; ++l) {
     const float depth = out.rho[l] * cell_longest(pass, stops, l) * (1.0F / footprint_integral);
-    out.rho[l] = depth >= medium.min_optical_depth ? out.rho[l] : 0.0F;
+    const bool kept = depth >= medium.min_optical_depth;
+    if (left_out != nullptr) left_out[l] = kept ? 0.0F : out.rho[l];
+    out.rho[l] = kept ? out.rho[l] : 0.0F;
   }
 }
 
@@ -193,14 +202,30 @@ void color_densities(const Pass& pass, const Stops& stops, Densities& out) {
   }
 }
 
+// The volume of a stop's cell; of a curved one no less than that.
+inline float cell_volume(const Pass& pass, const Stops& stops, int l) {
+  float volume = 1;
+  for (int a = 0; a < 3; ++a) {
+    volume *= pass.places == nullptr ? pass.axis[a].cell[stops.index[a][l]] : pass.cell_max[a];
+  }
+  return volume;
+}
+
 void summarise(const Pass& pass, const Brick& brick, BrickSummary& summary) {
   Stops stops;
   list_stops(pass, brick, stops);
   Winds winds;
   Densities densities;
-  if (pass.has_lines != 0) read_winds(pass, stops, winds);
-  if (pass.has_medium != 0) read_densities(pass, stops, densities);
+  float lines[brick_stops] = {0};
+  float splats[brick_stops] = {0};
+  if (pass.has_lines != 0) read_winds(pass, stops, winds, lines);
+  if (pass.has_medium != 0) read_densities(pass, stops, densities, splats);
   summary = {};
+  for (int l = 0; l < stops.count; ++l) {
+    summary.weak_lines += lines[l] > 0 ? 1 : 0;
+    summary.weak_parts += smaller(lines[l] * pass.line.inverse_full_magnitude, 1.0F);
+    if (splats[l] > 0) summary.thin_medium += splats[l] * cell_volume(pass, stops, l);
+  }
   for (int l = 0; l < stops.count; ++l) {
     const bool line = pass.has_lines != 0 && winds.magnitude[l] > 0;
     const bool splat = pass.has_medium != 0 && densities.rho[l] > 0;

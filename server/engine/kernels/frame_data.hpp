@@ -135,6 +135,11 @@ struct BrickSummary {
   std::int64_t without_line;
   std::int64_t without_splat;
   std::int64_t without_both;
+  // Left out by tolerance alone: lines, the parts of full length that they would have together, and
+  // extinction times cell volume of the splats.
+  int weak_lines;
+  float weak_parts;
+  float thin_medium;
   float magnitude_max;  // of the lines that are drawn
   int lines;            // stops that have one
   int splats;

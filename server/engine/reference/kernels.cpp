@@ -269,8 +269,7 @@ struct Seen {
 
 Vec undimmed_color(const Scene& scene, const VectorLayer& layer, const Stop& stop, const Wind& wind,
                    const Seen& seen) {
-  const double low = scene.lattice.box_min.z;
-  const double high = scene.lattice.box_max.z;
+  const auto [low, high] = scene::height_range(scene.lattice);
   switch (layer.color_by) {
     case LineColor::world_z:
       return table_color(layer.color, seen.z);
