@@ -51,7 +51,8 @@ Result<void> render(const Arguments& arguments) {
   view.dataset = (*dataset)->info().id;
 
   ThreadPool pool(arguments.threads);
-  const auto picture = frame::produce(view, **dataset, file_encoding(*format), pool, CancelToken());
+  const frame::Encoding encoding = file_encoding(*format, arguments.view.quality);
+  const auto picture = frame::produce(view, **dataset, encoding, pool, CancelToken());
   if (!picture) return picture.error();
   const auto written = write_output(arguments.output, picture->bytes);
   if (!written || arguments.report.empty()) return written;

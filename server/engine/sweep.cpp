@@ -30,6 +30,7 @@ class Sweep {
     space_.active.clear();
     space_.gathered.resize(static_cast<std::size_t>(tile_block_count) * kernels::gathered_floats);
     slab_.gathered = space_.gathered.data();
+    slab_.stop = plan_.stop_transmittance;
   }
 
   bool run(const CancelToken& cancel, std::uint32_t first, std::uint32_t last) {

@@ -7,16 +7,17 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// F(b^2, v) by linear interpolation in both; row is the table's row, v in [-1, 1].
-inline float partial_at(const float* __restrict row, float row_part, float v) {
+// F(b^2, v) by linear interpolation in both; row is where the table's row begins, v in [-1, 1].
+inline float partial_at(const float* __restrict partial, int row, float row_part, float v) {
   const float place = (v + 1.0F) * (0.5F * (partial_columns - 1));
-  const float inside = clamped(place, 0.0F, static_cast<float>(partial_columns - 1) - 0.001F);
+  const float inside = smaller(place, static_cast<float>(partial_columns - 1) - 0.001F);
   const int column = static_cast<int>(inside);
   const float part = inside - static_cast<float>(column);
-  const float a = row[column];
-  const float b = row[column + 1];
-  const float c = row[column + partial_columns];
-  const float d = row[column + partial_columns + 1];
+  const int at = row + column;
+  const float a = partial[at];
+  const float b = partial[at + 1];
+  const float c = partial[at + partial_columns];
+  const float d = partial[at + partial_columns + 1];
   const float upper = a + part * (b - a);
   const float lower = c + part * (d - c);
   return upper + row_part * (lower - upper);
@@ -39,11 +40,13 @@ void gather_block(const Splat& splat, const float* __restrict partial, float fro
     const float scale = lane.cells / square_root(chord2);
     const float v0 = clamped((front - lane.behind) * scale, -1.0F, 1.0F);
     const float v1 = clamped((back - lane.behind) * scale, -1.0F, 1.0F);
-    const float place = clamped(lane.r2 * rows_per_t2, 0.0F, partial_rows - 1.001F);
+    const float place = smaller(lane.r2 * rows_per_t2, partial_rows - 1.001F);
     const int row = static_cast<int>(place);
     const float row_part = place - static_cast<float>(row);
-    const float* at = partial + static_cast<std::ptrdiff_t>(row) * partial_columns;
-    tau[l] = lane.tau * (partial_at(at, row_part, v1) - partial_at(at, row_part, v0));
+    const int at = row * partial_columns;
+    const float after = partial_at(partial, at, row_part, v1);
+    const float before = partial_at(partial, at, row_part, v0);
+    tau[l] = lane.tau * (after - before);
   }
   for (int l = 0; l < block_pixels; ++l) gathered[l] += tau[l];
   for (int c = 0; c < 3; ++c) {
@@ -161,6 +164,15 @@ struct Passage {
   float left[block_pixels];      // cd-naive: light left there
 };
 
+// Lines as the pixels of a block meet them; a pixel that does not has opacity 0 and the place
+// `far`.
+struct Meeting {
+  float place[block_pixels];  // through the slab, 0 to 1
+  float opacity[block_pixels];
+  float color[3][block_pixels];
+};
+constexpr int meetings_max = 64;  // put in order together
+
 template <int Compositing>
 inline void open_passage(const float* __restrict gathered, Passage& p) {
   for (int l = 0; l < block_pixels; ++l) {
@@ -170,10 +182,8 @@ inline void open_passage(const float* __restrict gathered, Passage& p) {
     p.transmitted[l] = medium.transmitted;
     const float inverse = 1.0F / larger(p.tau[l], 1e-37F);
     for (int c = 0; c < 3; ++c) {
-      const float weighted = gathered == nullptr
-                                 ? 0.0F
-                                 : gathered[static_cast<std::ptrdiff_t>(1 + c) * block_pixels + l];
-      p.color[c][l] = weighted * inverse;
+      const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(1 + c) * block_pixels + l;
+      p.color[c][l] = gathered == nullptr ? 0.0F : gathered[at] * inverse;
       p.rgb[c][l] = 0;
     }
     p.through[l] = 1;
@@ -182,26 +192,73 @@ inline void open_passage(const float* __restrict gathered, Passage& p) {
   }
 }
 
-template <bool Perspective, int Compositing, int Style>
-inline void pass_line(const Ribbon& ribbon, float centre, const Slab& slab, float x, float y,
-                      Passage& p) {
+template <bool Perspective, int Style>
+inline void meet_line(const Ribbon& ribbon, float centre, const Slab& slab, float x, float y,
+                      Meeting& m) {
   const Ribbon r = ribbon;
   const float inverse = 1.0F / (slab.back - slab.front);
   const float first = centre + r.depth;
   for (int l = 0; l < block_pixels; ++l) {
     const RibbonLane lane = ribbon_lane<Perspective, Style>(r, x + lane_x[l], y + lane_y[l]);
     const float depth = first + lane.f * r.depth_rise;
-    const float place = clamped((depth - slab.front) * inverse, 0.0F, 1.0F);
-    const float opacity = depth >= slab.front && depth < slab.back ? lane.opacity : 0.0F;
-    float color[3];
-    for (int c = 0; c < 3; ++c) color[c] = r.tail[c] + lane.f * r.rise[c];
+    m.place[l] = clamped((depth - slab.front) * inverse, 0.0F, 1.0F);
+    m.opacity[l] = depth >= slab.front && depth < slab.back ? lane.opacity : 0.0F;
+    for (int c = 0; c < 3; ++c) m.color[c][l] = r.tail[c] + lane.f * r.rise[c];
+  }
+}
+
+// Puts two neighbours in order, each pixel by itself; whether any pixel had them the other way.
+inline int put_in_order(Meeting& first, Meeting& second) {
+  int swapped = 0;
+  for (int l = 0; l < block_pixels; ++l) {
+    swapped |= first.place[l] > second.place[l] ? 1 : 0;
+  }
+  if (swapped == 0) return 0;
+  int wrong[block_pixels];
+  for (int l = 0; l < block_pixels; ++l) wrong[l] = first.place[l] > second.place[l] ? 1 : 0;
+  const auto exchange = [&](float* a, float* b) {
+    for (int l = 0; l < block_pixels; ++l) {
+      const float near = wrong[l] != 0 ? b[l] : a[l];
+      const float far = wrong[l] != 0 ? a[l] : b[l];
+      a[l] = near;
+      b[l] = far;
+    }
+  };
+  exchange(first.place, second.place);
+  exchange(first.opacity, second.opacity);
+  for (int c = 0; c < 3; ++c) exchange(first.color[c], second.color[c]);
+  return 1;
+}
+
+// Front to back in every pixel, by insertion. The lines come nearly sorted, by their depth at the
+// block's middle, so that few pairs are exchanged.
+inline void sort_meetings(Meeting* m, int count) {
+  for (int n = 1; n < count; ++n) {
+    for (int k = n; k > 0 && put_in_order(m[k - 1], m[k]) != 0; --k) continue;
+  }
+}
+
+// Whether so little light is left in every pixel that what lies behind may be left out.
+inline bool is_dark(const float* __restrict transmittance, const Passage& p, float stop) {
+  float most = 0;
+  for (int l = 0; l < block_pixels; ++l) {
+    most = larger(most, absolute(transmittance[l] * p.through[l] * p.left[l]));
+  }
+  return most <= stop;
+}
+
+template <int Compositing>
+inline void pass_line(const Meeting& m, Passage& p) {
+  for (int l = 0; l < block_pixels; ++l) {
+    const float opacity = m.opacity[l];
+    const float place = m.place[l];
     if (Compositing == compositing_cd_naive) {
       // Only a pixel that the line covers is followed up to it.
       const float next = opacity > 0 ? larger(place, p.reached[l]) : p.reached[l];
       const float part = (next - p.reached[l]) * p.absorbed[l];
       const float behind = p.left[l] * (1.0F - part);
       for (int c = 0; c < 3; ++c) {
-        p.rgb[c][l] += p.left[l] * part * p.color[c][l] + behind * opacity * color[c];
+        p.rgb[c][l] += p.left[l] * part * p.color[c][l] + behind * opacity * m.color[c][l];
       }
       p.left[l] = behind * (1.0F - opacity);
       p.reached[l] = next;
@@ -210,7 +267,7 @@ inline void pass_line(const Ribbon& ribbon, float centre, const Slab& slab, floa
     const Attenuation medium = {p.absorbed[l], p.transmitted[l]};
     const float before = light_before<Compositing>(medium, p.tau[l], place);
     const float own = p.through[l] * opacity * before;
-    for (int c = 0; c < 3; ++c) p.rgb[c][l] += own * (color[c] - p.color[c][l]);
+    for (int c = 0; c < 3; ++c) p.rgb[c][l] += own * (m.color[c][l] - p.color[c][l]);
     p.through[l] *= 1.0F - opacity;
   }
 }
@@ -248,17 +305,25 @@ void close_slab_block(const Slab& slab, const Hit* hits, int count, int index, T
       medium ? slab.gathered + static_cast<std::ptrdiff_t>(index) * gathered_floats : nullptr;
   const float x = static_cast<float>(tile.x + column * block_side);
   const float y = static_cast<float>(tile.y + row * block_side);
+  float* block = tile.blocks + static_cast<std::ptrdiff_t>(index) * block_floats;
   Passage passage;
   open_passage<Compositing>(gathered, passage);
-  for (int h = 0; h < count; ++h) {
-    const Prepared& p = *hits[h].from;
-    const Ribbon ribbon = ribbon_at(p.pass->line, p.ribbons, hits[h].stop);
-    const float centre = p.stops.depth[hits[h].stop];
-    if (p.pass->line.moving != 0) {
-      pass_line<Perspective, Compositing, style_moving>(ribbon, centre, slab, x, y, passage);
-    } else {
-      pass_line<Perspective, Compositing, style_head>(ribbon, centre, slab, x, y, passage);
+  Meeting meetings[meetings_max];
+  for (int first = 0; first < count; first += meetings_max) {
+    const int last = first + meetings_max < count ? first + meetings_max : count;
+    for (int h = first; h < last; ++h) {
+      const Prepared& p = *hits[h].from;
+      const Ribbon ribbon = ribbon_at(p.pass->line, p.ribbons, hits[h].stop);
+      const float centre = p.stops.depth[hits[h].stop];
+      if (p.pass->line.moving != 0) {
+        meet_line<Perspective, style_moving>(ribbon, centre, slab, x, y, meetings[h - first]);
+      } else {
+        meet_line<Perspective, style_head>(ribbon, centre, slab, x, y, meetings[h - first]);
+      }
     }
+    sort_meetings(meetings, last - first);
+    for (int n = 0; n < last - first; ++n) pass_line<Compositing>(meetings[n], passage);
+    if (is_dark(block, passage, slab.stop)) break;
   }
   close_passage<Compositing>(passage,
                              tile.blocks + static_cast<std::ptrdiff_t>(index) * block_floats);

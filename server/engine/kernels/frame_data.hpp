@@ -116,8 +116,8 @@ struct Pass {
 
 // F(b^2, v): the part of a splat's footprint that lies before v half chords beyond its middle, on a
 // ray that passes at b strides. Rows: b^2 from 0 to t^2; columns: v from -1 to 1.
-constexpr int partial_rows = 65;
-constexpr int partial_columns = 129;
+constexpr int partial_rows = 33;
+constexpr int partial_columns = 65;
 
 // A brick of 8 x 8 x 1 stops, as ranges of the visit lists.
 struct Brick {

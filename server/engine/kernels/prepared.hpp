@@ -87,6 +87,7 @@ struct Prepared {
 // weighted by it, 4 floats a pixel in blocks as the tile's are.
 struct Slab {
   float front, back;  // view depths from the camera's depth origin, world units
+  float stop;         // transmittance from which on nothing behind counts
   float* gathered;
   std::uint32_t touched[tile_blocks];  // bit set: the block holds something
 };

@@ -269,6 +269,7 @@ TEST_F(Produce, FrameInfoNamesMethodsAndSlabs) {
   ASSERT_TRUE(frame);
   view.method.compositing = protocol::Compositing::cd_naive;
   view.method.slab_thickness = 0.5;
+  view.method.name = protocol::MethodName::kernel;
   EXPECT_FALSE(frame_info(*frame, view).slab_thickness);
   view.method.name = protocol::MethodName::slab;
   const protocol::FrameInfo info = frame_info(*frame, view);
@@ -282,13 +283,14 @@ TEST_F(Produce, FrameInfoTellsTheReport) {
   ASSERT_TRUE(frame) << frame.error().message;
   view.vector.stride = 3;
   const protocol::FrameInfo info = frame_info(*frame, view);
-  EXPECT_EQ(info.method, "kernel");
+  EXPECT_EQ(info.method, "slab");
   EXPECT_EQ(info.compositing, "analytic");
+  EXPECT_EQ(info.slab_thickness, 1);
   EXPECT_EQ(info.stride, 3);
   EXPECT_EQ(info.width, 48);
   EXPECT_EQ(info.height, 32);
   EXPECT_EQ(info.error_kind, "none");
-  EXPECT_FALSE(info.error_value || info.jpeg_error || info.slab_thickness);
+  EXPECT_FALSE(info.error_value || info.jpeg_error);
   EXPECT_EQ(info.samples, frame->work.samples);
   EXPECT_GT(info.samples, 0);
   EXPECT_EQ(info.fields, frame->work.fields);
