@@ -1,4 +1,4 @@
-// Sweeps a tile front to back.
+// Sweeps a tile of a curved lattice front to back, kernel by kernel.
 #include "server/engine/sweep.hpp"
 
 #include <algorithm>
@@ -9,14 +9,13 @@ namespace windsplat::engine {
 namespace {
 
 using kernels::Brick;
-using kernels::Hit;
 using kernels::Prepared;
-using kernels::Slab;
 using kernels::Tile;
-using kernels::tile_blocks;
 
-constexpr int tile_block_count = tile_blocks * tile_blocks;
-constexpr std::int64_t slabs_between_checks = 4;
+// Of view depth, from the camera's depth origin.
+struct Interval {
+  float front = 0, back = 0;
+};
 
 class Sweep {
  public:
@@ -28,9 +27,6 @@ class Sweep {
       space_.free.push_back(static_cast<std::int32_t>(s));
     }
     space_.active.clear();
-    space_.gathered.resize(static_cast<std::size_t>(tile_block_count) * kernels::gathered_floats);
-    slab_.gathered = space_.gathered.data();
-    slab_.stop = plan_.stop_transmittance;
   }
 
   bool run(const CancelToken& cancel, std::uint32_t first, std::uint32_t last) {
@@ -46,11 +42,7 @@ class Sweep {
       slab_.front = static_cast<float>(static_cast<double>(slab) * plan_.slab_depth);
       slab_.back = static_cast<float>(static_cast<double>(slab + 1) * plan_.slab_depth);
       activate();
-      if (plan_.slabs) {
-        draw_slab();
-      } else {
-        draw_kernels();
-      }
+      draw_kernels();
       retire();
       if (done % slabs_between_checks == slabs_between_checks - 1) {
         if (cancel.cancelled()) return false;
@@ -109,49 +101,6 @@ class Sweep {
                         space_.active.end());
   }
 
-  void draw_slab() {
-    std::fill(std::begin(slab_.touched), std::end(slab_.touched), 0U);
-    std::size_t hits = 0;
-    for (const DepthEntry& entry : space_.active) {
-      const Prepared& prepared = *space_.slots[entry.slot];
-      table_.gather(plan_.camera, prepared, slab_, tile_);
-      if (prepared.pass->has_lines == 0) continue;
-      if (space_.hits.size() < hits + kernels::hits_of_brick_max) {
-        space_.hits.resize(2 * hits + kernels::hits_of_brick_max);
-      }
-      hits += table_.list_hits(plan_.camera, prepared, slab_, tile_, space_.hits.data() + hits);
-    }
-    sort_hits(hits);
-    for (int block = 0; block < tile_block_count; ++block) {
-      const std::uint32_t from = space_.first[block];
-      const auto count = static_cast<int>(space_.first[block + 1] - from);
-      const std::uint32_t row = slab_.touched[block / tile_blocks];
-      const bool touched = (row >> static_cast<unsigned>(block % tile_blocks) & 1U) != 0;
-      if (!touched && count == 0) continue;
-      table_.close_slab(plan_.camera, plan_.compositing, slab_, space_.sorted.data() + from, count,
-                        block, tile_);
-    }
-  }
-
-  // By block, then from front to back.
-  void sort_hits(std::size_t count) {
-    space_.first.assign(tile_block_count + 1, 0);
-    for (std::size_t h = 0; h < count; ++h) ++space_.first[space_.hits[h].block + 1];
-    for (int b = 0; b < tile_block_count; ++b) space_.first[b + 1] += space_.first[b];
-    space_.sorted.resize(count);
-    std::vector<std::uint32_t>& at = next_of_block_;
-    at.assign(space_.first.begin(), space_.first.end() - 1);
-    for (std::size_t h = 0; h < count; ++h) {
-      const Hit& hit = space_.hits[h];
-      space_.sorted[at[hit.block]++] = hit;
-    }
-    for (int b = 0; b < tile_block_count; ++b) {
-      std::stable_sort(space_.sorted.begin() + space_.first[b],
-                       space_.sorted.begin() + space_.first[b + 1],
-                       [](const Hit& p, const Hit& q) { return p.depth < q.depth; });
-    }
-  }
-
   // The kernels whose centres lie in the slab, one after the other.
   void draw_kernels() {
     space_.order.clear();
@@ -177,16 +126,16 @@ class Sweep {
   const kernels::Table& table_;
   SweepSpace& space_;
   Tile& tile_;
-  Slab slab_{};
+  Interval slab_;
   std::uint32_t next_ = 0;
   std::uint32_t last_ = 0;
-  std::vector<std::uint32_t> next_of_block_;
 };
 
 }  // namespace
 
 bool sweep_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
                 const CancelToken& cancel, std::size_t index, SweepSpace& space, Tile& tile) {
+  if (plan.slabs) return sweep_slabs(plan, bins, table, cancel, index, space, tile);
   Sweep sweep(plan, bins, table, space, tile);
   return sweep.run(cancel, bins.first[index], bins.first[index + 1]);
 }

@@ -3,6 +3,7 @@
 // and forgotten once it has passed them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -20,17 +21,38 @@ struct DepthEntry {
   std::int32_t stop = 0;
 };
 
+// What of splats or lines has been reached and not yet passed: records in memory that is used
+// again, and for each of the next slabs the ones that wait for it.
+template <class Record>
+struct Reached {
+  std::vector<Record> records;
+  std::vector<std::uint32_t> free;
+  std::array<std::vector<std::uint32_t>, 256> waiting;  // by slab, modulo
+  std::size_t count = 0;
+};
+
 // A worker's own memory, used for one tile after the other.
 struct SweepSpace {
+  // Curved lattices: bricks as they were made ready.
   std::vector<std::unique_ptr<kernels::Prepared>> slots;
   std::vector<std::int32_t> free;
   std::vector<DepthEntry> active;  // a brick: its last depth and its slot
   std::vector<DepthEntry> order;
+  // Slabs.
+  std::unique_ptr<kernels::Prepared> prepared;
+  Reached<kernels::SplatRecord> splats;
+  Reached<kernels::RibbonRecord> ribbons;
+  std::vector<std::uint32_t> here;  // of one kind, in the slab at hand
+  std::vector<std::uint32_t> lines;
   std::vector<float> gathered;
   std::vector<kernels::Hit> hits;    // as listed
   std::vector<kernels::Hit> sorted;  // by block, then depth
   std::vector<std::uint32_t> first;  // of each block, in `sorted`
+  std::vector<std::uint32_t> next;
 };
+
+// Between looks at whether the tile is done or nobody wants it any more.
+constexpr std::int64_t slabs_between_checks = 4;
 
 // True if every block of the tile that the brick may touch lets no light through any more.
 bool all_closed(const kernels::Tile& tile, const kernels::Brick& brick);
@@ -40,5 +62,10 @@ bool all_closed(const kernels::Tile& tile, const kernels::Brick& brick);
 bool sweep_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
                 const CancelToken& cancel, std::size_t index, SweepSpace& space,
                 kernels::Tile& tile);
+
+// The same for the slab method.
+bool sweep_slabs(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
+                 const CancelToken& cancel, std::size_t index, SweepSpace& space,
+                 kernels::Tile& tile);
 
 }  // namespace windsplat::engine

@@ -25,22 +25,6 @@ alignas(64) constexpr float lane_x[block_pixels] = {0.5F, 1.5F, 2.5F, 3.5F, 0.5F
 alignas(64) constexpr float lane_y[block_pixels] = {0.5F, 0.5F, 0.5F, 0.5F, 1.5F, 1.5F, 1.5F, 1.5F,
                                                     2.5F, 2.5F, 2.5F, 2.5F, 3.5F, 3.5F, 3.5F, 3.5F};
 
-// One line's constants.
-struct Ribbon {
-  float x, y, ux, uy, inverse_u2, w0, depth_ratio;
-  float tail[3], rise[3];
-  float depth, depth_rise;
-  float phase, phase_rise;
-  float r2, inverse_ramp, opacity;
-};
-
-struct Splat {
-  float x, y, ex, ey, xx, xy, yy;
-  float b0, bx, by, d0, dx, dy, dxx, dxy, dyy, d2_least;
-  float z, near, strength;
-  float color[3];
-};
-
 struct RibbonLane {
   float opacity;
   float f;

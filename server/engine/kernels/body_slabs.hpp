@@ -69,44 +69,79 @@ inline float* touch(Slab& slab, int row, int column) {
 
 // What lies before the near plane does not count.
 template <bool Perspective>
-void gather_on(const Camera& camera, const Prepared& p, Slab& slab, Tile& tile) {
+void gather_on(const Camera& camera, const SplatRecord& record, Slab& slab, Tile& tile) {
   const auto near = static_cast<float>(static_cast<double>(camera.near) - camera.depth_origin);
   const float front = Perspective ? larger(slab.front, near) : slab.front;
   const float back = slab.back;
-  if (back <= front) return;
-  for (int l = 0; l < p.stops.count; ++l) {
-    const float middle = p.stops.depth[l];
-    const float half = p.splats.half_depth[l];
-    if (p.footing.row_last[l] < p.footing.row_first[l]) continue;
-    if (middle + half <= front || middle - half >= back) continue;
-    const Splat splat = splat_at<Perspective>(p.densities, p.splats, p.near, l);
-    const std::uint32_t columns = range_mask({p.footing.column_first[l], p.footing.column_last[l]});
-    for (int row = p.footing.row_first[l]; row <= p.footing.row_last[l]; ++row) {
-      std::uint32_t left = columns & tile.open[row];
-      while (left != 0) {
-        const int column = __builtin_ctz(left);
-        left &= left - 1U;
-        const float* ray =
-            Perspective
-                ? tile.rays + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * block_pixels
-                : nullptr;
-        gather_block<Perspective>(splat, p.pass->partial, front - middle, back - middle,
-                                  static_cast<float>(tile.x + column * block_side),
-                                  static_cast<float>(tile.y + row * block_side), ray,
-                                  touch(slab, row, column));
-        tile.counters.pixel_updates += block_pixels;
-      }
+  if (back <= front || record.last <= front || record.first >= back) return;
+  const std::uint32_t columns = range_mask({record.column_first, record.column_last});
+  for (int row = record.row_first; row <= record.row_last; ++row) {
+    std::uint32_t left = columns & tile.open[row];
+    while (left != 0) {
+      const int column = __builtin_ctz(left);
+      left &= left - 1U;
+      const std::ptrdiff_t index = row * tile_blocks + column;
+      const float* ray = Perspective ? tile.rays + index * block_pixels : nullptr;
+      gather_block<Perspective>(
+          record.splat, record.partial, front - record.middle, back - record.middle,
+          static_cast<float>(tile.x + column * block_side),
+          static_cast<float>(tile.y + row * block_side), ray, touch(slab, row, column));
+      tile.counters.pixel_updates += block_pixels;
     }
   }
 }
 
-void gather(const Camera& camera, const Prepared& p, Slab& slab, Tile& tile) {
-  if (p.pass->has_medium == 0) return;
+void gather(const Camera& camera, const SplatRecord& record, Slab& slab, Tile& tile) {
   if (camera.perspective != 0) {
-    gather_on<true>(camera, p, slab, tile);
+    gather_on<true>(camera, record, slab, tile);
   } else {
-    gather_on<false>(camera, p, slab, tile);
+    gather_on<false>(camera, record, slab, tile);
   }
+}
+
+template <bool Perspective>
+int pack_splats_on(const Prepared& p, SplatRecord* out) {
+  int n = 0;
+  for (int l = 0; l < p.stops.count; ++l) {
+    const Footing& f = p.footing;
+    if (f.row_last[l] < f.row_first[l]) continue;
+    const float middle = p.stops.depth[l];
+    const float half = p.splats.half_depth[l];
+    out[n++] = {middle - half,
+                middle + half,
+                middle,
+                static_cast<std::int16_t>(f.row_first[l]),
+                static_cast<std::int16_t>(f.row_last[l]),
+                static_cast<std::int16_t>(f.column_first[l]),
+                static_cast<std::int16_t>(f.column_last[l]),
+                p.pass->partial,
+                splat_at<Perspective>(p.densities, p.splats, p.near, l)};
+  }
+  return n;
+}
+
+int pack_splats(const Camera& camera, const Prepared& p, SplatRecord* out) {
+  if (p.pass->has_medium == 0) return 0;
+  return camera.perspective != 0 ? pack_splats_on<true>(p, out) : pack_splats_on<false>(p, out);
+}
+
+int pack_ribbons(const Prepared& p, RibbonRecord* out) {
+  if (p.pass->has_lines == 0) return 0;
+  int n = 0;
+  for (int l = 0; l < p.stops.count; ++l) {
+    const Footing& f = p.footing;
+    if (f.line_last[l] < f.line_first[l]) continue;
+    const float tail = p.stops.depth[l] + p.ribbons.depth[l];
+    const float head = tail + p.ribbons.depth_rise[l];
+    out[n++] = {smaller(tail, head),
+                larger(tail, head),
+                p.stops.depth[l],
+                static_cast<std::int16_t>(f.line_first[l]),
+                static_cast<std::int16_t>(f.line_last[l]),
+                p.pass->line.moving,
+                ribbon_at(p.pass->line, p.ribbons, l)};
+  }
+  return n;
 }
 
 // A line's view depth where it passes a pixel, from the camera's depth origin.
@@ -116,41 +151,44 @@ inline float ribbon_depth(const Ribbon& r, float centre, float px, float py) {
   return centre + r.depth + lane.f * r.depth_rise;
 }
 
-// Lists the blocks that lines in the slab may touch. `hits` has room for hits_of_brick_max.
+// How far a line's depth anywhere in a block may be from that at the block's middle: the way of f
+// over the farthest pixel's distance.
+inline float depth_slack(const Ribbon& r) {
+  constexpr float farthest = 2.2F;  // pixels
+  const float steepest = larger(r.depth_ratio, 1.0F / larger(r.depth_ratio, 1e-6F));
+  const float along = farthest * square_root(r.inverse_u2) * steepest;
+  return absolute(r.depth_rise) * smaller(along, 1.0F) * 1.001F;
+}
+
+// Lists the blocks that a line may touch within the slab. `hits` has room for hits_of_line_max.
 template <bool Perspective>
-int list_hits_on(const Prepared& p, const Slab& slab, const Tile& tile, Hit* hits) {
-  const float back = slab.back;
+int list_hits_on(const RibbonRecord& line, const Slab& slab, const Tile& tile, Hit* hits) {
+  if (line.last < slab.front || line.first >= slab.back) return 0;
+  const Ribbon& ribbon = line.ribbon;
+  const Capsule capsule = capsule_of(ribbon, tile);
   const int columns = blocks_of(tile.width);
+  const float slack = depth_slack(ribbon);
   int n = 0;
-  for (int l = 0; l < p.stops.count; ++l) {
-    if (p.footing.line_last[l] < p.footing.line_first[l]) continue;
-    const float first = p.stops.depth[l] + p.ribbons.depth[l];
-    const float last = first + p.ribbons.depth_rise[l];
-    if (larger(first, last) < slab.front || smaller(first, last) >= back) continue;
-    const Ribbon ribbon = ribbon_at(p.pass->line, p.ribbons, l);
-    const Capsule capsule = capsule_of(ribbon, tile);
-    for (int row = p.footing.line_first[l]; row <= p.footing.line_last[l]; ++row) {
-      std::uint32_t left = range_mask(capsule_in_row(capsule, row, columns)) & tile.open[row];
-      while (left != 0) {
-        const int column = __builtin_ctz(left);
-        left &= left - 1U;
-        constexpr float middle = 0.5F * block_side;
-        const float depth = ribbon_depth<Perspective>(
-            ribbon, p.stops.depth[l], static_cast<float>(tile.x + column * block_side) + middle,
-            static_cast<float>(tile.y + row * block_side) + middle);
-        hits[n++] = {&p, depth, static_cast<std::int16_t>(l),
-                     static_cast<std::int16_t>(row * tile_blocks + column)};
-      }
+  for (int row = line.row_first; row <= line.row_last; ++row) {
+    std::uint32_t left = range_mask(capsule_in_row(capsule, row, columns)) & tile.open[row];
+    while (left != 0) {
+      const int column = __builtin_ctz(left);
+      left &= left - 1U;
+      constexpr float middle = 0.5F * block_side;
+      const float depth = ribbon_depth<Perspective>(
+          ribbon, line.centre, static_cast<float>(tile.x + column * block_side) + middle,
+          static_cast<float>(tile.y + row * block_side) + middle);
+      if (depth + slack < slab.front || depth - slack >= slab.back) continue;
+      hits[n++] = {&line, depth, row * tile_blocks + column};
     }
   }
   return n;
 }
 
-int list_hits(const Camera& camera, const Prepared& p, const Slab& slab, const Tile& tile,
+int list_hits(const Camera& camera, const RibbonRecord& line, const Slab& slab, const Tile& tile,
               Hit* hits) {
-  if (p.pass->has_lines == 0) return 0;
-  return camera.perspective != 0 ? list_hits_on<true>(p, slab, tile, hits)
-                                 : list_hits_on<false>(p, slab, tile, hits);
+  return camera.perspective != 0 ? list_hits_on<true>(line, slab, tile, hits)
+                                 : list_hits_on<false>(line, slab, tile, hits);
 }
 
 // What has happened to the light of a block's pixels within the slab at hand.
@@ -312,13 +350,13 @@ void close_slab_block(const Slab& slab, const Hit* hits, int count, int index, T
   for (int first = 0; first < count; first += meetings_max) {
     const int last = first + meetings_max < count ? first + meetings_max : count;
     for (int h = first; h < last; ++h) {
-      const Prepared& p = *hits[h].from;
-      const Ribbon ribbon = ribbon_at(p.pass->line, p.ribbons, hits[h].stop);
-      const float centre = p.stops.depth[hits[h].stop];
-      if (p.pass->line.moving != 0) {
-        meet_line<Perspective, style_moving>(ribbon, centre, slab, x, y, meetings[h - first]);
+      const RibbonRecord& line = *hits[h].line;
+      if (line.moving != 0) {
+        meet_line<Perspective, style_moving>(line.ribbon, line.centre, slab, x, y,
+                                             meetings[h - first]);
       } else {
-        meet_line<Perspective, style_head>(ribbon, centre, slab, x, y, meetings[h - first]);
+        meet_line<Perspective, style_head>(line.ribbon, line.centre, slab, x, y,
+                                           meetings[h - first]);
       }
     }
     sort_meetings(meetings, last - first);

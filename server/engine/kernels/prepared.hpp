@@ -94,13 +94,47 @@ struct Slab {
 
 constexpr int gathered_floats = 4 * block_pixels;
 
+// One line's constants, see Ribbons.
+struct Ribbon {
+  float x, y, ux, uy, inverse_u2, w0, depth_ratio;
+  float tail[3], rise[3];
+  float depth, depth_rise;
+  float phase, phase_rise;
+  float r2, inverse_ramp, opacity;
+};
+
+// One splat's constants, see Splats.
+struct Splat {
+  float x, y, ex, ey, xx, xy, yy;
+  float b0, bx, by, d0, dx, dy, dxx, dxy, dyy, d2_least;
+  float z, near, strength;
+  float color[3];
+};
+
+// A splat and a line by themselves, for a sweep that meets each in several slabs. Depths are from
+// the camera's depth origin; rows and columns are the tile's blocks, both ends included.
+struct SplatRecord {
+  float first, last;  // where it begins and ends
+  float middle;
+  std::int16_t row_first, row_last, column_first, column_last;
+  const float* partial;
+  Splat splat;
+};
+
+struct RibbonRecord {
+  float first, last;
+  float centre;  // of its kernel
+  std::int16_t row_first, row_last;
+  int moving;
+  Ribbon ribbon;
+};
+
 // One line's meeting with one block.
 struct Hit {
-  const Prepared* from;
-  float depth;  // at the block's middle, from the camera's depth origin
-  std::int16_t stop;
-  std::int16_t block;
+  const RibbonRecord* line;
+  float depth;  // at the block's middle
+  int block;
 };
-constexpr int hits_of_brick_max = brick_stops * tile_blocks * tile_blocks;
+constexpr int hits_of_line_max = tile_blocks * tile_blocks;
 
 }  // namespace windsplat::engine::kernels

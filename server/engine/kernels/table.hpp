@@ -27,11 +27,16 @@ struct Table {
   void (*draw_prepared)(const Camera& camera, const Prepared& prepared, int first, int last,
                         Tile& tile);
 
-  // The slab method: adds the parts of the splats that lie in the slab.
-  void (*gather)(const Camera& camera, const Prepared& prepared, Slab& slab, Tile& tile);
+  // The slab method: a brick's splats and lines by themselves, at most brick_stops of each; how
+  // many.
+  int (*pack_splats)(const Camera& camera, const Prepared& prepared, SplatRecord* out);
+  int (*pack_ribbons)(const Prepared& prepared, RibbonRecord* out);
 
-  // Lists the blocks that lines in the slab may touch; how many. Room for hits_of_brick_max.
-  int (*list_hits)(const Camera& camera, const Prepared& prepared, const Slab& slab,
+  // Adds the part of the splat that lies in the slab.
+  void (*gather)(const Camera& camera, const SplatRecord& record, Slab& slab, Tile& tile);
+
+  // Lists the blocks that the line may touch within the slab; how many. Room for hits_of_line_max.
+  int (*list_hits)(const Camera& camera, const RibbonRecord& line, const Slab& slab,
                    const Tile& tile, Hit* hits);
 
   // Composites one block of the slab: its gathered medium with `count` lines, nearest first.
