@@ -74,7 +74,9 @@ std::array<double, 3> kernel_reach(const Pass& pass, double line_reach, bool spl
   for (int a = 0; a < 3; ++a) {
     const double cell = pass.cell_max[a];
     const double moved = 0.5 * (pass.line.jitter_center + pass.line.jitter_stride) * cell;
-    const double line = pass.has_lines != 0 && line_reach >= 0 ? line_reach + moved : 0;
+    // No line leaves its kernel's box.
+    const double inside = std::min<double>(line_reach, pass.line.half_span * cell);
+    const double line = pass.has_lines != 0 && line_reach >= 0 ? inside + moved : 0;
     const double splat = splats ? kernels::footprint_radius * cell : 0;
     reach[a] = std::max(line, splat) * 1.0001;
   }
@@ -276,7 +278,7 @@ SlabBricks slab_bricks(const RenderPlan& plan, const kernels::Table& table, int 
 // downward. Passes of different strides are interleaved by distance, lines first.
 struct SlabKey {
   int side;      // 0 upward, 1 downward
-  int distance;  // samples from the eye's slab
+  int distance;  // samples from the eye's
   int pass;
   int slab;
 };
@@ -286,9 +288,8 @@ std::vector<SlabKey> order_slabs(const RenderPlan& plan) {
   for (int p = 0; p < static_cast<int>(plan.passes.size()); ++p) {
     const PassPlan& pass = plan.passes[p];
     const AxisArrays& axis = pass.axis[pass.kernel.major];
-    const int eye_sample = axis.sample[axis.visit.front()];
     for (int s = 0; s < static_cast<int>(axis.visit.size()); ++s) {
-      const int ahead = axis.sample[axis.visit[s]] - eye_sample;
+      const int ahead = axis.sample[axis.visit[s]] - plan.eye_sample;
       keys.push_back({ahead >= 0 ? 0 : 1, std::abs(ahead), p, s});
     }
   }
@@ -317,7 +318,7 @@ void list_by_tile(Bins& bins) {
   }
   for (std::size_t t = 0; t < tiles; ++t) bins.first[t + 1] += bins.first[t];
   bins.entries.resize(bins.first[tiles]);
-  std::vector<std::uint32_t> next(bins.first.begin(), bins.first.end() - 1);
+  std::vector<std::size_t> next(bins.first.begin(), bins.first.end() - 1);
   for (std::size_t b = 0; b < bins.bricks.size(); ++b) {
     each_tile(bins, bins.bricks[b], [&](std::size_t tile) {
       bins.entries[next[tile]++] = static_cast<std::uint32_t>(b);

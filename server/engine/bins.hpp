@@ -18,7 +18,7 @@ struct Bins {
   int tiles_y = 0;
   std::vector<kernels::Brick> bricks;  // that have something to draw, front to back
   // Tile t (row by row) draws bricks[entries[e]] for e in [first[t], first[t + 1]), ascending.
-  std::vector<std::uint32_t> first;
+  std::vector<std::size_t> first;
   std::vector<std::uint32_t> entries;
 };
 

@@ -401,6 +401,7 @@ RenderPlan make_plan(const Scene& scene) {
   }
   plan.perspective_medium = scene.camera.perspective && !scene.scalars.empty();
   const int major = major_axis(scene.camera, scene.lattice);
+  plan.eye_sample = eye_stop(scene.camera, major, scene.lattice.positions[major]);
   for (PassPlan& pass : plan.passes) finish_pass(scene, major, pass);
   if (scene.method == scene::Method::slab || plan.curved) plan_slabs(scene, plan);
   plan.variant = describe(scene, plan);

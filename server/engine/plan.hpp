@@ -68,6 +68,7 @@ struct RenderPlan {
   const scene::Camera* view = nullptr;
   kernels::Camera camera{};
   std::vector<PassPlan> passes;     // the one with lines first
+  int eye_sample = 0;               // of the whole lattice along the major axis: see eye_stop
   bool perspective_medium = false;  // pixel rays are needed
   bool slabs = false;               // the slab method
   bool curved = false;              // visibility is told by depth alone

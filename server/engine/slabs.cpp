@@ -17,6 +17,7 @@ using kernels::Slab;
 using kernels::Tile;
 using kernels::tile_blocks;
 
+constexpr std::size_t bricks_between_looks = 64;
 constexpr int tile_block_count = tile_blocks * tile_blocks;
 
 class SlabSweep {
@@ -32,7 +33,7 @@ class SlabSweep {
     slab_.stop = plan_.stop_transmittance;
   }
 
-  bool run(const CancelToken& cancel, std::uint32_t first, std::uint32_t last) {
+  bool run(const CancelToken& cancel, std::size_t first, std::size_t last) {
     next_ = first;
     last_ = last;
     for (std::int64_t done = 0; next_ < last_ || reached() > 0; ++done, ++index_) {
@@ -42,10 +43,10 @@ class SlabSweep {
       }
       slab_.front = depth_of(index_);
       slab_.back = depth_of(index_ + 1);
-      activate();
+      activate(cancel);
       draw();
+      if (cancel.cancelled()) return false;
       if (done % slabs_between_checks == slabs_between_checks - 1) {
-        if (cancel.cancelled()) return false;
         if (table_.refresh_open(tile_, plan_.stop_transmittance) == 0) {
           for (; next_ < last_; ++next_) count_occluded(brick(next_));
           return true;
@@ -66,7 +67,7 @@ class SlabSweep {
 
   [[nodiscard]] std::size_t reached() const { return space_.splats.count + space_.ribbons.count; }
 
-  [[nodiscard]] const Brick& brick(std::uint32_t entry) const {
+  [[nodiscard]] const Brick& brick(std::size_t entry) const {
     return bins_.bricks[bins_.entries[entry]];
   }
 
@@ -111,10 +112,11 @@ class SlabSweep {
     }
   }
 
-  void activate() {
+  void activate(const CancelToken& cancel) {
     kernels::SplatRecord splats[brick_stops];
     kernels::RibbonRecord ribbons[brick_stops];
     for (; next_ < last_ && brick(next_).depth_first < slab_.back; ++next_) {
+      if (next_ % bricks_between_looks == 0 && cancel.cancelled()) return;
       const Brick& here = brick(next_);
       if (all_closed(tile_, here)) {
         count_occluded(here);
@@ -203,8 +205,8 @@ class SlabSweep {
   Tile& tile_;
   Slab slab_{};
   std::int64_t index_ = 0;
-  std::uint32_t next_ = 0;
-  std::uint32_t last_ = 0;
+  std::size_t next_ = 0;
+  std::size_t last_ = 0;
 };
 
 }  // namespace

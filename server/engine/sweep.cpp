@@ -29,7 +29,7 @@ class Sweep {
     space_.active.clear();
   }
 
-  bool run(const CancelToken& cancel, std::uint32_t first, std::uint32_t last) {
+  bool run(const CancelToken& cancel, std::size_t first, std::size_t last) {
     next_ = first;
     last_ = last;
     std::int64_t slab = 0;
@@ -41,7 +41,8 @@ class Sweep {
       }
       slab_.front = static_cast<float>(static_cast<double>(slab) * plan_.slab_depth);
       slab_.back = static_cast<float>(static_cast<double>(slab + 1) * plan_.slab_depth);
-      activate();
+      activate(cancel);
+      if (cancel.cancelled()) return false;
       draw_kernels();
       retire();
       if (done % slabs_between_checks == slabs_between_checks - 1) {
@@ -56,7 +57,7 @@ class Sweep {
   }
 
  private:
-  [[nodiscard]] const Brick& brick(std::uint32_t entry) const {
+  [[nodiscard]] const Brick& brick(std::size_t entry) const {
     return bins_.bricks[bins_.entries[entry]];
   }
 
@@ -74,8 +75,10 @@ class Sweep {
     return slot;
   }
 
-  void activate() {
+  void activate(const CancelToken& cancel) {
     for (; next_ < last_ && brick(next_).depth_first < slab_.back; ++next_) {
+      constexpr std::size_t bricks_between_looks = 64;
+      if (next_ % bricks_between_looks == 0 && cancel.cancelled()) return;
       const Brick& here = brick(next_);
       if (all_closed(tile_, here)) {
         count_occluded(here);
@@ -127,8 +130,8 @@ class Sweep {
   SweepSpace& space_;
   Tile& tile_;
   Interval slab_;
-  std::uint32_t next_ = 0;
-  std::uint32_t last_ = 0;
+  std::size_t next_ = 0;
+  std::size_t last_ = 0;
 };
 
 }  // namespace

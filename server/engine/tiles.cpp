@@ -104,10 +104,10 @@ std::int64_t stops_of(const Brick& brick) {
 void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
                const CancelToken& cancel, std::size_t index, Tile& tile, TileWork& work) {
   // Between looks at the clock of light and of the caller's patience.
-  constexpr std::uint32_t bricks_between_checks = 16;
-  const std::uint32_t first = bins.first[index];
-  const std::uint32_t last = bins.first[index + 1];
-  for (std::uint32_t e = first; e < last; ++e) {
+  constexpr std::size_t bricks_between_checks = 16;
+  const std::size_t first = bins.first[index];
+  const std::size_t last = bins.first[index + 1];
+  for (std::size_t e = first; e < last; ++e) {
     if ((e - first) % bricks_between_checks == bricks_between_checks - 1) {
       if (cancel.cancelled()) return;
       work.stopped = table.refresh_open(tile, plan.stop_transmittance) == 0;

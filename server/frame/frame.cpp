@@ -67,7 +67,6 @@ Result<engine::Rendered> render_scene(const scene::Scene& scene, ThreadPool& poo
   engine::Rendered rendered;
   rendered.image = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};
   rendered.work.variant = "reference double";
-  rendered.work.exponentials = truth->evaluations;
   return rendered;
 }
 

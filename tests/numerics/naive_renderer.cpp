@@ -114,12 +114,24 @@ struct Slab {
   }
 };
 
-std::vector<Slab> order_slabs(const std::vector<Group>& groups, int major) {
+// The sample whose cell holds the eye, of the whole lattice.
+int eye_sample(const Scene& scene, int a) {
+  const auto& at = scene.lattice.positions[a];
+  const int last = static_cast<int>(at.size()) - 1;
+  if (!scene.camera.perspective) return scene.camera.forward[a] >= 0 ? 0 : last;
+  int eye = 0;
+  for (int i = 1; i <= last; ++i) {
+    if (scene.camera.eye[a] >= (at[i - 1] + at[i]) / 2) eye = i;
+  }
+  return eye;
+}
+
+std::vector<Slab> order_slabs(const std::vector<Group>& groups, int major, int eye) {
   std::vector<Slab> slabs;
   for (int g = 0; g < static_cast<int>(groups.size()); ++g) {
     const AxisStops& axis = groups[g].axis[major];
     for (int i = 0; i < static_cast<int>(axis.stops.size()); ++i) {
-      const int ahead = axis.stops[i].sample - axis.stops[axis.eye].sample;
+      const int ahead = axis.stops[i].sample - eye;
       slabs.push_back({ahead < 0, std::abs(ahead), g, i});
     }
   }
@@ -188,7 +200,7 @@ class Renderer {
     const int major = major_axis(scene_);
     const int u = major == 0 ? 1 : 0;
     const int v = major == 2 ? 1 : 2;
-    for (const Slab& slab : order_slabs(groups, major)) {
+    for (const Slab& slab : order_slabs(groups, major, eye_sample(scene_, major))) {
       const Group& group = groups[slab.group];
       std::array<int, 3> stop{};
       stop[major] = slab.stop;

@@ -235,12 +235,15 @@ void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, flo
   }
   const float* const frame[3] = {camera.right, camera.down, camera.forward};
   for (int c = 0; c < 3; ++c) {
-    float line = brick.line_reach;
+    float box = 0;    // half the kernel's, along this axis of the camera
+    float shift = 0;  // of its centre
     float square = 0;
     for (int a = 0; a < 3; ++a) {
-      line += moved * absolute(frame[c][a]) * cell[a];
+      box += pass.line.half_span * absolute(frame[c][a]) * cell[a];
+      shift += moved * absolute(frame[c][a]) * cell[a];
       square += frame[c][a] * frame[c][a] * cell[a] * cell[a];
     }
+    const float line = smaller(brick.line_reach, box) + shift;
     if (pass.places != nullptr) square *= 3.0F;
     const float splat = pass.has_medium != 0 ? footprint_t * square_root(square) : 0.0F;
     reach[c] = larger(pass.has_lines != 0 ? line : 0.0F, splat) * 1.00001F;
@@ -337,7 +340,7 @@ void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, T
   fill_cells<Curved>(camera, pass, stops, cells);
   if (Curved) drop_flat_cells<Lines, Medium>(stops, cells, winds, out.densities);
   if (Lines) {
-    if (Curved) bend_winds(stops, cells, winds);
+    if (Curved) bend_winds(pass, stops, cells, winds);
     prepare_ribbons<Perspective, Curved>(camera, pass, stops, cells, winds, out.ribbons);
     find_line_rows(pass.line, out.ribbons, tile, stops.count, out.footing);
   }

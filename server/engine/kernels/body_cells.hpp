@@ -160,16 +160,20 @@ void drop_flat_cells(const Stops& stops, const Cells& cells, Winds& winds, Densi
   }
 }
 
-// Directions along a curved cell's own east, north and up become the world's.
-void bend_winds(const Stops& stops, const Cells& cells, Winds& winds) {
+// Directions along a curved cell's own east, north and up become the world's, of the same length:
+// of a slice's, what lies in its plane.
+void bend_winds(const Pass& pass, const Stops& stops, const Cells& cells, Winds& winds) {
   for (int l = 0; l < stops.count; ++l) {
     float world[3] = {0, 0, 0};
+    float kept2 = 0;
     for (int a = 0; a < 3; ++a) {
       const float edge[3] = {cells.edge[a][0][l], cells.edge[a][1][l], cells.edge[a][2][l]};
-      const float scale = winds.direction[a][l] / larger(square_root(dot3(edge, edge)), 1e-30F);
+      const float kept = winds.direction[a][l] * pass.line.keep[a];
+      const float scale = kept / larger(square_root(dot3(edge, edge)), 1e-30F);
+      kept2 += kept * kept;
       for (int c = 0; c < 3; ++c) world[c] += edge[c] * scale;
     }
-    const float unit = 1.0F / larger(square_root(dot3(world, world)), 1e-30F);
+    const float unit = square_root(kept2) / larger(square_root(dot3(world, world)), 1e-30F);
     for (int c = 0; c < 3; ++c) winds.bent[c][l] = world[c] * unit;
   }
 }

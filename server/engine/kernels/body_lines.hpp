@@ -61,10 +61,6 @@ void extend_segments(const Pass& pass, const Stops& stops, const Cells& cells, c
       if (!Curved) extent[a] *= line.keep[a];
     }
     to_grid<Curved>(cells, l, extent, along);
-    if (Curved) {
-      for (int a = 0; a < 3; ++a) along[a] *= line.keep[a];
-      to_world<Curved>(cells, l, along, extent);
-    }
     for (int a = 0; a < 3; ++a) {
       s.extent[a][l] = extent[a];
       s.along[a][l] = along[a];

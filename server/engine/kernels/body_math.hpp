@@ -35,7 +35,7 @@ struct Attenuation {
 // tau = n ln2 + r, |r| <= ln2 / 2; expm1(-r) by a polynomial (2.5e-8 relative). With n = 0 nothing
 // is subtracted from 1, so tau = 1e-30 absorbs 1e-30; from tau = 17 on exactly 1 is absorbed.
 inline Attenuation attenuation(float tau) {
-  const float t = smaller(tau, 87.0F);
+  const float t = clamped(tau, 0.0F, 87.0F);
   const float rounded = t * 1.44269504F + 0.5F;
   const int n = static_cast<int>(rounded);  // never negative: rounds to the nearest
   const float whole = static_cast<float>(n);

@@ -46,7 +46,7 @@ void gather_block(const Splat& splat, const float* __restrict partial, float fro
     const int at = row * partial_columns;
     const float after = partial_at(partial, at, row_part, v1);
     const float before = partial_at(partial, at, row_part, v0);
-    tau[l] = lane.tau * (after - before);
+    tau[l] = lane.tau * larger(after - before, 0.0F);
   }
   for (int l = 0; l < block_pixels; ++l) gathered[l] += tau[l];
   for (int c = 0; c < 3; ++c) {
@@ -214,19 +214,24 @@ constexpr int meetings_max = 64;  // put in order together
 template <int Compositing>
 inline void open_passage(const float* __restrict gathered, Passage& p) {
   for (int l = 0; l < block_pixels; ++l) {
-    p.tau[l] = gathered == nullptr ? 0.0F : gathered[l];
+    p.tau[l] = 0;
+    p.absorbed[l] = 0;
+    p.transmitted[l] = 1;
+    for (int c = 0; c < 3; ++c) p.color[c][l] = p.rgb[c][l] = 0;
+    p.through[l] = 1;
+    p.reached[l] = 0;
+    p.left[l] = 1;
+  }
+  if (gathered == nullptr) return;
+  for (int l = 0; l < block_pixels; ++l) {
+    p.tau[l] = gathered[l];
     const Attenuation medium = attenuation_by<Compositing>(p.tau[l]);
     p.absorbed[l] = medium.absorbed;
     p.transmitted[l] = medium.transmitted;
     const float inverse = 1.0F / larger(p.tau[l], 1e-37F);
     for (int c = 0; c < 3; ++c) {
-      const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(1 + c) * block_pixels + l;
-      p.color[c][l] = gathered == nullptr ? 0.0F : gathered[at] * inverse;
-      p.rgb[c][l] = 0;
+      p.color[c][l] = gathered[static_cast<std::ptrdiff_t>(1 + c) * block_pixels + l] * inverse;
     }
-    p.through[l] = 1;
-    p.reached[l] = 0;
-    p.left[l] = 1;
   }
 }
 
@@ -361,7 +366,10 @@ void close_slab_block(const Slab& slab, const Hit* hits, int count, int index, T
     }
     sort_meetings(meetings, last - first);
     for (int n = 0; n < last - first; ++n) pass_line<Compositing>(meetings[n], passage);
-    if (is_dark(block, passage, slab.stop)) break;
+    if (last < count && is_dark(block, passage, slab.stop)) {
+      tile.any_closed = 1;  // what is behind was left out
+      break;
+    }
   }
   close_passage<Compositing>(passage,
                              tile.blocks + static_cast<std::ptrdiff_t>(index) * block_floats);

@@ -88,7 +88,7 @@ std::array<Vec, 3> curved_edges(const scene::Lattice& lattice, const std::array<
 }
 
 // Less of a volume than this share of a right-angled cell's is none.
-constexpr double flattest = 1e-9;
+constexpr double flattest = 1e-6;
 
 double volume_of(const std::array<Vec, 3>& edge) { return dot(edge[0], cross(edge[1], edge[2])); }
 
@@ -257,7 +257,7 @@ Part clip_to_box(const VectorLayer& layer, const Stop& stop, const Vec& in_box, 
 
 // In [0, 360): 0 along +y, 90 along +x.
 double bearing(const Vec& v) {
-  const double degrees = std::atan2(v[0], v[1]) * 180 / std::numbers::pi;
+  const double degrees = std::atan2(v[0] + 0.0, v[1] + 0.0) * 180 / std::numbers::pi;
   const double turned = degrees < 0 ? degrees + 360 : degrees;
   return turned < 360 ? turned : 0;
 }
