@@ -163,7 +163,7 @@ std::string stability_table(const std::vector<Stiffness>& all) {
       "<h2 id=\"stability\">Stiffness</h2>\n<p>One kernel, a line of opacity 0.6 at nine depths of "
       "a cell of optical depth &tau;, against its closed form; and " +
       std::to_string(stiff_layers) +
-      " such cells behind each other. Drawn by the engine itself.</p>\n"
+      " such cells of medium alone behind each other. Drawn by the engine itself.</p>\n"
       "<div class=\"scroll\"><table><tr><th>compositing</th><th>&tau;</th><th>largest error</th>"
       "<th>least</th><th>most</th><th>within [0, 1]</th><th>monotone in &tau;</th>"
       "<th>layers, least</th><th>layers, most</th><th>diverges</th></tr>\n";
@@ -223,7 +223,7 @@ Result<std::string> report_page(const Report& report) {
   text += escaped(machine.compiler) + ", on " + escaped(machine.processor) + ", ";
   text += escaped(machine.system) + ": " + std::to_string(machine.threads) + " threads of ";
   text += std::to_string(machine.hardware_threads) + ". Each time is the median of ";
-  text += std::to_string(timed_runs) + " runs after one to warm up. ";
+  text += std::to_string(report.runs) + " runs after one to warm up. ";
   text += std::to_string(report.measured) + " points measured";
   if (report.skipped > 0) text += ", " + std::to_string(report.skipped) + " taken from before";
   text += ", in " + format_number("%.1f", report.seconds) + " s.";

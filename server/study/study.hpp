@@ -43,7 +43,8 @@ struct SceneReport {
 struct Report {
   Machine machine;
   bool quick = false;
-  double seconds = 0;  // this run alone
+  int runs = timed_runs;  // by the clock, of each point
+  double seconds = 0;     // this run alone
   std::size_t measured = 0;
   std::size_t skipped = 0;  // points that the folder held already
   std::vector<SceneReport> scenes;
