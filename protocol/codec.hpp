@@ -57,7 +57,9 @@ std::string encode(const ServerMessage& message);
 std::string encode_problem(const Problem& problem);                                // RFC 9457
 std::string encode_dataset(const DatasetDescription& dataset);                     // the long form
 std::string encode_dataset_list(const std::vector<DatasetDescription>& datasets);  // short forms
-std::string encode_frame_info(const FrameInfo& info);           // Windsplat-Frame
+std::string encode_frame_info(const FrameInfo& info);  // Windsplat-Frame
+// render --report: the same with renderMs and encodeMs.
+std::string encode_frame_report(const FrameInfo& info, double render_ms, double encode_ms);
 std::string encode_service(const ServiceDescription& service);  // GET /v1
 std::string encode_color_maps(const std::vector<ColorMapDescription>& maps);
 std::string encode_presets(const std::vector<std::string>& names);

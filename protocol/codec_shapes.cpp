@@ -263,6 +263,13 @@ std::string encode_dataset_list(const std::vector<DatasetDescription>& datasets)
 
 std::string encode_frame_info(const FrameInfo& info) { return dump(frame_info_json(info)); }
 
+std::string encode_frame_report(const FrameInfo& info, double render_ms, double encode_ms) {
+  Json report = frame_info_json(info);
+  report["renderMs"] = canonical_number(render_ms);
+  report["encodeMs"] = canonical_number(encode_ms);
+  return dump(report);
+}
+
 std::string encode_service(const ServiceDescription& service) {
   Json links = Json::object();
   for (const auto& [relation, target] : service.links) links[relation] = target;

@@ -121,7 +121,7 @@ struct DepthCueView {
 };
 
 struct MethodView {
-  MethodName name = MethodName::kernel;
+  MethodName name = MethodName::slab;
   Compositing compositing = Compositing::analytic;
   double slab_thickness = 1;  // grid cells along the line of sight, `slab` only
   double stop_transmittance = 1.5e-4;

@@ -200,7 +200,7 @@ Result<void> animate(const Arguments& arguments) {
   const auto plan = plan_of(arguments, static_cast<int>((*dataset)->info().steps.size()), view);
   if (!plan) return plan.error();
 
-  const frame::Encoding encoding = file_encoding(plan->format);
+  const frame::Encoding encoding = file_encoding(plan->format, arguments.view.quality);
   ThreadPool pool(arguments.threads);
   const int total = plan->steps.count() * plan->per_step;
   Progress progress(total);

@@ -12,7 +12,6 @@ namespace windsplat::cli {
 namespace {
 
 constexpr std::uint64_t resident_bytes_max = 8ULL << 30;
-constexpr int file_quality = 95;  // JPEG: a file is kept, so it costs bytes rather than detail
 
 }  // namespace
 
@@ -26,6 +25,10 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
   command.add_option("--set", arguments.settings, "Change one key of the view; may be repeated")
       ->allow_extra_args(false)
       ->type_name("/json/pointer=value");
+  command.add_option("--quality", arguments.quality, "Of a JPEG: 1 smallest to 100 best")
+      ->check(CLI::Range(1, 100))
+      ->type_name("N")
+      ->capture_default_str();
 }
 
 Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments) {
@@ -75,10 +78,10 @@ Result<frame::Format> format_of(const std::string& output) {
                     "-o '" + printable(output) + "': its name must end in .png, .jpg or .npy");
 }
 
-frame::Encoding file_encoding(frame::Format format) {
+frame::Encoding file_encoding(frame::Format format, int quality) {
   frame::Encoding encoding;
   encoding.format = format;
-  encoding.quality = file_quality;
+  encoding.quality = quality;
   encoding.allow_reference = true;
   return encoding;
 }

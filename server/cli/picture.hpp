@@ -19,9 +19,10 @@ struct ViewArguments {
   std::string step;
   std::string size;
   std::vector<std::string> settings;  // "/json/pointer=value"
+  int quality = 95;                   // JPEG: a file is kept, so it costs bytes rather than detail
 };
 
-// DATASET, --view, --size and --set; `arguments` outlives the command.
+// DATASET, --view, --size, --set and --quality; `arguments` outlives the command.
 void add_view_options(CLI::App& command, ViewArguments& arguments);
 
 // The view file, then --step, --size and --set on top of it, in this order.
@@ -30,8 +31,8 @@ Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments);
 // By the extension of a file's name. Errors: invalid.
 Result<frame::Format> format_of(const std::string& output);
 
-// How a kept picture is encoded; the reference is allowed.
-frame::Encoding file_encoding(frame::Format format);
+// How a kept picture is encoded, `quality` 1..100 for a JPEG; the reference is allowed.
+frame::Encoding file_encoding(frame::Format format, int quality);
 
 // A dataset of its own for this command.
 Result<std::shared_ptr<data::Dataset>> open_dataset(const std::string& sample_or_path);

@@ -1,13 +1,16 @@
-// windsplat render: dataset + view -> one picture in a file or on stdout.
+// windsplat render: dataset + view -> one picture in a file or on stdout, and what it took.
 #include <unistd.h>
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
+#include "protocol/codec.hpp"
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/picture.hpp"
+#include "server/frame/frame_info.hpp"
 
 namespace windsplat::cli {
 namespace {
@@ -15,11 +18,24 @@ namespace {
 struct Arguments {
   ViewArguments view;
   std::string output;
+  std::string report;  // empty: none
   unsigned threads = 0;
 };
 
+Result<void> write_report(const std::string& path, const frame::Frame& picture) {
+  constexpr double ms_per_us = 1e-3;
+  std::string text = protocol::encode_frame_report(
+      frame::frame_info(picture, picture.view), static_cast<double>(picture.render_us) * ms_per_us,
+      static_cast<double>(picture.encode_us) * ms_per_us);
+  text += '\n';
+  return write_output(path, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
+
 Result<void> render(const Arguments& arguments) {
   const bool to_stdout = arguments.output == "-";
+  if (to_stdout && arguments.report == "-") {
+    return make_error(ErrorKind::invalid, "--report -: the picture goes to stdout already");
+  }
   const auto format =
       to_stdout ? Result<frame::Format>(frame::Format::png) : format_of(arguments.output);
   if (!format) return format.error();
@@ -35,9 +51,12 @@ Result<void> render(const Arguments& arguments) {
   view.dataset = (*dataset)->info().id;
 
   ThreadPool pool(arguments.threads);
-  const auto picture = frame::produce(view, **dataset, file_encoding(*format), pool, CancelToken());
+  const frame::Encoding encoding = file_encoding(*format, arguments.view.quality);
+  const auto picture = frame::produce(view, **dataset, encoding, pool, CancelToken());
   if (!picture) return picture.error();
-  return write_output(arguments.output, picture->bytes);
+  const auto written = write_output(arguments.output, picture->bytes);
+  if (!written || arguments.report.empty()) return written;
+  return write_report(arguments.report, *picture);
 }
 
 }  // namespace
@@ -49,6 +68,10 @@ void add_render(CLI::App& app, Action& chosen) {
   command->add_option("--step", arguments->view.step, "Time step, from 0")->type_name("N");
   command->add_option("-o", arguments->output, "out.png, .jpg or .npy; - writes a PNG to stdout")
       ->required()
+      ->type_name("FILE");
+  command
+      ->add_option("--report", arguments->report,
+                   "What the picture took and left out, as JSON; - writes it to stdout")
       ->type_name("FILE");
   add_threads_option(*command, arguments->threads);
   command->callback([&chosen, arguments] {

@@ -172,30 +172,37 @@ struct SlabBricks {
   double left_out = 0;  // alphas of what tolerances left out, summed over pixels, at most
 };
 
+// Pixels a world unit at a view depth, or the nearest that is drawn.
+double scale_at(const kernels::Camera& camera, double depth) {
+  if (camera.perspective == 0) return camera.inverse_pixel;
+  return camera.inverse_pixel / std::max<double>(depth, camera.near);
+}
+
 // The sum over the picture of the alphas that a brick's weak lines and thin splats would have, at
 // most: a line covers its length times r1 + r2 and two half discs, a splat spreads its extinction
-// times its volume. All are taken at the brick's nearest.
+// times its volume. All are taken at the brick's nearest, where there are `scale` pixels a world
+// unit. Pixels sample what they show: shapes that are no narrower than a pixel, and lines whose
+// ramp is not, add up to at most this many times their area, over all places and turns.
 double left_out(const RenderPlan& plan, const PassPlan& pass, const BrickSummary& summary,
-                double nearest) {
+                double scale) {
+  constexpr double line_sampling = 1.2;
+  constexpr double splat_sampling = 1.03;
   if (summary.weak_lines == 0 && summary.thin_medium <= 0) return 0;
   const kernels::Camera& camera = plan.camera;
   const kernels::LineStyle& line = pass.kernel.line;
   const double pixels = static_cast<double>(camera.width) * camera.height;
-  double scale = camera.inverse_pixel;  // pixels per world unit
-  double oblique = 1;                   // a ray's length at unit depth, at most
+  double oblique = 1;  // a ray's length at unit depth, at most
   if (camera.perspective != 0) {
-    scale /= std::max<double>(nearest, camera.near);
     oblique = std::hypot(1.0, std::hypot(camera.half_width_px, camera.half_height_px) *
                                   static_cast<double>(camera.pixel));
   }
   const double r1 = line.r1;
-  const double r2 = line.r2;
+  const double r2 = std::max<double>(line.r2, r1 + 1);
   const double discs = std::numbers::pi * (r1 * r1 + r1 * r2 + r2 * r2) / 3;
   const double length = line.length * static_cast<double>(summary.weak_parts) * scale * oblique;
-  const double lines = line.opacity * (length * (r1 + r2) + summary.weak_lines * discs);
-  const double splats = static_cast<double>(summary.thin_medium) * scale * scale * oblique;
-  const double most = (summary.weak_lines > 0 ? summary.weak_lines * pixels : 0);
-  return std::min(lines, most) + splats;
+  const double covered = line_sampling * (length * (r1 + r2) + summary.weak_lines * discs);
+  const double lines = line.opacity * std::min(covered, summary.weak_lines * pixels);
+  return lines + splat_sampling * static_cast<double>(summary.thin_medium) * oblique;
 }
 
 void set_blocks(const Rectangle& r, const kernels::Camera& camera, Brick& brick) {
@@ -226,11 +233,12 @@ void add_brick(const RenderPlan& plan, const kernels::Table& table, const Projec
     return;
   }
   BrickSummary summary;
-  table.summarise(pass.kernel, brick, summary);
+  const double scale = scale_at(plan.camera, whole.depth_first);
+  table.summarise(pass.kernel, brick, static_cast<float>(scale), summary);
   out.without_line += summary.without_line;
   out.without_splat += summary.without_splat;
   out.without_both += summary.without_both;
-  out.left_out += left_out(plan, pass, summary, whole.depth_first);
+  out.left_out += left_out(plan, pass, summary, scale);
   if (summary.lines == 0 && summary.splats == 0) return;
   const double part =
       std::min(1.0F, summary.magnitude_max * pass.kernel.line.inverse_full_magnitude);

@@ -274,7 +274,9 @@ void plan_slabs(const Scene& scene, RenderPlan& plan) {
   plan.slab_depth = std::max(thickness * std::max(stride, 1) * cell_along_view(scene),
                              std::sqrt(diagonal2) / slabs_max);
   if (!plan.slabs) return;
-  for (PassPlan& pass : plan.passes) pass.kernel.partial = partial_footprints().data();
+  for (PassPlan& pass : plan.passes) {
+    if (!pass.scalars.empty()) pass.kernel.partial = partial_footprints().data();
+  }
 }
 
 void finish_pass(const Scene& scene, int major, PassPlan& pass) {

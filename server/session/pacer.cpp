@@ -87,7 +87,12 @@ void Session::start_moving(Micros now) {
   Render render = render_of(Purpose::moving);
   render.encoding.quality = moving_quality;
   render.encoding.level = levels_.choose(view_.image.width, view_.image.height, budget(), now);
-  start(render, view_);
+  // While the view changes, more pixels are worth more than slabs: see docs/study.
+  protocol::View view = view_;
+  if (view.method.name == protocol::MethodName::slab) {
+    view.method.name = protocol::MethodName::kernel;
+  }
+  start(render, view);
 }
 
 void Session::start_final() {

@@ -129,7 +129,9 @@ Effects Session::on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros n
     }
     return finish(now);
   }
-  if (!drawn->loaded && render.purpose != Purpose::still) {
+  // What moving frames cost is learnt from frames drawn as they are.
+  const bool comparable = drawn->info.method == "kernel";
+  if (!drawn->loaded && comparable && render.purpose != Purpose::still) {
     levels_.learn(render.encoding.level, render.width, render.height,
                   drawn->render_us + drawn->encode_us, now);
   }

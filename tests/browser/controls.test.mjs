@@ -176,6 +176,9 @@ test("the slab's thickness is asked for only of slabs, and each compositing is e
   withPage(async (page) => {
     await unfold(page, "Method");
     const note = (text) => page.locator("#panel .panel-note", { hasText: text });
+    assert.equal(await isShown(page, "slab thickness", "input"), true, "slabs are the default");
+    await choose(page, "method", /^kernel$/);
+    assert.equal(await lastPatch(page, "method", "name"), "kernel");
     assert.equal(await isShown(page, "slab thickness", "input"), false);
     assert.deepEqual(await control(page, "method").locator("option").allTextContents(), [
       "kernel",

@@ -106,6 +106,40 @@ TEST(CliFiles, TheNameDecidesTheFormatAndDashIsStdout) {
   EXPECT_EQ(png, read_file(folder.file("a.png")));
 }
 
+TEST(CliFiles, AReportTellsWhatAPictureTookAndLeftOut) {
+  const Folder folder;
+  const std::string path = synth(folder, "climate", "16x8x5");
+  const auto report_of = [&](const Words& more) {
+    Words words{"render", path, "--size", "64x48", "-o", folder.file("a.png")};
+    words.insert(words.end(), {"--report", "-"});
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return json::parse(outcome.out);
+  };
+  const json both = report_of({"--set", "/method/name=slab", "--set", "/vector/stride=2"});
+  EXPECT_EQ(both["method"], "slab");
+  EXPECT_EQ(both["stride"], 2);
+  EXPECT_EQ(both["width"], 64);
+  EXPECT_EQ(both["work"]["fields"], (json{"wind", "cloud"}));
+  EXPECT_EQ(both["work"]["bytes"], 4 * 4 * 16 * 8 * 5);
+  EXPECT_GT(both["work"]["exponentials"], 0);
+  EXPECT_GT(both["renderMs"], 0);
+  EXPECT_GT(both["encodeMs"], 0);
+
+  const json winds = report_of({"--set", "/scalars=[]"});
+  EXPECT_EQ(winds["work"]["fields"], json{"wind"});
+  EXPECT_EQ(winds["work"]["bytes"], 3 * 4 * 16 * 8 * 5);
+  EXPECT_EQ(winds["work"]["exponentials"], 0);
+
+  const std::string file = folder.file("report.json");
+  const Outcome drawn = run({"render", path, "--size", "8x8", "-o", "-", "--report", file});
+  ASSERT_EQ(drawn.code, 0) << drawn.err;
+  EXPECT_EQ(png_size(drawn.out).first, 8U);
+  EXPECT_EQ(json::parse(read_file(file))["height"], 8);
+  EXPECT_EQ(run({"render", path, "-o", "-", "--report", "-"}).code, 2);
+}
+
 TEST(CliFiles, AnyNumberOfThreadsGivesTheSameBytes) {
   const Folder folder;
   const std::string path = synth(folder, "climate", "32x16x6");

@@ -126,7 +126,7 @@ TEST_F(Rest, a_picture_has_the_size_asked_for_and_shows_something) {
               testing::MatchesRegex("queue;dur=[0-9.]+, render;dur=[0-9.]+, encode;dur=[0-9.]+"));
   const Json info = Json::parse(answer.header("windsplat-frame"));
   EXPECT_EQ(info["width"], 200);
-  EXPECT_EQ(info["method"], "kernel");
+  EXPECT_EQ(info["method"], "slab");
   EXPECT_GT(info["work"]["samples"], 0);
 }
 

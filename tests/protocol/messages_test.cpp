@@ -286,6 +286,13 @@ TEST(Shapes, FrameInfoTellsEveryCount) {
               "fields":["wind"],"bytes":3891200,"variant":"vector perspective"}})"));
 }
 
+TEST(Shapes, AReportIsTheFrameInfoWithItsTimes) {
+  Json expected = Json::parse(encode_frame_info(frame_info()));
+  expected["renderMs"] = 12.5;
+  expected["encodeMs"] = 0.25;
+  EXPECT_EQ(Json::parse(encode_frame_report(frame_info(), 12.5, 0.25)), expected);
+}
+
 TEST(Shapes, NumbersThatAreNotFiniteAreNull) {
   FrameInfo info = frame_info();
   info.error_value = std::numeric_limits<double>::quiet_NaN();

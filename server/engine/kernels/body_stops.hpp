@@ -202,16 +202,28 @@ void color_densities(const Pass& pass, const Stops& stops, Densities& out) {
   }
 }
 
-// The volume of a stop's cell; of a curved one no less than that.
-inline float cell_volume(const Pass& pass, const Stops& stops, int l) {
-  float volume = 1;
+// At most how many pixels a splat of unit extinction covers times its optical depth there: a splat
+// whose cell is no narrower than a pixel spreads its volume. One that is narrower is no higher than
+// the splat one pixel wide with its peak; then a section of the cell counts, or its longest chord.
+// `scale` is pixels a world unit; of a curved cell the extents bound all three.
+inline float splat_cover(const Pass& pass, const Stops& stops, int l, float scale) {
+  const bool curved = pass.places != nullptr;
+  float edge[3];
   for (int a = 0; a < 3; ++a) {
-    volume *= pass.places == nullptr ? pass.axis[a].cell[stops.index[a][l]] : pass.cell_max[a];
+    edge[a] = curved ? pass.cell_max[a] : pass.axis[a].cell[stops.index[a][l]];
   }
-  return volume;
+  const float volume = edge[0] * edge[1] * edge[2];
+  const float faces[3] = {edge[1] * edge[2], edge[2] * edge[0], edge[0] * edge[1]};
+  const auto length = [](const float v[3]) {
+    return square_root(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  };
+  const auto widest = [](const float v[3]) { return larger(larger(v[0], v[1]), v[2]); };
+  const float section = curved ? length(faces) : widest(faces);
+  const float chord = curved ? length(edge) : widest(edge);
+  return larger(larger(volume * scale * scale, section * scale), chord);
 }
 
-void summarise(const Pass& pass, const Brick& brick, BrickSummary& summary) {
+void summarise(const Pass& pass, const Brick& brick, float scale, BrickSummary& summary) {
   Stops stops;
   list_stops(pass, brick, stops);
   Winds winds;
@@ -224,7 +236,7 @@ void summarise(const Pass& pass, const Brick& brick, BrickSummary& summary) {
   for (int l = 0; l < stops.count; ++l) {
     summary.weak_lines += lines[l] > 0 ? 1 : 0;
     summary.weak_parts += smaller(lines[l] * pass.line.inverse_full_magnitude, 1.0F);
-    if (splats[l] > 0) summary.thin_medium += splats[l] * cell_volume(pass, stops, l);
+    if (splats[l] > 0) summary.thin_medium += splats[l] * splat_cover(pass, stops, l, scale);
   }
   for (int l = 0; l < stops.count; ++l) {
     const bool line = pass.has_lines != 0 && winds.magnitude[l] > 0;

@@ -136,7 +136,7 @@ struct BrickSummary {
   std::int64_t without_splat;
   std::int64_t without_both;
   // Left out by tolerance alone: lines, the parts of full length that they would have together, and
-  // extinction times cell volume of the splats.
+  // the optical depths of the splats summed over pixels, at most.
   int weak_lines;
   float weak_parts;
   float thin_medium;

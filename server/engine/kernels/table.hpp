@@ -13,7 +13,8 @@ struct Table {
   const char* name;  // "portable" or "avx2"
 
   // What a brick holds once samples below their tolerances are left out.
-  void (*summarise)(const Pass& pass, const Brick& brick, BrickSummary& summary);
+  // scale: pixels a world unit where the brick is nearest.
+  void (*summarise)(const Pass& pass, const Brick& brick, float scale, BrickSummary& summary);
 
   // Composites a brick's kernels into the tile's blocks that are still open, front to back.
   void (*draw)(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile);

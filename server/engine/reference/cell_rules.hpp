@@ -46,6 +46,8 @@ inline CellLight cell_light(scene::Compositing compositing, const Cell& cell) {
       const double glow = absorbed * cell.medium[c];
       const double behind = cell.opacity * cell.line[c] + (1 - cell.opacity) * (1 - cell.x) * glow;
       light.rgb[c] = cell.x * glow + before * behind;
+      const double back = 1 - (1 - cell.x) * absorbed;
+      light.alpha = 1 - before * (1 - cell.opacity) * back;
     }
     if (compositing == Compositing::simple) {
       light.rgb[c] = absorbed * cell.medium[c] + passed * cell.opacity * cell.line[c];

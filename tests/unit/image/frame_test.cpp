@@ -203,11 +203,73 @@ TEST(ProduceFields, OfColourAndHeightAreToldOnce) {
   EXPECT_EQ(fields(), (Names{"wind", "z"}));
 }
 
+// The source is asked for what is shown and for nothing else, whatever draws it.
+TEST(ProduceFields, WhatIsNotShownIsNeverRead) {
+  using Reads = scene::FakeSource::Reads;
+  for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
+    const auto reads_of = [&](const auto& change) {
+      const auto reads = std::make_shared<Reads>();
+      auto source = std::make_unique<scene::FakeSource>(
+          scene::atmosphere_grid(),
+          std::vector<data::FieldInfo>{scene::wind_info(), scene::scalar_info("q", "1"),
+                                       scene::scalar_info("t", "K")},
+          2, reads);
+      auto dataset = scene::dataset_of(std::move(source));
+      protocol::View view;
+      view.image.width = 32;
+      view.image.height = 32;
+      view.method.name = method;
+      change(view);
+      ThreadPool pool(1);
+      const auto frame = produce(view, *dataset, Encoding{}, pool, CancelToken());
+      EXPECT_TRUE(frame) << frame.error().message;
+      EXPECT_EQ(frame->work.fields.size(), reads->size());
+      return *reads;
+    };
+    const auto fog = [](const std::string& field) {
+      protocol::ScalarView medium;
+      medium.field = field;
+      medium.extinction = {{0.0, 1.0}, {1e3, 1.0}};
+      return medium;
+    };
+    const auto no_lines = [](protocol::View& view) {
+      view.vector.field.kind = protocol::FieldChoice::Kind::none;
+    };
+    EXPECT_EQ(reads_of([&](protocol::View& view) { view.scalars.emplace(); }),
+              (Reads{{"wind@0", 1}}));
+    EXPECT_EQ(reads_of([&](protocol::View& view) {
+                no_lines(view);
+                view.scalars = {fog("q")};
+              }),
+              (Reads{{"q@0", 1}}));
+    EXPECT_EQ(reads_of([&](protocol::View& view) {
+                view.step = 1;
+                view.scalars = {fog("t"), fog("t")};
+              }),
+              (Reads{{"t@1", 1}, {"wind@1", 1}}));
+    EXPECT_EQ(reads_of([&](protocol::View& view) {
+                view.scalars.emplace();
+                view.vector.color.by = protocol::ColorBy::scalar;
+                view.vector.color.field = "q";
+              }),
+              (Reads{{"q@0", 1}, {"wind@0", 1}}));
+    EXPECT_EQ(reads_of([&](protocol::View& view) {
+                no_lines(view);
+                view.scalars.emplace();
+                view.vector.color.by = protocol::ColorBy::scalar;
+                view.vector.color.field = "q";
+              }),
+              Reads{})
+        << "the colour of lines that are not drawn";
+  }
+}
+
 TEST_F(Produce, FrameInfoNamesMethodsAndSlabs) {
   const auto frame = produce_as(Format::jpeg);
   ASSERT_TRUE(frame);
   view.method.compositing = protocol::Compositing::cd_naive;
   view.method.slab_thickness = 0.5;
+  view.method.name = protocol::MethodName::kernel;
   EXPECT_FALSE(frame_info(*frame, view).slab_thickness);
   view.method.name = protocol::MethodName::slab;
   const protocol::FrameInfo info = frame_info(*frame, view);
@@ -221,13 +283,14 @@ TEST_F(Produce, FrameInfoTellsTheReport) {
   ASSERT_TRUE(frame) << frame.error().message;
   view.vector.stride = 3;
   const protocol::FrameInfo info = frame_info(*frame, view);
-  EXPECT_EQ(info.method, "kernel");
+  EXPECT_EQ(info.method, "slab");
   EXPECT_EQ(info.compositing, "analytic");
+  EXPECT_EQ(info.slab_thickness, 1);
   EXPECT_EQ(info.stride, 3);
   EXPECT_EQ(info.width, 48);
   EXPECT_EQ(info.height, 32);
   EXPECT_EQ(info.error_kind, "none");
-  EXPECT_FALSE(info.error_value || info.jpeg_error || info.slab_thickness);
+  EXPECT_FALSE(info.error_value || info.jpeg_error);
   EXPECT_EQ(info.samples, frame->work.samples);
   EXPECT_GT(info.samples, 0);
   EXPECT_EQ(info.fields, frame->work.fields);

@@ -199,6 +199,8 @@ TEST(Motion, CyclesAreRateTimesStepAndTime) {
 TEST(Methods, AreTheViews) {
   auto dataset = weather();
   View view;
+  EXPECT_EQ(built(view, *dataset).method, Method::slab);
+  view.method.name = protocol::MethodName::kernel;
   EXPECT_EQ(built(view, *dataset).method, Method::kernel);
   view.method.name = protocol::MethodName::slab;
   view.method.compositing = protocol::Compositing::cd_euler;

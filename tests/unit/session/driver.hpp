@@ -135,6 +135,8 @@ class Driver {
   static Drawn drawn(const StartRender& done, Micros cost, bool loaded) {
     Drawn out;
     out.payload = std::make_shared<const std::vector<std::uint8_t>>(100);
+    const bool kernel = done.view.method.name == protocol::MethodName::kernel;
+    out.info.method = kernel ? "kernel" : "slab";
     out.info.width = std::max(1, done.view.image.width >> done.encoding.level);
     out.info.height = std::max(1, done.view.image.height >> done.encoding.level);
     out.view_json = "{}";

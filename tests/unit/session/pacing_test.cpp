@@ -41,6 +41,32 @@ TEST(Pacing, a_patch_alone_brings_a_moving_frame_and_then_the_final_one) {
   EXPECT_FALSE(driver.render) << "nothing is left to draw";
 }
 
+TEST(Pacing, moving_frames_are_drawn_by_kernel_and_final_ones_as_asked) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  ASSERT_TRUE(driver.render);
+  EXPECT_EQ(driver.render->view.method.name, protocol::MethodName::kernel);
+  driver.finish_render(500 * ms);
+  driver.ack(1);
+  driver.wait(200 * ms);
+  ASSERT_TRUE(driver.render);
+  EXPECT_EQ(driver.render->view.method.name, protocol::MethodName::slab);
+}
+
+TEST(Pacing, slow_final_frames_by_slab_do_not_coarsen_moving_ones) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.finish_render(10 * ms);
+  driver.ack(1);
+  driver.wait(200 * ms);
+  ASSERT_TRUE(driver.render);
+  driver.finish_render(3000 * ms);
+  driver.ack(2);
+  driver.patch(2, azimuth(1));
+  ASSERT_TRUE(driver.render);
+  EXPECT_EQ(driver.render->encoding.level, 0);
+}
+
 TEST(Pacing, every_frame_is_announced_by_what_was_chosen_for_it) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");

@@ -1,0 +1,288 @@
+// What a scene does without, and what that saves: pairs of frames with and without a feature, drawn
+// in turns by one thread, as a table on stdout and as Markdown where asked for:
+//
+//   bench_left_out [--markdown=FILE] [--benchmark_filter=REGEX] [--benchmark_out=FILE]
+#include <benchmark/benchmark.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/data/store.hpp"
+#include "server/engine/kernels/dispatch.hpp"
+#include "server/engine/render.hpp"
+#include "server/frame/frame.hpp"
+#include "server/scene/build.hpp"
+#include "tests/bench/left_out_table.hpp"
+
+namespace windsplat {
+namespace {
+
+using bench::Half;
+using bench::Pair;
+using protocol::View;
+
+using Change = std::function<void(View&)>;
+
+// `with` and `without` change the dataset's own first picture, winds and clouds, 640 x 480.
+struct Feature {
+  std::string name;
+  std::string dataset;
+  Change with;
+  Change without;
+  bool alike = false;  // the picture should hardly change: how far it did is measured
+};
+
+[[noreturn]] void give_up(const Error& error) {
+  std::fprintf(stderr, "bench_left_out: %s\n", error.message.c_str());
+  std::exit(1);  // NOLINT(concurrency-mt-unsafe)
+}
+
+template <class T>
+T value_or_give_up(Result<T> result) {
+  if (!result) give_up(result.error());
+  return std::move(*result);
+}
+
+data::Dataset& dataset_of(const std::string& name) {
+  static std::map<std::string, std::unique_ptr<data::Dataset>> opened;
+  auto& dataset = opened[name];
+  if (!dataset) {
+    dataset = std::make_unique<data::Dataset>(value_or_give_up(data::open_sample(name)), name,
+                                              std::uint64_t{4} << 30U);
+  }
+  return *dataset;
+}
+
+void keep(View& /*view*/) {}
+void no_medium(View& view) { view.scalars.emplace(); }
+void no_lines(View& view) { view.vector.field = {protocol::FieldChoice::Kind::none, ""}; }
+
+Change then(Change first, Change second) {
+  return [=](View& view) {
+    first(view);
+    second(view);
+  };
+}
+
+Change compositing(protocol::Compositing rule) {
+  return [=](View& view) { view.method.compositing = rule; };
+}
+
+Change weakest_line(double of_range) {
+  return [=](View& view) {
+    view.vector.min_magnitude = of_range * view.vector.magnitude_range.value()[1];
+  };
+}
+
+Change thinnest_splat(double optical_depth) {
+  return [=](View& view) {
+    for (auto& scalar : *view.scalars) scalar.min_optical_depth = optical_depth;
+  };
+}
+
+Change stop_at(double transmittance) {
+  return [=](View& view) { view.method.stop_transmittance = transmittance; };
+}
+
+Change denser(double times) {
+  return [=](View& view) {
+    for (auto& scalar : *view.scalars) {
+      for (auto& point : *scalar.extinction) point[1] *= times;
+    }
+  };
+}
+
+Change stride(int samples) {
+  return [=](View& view) {
+    view.vector.stride = samples;
+    for (auto& scalar : *view.scalars) scalar.stride = samples;
+  };
+}
+
+Change colored_by(const std::string& field) {
+  return [=](View& view) {
+    view.vector.color.by = protocol::ColorBy::scalar;
+    view.vector.color.field = field;
+    view.vector.color.range.reset();
+  };
+}
+
+void with_vorticity(View& view) {
+  protocol::ScalarView second;
+  second.field = "vorticity";
+  view.scalars->push_back(second);
+}
+
+void moving(View& view) { view.vector.motion = protocol::MotionMode::phase; }
+void headless(View& view) { view.vector.head_desaturation = 0; }
+void no_overlap(View& view) { view.vector.span = 1; }
+void flat_on(View& view) { view.camera.projection = protocol::Projection::orthographic; }
+void globe(View& view) {
+  view.geometry.mapping = protocol::GeometryMapping::sphere;
+  view.camera.eye.reset();
+  view.camera.target.reset();
+  view.camera.height.reset();
+}
+void one_layer(View& view) { view.geometry.slice = {protocol::GridAxis::z, 8}; }
+
+// Every wind is drawn but where that is the feature, as in the paper's figures.
+std::vector<Feature> features() {
+  using protocol::Compositing;
+  const Change all = weakest_line(1e-3);
+  return {
+      {"medium", "climate", all, then(all, no_medium)},
+      {"lines", "climate", all, no_lines},
+      {"medium", "tornado", all, then(all, no_medium)},
+      {"lines", "tornado", all, no_lines},
+      {"heads", "climate", all, then(all, headless)},
+      {"motion", "climate", then(all, moving), all},
+      {"perspective", "climate", all, then(all, flat_on)},
+      {"second exponential: analytic to cd", "climate", all,
+       then(all, compositing(Compositing::cd))},
+      {"second exponential: analytic to simple", "climate", all,
+       then(all, compositing(Compositing::simple))},
+      {"second scalar", "tornado", then(all, with_vorticity), all},
+      {"colour by a scalar, no medium", "climate", then(then(all, no_medium), colored_by("cloud")),
+       then(all, no_medium)},
+      {"curved lattice: globe to flat", "climate", then(all, globe), all},
+      {"overlap: span 7 to 1", "climate", all, then(all, no_overlap)},
+      {"every other sample: stride 2", "climate", all, then(all, stride(2))},
+      {"all layers but one: a slice", "climate", all, then(all, one_layer)},
+      {"winds below 0.1 % of the range", "climate", weakest_line(0), weakest_line(1e-3), true},
+      {"winds below 2 % of the range", "climate", weakest_line(0), weakest_line(0.02), true},
+      {"winds below the view's default", "climate", weakest_line(0), keep, true},
+      {"optical depths below 1e-4", "climate", then(all, thinnest_splat(0)), all, true},
+      {"optical depths below 1e-2", "climate", then(all, thinnest_splat(0)),
+       then(all, thinnest_splat(1e-2)), true},
+      {"what is behind 1 - 1.5e-4", "climate", then(all, stop_at(0)), all, true},
+      {"the same, clouds 30 times as dense", "climate", then(then(all, stop_at(0)), denser(30)),
+       then(all, denser(30)), true},
+      {"what is behind 1 - 1.5e-4", "tornado", then(all, stop_at(0)), all, true},
+  };
+}
+
+View make_view(const Feature& feature, const Change& change, protocol::MethodName method) {
+  data::Dataset& dataset = dataset_of(feature.dataset);
+  View view = value_or_give_up(scene::default_view(dataset));
+  view.image.width = 640;
+  view.image.height = 480;
+  const auto placed = value_or_give_up(scene::place_dataset(view.geometry, dataset));
+  scene::orbit(view, placed->lattice, 20, 35, 1);
+  view.method.name = method;
+  change(view);
+  return value_or_give_up(scene::complete_view(view, dataset));
+}
+
+// The report as a frame has it; the picture is the end of an NPY file.
+void draw_once(const View& view, data::Dataset& dataset, Half& half) {
+  ThreadPool pool(1);
+  frame::Encoding encoding;
+  encoding.format = frame::Format::npy;
+  const frame::Frame drawn =
+      value_or_give_up(frame::produce(view, dataset, encoding, pool, CancelToken()));
+  half.work = drawn.work;
+  half.rgba = bench::npy_values(drawn.bytes, drawn.width, drawn.height);
+}
+
+// One thread's processor time: what else runs on the machine disturbs it least.
+double time_frame(const scene::Scene& scene, ThreadPool& pool) {
+  const auto now = [] {
+    timespec at{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &at);
+    return 1e3 * static_cast<double>(at.tv_sec) + 1e-6 * static_cast<double>(at.tv_nsec);
+  };
+  const double start = now();
+  const auto rendered = value_or_give_up(engine::render(scene, pool, CancelToken()));
+  benchmark::DoNotOptimize(rendered.image.rgba.data());
+  return now() - start;
+}
+
+// With, without, without, with: whatever drifts hurts both alike.
+void run_pair(benchmark::State& state, const Feature& feature, protocol::MethodName method,
+              Pair& pair) {
+  data::Dataset& dataset = dataset_of(feature.dataset);
+  std::array<scene::Scene, 2> scenes;
+  std::array<Half*, 2> halves{&pair.with, &pair.without};
+  for (const std::size_t i : {0U, 1U}) {
+    const View view = make_view(feature, i == 0 ? feature.with : feature.without, method);
+    draw_once(view, dataset, *halves[i]);
+    scenes[i] = value_or_give_up(scene::build_scene(view, dataset));
+  }
+  ThreadPool pool(1);
+  std::size_t first = 0;
+  while (state.KeepRunning()) {
+    std::array<double, 2> ms{};
+    ms[first] = time_frame(scenes[first], pool);
+    ms[1 - first] = time_frame(scenes[1 - first], pool);
+    first = 1 - first;
+    pair.with.ms.push_back(ms[0]);
+    pair.without.ms.push_back(ms[1]);
+    state.SetIterationTime((ms[0] + ms[1]) * 1e-3);
+  }
+  state.counters["with_ms"] = bench::median(pair.with.ms);
+  state.counters["without_ms"] = bench::median(pair.without.ms);
+}
+
+void write_markdown(const std::string& path, const std::vector<Pair>& pairs) {
+  std::ofstream file(path);
+  for (const bench::Table& table : bench::tables(pairs)) file << bench::markdown(table) << '\n';
+  if (file.flush()) return;
+  std::fprintf(stderr, "bench_left_out: cannot write '%s'\n", path.c_str());
+  std::exit(1);  // NOLINT(concurrency-mt-unsafe)
+}
+
+int run(int argc, char** argv) {
+  constexpr int rounds = 15;
+  benchmark::Initialize(&argc, argv);
+  std::string output;
+  const std::string option = "--markdown=";
+  if (argc == 2 && std::string(argv[1]).rfind(option, 0) == 0) {
+    output = std::string(argv[1]).substr(option.size());
+    argc = 1;
+  }
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  const auto target = value_or_give_up(engine::kernels::chosen_table());
+  benchmark::AddCustomContext("target", target->name);
+  benchmark::AddCustomContext("compiler", __VERSION__);
+  const std::vector<Feature> all = features();
+  std::vector<Pair> pairs(2 * all.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const Feature& feature = all[i / 2];
+    const bool slab = i % 2 == 1;
+    pairs[i].feature = feature.dataset == "climate" ? feature.name : feature.name + " (tornado)";
+    pairs[i].method = slab ? "slab" : "kernel";
+    pairs[i].alike = feature.alike;
+    const auto method = slab ? protocol::MethodName::slab : protocol::MethodName::kernel;
+    const std::string label = pairs[i].feature + ", " + pairs[i].method;
+    benchmark::RegisterBenchmark(label.c_str(),
+                                 [&, method, i](benchmark::State& state) {
+                                   pairs[i].with.ms.clear();
+                                   pairs[i].without.ms.clear();
+                                   run_pair(state, feature, method, pairs[i]);
+                                 })
+        ->Unit(benchmark::kMillisecond)
+        ->UseManualTime()
+        ->Iterations(rounds);
+  }
+  benchmark::RunSpecifiedBenchmarks();
+  for (const bench::Table& table : bench::tables(pairs)) {
+    std::fputs(("\n" + bench::plain(table)).c_str(), stdout);
+  }
+  if (!output.empty()) write_markdown(output, pairs);
+  benchmark::Shutdown();
+  return 0;
+}
+
+}  // namespace
+}  // namespace windsplat
+
+int main(int argc, char** argv) { return windsplat::run(argc, argv); }
