@@ -110,7 +110,7 @@ Result<Subject> standard_subject(const std::string& name, bool quick) {
   protocol::View view;
   view.dataset = name;
   return make_subject(name, std::move(dataset), view,
-                      quick ? PictureSize{160, 120} : PictureSize{320, 240});
+                      quick ? PictureSize{80, 60} : PictureSize{160, 120});
 }
 
 Result<Subject> make_subject(const std::string& name, std::shared_ptr<data::Dataset> dataset,

@@ -26,8 +26,7 @@ struct PictureSize {
 // behind a step edge), vectors, scalar, climate, tornado, efield.
 std::vector<std::string> standard_names();
 
-// Pictures of 128 x 128 for the blobs and 320 x 240 for the samples, whose lines would crowd each
-// other in smaller ones; half of both when `quick`.
+// Pictures of 128 x 128 for the blobs and 160 x 120 for the samples; half of both when `quick`.
 // Errors: not_found for any other name; those of the samples.
 Result<Subject> standard_subject(const std::string& name, bool quick);
 
