@@ -143,10 +143,14 @@ std::string reference_words(const SceneReport& scene) {
 Result<std::string> section(const SceneReport& scene) {
   std::string text = "<h2 id=\"" + escaped(scene.name) + "\">" + escaped(scene.name) + "</h2>\n";
   text += "<p>" + reference_words(scene) + "</p>\n<div class=\"plot\">" + plot_svg(scene);
-  text += "</div>\n<p>Ripple of overlapping footprints in a uniform medium of optical depth 1: ";
-  text += format_number("%.1e", scene.ripple_floor) + ". The truth is made of the same footprints ";
-  text += "and ripples alike: points below it are nearer to the splatted medium, not to the even ";
-  text += "one.</p>\n";
+  text += "</div>\n";
+  if (scene.ripple_floor > 0) {
+    text += "<p>Ripple of overlapping footprints in a uniform medium of optical depth 1: ";
+    text += format_number("%.1e", scene.ripple_floor);
+    text +=
+        ". The truth is made of the same footprints and ripples alike: points below it are "
+        "nearer to the splatted medium, not to the even one.</p>\n";
+  }
   text += "<details><summary>Every point, the most exact first</summary>" + points_table(scene);
   text += "</details>\n<details><summary>The encoding alone</summary>" + encoding_table(scene);
   text += "</details>\n<details><summary>The view</summary><pre>";

@@ -208,9 +208,11 @@ class Study {
     scene.evaluations = truth->evaluations;
     if (const auto done = measure_points(subject, *truth, scene); !done) return done.error();
     tell(subject, "pictures");
-    const auto ripple = ripple_floor(subject, pool_, cancel_);
-    if (!ripple) return ripple.error();
-    scene.ripple_floor = *ripple;
+    if (!subject.view.scalars->empty()) {
+      const auto ripple = ripple_floor(subject, pool_, cancel_);
+      if (!ripple) return ripple.error();
+      scene.ripple_floor = *ripple;
+    }
     auto encoded = measure_encoding(subject, pool_, cancel_);
     if (!encoded) return encoded.error();
     scene.encoded = std::move(*encoded);

@@ -35,7 +35,7 @@ struct SceneReport {
   std::int64_t evaluations = 0;
   std::vector<Point> points;
   std::vector<Curve> curves;
-  double ripple_floor = 0;
+  double ripple_floor = 0;  // 0: nothing ripples, there is no medium
   std::vector<Encoded> encoded;
   std::vector<Shown> pictures;
 };

@@ -57,6 +57,14 @@ TEST(MethodError, SlabsOfOneCellErrAFifthOfKernelsAtMostAtEqualStride) {
   }
 }
 
+// A slab of thickness 1 is twice as deep at stride 2, which a dense medium shows.
+TEST(MethodError, SlabsAsThickAsAtStrideOneErrAFifthAtMostInADenseMediumToo) {
+  const Scene scene = standard_scene("dense", 2);
+  const std::vector<double> truth = integral(scene);
+  EXPECT_GE(error_of(scene, Method::kernel, 1, truth).rmse,
+            5 * error_of(scene, Method::slab, 0.5, truth).rmse);
+}
+
 // Every line at its own depth in every pixel, whatever the slabs are.
 TEST(MethodError, SlabsOfLinesAloneAreTheIntegralItself) {
   const Scene scene = standard_scene("vectors", 1);
