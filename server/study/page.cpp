@@ -19,7 +19,7 @@ constexpr const char* style =
     "th,td{padding:.15em .7em;text-align:right;border-bottom:1px solid #e6e6ea}"
     "th{background:#f0f0f4}td:first-child,th:first-child{text-align:left}"
     "tr.front td{background:#fff6dd}tr.bad td{color:#b00020}"
-    ".plot{background:#fff;border:1px solid #e0e0e6;max-width:920px}"
+    ".plot{background:#fff;border:1px solid #e0e0e6;max-width:980px}"
     ".pictures{display:flex;flex-wrap:wrap;gap:14px 28px}.pair{display:flex;gap:6px}"
     "figure{margin:0}figcaption{font-size:13px;color:#555}"
     "img{display:block;image-rendering:pixelated;background:#000}"
@@ -46,7 +46,7 @@ Result<std::string> figure(const std::vector<std::uint8_t>& rgb, const SceneRepo
   const auto png = image::encode_png(rgb, scene.width, scene.height);
   if (!png) return png.error();
   std::string text = "<figure><img alt=\"" + escaped(scene.name + ", " + caption);
-  text += "\" width=\"" + std::to_string(std::max(200, 2 * scene.width));
+  text += "\" width=\"" + std::to_string(std::max(200, std::min(2 * scene.width, 320)));
   text += "\" src=\"data:image/png;base64," + base64(*png);
   text += "\"><figcaption>" + escaped(caption) + "</figcaption></figure>\n";
   return text;
@@ -143,8 +143,14 @@ std::string reference_words(const SceneReport& scene) {
 Result<std::string> section(const SceneReport& scene) {
   std::string text = "<h2 id=\"" + escaped(scene.name) + "\">" + escaped(scene.name) + "</h2>\n";
   text += "<p>" + reference_words(scene) + "</p>\n<div class=\"plot\">" + plot_svg(scene);
-  text += "</div>\n<p>Ripple of overlapping footprints in a uniform medium of optical depth 1: ";
-  text += format_number("%.1e", scene.ripple_floor) + ".</p>\n";
+  text += "</div>\n";
+  if (scene.ripple_floor > 0) {
+    text += "<p>Ripple of overlapping footprints in a uniform medium of optical depth 1: ";
+    text += format_number("%.1e", scene.ripple_floor);
+    text +=
+        ". The truth is made of the same footprints and ripples alike: points below it are "
+        "nearer to the splatted medium, not to the even one.</p>\n";
+  }
   text += "<details><summary>Every point, the most exact first</summary>" + points_table(scene);
   text += "</details>\n<details><summary>The encoding alone</summary>" + encoding_table(scene);
   text += "</details>\n<details><summary>The view</summary><pre>";
@@ -163,7 +169,7 @@ std::string stability_table(const std::vector<Stiffness>& all) {
       "<h2 id=\"stability\">Stiffness</h2>\n<p>One kernel, a line of opacity 0.6 at nine depths of "
       "a cell of optical depth &tau;, against its closed form; and " +
       std::to_string(stiff_layers) +
-      " such cells behind each other. Drawn by the engine itself.</p>\n"
+      " such cells of medium alone behind each other. Drawn by the engine itself.</p>\n"
       "<div class=\"scroll\"><table><tr><th>compositing</th><th>&tau;</th><th>largest error</th>"
       "<th>least</th><th>most</th><th>within [0, 1]</th><th>monotone in &tau;</th>"
       "<th>layers, least</th><th>layers, most</th><th>diverges</th></tr>\n";
@@ -223,7 +229,7 @@ Result<std::string> report_page(const Report& report) {
   text += escaped(machine.compiler) + ", on " + escaped(machine.processor) + ", ";
   text += escaped(machine.system) + ": " + std::to_string(machine.threads) + " threads of ";
   text += std::to_string(machine.hardware_threads) + ". Each time is the median of ";
-  text += std::to_string(timed_runs) + " runs after one to warm up. ";
+  text += std::to_string(report.runs) + " runs after one to warm up. ";
   text += std::to_string(report.measured) + " points measured";
   if (report.skipped > 0) text += ", " + std::to_string(report.skipped) + " taken from before";
   text += ", in " + format_number("%.1f", report.seconds) + " s.";

@@ -13,7 +13,7 @@ namespace windsplat::study {
 namespace {
 
 // Pixels of the drawing.
-constexpr double width = 920;
+constexpr double width = 980;
 constexpr double height = 520;
 constexpr double left = 70;
 constexpr double right = 620;
@@ -179,7 +179,11 @@ class Plot {
     if (!drawable(scene_.ripple_floor)) return;
     const double y = y_.at(scene_.ripple_floor);
     text_ += line(left, y, right, y, "stroke:#888888;stroke-dasharray:3,3");
-    text_ += label(right - 5, y - 4, "ripple floor", " text-anchor=\"end\" fill=\"#777777\"");
+    // Points crowd on the right where little is left to err.
+    text_ += "<rect" + attribute("x", left + 6) + attribute("y", y - 17) +
+             " width=\"222\" height=\"15\" fill=\"#ffffff\" opacity=\"0.8\"/>\n";
+    text_ += label(left + 9, y - 5, "ripple floor: splats against an even medium",
+                   " fill=\"#666666\" font-size=\"10.5\"");
   }
 
   void draw(const Curve& curve) {
@@ -233,12 +237,28 @@ class Plot {
                     "stroke:" + color + ";opacity:0.35;stroke-width:3");
     }
     if (m.stable && std::isfinite(m.rmse)) {
-      text_ += "<circle" + attribute("cx", x) + attribute("cy", y) + " r=\"3.4\" fill=\"" + color +
-               "\"><title>" + escaped(describe(point)) + "</title></circle>\n";
+      text_ += symbol(point.setting.method, x, y, color, escaped(describe(point)));
       return;
     }
     text_ += line(x - 5, y - 5, x + 5, y + 5, "stroke:" + color + ";stroke-width:2.2");
     text_ += line(x - 5, y + 5, x + 5, y - 5, "stroke:" + color + ";stroke-width:2.2");
+  }
+
+  // A disc for method kernel, a square for method slab.
+  static std::string symbol(scene::Method method, double x, double y, const std::string& color,
+                            const std::string& says) {
+    std::string text;
+    const bool square = method == scene::Method::slab;
+    if (square) {
+      text = "<rect" + attribute("x", x - 3.2) + attribute("y", y - 3.2) +
+             " width=\"6.4\" height=\"6.4\"";
+    } else {
+      text = "<circle" + attribute("cx", x) + attribute("cy", y) + " r=\"3.4\"";
+    }
+    text += " fill=\"" + color + "\">";
+    if (!says.empty()) text += "<title>" + says + "</title>";
+    text += square ? "</rect>\n" : "</circle>\n";
+    return text;
   }
 
   static std::string describe(const Point& point) {
@@ -267,21 +287,24 @@ class Plot {
       if (curve.points.size() < 2) entry(curve, y);
     }
     y += 6;
-    const char* const says = "ring: on the Pareto front; cross: unstable";
-    text_ += label(legend_left, y, says, " fill=\"#555555\" font-size=\"11\"");
+    for (const char* const says : {"disc: kernel; square: slab; bar: least to most time",
+                                   "ring, thin steps: the Pareto front",
+                                   "cross: outside [0, 1] (on the upper edge: beyond it)",
+                                   "slope: of log error over log knob"}) {
+      text_ += label(legend_left, y, says, " fill=\"#555555\" font-size=\"11\"");
+      y += legend_step - 2;
+    }
   }
 
   void entry(const Curve& curve, double& y) {
     const std::string color = color_of(curve.method, curve.compositing);
     const bool single = curve.points.size() < 2;
-    if (single) {
-      text_ += "<circle" + attribute("cx", legend_left + 12) + attribute("cy", y - 4) +
-               " r=\"3.4\" fill=\"" + color + "\"/>\n";
-    } else {
+    if (!single) {
       text_ +=
           line(legend_left, y - 4, legend_left + 26, y - 4,
                "stroke:" + color + ";stroke-width:1.8;stroke-dasharray:" + dash_of(curve.knob));
     }
+    text_ += symbol(curve.method, legend_left + 13, y - 4, color, "");
     std::string words = name_of(curve.method);
     words += ' ';
     words += name_of(curve.compositing);

@@ -80,7 +80,7 @@ std::string report_json(const Report& report) {
   document.threads = machine.threads;
   document.quick = report.quick;
   document.seconds = report.seconds;
-  document.runs = timed_runs;
+  document.runs = report.runs;
   document.measured = report.measured;
   document.skipped = report.skipped;
   for (const SceneReport& scene : report.scenes) document.scenes.push_back(document_of(scene));

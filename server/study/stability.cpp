@@ -36,7 +36,7 @@ scene::ColorTable one_color(const std::array<float, 3>& rgb) {
 }
 
 // Cells of edge 1 in a row along y, the way of the view.
-scene::Scene make_scene(int layers, double tau, scene::Compositing compositing) {
+scene::Scene make_scene(int layers, double tau, scene::Compositing compositing, bool with_line) {
   scene::Scene scene;
   scene.compositing = compositing;
   // Nothing is left out, not even behind a transmittance that a false compositing makes negative.
@@ -69,7 +69,7 @@ scene::Scene make_scene(int layers, double tau, scene::Compositing compositing) 
   lines.magnitude_intensity = 0;
   lines.jitter_center = 0;
   lines.jitter_stride = 0;
-  scene.vector = std::move(lines);
+  if (with_line) scene.vector = std::move(lines);
 
   scene::ScalarLayer medium;
   medium.field = make_volume(layers, {1.0F});
@@ -110,16 +110,22 @@ void take(const std::vector<float>& rgba, double& low, double& high) {
 Result<Stiffness> measure_one(scene::Compositing compositing, double tau,
                               std::vector<float>& alphas, ThreadPool& pool,
                               const CancelToken& cancel) {
-  const auto one = engine::render(make_scene(1, tau, compositing), pool, cancel);
+  const auto one = engine::render(make_scene(1, tau, compositing, true), pool, cancel);
   if (!one) return one.error();
-  const auto many = engine::render(make_scene(stiff_layers, tau, compositing), pool, cancel);
-  if (!many) return many.error();
+  const auto plain = engine::render(make_scene(1, tau, compositing, false), pool, cancel);
+  if (!plain) return plain.error();
+  const auto layers =
+      engine::render(make_scene(stiff_layers, tau, compositing, false), pool, cancel);
+  if (!layers) return layers.error();
   Stiffness out;
   out.compositing = compositing;
   out.tau = tau;
   const std::vector<float>& rgba = one->image.rgba;
   take(rgba, out.min, out.max);
-  take(many->image.rgba, out.layers_min, out.layers_max);
+  double plain_min = 0;
+  double plain_max = 0;
+  take(plain->image.rgba, plain_min, plain_max);
+  take(layers->image.rgba, out.layers_min, out.layers_max);
   for (int i = 0; i < pixels; ++i) {
     // The line's way through the cell and the row's width are one: pixel i meets it at x.
     const auto truth = exact(tau, (i + 0.5) / pixels);
@@ -134,8 +140,8 @@ Result<Stiffness> measure_one(scene::Compositing compositing, double tau,
   alphas.clear();
   for (int i = 0; i < pixels; ++i) alphas.push_back(rgba[4 * static_cast<std::size_t>(i) + 3]);
   out.bounded = outside(out.min, out.max) <= unit_slack;
-  out.diverges =
-      outside(out.layers_min, out.layers_max) > 2 * std::max(outside(out.min, out.max), unit_slack);
+  const double beyond = outside(out.layers_min, out.layers_max);
+  out.diverges = beyond > unit_slack && beyond >= (1 - unit_slack) * outside(plain_min, plain_max);
   return out;
 }
 

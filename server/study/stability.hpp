@@ -21,12 +21,12 @@ struct Stiffness {
   double max = 0;
   bool bounded = true;    // within [0, 1] but for 1e-3
   bool monotone = true;   // alpha no less than at the next smaller tau, at every depth of the line
-  double layers_min = 0;  // the same of stiff_layers such kernels behind each other
+  double layers_min = 0;  // the same of stiff_layers cells behind each other, their medium alone
   double layers_max = 0;
-  bool diverges = false;  // the layers go further beyond [0, 1] than twice what one kernel does
+  bool diverges = false;  // the layers do not heal how far beyond [0, 1] one cell's medium goes
 };
 
-inline constexpr int stiff_layers = 16;
+inline constexpr int stiff_layers = 17;  // odd: an even number of sign changes looks like none
 
 // Every compositing of method kernel at every optical depth of stiffness(). Exact for one kernel
 // (medium c_s, line c_v of opacity a at the fraction x of the cell's depth):

@@ -20,7 +20,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int results_version = 1;     // a new number whenever results change for the same setting
+constexpr int results_version = 2;     // a new number whenever results change for the same setting
 constexpr double truth_weight = 12;    // points that take as long as one truth
 constexpr double pictures_weight = 2;  // and as the rest of a scene
 constexpr int amplification = 10;
@@ -65,6 +65,7 @@ class Study {
         points_(std::move(points)) {
     report_.machine = this_machine(pool.size());
     report_.quick = options.quick;
+    report_.runs = options.quick ? quick_runs : timed_runs;
   }
 
   Result<Report> run() {
@@ -85,7 +86,7 @@ class Study {
     std::string text = identity(subject, report_.machine, bool(options_.truth));
     text += ' ';
     text += words_of(setting);
-    text += " runs " + std::to_string(timed_runs);
+    text += " runs " + std::to_string(report_.runs);
     text += " threads " + std::to_string(pool_.size());
     text += ' ';
     text += report_.machine.kernels;
@@ -150,7 +151,7 @@ class Study {
       // Small pictures end before the engine asks.
       if (cancel_.cancelled()) return make_error(ErrorKind::cancelled, "the study was interrupted");
       tell(subject, std::string(name_of(setting.method)) + " " + name_of(setting.compositing));
-      const auto measured = measure(subject, setting, truth, pool_, cancel_);
+      const auto measured = measure(subject, setting, truth, pool_, cancel_, report_.runs);
       if (!measured) return measured.error();
       if (const auto kept = points_.append(key, *measured); !kept) return kept.error();
       scene.points.push_back({setting, *measured, false});
@@ -207,9 +208,11 @@ class Study {
     scene.evaluations = truth->evaluations;
     if (const auto done = measure_points(subject, *truth, scene); !done) return done.error();
     tell(subject, "pictures");
-    const auto ripple = ripple_floor(subject, pool_, cancel_);
-    if (!ripple) return ripple.error();
-    scene.ripple_floor = *ripple;
+    if (!subject.view.scalars->empty()) {
+      const auto ripple = ripple_floor(subject, pool_, cancel_);
+      if (!ripple) return ripple.error();
+      scene.ripple_floor = *ripple;
+    }
     auto encoded = measure_encoding(subject, pool_, cancel_);
     if (!encoded) return encoded.error();
     scene.encoded = std::move(*encoded);

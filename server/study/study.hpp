@@ -35,7 +35,7 @@ struct SceneReport {
   std::int64_t evaluations = 0;
   std::vector<Point> points;
   std::vector<Curve> curves;
-  double ripple_floor = 0;
+  double ripple_floor = 0;  // 0: nothing ripples, there is no medium
   std::vector<Encoded> encoded;
   std::vector<Shown> pictures;
 };
@@ -43,7 +43,8 @@ struct SceneReport {
 struct Report {
   Machine machine;
   bool quick = false;
-  double seconds = 0;  // this run alone
+  int runs = timed_runs;  // by the clock, of each point
+  double seconds = 0;     // this run alone
   std::size_t measured = 0;
   std::size_t skipped = 0;  // points that the folder held already
   std::vector<SceneReport> scenes;

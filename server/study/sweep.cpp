@@ -105,14 +105,14 @@ Result<engine::Image> draw(const Subject& subject, const Setting& setting, Threa
 }
 
 Result<Measurement> measure(const Subject& subject, const Setting& setting, const Picture& truth,
-                            ThreadPool& pool, const CancelToken& cancel) {
+                            ThreadPool& pool, const CancelToken& cancel, int runs) {
   using Clock = std::chrono::steady_clock;
   const auto scene = scene_at(subject, setting);
   if (!scene) return scene.error();
   auto rendered = engine::render(*scene, pool, cancel);
   if (!rendered) return rendered.error();
   std::vector<double> times;
-  for (int run = 0; run < timed_runs; ++run) {
+  for (int run = 0; run < runs; ++run) {
     const Clock::time_point start = Clock::now();
     const auto again = engine::render(*scene, pool, cancel);
     times.push_back(milliseconds(Clock::now() - start));

@@ -14,6 +14,7 @@
 namespace windsplat::study {
 
 inline constexpr int timed_runs = 9;
+inline constexpr int quick_runs = 3;        // of a quick study
 inline constexpr double unit_slack = 1e-3;  // how far beyond [0, 1] a stable picture may go
 
 struct Sweep {
@@ -29,10 +30,10 @@ Sweep plan_sweep(const Subject& subject, bool quick);
 Result<engine::Image> draw(const Subject& subject, const Setting& setting, ThreadPool& pool,
                            const CancelToken& cancel);
 
-// Draws the setting once to warm up and timed_runs times by the clock, and compares the picture,
+// Draws the setting once to warm up and `runs` times by the clock, and compares the picture,
 // brought to the truth's size, with the truth.
 Result<Measurement> measure(const Subject& subject, const Setting& setting, const Picture& truth,
-                            ThreadPool& pool, const CancelToken& cancel);
+                            ThreadPool& pool, const CancelToken& cancel, int runs = timed_runs);
 
 // The picture as it is displayed: 8-bit sRGB over the background.
 std::vector<std::uint8_t> displayed(std::span<const float> rgba, int width, int height,

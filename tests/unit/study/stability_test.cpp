@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace windsplat::study {
@@ -28,6 +29,62 @@ TEST(Stability, AnalyticIsExactBoundedAndMonotoneAtEveryStiffness) {
     EXPECT_TRUE(s.bounded) << s.tau;
     EXPECT_TRUE(s.monotone) << s.tau;
     EXPECT_FALSE(s.diverges) << s.tau;
+  }
+}
+
+// No slack here but a float's rounding: what is bounded is so at every optical depth.
+TEST(Stability, CorrectedAndAnalyticStayWithinTheUnitIntervalForEveryOpticalDepth) {
+  constexpr double rounding = 1e-6;
+  for (const Compositing compositing : {Compositing::cd, Compositing::analytic}) {
+    for (const Stiffness& s : sweep_of(compositing)) {
+      SCOPED_TRACE(testing::Message() << name_of(compositing) << " " << s.tau);
+      EXPECT_GE(s.min, 0);
+      EXPECT_LE(s.max, 1 + rounding);
+      EXPECT_GE(s.layers_min, 0);
+      EXPECT_LE(s.layers_max, 1 + rounding);
+      EXPECT_TRUE(s.monotone);
+      EXPECT_FALSE(s.diverges);
+    }
+  }
+}
+
+// exp(-tau x) and its chord 1 - x (1 - exp(-tau)) differ by at most tau^2 / 8, and by less than 1;
+// times the line's opacity 0.6 and the largest distance of its colour from the medium's, 0.7. The
+// error grows with tau: the bound is not met by being exact.
+TEST(Stability, TheChordOfCorrectedErrsByAtMostAnEighthOfTheSquare) {
+  for (const Stiffness& s : sweep_of(Compositing::cd)) {
+    const double most = 0.6 * 0.7 * std::min(1.0, s.tau * s.tau / 8);
+    EXPECT_LE(s.error, most + 1e-6) << s.tau;
+    if (s.tau >= 0.1) {
+      EXPECT_GE(s.error, 0.25 * std::min(most, 0.3)) << s.tau;
+    }
+  }
+}
+
+// The transmittance of n layers is (1 - tau)^n: beyond 1 the first layer leaves [0, 1], below 2
+// those behind it heal that, from 2 on they make it no better or worse.
+TEST(Stability, EulerLeavesTheUnitIntervalBeyondOneAndDivergesFromTwoOn) {
+  for (const Stiffness& s : sweep_of(Compositing::cd_euler)) {
+    EXPECT_EQ(s.bounded, s.tau <= 1) << s.tau;
+    EXPECT_EQ(s.diverges, s.tau >= 2) << s.tau;
+    if (s.tau == 2 || s.tau == 3) {
+      EXPECT_NEAR(s.layers_max, 1 + std::pow(s.tau - 1, stiff_layers), 1e-4 * s.layers_max);
+    }
+    if (s.tau >= 10) {
+      EXPECT_GT(s.layers_max, 1e6 * s.max) << s.tau;
+    }
+  }
+}
+
+TEST(Stability, SimpleAndNaiveAreBoundedButWrong) {
+  for (const Compositing compositing : {Compositing::simple, Compositing::cd_naive}) {
+    double worst = 0;
+    for (const Stiffness& s : sweep_of(compositing)) {
+      EXPECT_TRUE(s.bounded) << s.tau;
+      EXPECT_FALSE(s.diverges) << s.tau;
+      worst = std::max(worst, s.error);
+    }
+    EXPECT_GT(worst, 0.1) << name_of(compositing);
   }
 }
 

@@ -1,0 +1,65 @@
+#!/usr/bin/env python3
+"""A study's study.json -> the tables of README.md beside this file, as Markdown.
+Usage: table.py DIR/study.json [SCENE...]"""
+import json
+import sys
+
+COMPOSITINGS = ["analytic", "cd", "cd-naive", "simple", "cd-euler"]
+TAUS = [1e-30, 0.1, 0.5, 1, 1.5, 2, 3, 10, 50, 1e30]
+
+
+def at_own_knobs(scene):
+    """The points of one scene at its view's own knobs; of the slabs those of thickness 1."""
+    view = scene["view"]
+    for point in scene["points"]:
+        knobs = point["knobs"]
+        stop = knobs["stopTransmittance"] == view["method"]["stopTransmittance"]
+        whole = knobs["width"] == view["image"]["width"]
+        if stop and whole and knobs["stride"] == 1 and knobs.get("slabThickness", 1) == 1:
+            if knobs.get("span", 7) == view["vector"]["span"]:
+                yield point
+
+
+def number(form, value, stable):
+    return form % value if stable and value is not None else "fails"
+
+
+def methods(scene):
+    for point in at_own_knobs(scene):
+        s = point["stable"]
+        print("| %s | %s %s | %s | %s | %s | %.3g | %s |" % (
+            scene["name"], point["method"], point["compositing"],
+            number("%.1e", point["rmse"], s), number("%.1f", point["psnr"], s),
+            number("%.4f", point["flip"], s), point["ms"], "yes" if point["pareto"] else ""))
+
+
+def words(row):
+    if row["diverges"]:
+        return "diverges"
+    if not row["bounded"]:
+        return "leaves [0, 1]"
+    return "%.0e" % row["error"] if row["error"] > 1e-6 else "exact"
+
+
+def stiffness(rows):
+    print("| tau | " + " | ".join(COMPOSITINGS) + " |")
+    print("|---" * (1 + len(COMPOSITINGS)) + "|")
+    for tau in TAUS:
+        found = {r["compositing"]: r for r in rows if r["tau"] == tau}
+        cells = [words(found[name]) for name in COMPOSITINGS]
+        print("| %s | " % ("inf" if tau == 1e30 else "%g" % tau) + " | ".join(cells) + " |")
+
+
+def main():
+    with open(sys.argv[1], encoding="utf-8") as file:
+        study = json.load(file)
+    print("| scene | method | RMSE | PSNR, dB | FLIP | ms | on the front |")
+    print("|---|---|---|---|---|---|---|")
+    for scene in study["scenes"]:
+        if scene["name"] in sys.argv[2:] or len(sys.argv) == 2:
+            methods(scene)
+    print()
+    stiffness(study["stability"])
+
+
+main()
