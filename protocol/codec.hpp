@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "protocol/messages.hpp"
@@ -39,6 +40,10 @@ class ViewDocument {
 // render --set /pointer=value: the value is JSON, or a plain string where it does not parse.
 Result<ViewDocument> set_at(const ViewDocument& document, std::string_view pointer,
                             std::string_view value);
+
+// Several of them, (pointer, value) in order; only what they make together is checked.
+Result<ViewDocument> set_all(const ViewDocument& document,
+                             const std::vector<std::pair<std::string, std::string>>& changes);
 
 std::string encode_view(const View& view);  // every key; canonical
 

@@ -129,13 +129,12 @@ View ViewDocument::view() const {
   return view;
 }
 
-Result<ViewDocument> set_at(const ViewDocument& document, std::string_view pointer,
-                            std::string_view value) {
+namespace {
+
+Result<void> put(Json& tree, std::string_view pointer, std::string_view value) {
   const auto tokens = split_pointer(pointer);
   if (!tokens) return tokens.error();
-  auto tree = parse_json(document.canonical());
-  if (!tree) return tree.error();
-  Json* target = &*tree;
+  Json* target = &tree;
   std::string at;
   for (const std::string& token : *tokens) {
     const bool starts_array = token == "0" || token == "-";
@@ -156,7 +155,24 @@ Result<ViewDocument> set_at(const ViewDocument& document, std::string_view point
   }
   auto parsed = parse_json(value);
   *target = parsed ? std::move(*parsed) : Json(std::string(value));
+  return {};
+}
+
+}  // namespace
+
+Result<ViewDocument> set_all(const ViewDocument& document,
+                             const std::vector<std::pair<std::string, std::string>>& changes) {
+  auto tree = parse_json(document.canonical());
+  if (!tree) return tree.error();
+  for (const auto& [pointer, value] : changes) {
+    if (auto done = put(*tree, pointer, value); !done) return done.error();
+  }
   return checked_document(*tree);
+}
+
+Result<ViewDocument> set_at(const ViewDocument& document, std::string_view pointer,
+                            std::string_view value) {
+  return set_all(document, {{std::string(pointer), std::string(value)}});
 }
 
 }  // namespace windsplat::protocol

@@ -59,11 +59,8 @@ Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments) {
     }
     changes.emplace_back(setting.substr(0, equals), setting.substr(equals + 1));
   }
-  for (const auto& [pointer, value] : changes) {
-    if (!document) break;
-    document = protocol::set_at(*document, pointer, value);
-  }
-  return document;
+  if (!document || changes.empty()) return document;
+  return protocol::set_all(*document, changes);
 }
 
 Result<frame::Format> format_of(const std::string& output) {

@@ -91,7 +91,12 @@ Result<void> complete_magnitudes(View& view, const Lattice& lattice,
   const Range& range = *vector.magnitude_range;
   if (!(range[0] < range[1])) return invalid("/vector/magnitudeRange", "does not ascend");
   if (!vector.min_magnitude) {
-    vector.min_magnitude = volume ? default_min_magnitude(vector, *volume, lattice, slice) : 0.0;
+    // Of the lines as they are by default: a view that changes one of their keys changes that
+    // alone.
+    protocol::VectorView plain;
+    plain.length = default_length(lattice, plain.stride, slice);
+    plain.magnitude_range = vector.magnitude_range;
+    vector.min_magnitude = volume ? default_min_magnitude(plain, *volume, lattice, slice) : 0.0;
   }
   return {};
 }
@@ -229,7 +234,7 @@ Result<View> complete_view(const View& view, data::Dataset& dataset) {
   if (!camera) return camera.error();
   if (auto ok = choose_vector_field(full, info); !ok) return ok.error();
   protocol::VectorView& vector = full.vector;
-  if (!vector.length) vector.length = default_length(*lattice, vector.stride, slice);
+  if (!vector.length) vector.length = default_length(*lattice, 1, slice);
   if (auto ok = complete_magnitudes(full, *lattice, slice, dataset); !ok) return ok.error();
   if (auto ok = check_color_field(vector.color, info); !ok) return ok.error();
   if (!vector.color.by) vector.color.by = default_color_by(info.grid);

@@ -62,7 +62,7 @@ void Session::start_next(Micros now) {
   } else if (moving) {
     const int width = view_.image.width;
     const int height = view_.image.height;
-    const bool cheap = levels_.expected(0, width, height, now) <= budget();
+    const bool cheap = final_cost(width, height, now) <= budget();
     // A viewer that has stopped while its credit was out need not see a lesser frame first.
     if (quiet && cheap && !player_.running()) {
       start_final();
@@ -72,6 +72,15 @@ void Session::start_next(Micros now) {
   } else if (wants_final() && quiet) {
     start_final();
   }
+}
+
+// What a final frame is expected to take: by slab, what the last one of its kind took, or at first
+// several times what a moving frame does.
+Micros Session::final_cost(int width, int height, Micros now) const {
+  const Micros moving = levels_.expected(0, width, height, now);
+  if (view_.method.name == protocol::MethodName::kernel) return moving;
+  constexpr Micros dearer = 4;
+  return std::max(moving, last_final_cost_.value_or(dearer * moving));
 }
 
 Session::Render Session::render_of(Purpose purpose) const {

@@ -135,6 +135,9 @@ Effects Session::on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros n
     levels_.learn(render.encoding.level, render.width, render.height,
                   drawn->render_us + drawn->encode_us, now);
   }
+  if (!comparable && render.purpose == Purpose::final) {
+    last_final_cost_ = drawn->render_us + drawn->encode_us;
+  }
   if (render.unwanted) {
     ++stats_.dropped;
   } else {

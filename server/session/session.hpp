@@ -107,6 +107,7 @@ class Session {
   void start_moving(Micros now);
   void start_final();
   void start_still();
+  [[nodiscard]] Micros final_cost(int width, int height, Micros now) const;
   [[nodiscard]] Render render_of(Purpose purpose) const;
   void start(Render render, const protocol::View& view);
   void abandon_render();
@@ -157,6 +158,7 @@ class Session {
   std::optional<Render> render_;
   std::uint64_t tickets_ = 0;
   LevelChooser levels_;
+  std::optional<Micros> last_final_cost_;  // of a frame not drawn by kernel
   protocol::StatsMessage stats_;
 };
 

@@ -209,7 +209,7 @@ struct Meeting {
   float opacity[block_pixels];
   float color[3][block_pixels];
 };
-constexpr int meetings_max = 64;  // put in order together
+constexpr int meetings_max = 64;  // put in order together; a line moves by half of that at most
 
 template <int Compositing>
 inline void open_passage(const float* __restrict gathered, Passage& p) {
@@ -352,25 +352,28 @@ void close_slab_block(const Slab& slab, const Hit* hits, int count, int index, T
   Passage passage;
   open_passage<Compositing>(gathered, passage);
   Meeting meetings[meetings_max];
-  for (int first = 0; first < count; first += meetings_max) {
-    const int last = first + meetings_max < count ? first + meetings_max : count;
-    for (int h = first; h < last; ++h) {
-      const RibbonRecord& line = *hits[h].line;
-      if (line.moving != 0) {
-        meet_line<Perspective, style_moving>(line.ribbon, line.centre, slab, x, y,
-                                             meetings[h - first]);
-      } else {
-        meet_line<Perspective, style_head>(line.ribbon, line.centre, slab, x, y,
-                                           meetings[h - first]);
-      }
+  int held = 0;
+  for (int h = 0; h < count; ++h) {
+    const RibbonRecord& line = *hits[h].line;
+    if (line.moving != 0) {
+      meet_line<Perspective, style_moving>(line.ribbon, line.centre, slab, x, y, meetings[held]);
+    } else {
+      meet_line<Perspective, style_head>(line.ribbon, line.centre, slab, x, y, meetings[held]);
     }
-    sort_meetings(meetings, last - first);
-    for (int n = 0; n < last - first; ++n) pass_line<Compositing>(meetings[n], passage);
-    if (last < count && is_dark(block, passage, slab.stop)) {
+    if (++held < meetings_max || h + 1 == count) continue;
+    // The nearer half passes, the farther one may still be met by lines to come.
+    sort_meetings(meetings, held);
+    held = meetings_max / 2;
+    for (int n = 0; n < held; ++n) pass_line<Compositing>(meetings[n], passage);
+    for (int n = 0; n < held; ++n) meetings[n] = meetings[n + held];
+    if (is_dark(block, passage, slab.stop)) {
       tile.any_closed = 1;  // what is behind was left out
+      held = 0;
       break;
     }
   }
+  sort_meetings(meetings, held);
+  for (int n = 0; n < held; ++n) pass_line<Compositing>(meetings[n], passage);
   close_passage<Compositing>(passage,
                              tile.blocks + static_cast<std::ptrdiff_t>(index) * block_floats);
   constexpr bool euler = Compositing == compositing_cd_euler;
