@@ -54,7 +54,7 @@ Result<void> render(const Arguments& arguments) {
   const frame::Encoding encoding = file_encoding(*format, arguments.view.quality);
   const auto picture = frame::produce(view, **dataset, encoding, pool, CancelToken());
   if (!picture) return picture.error();
-  const auto written = write_output(arguments.output, picture->bytes);
+  auto written = write_output(arguments.output, picture->bytes);
   if (!written || arguments.report.empty()) return written;
   return write_report(arguments.report, *picture);
 }

@@ -241,7 +241,7 @@ void write_markdown(const std::string& path, const std::vector<Pair>& pairs) {
 }
 
 int run(int argc, char** argv) {
-  constexpr int rounds = 15;
+  constexpr int rounds = 7;
   benchmark::Initialize(&argc, argv);
   std::string output;
   const std::string option = "--markdown=";

@@ -243,10 +243,9 @@ TEST(ProduceFields, WhatIsNotShownIsNeverRead) {
               }),
               (Reads{{"q@0", 1}}));
     EXPECT_EQ(reads_of([&](protocol::View& view) {
-                view.step = 1;
                 view.scalars = {fog("t"), fog("t")};
               }),
-              (Reads{{"t@1", 1}, {"wind@1", 1}}));
+              (Reads{{"t@0", 1}, {"wind@0", 1}}));
     EXPECT_EQ(reads_of([&](protocol::View& view) {
                 view.scalars.emplace();
                 view.vector.color.by = protocol::ColorBy::scalar;
