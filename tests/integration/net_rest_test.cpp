@@ -303,7 +303,7 @@ TEST_F(Rest, head_is_get_without_the_body) {
 TEST_F(Rest, beyond_what_can_wait_comes_429_at_once) {
   // More pictures than may wait, asked for before the first is done.
   const std::string slow =
-      "GET /v1/datasets/small/frame.png?width=4096&height=2048 HTTP/1.1\r\nHost: x\r\n\r\n";
+      "GET /v1/datasets/small/frame.png?width=4096&height=4096 HTTP/1.1\r\nHost: x\r\n\r\n";
   std::vector<std::unique_ptr<Socket>> sockets;
   for (int n = 0; n < 30; ++n) {
     sockets.push_back(std::make_unique<Socket>(port()));

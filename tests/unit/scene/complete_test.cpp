@@ -167,8 +167,19 @@ TEST(CompleteView, LinesAreAboutFiveGridSpacingsLong) {
   auto dataset = sample_dataset("tornado", {32, 32, 32});
   View view;
   EXPECT_NEAR(*completed(view, *dataset).vector.length, 5 * 2.0 / 32, 0.02);
+}
+
+TEST(CompleteView, AChangedKeyOfTheLinesLeavesTheOthersDefaultsAlone) {
+  auto dataset = sample_dataset("tornado", {32, 32, 32});
+  const protocol::VectorView plain = completed(View{}, *dataset).vector;
+  View view;
   view.vector.stride = 3;
-  EXPECT_NEAR(*completed(view, *dataset).vector.length, 15 * 2.0 / 32, 0.06);
+  EXPECT_EQ(completed(view, *dataset).vector.length, plain.length);
+  view.vector.length = 0.01;
+  view.vector.r2 = 5;
+  const protocol::VectorView changed = completed(view, *dataset).vector;
+  EXPECT_EQ(changed.min_magnitude, plain.min_magnitude);
+  EXPECT_EQ(changed.color.range, plain.color.range);
 }
 
 TEST(CompleteView, AtmospheresAreColouredByHeightOthersByMagnitude) {

@@ -85,7 +85,7 @@ TEST(Slice, KeepsItsLinesByDefault) {
 // Of many lines in one layer only the strongest of that layer are shown, wherever the others are.
 TEST(Slice, CountsItsOwnLinesAlone) {
   data::Grid grid;
-  std::vector<double> many(300);
+  std::vector<double> many(900);
   for (std::size_t n = 0; n < many.size(); ++n) many[n] = static_cast<double>(n);
   grid.axes = {axis(data::AxisKind::cartesian, "m", many),
                axis(data::AxisKind::cartesian, "m", many),
@@ -94,21 +94,21 @@ TEST(Slice, CountsItsOwnLinesAlone) {
       std::make_unique<FakeSource>(std::move(grid), std::vector<data::FieldInfo>{wind_info()}, 1);
   // Magnitudes of the lower layer spread evenly up to 1, of the upper up to 100.
   source->values = [](const std::string&, std::size_t n) {
-    const bool upper = n >= std::size_t{300} * 300;
+    const bool upper = n >= std::size_t{900} * 900;
     const double share = std::fmod(static_cast<double>(n) * 0.7548776662466927, 1.0);
     return share * (upper ? 100 : 1) / std::sqrt(3.0);
   };
   auto dataset = dataset_of(std::move(source));
   View view;
   view.vector.magnitude_range = protocol::Range{0, 1};
-  view.vector.length = 0.2;
   view.geometry.slice = SliceView{GridAxis::z, 0};
   const auto full = complete_view(view, *dataset);
   ASSERT_TRUE(full);
   // The layer is 2 by 2; seen from 35 degrees above, 720 pixels are 2.08 (sin 35 + 0.01) high, so
-  // 300 x 300 lines of 0.15 by 2 pixels are there to cover three times that area.
+  // 900 x 900 lines of three quarters of five spacings by 2 pixels are there to cover three times
+  // that area.
   const double pixel = 2.08 * (std::sin(35 * std::numbers::pi / 180) + 0.005) / 720;
-  const double wanted = 1 - 3 * 4 / (0.15 * 2 * pixel * 90000);
+  const double wanted = 1 - 3 * 4 / (0.75 * 0.011 * 2 * pixel * 810000);
   EXPECT_NEAR(*full->vector.min_magnitude, wanted, 0.06);
   view.geometry.slice->index = 1;
   EXPECT_DOUBLE_EQ(*complete_view(view, *dataset)->vector.min_magnitude, 0.9);  // all but the top
