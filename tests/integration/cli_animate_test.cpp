@@ -123,6 +123,7 @@ TEST(CliAnimate, ASignalStopsItBetweenWholeFiles) {
       if (entry.path() == path) continue;
       const std::string bytes = read_file(entry.path().string());
       EXPECT_EQ(entry.path().extension(), ".png") << entry.path();
+      ASSERT_GT(bytes.size(), 8U) << entry.path();
       EXPECT_EQ(png_size(bytes), (std::pair<std::uint32_t, std::uint32_t>(320, 240)));
       EXPECT_EQ(bytes.substr(bytes.size() - 8, 4), "IEND") << entry.path();
     }
