@@ -237,6 +237,7 @@ Json dataset_json(const DatasetDescription& dataset) {
                  {"y", axis_json(dataset.axes[1])},
                  {"z", axis_json(dataset.axes[2])}};
   out["world"] = {{"min", vec3_json(dataset.world_min)}, {"max", vec3_json(dataset.world_max)}};
+  out["mappings"] = dataset.mappings;
   out["leftOut"] = std::move(left_out);
   out["steps"] = {{"count", dataset.steps.size()}, {"times", std::move(times)}};
   out["timeUnits"] = dataset.time_units;

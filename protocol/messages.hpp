@@ -88,6 +88,7 @@ struct DatasetDescription {
   std::array<AxisDescription, 3> axes;
   Vec3 world_min{};
   Vec3 world_max{};
+  std::vector<std::string> mappings;  // of /geometry/mapping, those that its grid can be bent to
   std::vector<FieldDescription> fields;
   std::vector<std::pair<std::string, std::string>> left_out;  // variable, reason
   std::vector<StepDescription> steps;

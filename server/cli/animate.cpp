@@ -17,6 +17,7 @@
 #include "server/base/thread_pool.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/picture.hpp"
+#include "server/cli/signals.hpp"
 
 namespace windsplat::cli {
 namespace {
@@ -154,7 +155,16 @@ struct Plan {
   int per_step = 1;
 };
 
-Result<Plan> plan_of(const Arguments& arguments, int step_count, const protocol::View& view) {
+bool draws_lines(const protocol::View& view, const data::DatasetInfo& info) {
+  using Kind = protocol::FieldChoice::Kind;
+  const Kind kind = view.vector.field.kind;
+  if (kind != Kind::dataset_default) return kind == Kind::named;
+  return info.first(data::FieldKind::vector) != nullptr;
+}
+
+Result<Plan> plan_of(const Arguments& arguments, const data::DatasetInfo& info,
+                     const protocol::View& view) {
+  const int step_count = static_cast<int>(info.steps.size());
   Plan plan;
   const auto pattern = parse_pattern(arguments.output);
   if (!pattern) {
@@ -179,9 +189,10 @@ Result<Plan> plan_of(const Arguments& arguments, int step_count, const protocol:
                       "--steps: the last step is " + std::to_string(step_count - 1));
   }
   plan.per_step = arguments.per_step;
-  if (plan.per_step > 1 && view.vector.motion == protocol::MotionMode::still) {
+  const bool moves = view.vector.motion == protocol::MotionMode::phase && draws_lines(view, info);
+  if (plan.per_step > 1 && !moves) {
     return make_error(ErrorKind::invalid,
-                      "--per-step: nothing moves between steps unless the view has "
+                      "--per-step: nothing moves between steps unless the view has lines and "
                       "/vector/motion/mode=phase");
   }
   if (plan.steps.count() > std::numeric_limits<int>::max() / plan.per_step) {
@@ -190,27 +201,34 @@ Result<Plan> plan_of(const Arguments& arguments, int step_count, const protocol:
   return plan;
 }
 
-Result<void> animate(const Arguments& arguments) {
+Error interrupted(int done, int total) {
+  return make_error(ErrorKind::cancelled, "animate: interrupted after " + std::to_string(done) +
+                                              " of " + std::to_string(total) + " frames");
+}
+
+Result<void> animate(const Arguments& arguments, const CancelToken& cancel) {
   const auto document = assemble_view(arguments.view);
   if (!document) return document.error();
   const auto dataset = open_dataset(arguments.view.dataset);
   if (!dataset) return dataset.error();
   protocol::View view = document->view();
   view.dataset = (*dataset)->info().id;
-  const auto plan = plan_of(arguments, static_cast<int>((*dataset)->info().steps.size()), view);
+  const auto plan = plan_of(arguments, (*dataset)->info(), view);
   if (!plan) return plan.error();
 
   const frame::Encoding encoding = file_encoding(plan->format, arguments.view.quality);
   ThreadPool pool(arguments.threads);
   const int total = plan->steps.count() * plan->per_step;
+  const double motion_start = view.vector.motion_time;
   Progress progress(total);
   for (int n = 0; n < total; ++n) {
     progress.show(n);
     view.step = plan->steps.first + n / plan->per_step * plan->steps.stride;
-    if (plan->per_step > 1) {
-      view.vector.motion_time = static_cast<double>(n % plan->per_step) / plan->per_step;
-    }
-    const auto picture = frame::produce(view, **dataset, encoding, pool, CancelToken());
+    // Of the way to the next step that is drawn, so that the phase does not jump there.
+    const double part = static_cast<double>(n % plan->per_step) / plan->per_step;
+    view.vector.motion_time = motion_start + plan->steps.stride * part;
+    const auto picture = frame::produce(view, **dataset, encoding, pool, cancel);
+    if (cancel.cancelled()) return interrupted(n, total);
     if (!picture) return picture.error();
     if (auto done = write_output(plan->pattern.name(n), picture->bytes); !done) return done;
   }
@@ -237,8 +255,12 @@ void add_animate(CLI::App& app, Action& chosen) {
   add_threads_option(*command, arguments->threads);
   command->callback([&chosen, arguments] {
     chosen = [arguments] {
-      const auto done = animate(*arguments);
-      return done ? exit_ok : answer(done.error());
+      const CancelToken cancel;
+      const SignalWatch watch([&cancel] { cancel.cancel(); });
+      const auto done = animate(*arguments, cancel);
+      if (done) return exit_ok;
+      const int code = answer(done.error());
+      return done.error().kind == ErrorKind::cancelled ? exit_interrupted : code;
     };
   });
 }

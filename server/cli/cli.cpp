@@ -13,8 +13,8 @@ namespace {
 
 constexpr const char* description =
     "windsplat draws winds and clouds from a 3-D field, on the CPU, for a browser or a file.\n"
-    "Exit codes: 0 ok, 1 failed, 2 usage, 3 bad data. An option that names an environment\n"
-    "variable may be given by it; the option wins.";
+    "Exit codes: 0 ok, 1 failed, 2 usage, 3 bad data, 130 interrupted (animate, study).\n"
+    "An option that names an environment variable may be given by it; the option wins.";
 
 int run_parsed(CLI::App& app, const Action& chosen, int argc, const char* const* argv) {
   if (argc <= 1) {

@@ -8,6 +8,8 @@
 #include <memory>
 #include <system_error>
 
+#include "server/base/whole_file.hpp"
+
 namespace windsplat::cli {
 namespace {
 
@@ -21,11 +23,6 @@ using File = std::unique_ptr<std::FILE, CloseFile>;
 Error file_error(ErrorKind kind, const char* what, const std::string& path) {
   return make_error(kind, std::string(what) + " '" + printable(path) +
                               "': " + std::generic_category().message(errno));
-}
-
-bool write_whole(std::FILE* file, std::string_view bytes) {
-  const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
-  return std::fflush(file) == 0 && written;
 }
 
 }  // namespace
@@ -118,20 +115,14 @@ Result<std::string> read_text_file(const std::string& path, std::size_t bytes_ma
 }
 
 Result<void> write_stdout(std::string_view text) {
-  if (!write_whole(stdout, text)) return file_error(ErrorKind::internal, "cannot write", "-");
-  return {};
+  const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
+  if (std::fflush(stdout) == 0 && written) return {};
+  return file_error(ErrorKind::internal, "cannot write", "-");
 }
 
 Result<void> write_output(const std::string& path, std::span<const std::uint8_t> bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (path == "-") return write_stdout(text);
-  File file(std::fopen(path.c_str(), "wbe"));
-  if (!file) return file_error(ErrorKind::internal, "cannot create", path);
-  const bool written = write_whole(file.get(), text);
-  if (std::fclose(file.release()) == 0 && written) return {};
-  const Error error = file_error(ErrorKind::internal, "cannot write", path);
-  std::remove(path.c_str());
-  return error;
+  return path == "-" ? write_stdout(text) : write_whole_file(path, text);
 }
 
 }  // namespace windsplat::cli

@@ -18,6 +18,7 @@ inline constexpr int exit_ok = 0;
 inline constexpr int exit_failed = 1;
 inline constexpr int exit_usage = 2;
 inline constexpr int exit_bad_data = 3;
+inline constexpr int exit_interrupted = 130;  // as shells say it of SIGINT
 
 // What is run once the arguments are known to be right; the value is the exit code.
 using Action = std::function<int()>;
@@ -51,7 +52,7 @@ std::optional<std::uint64_t> parse_bytes(std::string_view text);
 // The whole file. Errors: not_found, too_large beyond `bytes_max`.
 Result<std::string> read_text_file(const std::string& path, std::size_t bytes_max);
 
-// To a file, or to stdout for "-". A file that could not be written whole is removed.
+// To a file (see write_whole_file), or to stdout for "-".
 Result<void> write_output(const std::string& path, std::span<const std::uint8_t> bytes);
 Result<void> write_stdout(std::string_view text);
 

@@ -26,7 +26,6 @@ namespace windsplat::cli {
 namespace {
 
 constexpr std::uint64_t resident_bytes_max = 8ULL << 30;
-constexpr int exit_interrupted = 130;  // as shells say it of SIGINT
 constexpr int bar_width = 28;
 // Of the integral: a hundredth of the least error that a picture of floats in few layers has.
 constexpr double truth_tolerance = 1e-7;

@@ -2,8 +2,12 @@
 #include "server/scene/describe.hpp"
 
 #include <algorithm>
+#include <array>
+#include <string>
 #include <utility>
+#include <vector>
 
+#include "server/scene/bend.hpp"
 #include "server/scene/build.hpp"
 
 namespace windsplat::scene {
@@ -28,6 +32,19 @@ const char* axis_kind_name(data::AxisKind kind) {
       return "cartesian";
   }
   return "cartesian";
+}
+
+std::vector<std::string> mappings_of(const data::Grid& grid) {
+  using protocol::GeometryMapping;
+  constexpr std::array<std::pair<GeometryMapping, const char*>, 3> all{
+      {{GeometryMapping::flat, "flat"},
+       {GeometryMapping::sphere, "sphere"},
+       {GeometryMapping::curvilinear, "curvilinear"}}};
+  std::vector<std::string> out;
+  for (const auto& [mapping, name] : all) {
+    if (check_mapping(grid, mapping)) out.emplace_back(name);
+  }
+  return out;
 }
 
 protocol::FieldDescription describe_field(const data::FieldInfo& field) {
@@ -84,6 +101,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
     out.world_min[a] = lattice->box_min[index];
     out.world_max[a] = lattice->box_max[index];
   }
+  out.mappings = mappings_of(info.grid);
   const std::size_t steps = ranges == RangesOf::all_steps ? info.steps.size() : 1;
   std::uint64_t components = 0;
   for (const data::FieldInfo& field : info.fields) {

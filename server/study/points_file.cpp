@@ -10,6 +10,8 @@
 #include <system_error>
 #include <vector>
 
+#include "server/base/whole_file.hpp"
+
 namespace windsplat::study {
 
 namespace {
@@ -96,7 +98,7 @@ Result<PointsFile> PointsFile::open(const std::filesystem::path& path) {
     start = end + 1;
   }
   if (good != text) {
-    if (const auto written = write_whole(path, good); !written) return written.error();
+    if (const auto written = write_whole_file(path, good); !written) return written.error();
   }
   return file;
 }
@@ -113,28 +115,6 @@ Result<void> PointsFile::append(const std::string& key, const Measurement& measu
   out << line_of(key, measured) << std::flush;
   if (!out) return cannot("cannot write", path_);
   points_.insert_or_assign(key, measured);
-  return {};
-}
-
-Result<void> write_whole(const std::filesystem::path& path, const std::string& bytes) {
-  errno = 0;
-  std::filesystem::path beside = path;
-  beside += ".part";
-  {
-    std::ofstream out(beside, std::ios::binary | std::ios::trunc);
-    out << bytes << std::flush;
-    if (!out) {
-      const Error error = cannot("cannot write", path);
-      std::error_code ignored;
-      std::filesystem::remove(beside, ignored);
-      return error;
-    }
-  }
-  std::error_code fault;
-  std::filesystem::rename(beside, path, fault);
-  if (fault)
-    return make_error(ErrorKind::internal,
-                      "cannot write '" + printable(path.native()) + "': " + fault.message());
   return {};
 }
 

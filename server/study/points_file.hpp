@@ -35,8 +35,4 @@ class PointsFile {
   std::map<std::string, Measurement> points_;
 };
 
-// Written beside its place and renamed into it, so that a reader sees the old file or the new one.
-// Errors: internal.
-Result<void> write_whole(const std::filesystem::path& path, const std::string& bytes);
-
 }  // namespace windsplat::study

@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "protocol/study.hpp"
-#include "server/study/points_file.hpp"
+#include "server/base/whole_file.hpp"
 
 namespace windsplat::study {
 
@@ -134,11 +134,11 @@ Result<void> write_report(const Report& report, const std::filesystem::path& fol
     std::string name = "plot-";
     for (const char c : scene.name) name += c == '/' || c == '\0' ? '_' : c;
     name += ".svg";
-    if (auto done = write_whole(folder / name, plot_svg(scene)); !done) return done;
+    if (auto done = write_whole_file(folder / name, plot_svg(scene)); !done) return done;
   }
-  if (auto done = write_whole(folder / "study.csv", report_csv(report)); !done) return done;
-  if (auto done = write_whole(folder / "study.json", report_json(report)); !done) return done;
-  return write_whole(folder / "index.html", *page);
+  if (auto done = write_whole_file(folder / "study.csv", report_csv(report)); !done) return done;
+  if (auto done = write_whole_file(folder / "study.json", report_json(report)); !done) return done;
+  return write_whole_file(folder / "index.html", *page);
 }
 
 std::string format_number(const char* format, double value) {

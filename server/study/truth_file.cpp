@@ -4,8 +4,9 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <string>
 
-#include "server/study/points_file.hpp"
+#include "server/base/whole_file.hpp"
 
 namespace windsplat::study {
 
@@ -41,7 +42,7 @@ Result<void> write_truth(const std::filesystem::path& path, const Picture& pictu
   numbers.insert(numbers.end(), picture.rgba.begin(), picture.rgba.end());
   std::string bytes(numbers.size() * sizeof(double), '\0');
   std::memcpy(bytes.data(), numbers.data(), bytes.size());
-  return write_whole(path, bytes);
+  return write_whole_file(path, bytes);
 }
 
 }  // namespace windsplat::study

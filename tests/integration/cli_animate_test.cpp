@@ -1,6 +1,7 @@
 // `windsplat animate`: which files it writes, and that each is the picture of its step and time.
 #include <gmock/gmock.h>
 
+#include <csignal>
 #include <filesystem>
 #include <set>
 #include <string>
@@ -77,6 +78,59 @@ TEST(CliAnimate, FramesBetweenStepsHaveTheirTimes) {
   EXPECT_EQ(read_file(folder.file("f_7.png")), read_file(one));
 }
 
+// From one drawn step to the next the time grows evenly, by the stride, from the view's own time.
+TEST(CliAnimate, TimesRunOnOverAStrideFromTheViewsOwn) {
+  const Folder folder;
+  const std::string path = folder.file("four.nc");
+  ASSERT_EQ(run({"synth", "tornado", "--dims", "12x12x12", "--steps", "4", "-o", path}).code, 0);
+  const Words phase{"--set", "/vector/motion/mode=phase", "--set", "/vector/motion/rate=0.3"};
+  Words more = phase;
+  more.insert(more.end(), {"--set", "/vector/motion/time=0.5"});
+  more.insert(more.end(), {"--steps", "0:2:2", "--per-step", "4"});
+  const Outcome made = run_with({"animate", path, "-o", folder.file("f_%d.png")}, more);
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_EQ(files_like(folder, ".png"), 8U);
+  struct Case {
+    const char* frame;
+    const char* step;
+    const char* time;
+  };
+  for (const Case& each : {Case{"f_0.png", "0", "0.5"}, Case{"f_3.png", "0", "2"},
+                           Case{"f_4.png", "2", "0.5"}, Case{"f_5.png", "2", "1"}}) {
+    const std::string one = folder.file("one.nc.png");
+    more = phase;
+    more.insert(more.end(), {"--step", each.step, "--set"});
+    more.push_back(std::string("/vector/motion/time=") + each.time);
+    ASSERT_EQ(run_with({"render", path, "-o", one}, more).code, 0);
+    EXPECT_EQ(read_file(folder.file(each.frame)), read_file(one)) << each.frame;
+  }
+}
+
+// Nobody knows beforehand which frame the signal meets: every file there is must be whole.
+TEST(CliAnimate, ASignalStopsItBetweenWholeFiles) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const Folder folder;
+    const std::string path = synth(folder, "tornado", "12x12x12");
+    Process process({"animate", path, "-o", folder.file("f_%d.png"), "--size", "320x240", "--set",
+                     "/vector/motion/mode=phase", "--per-step", "1000"});
+    for (int n = 0; n < 30000 && !std::filesystem::exists(folder.file("f_1.png")); ++n) {
+      usleep(2000);
+    }
+    process.send(signal);
+    EXPECT_EQ(process.wait(), 130);
+    EXPECT_THAT(process.messages(), HasSubstr("interrupted"));
+    for (const auto& entry : std::filesystem::directory_iterator(folder.file(""))) {
+      if (entry.path() == path) continue;
+      const std::string bytes = read_file(entry.path().string());
+      EXPECT_EQ(entry.path().extension(), ".png") << entry.path();
+      ASSERT_GT(bytes.size(), 8U) << entry.path();
+      EXPECT_EQ(png_size(bytes), (std::pair<std::uint32_t, std::uint32_t>(320, 240)));
+      EXPECT_EQ(bytes.substr(bytes.size() - 8, 4), "IEND") << entry.path();
+    }
+    EXPECT_LT(files_like(folder, ".png"), 2000U);
+  }
+}
+
 TEST(CliAnimate, StopsAtTheFirstErrorAndNamesIt) {
   const Folder folder;
   const std::string path = synth(folder, "tornado", "8x8x8");
@@ -97,6 +151,11 @@ TEST(CliAnimate, NothingIsDrawnTwiceForNothing) {
       run_with({"animate", path, "-o", folder.file("f_%d.png")}, {"--per-step", "3"});
   EXPECT_EQ(refused.code, 2);
   EXPECT_THAT(refused.err, HasSubstr("/vector/motion/mode=phase"));
+  const Outcome without_lines = run_with(
+      {"animate", path, "-o", folder.file("f_%d.png")},
+      {"--per-step", "3", "--set", "/vector/motion/mode=phase", "--set", "/vector/field=null"});
+  EXPECT_EQ(without_lines.code, 2);
+  EXPECT_THAT(without_lines.err, HasSubstr("lines"));
   EXPECT_EQ(files_like(folder, ".png"), 0U);
 }
 

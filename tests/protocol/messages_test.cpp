@@ -59,6 +59,7 @@ DatasetDescription climate() {
   dataset.axes[0] = {"lon", "longitude", "degrees_east", "longitude", {0, 180}, {-0.5, 0.5}};
   dataset.world_min = {-1, -0.5, -0.15};
   dataset.world_max = {1, 0.5, 0.15};
+  dataset.mappings = {"flat", "sphere"};
   dataset.fields = {wind_field()};
   dataset.left_out = {{"ps", "two-dimensional"}};
   dataset.steps = {{0, "2001-01-01T00:00:00Z"}, {1.5, "2001-01-01T01:30:00Z"}};
@@ -225,6 +226,7 @@ TEST(Shapes, DatasetInFull) {
   EXPECT_EQ(dataset["axes"]["x"], Json::parse(R"({"name":"lon","standardName":"longitude",
       "units":"degrees_east","kind":"longitude","coordinates":[0,180],"world":[-0.5,0.5]})"));
   EXPECT_EQ(dataset["world"], Json::parse(R"({"min":[-1,-0.5,-0.15],"max":[1,0.5,0.15]})"));
+  EXPECT_EQ(dataset["mappings"], Json::parse(R"(["flat","sphere"])"));
   EXPECT_EQ(dataset["fields"][0], Json::parse(R"({"name":"wind","kind":"vector",
       "components":["u","v","w"],"units":"m/s","standardName":"","longName":"Wind",
       "range":[0,61.5],"masked":7,"rangeOf":"step","dtype":"float32"})"));

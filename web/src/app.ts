@@ -111,6 +111,10 @@ export class App {
         this.send(outgoing);
         return outgoing.rev;
       },
+      ended: () => {
+        this.saveHash();
+        this.refresh();
+      },
     });
   }
 

@@ -47,17 +47,15 @@ function optionsOf(fields: Field[]): Options {
   );
 }
 
-const isGlobal = (dataset: Dataset): boolean =>
-  dataset.axes.x.kind === "longitude" && dataset.axes.y.kind === "latitude";
+const mappingLabels: Readonly<Record<Dataset["mappings"][number], string>> = {
+  flat: "flat",
+  sphere: "sphere (globe)",
+  curvilinear: "curvilinear map",
+};
 
-// Shapes that the grid can be bent to. The dataset says that it is curvilinear by its own default.
+// Shapes that the grid can be bent to, as the dataset tells them.
 export function mappingOptions(dataset: Dataset): Options {
-  const options: Options = { flat: "flat" };
-  if (isGlobal(dataset)) options["sphere (globe)"] = "sphere";
-  if (dataset.defaultView?.geometry?.mapping === "curvilinear") {
-    options["curvilinear map"] = "curvilinear";
-  }
-  return options;
+  return Object.fromEntries(dataset.mappings.map((mapping) => [mappingLabels[mapping], mapping]));
 }
 
 export const ownHeight = ""; // the option that names no height field

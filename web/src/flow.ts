@@ -15,6 +15,7 @@ export interface FlowHost {
   wanted(): boolean; // the view's lines are there and move
   time(): number; // of the view, steps
   send(time: number): number; // the rev that asks for it
+  ended(): void; // the flow stopped of itself, not because stop() was called
 }
 
 // The view's time `ms` later: one step a second, so that `rate` is cycles a second.
@@ -63,7 +64,12 @@ export class Flow {
 
   // The server refused what this rev asked for: a flow that asked for it ends.
   refused(rev: number): void {
-    if (rev === this.sentRev) this.stop();
+    if (this.on && rev === this.sentRev) this.end();
+  }
+
+  private end(): void {
+    this.stop();
+    this.host.ended();
   }
 
   private plan(): void {
@@ -81,7 +87,7 @@ export class Flow {
   private move(): void {
     if (!this.on || this.host.hidden()) return; // seen() goes on
     if (!this.host.wanted()) {
-      this.stop();
+      this.end();
       return;
     }
     const now = this.host.now();

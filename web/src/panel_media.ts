@@ -80,13 +80,27 @@ class MediaPanel {
   }
 
   private addLayer(index: number): void {
-    const layer = () => this.layers[index]?.view ?? { field: "" };
-    const dataset = this.kit.host.dataset();
-    const info = dataset.fields.find((field) => field.name === layer().field);
-    const folder = this.folder.addFolder(`Medium: ${layer().field}`);
+    const name = this.viewOf(index).field;
+    const info = this.kit.host.dataset().fields.find((field) => field.name === name);
+    const units = unitText(info?.units);
+    const folder = this.folder.addFolder(`Medium: ${name}`);
     folder.domElement.title = info?.longName ?? "";
-    const { controls } = this;
-    controls.toggle(folder, "shown", {
+    this.addField(folder, index);
+    this.addOpacity(folder, index, units);
+    this.addColors(folder, index, units);
+    this.addSampling(folder, index);
+    this.controls.action(folder, "Remove", "Take this medium out of the view", () => {
+      this.layers.splice(index, 1);
+      this.send();
+    });
+  }
+
+  private viewOf(index: number): ScalarView {
+    return this.layers[index]?.view ?? { field: "" };
+  }
+
+  private addField(folder: GUI, index: number): void {
+    this.controls.toggle(folder, "shown", {
       pointer: "/scalars",
       get: () => this.layers[index]?.on,
       set: (on) => {
@@ -95,12 +109,12 @@ class MediaPanel {
         return null;
       },
     });
-    controls.choice(
+    this.controls.choice(
       folder,
       "field",
       {
         pointer: "/scalars/field",
-        get: () => layer().field,
+        get: () => this.viewOf(index).field,
         // Another field's range and opacity would mean nothing: its own defaults.
         set: (field) => {
           this.layers[index]!.view = { field };
@@ -110,50 +124,52 @@ class MediaPanel {
       },
       this.options,
     );
-    this.addOpacity(folder, index, unitText(info?.units));
-    controls.map(folder, "map", {
+  }
+
+  private addColors(folder: GUI, index: number, units: string): void {
+    const color = () => this.viewOf(index).color;
+    this.controls.map(folder, "map", {
       pointer: "/scalars/color/map",
-      get: () => layer().color?.map,
-      set: (map) => this.update(index, { color: { ...layer().color, map } }),
+      get: () => color()?.map,
+      set: (map) => this.update(index, { color: { ...color(), map } }),
     });
-    controls.range(
+    this.controls.range(
       folder,
       "colours",
       {
         pointer: "/scalars/color/range",
-        get: () => layer().color?.range,
-        set: (range) => this.update(index, { color: { ...layer().color, range } }),
+        get: () => color()?.range,
+        set: (range) => this.update(index, { color: { ...color(), range } }),
       },
-      unitText(info?.units),
+      units,
     );
-    controls.number(
+  }
+
+  private addSampling(folder: GUI, index: number): void {
+    this.controls.number(
       folder,
       "every n-th sample",
       {
         pointer: "/scalars/stride",
-        get: () => layer().stride,
+        get: () => this.viewOf(index).stride,
         set: (stride) => this.update(index, { stride }),
       },
       { min: 1, max: 16, step: 1 },
     );
-    controls.number(
+    this.controls.number(
       folder,
       "min optical depth",
       {
         pointer: "/scalars/minOpticalDepth",
-        get: () => layer().minOpticalDepth,
+        get: () => this.viewOf(index).minOpticalDepth,
         set: (minOpticalDepth) => this.update(index, { minOpticalDepth }),
       },
       { min: 0, max: 0.05, step: 0.0001 },
     );
-    controls.action(folder, "Remove", "Take this medium out of the view", () => {
-      this.layers.splice(index, 1);
-      this.send();
-    });
   }
 
   private addOpacity(folder: GUI, index: number, units: string): void {
-    const layer = () => this.layers[index]?.view ?? { field: "" };
+    const layer = () => this.viewOf(index);
     if (layer().extinction == null) return; // the server has not told its default yet
     const range = (): [number, number] =>
       (layer().color?.range ?? [curveOf(layer())[0]![0], curveOf(layer()).at(-1)![0]]) as [

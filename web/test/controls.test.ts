@@ -52,6 +52,7 @@ const dataset = {
     z: axis("lev", "pressure", [1000, 850, 700, 500, 200]),
   },
   world: { min: [-1, -1, -1], max: [1, 1, 1] },
+  mappings: ["flat", "sphere"],
   fields: [
     field("wind", "vector", "m s-1"),
     field("cloud", "scalar", "1"),
@@ -59,16 +60,14 @@ const dataset = {
   ],
 } as unknown as Dataset;
 
-const box = {
-  ...dataset,
-  axes: { ...dataset.axes, x: axis("x", "cartesian", [0, 1, 2, 3]) },
-} as Dataset;
-
-test("a globe is offered to longitudes and latitudes alone, a curved map to who says so", () => {
-  assert.deepEqual(Object.values(mappingOptions(dataset)), ["flat", "sphere"]);
-  assert.deepEqual(Object.values(mappingOptions(box)), ["flat"]);
-  const curved = { ...box, defaultView: { geometry: { mapping: "curvilinear" } } } as Dataset;
-  assert.deepEqual(Object.values(mappingOptions(curved)), ["flat", "curvilinear"]);
+test("the shapes offered are those that the dataset tells, whatever its axes and default", () => {
+  const told = (mappings: Dataset["mappings"]) =>
+    mappingOptions({ ...dataset, mappings, defaultView: { geometry: { mapping: "flat" } } });
+  assert.deepEqual(Object.values(told(["flat"])), ["flat"]);
+  assert.deepEqual(Object.values(told(["flat", "sphere"])), ["flat", "sphere"]);
+  const curved = told(["flat", "sphere", "curvilinear"]);
+  assert.deepEqual(Object.values(curved), ["flat", "sphere", "curvilinear"]);
+  assert.equal(Object.keys(curved).length, 3);
 });
 
 test("heights come from the axis or a scalar, those in metres first", () => {

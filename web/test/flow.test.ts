@@ -10,6 +10,7 @@ class Page {
   isWanted = true;
   at = 0;
   sent: number[] = []; // ms at which a move went out
+  ends: boolean[] = []; // of every end that was told: whether the flow still ran then
   rev = 0;
   private timers = new Map<number, { due: number; run: () => void }>();
   private lastTimer = 0;
@@ -28,6 +29,7 @@ class Page {
       this.sent.push(this.clock);
       return ++this.rev;
     },
+    ended: () => this.ends.push(this.flow.running),
   });
 
   get waiting(): number {
@@ -130,6 +132,31 @@ test("a stop, a refusal and lines that stand still end the flow", () => {
   page.run(500, 5);
   page.flow.refused(page.rev + 1);
   assert.equal(page.flow.running, true, "another's refusal is not the flow's");
+});
+
+test("the page hears of an end that it did not ask for, once, when the flow has stopped", () => {
+  const told = (end: (page: Page) => void): boolean[] => {
+    const page = new Page();
+    page.flow.start();
+    page.run(500, 5);
+    assert.deepEqual(page.ends, []);
+    end(page);
+    page.run(1000, 5);
+    page.flow.refused(page.rev);
+    return page.ends;
+  };
+  assert.deepEqual(
+    told((page) => (page.isWanted = false)),
+    [false],
+  );
+  assert.deepEqual(
+    told((page) => page.flow.refused(page.rev)),
+    [false],
+  );
+  assert.deepEqual(
+    told((page) => page.flow.stop()),
+    [],
+  );
 });
 
 test("a flow that was stopped while a frame was due begins anew at once", () => {

@@ -58,6 +58,7 @@ const dataset: Dataset = {
     },
   },
   world: { min: [-1, -1, -0.15], max: [1, 1, 0.15] },
+  mappings: ["flat", "sphere"],
   fields: [
     {
       name: "wind",

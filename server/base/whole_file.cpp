@@ -1,0 +1,85 @@
+// A part file with this process's number in its name, then a rename.
+#include "server/base/whole_file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstddef>
+#include <string>
+#include <system_error>
+
+namespace windsplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr mode_t mode_of_new_files = 0666;  // less the umask
+
+Error file_error(const char* what, const fs::path& path, int fault) {
+  std::string message = what;
+  message += " '";
+  message += printable(path.native());
+  message += "': ";
+  message += std::generic_category().message(fault);
+  return make_error(ErrorKind::internal, std::move(message));
+}
+
+// 0, or the errno of what failed.
+int write_and_close(int file, std::string_view bytes) {
+  int fault = 0;
+  for (std::size_t done = 0; done < bytes.size() && fault == 0;) {
+    const ssize_t wrote = ::write(file, bytes.data() + done, bytes.size() - done);
+    if (wrote >= 0) {
+      done += static_cast<std::size_t>(wrote);
+    } else if (errno != EINTR) {
+      fault = errno;
+    }
+  }
+  if (::close(file) != 0 && fault == 0) fault = errno;
+  return fault;
+}
+
+Result<void> write_in_place(const fs::path& path, std::string_view bytes) {
+  const int file = ::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY);
+  if (file < 0) return file_error("cannot write", path, errno);
+  if (const int fault = write_and_close(file, bytes))
+    return file_error("cannot write", path, fault);
+  return {};
+}
+
+// A new file; one that a process of the same number left there gives way.
+int create(const fs::path& path) {
+  constexpr int flags = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW;
+  const int file = ::open(path.c_str(), flags, mode_of_new_files);
+  std::error_code ignored;
+  if (file >= 0 || errno != EEXIST || !fs::is_regular_file(fs::symlink_status(path, ignored))) {
+    return file;
+  }
+  fs::remove(path, ignored);
+  return ::open(path.c_str(), flags, mode_of_new_files);
+}
+
+}  // namespace
+
+Result<void> write_whole_file(const fs::path& path, std::string_view bytes) {
+  std::error_code ignored;
+  const fs::file_status status = fs::status(path, ignored);
+  const bool replaces = fs::is_regular_file(status);
+  if (fs::exists(status) && !replaces) return write_in_place(path, bytes);
+  const fs::path target = replaces ? fs::canonical(path, ignored) : path;
+  fs::path part = target;
+  part += ".";
+  part += std::to_string(::getpid());
+  part += ".part";
+  const int file = create(part);
+  if (file < 0) return file_error("cannot create", path, errno);
+  if (replaces) fs::permissions(part, status.permissions(), ignored);
+  int fault = write_and_close(file, bytes);
+  if (fault == 0 && ::rename(part.c_str(), target.c_str()) != 0) fault = errno;
+  if (fault == 0) return {};
+  fs::remove(part, ignored);
+  return file_error("cannot write", path, fault);
+}
+
+}  // namespace windsplat

@@ -1,0 +1,17 @@
+// Bytes -> a file that is there whole or not at all.
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+#include "server/base/error.hpp"
+
+namespace windsplat {
+
+// A regular file is written beside its place and renamed into it, so that a reader sees the old
+// file or the new one, and a failure leaves the old one alone; of a symbolic link, the file that it
+// leads to. What is no regular file (a device, a pipe) is written to as it is and never removed.
+// Errors: internal.
+Result<void> write_whole_file(const std::filesystem::path& path, std::string_view bytes);
+
+}  // namespace windsplat

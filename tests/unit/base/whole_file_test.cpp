@@ -1,0 +1,130 @@
+// Files are written whole or not at all, and what is no regular file is left where it is.
+#include "server/base/whole_file.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+namespace windsplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+class WholeFile : public testing::Test {
+ protected:
+  WholeFile() {
+    std::string name = (fs::temp_directory_path() / "windsplat-base-XXXXXX").string();
+    EXPECT_NE(mkdtemp(name.data()), nullptr);
+    folder_ = name;
+  }
+  ~WholeFile() override { fs::remove_all(folder_); }
+
+  static std::string read(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  }
+  [[nodiscard]] std::ptrdiff_t entries() const {
+    return std::distance(fs::directory_iterator(folder_), fs::directory_iterator());
+  }
+
+  fs::path folder_;
+};
+
+// No file may grow beyond this while it lives, as on a disk that is full.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  void (*handler_)(int);
+  rlimit before_{};
+};
+
+TEST_F(WholeFile, IsMadeAndReplacedAndLeavesNothingBesideIt) {
+  const fs::path path = folder_ / "a.png";
+  ASSERT_TRUE(write_whole_file(path, "first"));
+  EXPECT_EQ(read(path), "first");
+  fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write);
+  ASSERT_TRUE(write_whole_file(path, std::string("se\0cond", 7)));
+  EXPECT_EQ(read(path), std::string("se\0cond", 7));
+  EXPECT_EQ(fs::status(path).permissions(), fs::perms::owner_read | fs::perms::owner_write);
+  EXPECT_EQ(entries(), 1);
+}
+
+TEST_F(WholeFile, AReaderOfTheOldOneKeepsIt) {
+  const fs::path path = folder_ / "a.png";
+  ASSERT_TRUE(write_whole_file(path, "the old one"));
+  std::ifstream reader(path, std::ios::binary);
+  ASSERT_TRUE(write_whole_file(path, "new"));
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(reader), {}), "the old one");
+}
+
+TEST_F(WholeFile, AFailureLeavesTheOldOneAndNoPart) {
+  const fs::path path = folder_ / "a.png";
+  ASSERT_TRUE(write_whole_file(path, "good"));
+  Result<void> written;
+  {
+    const FullDisk disk(10);
+    written = write_whole_file(path, std::string(1000, 'x'));
+  }
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().kind, ErrorKind::internal);
+  EXPECT_NE(written.error().message.find("a.png"), std::string::npos);
+  EXPECT_EQ(read(path), "good");
+  EXPECT_EQ(entries(), 1);
+}
+
+TEST_F(WholeFile, OfALinkTheFileBehindItIsWritten) {
+  const fs::path path = folder_ / "a.png";
+  const fs::path link = folder_ / "link.png";
+  ASSERT_TRUE(write_whole_file(path, "old"));
+  fs::create_symlink("a.png", link);
+  ASSERT_TRUE(write_whole_file(link, "new"));
+  EXPECT_TRUE(fs::is_symlink(link));
+  EXPECT_EQ(read(path), "new");
+}
+
+TEST_F(WholeFile, WhatIsNoRegularFileIsWrittenToAndStays) {
+  const fs::path pipe = folder_ / "pipe.png";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  ASSERT_GE(reader, 0);
+  ASSERT_TRUE(write_whole_file(pipe, "bytes"));
+  std::string got(16, '\0');
+  EXPECT_EQ(::read(reader, got.data(), got.size()), 5);
+  EXPECT_EQ(got.substr(0, 5), "bytes");
+  ::close(reader);
+  EXPECT_TRUE(fs::is_fifo(pipe));
+
+  const fs::path full = folder_ / "full.png";  // every write to /dev/full fails
+  fs::create_symlink("/dev/full", full);
+  EXPECT_FALSE(write_whole_file(full, "bytes"));
+  EXPECT_TRUE(fs::is_symlink(full));
+
+  const fs::path folder = folder_ / "folder.png";
+  fs::create_directory(folder);
+  EXPECT_FALSE(write_whole_file(folder, "bytes"));
+  EXPECT_TRUE(fs::is_directory(folder));
+  EXPECT_FALSE(write_whole_file(folder_ / "no" / "a.png", "bytes"));
+}
+
+}  // namespace
+}  // namespace windsplat
