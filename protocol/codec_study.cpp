@@ -43,13 +43,14 @@ Json scene_json(const StudyScene& scene) {
                {{"kind", reference.kind},
                 {"estimate", reference.estimate},
                 {"seconds", reference.seconds},
+                {"tolerance", reference.tolerance},
                 {"width", reference.width},
                 {"height", reference.height},
                 {"pieces", reference.pieces},
                 {"evaluations", reference.evaluations}}},
               {"points", std::move(points)},
               {"curves", std::move(curves)},
-              {"rippleFloor", scene.ripple_floor},
+              {"reconstructionRipple", scene.reconstruction_ripple},
               {"jpeg", std::move(jpeg)}};
 }
 

@@ -35,9 +35,10 @@ struct StudyEncoding {
 };
 
 struct StudyReference {
-  std::string kind;     // "integral", or "extrapolated" from method slab
-  double estimate = 0;  // RMS of an extrapolated reference's own error
-  double seconds = 0;
+  std::string kind;      // "integral", or "extrapolated" from method slab
+  double estimate = 0;   // RMS of an extrapolated reference's own error
+  double seconds = 0;    // that it took when it was made; null: unknown
+  double tolerance = 0;  // null: not an integral
   int width = 0, height = 0;
   std::int64_t pieces = 0, evaluations = 0;
 };
@@ -48,7 +49,7 @@ struct StudyScene {
   StudyReference reference;
   std::vector<StudyPoint> points;
   std::vector<StudyCurve> curves;
-  double ripple_floor = 0;
+  double reconstruction_ripple = 0;  // null: bent lattice or slice
   std::vector<StudyEncoding> jpeg;
 };
 

@@ -47,7 +47,7 @@ def stiffness(rows):
     for tau in TAUS:
         found = {r["compositing"]: r for r in rows if r["tau"] == tau}
         cells = [words(found[name]) for name in COMPOSITINGS]
-        print("| %s | " % ("inf" if tau == 1e30 else "%g" % tau) + " | ".join(cells) + " |")
+        print("| %s | " % ("%g" % tau).replace("e+", "e") + " | ".join(cells) + " |")
 
 
 def main():

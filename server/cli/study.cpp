@@ -160,8 +160,8 @@ int study_command(const Arguments& arguments) {
   study::Options options;
   options.folder = arguments.output;
   options.quick = arguments.quick;
-  const double tolerance = arguments.quick ? quick_tolerance : truth_tolerance;
-  if (!arguments.no_reference) options.truth = integral(tolerance, pool, cancel);
+  options.tolerance = arguments.quick ? quick_tolerance : truth_tolerance;
+  if (!arguments.no_reference) options.truth = integral(options.tolerance, pool, cancel);
   Reporter reporter(isatty(STDERR_FILENO) == 1);
   const auto report =
       study::run_study(*subjects, options, pool, cancel,

@@ -4,10 +4,11 @@
 #include <sys/utsname.h>
 
 #include <fstream>
+#include <iterator>
 #include <thread>
 
-#include "server/base/error.hpp"
 #include "server/engine/kernels/dispatch.hpp"
+#include "server/study/points_file.hpp"
 
 namespace windsplat::study {
 
@@ -26,7 +27,7 @@ std::string processor() {
 
 }  // namespace
 
-Machine this_machine(unsigned threads) {
+Result<Machine> this_machine(unsigned threads) {
   Machine machine;
   machine.processor = processor();
   utsname names{};
@@ -43,6 +44,12 @@ Machine this_machine(unsigned threads) {
   machine.compiler = "g++ " __VERSION__;
 #endif
   machine.version = WINDSPLAT_VERSION;
+  std::ifstream in("/proc/self/exe", std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  if (bytes.empty()) {
+    return make_error(ErrorKind::internal, "cannot read the running program, /proc/self/exe");
+  }
+  machine.program = key_of(bytes);
   if (const auto table = engine::kernels::chosen_table()) machine.kernels = (*table)->name;
   machine.hardware_threads = std::thread::hardware_concurrency();
   machine.threads = threads;

@@ -134,7 +134,8 @@ std::string reference_words(const SceneReport& scene) {
   text += "The truth is the integral in double precision: ";
   text += std::to_string(scene.pieces) + " pieces, " + std::to_string(scene.evaluations);
   text += " evaluations";
-  if (scene.truth_seconds > 0) {
+  text += ", tolerance " + format_number("%g", scene.tolerance);
+  if (std::isfinite(scene.truth_seconds)) {
     text += ", " + format_number("%.1f", scene.truth_seconds) + " s";
   }
   return text + ".";
@@ -144,12 +145,12 @@ Result<std::string> section(const SceneReport& scene) {
   std::string text = "<h2 id=\"" + escaped(scene.name) + "\">" + escaped(scene.name) + "</h2>\n";
   text += "<p>" + reference_words(scene) + "</p>\n<div class=\"plot\">" + plot_svg(scene);
   text += "</div>\n";
-  if (scene.ripple_floor > 0) {
-    text += "<p>Ripple of overlapping footprints in a uniform medium of optical depth 1: ";
-    text += format_number("%.1e", scene.ripple_floor);
+  if (scene.reconstruction_ripple > 0) {
+    text += "<p>Reconstruction ripple (not in these errors): ";
+    text += format_number("%.1e", scene.reconstruction_ripple);
     text +=
-        ". The truth is made of the same footprints and ripples alike: points below it are "
-        "nearer to the splatted medium, not to the even one.</p>\n";
+        " of overlapping footprints against an even medium of optical depth 1. The truth is made "
+        "of the same footprints and ripples alike.</p>\n";
   }
   text += "<details><summary>Every point, the most exact first</summary>" + points_table(scene);
   text += "</details>\n<details><summary>The encoding alone</summary>" + encoding_table(scene);
@@ -161,7 +162,7 @@ Result<std::string> section(const SceneReport& scene) {
 }
 
 std::string optical_depth(double tau) {
-  return tau >= 1e30 ? "1e30 (as infinity)" : format_number("%g", tau);
+  return tau >= 1e30 ? "1e30 (the largest)" : format_number("%g", tau);
 }
 
 std::string stability_table(const std::vector<Stiffness>& all) {
@@ -169,7 +170,9 @@ std::string stability_table(const std::vector<Stiffness>& all) {
       "<h2 id=\"stability\">Stiffness</h2>\n<p>One kernel, a line of opacity 0.6 at nine depths of "
       "a cell of optical depth &tau;, against its closed form; and " +
       std::to_string(stiff_layers) +
-      " such cells of medium alone behind each other. Drawn by the engine itself.</p>\n"
+      " such cells of medium alone behind each other. Drawn by the engine itself. Extinctions of a "
+      "view are "
+      "bounded by 1e30 per world unit, so that the last &tau; is the largest.</p>\n"
       "<div class=\"scroll\"><table><tr><th>compositing</th><th>&tau;</th><th>largest error</th>"
       "<th>least</th><th>most</th><th>within [0, 1]</th><th>monotone in &tau;</th>"
       "<th>layers, least</th><th>layers, most</th><th>diverges</th></tr>\n";
@@ -191,7 +194,7 @@ std::string stability_table(const std::vector<Stiffness>& all) {
   return text + "</table></div>\n";
 }
 
-// The most exact and the quickest of each scene's front.
+// Both methods at each view's own knobs.
 std::string summary(const Report& report) {
   std::string text =
       "<table><tr><th>scene</th><th>kernel analytic, RMSE</th><th>ms</th>"
@@ -199,10 +202,12 @@ std::string summary(const Report& report) {
   for (const SceneReport& scene : report.scenes) {
     text += "<tr><td><a href=\"#" + escaped(scene.name) + "\">" + escaped(scene.name) + "</a></td>";
     for (const scene::Method method : {scene::Method::kernel, scene::Method::slab}) {
+      const Knobs wanted = own_knobs(scene.view);
       const auto own = std::find_if(scene.points.begin(), scene.points.end(), [&](const Point& p) {
+        Knobs knobs = p.setting.knobs;
+        if (method == scene::Method::kernel) knobs.slab_thickness = wanted.slab_thickness;
         return p.setting.method == method &&
-               p.setting.compositing == scene::Compositing::analytic &&
-               p.setting.knobs.width == scene.width && p.setting.knobs.slab_thickness == 1;
+               p.setting.compositing == scene::Compositing::analytic && knobs == wanted;
       });
       const bool there = own != scene.points.end();
       cell(text, there ? format_number("%.2e", own->measured.rmse) : "");

@@ -121,9 +121,9 @@ class Plot {
       error_low = std::min(error_low, m.rmse);
       error_high = std::max(error_high, m.rmse);
     }
-    if (drawable(scene.ripple_floor)) {
-      error_low = std::min(error_low, scene.ripple_floor);
-      error_high = std::max(error_high, scene.ripple_floor);
+    if (drawable(scene.reconstruction_ripple)) {
+      error_low = std::min(error_low, scene.reconstruction_ripple);
+      error_high = std::max(error_high, scene.reconstruction_ripple);
     }
     x_ = make_axis(ms_low, ms_high, left, right);
     y_ = make_axis(error_low, error_high, bottom, top);
@@ -136,7 +136,7 @@ class Plot {
     text_ += "<title>" + escaped(scene_.name) + ": error against run time</title>\n";
     text_ += "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n";
     frame();
-    floor();
+    ripple();
     for (const Curve& curve : scene_.curves) draw(curve);
     front();
     for (const Point& point : scene_.points) mark(point);
@@ -175,14 +175,14 @@ class Plot {
              ") rotate(-90)\" text-anchor=\"middle\">error, RMS of linear RGBA</text>\n";
   }
 
-  void floor() {
-    if (!drawable(scene_.ripple_floor)) return;
-    const double y = y_.at(scene_.ripple_floor);
+  void ripple() {
+    if (!drawable(scene_.reconstruction_ripple)) return;
+    const double y = y_.at(scene_.reconstruction_ripple);
     text_ += line(left, y, right, y, "stroke:#888888;stroke-dasharray:3,3");
     // Points crowd on the right where little is left to err.
     text_ += "<rect" + attribute("x", left + 6) + attribute("y", y - 17) +
              " width=\"222\" height=\"15\" fill=\"#ffffff\" opacity=\"0.8\"/>\n";
-    text_ += label(left + 9, y - 5, "ripple floor: splats against an even medium",
+    text_ += label(left + 9, y - 5, "reconstruction ripple (not in these errors)",
                    " fill=\"#666666\" font-size=\"10.5\"");
   }
 

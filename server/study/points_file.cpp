@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
-#include <sstream>
 #include <system_error>
 #include <vector>
 
@@ -64,28 +63,53 @@ std::optional<std::pair<std::string, Measurement>> read_line(const std::string& 
                    Measurement{rmse, max, psnr, flip, ms, ms_min, ms_max, stable == 1.0}};
 }
 
+// Empty where there is no file.
+Result<std::string> read_whole(const std::filesystem::path& path) {
+  errno = 0;
+  std::ifstream in(path, std::ios::binary);
+  if (!in.is_open()) {
+    if (errno == ENOENT) return std::string();
+    return cannot("cannot read", path);
+  }
+  std::string text;
+  std::array<char, 1U << 16U> block{};
+  while (in.read(block.data(), block.size()) || in.gcount() > 0) {
+    text.append(block.data(), static_cast<std::size_t>(in.gcount()));
+  }
+  if (in.bad()) return cannot("cannot read", path);
+  return text;
+}
+
 }  // namespace
 
-std::string key_of(const std::string& text) {
+std::uint64_t hash_of(std::string_view bytes) {
   std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char c : text) {
+  for (const char c : bytes) {
     hash ^= static_cast<unsigned char>(c);
     hash *= 0x100000001b3U;
   }
+  return hash;
+}
+
+std::string key_of(std::string_view text) {
   std::array<char, key_digits + 1> digits{};
-  std::snprintf(digits.data(), digits.size(), "%016llx", static_cast<unsigned long long>(hash));
+  std::snprintf(digits.data(), digits.size(), "%016llx",
+                static_cast<unsigned long long>(hash_of(text)));
   return digits.data();
 }
 
 Result<PointsFile> PointsFile::open(const std::filesystem::path& path) {
   PointsFile file(path);
-  std::string text;
-  if (std::ifstream in(path, std::ios::binary); in) {
-    std::stringstream whole;
-    whole << in.rdbuf();
-    text = whole.str();
-  }
+  const auto whole = read_whole(path);
+  if (!whole) return whole.error();
+  const std::string& text = *whole;
   std::string good = heading;
+  if (!text.empty() && !text.starts_with(heading)) {
+    std::string message = "'";
+    message += printable(path.native());
+    message += "' is no study's: it does not open with the heading of points.csv";
+    return make_error(ErrorKind::bad_data, std::move(message));
+  }
   for (std::size_t start = text.find('\n') + 1; start != 0 && start < text.size();) {
     const std::size_t end = text.find('\n', start);
     if (end == std::string::npos) break;

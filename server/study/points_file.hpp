@@ -7,19 +7,24 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "server/base/error.hpp"
 #include "server/study/types.hpp"
 
 namespace windsplat::study {
 
-// 16 hexadecimal digits of a text that says all a result depends on (FNV-1a, 64 bits).
-std::string key_of(const std::string& text);
+// FNV-1a, 64 bits.
+std::uint64_t hash_of(std::string_view bytes);
+
+// 16 hexadecimal digits of a text that says all a result depends on: its hash.
+std::string key_of(std::string_view text);
 
 class PointsFile {
  public:
   // Reads what is there. A line that was cut off or is no point is left out, and the file is
-  // written anew without it. Errors: internal (the file cannot be read or written).
+  // written anew without it. Errors, which leave the file as it is: bad_data (a file that does not
+  // open with our heading), internal (it cannot be read or written).
   static Result<PointsFile> open(const std::filesystem::path& path);
 
   [[nodiscard]] std::optional<Measurement> find(const std::string& key) const;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "protocol/study.hpp"
 #include "server/base/whole_file.hpp"
@@ -31,6 +32,7 @@ protocol::StudyScene document_of(const SceneReport& scene) {
   out.reference = {scene.integral ? "integral" : "extrapolated",
                    scene.truth_estimate,
                    scene.truth_seconds,
+                   scene.integral ? scene.tolerance : std::numeric_limits<double>::quiet_NaN(),
                    scene.width,
                    scene.height,
                    scene.pieces,
@@ -59,7 +61,7 @@ protocol::StudyScene document_of(const SceneReport& scene) {
     out.curves.push_back({name_of(curve.method), name_of(curve.compositing), name_of(curve.knob),
                           curve.order, curve.points});
   }
-  out.ripple_floor = scene.ripple_floor;
+  out.reconstruction_ripple = scene.reconstruction_ripple;
   for (const Encoded& e : scene.encoded) {
     out.jpeg.push_back({e.quality, e.rmse, e.psnr, e.flip, e.bytes});
   }

@@ -14,8 +14,8 @@ std::string report_json(const Report& report);
 std::string report_csv(const Report& report);  // one line a point
 
 // Error against run time, both logarithmic: a line a curve, rings on the Pareto front, crosses for
-// unstable points (on the upper edge when beyond it), the ripple floor dashed, orders in the
-// legend.
+// unstable points (on the upper edge when beyond it), the reconstruction ripple dashed, orders
+// in the legend.
 std::string plot_svg(const SceneReport& scene);
 
 // One page that needs nothing else: plots, tables, and the pictures beside their differences.

@@ -54,10 +54,12 @@ bool clear_of_edges(const scene::Lattice& lattice, const glm::dvec3& point) {
 
 }  // namespace
 
-Result<double> ripple_floor(const Subject& subject, ThreadPool& pool, const CancelToken& cancel) {
+Result<double> reconstruction_ripple(const Subject& subject, ThreadPool& pool,
+                                     const CancelToken& cancel) {
   Setting setting{scene::Method::kernel, scene::Compositing::analytic, own_knobs(subject)};
   auto scene = scene_at(subject, setting);
   if (!scene) return scene.error();
+  if (scene->lattice.places || scene->slice) return std::numeric_limits<double>::quiet_NaN();
   scene->vector.reset();
   scene->depth_cue = {};
   scene->stop_transmittance = 0;

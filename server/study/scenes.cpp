@@ -118,28 +118,30 @@ Result<Subject> make_subject(const std::string& name, std::shared_ptr<data::Data
   protocol::View wanted = view;
   wanted.image.width = size.width;
   wanted.image.height = size.height;
-  const bool has_camera = view.camera.eye.has_value();
+  const bool framed = view.camera.eye || view.camera.target || view.camera.height;
   auto completed = scene::complete_view(wanted, *dataset);
   if (!completed) return completed.error();
-  if (!has_camera) {
-    const auto lattice = scene::place_lattice(dataset->info().grid, completed->geometry);
-    if (!lattice) return lattice.error();
-    scene::orbit(*completed, *lattice, azimuth, elevation, 1);
+  if (!framed) {
+    const auto placed = scene::place_dataset(completed->geometry, *dataset);
+    if (!placed) return placed.error();
+    scene::orbit(*completed, (*placed)->lattice, azimuth, elevation, 1);
   }
   return Subject{name, std::move(*completed), std::move(dataset)};
 }
 
-Knobs own_knobs(const Subject& subject) {
+Knobs own_knobs(const protocol::View& view) {
   Knobs knobs;
-  knobs.stride = subject.view.vector.stride;
-  const bool lines = subject.view.vector.field.kind == protocol::FieldChoice::Kind::named;
-  if (!lines && !subject.view.scalars->empty()) knobs.stride = subject.view.scalars->front().stride;
-  knobs.span = subject.view.vector.span;
-  knobs.slab_thickness = subject.view.method.slab_thickness;
-  knobs.stop_transmittance = subject.view.method.stop_transmittance;
-  knobs.width = subject.view.image.width;
+  knobs.stride = view.vector.stride;
+  const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
+  if (!lines && !view.scalars->empty()) knobs.stride = view.scalars->front().stride;
+  knobs.span = view.vector.span;
+  knobs.slab_thickness = view.method.slab_thickness;
+  knobs.stop_transmittance = view.method.stop_transmittance;
+  knobs.width = view.image.width;
   return knobs;
 }
+
+Knobs own_knobs(const Subject& subject) { return own_knobs(subject.view); }
 
 Result<scene::Scene> scene_at(const Subject& subject, const Setting& setting) {
   const Knobs& knobs = setting.knobs;

@@ -30,11 +30,13 @@ std::vector<std::string> standard_names();
 // Errors: not_found for any other name; those of the samples.
 Result<Subject> standard_subject(const std::string& name, bool quick);
 
-// Any dataset seen as a view says, but for the picture's size. Errors: those of complete_view.
+// Any dataset seen as a view says, but for the picture's size; obliquely if the view says nothing
+// of eye, target and height. Errors: those of complete_view.
 Result<Subject> make_subject(const std::string& name, std::shared_ptr<data::Dataset> dataset,
                              const protocol::View& view, PictureSize size);
 
-// The knobs that the subject's view has.
+// The knobs that a complete view has.
+Knobs own_knobs(const protocol::View& view);
 Knobs own_knobs(const Subject& subject);
 
 // The subject at a setting: its picture knobs.width wide and its lines scaled with it. Stride and

@@ -10,7 +10,8 @@
 
 namespace windsplat::study {
 
-// 1e-30 .. 1e30, the last standing for infinity: no float tells exp(-1e30) from exp(-inf).
+// 1e-30 .. 1e30, the last being the largest: extinctions of a view are bounded by 1e30 per world
+// unit. No float tells its transmittance from that of infinity.
 const std::vector<double>& stiffness();
 
 struct Stiffness {

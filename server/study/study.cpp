@@ -1,15 +1,14 @@
-// For each subject: its truth, every point of its sweep, its ripple floor, its encodings and its
-// pictures. What the folder holds is not measured again.
+// For each subject: its truth, every point of its sweep, its reconstruction ripple, its encodings
+// and its pictures. What the folder holds is not measured again.
 #include "server/study/study.hpp"
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <utility>
 
-#include "protocol/codec.hpp"
+#include "server/study/keys.hpp"
 #include "server/study/metrics.hpp"
 #include "server/study/points_file.hpp"
 #include "server/study/truth_file.hpp"
@@ -20,7 +19,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int results_version = 2;     // a new number whenever results change for the same setting
 constexpr double truth_weight = 12;    // points that take as long as one truth
 constexpr double pictures_weight = 2;  // and as the rest of a scene
 constexpr int amplification = 10;
@@ -29,41 +27,22 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// All that a scene's numbers depend on, but for the setting.
-std::string identity(const Subject& subject, const Machine& machine, bool integral) {
-  std::string text = "windsplat " + machine.version;
-  text += " results " + std::to_string(results_version);
-  text += integral ? " integral " : " extrapolated ";
-  text += subject.dataset->info().digest;
-  text += ' ';
-  text += protocol::encode_view(subject.view);
-  return text;
-}
-
-std::string words_of(const Setting& setting) {
-  std::string text = name_of(setting.method);
-  text += ' ';
-  text += name_of(setting.compositing);
-  for (const Knob knob :
-       {Knob::stride, Knob::span, Knob::slab_thickness, Knob::stop_transmittance, Knob::width}) {
-    char number[40];
-    std::snprintf(number, sizeof number, " %.17g", value_of(setting.knobs, knob));
-    text += number;
-  }
-  return text;
+bool finite(const Picture& picture) {
+  return std::all_of(picture.rgba.begin(), picture.rgba.end(),
+                     [](double v) { return std::isfinite(v); });
 }
 
 class Study {
  public:
   Study(const std::vector<Subject>& subjects, const Options& options, ThreadPool& pool,
-        const CancelToken& cancel, const Listener& listen, PointsFile points)
+        const CancelToken& cancel, const Listener& listen, PointsFile points, Machine machine)
       : subjects_(subjects),
         options_(options),
         pool_(pool),
         cancel_(cancel),
         listen_(listen),
         points_(std::move(points)) {
-    report_.machine = this_machine(pool.size());
+    report_.machine = std::move(machine);
     report_.quick = options.quick;
     report_.runs = options.quick ? quick_runs : timed_runs;
   }
@@ -83,19 +62,13 @@ class Study {
 
  private:
   std::string point_key(const Subject& subject, const Setting& setting) const {
-    std::string text = identity(subject, report_.machine, bool(options_.truth));
-    text += ' ';
-    text += words_of(setting);
-    text += " runs " + std::to_string(report_.runs);
-    text += " threads " + std::to_string(pool_.size());
-    text += ' ';
-    text += report_.machine.kernels;
-    return key_of(text);
+    return study::point_key(subject, setting, report_.machine,
+                            {bool(options_.truth), options_.tolerance, report_.runs});
   }
 
   std::filesystem::path truth_path(const Subject& subject) const {
     std::string name = "truth-";
-    name += key_of(identity(subject, report_.machine, true));
+    name += truth_key(subject, report_.machine, options_.tolerance);
     name += ".f64";
     return options_.folder / name;
   }
@@ -117,25 +90,35 @@ class Study {
 
   Result<Picture> find_truth(const Subject& subject, SceneReport& scene) {
     scene.integral = bool(options_.truth);
+    const Clock::time_point start = Clock::now();
     if (!scene.integral) {
       auto made = extrapolate(subject, pool_, cancel_);
       if (!made) return made.error();
       scene.truth_estimate = made->estimate;
+      scene.truth_seconds = seconds_since(start);
       return std::move(made->picture);
     }
     const std::filesystem::path path = truth_path(subject);
-    if (auto kept = read_truth(path, scene.width, scene.height)) return std::move(*kept);
+    scene.tolerance = options_.tolerance;
+    if (auto kept = read_truth(path, scene.width, scene.height, options_.tolerance)) {
+      scene.truth_seconds = kept->seconds;
+      return std::move(kept->picture);
+    }
     tell(subject, "reference");
     const auto truth_scene = scene_at(
         subject, {scene::Method::reference, scene::Compositing::analytic, own_knobs(subject)});
     if (!truth_scene) return truth_scene.error();
-    const Clock::time_point start = Clock::now();
     auto truth = options_.truth(*truth_scene);
     if (!truth) return truth.error();
+    if (!finite(*truth)) {
+      return make_error(ErrorKind::internal,
+                        "the truth of '" + printable(subject.name) + "' is not finite");
+    }
     scene.truth_seconds = seconds_since(start);
-    if (const auto kept = write_truth(path, *truth); !kept) return kept.error();
+    KeptTruth made{std::move(*truth), scene.truth_seconds, options_.tolerance};
+    if (const auto kept = write_truth(path, made); !kept) return kept.error();
     done_ += truth_weight;
-    return std::move(*truth);
+    return std::move(made.picture);
   }
 
   Result<void> measure_points(const Subject& subject, const Picture& truth, SceneReport& scene) {
@@ -209,9 +192,9 @@ class Study {
     if (const auto done = measure_points(subject, *truth, scene); !done) return done.error();
     tell(subject, "pictures");
     if (!subject.view.scalars->empty()) {
-      const auto ripple = ripple_floor(subject, pool_, cancel_);
+      const auto ripple = reconstruction_ripple(subject, pool_, cancel_);
       if (!ripple) return ripple.error();
-      scene.ripple_floor = *ripple;
+      scene.reconstruction_ripple = *ripple;
     }
     auto encoded = measure_encoding(subject, pool_, cancel_);
     if (!encoded) return encoded.error();
@@ -249,7 +232,10 @@ Result<Report> run_study(const std::vector<Subject>& subjects, const Options& op
   }
   auto points = PointsFile::open(options.folder / "points.csv");
   if (!points) return points.error();
-  return Study(subjects, options, pool, cancel, listen, std::move(*points)).run();
+  auto machine = this_machine(pool.size());
+  if (!machine) return machine.error();
+  return Study(subjects, options, pool, cancel, listen, std::move(*points), std::move(*machine))
+      .run();
 }
 
 }  // namespace windsplat::study

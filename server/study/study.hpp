@@ -30,12 +30,13 @@ struct SceneReport {
   int height = 0;
   bool integral = true;       // the truth: the integral, or extrapolated from slabs
   double truth_estimate = 0;  // of an extrapolated truth's own error, RMS
-  double truth_seconds = 0;   // 0: it was in the folder already
+  double truth_seconds = 0;   // that it took when it was made; not a number: unknown
+  double tolerance = 0;       // of the integral
   std::int64_t pieces = 0;
   std::int64_t evaluations = 0;
   std::vector<Point> points;
   std::vector<Curve> curves;
-  double ripple_floor = 0;  // 0: nothing ripples, there is no medium
+  double reconstruction_ripple = 0;  // 0: there is no medium; not a number: bent lattice or slice
   std::vector<Encoded> encoded;
   std::vector<Shown> pictures;
 };
@@ -60,13 +61,15 @@ struct Progress {
 struct Options {
   std::filesystem::path folder;
   bool quick = false;
-  Truth truth;  // empty: extrapolated from slabs
+  Truth truth;           // empty: extrapolated from slabs
+  double tolerance = 0;  // that `truth` is integrated to
 };
 
 using Listener = std::function<void(const Progress&)>;
 
 // Measures what the folder does not hold yet, and says what it found. Errors: cancelled (the folder
-// then holds every point that was finished); those of the scenes, the engine and the files.
+// then holds every point that was finished); internal (a truth that is not finite); those of the
+// scenes, the engine and the files.
 Result<Report> run_study(const std::vector<Subject>& subjects, const Options& options,
                          ThreadPool& pool, const CancelToken& cancel, const Listener& listen);
 

@@ -50,9 +50,11 @@ Result<Extrapolated> extrapolate(const Subject& subject, ThreadPool& pool,
                                  const CancelToken& cancel);
 
 // RMSE over RGBA of a uniform white medium, optical depth 1 through the middle, on the subject's
-// lattice in the subject's direction, against -expm1(-rho L): what overlapping footprints ripple,
-// a floor for any picture made of splats.
-Result<double> ripple_floor(const Subject& subject, ThreadPool& pool, const CancelToken& cancel);
+// lattice in the subject's direction, against -expm1(-rho L): what overlapping footprints ripple.
+// Not in the errors against the integral, which is of the same footprints, and so no floor of them.
+// Not a number for a bent lattice and a slice: neither is a box with an even medium.
+Result<double> reconstruction_ripple(const Subject& subject, ThreadPool& pool,
+                                     const CancelToken& cancel);
 
 // An encoding's own error, in linear light and by FLIP, of the subject's picture.
 struct Encoded {

@@ -8,10 +8,17 @@
 
 namespace windsplat::study {
 
-// Empty if there is none, or not of that size.
-std::optional<Picture> read_truth(const std::filesystem::path& path, int width, int height);
+struct KeptTruth {
+  Picture picture;
+  double seconds = 0;    // that it took
+  double tolerance = 0;  // that it was integrated to
+};
+
+// Empty if there is none, or it is damaged, not finite, or not of that size or tolerance.
+std::optional<KeptTruth> read_truth(const std::filesystem::path& path, int width, int height,
+                                    double tolerance);
 
 // Errors: internal.
-Result<void> write_truth(const std::filesystem::path& path, const Picture& picture);
+Result<void> write_truth(const std::filesystem::path& path, const KeptTruth& truth);
 
 }  // namespace windsplat::study

@@ -65,6 +65,7 @@ TEST(Study, ASecondRunSkipsEveryPointAndTellsTheSameNumbers) {
   EXPECT_EQ(second.skipped, first.measured);
   EXPECT_EQ(report_csv(second), report_csv(first));
   EXPECT_EQ(second.scenes[0].pieces, 7);
+  EXPECT_EQ(second.scenes[0].truth_seconds, first.scenes[0].truth_seconds);
 }
 
 TEST(Study, AnInterruptedOneGoesOnWhereItStopped) {
@@ -102,6 +103,76 @@ TEST(Study, AnotherTruthIsAnotherPoint) {
   EXPECT_EQ(extrapolated.skipped, 0U);
   EXPECT_FALSE(extrapolated.scenes[0].integral);
   EXPECT_TRUE(std::isfinite(extrapolated.scenes[0].truth_estimate));
+}
+
+TEST(Study, AnotherToleranceIsAnotherTruthAndOtherPoints) {
+  const Folder folder;
+  int asked = 0;
+  ASSERT_TRUE(study(folder, grey(asked)));
+  ThreadPool pool(1);
+  const Report finer =
+      run_study(vectors_only(), {folder.path, true, grey(asked), 1e-9}, pool, {}, {}).value();
+  EXPECT_EQ(asked, 2);
+  EXPECT_EQ(finer.skipped, 0U);
+  EXPECT_EQ(finer.scenes[0].tolerance, 1e-9);
+}
+
+TEST(Study, ATruthThatIsNotFiniteIsAnErrorAndNotKept) {
+  const Folder folder;
+  int asked = 0;
+  const Truth broken = [&](const scene::Scene& scene) {
+    auto picture = grey(asked)(scene);
+    picture->rgba[5] = NAN;
+    return picture;
+  };
+  const auto failed = study(folder, broken);
+  ASSERT_FALSE(failed);
+  EXPECT_NE(failed.error().message.find("vectors"), std::string::npos);
+  EXPECT_EQ(study(folder, grey(asked)).value().skipped, 0U);
+  EXPECT_EQ(asked, 2);
+}
+
+// Seconds that nobody knows are null, as is the tolerance of what is no integral.
+TEST(Study, WhatIsUnknownIsNull) {
+  Report report;
+  report.scenes.emplace_back();
+  report.scenes[0].view = vectors_only()[0].view;
+  report.scenes[0].integral = false;
+  report.scenes[0].truth_seconds = NAN;
+  const Json reference = Json::parse(report_json(report)).at("scenes").at(0).at("reference");
+  EXPECT_TRUE(reference.at("seconds").is_null());
+  EXPECT_TRUE(reference.at("tolerance").is_null());
+}
+
+// The page opens with both methods at the view's own thickness, which is not the default's.
+TEST(Page, SummaryLooksAtTheViewsOwnKnobs) {
+  Report report;
+  SceneReport scene;
+  scene.name = "thin";
+  Subject subject = vectors_only()[0];
+  subject.view.method.slab_thickness = 0.5;
+  scene.view = subject.view;
+  scene.width = subject.view.image.width;
+  scene.height = subject.view.image.height;
+  const auto point = [&](scene::Method method, double thickness, int stride, double rmse) {
+    Point one;
+    one.setting = {method, scene::Compositing::analytic, own_knobs(subject)};
+    one.setting.knobs.slab_thickness = thickness;
+    one.setting.knobs.stride = stride;
+    one.measured.rmse = rmse;
+    scene.points.push_back(one);
+  };
+  point(scene::Method::kernel, 1, 2, 0.125);
+  point(scene::Method::kernel, 1, 1, 0.25);
+  point(scene::Method::slab, 1, 1, 0.375);
+  point(scene::Method::slab, 0.5, 1, 0.5);
+  report.scenes.push_back(scene);
+  const std::string page = report_page(report).value();
+  const std::string summary = page.substr(0, page.find("<h2"));
+  EXPECT_NE(summary.find("2.50e-01"), std::string::npos);
+  EXPECT_NE(summary.find("5.00e-01"), std::string::npos);
+  EXPECT_EQ(summary.find("1.25e-01"), std::string::npos);
+  EXPECT_EQ(summary.find("3.75e-01"), std::string::npos);
 }
 
 TEST(Study, WritesJsonOfTheShapeThatProgramsRelyOn) {
@@ -199,7 +270,7 @@ TEST(Key, IsFnv1a) {
 TEST(Plot, DrawsDiscsRingsAndCrosses) {
   SceneReport scene;
   scene.name = "a<b";
-  scene.ripple_floor = 1e-3;
+  scene.reconstruction_ripple = 1e-3;
   for (int i = 0; i < 4; ++i) {
     Point point;
     point.measured = {std::pow(10, -i), 0.1, 20, 0.1, 1.0 + i, 1.0 + i, 2.0 + i, i != 0};
@@ -215,7 +286,7 @@ TEST(Plot, DrawsDiscsRingsAndCrosses) {
   EXPECT_EQ(count("r=\"3.4\""), 3);
   EXPECT_EQ(count("r=\"7\""), 3);
   EXPECT_EQ(count("stroke-width:2.2"), 2);
-  EXPECT_EQ(count("ripple floor"), 1);
+  EXPECT_EQ(count("reconstruction ripple (not in these errors)"), 1);
   EXPECT_EQ(svg.find("a<b"), std::string::npos);
   EXPECT_EQ(svg.find("nan"), std::string::npos);
 }

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/scene/build.hpp"
 #include "server/study/metrics.hpp"
+#include "tests/unit/scene/fake.hpp"
 
 namespace windsplat::study {
 namespace {
@@ -143,9 +145,48 @@ TEST(Measure, ASmallerPictureIsComparedAtTheTruthsSize) {
 TEST(Ripple, IsBetweenNothingAndWhatTheFootprintAllows) {
   ThreadPool pool(1);
   const double floor =
-      ripple_floor(standard_subject("scalar", true).value(), pool, CancelToken()).value();
+      reconstruction_ripple(standard_subject("scalar", true).value(), pool, CancelToken()).value();
   EXPECT_GT(floor, 1e-6);
   EXPECT_LT(floor, 0.5 * 0.039 / std::exp(1.0));
+}
+
+TEST(Ripple, IsNoneOfABentLatticeAndOfASlice) {
+  ThreadPool pool(1);
+  const Subject flat = standard_subject("climate", true).value();
+  EXPECT_TRUE(std::isfinite(reconstruction_ripple(flat, pool, CancelToken()).value()));
+  Subject bent = flat;
+  bent.view.geometry.mapping = protocol::GeometryMapping::sphere;
+  EXPECT_TRUE(std::isnan(reconstruction_ripple(bent, pool, CancelToken()).value()));
+  Subject slice = flat;
+  slice.view.geometry.slice = protocol::SliceView{};
+  EXPECT_TRUE(std::isnan(reconstruction_ripple(slice, pool, CancelToken()).value()));
+}
+
+// Heights bend the lattice and its box; the study's own orbit looks at that box.
+TEST(Scene, FramesHeightsUnlessTheViewSaysAnythingOfItsFrame) {
+  const auto terrain = [] {
+    auto source = std::make_unique<scene::FakeSource>(
+        scene::atmosphere_grid(),
+        std::vector<data::FieldInfo>{scene::wind_info(), scene::scalar_info("z", "m")}, 1);
+    source->values = [](const std::string& field, std::size_t n) {
+      return field == "z" ? 1e5 * static_cast<double>(n) : 1.0;
+    };
+    return std::shared_ptr<data::Dataset>(scene::dataset_of(std::move(source)));
+  };
+  protocol::View view;
+  view.geometry.height_field = "z";
+  const auto own = terrain();
+  const Subject subject = make_subject("terrain", own, view, {40, 30}).value();
+  protocol::View framed = subject.view;
+  scene::orbit(framed, scene::place_dataset(view.geometry, *own).value()->lattice, 30, 25, 1);
+  EXPECT_EQ(subject.view.camera.eye, framed.camera.eye);
+  EXPECT_EQ(subject.view.camera.height, framed.camera.height);
+
+  view.camera.target = protocol::Vec3{0.25, 0, 0};
+  EXPECT_EQ(make_subject("t", own, view, {40, 30}).value().view.camera.target, view.camera.target);
+  view.camera.target.reset();
+  view.camera.height = 0.75;
+  EXPECT_EQ(make_subject("t", own, view, {40, 30}).value().view.camera.height, 0.75);
 }
 
 TEST(Encoding, ErrsLessAndTakesMoreBytesTheHigherItsQuality) {
