@@ -28,6 +28,7 @@ struct Workload {
   int width;
   int height;
   bool every_line;
+  scene::Method method = scene::Method::kernel;  // as moving frames are drawn
 };
 
 constexpr Workload workloads[] = {
@@ -37,6 +38,8 @@ constexpr Workload workloads[] = {
     {"winds+clouds 1280x720", "default", 1280, 720, true},
     {"default view 640x480", "default", 640, 480, false},
     {"clouds 640x480", "clouds", 640, 480, false},
+    {"winds+clouds by slab", "default", 640, 480, true, scene::Method::slab},
+    {"default view by slab", "default", 640, 480, false, scene::Method::slab},
 };
 
 [[noreturn]] void give_up(const Error& error) {
@@ -68,6 +71,7 @@ scene::Scene make_scene(const Workload& workload) {
   }
   scene::orbit(view, lattice, 20, 35, 1);
   scene::Scene scene = value_or_give_up(scene::build_scene(view, dataset));
+  scene.method = workload.method;
   if (workload.every_line && scene.vector) {
     scene.vector->min_magnitude = 1e-3 * scene.vector->magnitude_range[1];
   }
