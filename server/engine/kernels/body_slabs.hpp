@@ -107,15 +107,15 @@ int pack_splats_on(const Prepared& p, SplatRecord* out) {
     if (f.row_last[l] < f.row_first[l]) continue;
     const float middle = p.stops.depth[l];
     const float half = p.splats.half_depth[l];
-    out[n++] = {middle - half,
+    out[n++] = {p.pass->partial,
+                middle - half,
                 middle + half,
                 middle,
+                splat_at<Perspective>(p.densities, p.splats, p.near, l),
                 static_cast<std::int16_t>(f.row_first[l]),
                 static_cast<std::int16_t>(f.row_last[l]),
                 static_cast<std::int16_t>(f.column_first[l]),
-                static_cast<std::int16_t>(f.column_last[l]),
-                p.pass->partial,
-                splat_at<Perspective>(p.densities, p.splats, p.near, l)};
+                static_cast<std::int16_t>(f.column_last[l])};
   }
   return n;
 }

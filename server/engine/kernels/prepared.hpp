@@ -114,11 +114,11 @@ struct Splat {
 // A splat and a line by themselves, for a sweep that meets each in several slabs. Depths are from
 // the camera's depth origin; rows and columns are the tile's blocks, both ends included.
 struct SplatRecord {
+  const float* partial;
   float first, last;  // where it begins and ends
   float middle;
-  std::int16_t row_first, row_last, column_first, column_last;
-  const float* partial;
   Splat splat;
+  std::int16_t row_first, row_last, column_first, column_last;
 };
 
 struct RibbonRecord {
