@@ -174,9 +174,10 @@ test("kernels that do not overlap have no span, no jitter no pattern", () =>
 
 test("the slab's thickness is asked for only of slabs, and each compositing is explained", () =>
   withPage(async (page) => {
+    await finalPicture(page);
     await unfold(page, "Method");
     const note = (text) => page.locator("#panel .panel-note", { hasText: text });
-    assert.equal(await isShown(page, "slab thickness", "input"), true, "slabs are the default");
+    await control(page, "slab thickness", "input").waitFor(); // slabs are the default
     await choose(page, "method", /^kernel$/);
     assert.equal(await lastPatch(page, "method", "name"), "kernel");
     assert.equal(await isShown(page, "slab thickness", "input"), false);
@@ -194,7 +195,7 @@ test("the slab's thickness is asked for only of slabs, and each compositing is e
       [/^cd \(/, "cd", /no seams/],
       [/^cd-naive/, "cd-naive", /seams about/],
       [/^cd-euler/, "cd-euler", /unstable/],
-      [/^simple/, "simple", /in front/],
+      [/^simple/, "simple", /behind all/],
       [/^analytic/, "analytic", /exactly/],
     ]) {
       await choose(page, "compositing", option);

@@ -12,7 +12,7 @@ export type SliceAxis = "x" | "y" | "z";
 export const compositingHints: Readonly<Record<string, string>> = {
   analytic: "Line and medium mixed exactly along their common piece.",
   cd: "Colour times density added, corrected: no seams about lines.",
-  simple: "A line lies in front of its whole piece of medium.",
+  simple: "A line lies behind all of its piece of medium.",
   "cd-naive": "Colour times density added as it is: seams about lines.",
   "cd-euler": "Rates of cd in one explicit step: unstable where the medium is dense.",
 };
