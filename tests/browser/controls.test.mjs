@@ -174,7 +174,6 @@ test("kernels that do not overlap have no span, no jitter no pattern", () =>
 
 test("the slab's thickness is asked for only of slabs, and each compositing is explained", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     await unfold(page, "Method");
     const note = (text) => page.locator("#panel .panel-note", { hasText: text });
     await control(page, "slab thickness", "input").waitFor(); // slabs are the default
