@@ -83,6 +83,7 @@ void place_axis(const Scene& scene, int a, int stride, AxisArrays& axis) {
     axis.from_eye.push_back(static_cast<float>(from_eye));
     axis.world.push_back(static_cast<float>(position));
     axis.cell.push_back(static_cast<float>(cell));
+    axis.inverse_cell.push_back(1.0F / axis.cell.back());
   }
   const int count = static_cast<int>(axis.sample.size());
   axis.visit = visit_order(count, eye_stop(camera, a, axis.position));
@@ -95,10 +96,15 @@ void place_axis(const Scene& scene, int a, int stride, AxisArrays& axis) {
   }
 }
 
+// As kernels::ColorTable wants it.
 std::vector<float> flatten(const scene::ColorTable& table) {
   std::vector<float> rgb;
-  rgb.reserve(3 * table.entries.size());
-  for (const auto& entry : table.entries) rgb.insert(rgb.end(), entry.begin(), entry.end());
+  rgb.reserve(kernels::color_floats * (table.entries.size() + 1));
+  const auto add = [&](const std::array<float, 3>& entry) {
+    rgb.insert(rgb.end(), {entry[0], entry[1], entry[2], 0.0F});
+  };
+  for (const auto& entry : table.entries) add(entry);
+  add(table.entries.back());
   return rgb;
 }
 
@@ -296,6 +302,7 @@ void finish_pass(const Scene& scene, int major, PassPlan& pass) {
                   axis.from_eye.data(),
                   axis.world.data(),
                   axis.cell.data(),
+                  axis.inverse_cell.data(),
                   axis.sample.data(),
                   axis.group.data(),
                   axis.visit.data()};

@@ -40,6 +40,7 @@ struct AxisArrays {
   std::vector<float> from_eye;
   std::vector<float> world;
   std::vector<float> cell;
+  std::vector<float> inverse_cell;
   std::vector<int> sample;
   std::vector<int> group;
   std::vector<int> visit;

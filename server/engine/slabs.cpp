@@ -47,7 +47,7 @@ class SlabSweep {
       draw();
       if (cancel.cancelled()) return false;
       if (done % slabs_between_checks == slabs_between_checks - 1) {
-        if (table_.refresh_open(tile_, plan_.stop_transmittance) == 0) {
+        if (table_.refresh_open(tile_) == 0) {
           for (; next_ < last_; ++next_) count_occluded(brick(next_));
           return true;
         }

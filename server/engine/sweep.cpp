@@ -2,6 +2,7 @@
 #include "server/engine/sweep.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace windsplat::engine {
@@ -47,7 +48,7 @@ class Sweep {
       retire();
       if (done % slabs_between_checks == slabs_between_checks - 1) {
         if (cancel.cancelled()) return false;
-        if (table_.refresh_open(tile_, plan_.stop_transmittance) == 0) {
+        if (table_.count_open(tile_) == 0) {
           for (; next_ < last_; ++next_) count_occluded(brick(next_));
           return true;
         }
@@ -109,7 +110,8 @@ class Sweep {
     space_.order.clear();
     for (const DepthEntry& entry : space_.active) {
       const kernels::Stops& stops = space_.slots[entry.slot]->stops;
-      for (int l = 0; l < stops.count; ++l) {
+      for (std::uint64_t left = stops.lines | stops.splats; left != 0; left &= left - 1U) {
+        const int l = std::countr_zero(left);
         const float depth = stops.depth[l];
         if (depth >= slab_.front && depth < slab_.back) {
           space_.order.push_back({depth, entry.slot, l});
@@ -119,8 +121,7 @@ class Sweep {
     std::stable_sort(space_.order.begin(), space_.order.end(),
                      [](const DepthEntry& a, const DepthEntry& b) { return a.depth < b.depth; });
     for (const DepthEntry& kernel : space_.order) {
-      table_.draw_prepared(plan_.camera, *space_.slots[kernel.slot], kernel.stop, kernel.stop + 1,
-                           tile_);
+      table_.draw_prepared(plan_.camera, *space_.slots[kernel.slot], kernel.stop, tile_);
     }
   }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "server/base/aligned_vector.hpp"
 #include "server/base/cancel.hpp"
 #include "server/engine/bins.hpp"
 #include "server/engine/kernels/prepared.hpp"
@@ -44,7 +45,7 @@ struct SweepSpace {
   Reached<kernels::RibbonRecord> ribbons;
   std::vector<std::uint32_t> here;  // of one kind, in the slab at hand
   std::vector<std::uint32_t> lines;
-  std::vector<float> gathered;
+  AlignedVector<float> gathered;
   std::vector<kernels::Hit> hits;    // as listed
   std::vector<kernels::Hit> sorted;  // by block, then depth
   std::vector<std::uint32_t> first;  // of each block, in `sorted`

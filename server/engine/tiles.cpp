@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "server/base/aligned_vector.hpp"
 #include "server/engine/sweep.hpp"
 
 #if defined(__SSE__)
@@ -45,8 +46,8 @@ class FlushDenormals {
 
 // A worker's own pixels, used for one tile after the other.
 struct Workspace {
-  std::vector<float> blocks;
-  std::vector<float> rays;
+  AlignedVector<float> blocks;
+  AlignedVector<float> rays;
   SweepSpace sweep;
 };
 
@@ -58,7 +59,7 @@ struct TileWork {
 };
 
 // The length of every pixel's ray whose forward component is 1.
-void fill_rays(const kernels::Camera& camera, const Tile& tile, std::vector<float>& rays) {
+void fill_rays(const kernels::Camera& camera, const Tile& tile, AlignedVector<float>& rays) {
   for (int block = 0; block < tile_blocks * tile_blocks; ++block) {
     float* ray = rays.data() + static_cast<std::size_t>(block) * block_pixels;
     for (int l = 0; l < block_pixels; ++l) {
@@ -91,6 +92,7 @@ void open_tile(const RenderPlan& plan, const Bins& bins, std::size_t index, Work
   }
   tile.blocks = space.blocks.data();
   tile.rays = space.rays.data();
+  tile.stop = plan.stop_transmittance;
   const int columns = (tile.width + block_side - 1) / block_side;
   const int rows = (tile.height + block_side - 1) / block_side;
   std::fill(std::begin(tile.open), std::end(tile.open), 0U);
@@ -110,7 +112,7 @@ void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& t
   for (std::size_t e = first; e < last; ++e) {
     if ((e - first) % bricks_between_checks == bricks_between_checks - 1) {
       if (cancel.cancelled()) return;
-      work.stopped = table.refresh_open(tile, plan.stop_transmittance) == 0;
+      work.stopped = table.count_open(tile) == 0;
     }
     if (e + 1 < last) {
       const Brick& next = bins.bricks[bins.entries[e + 1]];

@@ -2,8 +2,9 @@
 // WINDSPLAT_KERNEL_TABLE. Everything here has internal linkage, so no function built for one
 // instruction set can stand in for another's.
 //
-// A brick goes through three steps: its stops are projected and culled, what is left is prepared as
-// lines and splats in visibility order, and these are composited block by block.
+// A brick goes through three steps, the first two row by row with a lane a stop: its stops are
+// projected and culled, what is left is made ready as lines and splats, and these are composited in
+// visibility order, block by block with a lane a pixel.
 #include <cstddef>
 #include <cstdint>
 
@@ -14,9 +15,9 @@ namespace windsplat::engine::kernels {
 
 const Table& WINDSPLAT_KERNEL_TABLE() {
   static constexpr Table table{
-      WINDSPLAT_KERNEL_NAME, summarise,    draw,      prepare,   draw_prepared,
-      pack_splats,           pack_ribbons, gather,    list_hits, close_slab,
-      prefetch_brick,        refresh_open, attenuate, jitter};
+      WINDSPLAT_KERNEL_NAME, summarise,    draw,         prepare,   draw_prepared,
+      pack_splats,           pack_ribbons, gather,       list_hits, close_slab,
+      prefetch_brick,        count_open,   refresh_open, attenuate, jitter};
   return table;
 }
 

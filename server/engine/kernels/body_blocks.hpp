@@ -1,4 +1,5 @@
-// Part of the kernel body: a brick's prepared lines and splats into a tile's blocks, front to back.
+// Part of the kernel body: a brick's stops made ready for a tile, and composited into its blocks,
+// front to back.
 #pragma once
 
 #include "server/engine/kernels/body_composite.hpp"
@@ -6,48 +7,96 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// First and last block of a row or column; none if last < first.
-struct Range {
-  int first, last;
+using StopIntegers = hn::RebindToSigned<StopTag>;
+using StopInteger = hn::Vec<StopIntegers>;
+
+// blocks_between for a row of stops.
+struct Ranges {
+  StopInteger first, last;
 };
 
-// Blocks of the tile whose pixel centres may lie between two coordinates in pixels from the tile's
-// edge. Block b holds the centres 4 b + 0.5 to 4 b + 3.5.
-inline Range blocks_between(float low, float high, int blocks) {
+HWY_INLINE Ranges blocks_between(Stop low, Stop high, int blocks) {
   constexpr float per_block = 1.0F / block_side;
   constexpr float slack = 1e-3F;
   const float bound = static_cast<float>(blocks);
-  // Truncation rounds down because nothing below zero is truncated.
-  const float first = clamped((low - slack + 0.5F) * per_block, 0.0F, bound);
-  const float last = clamped((high + slack - 0.5F) * per_block, -1.0F, bound - 0.5F);
-  return {static_cast<int>(first), static_cast<int>(last + 1.0F) - 1};
+  const Stop first = clamped((low + all<Stop>(0.5F - slack)) * all<Stop>(per_block), 0.0F, bound);
+  const Stop last =
+      clamped((high + all<Stop>(slack - 0.5F)) * all<Stop>(per_block), -1.0F, bound - 0.5F);
+  return {truncated(first), truncated(last + all<Stop>(1.0F)) - hn::Set(StopIntegers(), 1)};
 }
 
-// Blocks of one row that the line's capsule may touch: the part of the segment within r2 of the
-// row's pixel centres, widened by r2. Coordinates from the tile's corner.
-struct Capsule {
-  float x, y, ux;
-  float inverse_uy;  // 0 for a level line, whose whole length counts in every row
-  float radius;
-};
-
-inline Range capsule_in_row(const Capsule& c, int row, int blocks) {
-  const float top = static_cast<float>(row * block_side) + 0.5F - c.y;
-  const float a = (top - c.radius) * c.inverse_uy;
-  const float b = (top + static_cast<float>(block_side - 1) + c.radius) * c.inverse_uy;
-  const float from = c.inverse_uy == 0 ? 0.0F : clamped(smaller(a, b), 0.0F, 1.0F);
-  const float to = c.inverse_uy == 0 ? 1.0F : clamped(larger(a, b), 0.0F, 1.0F);
-  const float xa = c.x + from * c.ux;
-  const float xb = c.x + to * c.ux;
-  return blocks_between(smaller(xa, xb) - c.radius, larger(xa, xb) + c.radius, blocks);
+// The bits from first to last; none if last < first.
+HWY_INLINE UnsignedOf<Stop> range_masks(const Ranges& range) {
+  const hn::RebindToUnsigned<StopTag> tag;
+  const auto one = hn::Set(tag, 1U);
+  const auto above =
+      hn::Shl(one + one, hn::BitCast(tag, hn::Max(range.last, hn::Zero(StopIntegers()))));
+  const auto below = hn::Shl(one, hn::BitCast(tag, range.first));
+  const auto bits = hn::AndNot(below - one, above - one);
+  const auto none = hn::Gt(range.first, range.last);
+  return hn::IfThenZeroElse(hn::RebindMask(tag, none), bits);
 }
 
-inline int blocks_of(int pixels) { return (pixels + block_side - 1) / block_side; }
+// Rows and columns of blocks that a row's lines may touch. In a row of blocks that is the part of
+// the segment within r2 of the row's pixel centres, widened by r2.
+HWY_INLINE std::uint32_t find_line_blocks(const LineStyle& line, const Ribbons& r, const Tile& tile,
+                                          int l, std::uint32_t bits, Footing& f) {
+  const int rows = blocks_of(tile.height);
+  const int columns = blocks_of(tile.width);
+  const Stop radius = all<Stop>(line.r2);
+  const Stop x = load<Stop>(r.x + l) - all<Stop>(static_cast<float>(tile.x));
+  const Stop y = load<Stop>(r.y + l) - all<Stop>(static_cast<float>(tile.y));
+  const Stop ux = load<Stop>(r.ux + l);
+  const Stop uy = load<Stop>(r.uy + l);
+  const Stop end = y + uy;
+  const Ranges range = blocks_between(hn::Min(y, end) - radius, hn::Max(y, end) + radius, rows);
+  const Stop other_end = x + ux;
+  const Ranges across =
+      blocks_between(hn::Min(x, other_end) - radius, hn::Max(x, other_end) + radius, columns);
+  const auto missing = hn::Or(hn::Gt(range.first, range.last), hn::Gt(across.first, across.last));
+  bits &= ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
+  if (bits == 0) return 0;
+  hn::Store(range.first, StopIntegers(), f.line_first + l);
+  hn::Store(range.last, StopIntegers(), f.line_last + l);
+  // A level line's whole length counts in every row.
+  const auto level = hn::Le(hn::Abs(uy), all<Stop>(1e-3F));
+  const Stop inverse = inverse_of(hn::IfThenElse(level, all<Stop>(1.0F), uy));
+  const Stop widen = hn::IfThenElseZero(level, all<Stop>(1e6F));
+  const Stop zero = hn::Zero(StopTag());
+  const Stop one = all<Stop>(1.0F);
+  const int most = hn::GetLane(
+      hn::MaxOfLanes(StopIntegers(), hn::IfThenZeroElse(missing, range.last - range.first)));
+  const Stop first = from_integer<Stop>(range.first);
+  for (int k = 0; k <= most; ++k) {
+    const Stop row = first + all<Stop>(static_cast<float>(k));
+    const Stop top = hn::MulAdd(row, all<Stop>(block_side), all<Stop>(0.5F)) - y;
+    const Stop a = (top - radius) * inverse;
+    const Stop b = (top + all<Stop>(block_side - 1) + radius) * inverse;
+    const Stop from = clamped(hn::Min(a, b) - widen, zero, one);
+    const Stop to = clamped(hn::Max(a, b) + widen, zero, one);
+    const Stop xa = hn::MulAdd(from, ux, x);
+    const Stop xb = hn::MulAdd(to, ux, x);
+    const Ranges here = blocks_between(hn::Min(xa, xb) - radius, hn::Max(xa, xb) + radius, columns);
+    hn::Store(range_masks(here), hn::RebindToUnsigned<StopTag>(), f.line_columns[k] + l);
+  }
+  return bits;
+}
 
-inline std::uint32_t range_mask(Range range) {
-  if (range.last < range.first) return 0;
-  return (~std::uint32_t{0} >> static_cast<unsigned>(31 - (range.last - range.first)))
-         << static_cast<unsigned>(range.first);
+// Rows and columns of blocks that a row's splats may touch; which of `bits` touch any.
+HWY_INLINE std::uint32_t find_splat_blocks(const Outline& outline, const Tile& tile, int l,
+                                           std::uint32_t bits, Footing& f) {
+  const Stop left = all<Stop>(static_cast<float>(tile.x));
+  const Stop top = all<Stop>(static_cast<float>(tile.y));
+  const Ranges across =
+      blocks_between(outline.x.low - left, outline.x.high - left, blocks_of(tile.width));
+  const Ranges down =
+      blocks_between(outline.y.low - top, outline.y.high - top, blocks_of(tile.height));
+  hn::Store(across.first, StopIntegers(), f.column_first + l);
+  hn::Store(across.last, StopIntegers(), f.column_last + l);
+  hn::Store(down.first, StopIntegers(), f.row_first + l);
+  hn::Store(down.last, StopIntegers(), f.row_last + l);
+  const auto missing = hn::Or(hn::Gt(across.first, across.last), hn::Gt(down.first, down.last));
+  return bits & ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
 }
 
 inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
@@ -58,8 +107,8 @@ inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
                 r.inverse_u2[l],
                 r.w0[l],
                 r.depth_ratio[l],
-                {r.tail[0][l], r.tail[1][l], r.tail[2][l]},
-                {r.rise[0][l], r.rise[1][l], r.rise[2][l]},
+                {r.tail[l][0], r.tail[l][1], r.tail[l][2]},
+                {r.rise[l][0], r.rise[l][1], r.rise[l][2]},
                 r.depth[l],
                 r.depth_rise[l],
                 0,
@@ -75,7 +124,8 @@ inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
 }
 
 template <bool Perspective>
-inline Splat splat_at(const Densities& d, const Splats& s, float near, int l) {
+inline Splat splat_at(const Prepared& p, int l) {
+  const Splats& s = p.splats;
   Splat out = {};
   out.x = s.x[l];
   out.y = s.y[l];
@@ -95,260 +145,97 @@ inline Splat splat_at(const Densities& d, const Splats& s, float near, int l) {
     out.dxy = s.dxy[l];
     out.dyy = s.dyy[l];
     out.d2_least = s.d2_least[l];
-    out.z = s.z[l];
-    out.near = near;
+    out.z = p.stops.z[l];
+    out.near = p.near;
   }
   out.strength = s.strength[l];
-  for (int c = 0; c < 3; ++c) out.color[c] = d.color[c][l];
+  for (int c = 0; c < 3; ++c) out.color[c] = p.densities.color[l][c];
   return out;
 }
 
-inline Capsule capsule_of(const Ribbon& ribbon, const Tile& tile) {
-  return {ribbon.x - static_cast<float>(tile.x), ribbon.y - static_cast<float>(tile.y), ribbon.ux,
-          absolute(ribbon.uy) > 1e-3F ? 1.0F / ribbon.uy : 0.0F, ribbon.r2};
-}
+inline bool has(std::uint64_t bits, int l) { return (bits >> static_cast<unsigned>(l) & 1U) != 0; }
 
-// Rows of blocks that each stop's line may touch.
-void find_line_rows(const LineStyle& line, const Ribbons& r, const Tile& tile, int count,
-                    Footing& f) {
-  const int rows = blocks_of(tile.height);
-  const float top = static_cast<float>(tile.y);
-  WINDSPLAT_LANES
-  for (int l = 0; l < count; ++l) {
-    const float a = r.y[l] - top;
-    const float b = a + r.uy[l];
-    const Range range = blocks_between(smaller(a, b) - line.r2, larger(a, b) + line.r2, rows);
-    f.line_first[l] = range.first;
-    f.line_last[l] = r.drawn[l] != 0 ? range.last : -1;
-  }
-}
+// One vector of a row of stops, made ready: see prepare_brick.
+template <bool Lines, bool Medium, bool Perspective, bool Curved>
+struct RowMaker {
+  const Camera& camera;
+  const Pass& pass;
+  const Tile& tile;
+  Hash3<std::uint32_t> key;
+  Prepared& out;
+  Rows rows;
+  Cells cells;
 
-// Rows and columns of blocks that each stop's splat may touch.
-void find_splat_blocks(const Densities& densities, const Splats& s, const Tile& tile, int count,
-                       Footing& f) {
-  const int rows = blocks_of(tile.height);
-  const int columns = blocks_of(tile.width);
-  const float left = static_cast<float>(tile.x);
-  const float top = static_cast<float>(tile.y);
-  WINDSPLAT_LANES
-  for (int l = 0; l < count; ++l) {
-    const Range across = blocks_between(s.x0[l] - left, s.x1[l] - left, columns);
-    const Range down = blocks_between(s.y0[l] - top, s.y1[l] - top, rows);
-    const bool drawn = densities.rho[l] > 0 && across.last >= across.first;
-    f.column_first[l] = across.first;
-    f.column_last[l] = across.last;
-    f.row_first[l] = down.first;
-    f.row_last[l] = drawn ? down.last : -1;
-  }
-}
-
-struct Reach {
-  int first, last;        // rows of blocks, of line and splat together
-  std::uint32_t columns;  // of the splat
-};
-
-template <bool Lines, bool Medium>
-inline Reach reach_of(const Footing& f, int l) {
-  Reach reach = {0, -1, 0};
-  if (Lines) {
-    reach.first = f.line_first[l];
-    reach.last = f.line_last[l];
-  }
-  if (Medium && f.row_last[l] >= f.row_first[l]) {
-    reach.columns = range_mask({f.column_first[l], f.column_last[l]});
-    const bool alone = !Lines || reach.last < reach.first;
-    reach.first = alone || f.row_first[l] < reach.first ? f.row_first[l] : reach.first;
-    reach.last = alone || f.row_last[l] > reach.last ? f.row_last[l] : reach.last;
-  }
-  return reach;
-}
-
-// Composites one kernel: its line, its splat or both.
-template <bool Lines, bool Medium, bool Perspective>
-inline void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
-  const Reach reach = reach_of<Lines, Medium>(p.footing, l);
-  if (reach.last < reach.first) return;
-  Ribbon ribbon;
-  Splat splat;
-  Capsule capsule = {};
-  if (Lines && p.footing.line_last[l] >= p.footing.line_first[l]) {
-    ribbon = ribbon_at(p.pass->line, p.ribbons, l);
-    capsule = capsule_of(ribbon, tile);
-  }
-  bool near = false;
-  if (Medium && reach.columns != 0) {
-    splat = splat_at<Perspective>(p.densities, p.splats, p.near, l);
-    near = Perspective && splat.z - 2.0F * p.splats.half_depth[l] < p.near;
-  }
-  const SplatFunction splat_function = near ? with.near_splat : with.splat;
-  const BothFunction both_function = near ? with.near_both : with.both;
-  const int columns_in_tile = blocks_of(tile.width);
-  for (int row = reach.first; row <= reach.last; ++row) {
-    std::uint32_t lines = 0;
-    std::uint32_t splats = 0;
-    if (Lines && row >= p.footing.line_first[l] && row <= p.footing.line_last[l]) {
-      lines = range_mask(capsule_in_row(capsule, row, columns_in_tile));
+  // What of the lanes from i on (`bits`) has a line or a splat, made ready at stop l.
+  HWY_INLINE void make(int i, int l, std::uint32_t bits) {
+    const CellLanes<Curved> cell(rows, cells, i);
+    if (Lines) {
+      const Winds winds = read_winds(pass, rows, i);
+      std::uint32_t lines =
+          bits & bits_of<Stop>(hn::Ge(winds.magnitude, all<Stop>(least_magnitude(pass.line))));
+      if (lines != 0) {
+        lines = prepare_ribbons<Perspective, Curved>(camera, pass, rows, out.stops, cell, winds,
+                                                     key, i, l, lines, out.ribbons);
+      }
+      if (lines != 0) lines = find_line_blocks(pass.line, out.ribbons, tile, l, lines, out.footing);
+      out.stops.lines |= static_cast<std::uint64_t>(lines) << static_cast<unsigned>(l);
     }
-    if (Medium && row >= p.footing.row_first[l] && row <= p.footing.row_last[l]) {
-      splats = reach.columns;
-    }
-    const float y = static_cast<float>(tile.y + row * block_side);
-    std::uint32_t left = (lines | splats) & tile.open[row];
-    while (left != 0) {
-      const int column = __builtin_ctz(left);
-      const std::uint32_t bit = left & (~left + 1U);
-      left ^= bit;
-      const float x = static_cast<float>(tile.x + column * block_side);
-      const int index = row * tile_blocks + column;
-      float* block = tile.blocks + static_cast<std::ptrdiff_t>(index) * block_floats;
-      const float* ray = Medium && Perspective
-                             ? tile.rays + static_cast<std::ptrdiff_t>(index) * block_pixels
-                             : nullptr;
-      tile.counters.pixel_updates += block_pixels;
-      if (Lines && Medium && (lines & splats & bit) != 0) {
-        both_function(ribbon, splat, x, y, ray, block);
-        tile.counters.exponentials += std::int64_t{with.both_exponentials} * block_pixels;
-      } else if (Lines && (!Medium || (lines & bit) != 0)) {
-        with.line(ribbon, x, y, block);
-      } else if (Medium) {
-        splat_function(splat, x, y, ray, block);
-        tile.counters.exponentials += std::int64_t{with.splat_exponentials} * block_pixels;
+    if (Medium) {
+      const Extinctions found = read_extinctions(pass, rows, i);
+      std::uint32_t splats = bits & bits_of<Stop>(found.kept);
+      if (splats == 0) return;
+      store(found.rho, out.densities.rho + l);
+      const Outline outline =
+          prepare_splats<Perspective, Curved>(camera, out.stops, cell, l, found.rho, out.splats);
+      splats = find_splat_blocks(outline, tile, l, splats, out.footing);
+      out.stops.splats |= static_cast<std::uint64_t>(splats) << static_cast<unsigned>(l);
+      for (; splats != 0; splats &= splats - 1U) {
+        const int k = __builtin_ctz(splats);
+        color_density(pass, rows.offset + rows.along_u[i + k], out.densities.color[l + k]);
       }
     }
   }
-}
-
-// How far a brick's kernels reach beyond their stops along right, down and forward.
-void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, float reach[3]) {
-  float cell[3] = {0, 0, 0};
-  const auto widest = [&](int a, int first, int count) {
-    for (int i = first; i < first + count; ++i) {
-      cell[a] = larger(cell[a], pass.axis[a].cell[pass.axis[a].visit[i]]);
-    }
-  };
-  widest(pass.major, brick.slab, 1);
-  widest(pass.u, brick.u_first, brick.u_count);
-  widest(pass.v, brick.v_first, brick.v_count);
-  const float moved = 0.5F * (pass.line.jitter_center + pass.line.jitter_stride);
-  if (pass.places != nullptr) {
-    for (int c = 0; c < 3; ++c) cell[c] = pass.cell_max[c];
-  }
-  const float* const frame[3] = {camera.right, camera.down, camera.forward};
-  for (int c = 0; c < 3; ++c) {
-    float box = 0;    // half the kernel's, along this axis of the camera
-    float shift = 0;  // of its centre
-    float square = 0;
-    for (int a = 0; a < 3; ++a) {
-      box += pass.line.half_span * absolute(frame[c][a]) * cell[a];
-      shift += moved * absolute(frame[c][a]) * cell[a];
-      square += frame[c][a] * frame[c][a] * cell[a] * cell[a];
-    }
-    const float line = smaller(brick.line_reach, box) + shift;
-    if (pass.places != nullptr) square *= 3.0F;
-    const float splat = pass.has_medium != 0 ? footprint_t * square_root(square) : 0.0F;
-    reach[c] = larger(pass.has_lines != 0 ? line : 0.0F, splat) * 1.00001F;
-  }
-}
-
-// Leaves out the stops whose kernel can only touch closed blocks.
-template <bool Perspective>
-void keep_unhidden(const Camera& camera, const float reach[3], float margin, Tile& tile,
-                   Stops& stops) {
-  const float left = static_cast<float>(tile.x) - camera.half_width_px;
-  const float top = static_cast<float>(tile.y) - camera.half_height_px;
-  const int columns = blocks_of(tile.width);
-  const int rows = blocks_of(tile.height);
-  int first_column[brick_stops], last_column[brick_stops];
-  int first_row[brick_stops], last_row[brick_stops];
-  WINDSPLAT_LANES
-  for (int l = 0; l < stops.count; ++l) {
-    const float z = stops.z[l];
-    // The nearest and farthest the kernel reaches widen it most, on either side of the middle.
-    const float near = Perspective ? 1.0F / larger(z - reach[2], camera.near) : 1.0F;
-    const float far = Perspective ? 1.0F / (z + reach[2]) : 1.0F;
-    const float x0 = stops.x[l] - reach[0];
-    const float x1 = stops.x[l] + reach[0];
-    const float y0 = stops.y[l] - reach[1];
-    const float y1 = stops.y[l] + reach[1];
-    const float scale = camera.inverse_pixel;
-    const Range across =
-        blocks_between(smaller(x0 * near, x0 * far) * scale - left - margin,
-                       larger(x1 * near, x1 * far) * scale - left + margin, columns);
-    const Range along = blocks_between(smaller(y0 * near, y0 * far) * scale - top - margin,
-                                       larger(y1 * near, y1 * far) * scale - top + margin, rows);
-    first_column[l] = across.first;
-    last_column[l] = across.last;
-    first_row[l] = along.first;
-    last_row[l] = along.last;
-  }
-  int kept[brick_stops];
-  for (int l = 0; l < stops.count; ++l) {
-    std::uint32_t open = 0;
-    for (int row = first_row[l]; row <= last_row[l]; ++row) open |= tile.open[row];
-    kept[l] = (open & range_mask({first_column[l], last_column[l]})) != 0 ? 1 : 0;
-    tile.counters.occluded += 1 - kept[l];
-  }
-  keep_stops(kept, stops);
-}
-
-// Leaves out the stops that have neither line nor splat.
-template <bool Lines, bool Medium>
-void keep_drawn(Stops& stops, Winds& winds, Densities& densities) {
-  int kept[brick_stops];
-  int n = 0;
-  for (int l = 0; l < stops.count; ++l) {
-    int keep = 0;
-    if (Lines) {
-      keep |= winds.magnitude[l] > 0 ? 1 : 0;
-      winds.magnitude[n] = winds.magnitude[l];
-      for (auto& component : winds.direction) component[n] = component[l];
-    }
-    if (Medium) {
-      keep |= densities.rho[l] > 0 ? 1 : 0;
-      densities.rho[n] = densities.rho[l];
-    }
-    kept[l] = keep;
-    n += keep;
-  }
-  keep_stops(kept, stops);
-}
+};
 
 // Everything up to the pixels: what of a brick may touch the tile's open blocks, made ready.
 template <bool Lines, bool Medium, bool Perspective, bool Curved>
 void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
                    Prepared& out) {
+  RowMaker<Lines, Medium, Perspective, Curved> maker = {
+      camera, pass, tile, hash_key(pass.line.seed, pass.line.epoch), out, {}, {}};
+  Rows& rows = maker.rows;
   Stops& stops = out.stops;
-  Winds winds;
-  Cells cells;
+  stops.lines = stops.splats = 0;
   out.pass = &pass;
   out.near = camera.near;
-  list_stops(pass, brick, stops);
-  if (Curved) {
-    place_curved_stops(camera, pass, stops);
-  } else {
-    place_stops(camera, pass, brick, stops);
-  }
+  open_rows(pass, brick, rows);
   float reach[3];
   brick_reach(camera, pass, brick, reach);
-  const float margin = Lines ? pass.line.r2 : 0.0F;
-  cull_stops<Perspective>(camera, tile, reach, margin, stops);
-  if (tile.any_closed != 0) keep_unhidden<Perspective>(camera, reach, margin, tile, stops);
-  if (stops.count == 0) return;
-  if (Lines) read_winds(pass, stops, winds);
-  if (Medium) read_densities(pass, stops, out.densities);
-  keep_drawn<Lines, Medium>(stops, winds, out.densities);
-  fill_cells<Curved>(camera, pass, stops, cells);
-  if (Curved) drop_flat_cells<Lines, Medium>(stops, cells, winds, out.densities);
-  if (Lines) {
-    if (Curved) bend_winds(pass, stops, cells, winds);
-    prepare_ribbons<Perspective, Curved>(camera, pass, stops, cells, winds, out.ribbons);
-    find_line_rows(pass.line, out.ribbons, tile, stops.count, out.footing);
+  const Frustum frustum = frustum_of<Perspective>(camera, tile, reach, Lines ? pass.line.r2 : 0.0F);
+  for (int j = 0; j < rows.v_count; ++j) {
+    set_row(pass, j, rows);
+    if (Curved) {
+      place_curved_row(camera, pass, j, rows, stops);
+    } else {
+      place_row(camera, pass, j, rows, stops);
+    }
+    std::uint32_t bits = seen_in_row<Perspective>(camera, frustum, stops, j) & row_bits(rows);
+    if (bits == 0) continue;
+    if (tile.any_closed != 0 &&
+        !row_is_open<Perspective>(camera, frustum, stops, j, rows.u_count, !Curved, tile)) {
+      tile.counters.occluded += __builtin_popcount(bits);
+      continue;
+    }
+    if (Curved) {
+      fill_cells(camera, pass, rows, maker.cells);
+      bits &= maker.cells.solid;
+    }
+    for (int i = 0; i < brick_side; i += stop_lanes) {
+      const std::uint32_t here = bits >> static_cast<unsigned>(i) & ((2U << (stop_lanes - 1)) - 1U);
+      if (here != 0) maker.make(i, brick_side * j + i, here);
+    }
   }
-  if (Medium) {
-    color_densities(pass, stops, out.densities);
-    prepare_splats<Perspective, Curved>(camera, stops, cells, out.densities, out.splats);
-    find_splat_blocks(out.densities, out.splats, tile, stops.count, out.footing);
-  }
+  stops.count = __builtin_popcountll(stops.lines | stops.splats);
 }
 
 template <bool Lines, bool Medium, bool Perspective>
@@ -361,10 +248,155 @@ void prepare_on(const Camera& camera, const Pass& pass, const Brick& brick, Tile
   }
 }
 
-template <bool Lines, bool Medium, bool Perspective>
-void draw_stops(const Prepared& p, int first, int last, Tile& tile) {
-  const Compositor with = compositor_of<Perspective>(*p.pass);
-  for (int l = first; l < last; ++l) draw_kernel<Lines, Medium, Perspective>(p, with, l, tile);
+inline float* block_at(const Tile& tile, int row, int column) {
+  return tile.blocks + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * block_floats;
+}
+
+inline const float* rays_at(const Tile& tile, int row, int column) {
+  return tile.rays + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * block_pixels;
+}
+
+inline float left_of(const Tile& tile, int column) {
+  return static_cast<float>(tile.x + column * block_side);
+}
+
+inline float top_of(const Tile& tile, int row) {
+  return static_cast<float>(tile.y + row * block_side);
+}
+
+// A block that lets nothing through any more is closed for all that lies behind.
+HWY_INLINE void note_light(const Light& light, int row, std::uint32_t bit, Tile& tile) {
+  if (light.above(tile.stop)) return;
+  tile.open[row] &= ~bit;
+  tile.any_closed = 1;
+}
+
+// Composites one line into its blocks; how many.
+template <Depth Along, int Style>
+HWY_INLINE int draw_ribbon(const Ribbon& ribbon, const Footing& f, int l, Tile& tile) {
+  const RibbonLanes lanes = spread(ribbon);
+  int blocks = 0;
+  for (int row = f.line_first[l], k = 0; row <= f.line_last[l]; ++row, ++k) {
+    std::uint32_t left = f.line_columns[k][l] & tile.open[row];
+    blocks += __builtin_popcount(left);
+    while (left != 0) {
+      const int column = __builtin_ctz(left);
+      const std::uint32_t bit = left & (~left + 1U);
+      left ^= bit;
+      note_light(line_block<Along, Style>(lanes, left_of(tile, column), top_of(tile, row),
+                                          block_at(tile, row, column)),
+                 row, bit, tile);
+    }
+  }
+  return blocks;
+}
+
+template <bool Perspective, int Style>
+HWY_INLINE void draw_line(const Prepared& p, int l, Tile& tile) {
+  const Ribbon ribbon = ribbon_at(p.pass->line, p.ribbons, l);
+  int blocks = 0;
+  if (!Perspective || Style == style_plain) {
+    blocks = draw_ribbon<Depth::flat, Style>(ribbon, p.footing, l, tile);
+  } else if (absolute(ribbon.depth_ratio - 1.0F) <= series_bend_max) {
+    blocks = draw_ribbon<Depth::series, Style>(ribbon, p.footing, l, tile);
+  } else {
+    blocks = draw_ribbon<Depth::exact, Style>(ribbon, p.footing, l, tile);
+  }
+  tile.counters.pixel_updates += std::int64_t{blocks} * block_pixels;
+}
+
+template <bool Perspective>
+void draw_styled(const Prepared& p, int style, int l, Tile& tile) {
+  if (style == style_head) {
+    draw_line<Perspective, style_head>(p, l, tile);
+  } else if (style == style_moving) {
+    draw_line<Perspective, style_moving>(p, l, tile);
+  } else {
+    draw_line<Perspective, style_plain>(p, l, tile);
+  }
+}
+
+// A kernel whose splat the near plane may cut.
+template <bool Perspective>
+inline bool is_near(const Prepared& p, int l) {
+  return Perspective && p.stops.z[l] - 2.0F * p.splats.half_depth[l] < p.near;
+}
+
+// Composites one kernel that has a splat, and perhaps a line.
+template <bool Perspective>
+void draw_kernel(const Prepared& p, const Compositor& with, int style, int l, Tile& tile) {
+  const Footing& f = p.footing;
+  const bool lined = has(p.stops.lines, l);
+  const Splat splat = splat_at<Perspective>(p, l);
+  Ribbon ribbon;
+  if (lined) ribbon = ribbon_at(p.pass->line, p.ribbons, l);
+  const bool near = is_near<Perspective>(p, l);
+  const SplatFunction splat_function = near ? with.near_splat : with.splat;
+  const BothFunction both_function = near ? with.near_both : with.both;
+  const std::uint32_t columns = range_mask({f.column_first[l], f.column_last[l]});
+  const int first = lined && f.line_first[l] < f.row_first[l] ? f.line_first[l] : f.row_first[l];
+  const int last = lined && f.line_last[l] > f.row_last[l] ? f.line_last[l] : f.row_last[l];
+  for (int row = first; row <= last; ++row) {
+    const bool with_line = lined && row >= f.line_first[l] && row <= f.line_last[l];
+    const std::uint32_t lines = with_line ? f.line_columns[row - f.line_first[l]][l] : 0;
+    const std::uint32_t splats = row >= f.row_first[l] && row <= f.row_last[l] ? columns : 0;
+    std::uint32_t left = (lines | splats) & tile.open[row];
+    tile.counters.pixel_updates += std::int64_t{__builtin_popcount(left)} * block_pixels;
+    tile.counters.exponentials +=
+        std::int64_t{__builtin_popcount(left & splats & ~lines) * with.splat_exponentials +
+                     __builtin_popcount(left & splats & lines) * with.both_exponentials} *
+        block_pixels;
+    while (left != 0) {
+      const int column = __builtin_ctz(left);
+      const std::uint32_t bit = left & (~left + 1U);
+      left ^= bit;
+      const float x = left_of(tile, column);
+      const float y = top_of(tile, row);
+      const float* ray = Perspective ? rays_at(tile, row, column) : nullptr;
+      float* block = block_at(tile, row, column);
+      if ((lines & splats & bit) != 0) {
+        note_light(both_function(ribbon, splat, x, y, ray, block), row, bit, tile);
+      } else if ((splats & bit) != 0) {
+        note_light(splat_function(splat, x, y, ray, block), row, bit, tile);
+      } else {
+        const RibbonLanes lanes = spread(ribbon);
+        constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
+        note_light(style == style_moving ? line_block<along, style_moving>(lanes, x, y, block)
+                                         : line_block<along, style_head>(lanes, x, y, block),
+                   row, bit, tile);
+      }
+    }
+  }
+}
+
+template <bool Perspective>
+HWY_INLINE void draw_stop(const Prepared& p, const Compositor& with, int style, int l, Tile& tile) {
+  if (has(p.stops.splats, l)) {
+    draw_kernel<Perspective>(p, with, style, l, tile);
+  } else {
+    draw_styled<Perspective>(p, style, l, tile);
+  }
+}
+
+// A brick's kernels in visibility order: rows outward from the eye's, stops outward in each.
+template <bool Perspective>
+void draw_in_order(const Brick& brick, const Prepared& p, Tile& tile) {
+  const Pass& pass = *p.pass;
+  const int* us = pass.axis[pass.u].visit + brick.u_first;
+  const int* vs = pass.axis[pass.v].visit + brick.v_first;
+  const int u_low = lowest(us, brick.u_count);
+  const int v_low = lowest(vs, brick.v_count);
+  const std::uint64_t kept = p.stops.lines | p.stops.splats;
+  const Compositor with = compositor_of<Perspective>(pass);
+  const int style = style_of(pass.line);
+  for (int j = 0; j < brick.v_count; ++j) {
+    const int row = brick_side * (vs[j] - v_low);
+    if ((kept >> static_cast<unsigned>(row) & 0xffU) == 0) continue;
+    for (int i = 0; i < brick.u_count; ++i) {
+      const int l = row + us[i] - u_low;
+      if (has(kept, l)) draw_stop<Perspective>(p, with, style, l, tile);
+    }
+  }
 }
 
 // Brings a brick's samples closer while the one before it is drawn: rows of a brick are far apart
@@ -409,51 +441,29 @@ void prepare(const Camera& camera, const Pass& pass, const Brick& brick, Tile& t
   }
 }
 
-template <bool Perspective>
-void draw_projected(const Prepared& p, int first, int last, Tile& tile) {
-  if (p.pass->has_lines != 0 && p.pass->has_medium != 0) {
-    draw_stops<true, true, Perspective>(p, first, last, tile);
-  } else if (p.pass->has_lines != 0) {
-    draw_stops<true, false, Perspective>(p, first, last, tile);
-  } else {
-    draw_stops<false, true, Perspective>(p, first, last, tile);
-  }
-}
-
-void draw_prepared(const Camera& camera, const Prepared& p, int first, int last, Tile& tile) {
+void draw_prepared(const Camera& camera, const Prepared& p, int stop, Tile& tile) {
+  const int style = style_of(p.pass->line);
   if (camera.perspective != 0) {
-    draw_projected<true>(p, first, last, tile);
+    draw_stop<true>(p, compositor_of<true>(*p.pass), style, stop, tile);
   } else {
-    draw_projected<false>(p, first, last, tile);
+    draw_stop<false>(p, compositor_of<false>(*p.pass), style, stop, tile);
   }
 }
 
 void draw(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile) {
   Prepared prepared;
   prepare(camera, pass, brick, tile, prepared);
-  if (prepared.stops.count > 0) draw_prepared(camera, prepared, 0, prepared.stops.count, tile);
+  if (prepared.stops.count == 0) return;
+  if (camera.perspective != 0) {
+    draw_in_order<true>(brick, prepared, tile);
+  } else {
+    draw_in_order<false>(brick, prepared, tile);
+  }
 }
 
-int refresh_open(Tile& tile, float stop) {
+int count_open(const Tile& tile) {
   int open = 0;
-  const int rows = blocks_of(tile.height);
-  for (int row = 0; row < rows; ++row) {
-    std::uint32_t left = tile.open[row];
-    open += __builtin_popcount(left);
-    while (left != 0) {
-      const int column = __builtin_ctz(left);
-      const std::uint32_t bit = left & (~left + 1U);
-      left ^= bit;
-      const float* t =
-          tile.blocks + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * block_floats;
-      float most = 0;
-      for (int l = 0; l < block_pixels; ++l) most = larger(most, absolute(t[l]));
-      if (most > stop) continue;
-      tile.open[row] ^= bit;
-      tile.any_closed = 1;
-      --open;
-    }
-  }
+  for (const std::uint32_t row : tile.open) open += __builtin_popcount(row);
   return open;
 }
 

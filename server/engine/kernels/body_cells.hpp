@@ -1,5 +1,5 @@
-// Part of the kernel body: the cell that a stop stands for, from grid strides to the world and
-// back.
+// Part of the kernel body: the cells that a row's stops stand for, from grid strides to the world
+// and back.
 #pragma once
 
 #include "server/engine/kernels/body_stops.hpp"
@@ -7,38 +7,14 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// world = sum over axes a of edge[a] * grid[a]; grid[a] = inverse[a] . world. A rectilinear lattice
-// uses the diagonals alone.
+// Of a curved lattice's row: world = sum over axes a of edge[a] * grid[a]; grid[a] = inverse[a] .
+// world. Components of the world come second, lanes last.
 struct Cells {
-  float edge[3][3][brick_stops];     // [axis][world component]
-  float inverse[3][3][brick_stops];  // [axis][world component]
-  float from_eye[3][brick_stops];    // of the stop, world units
-  int solid[brick_stops];            // of a curved lattice: 0 if the cell spans no volume
+  alignas(64) float edge[3][3][brick_side];
+  alignas(64) float inverse[3][3][brick_side];
+  alignas(64) float from_eye[3][brick_side];  // of the stop, world units
+  std::uint32_t solid;                        // bit clear: the cell spans no volume
 };
-
-template <bool Curved>
-inline void to_world(const Cells& cells, int l, const float grid[3], float world[3]) {
-  for (int c = 0; c < 3; ++c) {
-    if (Curved) {
-      world[c] = cells.edge[0][c][l] * grid[0] + cells.edge[1][c][l] * grid[1] +
-                 cells.edge[2][c][l] * grid[2];
-    } else {
-      world[c] = cells.edge[c][c][l] * grid[c];
-    }
-  }
-}
-
-template <bool Curved>
-inline void to_grid(const Cells& cells, int l, const float world[3], float grid[3]) {
-  for (int a = 0; a < 3; ++a) {
-    if (Curved) {
-      grid[a] = cells.inverse[a][0][l] * world[0] + cells.inverse[a][1][l] * world[1] +
-                cells.inverse[a][2][l] * world[2];
-    } else {
-      grid[a] = cells.inverse[a][a][l] * world[a];
-    }
-  }
-}
 
 inline void cross3(const float a[3], const float b[3], float out[3]) {
   out[0] = a[1] * b[2] - a[2] * b[1];
@@ -50,23 +26,19 @@ inline float dot3(const float a[3], const float b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-inline float dot3(const float a[3], float x, float y, float z) {
-  return a[0] * x + a[1] * y + a[2] * z;
-}
-
 // The edge of a curved cell along axis a: half the way from the sample before to the one after, at
 // an end the way to the one neighbour, times the samples that the stop stands for. False along an
 // axis of one sample.
-inline bool edge_between(const Pass& pass, const Stops& stops, int a, int l, float edge[3]) {
+inline bool edge_between(const Pass& pass, const Rows& rows, int a, int i, float edge[3]) {
   const int dim = pass.dims[a];
   if (dim == 1) return false;
-  const int at = pass.axis[a].sample[stops.index[a][l]];
+  const int at = rows.sample[a][i];
   const int before = at > 0 ? 1 : 0;
   const int after = at + 1 < dim ? 1 : 0;
-  const float* p = pass.places + 3 * (stops.offset[l] - before * pass.step[a]);
-  const float* q = pass.places + 3 * (stops.offset[l] + after * pass.step[a]);
-  const float scale = static_cast<float>(pass.axis[a].group[stops.index[a][l]]) /
-                      static_cast<float>(before + after);
+  const std::int64_t offset = rows.offset + rows.along_u[i];
+  const float* p = pass.places + 3 * (offset - before * pass.step[a]);
+  const float* q = pass.places + 3 * (offset + after * pass.step[a]);
+  const float scale = static_cast<float>(rows.group[a][i]) / static_cast<float>(before + after);
   for (int c = 0; c < 3; ++c) edge[c] = (q[c] - p[c]) * scale;
   return true;
 }
@@ -81,101 +53,141 @@ inline void raise_edge(const float unbent, int a, float edge[3][3]) {
 }
 
 // Where neighbours meet (at a pole) a cell spans no volume, and its stop shows nothing.
-inline void fill_curved_cell(const Pass& pass, const Stops& stops, int l, Cells& cells) {
+inline void fill_curved_cell(const Pass& pass, const Rows& rows, int i, Cells& cells) {
   constexpr float flattest = 1e-6F;
   float edge[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
   bool known[3];
   for (int a = 0; a < 3; ++a) {
-    known[a] = edge_between(pass, stops, a, l, edge[a]);
-    if (!known[a]) edge[a][a] = pass.axis[a].cell[stops.index[a][l]];
+    known[a] = edge_between(pass, rows, a, i, edge[a]);
+    if (!known[a]) edge[a][a] = rows.cell[a][i];
   }
   for (int a = 0; a < 3; ++a) {
-    if (!known[a]) raise_edge(pass.axis[a].cell[stops.index[a][l]], a, edge);
+    if (!known[a]) raise_edge(rows.cell[a][i], a, edge);
   }
-  float rows[3][3];
+  float normals[3][3];
   float upright = 1;
   for (int a = 0; a < 3; ++a) {
-    cross3(edge[(a + 1) % 3], edge[(a + 2) % 3], rows[a]);
+    cross3(edge[(a + 1) % 3], edge[(a + 2) % 3], normals[a]);
     upright *= square_root(dot3(edge[a], edge[a]));
   }
-  const float volume = dot3(edge[0], rows[0]);
-  cells.solid[l] = absolute(volume) > flattest * upright ? 1 : 0;
-  const float inverse = cells.solid[l] != 0 ? 1.0F / volume : 0.0F;
+  const float volume = dot3(edge[0], normals[0]);
+  const bool solid = absolute(volume) > flattest * upright;
+  if (solid) cells.solid |= 1U << static_cast<unsigned>(i);
+  const float inverse = solid ? 1.0F / volume : 0.0F;
   for (int a = 0; a < 3; ++a) {
     for (int c = 0; c < 3; ++c) {
-      cells.edge[a][c][l] = edge[a][c];
-      cells.inverse[a][c][l] = rows[a][c] * inverse;
+      cells.edge[a][c][i] = edge[a][c];
+      cells.inverse[a][c][i] = normals[a][c] * inverse;
     }
   }
 }
 
+void fill_cells(const Camera& camera, const Pass& pass, const Rows& rows, Cells& cells) {
+  cells.solid = 0;
+  for (int i = 0; i < brick_side; ++i) {
+    const float* place = pass.places + 3 * (rows.offset + rows.along_u[i]);
+    for (int c = 0; c < 3; ++c) {
+      cells.from_eye[c][i] = static_cast<float>(static_cast<double>(place[c]) - camera.eye[c]);
+    }
+    fill_curved_cell(pass, rows, i, cells);
+  }
+}
+
+// The cells of a vector of stops. A rectilinear lattice has edges along the world's axes alone.
 template <bool Curved>
-void fill_cells(const Camera& camera, const Pass& pass, const Stops& stops, Cells& cells) {
-  if (Curved) {
-    for (int l = 0; l < stops.count; ++l) {
-      const float* place = pass.places + 3 * stops.offset[l];
-      for (int c = 0; c < 3; ++c) {
-        cells.from_eye[c][l] = static_cast<float>(static_cast<double>(place[c]) - camera.eye[c]);
-      }
-      fill_curved_cell(pass, stops, l, cells);
+struct CellLanes;
+
+template <>
+struct CellLanes<false> {
+  Three<Stop> edge, inverse, from_eye;
+
+  HWY_INLINE CellLanes(const Rows& rows, const Cells& /*cells*/, int i)
+      : edge{load<Stop>(rows.cell[0] + i), load<Stop>(rows.cell[1] + i),
+             load<Stop>(rows.cell[2] + i)},
+        inverse{load<Stop>(rows.inverse_cell[0] + i), load<Stop>(rows.inverse_cell[1] + i),
+                load<Stop>(rows.inverse_cell[2] + i)},
+        from_eye{load<Stop>(rows.from_eye[0] + i), load<Stop>(rows.from_eye[1] + i),
+                 load<Stop>(rows.from_eye[2] + i)} {}
+
+  HWY_INLINE Three<Stop> to_world(const Three<Stop>& grid) const {
+    return {edge.x * grid.x, edge.y * grid.y, edge.z * grid.z};
+  }
+  HWY_INLINE Three<Stop> to_grid(const Three<Stop>& world) const {
+    return {inverse.x * world.x, inverse.y * world.y, inverse.z * world.z};
+  }
+  HWY_INLINE Three<Stop> to_grid(const float world[3]) const {
+    return {inverse.x * all<Stop>(world[0]), inverse.y * all<Stop>(world[1]),
+            inverse.z * all<Stop>(world[2])};
+  }
+  // The edge along axis a, seen along a direction.
+  HWY_INLINE Stop edge_along(int a, const float direction[3]) const {
+    const Stop& width = a == 0 ? edge.x : a == 1 ? edge.y : edge.z;
+    return width * all<Stop>(direction[a]);
+  }
+  HWY_INLINE Stop edges2() const { return kernels::dot3(edge, edge); }
+};
+
+template <>
+struct CellLanes<true> {
+  Three<Stop> edge[3];
+  Three<Stop> inverse[3];
+  Three<Stop> from_eye;
+
+  HWY_INLINE CellLanes(const Rows& /*rows*/, const Cells& cells, int i) {
+    for (int a = 0; a < 3; ++a) {
+      edge[a] = {load<Stop>(cells.edge[a][0] + i), load<Stop>(cells.edge[a][1] + i),
+                 load<Stop>(cells.edge[a][2] + i)};
+      inverse[a] = {load<Stop>(cells.inverse[a][0] + i), load<Stop>(cells.inverse[a][1] + i),
+                    load<Stop>(cells.inverse[a][2] + i)};
     }
-    return;
+    from_eye = {load<Stop>(cells.from_eye[0] + i), load<Stop>(cells.from_eye[1] + i),
+                load<Stop>(cells.from_eye[2] + i)};
   }
-  for (int a = 0; a < 3; ++a) {
-    for (int l = 0; l < stops.count; ++l) {
-      const float cell = pass.axis[a].cell[stops.index[a][l]];
-      cells.edge[a][a][l] = cell;
-      cells.inverse[a][a][l] = 1.0F / cell;
-      cells.from_eye[a][l] = pass.axis[a].from_eye[stops.index[a][l]];
-    }
-  }
-}
 
-inline double dot3(const double a[3], const double b[3]) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-// Camera coordinates of stops that stand where the field says.
-void place_curved_stops(const Camera& camera, const Pass& pass, Stops& stops) {
-  const int count = stops.count;
-  for (int l = 0; l < count; ++l) {
-    const float* place = pass.places + 3 * stops.offset[l];
-    double at[3];
-    for (int c = 0; c < 3; ++c) at[c] = static_cast<double>(place[c]) - camera.eye[c];
-    const double z = dot3(camera.world_forward, at);
-    stops.x[l] = static_cast<float>(dot3(camera.world_right, at));
-    stops.y[l] = static_cast<float>(dot3(camera.world_down, at));
-    stops.z[l] = static_cast<float>(z);
-    stops.depth[l] = static_cast<float>(z - camera.depth_origin);
+  HWY_INLINE Three<Stop> to_world(const Three<Stop>& grid) const {
+    const auto sum = [&](Stop a, Stop b, Stop c) {
+      return hn::MulAdd(c, grid.z, hn::MulAdd(b, grid.y, a * grid.x));
+    };
+    return {sum(edge[0].x, edge[1].x, edge[2].x), sum(edge[0].y, edge[1].y, edge[2].y),
+            sum(edge[0].z, edge[1].z, edge[2].z)};
   }
-}
-
-// Stops without a cell have neither line nor splat.
-template <bool Lines, bool Medium>
-void drop_flat_cells(const Stops& stops, const Cells& cells, Winds& winds, Densities& densities) {
-  for (int l = 0; l < stops.count; ++l) {
-    if (cells.solid[l] != 0) continue;
-    if (Lines) winds.magnitude[l] = -1;
-    if (Medium) densities.rho[l] = 0;
+  HWY_INLINE Three<Stop> to_grid(const Three<Stop>& world) const {
+    return {kernels::dot3(inverse[0], world), kernels::dot3(inverse[1], world),
+            kernels::dot3(inverse[2], world)};
   }
-}
+  HWY_INLINE Three<Stop> to_grid(const float world[3]) const {
+    return {kernels::dot3(world, inverse[0]), kernels::dot3(world, inverse[1]),
+            kernels::dot3(world, inverse[2])};
+  }
+  HWY_INLINE Stop edge_along(int a, const float direction[3]) const {
+    return kernels::dot3(direction, edge[a]);
+  }
+  HWY_INLINE Stop edges2() const {
+    return kernels::dot3(edge[0], edge[0]) + kernels::dot3(edge[1], edge[1]) +
+           kernels::dot3(edge[2], edge[2]);
+  }
+};
 
 // Directions along a curved cell's own east, north and up become the world's, of the same length:
 // of a slice's, what lies in its plane.
-void bend_winds(const Pass& pass, const Stops& stops, const Cells& cells, Winds& winds) {
-  for (int l = 0; l < stops.count; ++l) {
-    float world[3] = {0, 0, 0};
-    float kept2 = 0;
-    for (int a = 0; a < 3; ++a) {
-      const float edge[3] = {cells.edge[a][0][l], cells.edge[a][1][l], cells.edge[a][2][l]};
-      const float kept = winds.direction[a][l] * pass.line.keep[a];
-      const float scale = kept / larger(square_root(dot3(edge, edge)), 1e-30F);
-      kept2 += kept * kept;
-      for (int c = 0; c < 3; ++c) world[c] += edge[c] * scale;
-    }
-    const float unit = square_root(kept2) / larger(square_root(dot3(world, world)), 1e-30F);
-    for (int c = 0; c < 3; ++c) winds.bent[c][l] = world[c] * unit;
+HWY_INLINE Three<Stop> bent_direction(const LineStyle& line, const CellLanes<true>& cells,
+                                      const Three<Stop>& direction) {
+  const Stop kept[3] = {direction.x * all<Stop>(line.keep[0]),
+                        direction.y * all<Stop>(line.keep[1]),
+                        direction.z * all<Stop>(line.keep[2])};
+  const Stop least = all<Stop>(1e-30F);
+  const Stop zero = hn::Zero(StopTag());
+  Three<Stop> world = {zero, zero, zero};
+  Stop kept2 = zero;
+  for (int a = 0; a < 3; ++a) {
+    const Three<Stop>& edge = cells.edge[a];
+    const Stop scale = kept[a] / hn::Max(hn::Sqrt(dot3(edge, edge)), least);
+    kept2 = hn::MulAdd(kept[a], kept[a], kept2);
+    world = {hn::MulAdd(edge.x, scale, world.x), hn::MulAdd(edge.y, scale, world.y),
+             hn::MulAdd(edge.z, scale, world.z)};
   }
+  const Stop unit = hn::Sqrt(kept2) / hn::Max(hn::Sqrt(dot3(world, world)), least);
+  return {world.x * unit, world.y * unit, world.z * unit};
 }
 
 }  // namespace

@@ -25,37 +25,106 @@ alignas(64) constexpr float lane_x[block_pixels] = {0.5F, 1.5F, 2.5F, 3.5F, 0.5F
 alignas(64) constexpr float lane_y[block_pixels] = {0.5F, 0.5F, 0.5F, 0.5F, 1.5F, 1.5F, 1.5F, 1.5F,
                                                     2.5F, 2.5F, 2.5F, 2.5F, 3.5F, 3.5F, 3.5F, 3.5F};
 
-struct RibbonLane {
-  float opacity;
-  float f;
+// A line's constants, each in every lane.
+struct RibbonLanes {
+  Pixel x, y, ux, uy;
+  Pixel wx, wy, w0;   // w = wx dx + wy dy + w0
+  Pixel ratio, bend;  // depth ratio, and that minus 1
+  Pixel tail[3], rise[3];
+  Pixel phase, phase_rise;
+  Pixel reach, steep, opacity;  // the ramp: clamp(reach - steep distance, 0, opacity)
 };
 
-template <bool Perspective, int Style>
-inline RibbonLane ribbon_lane(const Ribbon& r, float px, float py) {
-  const float dx = px - r.x;
-  const float dy = py - r.y;
-  const float w = clamped((dx * r.ux + dy * r.uy) * r.inverse_u2 + r.w0, 0.0F, 1.0F);
-  const float ex = dx - w * r.ux;
-  const float ey = dy - w * r.uy;
-  const float distance = square_root(ex * ex + ey * ey);
-  const float cover = clamped((r.r2 - distance) * r.inverse_ramp, 0.0F, 1.0F);
-  // 1/z is linear on the screen.
-  const float f = Perspective ? w * r.depth_ratio / (1.0F + w * (r.depth_ratio - 1.0F)) : w;
+HWY_INLINE RibbonLanes spread(const Ribbon& r) {
+  const auto lanes = [](float v) { return all<Pixel>(v); };
+  const float steep = r.inverse_ramp * r.opacity;
+  return {lanes(r.x),
+          lanes(r.y),
+          lanes(r.ux),
+          lanes(r.uy),
+          lanes(r.ux * r.inverse_u2),
+          lanes(r.uy * r.inverse_u2),
+          lanes(r.w0),
+          lanes(r.depth_ratio),
+          lanes(r.depth_ratio - 1.0F),
+          {lanes(r.tail[0]), lanes(r.tail[1]), lanes(r.tail[2])},
+          {lanes(r.rise[0]), lanes(r.rise[1]), lanes(r.rise[2])},
+          lanes(r.phase),
+          lanes(r.phase_rise),
+          lanes(r.r2 * steep),
+          lanes(steep),
+          lanes(r.opacity)};
+}
+
+struct RibbonLane {
+  Pixel opacity;
+  Pixel f;
+};
+
+// How f follows from w, the place along the line on the screen: 1/z is linear there. The series is
+// good to bend^3 / 7.
+enum class Depth { flat, series, exact };
+constexpr float series_bend_max = 4e-3F;
+
+template <Depth Along>
+HWY_INLINE Pixel along_ribbon(const RibbonLanes& r, Pixel w) {
+  const Pixel one = all<Pixel>(1.0F);
+  if (Along == Depth::exact) return w * r.ratio / hn::MulAdd(w, r.bend, one);
+  if (Along == Depth::series) {
+    const Pixel bent = hn::NegMulAdd(w * r.bend, r.bend, r.bend);
+    return hn::MulAdd(hn::NegMulAdd(w, w, w), bent, w);
+  }
+  return w;
+}
+
+template <Depth Along, int Style>
+HWY_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel px, Pixel py) {
+  const Pixel zero = hn::Zero(PixelTag());
+  const Pixel dx = px - r.x;
+  const Pixel dy = py - r.y;
+  const Pixel w = clamped(hn::MulAdd(dx, r.wx, hn::MulAdd(dy, r.wy, r.w0)), zero, all<Pixel>(1.0F));
+  const Pixel ex = hn::NegMulAdd(w, r.ux, dx);
+  const Pixel ey = hn::NegMulAdd(w, r.uy, dy);
+  const Pixel distance = hn::Sqrt(hn::MulAdd(ex, ex, ey * ey));
+  const Pixel cover = clamped(hn::NegMulAdd(distance, r.steep, r.reach), zero, r.opacity);
+  if (Style == style_plain) return {cover, zero};
+  const Pixel f = along_ribbon<Along>(r, w);
   if (Style == style_moving) {
     // W(frac(q + 1/2 - phase)), W(p) = 1 - |2 p - 1|.
-    const float place = r.phase + f * r.phase_rise;
-    const float p = place >= 1.0F ? place - 1.0F : place;
-    return {cover * r.opacity * (1.0F - absolute(2.0F * p - 1.0F)), f};
+    const Pixel one = all<Pixel>(1.0F);
+    const Pixel place = hn::MulAdd(f, r.phase_rise, r.phase);
+    const Pixel p = hn::IfThenElse(hn::Ge(place, one), place - one, place);
+    return {cover * (one - hn::Abs(hn::MulSub(all<Pixel>(2.0F), p, one))), f};
   }
-  return {cover * r.opacity, f};
+  return {cover, f};
+}
+
+// A splat's constants, each in every lane.
+struct SplatLanes {
+  Pixel x, y, ex, ey, xx, xy, yy;
+  Pixel b0, bx, by, d0, dx, dy, dxx, dxy, dyy, d2_least;
+  Pixel z, near, strength;
+  Pixel color[3];
+};
+
+HWY_INLINE SplatLanes spread(const Splat& s) {
+  const auto lanes = [](float v) { return all<Pixel>(v); };
+  return {
+      lanes(s.x),    lanes(s.y),        lanes(s.ex),
+      lanes(s.ey),   lanes(s.xx),       lanes(s.xy),
+      lanes(s.yy),   lanes(s.b0),       lanes(s.bx),
+      lanes(s.by),   lanes(s.d0),       lanes(s.dx),
+      lanes(s.dy),   lanes(s.dxx),      lanes(s.dxy),
+      lanes(s.dyy),  lanes(s.d2_least), lanes(s.z),
+      lanes(s.near), lanes(s.strength), {lanes(s.color[0]), lanes(s.color[1]), lanes(s.color[2])}};
 }
 
 // Where a pixel's ray passes a splat, see Splats.
 struct SplatLane {
-  float r2;      // squared distance from the centre, cells
-  float tau;     // optical depth of the whole splat
-  float cells;   // per unit of view depth along the ray
-  float behind;  // how far beyond the centre's view depth the ray is closest to it
+  Pixel r2;      // squared distance from the centre, cells
+  Pixel tau;     // optical depth of the whole splat
+  Pixel cells;   // per unit of view depth along the ray
+  Pixel behind;  // how far beyond the centre's view depth the ray is closest to it
 };
 
 // From: the rays' beginning. `eye`: far before the splat. `near_plane`: the splat reaches it, and
@@ -63,28 +132,34 @@ struct SplatLane {
 enum class From { eye, near_plane };
 
 template <bool Perspective, From Start>
-inline SplatLane splat_lane(const Splat& s, float px, float py, float ray) {
-  const float dx = px - s.x;
-  const float dy = py - s.y;
+HWY_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixel ray) {
+  const Pixel zero = hn::Zero(PixelTag());
+  const Pixel dx = px - s.x;
+  const Pixel dy = py - s.y;
   // The quadratic form is never negative; its rounded sum may be.
-  const float top = larger(s.xx * (dx * dx) + s.xy * (dx * dy) + s.yy * (dy * dy), 0.0F);
+  const Pixel top =
+      hn::Max(hn::MulAdd(s.xx, dx * dx, hn::MulAdd(s.xy, dx * dy, s.yy * (dy * dy))), zero);
   if constexpr (Perspective) {
-    const float ex = px - s.ex;
-    const float ey = py - s.ey;
-    const float bent = s.dxx * (ex * ex) + s.dxy * (ex * ey) + s.dyy * (ey * ey);
-    const float length2 = larger(s.d0 + (s.dx * ex + s.dy * ey + bent), s.d2_least);
-    const float inverse = 1.0F / square_root(length2);
-    const float inverse2 = inverse * inverse;
-    const float r2 = top * inverse2;
-    const float tau = s.strength * footprint(r2, square_root(r2)) * (inverse * ray);
-    const float cells = length2 * inverse;
-    const float behind = (s.b0 + s.bx * ex + s.by * ey - s.z * bent) * inverse2;
-    const float beyond = 0.5F + ((s.z - s.near) + behind) * cells;
-    const float kept = Start == From::near_plane ? tau * clamped(beyond, 0.0F, 1.0F) : tau;
-    return {r2, kept, cells, behind};
+    const Pixel ex = px - s.ex;
+    const Pixel ey = py - s.ey;
+    const Pixel bent = hn::MulAdd(s.dxx, ex * ex, hn::MulAdd(s.dxy, ex * ey, s.dyy * (ey * ey)));
+    const Pixel length2 =
+        hn::Max(s.d0 + hn::MulAdd(s.dx, ex, hn::MulAdd(s.dy, ey, bent)), s.d2_least);
+    const Pixel inverse = inverse_of(hn::Sqrt(length2));
+    const Pixel inverse2 = inverse * inverse;
+    const Pixel r2 = top * inverse2;
+    const Pixel tau = s.strength * footprint(r2) * (inverse * ray);
+    const Pixel cells = length2 * inverse;
+    const Pixel behind =
+        hn::NegMulAdd(s.z, bent, hn::MulAdd(s.bx, ex, hn::MulAdd(s.by, ey, s.b0))) * inverse2;
+    if (Start == From::near_plane) {
+      const Pixel beyond = hn::MulAdd((s.z - s.near) + behind, cells, all<Pixel>(0.5F));
+      return {r2, tau * clamped(beyond, 0.0F, 1.0F), cells, behind};
+    }
+    return {r2, tau, cells, behind};
   } else {
-    const float behind = s.bx * dx + s.by * dy;
-    return {top, s.strength * footprint(top, square_root(top)), square_root(s.d0), behind};
+    const Pixel behind = hn::MulAdd(s.bx, dx, s.by * dy);
+    return {top, s.strength * footprint(top), hn::Sqrt(s.d0), behind};
   }
 }
 
@@ -94,124 +169,172 @@ struct Channels {
   float* rgb[3];
 };
 
-inline Channels channels_of(float* block) {
+HWY_INLINE Channels channels_of(float* block) {
   constexpr std::ptrdiff_t lanes = block_pixels;
   return {block, block + lanes, {block + 2 * lanes, block + 3 * lanes, block + 4 * lanes}};
 }
 
+HWY_INLINE void add_to(float* channel, Pixel value) {
+  store(load<Pixel>(channel) + value, channel);
+}
+
+HWY_INLINE void add_product(float* channel, Pixel a, Pixel b) {
+  store(hn::MulAdd(a, b, load<Pixel>(channel)), channel);
+}
+
+// Whether a block's pixels let more than `stop` through: found out by whoever changes them.
+struct Light {
+  Pixel most = hn::Zero(PixelTag());
+
+  HWY_INLINE void see(Pixel transmittance) { most = hn::Max(most, hn::Abs(transmittance)); }
+  HWY_INLINE bool above(float stop) const {
+    return !hn::AllFalse(PixelTag(), hn::Gt(most, all<Pixel>(stop)));
+  }
+};
+
 // Forward Euler takes the optical depth itself for the absorbed part: stable below 1 alone. Bounded
 // so that a picture that diverges stays a number.
-inline Attenuation euler_attenuation(float tau) {
-  const float bounded = smaller(tau, 1e6F);
-  return {bounded, 1.0F - bounded};
+HWY_INLINE Attenuation<Pixel> euler_attenuation(Pixel tau) {
+  const Pixel bounded = hn::Min(tau, all<Pixel>(1e6F));
+  return {bounded, all<Pixel>(1.0F) - bounded};
 }
 
 template <int Compositing>
-inline Attenuation attenuation_by(float tau) {
-  return Compositing == compositing_cd_euler ? euler_attenuation(tau) : attenuation(tau);
+HWY_INLINE Attenuation<Pixel> attenuation_by(Pixel tau) {
+  if (Compositing == compositing_cd_euler) return euler_attenuation(tau);
+  return attenuation(tau);
 }
 
-inline float bounded_light(float transmittance) { return clamped(transmittance, -1e12F, 1e12F); }
+template <int Compositing>
+HWY_INLINE Pixel bounded_light(Pixel transmittance) {
+  if (Compositing != compositing_cd_euler) return transmittance;
+  return clamped(transmittance, -1e12F, 1e12F);
+}
 
 // What is left of a line's light in front of which the part `place` of the medium lies.
 template <int Compositing>
-inline float light_before(const Attenuation& medium, float tau, float place) {
+HWY_INLINE Pixel light_before(const Attenuation<Pixel>& medium, Pixel tau, Pixel place) {
   if (Compositing == compositing_simple) return medium.transmitted;
   // tau is finite (the plan bounds extinctions), so that 0 times it is 0.
   if (Compositing == compositing_analytic) return attenuation(tau * place).transmitted;
-  return 1.0F - place * medium.absorbed;
+  return hn::NegMulAdd(place, medium.absorbed, all<Pixel>(1.0F));
 }
 
-using LineFunction = void (*)(const Ribbon& r, float x, float y, float* block);
-using SplatFunction = void (*)(const Splat& s, float x, float y, const float* ray, float* block);
-using BothFunction = void (*)(const Ribbon& r, const Splat& s, float x, float y, const float* ray,
-                              float* block);
-
-template <bool Perspective, int Style>
-void line_block(const Ribbon& ribbon, float x, float y, float* __restrict block) {
-  const Ribbon r = ribbon;
+template <Depth Along, int Style>
+HWY_INLINE Light line_block(const RibbonLanes& r, float x, float y, float* HWY_RESTRICT block) {
   const Channels to = channels_of(block);
-  for (int l = 0; l < block_pixels; ++l) {
-    const RibbonLane lane = ribbon_lane<Perspective, Style>(r, x + lane_x[l], y + lane_y[l]);
-    const float t = to.transmittance[l];
-    const float a = t * lane.opacity;
+  Light light;
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
+    const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
+    const RibbonLane lane = ribbon_lane<Along, Style>(r, px, py);
+    const Pixel t = load<Pixel>(to.transmittance + l);
+    const Pixel a = t * lane.opacity;
     for (int c = 0; c < 3; ++c) {
-      const float color = Style != style_plain ? r.tail[c] + lane.f * r.rise[c] : r.tail[c];
-      to.rgb[c][l] += a * color;
+      const Pixel color =
+          Style != style_plain ? hn::MulAdd(lane.f, r.rise[c], r.tail[c]) : r.tail[c];
+      add_product(to.rgb[c] + l, a, color);
     }
-    to.alpha[l] += a;
-    to.transmittance[l] = t * (1.0F - lane.opacity);
+    add_to(to.alpha + l, a);
+    const Pixel left = hn::NegMulAdd(t, lane.opacity, t);
+    store(left, to.transmittance + l);
+    light.see(left);
   }
+  return light;
 }
 
 template <bool Perspective, int Compositing, From Start>
-void splat_block(const Splat& splat, float x, float y, const float* __restrict ray,
-                 float* __restrict block) {
-  const Splat s = splat;
+Light splat_block(const Splat& splat, float x, float y, const float* HWY_RESTRICT ray,
+                  float* HWY_RESTRICT block) {
+  const SplatLanes s = spread(splat);
   const Channels to = channels_of(block);
-  for (int l = 0; l < block_pixels; ++l) {
-    const float length = Perspective ? ray[l] : 1.0F;
-    const SplatLane lane = splat_lane<Perspective, Start>(s, x + lane_x[l], y + lane_y[l], length);
-    const Attenuation medium = attenuation_by<Compositing>(lane.tau);
-    const float t = to.transmittance[l];
-    const float a = t * medium.absorbed;
-    for (int c = 0; c < 3; ++c) to.rgb[c][l] += a * s.color[c];
-    to.alpha[l] += a;
-    const float left = t * medium.transmitted;
-    to.transmittance[l] = Compositing == compositing_cd_euler ? bounded_light(left) : left;
+  Light light;
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
+    const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
+    const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
+    const SplatLane lane = splat_lane<Perspective, Start>(s, px, py, length);
+    const Attenuation<Pixel> medium = attenuation_by<Compositing>(lane.tau);
+    const Pixel t = load<Pixel>(to.transmittance + l);
+    const Pixel a = t * medium.absorbed;
+    for (int c = 0; c < 3; ++c) add_product(to.rgb[c] + l, a, s.color[c]);
+    add_to(to.alpha + l, a);
+    const Pixel left = bounded_light<Compositing>(t * medium.transmitted);
+    store(left, to.transmittance + l);
+    light.see(left);
   }
+  return light;
+}
+
+// The paper's first form: front part, line and back part one over the other, where the ray meets
+// the line at all.
+HWY_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const RibbonLane& line,
+                             const Attenuation<Pixel>& medium, Pixel place, const Channels& to,
+                             int l) {
+  const Pixel one = all<Pixel>(1.0F);
+  const Pixel met = hn::IfThenElse(hn::Gt(line.opacity, hn::Zero(PixelTag())), place, one);
+  const Pixel front = met * medium.absorbed;
+  const Pixel back = (one - met) * medium.absorbed;
+  const Pixel own = (one - front) * line.opacity;
+  const Pixel rest = (one - front) * (one - line.opacity);
+  const Pixel absorbed = front + rest * back;
+  const Pixel t = load<Pixel>(to.transmittance + l);
+  for (int c = 0; c < 3; ++c) {
+    const Pixel color = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
+    add_product(to.rgb[c] + l, t, hn::MulAdd(own, color, s.color[c] * absorbed));
+  }
+  add_product(to.alpha + l, t, absorbed + own);
+  return t * (rest * (one - back));
 }
 
 // A line inside its homogeneous cell, at x = tf / tau of the way through it:
 // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tf) (c_v - c_s).
 template <bool Perspective, int Compositing, int Style, From Start>
-void both_block(const Ribbon& ribbon, const Splat& splat, float x, float y,
-                const float* __restrict ray, float* __restrict block) {
-  const Ribbon r = ribbon;
-  const Splat s = splat;
+Light both_block(const Ribbon& ribbon, const Splat& splat, float x, float y,
+                 const float* HWY_RESTRICT ray, float* HWY_RESTRICT block) {
+  const RibbonLanes r = spread(ribbon);
+  const SplatLanes s = spread(splat);
+  const Pixel depth = all<Pixel>(ribbon.depth);
+  const Pixel depth_rise = all<Pixel>(ribbon.depth_rise);
   const Channels to = channels_of(block);
-  for (int l = 0; l < block_pixels; ++l) {
-    const float px = x + lane_x[l];
-    const float py = y + lane_y[l];
-    const RibbonLane line = ribbon_lane<Perspective, Style>(r, px, py);
-    const SplatLane lane = splat_lane<Perspective, Start>(s, px, py, Perspective ? ray[l] : 1.0F);
-    const Attenuation medium = attenuation_by<Compositing>(lane.tau);
-    const float past = (r.depth + line.f * r.depth_rise) - lane.behind;
-    const float place = clamped(0.5F + past * lane.cells, 0.0F, 1.0F);
-    const float t = to.transmittance[l];
+  Light light;
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
+    const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
+    const RibbonLane line = ribbon_lane < Perspective ? Depth::exact : Depth::flat,
+                     Style > (r, px, py);
+    const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
+    const SplatLane lane = splat_lane<Perspective, Start>(s, px, py, length);
+    const Attenuation<Pixel> medium = attenuation_by<Compositing>(lane.tau);
+    const Pixel past = hn::MulAdd(line.f, depth_rise, depth) - lane.behind;
+    const Pixel place = clamped(hn::MulAdd(past, lane.cells, all<Pixel>(0.5F)), 0.0F, 1.0F);
+    Pixel left;
     if (Compositing == compositing_cd_naive) {
-      // The paper's first form: front part, line and back part one over the other, where the ray
-      // meets the line at all.
-      const float met = line.opacity > 0 ? place : 1.0F;
-      const float front = met * medium.absorbed;
-      const float back = (1.0F - met) * medium.absorbed;
-      const float own = (1.0F - front) * line.opacity;
-      const float rest = (1.0F - front) * (1.0F - line.opacity);
-      const float absorbed = front + rest * back;
+      left = naive_block(r, s, line, medium, place, to, l);
+    } else {
+      const Pixel t = load<Pixel>(to.transmittance + l);
+      const Pixel a = hn::MulAdd(line.opacity, medium.transmitted, medium.absorbed);
+      const Pixel own = line.opacity * light_before<Compositing>(medium, lane.tau, place);
       for (int c = 0; c < 3; ++c) {
-        const float color = r.tail[c] + line.f * r.rise[c];
-        to.rgb[c][l] += t * (s.color[c] * absorbed + own * color);
+        const Pixel color = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
+        add_product(to.rgb[c] + l, t, hn::MulAdd(own, color - s.color[c], s.color[c] * a));
       }
-      to.alpha[l] += t * (absorbed + own);
-      to.transmittance[l] = t * (rest * (1.0F - back));
-      continue;
+      add_product(to.alpha + l, t, a);
+      left = t * (medium.transmitted * (all<Pixel>(1.0F) - line.opacity));
     }
-    const float before = light_before<Compositing>(medium, lane.tau, place);
-    const float a = medium.absorbed + line.opacity * medium.transmitted;
-    const float own = line.opacity * before;
-    for (int c = 0; c < 3; ++c) {
-      const float color = r.tail[c] + line.f * r.rise[c];
-      to.rgb[c][l] += t * (s.color[c] * a + own * (color - s.color[c]));
-    }
-    to.alpha[l] += t * a;
-    const float left = t * (medium.transmitted * (1.0F - line.opacity));
-    to.transmittance[l] = Compositing == compositing_cd_euler ? bounded_light(left) : left;
+    left = bounded_light<Compositing>(left);
+    store(left, to.transmittance + l);
+    light.see(left);
   }
+  return light;
 }
 
-// The functions that a pass composites with, chosen once a brick.
+using SplatFunction = Light (*)(const Splat& s, float x, float y, const float* ray, float* block);
+using BothFunction = Light (*)(const Ribbon& r, const Splat& s, float x, float y, const float* ray,
+                               float* block);
+
+// The functions that a pass composites its medium with, chosen once a brick.
 struct Compositor {
-  LineFunction line;
   SplatFunction splat, near_splat;
   BothFunction both, near_both;
   int splat_exponentials;  // a pixel
@@ -229,16 +352,13 @@ inline Compositor compositor_with(int style) {
   constexpr bool euler = Compositing == compositing_cd_euler;
   constexpr int splat = euler ? 0 : 1;
   constexpr int both = Compositing == compositing_analytic ? 2 : splat;
-  Compositor c = {line_block<Perspective, style_plain>,
-                  splat_block<Perspective, Compositing, From::eye>,
+  Compositor c = {splat_block<Perspective, Compositing, From::eye>,
                   splat_block<Perspective, Compositing, near>,
                   both_block<Perspective, Compositing, style_head, From::eye>,
                   both_block<Perspective, Compositing, style_head, near>,
                   splat,
                   both};
-  if (style == style_head) c.line = line_block<Perspective, style_head>;
   if (style == style_moving) {
-    c.line = line_block<Perspective, style_moving>;
     c.both = both_block<Perspective, Compositing, style_moving, From::eye>;
     c.near_both = both_block<Perspective, Compositing, style_moving, near>;
   }

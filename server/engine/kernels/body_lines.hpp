@@ -1,4 +1,4 @@
-// Part of the kernel body: oriented lines, from a stop's wind to a ribbon on the screen.
+// Part of the kernel body: oriented lines, from a row's winds to ribbons on the screen.
 #pragma once
 
 #include "server/engine/kernels/body_cells.hpp"
@@ -6,248 +6,291 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// Segments, clipped to q in [low, high].
+// Where lines begin and end before they are projected. q runs from -1/2 at the tail to 1/2 at the
+// head; what is drawn lies in [low, high].
 struct Segments {
-  float offset[3][brick_stops];  // of the line's centre from the stop, world units
-  float in_box[3][brick_stops];  // of the line's centre from its kernel's centre, cells
-  float extent[3][brick_stops];  // tail to head, world units
-  float along[3][brick_stops];   // the same in cells
-  float low[brick_stops], high[brick_stops];
-  float lift[brick_stops];   // of the line's centre from the stop along z, cells
-  float phase[brick_stops];  // of the texture's motion
+  Three<Stop> offset;  // of the line's centre from the stop, world units
+  Three<Stop> extent;  // tail to head, world units
+  Stop low, high;
+  Stop lift;   // of the line's centre from the stop along z, cells
+  Stop phase;  // of the texture's motion
 };
 
-template <bool Curved>
-void move_centres(const Pass& pass, const Stops& stops, const Cells& cells, Segments& s) {
-  const LineStyle& line = pass.line;
-  const Hash3 key = pcg3d({line.seed, line.epoch, 0x9e3779b9U});
-  std::uint32_t at[3][brick_stops];
-  for (int a = 0; a < 3; ++a) {
-    for (int l = 0; l < stops.count; ++l) {
-      at[a][l] = static_cast<std::uint32_t>(pass.axis[a].sample[stops.index[a][l]]);
-    }
-  }
-  WINDSPLAT_LANES
-  for (int l = 0; l < stops.count; ++l) {
-    const Hash3 kernel = pcg3d({at[0][l] + key.x, at[1][l] + key.y, at[2][l] + key.z});
-    const Hash3 centre = pcg3d(kernel);
-    const float us[3] = {unit_interval(kernel.x), unit_interval(kernel.y), unit_interval(kernel.z)};
-    const float uc[3] = {unit_interval(centre.x), unit_interval(centre.y), unit_interval(centre.z)};
-    float moved[3];
-    for (int a = 0; a < 3; ++a) {
-      s.in_box[a][l] = line.jitter_center * (uc[a] - 0.5F);
-      moved[a] = s.in_box[a][l] + line.jitter_stride * (us[a] - 0.5F);
-    }
-    float offset[3];
-    to_world<Curved>(cells, l, moved, offset);
-    for (int a = 0; a < 3; ++a) s.offset[a][l] = offset[a];
-    s.lift[l] = moved[2];
-    s.phase[l] = unit_interval(pcg3d(centre).x);
-  }
-}
-
-// The drawn vector, in the world and in cells; a slice keeps what lies in its plane.
-template <bool Curved>
-void extend_segments(const Pass& pass, const Stops& stops, const Cells& cells, const Winds& winds,
-                     Segments& s) {
-  const LineStyle& line = pass.line;
-  WINDSPLAT_LANES
-  for (int l = 0; l < stops.count; ++l) {
-    const float part = clamped(winds.magnitude[l] * line.inverse_full_magnitude, 0.0F, 1.0F);
-    float extent[3];
-    float along[3];
-    for (int a = 0; a < 3; ++a) {
-      extent[a] = (Curved ? winds.bent[a][l] : winds.direction[a][l]) * (line.length * part);
-      if (!Curved) extent[a] *= line.keep[a];
-    }
-    to_grid<Curved>(cells, l, extent, along);
-    for (int a = 0; a < 3; ++a) {
-      s.extent[a][l] = extent[a];
-      s.along[a][l] = along[a];
-    }
-  }
+HWY_INLINE UnsignedOf<Stop> hashed_sample(const Rows& rows, int a, int i, std::uint32_t key) {
+  const hn::RebindToUnsigned<StopTag> tag;
+  const hn::RebindToSigned<StopTag> integers;
+  return hn::BitCast(tag, hn::Load(integers, rows.sample[a] + i)) + hn::Set(tag, key);
 }
 
 // Liang-Barsky against the kernel box: per axis |in_box + q along| <= half the box.
-void clip_to_box(const Pass& pass, const Stops& stops, Segments& s) {
-  const float half = pass.line.half_span;
-  WINDSPLAT_LANES
-  for (int l = 0; l < stops.count; ++l) {
-    float low = -0.5F;
-    float high = 0.5F;
-    for (int a = 0; a < 3; ++a) {
-      const float inverse = 1.0F / divisor(s.along[a][l]);
-      const float enter = (-half - s.in_box[a][l]) * inverse;
-      const float leave = (half - s.in_box[a][l]) * inverse;
-      low = larger(low, smaller(enter, leave));
-      high = smaller(high, larger(enter, leave));
-    }
-    s.low[l] = low;
-    s.high[l] = high;
+HWY_INLINE void clip_to_box(float half_span, const Three<Stop>& in_box, const Three<Stop>& along,
+                            Segments& s) {
+  s.low = all<Stop>(-0.5F);
+  s.high = all<Stop>(0.5F);
+  const Stop half = all<Stop>(half_span);
+  const auto reach = [&](Stop at, Stop way) {
+    return hn::MulAdd(hn::Abs(way), all<Stop>(0.5F), hn::Abs(at));
+  };
+  const Stop most = hn::Max(hn::Max(reach(in_box.x, along.x), reach(in_box.y, along.y)),
+                            reach(in_box.z, along.z));
+  if (hn::AllTrue(StopTag(), hn::Le(most, half))) return;
+  const auto clip = [&](Stop at, Stop way) {
+    const Stop inverse = inverse_of(divisor(way));
+    const Stop enter = (hn::Neg(half) - at) * inverse;
+    const Stop leave = (half - at) * inverse;
+    s.low = hn::Max(s.low, hn::Min(enter, leave));
+    s.high = hn::Min(s.high, hn::Max(enter, leave));
+  };
+  clip(in_box.x, along.x);
+  clip(in_box.y, along.y);
+  clip(in_box.z, along.z);
+}
+
+// The drawn vector, in the world; a slice keeps what lies in its plane.
+template <bool Curved>
+HWY_INLINE Three<Stop> extent_of(const LineStyle& line, const CellLanes<Curved>& cells,
+                                 const Winds& winds) {
+  const Stop part = clamped(winds.magnitude * all<Stop>(line.inverse_full_magnitude), 0.0F, 1.0F);
+  const Stop length = all<Stop>(line.length) * part;
+  if constexpr (Curved) {
+    const Three<Stop> bent = bent_direction(line, cells, winds.direction);
+    return {bent.x * length, bent.y * length, bent.z * length};
+  } else {
+    return {winds.direction.x * length * all<Stop>(line.keep[0]),
+            winds.direction.y * length * all<Stop>(line.keep[1]),
+            winds.direction.z * length * all<Stop>(line.keep[2])};
   }
+}
+
+template <bool Curved>
+HWY_INLINE Segments place_segments(const LineStyle& line, const Rows& rows,
+                                   const CellLanes<Curved>& cells, const Winds& winds,
+                                   const Hash3<std::uint32_t>& key, int i) {
+  const Hash3<UnsignedOf<Stop>> kernel = pcg3d(
+      Hash3<UnsignedOf<Stop>>{hashed_sample(rows, 0, i, key.x), hashed_sample(rows, 1, i, key.y),
+                              hashed_sample(rows, 2, i, key.z)});
+  const Hash3<UnsignedOf<Stop>> centre = pcg3d(kernel);
+  const Stop half = all<Stop>(0.5F);
+  const Stop by_centre = all<Stop>(line.jitter_center);
+  const Stop by_stride = all<Stop>(line.jitter_stride);
+  const auto centred = [&](UnsignedOf<Stop> bits) { return unit_interval<Stop>(bits) - half; };
+  const Three<Stop> in_box = {by_centre * centred(centre.x), by_centre * centred(centre.y),
+                              by_centre * centred(centre.z)};
+  const Three<Stop> moved = {hn::MulAdd(by_stride, centred(kernel.x), in_box.x),
+                             hn::MulAdd(by_stride, centred(kernel.y), in_box.y),
+                             hn::MulAdd(by_stride, centred(kernel.z), in_box.z)};
+  Segments s;
+  s.offset = cells.to_world(moved);
+  s.extent = extent_of(line, cells, winds);
+  s.lift = moved.z;
+  s.phase = hn::Zero(StopTag());
+  if (line.moving != 0) s.phase = unit_interval<Stop>(pcg3d(centre).x);
+  clip_to_box(line.half_span, in_box, cells.to_grid(s.extent), s);
+  return s;
+}
+
+// On the screen; which lanes have a line there.
+template <bool Perspective>
+HWY_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyle& line,
+                                         const Stops& stops, int l, const Winds& winds, Segments& s,
+                                         Ribbons& r) {
+  const Stop vx = dot3(camera.right, s.extent);
+  const Stop vy = dot3(camera.down, s.extent);
+  const Stop vz = dot3(camera.forward, s.extent);
+  const Stop px = load<Stop>(stops.x + l) + dot3(camera.right, s.offset);
+  const Stop py = load<Stop>(stops.y + l) + dot3(camera.down, s.offset);
+  const Stop dz = dot3(camera.forward, s.offset);
+  const Stop pz = load<Stop>(stops.z + l) + dz;
+  const Stop near = all<Stop>(camera.near);
+  const Stop one = all<Stop>(1.0F);
+  const Stop half_way = all<Stop>(0.5F) * hn::Abs(vz);
+  // Negative if there is no line, nothing of it in its box, or nothing beyond the near plane.
+  Stop shown = hn::Min(winds.magnitude, s.high - s.low);
+  Stop z0 = one;
+  Stop z1 = one;
+  if (Perspective) {
+    if (!hn::AllTrue(StopTag(), hn::Ge(pz - half_way, near))) {
+      // The near plane takes off the end that is nearer to the eye.
+      const Stop q_near = (near - pz) / divisor(vz);
+      const Stop zero = hn::Zero(StopTag());
+      s.low = hn::Max(s.low, hn::IfThenElse(hn::Gt(vz, zero), q_near, all<Stop>(-0.5F)));
+      s.high = hn::Min(s.high, hn::IfThenElse(hn::Lt(vz, zero), q_near, all<Stop>(0.5F)));
+      shown = hn::Min(winds.magnitude, s.high - s.low);
+      shown = hn::Min(shown, pz + half_way - near);
+    }
+    z0 = hn::Max(hn::MulAdd(s.low, vz, pz), near);
+    z1 = hn::Max(hn::MulAdd(s.high, vz, pz), near);
+  }
+  const Stop scale = all<Stop>(camera.inverse_pixel);
+  const Stop k0 = Perspective ? scale / z0 : scale;
+  const Stop inverse_z1 = Perspective ? inverse_of(z1) : one;
+  const Stop k1 = Perspective ? scale * inverse_z1 : scale;
+  const Stop x0 = hn::MulAdd(s.low, vx, px) * k0;
+  const Stop y0 = hn::MulAdd(s.low, vy, py) * k0;
+  const Stop ux = hn::MulSub(hn::MulAdd(s.high, vx, px), k1, x0);
+  const Stop uy = hn::MulSub(hn::MulAdd(s.high, vy, py), k1, y0);
+  const float least = 1e-6F * line.r2;
+  const Stop u2 = hn::MulAdd(ux, ux, uy * uy);
+  const Stop inverse_u2 = inverse_of(hn::Max(u2, all<Stop>(least * least)));
+  store(x0 + all<Stop>(camera.half_width_px), r.x + l);
+  store(y0 + all<Stop>(camera.half_height_px), r.y + l);
+  store(ux, r.ux + l);
+  store(uy, r.uy + l);
+  store(inverse_u2, r.inverse_u2 + l);
+  store(hn::NegMulAdd(all<Stop>(0.5F), u2 * inverse_u2, all<Stop>(0.5F)), r.w0 + l);
+  store(Perspective ? z0 * inverse_z1 : one, r.depth_ratio + l);
+  store(hn::MulAdd(s.low, vz, dz), r.depth + l);
+  store((s.high - s.low) * vz, r.depth_rise + l);
+  return hn::Ge(shown, hn::Zero(StopTag()));
 }
 
 // Where along its texture each line begins: a line at full magnitude runs through motion_cycles.
-void phase_ribbons(const Pass& pass, const Stops& stops, const Winds& winds, const Segments& s,
-                   const float* q_low, const float* q_high, Ribbons& r) {
-  const LineStyle& line = pass.line;
-  for (int l = 0; l < stops.count; ++l) {
-    const float part = clamped(winds.magnitude[l] * line.inverse_full_magnitude, 0.0F, 1.0F);
-    const double cycles = static_cast<double>(s.phase[l]) + line.motion_cycles * part;
-    const double whole = static_cast<double>(static_cast<std::int64_t>(cycles));
-    const double rest = cycles - whole;
-    const double phase = rest < 0 ? rest + 1 : rest;
-    r.phase[l] = static_cast<float>(static_cast<double>(q_low[l]) + 1.5 - phase);
-    r.phase_rise[l] = q_high[l] - q_low[l];
-  }
-}
-
-template <bool Perspective>
-void project_segments(const Camera& camera, const Pass& pass, const Stops& stops, const Winds& w,
-                      const Segments& s, float* __restrict q_low, float* __restrict q_high,
-                      Ribbons& __restrict r) {
-  const float least = 1e-6F * pass.line.r2;
-  WINDSPLAT_LANES
-  for (int l = 0; l < stops.count; ++l) {
-    const float ex = s.extent[0][l];
-    const float ey = s.extent[1][l];
-    const float ez = s.extent[2][l];
-    const float vx = dot3(camera.right, ex, ey, ez);
-    const float vy = dot3(camera.down, ex, ey, ez);
-    const float vz = dot3(camera.forward, ex, ey, ez);
-    const float ox = s.offset[0][l];
-    const float oy = s.offset[1][l];
-    const float oz = s.offset[2][l];
-    const float px = stops.x[l] + dot3(camera.right, ox, oy, oz);
-    const float py = stops.y[l] + dot3(camera.down, ox, oy, oz);
-    const float dz = dot3(camera.forward, ox, oy, oz);
-    const float pz = stops.z[l] + dz;
-    // The near plane takes off the end that is nearer to the eye.
-    const float q_near = (camera.near - pz) / divisor(vz);
-    const float near_low = vz > 0 ? q_near : -0.5F;
-    const float near_high = vz < 0 ? q_near : 0.5F;
-    const float low = Perspective ? larger(s.low[l], near_low) : s.low[l];
-    const float high = Perspective ? smaller(s.high[l], near_high) : s.high[l];
-    const float z0 = Perspective ? larger(pz + low * vz, camera.near) : 1.0F;
-    const float z1 = Perspective ? larger(pz + high * vz, camera.near) : 1.0F;
-    // Negative if there is no line, nothing of it in its box, or nothing beyond the near plane.
-    float shown = smaller(w.magnitude[l], high - low);
-    if (Perspective) shown = smaller(shown, pz + 0.5F * absolute(vz) - camera.near);
-    r.drawn[l] = shown >= 0 ? 1 : 0;
-    const float k0 = camera.inverse_pixel / z0;
-    const float k1 = camera.inverse_pixel / z1;
-    const float x0 = (px + low * vx) * k0;
-    const float y0 = (py + low * vy) * k0;
-    const float ux = (px + high * vx) * k1 - x0;
-    const float uy = (py + high * vy) * k1 - y0;
-    r.x[l] = x0 + camera.half_width_px;
-    r.y[l] = y0 + camera.half_height_px;
-    r.ux[l] = ux;
-    r.uy[l] = uy;
-    const float u2 = ux * ux + uy * uy;
-    const float inverse_u2 = 1.0F / larger(u2, least * least);
-    r.inverse_u2[l] = inverse_u2;
-    r.w0[l] = 0.5F - 0.5F * (u2 * inverse_u2);
-    r.depth_ratio[l] = z0 / z1;
-    r.depth[l] = dz + low * vz;
-    r.depth_rise[l] = (high - low) * vz;
-    q_low[l] = low;
-    q_high[l] = high;
+void phase_ribbons(const LineStyle& line, const Winds& winds, const Segments& s, int l,
+                   Ribbons& r) {
+  alignas(64) float magnitude[brick_side], phase[brick_side], low[brick_side], high[brick_side];
+  store(winds.magnitude, magnitude);
+  store(s.phase, phase);
+  store(s.low, low);
+  store(s.high, high);
+  for (int k = 0; k < stop_lanes; ++k) {
+    const float part = limited(magnitude[k] * line.inverse_full_magnitude, 0.0F, 1.0F);
+    const double cycles = static_cast<double>(phase[k]) + line.motion_cycles * part;
+    const double rest = cycles - static_cast<double>(static_cast<std::int64_t>(cycles));
+    const double turn = rest < 0 ? rest + 1 : rest;
+    r.phase[l + k] = static_cast<float>(static_cast<double>(low[k]) + 1.5 - turn);
+    r.phase_rise[l + k] = high[k] - low[k];
   }
 }
 
 // The compass bearing of a vector in degrees, 0 along y, 90 along x, in [0, 360). atan on [0, 1] by
 // a polynomial (1e-6 radians).
-inline float bearing(float x, float y) {
-  const float ax = absolute(x);
-  const float ay = absolute(y);
-  const float t = smaller(ax, ay) / larger(larger(ax, ay), 1e-30F);
-  const float t2 = t * t;
-  float p = -0.0117212F;
-  p = p * t2 + 0.05265332F;
-  p = p * t2 - 0.11643287F;
-  p = p * t2 + 0.19354346F;
-  p = p * t2 - 0.33262347F;
-  p = p * t2 + 0.99997726F;
-  constexpr float degrees = 57.29577951F;
-  const float from_axis = p * t * degrees;                      // 0 .. 45
-  const float first = ax > ay ? 90.0F - from_axis : from_axis;  // from north towards east
-  const float half = y < 0 ? 180.0F - first : first;
-  const float whole = x < 0 ? 360.0F - half : half;
-  return whole < 360.0F ? whole : 0.0F;
+HWY_INLINE Stop bearing(Stop x, Stop y) {
+  const Stop ax = hn::Abs(x);
+  const Stop ay = hn::Abs(y);
+  const Stop t = hn::Min(ax, ay) / hn::Max(hn::Max(ax, ay), all<Stop>(1e-30F));
+  const Stop t2 = t * t;
+  Stop p = all<Stop>(-0.0117212F);
+  p = hn::MulAdd(p, t2, all<Stop>(0.05265332F));
+  p = hn::MulAdd(p, t2, all<Stop>(-0.11643287F));
+  p = hn::MulAdd(p, t2, all<Stop>(0.19354346F));
+  p = hn::MulAdd(p, t2, all<Stop>(-0.33262347F));
+  p = hn::MulAdd(p, t2, all<Stop>(0.99997726F));
+  const Stop zero = hn::Zero(StopTag());
+  const Stop from_axis = p * t * all<Stop>(57.29577951F);  // 0 .. 45 degrees
+  // From north towards east.
+  const Stop first = hn::IfThenElse(hn::Gt(ax, ay), all<Stop>(90.0F) - from_axis, from_axis);
+  const Stop half = hn::IfThenElse(hn::Lt(y, zero), all<Stop>(180.0F) - first, first);
+  const Stop whole = hn::IfThenElse(hn::Lt(x, zero), all<Stop>(360.0F) - half, half);
+  return hn::IfThenElse(hn::Lt(whole, all<Stop>(360.0F)), whole, zero);
 }
 
-// Height is that of the unbent lattice on a curved one.
-inline float height_of(const Pass& pass, const Stops& stops, const Segments& s, int l) {
-  const Axis& z = pass.axis[2];
-  return z.position[stops.index[2][l]] + s.lift[l] * z.cell[stops.index[2][l]];
-}
-
-inline float color_value(const Pass& pass, const Stops& stops, const Winds& winds,
-                         const Segments& s, float view_distance, int l) {
-  const LineStyle& line = pass.line;
-  const float z = height_of(pass, stops, s, l);
+// What the colour tells. Height is that of the unbent lattice on a curved one.
+HWY_INLINE Stop color_value(const LineStyle& line, const Rows& rows, const Winds& winds,
+                            const Segments& s, Stop view_distance, int i) {
+  const Stop z = hn::MulAdd(s.lift, load<Stop>(rows.cell[2] + i), load<Stop>(rows.height + i));
   switch (line.color_by) {
     case 0:
       return z;
     case 1:
       return view_distance;
     case 2: {
-      const float height = (z - line.box_low_z) * line.inverse_box_height;
-      const float rise = 0.5F + 0.5F * winds.direction[2][l] * line.keep[2];
-      return (1.0F - line.rise_weight) * height + line.rise_weight * rise;
+      const Stop height = (z - all<Stop>(line.box_low_z)) * all<Stop>(line.inverse_box_height);
+      const Stop half = all<Stop>(0.5F);
+      const Stop rise = hn::MulAdd(winds.direction.z * all<Stop>(line.keep[2]), half, half);
+      return all<Stop>(1.0F - line.rise_weight) * height + all<Stop>(line.rise_weight) * rise;
     }
     case 3:
-      return winds.magnitude[l];
+      return winds.magnitude;
     case 4:
-      return bearing(winds.direction[0][l] * line.keep[0], winds.direction[1][l] * line.keep[1]);
+      return bearing(winds.direction.x * all<Stop>(line.keep[0]),
+                     winds.direction.y * all<Stop>(line.keep[1]));
     case 5:
-      return line.color_values[stops.offset[l]];
+      return fetch(line.color_values, rows, i);
     default:
-      return 0;
+      return hn::Zero(StopTag());
   }
 }
 
-// Colour by the table, dimmed by magnitude and by view distance; towards the head it turns grey.
-void color_ribbons(const Camera& camera, const Pass& pass, const Stops& stops, const Winds& winds,
-                   const Segments& s, const float* q_low, const float* q_high, Ribbons& r) {
-  const LineStyle& line = pass.line;
-  for (int l = 0; l < stops.count; ++l) {
-    if (r.drawn[l] == 0) continue;
-    const float distance =
-        stops.z[l] + dot3(camera.forward, s.offset[0][l], s.offset[1][l], s.offset[2][l]);
-    const float strong =
-        clamped((winds.magnitude[l] - line.intensity_low) * line.intensity_scale, 0.0F, 1.0F);
-    const float far = clamped((distance - line.cue_near) * line.cue_scale, 0.0F, 1.0F);
-    const float dim = (1.0F - line.intensity * (1.0F - strong)) * (1.0F - line.cue_strength * far);
-    float rgb[3] = {0.5F, 0.5F, 0.5F};
-    const float value = color_value(pass, stops, winds, s, distance, l);
-    if (!is_masked(value)) look_up(line.color, value, rgb);
-    for (float& c : rgb) c *= dim;
-    const float top = larger(larger(rgb[0], rgb[1]), rgb[2]);
-    const float grey = line.head_desaturation * (q_low[l] + 0.5F);
-    const float more = line.head_desaturation * (q_high[l] - q_low[l]);
-    for (int c = 0; c < 3; ++c) {
-      r.tail[c][l] = rgb[c] + grey * (top - rgb[c]);
-      r.rise[c][l] = more * (top - rgb[c]);
+using ColorTag = hn::CappedTag<float, color_floats>;
+
+// Red, green and blue between a table's entry and the next.
+HWY_INLINE void blend(const float* entry, float part, float* rgb) {
+  const ColorTag tag;
+  for (std::size_t c = 0; c < color_floats; c += hn::MaxLanes(tag)) {
+    const auto a = hn::LoadU(tag, entry + c);
+    const auto b = hn::LoadU(tag, entry + color_floats + c);
+    hn::Store(hn::MulAdd(hn::Set(tag, part), b - a, a), tag, rgb + c);
+  }
+}
+
+// One line's colours: `tail` holds its table's. It is dimmed, and towards the head it turns grey by
+// `grey` at its start and by `more` on the way.
+HWY_INLINE void shade(float dim, float grey, float more, float* tail, float* rise) {
+  const ColorTag tag;
+  const float top = dim * larger(larger(tail[0], tail[1]), tail[2]);
+  for (std::size_t c = 0; c < color_floats; c += hn::MaxLanes(tag)) {
+    const auto rgb = hn::Load(tag, tail + c) * hn::Set(tag, dim);
+    const auto to_grey = hn::Set(tag, top) - rgb;
+    hn::Store(hn::MulAdd(hn::Set(tag, grey), to_grey, rgb), tag, tail + c);
+    hn::Store(hn::Set(tag, more) * to_grey, tag, rise + c);
+  }
+}
+
+// Colour by the table, dimmed by magnitude and by view distance.
+HWY_INLINE void color_ribbons(const Camera& camera, const LineStyle& line, const Rows& rows,
+                              const Stops& stops, const Winds& winds, const Segments& s, int i,
+                              int l, std::uint32_t bits, Ribbons& r) {
+  const Stop distance = load<Stop>(stops.z + l) + dot3(camera.forward, s.offset);
+  const Stop one = all<Stop>(1.0F);
+  const Stop strong =
+      clamped((winds.magnitude - all<Stop>(line.intensity_low)) * all<Stop>(line.intensity_scale),
+              0.0F, 1.0F);
+  const Stop far =
+      clamped((distance - all<Stop>(line.cue_near)) * all<Stop>(line.cue_scale), 0.0F, 1.0F);
+  const Stop dim = hn::NegMulAdd(all<Stop>(line.intensity), one - strong, one) *
+                   hn::NegMulAdd(all<Stop>(line.cue_strength), far, one);
+  const Stop value = color_value(line, rows, winds, s, distance, i);
+  const auto masked = is_masked(value);
+  const ColorTable& table = line.color;
+  const Stop known = hn::IfThenElse(masked, all<Stop>(table.low), value);
+  const Stop place = clamped((known - all<Stop>(table.low)) * all<Stop>(table.scale), 0.0F,
+                             static_cast<float>(table.entries - 1));
+  const SignedOf<Stop> entry = truncated(place);
+  alignas(64) std::int32_t entries[brick_side];
+  alignas(64) float parts[brick_side], dims[brick_side], greys[brick_side], mores[brick_side];
+  hn::Store(entry, hn::RebindToSigned<StopTag>(), entries);
+  store(place - from_integer<Stop>(entry), parts);
+  store(dim, dims);
+  const Stop desaturation = all<Stop>(line.head_desaturation);
+  store(desaturation * (s.low + all<Stop>(0.5F)), greys);
+  store(desaturation * (s.high - s.low), mores);
+  const std::uint32_t unknown = bits_of<Stop>(masked);
+  for (; bits != 0; bits &= bits - 1U) {
+    const int k = __builtin_ctz(bits);
+    float* tail = r.tail[l + k];
+    if ((unknown >> static_cast<unsigned>(k) & 1U) == 0) {
+      blend(table.rgb + color_floats * static_cast<std::ptrdiff_t>(entries[k]), parts[k], tail);
+    } else {
+      tail[0] = tail[1] = tail[2] = 0.5F;
+      tail[3] = 0;
     }
+    shade(dims[k], greys[k], mores[k], tail, r.rise[l + k]);
   }
 }
 
+// A row's lines from lane i on, made ready; which of `bits` are left.
 template <bool Perspective, bool Curved>
-void prepare_ribbons(const Camera& camera, const Pass& pass, const Stops& stops, const Cells& cells,
-                     const Winds& winds, Ribbons& ribbons) {
-  Segments segments;
-  float q_low[brick_stops];
-  float q_high[brick_stops];
-  move_centres<Curved>(pass, stops, cells, segments);
-  extend_segments<Curved>(pass, stops, cells, winds, segments);
-  clip_to_box(pass, stops, segments);
-  project_segments<Perspective>(camera, pass, stops, winds, segments, q_low, q_high, ribbons);
-  color_ribbons(camera, pass, stops, winds, segments, q_low, q_high, ribbons);
-  if (pass.line.moving != 0) {
-    phase_ribbons(pass, stops, winds, segments, q_low, q_high, ribbons);
-  }
+HWY_INLINE std::uint32_t prepare_ribbons(const Camera& camera, const Pass& pass, const Rows& rows,
+                                         const Stops& stops, const CellLanes<Curved>& cells,
+                                         const Winds& winds, const Hash3<std::uint32_t>& key, int i,
+                                         int l, std::uint32_t bits, Ribbons& ribbons) {
+  Segments s = place_segments<Curved>(pass.line, rows, cells, winds, key, i);
+  const auto shown = project_segments<Perspective>(camera, pass.line, stops, l, winds, s, ribbons);
+  bits &= bits_of<Stop>(shown);
+  if (bits == 0) return 0;
+  color_ribbons(camera, pass.line, rows, stops, winds, s, i, l, bits, ribbons);
+  if (pass.line.moving != 0) phase_ribbons(pass.line, winds, s, l, ribbons);
+  return bits;
 }
 
 }  // namespace

@@ -8,50 +8,53 @@ namespace windsplat::engine::kernels {
 namespace {
 
 // F(b^2, v) by linear interpolation in both; row is where the table's row begins, v in [-1, 1].
-inline float partial_at(const float* __restrict partial, int row, float row_part, float v) {
-  const float place = (v + 1.0F) * (0.5F * (partial_columns - 1));
-  const float inside = smaller(place, static_cast<float>(partial_columns - 1) - 0.001F);
-  const int column = static_cast<int>(inside);
-  const float part = inside - static_cast<float>(column);
-  const int at = row + column;
-  const float a = partial[at];
-  const float b = partial[at + 1];
-  const float c = partial[at + partial_columns];
-  const float d = partial[at + partial_columns + 1];
-  const float upper = a + part * (b - a);
-  const float lower = c + part * (d - c);
-  return upper + row_part * (lower - upper);
+HWY_INLINE Pixel partial_at(const float* partial, SignedOf<Pixel> row, Pixel row_part, Pixel v) {
+  const Pixel place = (v + all<Pixel>(1.0F)) * all<Pixel>(0.5F * (partial_columns - 1));
+  const Pixel inside = hn::Min(place, all<Pixel>(static_cast<float>(partial_columns - 1) - 0.001F));
+  const SignedOf<Pixel> column = truncated(inside);
+  const Pixel part = inside - from_integer<Pixel>(column);
+  const SignedOf<Pixel> at = row + column;
+  const PixelTag tag;
+  const Pixel a = hn::GatherIndex(tag, partial, at);
+  const Pixel b = hn::GatherIndex(tag, partial + 1, at);
+  const Pixel c = hn::GatherIndex(tag, partial + partial_columns, at);
+  const Pixel d = hn::GatherIndex(tag, partial + partial_columns + 1, at);
+  const Pixel upper = hn::MulAdd(part, b - a, a);
+  const Pixel lower = hn::MulAdd(part, d - c, c);
+  return hn::MulAdd(row_part, lower - upper, upper);
 }
 
 // Adds what of the splat lies between two view depths, given from the splat's centre.
 template <bool Perspective>
-void gather_block(const Splat& splat, const float* __restrict partial, float front, float back,
-                  float x, float y, const float* __restrict ray, float* __restrict gathered) {
-  const Splat s = splat;
+HWY_INLINE void gather_block(const SplatLanes& s, const float* HWY_RESTRICT partial, float front,
+                             float back, float x, float y, const float* HWY_RESTRICT ray,
+                             float* HWY_RESTRICT gathered) {
   constexpr float t2 = footprint_t * footprint_t;
   constexpr float rows_per_t2 = static_cast<float>(partial_rows - 1) / t2;
-  float tau[block_pixels];
-  for (int l = 0; l < block_pixels; ++l) {
-    const float length = Perspective ? ray[l] : 1.0F;
-    const SplatLane lane =
-        splat_lane<Perspective, From::eye>(s, x + lane_x[l], y + lane_y[l], length);
+  const hn::RebindToSigned<PixelTag> integers;
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
+    const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
+    const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
+    const SplatLane lane = splat_lane<Perspective, From::eye>(s, px, py, length);
     // Half the chord in cells, and with it the slab's faces in half chords from the middle.
-    const float chord2 = larger(t2 - lane.r2, 1e-6F);
-    const float scale = lane.cells / square_root(chord2);
-    const float v0 = clamped((front - lane.behind) * scale, -1.0F, 1.0F);
-    const float v1 = clamped((back - lane.behind) * scale, -1.0F, 1.0F);
-    const float place = smaller(lane.r2 * rows_per_t2, partial_rows - 1.001F);
-    const int row = static_cast<int>(place);
-    const float row_part = place - static_cast<float>(row);
-    const int at = row * partial_columns;
-    const float after = partial_at(partial, at, row_part, v1);
-    const float before = partial_at(partial, at, row_part, v0);
-    tau[l] = lane.tau * larger(after - before, 0.0F);
-  }
-  for (int l = 0; l < block_pixels; ++l) gathered[l] += tau[l];
-  for (int c = 0; c < 3; ++c) {
-    float* to = gathered + static_cast<std::ptrdiff_t>(1 + c) * block_pixels;
-    for (int l = 0; l < block_pixels; ++l) to[l] += tau[l] * s.color[c];
+    const Pixel chord2 = hn::Max(all<Pixel>(t2) - lane.r2, all<Pixel>(1e-6F));
+    const Pixel scale = lane.cells / hn::Sqrt(chord2);
+    const Pixel v0 = clamped((all<Pixel>(front) - lane.behind) * scale, -1.0F, 1.0F);
+    const Pixel v1 = clamped((all<Pixel>(back) - lane.behind) * scale, -1.0F, 1.0F);
+    const Pixel place =
+        hn::Min(lane.r2 * all<Pixel>(rows_per_t2), all<Pixel>(partial_rows - 1.001F));
+    const SignedOf<Pixel> row = truncated(place);
+    const Pixel row_part = place - from_integer<Pixel>(row);
+    const SignedOf<Pixel> at = row * hn::Set(integers, partial_columns);
+    const Pixel after = partial_at(partial, at, row_part, v1);
+    const Pixel before = partial_at(partial, at, row_part, v0);
+    const Pixel tau = lane.tau * hn::Max(after - before, hn::Zero(PixelTag()));
+    add_to(gathered + l, tau);
+    for (int c = 0; c < 3; ++c) {
+      add_product(gathered + static_cast<std::ptrdiff_t>(1 + c) * block_pixels + l, tau,
+                  s.color[c]);
+    }
   }
 }
 
@@ -75,6 +78,7 @@ void gather_on(const Camera& camera, const SplatRecord& record, Slab& slab, Tile
   const float back = slab.back;
   if (back <= front || record.last <= front || record.first >= back) return;
   const std::uint32_t columns = range_mask({record.column_first, record.column_last});
+  const SplatLanes lanes = spread(record.splat);
   for (int row = record.row_first; row <= record.row_last; ++row) {
     std::uint32_t left = columns & tile.open[row];
     while (left != 0) {
@@ -82,10 +86,10 @@ void gather_on(const Camera& camera, const SplatRecord& record, Slab& slab, Tile
       left &= left - 1U;
       const std::ptrdiff_t index = row * tile_blocks + column;
       const float* ray = Perspective ? tile.rays + index * block_pixels : nullptr;
-      gather_block<Perspective>(
-          record.splat, record.partial, front - record.middle, back - record.middle,
-          static_cast<float>(tile.x + column * block_side),
-          static_cast<float>(tile.y + row * block_side), ray, touch(slab, row, column));
+      gather_block<Perspective>(lanes, record.partial, front - record.middle, back - record.middle,
+                                static_cast<float>(tile.x + column * block_side),
+                                static_cast<float>(tile.y + row * block_side), ray,
+                                touch(slab, row, column));
       tile.counters.pixel_updates += block_pixels;
     }
   }
@@ -101,17 +105,17 @@ void gather(const Camera& camera, const SplatRecord& record, Slab& slab, Tile& t
 
 template <bool Perspective>
 int pack_splats_on(const Prepared& p, SplatRecord* out) {
+  const Footing& f = p.footing;
   int n = 0;
-  for (int l = 0; l < p.stops.count; ++l) {
-    const Footing& f = p.footing;
-    if (f.row_last[l] < f.row_first[l]) continue;
+  for (std::uint64_t left = p.stops.splats; left != 0; left &= left - 1U) {
+    const int l = __builtin_ctzll(left);
     const float middle = p.stops.depth[l];
     const float half = p.splats.half_depth[l];
     out[n++] = {p.pass->partial,
                 middle - half,
                 middle + half,
                 middle,
-                splat_at<Perspective>(p.densities, p.splats, p.near, l),
+                splat_at<Perspective>(p, l),
                 static_cast<std::int16_t>(f.row_first[l]),
                 static_cast<std::int16_t>(f.row_last[l]),
                 static_cast<std::int16_t>(f.column_first[l]),
@@ -121,34 +125,38 @@ int pack_splats_on(const Prepared& p, SplatRecord* out) {
 }
 
 int pack_splats(const Camera& camera, const Prepared& p, SplatRecord* out) {
-  if (p.pass->has_medium == 0) return 0;
   return camera.perspective != 0 ? pack_splats_on<true>(p, out) : pack_splats_on<false>(p, out);
 }
 
 int pack_ribbons(const Prepared& p, RibbonRecord* out) {
-  if (p.pass->has_lines == 0) return 0;
+  const Footing& f = p.footing;
   int n = 0;
-  for (int l = 0; l < p.stops.count; ++l) {
-    const Footing& f = p.footing;
-    if (f.line_last[l] < f.line_first[l]) continue;
+  for (std::uint64_t left = p.stops.lines; left != 0; left &= left - 1U) {
+    const int l = __builtin_ctzll(left);
     const float tail = p.stops.depth[l] + p.ribbons.depth[l];
     const float head = tail + p.ribbons.depth_rise[l];
-    out[n++] = {smaller(tail, head),
-                larger(tail, head),
-                p.stops.depth[l],
-                static_cast<std::int16_t>(f.line_first[l]),
-                static_cast<std::int16_t>(f.line_last[l]),
-                p.pass->line.moving,
-                ribbon_at(p.pass->line, p.ribbons, l)};
+    RibbonRecord& to = out[n++];
+    to.first = smaller(tail, head);
+    to.last = larger(tail, head);
+    to.centre = p.stops.depth[l];
+    to.row_first = static_cast<std::int16_t>(f.line_first[l]);
+    to.row_last = static_cast<std::int16_t>(f.line_last[l]);
+    to.moving = p.pass->line.moving;
+    for (int k = 0; k <= to.row_last - to.row_first; ++k) {
+      to.columns[k] = static_cast<std::uint16_t>(f.line_columns[k][l]);
+    }
+    to.ribbon = ribbon_at(p.pass->line, p.ribbons, l);
   }
   return n;
 }
 
-// A line's view depth where it passes a pixel, from the camera's depth origin.
+// A line's view depth where it passes a point of the picture, from the camera's depth origin.
 template <bool Perspective>
 inline float ribbon_depth(const Ribbon& r, float centre, float px, float py) {
-  const RibbonLane lane = ribbon_lane<Perspective, style_plain>(r, px, py);
-  return centre + r.depth + lane.f * r.depth_rise;
+  const float along = ((px - r.x) * r.ux + (py - r.y) * r.uy) * r.inverse_u2 + r.w0;
+  const float w = limited(along, 0.0F, 1.0F);
+  const float f = Perspective ? w * r.depth_ratio / (1.0F + w * (r.depth_ratio - 1.0F)) : w;
+  return centre + r.depth + f * r.depth_rise;
 }
 
 // How far a line's depth anywhere in a block may be from that at the block's middle: the way of f
@@ -165,12 +173,10 @@ template <bool Perspective>
 int list_hits_on(const RibbonRecord& line, const Slab& slab, const Tile& tile, Hit* hits) {
   if (line.last < slab.front || line.first >= slab.back) return 0;
   const Ribbon& ribbon = line.ribbon;
-  const Capsule capsule = capsule_of(ribbon, tile);
-  const int columns = blocks_of(tile.width);
   const float slack = depth_slack(ribbon);
   int n = 0;
   for (int row = line.row_first; row <= line.row_last; ++row) {
-    std::uint32_t left = range_mask(capsule_in_row(capsule, row, columns)) & tile.open[row];
+    std::uint32_t left = line.columns[row - line.row_first] & tile.open[row];
     while (left != 0) {
       const int column = __builtin_ctz(left);
       left &= left - 1U;
@@ -191,151 +197,158 @@ int list_hits(const Camera& camera, const RibbonRecord& line, const Slab& slab, 
                                  : list_hits_on<false>(line, slab, tile, hits);
 }
 
-// What has happened to the light of a block's pixels within the slab at hand.
+// What has happened to the light of a vector of a block's pixels within the slab at hand.
 struct Passage {
-  float tau[block_pixels];
-  float absorbed[block_pixels], transmitted[block_pixels];
-  float color[3][block_pixels];  // of the medium
-  float rgb[3][block_pixels];    // added by lines, minus the medium's behind them
-  float through[block_pixels];   // product of 1 - opacity of the lines so far
-  float reached[block_pixels];   // cd-naive: how far through the slab the light was followed
-  float left[block_pixels];      // cd-naive: light left there
+  Pixel tau;
+  Attenuation<Pixel> medium;
+  Pixel color[3];  // of the medium
+  Pixel rgb[3];    // added by lines, minus the medium's behind them
+  Pixel through;   // product of 1 - opacity of the lines so far
+  Pixel reached;   // cd-naive: how far through the slab the light was followed
+  Pixel left;      // cd-naive: light left there
 };
 
-// Lines as the pixels of a block meet them; a pixel that does not has opacity 0 and the place
-// `far`.
+// A line as a block's pixels meet it; a pixel that does not has opacity 0.
 struct Meeting {
-  float place[block_pixels];  // through the slab, 0 to 1
-  float opacity[block_pixels];
-  float color[3][block_pixels];
+  alignas(64) float place[block_pixels];  // through the slab, 0 to 1
+  alignas(64) float opacity[block_pixels];
+  alignas(64) float color[3][block_pixels];
 };
 constexpr int meetings_max = 64;  // put in order together; a line moves by half of that at most
 
 template <int Compositing>
-inline void open_passage(const float* __restrict gathered, Passage& p) {
-  for (int l = 0; l < block_pixels; ++l) {
-    p.tau[l] = 0;
-    p.absorbed[l] = 0;
-    p.transmitted[l] = 1;
-    for (int c = 0; c < 3; ++c) p.color[c][l] = p.rgb[c][l] = 0;
-    p.through[l] = 1;
-    p.reached[l] = 0;
-    p.left[l] = 1;
+HWY_INLINE Passage open_passage(const float* gathered, int l) {
+  const Pixel zero = hn::Zero(PixelTag());
+  const Pixel one = all<Pixel>(1.0F);
+  Passage p = {zero, {zero, one}, {zero, zero, zero}, {zero, zero, zero}, one, zero, one};
+  if (gathered == nullptr) return p;
+  p.tau = load<Pixel>(gathered + l);
+  p.medium = attenuation_by<Compositing>(p.tau);
+  const Pixel inverse = inverse_of(hn::Max(p.tau, all<Pixel>(1e-37F)));
+  for (int c = 0; c < 3; ++c) {
+    p.color[c] =
+        load<Pixel>(gathered + static_cast<std::ptrdiff_t>(1 + c) * block_pixels + l) * inverse;
   }
-  if (gathered == nullptr) return;
-  for (int l = 0; l < block_pixels; ++l) {
-    p.tau[l] = gathered[l];
-    const Attenuation medium = attenuation_by<Compositing>(p.tau[l]);
-    p.absorbed[l] = medium.absorbed;
-    p.transmitted[l] = medium.transmitted;
-    const float inverse = 1.0F / larger(p.tau[l], 1e-37F);
-    for (int c = 0; c < 3; ++c) {
-      p.color[c][l] = gathered[static_cast<std::ptrdiff_t>(1 + c) * block_pixels + l] * inverse;
-    }
-  }
+  return p;
 }
 
 template <bool Perspective, int Style>
-inline void meet_line(const Ribbon& ribbon, float centre, const Slab& slab, float x, float y,
-                      Meeting& m) {
-  const Ribbon r = ribbon;
-  const float inverse = 1.0F / (slab.back - slab.front);
-  const float first = centre + r.depth;
-  for (int l = 0; l < block_pixels; ++l) {
-    const RibbonLane lane = ribbon_lane<Perspective, Style>(r, x + lane_x[l], y + lane_y[l]);
-    const float depth = first + lane.f * r.depth_rise;
-    m.place[l] = clamped((depth - slab.front) * inverse, 0.0F, 1.0F);
-    m.opacity[l] = depth >= slab.front && depth < slab.back ? lane.opacity : 0.0F;
-    for (int c = 0; c < 3; ++c) m.color[c][l] = r.tail[c] + lane.f * r.rise[c];
+HWY_INLINE void meet_line(const RibbonRecord& line, const Slab& slab, float x, float y,
+                          Meeting& m) {
+  const RibbonLanes r = spread(line.ribbon);
+  const Pixel inverse = all<Pixel>(1.0F / (slab.back - slab.front));
+  const Pixel first = all<Pixel>(line.centre + line.ribbon.depth);
+  const Pixel rise = all<Pixel>(line.ribbon.depth_rise);
+  const Pixel front = all<Pixel>(slab.front);
+  const Pixel back = all<Pixel>(slab.back);
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
+    const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
+    const RibbonLane lane = ribbon_lane < Perspective ? Depth::exact : Depth::flat,
+                     Style > (r, px, py);
+    const Pixel depth = hn::MulAdd(lane.f, rise, first);
+    store(clamped((depth - front) * inverse, 0.0F, 1.0F), m.place + l);
+    const auto here = hn::And(hn::Ge(depth, front), hn::Lt(depth, back));
+    store(hn::IfThenElseZero(here, lane.opacity), m.opacity + l);
+    for (int c = 0; c < 3; ++c) store(hn::MulAdd(lane.f, r.rise[c], r.tail[c]), m.color[c] + l);
   }
 }
 
 // Puts two neighbours in order, each pixel by itself; whether any pixel had them the other way.
-inline int put_in_order(Meeting& first, Meeting& second) {
-  int swapped = 0;
-  for (int l = 0; l < block_pixels; ++l) {
-    swapped |= first.place[l] > second.place[l] ? 1 : 0;
+HWY_INLINE bool put_in_order(Meeting& first, Meeting& second) {
+  bool swapped = false;
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const auto wrong = hn::Gt(load<Pixel>(first.place + l), load<Pixel>(second.place + l));
+    if (hn::AllFalse(PixelTag(), wrong)) continue;
+    swapped = true;
+    const auto exchange = [&](float* a, float* b) {
+      const Pixel p = load<Pixel>(a + l);
+      const Pixel q = load<Pixel>(b + l);
+      store(hn::IfThenElse(wrong, q, p), a + l);
+      store(hn::IfThenElse(wrong, p, q), b + l);
+    };
+    exchange(first.place, second.place);
+    exchange(first.opacity, second.opacity);
+    for (int c = 0; c < 3; ++c) exchange(first.color[c], second.color[c]);
   }
-  if (swapped == 0) return 0;
-  int wrong[block_pixels];
-  for (int l = 0; l < block_pixels; ++l) wrong[l] = first.place[l] > second.place[l] ? 1 : 0;
-  const auto exchange = [&](float* a, float* b) {
-    for (int l = 0; l < block_pixels; ++l) {
-      const float near = wrong[l] != 0 ? b[l] : a[l];
-      const float far = wrong[l] != 0 ? a[l] : b[l];
-      a[l] = near;
-      b[l] = far;
-    }
-  };
-  exchange(first.place, second.place);
-  exchange(first.opacity, second.opacity);
-  for (int c = 0; c < 3; ++c) exchange(first.color[c], second.color[c]);
-  return 1;
+  return swapped;
 }
 
 // Front to back in every pixel, by insertion. The lines come nearly sorted, by their depth at the
 // block's middle, so that few pairs are exchanged.
 inline void sort_meetings(Meeting* m, int count) {
   for (int n = 1; n < count; ++n) {
-    for (int k = n; k > 0 && put_in_order(m[k - 1], m[k]) != 0; --k) continue;
+    for (int k = n; k > 0 && put_in_order(m[k - 1], m[k]); --k) continue;
   }
-}
-
-// Whether so little light is left in every pixel that what lies behind may be left out.
-inline bool is_dark(const float* __restrict transmittance, const Passage& p, float stop) {
-  float most = 0;
-  for (int l = 0; l < block_pixels; ++l) {
-    most = larger(most, absolute(transmittance[l] * p.through[l] * p.left[l]));
-  }
-  return most <= stop;
 }
 
 template <int Compositing>
-inline void pass_line(const Meeting& m, Passage& p) {
-  for (int l = 0; l < block_pixels; ++l) {
-    const float opacity = m.opacity[l];
-    const float place = m.place[l];
-    if (Compositing == compositing_cd_naive) {
-      // Only a pixel that the line covers is followed up to it.
-      const float next = opacity > 0 ? larger(place, p.reached[l]) : p.reached[l];
-      const float part = (next - p.reached[l]) * p.absorbed[l];
-      const float behind = p.left[l] * (1.0F - part);
-      for (int c = 0; c < 3; ++c) {
-        p.rgb[c][l] += p.left[l] * part * p.color[c][l] + behind * opacity * m.color[c][l];
-      }
-      p.left[l] = behind * (1.0F - opacity);
-      p.reached[l] = next;
-      continue;
+HWY_INLINE void pass_line(const Meeting& m, int l, Passage& p) {
+  const Pixel one = all<Pixel>(1.0F);
+  const Pixel opacity = load<Pixel>(m.opacity + l);
+  const Pixel place = load<Pixel>(m.place + l);
+  if (Compositing == compositing_cd_naive) {
+    // Only a pixel that the line covers is followed up to it.
+    const Pixel next =
+        hn::IfThenElse(hn::Gt(opacity, hn::Zero(PixelTag())), hn::Max(place, p.reached), p.reached);
+    const Pixel part = (next - p.reached) * p.medium.absorbed;
+    const Pixel behind = p.left * (one - part);
+    for (int c = 0; c < 3; ++c) {
+      const Pixel own = behind * opacity * load<Pixel>(m.color[c] + l);
+      p.rgb[c] = p.rgb[c] + hn::MulAdd(p.left * part, p.color[c], own);
     }
-    const Attenuation medium = {p.absorbed[l], p.transmitted[l]};
-    const float before = light_before<Compositing>(medium, p.tau[l], place);
-    const float own = p.through[l] * opacity * before;
-    for (int c = 0; c < 3; ++c) p.rgb[c][l] += own * (m.color[c][l] - p.color[c][l]);
-    p.through[l] *= 1.0F - opacity;
+    p.left = behind * (one - opacity);
+    p.reached = next;
+    return;
   }
+  const Pixel own = p.through * opacity * light_before<Compositing>(p.medium, p.tau, place);
+  for (int c = 0; c < 3; ++c) {
+    p.rgb[c] = hn::MulAdd(own, load<Pixel>(m.color[c] + l) - p.color[c], p.rgb[c]);
+  }
+  p.through = p.through * (one - opacity);
 }
 
 // I = c_s (1 - P exp(-tau)) + sum_k prod_(j<k) (1 - a_j) a_k exp(-tau x_k) (c_k - c_s).
 template <int Compositing>
-inline void close_passage(const Passage& p, float* __restrict block) {
+HWY_INLINE void close_passage(const Passage& p, int l, float* block) {
   const Channels to = channels_of(block);
-  for (int l = 0; l < block_pixels; ++l) {
-    const float t = to.transmittance[l];
-    if (Compositing == compositing_cd_naive) {
-      const float part = (1.0F - p.reached[l]) * p.absorbed[l];
-      const float left = p.left[l] * (1.0F - part);
-      for (int c = 0; c < 3; ++c) {
-        to.rgb[c][l] += t * (p.rgb[c][l] + p.left[l] * part * p.color[c][l]);
-      }
-      to.alpha[l] += t * (1.0F - left);
-      to.transmittance[l] = t * left;
-      continue;
+  const Pixel one = all<Pixel>(1.0F);
+  const Pixel t = load<Pixel>(to.transmittance + l);
+  if (Compositing == compositing_cd_naive) {
+    const Pixel part = (one - p.reached) * p.medium.absorbed;
+    const Pixel left = p.left * (one - part);
+    for (int c = 0; c < 3; ++c) {
+      add_product(to.rgb[c] + l, t, hn::MulAdd(p.left * part, p.color[c], p.rgb[c]));
     }
-    const float absorbed = p.absorbed[l] + (1.0F - p.through[l]) * p.transmitted[l];
-    for (int c = 0; c < 3; ++c) to.rgb[c][l] += t * (p.rgb[c][l] + p.color[c][l] * absorbed);
-    to.alpha[l] += t * absorbed;
-    const float left = t * (p.through[l] * p.transmitted[l]);
-    to.transmittance[l] = Compositing == compositing_cd_euler ? bounded_light(left) : left;
+    add_product(to.alpha + l, t, one - left);
+    store(t * left, to.transmittance + l);
+    return;
+  }
+  const Pixel absorbed = hn::MulAdd(one - p.through, p.medium.transmitted, p.medium.absorbed);
+  for (int c = 0; c < 3; ++c) {
+    add_product(to.rgb[c] + l, t, hn::MulAdd(p.color[c], absorbed, p.rgb[c]));
+  }
+  add_product(to.alpha + l, t, absorbed);
+  store(bounded_light<Compositing>(t * (p.through * p.medium.transmitted)), to.transmittance + l);
+}
+
+constexpr int block_vectors = block_pixels / pixel_lanes;
+
+// Whether so little light is left in every pixel that what lies behind may be left out.
+inline bool is_dark(const float* transmittance, const Passage* p, float stop) {
+  Light light;
+  for (int v = 0; v < block_vectors; ++v) {
+    light.see(load<Pixel>(transmittance + v * pixel_lanes) * p[v].through * p[v].left);
+  }
+  return !light.above(stop);
+}
+
+template <int Compositing>
+HWY_INLINE void pass_lines(const Meeting* m, int count, Passage* p) {
+  for (int v = 0; v < block_vectors; ++v) {
+    Passage passage = p[v];
+    for (int n = 0; n < count; ++n) pass_line<Compositing>(m[n], v * pixel_lanes, passage);
+    p[v] = passage;
   }
 }
 
@@ -349,22 +362,24 @@ void close_slab_block(const Slab& slab, const Hit* hits, int count, int index, T
   const float x = static_cast<float>(tile.x + column * block_side);
   const float y = static_cast<float>(tile.y + row * block_side);
   float* block = tile.blocks + static_cast<std::ptrdiff_t>(index) * block_floats;
-  Passage passage;
-  open_passage<Compositing>(gathered, passage);
+  Passage passage[block_vectors];
+  for (int v = 0; v < block_vectors; ++v) {
+    passage[v] = open_passage<Compositing>(gathered, v * pixel_lanes);
+  }
   Meeting meetings[meetings_max];
   int held = 0;
   for (int h = 0; h < count; ++h) {
     const RibbonRecord& line = *hits[h].line;
     if (line.moving != 0) {
-      meet_line<Perspective, style_moving>(line.ribbon, line.centre, slab, x, y, meetings[held]);
+      meet_line<Perspective, style_moving>(line, slab, x, y, meetings[held]);
     } else {
-      meet_line<Perspective, style_head>(line.ribbon, line.centre, slab, x, y, meetings[held]);
+      meet_line<Perspective, style_head>(line, slab, x, y, meetings[held]);
     }
     if (++held < meetings_max || h + 1 == count) continue;
     // The nearer half passes, the farther one may still be met by lines to come.
     sort_meetings(meetings, held);
     held = meetings_max / 2;
-    for (int n = 0; n < held; ++n) pass_line<Compositing>(meetings[n], passage);
+    pass_lines<Compositing>(meetings, held, passage);
     for (int n = 0; n < held; ++n) meetings[n] = meetings[n + held];
     if (is_dark(block, passage, slab.stop)) {
       tile.any_closed = 1;  // what is behind was left out
@@ -373,14 +388,37 @@ void close_slab_block(const Slab& slab, const Hit* hits, int count, int index, T
     }
   }
   sort_meetings(meetings, held);
-  for (int n = 0; n < held; ++n) pass_line<Compositing>(meetings[n], passage);
-  close_passage<Compositing>(passage,
-                             tile.blocks + static_cast<std::ptrdiff_t>(index) * block_floats);
+  pass_lines<Compositing>(meetings, held, passage);
+  for (int v = 0; v < block_vectors; ++v) {
+    close_passage<Compositing>(passage[v], v * pixel_lanes, block);
+  }
   constexpr bool euler = Compositing == compositing_cd_euler;
   const int own = medium && !euler ? 1 : 0;
   const int each = medium && Compositing == compositing_analytic ? count : 0;
   tile.counters.pixel_updates += std::int64_t{1 + count} * block_pixels;
   tile.counters.exponentials += std::int64_t{own + each} * block_pixels;
+}
+
+int refresh_open(Tile& tile) {
+  int open = 0;
+  const int rows = blocks_of(tile.height);
+  for (int row = 0; row < rows; ++row) {
+    std::uint32_t left = tile.open[row];
+    open += __builtin_popcount(left);
+    while (left != 0) {
+      const int column = __builtin_ctz(left);
+      const std::uint32_t bit = left & (~left + 1U);
+      left ^= bit;
+      const float* transmittance = block_at(tile, row, column);
+      Light light;
+      for (int l = 0; l < block_pixels; l += pixel_lanes) light.see(load<Pixel>(transmittance + l));
+      if (light.above(tile.stop)) continue;
+      tile.open[row] ^= bit;
+      tile.any_closed = 1;
+      --open;
+    }
+  }
+  return open;
 }
 
 template <bool Perspective>

@@ -1,4 +1,4 @@
-// Part of the kernel body: splats, from a stop's extinction to its footprint on the screen.
+// Part of the kernel body: splats, from a row's extinctions to footprints on the screen.
 #pragma once
 
 #include "server/engine/kernels/body_cells.hpp"
@@ -7,149 +7,155 @@ namespace windsplat::engine::kernels {
 namespace {
 
 // Half the silhouette's width along one screen axis and its middle, as coordinates at unit
-// distance, from M = v v^T - t^2 A A^T (NaN and infinity when the splat reaches the eye's plane).
-// The discriminant M13^2 - M11 M33 is written out so that v's own squares never cancel.
+// distance, from M = v v^T - t^2 A A^T; unbounded when the splat reaches the eye's plane. The
+// discriminant M13^2 - M11 M33 is written out so that v's own squares never cancel.
 struct Extent {
-  float low, high;
+  Stop low, high;
 };
 
-inline Extent silhouette(float v, float z, float s11, float s13, float s33) {
-  const float m33 = z * z - s33;
-  const float inner = (z * z * s11 - 2.0F * v * z * s13 + v * v * s33) - (s11 * s33 - s13 * s13);
-  const float root = square_root(larger(inner, 0.0F));
-  const float middle = v * z - s13;
-  const bool bounded = m33 > 1e-6F * z * z;
-  const float inverse = 1.0F / (bounded ? m33 : 1.0F);
-  const float low = bounded ? (middle - root) * inverse : -1e30F;
-  const float high = bounded ? (middle + root) * inverse : 1e30F;
-  return {low, high};
+HWY_INLINE Extent silhouette(Stop v, Stop z, Stop s11, Stop s13, Stop s33) {
+  const Stop z2 = z * z;
+  const Stop m33 = z2 - s33;
+  const Stop inner =
+      (z2 * s11 - all<Stop>(2.0F) * v * z * s13 + v * v * s33) - (s11 * s33 - s13 * s13);
+  const Stop root = hn::Sqrt(hn::Max(inner, hn::Zero(StopTag())));
+  const Stop middle = v * z - s13;
+  const auto bounded = hn::Gt(m33, all<Stop>(1e-6F) * z2);
+  const Stop inverse = inverse_of(hn::IfThenElse(bounded, m33, all<Stop>(1.0F)));
+  return {hn::IfThenElse(bounded, (middle - root) * inverse, all<Stop>(-1e30F)),
+          hn::IfThenElse(bounded, (middle + root) * inverse, all<Stop>(1e30F))};
 }
 
 // What of the cell a view direction meets: its squares along the camera's axes times t^2, and the
 // screen's axes in cells a pixel.
 struct Facing {
-  float s11, s22, s33, s13, s23;
-  float right[3], down[3], forward[3];  // cells per pixel; forward per world unit
-  float edges2;                         // squared lengths of the three edges together
+  Stop s11, s22, s33, s13, s23;
+  Three<Stop> right, down;  // cells per pixel
 };
 
 template <bool Curved>
-inline Facing face(const Camera& camera, const Cells& cells, int l) {
-  constexpr float t2 = footprint_t * footprint_t;
-  Facing f = {};
+HWY_INLINE Facing face(const Camera& camera, const CellLanes<Curved>& cells) {
+  const Stop zero = hn::Zero(StopTag());
+  Facing f = {zero, zero, zero, zero, zero, {}, {}};
   for (int a = 0; a < 3; ++a) {
-    float edge[3] = {0, 0, 0};
-    for (int c = 0; c < 3; ++c) {
-      if (Curved || c == a) edge[c] = cells.edge[a][c][l];
-    }
-    const float r = Curved ? dot3(camera.right, edge) : camera.right[a] * edge[a];
-    const float d = Curved ? dot3(camera.down, edge) : camera.down[a] * edge[a];
-    const float w = Curved ? dot3(camera.forward, edge) : camera.forward[a] * edge[a];
-    f.s11 += t2 * r * r;
-    f.s22 += t2 * d * d;
-    f.s33 += t2 * w * w;
-    f.s13 += t2 * r * w;
-    f.s23 += t2 * d * w;
-    f.edges2 += Curved ? dot3(edge, edge) : edge[a] * edge[a];
+    const Stop t = all<Stop>(footprint_t);
+    const Stop r = t * cells.edge_along(a, camera.right);
+    const Stop d = t * cells.edge_along(a, camera.down);
+    const Stop w = t * cells.edge_along(a, camera.forward);
+    f.s11 = hn::MulAdd(r, r, f.s11);
+    f.s22 = hn::MulAdd(d, d, f.s22);
+    f.s33 = hn::MulAdd(w, w, f.s33);
+    f.s13 = hn::MulAdd(r, w, f.s13);
+    f.s23 = hn::MulAdd(d, w, f.s23);
   }
-  to_grid<Curved>(cells, l, camera.right, f.right);
-  to_grid<Curved>(cells, l, camera.down, f.down);
-  to_grid<Curved>(cells, l, camera.forward, f.forward);
-  for (int a = 0; a < 3; ++a) {
-    f.right[a] *= camera.pixel;
-    f.down[a] *= camera.pixel;
-  }
+  const Stop pixel = all<Stop>(camera.pixel);
+  const Three<Stop> right = cells.to_grid(camera.right);
+  const Three<Stop> down = cells.to_grid(camera.down);
+  f.right = {right.x * pixel, right.y * pixel, right.z * pixel};
+  f.down = {down.x * pixel, down.y * pixel, down.z * pixel};
   return f;
 }
 
+// Where on the picture the silhouette lies, pixels.
+struct Outline {
+  Extent x, y;
+};
+
 template <bool Curved>
-void perspective_splats(const Camera& camera, const Stops& stops, const Cells& cells, Splats& s) {
-  WINDSPLAT_LANES
-  for (int l = 0; l < stops.count; ++l) {
-    const Facing f = face<Curved>(camera, cells, l);
-    const float from_eye[3] = {cells.from_eye[0][l], cells.from_eye[1][l], cells.from_eye[2][l]};
-    float o[3], ox[3], oy[3];
-    to_grid<Curved>(cells, l, from_eye, o);
-    cross3(o, f.right, ox);
-    cross3(o, f.down, oy);
-    s.xx[l] = dot3(ox, ox);
-    s.xy[l] = 2.0F * dot3(ox, oy);
-    s.yy[l] = dot3(oy, oy);
-    const float scale = camera.inverse_pixel / stops.z[l];
-    s.x[l] = camera.half_width_px + stops.x[l] * scale;
-    s.y[l] = camera.half_height_px + stops.y[l] * scale;
-    // The nearest point of the picture; its ray, forward component 1, in cells.
-    s.ex[l] = clamped(s.x[l], 0.0F, 2.0F * camera.half_width_px);
-    s.ey[l] = clamped(s.y[l], 0.0F, 2.0F * camera.half_height_px);
-    const bool inside = s.ex[l] == s.x[l] && s.ey[l] == s.y[l];
-    float d[3];
-    for (int a = 0; a < 3; ++a) {
-      const float there = f.forward[a] + (s.ex[l] - camera.half_width_px) * f.right[a] +
-                          (s.ey[l] - camera.half_height_px) * f.down[a];
-      d[a] = inside ? o[a] / stops.z[l] : there;
-    }
-    s.d0[l] = dot3(d, d);
-    s.dx[l] = 2.0F * dot3(d, f.right);
-    s.dy[l] = 2.0F * dot3(d, f.down);
-    s.dxx[l] = dot3(f.right, f.right);
-    s.dxy[l] = 2.0F * dot3(f.right, f.down);
-    s.dyy[l] = dot3(f.down, f.down);
-    s.b0[l] = inside ? 0.0F : dot3(o, d) - stops.z[l] * s.d0[l];
-    s.bx[l] = dot3(o, f.right) - stops.z[l] * s.dx[l];
-    s.by[l] = dot3(o, f.down) - stops.z[l] * s.dy[l];
-    s.d2_least[l] = 1.0F / f.edges2;
-    s.z[l] = stops.z[l];
-    s.half_depth[l] = square_root(f.s33);
-    const Extent across = silhouette(stops.x[l], stops.z[l], f.s11, f.s13, f.s33);
-    const Extent along = silhouette(stops.y[l], stops.z[l], f.s22, f.s23, f.s33);
-    s.x0[l] = camera.half_width_px + across.low * camera.inverse_pixel;
-    s.x1[l] = camera.half_width_px + across.high * camera.inverse_pixel;
-    s.y0[l] = camera.half_height_px + along.low * camera.inverse_pixel;
-    s.y1[l] = camera.half_height_px + along.high * camera.inverse_pixel;
-  }
+HWY_INLINE Outline perspective_splats(const Camera& camera, const Stops& stops,
+                                      const CellLanes<Curved>& cells, int l, Stop rho, Splats& s) {
+  const Facing f = face<Curved>(camera, cells);
+  const Stop x = load<Stop>(stops.x + l);
+  const Stop y = load<Stop>(stops.y + l);
+  const Stop z = load<Stop>(stops.z + l);
+  const Stop two = all<Stop>(2.0F);
+  const Three<Stop> o = cells.to_grid(cells.from_eye);
+  const Three<Stop> ox = cross3(o, f.right);
+  const Three<Stop> oy = cross3(o, f.down);
+  store(dot3(ox, ox), s.xx + l);
+  store(two * dot3(ox, oy), s.xy + l);
+  store(dot3(oy, oy), s.yy + l);
+  const Stop half_width = all<Stop>(camera.half_width_px);
+  const Stop half_height = all<Stop>(camera.half_height_px);
+  const Stop inverse_z = inverse_of(z);
+  const Stop per_pixel = all<Stop>(camera.inverse_pixel);
+  const Stop scale = per_pixel * inverse_z;
+  const Stop px = hn::MulAdd(x, scale, half_width);
+  const Stop py = hn::MulAdd(y, scale, half_height);
+  // The nearest point of the picture; its ray, forward component 1, in cells.
+  const Stop ex = clamped(px, hn::Zero(StopTag()), two * half_width);
+  const Stop ey = clamped(py, hn::Zero(StopTag()), two * half_height);
+  const auto inside = hn::And(hn::Eq(ex, px), hn::Eq(ey, py));
+  const Three<Stop> forward = cells.to_grid(camera.forward);
+  const Stop from_middle_x = ex - half_width;
+  const Stop from_middle_y = ey - half_height;
+  const auto ray = [&](Stop own, Stop ahead, Stop right, Stop down) {
+    const Stop there = ahead + from_middle_x * right + from_middle_y * down;
+    return hn::IfThenElse(inside, own * inverse_z, there);
+  };
+  const Three<Stop> d = {ray(o.x, forward.x, f.right.x, f.down.x),
+                         ray(o.y, forward.y, f.right.y, f.down.y),
+                         ray(o.z, forward.z, f.right.z, f.down.z)};
+  const Stop d0 = dot3(d, d);
+  const Stop dx = two * dot3(d, f.right);
+  const Stop dy = two * dot3(d, f.down);
+  store(px, s.x + l);
+  store(py, s.y + l);
+  store(ex, s.ex + l);
+  store(ey, s.ey + l);
+  store(d0, s.d0 + l);
+  store(dx, s.dx + l);
+  store(dy, s.dy + l);
+  store(dot3(f.right, f.right), s.dxx + l);
+  store(two * dot3(f.right, f.down), s.dxy + l);
+  store(dot3(f.down, f.down), s.dyy + l);
+  store(hn::IfThenElse(inside, hn::Zero(StopTag()), dot3(o, d) - z * d0), s.b0 + l);
+  store(dot3(o, f.right) - z * dx, s.bx + l);
+  store(dot3(o, f.down) - z * dy, s.by + l);
+  store(inverse_of(cells.edges2()), s.d2_least + l);
+  store(hn::Sqrt(f.s33), s.half_depth + l);
+  store(rho * all<Stop>(1.0F / footprint_integral), s.strength + l);
+  const Extent across = silhouette(x, z, f.s11, f.s13, f.s33);
+  const Extent along = silhouette(y, z, f.s22, f.s23, f.s33);
+  return {{hn::MulAdd(across.low, per_pixel, half_width),
+           hn::MulAdd(across.high, per_pixel, half_width)},
+          {hn::MulAdd(along.low, per_pixel, half_height),
+           hn::MulAdd(along.high, per_pixel, half_height)}};
 }
 
 template <bool Curved>
-void orthographic_splats(const Camera& camera, const Stops& stops, const Cells& cells, Splats& s) {
-  WINDSPLAT_LANES
-  for (int l = 0; l < stops.count; ++l) {
-    const Facing f = face<Curved>(camera, cells, l);
-    float ox[3], oy[3];
-    const float length2 = dot3(f.forward, f.forward);
-    const float inverse2 = 1.0F / length2;
-    cross3(f.right, f.forward, ox);
-    cross3(f.down, f.forward, oy);
-    s.xx[l] = dot3(ox, ox) * inverse2;
-    s.xy[l] = 2.0F * dot3(ox, oy) * inverse2;
-    s.yy[l] = dot3(oy, oy) * inverse2;
-    s.d0[l] = length2;
-    s.bx[l] = -dot3(f.right, f.forward) * inverse2;
-    s.by[l] = -dot3(f.down, f.forward) * inverse2;
-    s.half_depth[l] = square_root(f.s33);
-    s.x[l] = camera.half_width_px + stops.x[l] * camera.inverse_pixel;
-    s.y[l] = camera.half_height_px + stops.y[l] * camera.inverse_pixel;
-    const float wide = square_root(f.s11) * camera.inverse_pixel;
-    const float tall = square_root(f.s22) * camera.inverse_pixel;
-    s.x0[l] = s.x[l] - wide;
-    s.x1[l] = s.x[l] + wide;
-    s.y0[l] = s.y[l] - tall;
-    s.y1[l] = s.y[l] + tall;
-  }
+HWY_INLINE Outline orthographic_splats(const Camera& camera, const Stops& stops,
+                                       const CellLanes<Curved>& cells, int l, Stop rho, Splats& s) {
+  const Facing f = face<Curved>(camera, cells);
+  const Three<Stop> forward = cells.to_grid(camera.forward);
+  const Stop length2 = dot3(forward, forward);
+  const Stop inverse2 = inverse_of(length2);
+  const Three<Stop> ox = cross3(f.right, forward);
+  const Three<Stop> oy = cross3(f.down, forward);
+  store(dot3(ox, ox) * inverse2, s.xx + l);
+  store(all<Stop>(2.0F) * dot3(ox, oy) * inverse2, s.xy + l);
+  store(dot3(oy, oy) * inverse2, s.yy + l);
+  store(length2, s.d0 + l);
+  store(hn::Neg(dot3(f.right, forward)) * inverse2, s.bx + l);
+  store(hn::Neg(dot3(f.down, forward)) * inverse2, s.by + l);
+  store(hn::Sqrt(f.s33), s.half_depth + l);
+  store(rho * all<Stop>(1.0F / footprint_integral) / hn::Sqrt(length2), s.strength + l);
+  const Stop scale = all<Stop>(camera.inverse_pixel);
+  const Stop x = hn::MulAdd(load<Stop>(stops.x + l), scale, all<Stop>(camera.half_width_px));
+  const Stop y = hn::MulAdd(load<Stop>(stops.y + l), scale, all<Stop>(camera.half_height_px));
+  store(x, s.x + l);
+  store(y, s.y + l);
+  const Stop wide = hn::Sqrt(f.s11) * scale;
+  const Stop tall = hn::Sqrt(f.s22) * scale;
+  return {{x - wide, x + wide}, {y - tall, y + tall}};
 }
 
+// A row's splats from lane i on, made ready.
 template <bool Perspective, bool Curved>
-void prepare_splats(const Camera& camera, const Stops& stops, const Cells& cells,
-                    const Densities& densities, Splats& s) {
-  constexpr float normalise = 1.0F / footprint_integral;
-  if (Perspective) {
-    perspective_splats<Curved>(camera, stops, cells, s);
-    for (int l = 0; l < stops.count; ++l) s.strength[l] = densities.rho[l] * normalise;
-  } else {
-    orthographic_splats<Curved>(camera, stops, cells, s);
-    for (int l = 0; l < stops.count; ++l) {
-      s.strength[l] = densities.rho[l] * normalise / square_root(s.d0[l]);
-    }
-  }
+HWY_INLINE Outline prepare_splats(const Camera& camera, const Stops& stops,
+                                  const CellLanes<Curved>& cells, int l, Stop rho, Splats& s) {
+  if (Perspective) return perspective_splats<Curved>(camera, stops, cells, l, rho, s);
+  return orthographic_splats<Curved>(camera, stops, cells, l, rho, s);
 }
 
 }  // namespace

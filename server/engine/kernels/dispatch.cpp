@@ -26,9 +26,18 @@ Result<const Table*> choose() {
 std::vector<const Table*> usable_tables() {
   std::vector<const Table*> usable{&portable_table()};
 #ifdef WINDSPLAT_X86_TARGETS
+  if (__builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt") &&
+      __builtin_cpu_supports("ssse3")) {
+    usable.push_back(&sse4_table());
+  }
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
       __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2")) {
     usable.push_back(&avx2_table());
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+        __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512vl")) {
+      usable.push_back(&avx512_table());
+    }
   }
 #endif
   return usable;

@@ -23,13 +23,16 @@ struct Axis {
   const float* from_eye;  // a stop: world coordinate minus the eye's
   const float* position;  // a stop: world coordinate
   const float* cell;      // a stop: stride times spacing, world units
-  const int* sample;      // a stop: index of its sample in the field
-  const int* group;       // a stop: samples that it stands for
-  const int* visit;       // stops in visibility order: bricks outward from the eye's cell
+  const float* inverse_cell;
+  const int* sample;  // a stop: index of its sample in the field
+  const int* group;   // a stop: samples that it stands for
+  const int* visit;   // stops in visibility order: bricks outward from the eye's cell
 };
 
+constexpr int color_floats = 4;
+
 struct ColorTable {
-  const float* rgb;  // 3 an entry
+  const float* rgb;  // color_floats an entry, the fourth 0; the last entry stands there twice
   int entries;
   float low;
   float scale;  // entries - 1 over the range
@@ -158,6 +161,7 @@ struct Tile {
   int width, height;  // pixels inside the picture
   float* blocks;
   const float* rays;
+  float stop;                       // a block whose pixels let no more than this through is closed
   std::uint32_t open[tile_blocks];  // bit set: the block still lets light through
   int any_closed;
   Counters counters;

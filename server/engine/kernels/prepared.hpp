@@ -8,37 +8,40 @@
 
 namespace windsplat::engine::kernels {
 
-// Stops of a brick in visibility order, or those of them that are left after culling.
+// Stop l = brick_side j + i of a brick is the i-th along u and the j-th along v in world order.
 struct Stops {
-  int count;
-  int index[3][brick_stops];         // along each axis, into the pass' arrays
-  std::int64_t offset[brick_stops];  // of its sample in the fields
-  float x[brick_stops];              // right, down and forward of the eye, world units
-  float y[brick_stops];
-  float z[brick_stops];
-  float depth[brick_stops];  // forward of the camera's depth origin
+  int count;            // that have a line or a splat here
+  std::uint64_t lines;  // bit l set: which
+  std::uint64_t splats;
+  alignas(64) float x[brick_stops];  // right, down and forward of the eye, world units
+  alignas(64) float y[brick_stops];
+  alignas(64) float z[brick_stops];
+  alignas(64) float depth[brick_stops];  // forward of the camera's depth origin
 };
 
 // A ribbon's place along it is f in [0, 1] from its tail end to its head end, as clipped; colour,
 // depth and phase are linear in f.
 struct Ribbons {
-  int drawn[brick_stops];
-  float x[brick_stops], y[brick_stops];    // f = 0, pixels
-  float ux[brick_stops], uy[brick_stops];  // from f = 0 to 1, pixels
-  float inverse_u2[brick_stops];
-  float w0[brick_stops];  // where along itself a line is met at its start: 0; a dot everywhere: 1/2
-  float depth_ratio[brick_stops];  // view distance at f = 0 over that at f = 1
-  float tail[3][brick_stops];      // colour at f = 0
-  float rise[3][brick_stops];      // colour at f = 1 minus that
-  float depth[brick_stops];        // view distance at f = 0 minus the kernel's centre's
-  float depth_rise[brick_stops];
-  float phase[brick_stops];  // q + 3/2 - phase at f = 0, in [0, 2]; only where lines move
-  float phase_rise[brick_stops];
+  alignas(64) float x[brick_stops];  // f = 0, pixels
+  alignas(64) float y[brick_stops];
+  alignas(64) float ux[brick_stops];  // from f = 0 to 1, pixels
+  alignas(64) float uy[brick_stops];
+  alignas(64) float inverse_u2[brick_stops];
+  // Where along itself a line is met at its start: 0; a dot everywhere: 1/2.
+  alignas(64) float w0[brick_stops];
+  alignas(64) float depth_ratio[brick_stops];  // view distance at f = 0 over that at f = 1
+  alignas(64) float depth[brick_stops];        // view distance at f = 0 minus the kernel's centre's
+  alignas(64) float depth_rise[brick_stops];
+  // q + 3/2 - phase at f = 0, in [0, 2]; only where lines move.
+  alignas(64) float phase[brick_stops];
+  alignas(64) float phase_rise[brick_stops];
+  alignas(64) float tail[brick_stops][color_floats];  // colour at f = 0
+  alignas(64) float rise[brick_stops][color_floats];  // colour at f = 1 minus that
 };
 
 struct Densities {
-  float rho[brick_stops];  // per world length; zero: no splat
-  float color[3][brick_stops];
+  alignas(64) float rho[brick_stops];  // per world length
+  float color[brick_stops][color_floats];
 };
 
 // With p = (px, py) the pixel minus the projected centre and e = (ex, ey) the pixel minus a point
@@ -52,25 +55,29 @@ struct Densities {
 // The second point is the centre itself wherever that is in the picture. Centres far outside it (of
 // kernels that the eye stands in) would cost every digit.
 struct Splats {
-  float x[brick_stops], y[brick_stops];    // projected centre, pixels
-  float ex[brick_stops], ey[brick_stops];  // the point of the picture near it, pixels
-  float xx[brick_stops], xy[brick_stops], yy[brick_stops];
-  float b0[brick_stops], bx[brick_stops], by[brick_stops];
-  float d0[brick_stops], dx[brick_stops], dy[brick_stops];
-  float dxx[brick_stops], dxy[brick_stops], dyy[brick_stops];
-  float d2_least[brick_stops];    // |d|^2 is never less
-  float z[brick_stops];           // view depth of the centre
-  float strength[brick_stops];    // optical depth at the centre; perspective: times |d|
-  float half_depth[brick_stops];  // of the silhouette along the view, world units
-  float x0[brick_stops], x1[brick_stops], y0[brick_stops], y1[brick_stops];  // silhouette, pixels
+  alignas(64) float x[brick_stops], y[brick_stops];    // projected centre, pixels
+  alignas(64) float ex[brick_stops], ey[brick_stops];  // the point of the picture near it, pixels
+  alignas(64) float xx[brick_stops], xy[brick_stops], yy[brick_stops];
+  alignas(64) float b0[brick_stops], bx[brick_stops], by[brick_stops];
+  alignas(64) float d0[brick_stops], dx[brick_stops], dy[brick_stops];
+  alignas(64) float dxx[brick_stops], dxy[brick_stops], dyy[brick_stops];
+  alignas(64) float d2_least[brick_stops];  // |d|^2 is never less
+  // Optical depth at the centre; perspective: times |d|.
+  alignas(64) float strength[brick_stops];
+  alignas(64) float half_depth[brick_stops];  // of the silhouette along the view, world units
 };
 
 // Rows and columns of the tile's blocks that each stop's line and splat may touch, both ends
 // included; none if last < first.
 struct Footing {
-  int line_first[brick_stops], line_last[brick_stops];
-  int row_first[brick_stops], row_last[brick_stops];
-  int column_first[brick_stops], column_last[brick_stops];
+  alignas(64) std::int32_t line_first[brick_stops];
+  alignas(64) std::int32_t line_last[brick_stops];
+  // Bit set: the column of the line's k-th row.
+  alignas(64) std::uint32_t line_columns[tile_blocks][brick_stops];
+  alignas(64) std::int32_t row_first[brick_stops];
+  alignas(64) std::int32_t row_last[brick_stops];
+  alignas(64) std::int32_t column_first[brick_stops];
+  alignas(64) std::int32_t column_last[brick_stops];
 };
 
 struct Prepared {
@@ -126,8 +133,10 @@ struct RibbonRecord {
   float centre;  // of its kernel
   std::int16_t row_first, row_last;
   int moving;
+  std::uint16_t columns[tile_blocks];  // bit set: the column of its k-th row
   Ribbon ribbon;
 };
+static_assert(tile_blocks <= 16);
 
 // One line's meeting with one block.
 struct Hit {

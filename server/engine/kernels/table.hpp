@@ -1,5 +1,6 @@
-// The hot loops of one instruction set as a table of functions. They take plain data, cannot fail,
-// and give the same bits on every target. Plain includes only: see frame_data.hpp.
+// The hot loops of one instruction set as a table of functions. They take plain data and cannot
+// fail. Targets differ by roundings alone: those without fused multiply-add round twice. Plain
+// includes only: see frame_data.hpp.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,7 @@
 namespace windsplat::engine::kernels {
 
 struct Table {
-  const char* name;  // "portable" or "avx2"
+  const char* name;  // "portable", "sse4", "avx2" or "avx512"
 
   // What a brick holds once samples below their tolerances are left out.
   // scale: pixels a world unit where the brick is nearest.
@@ -23,9 +24,8 @@ struct Table {
   void (*prepare)(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
                   Prepared& prepared);
 
-  // The second half, for the stops from first to before last.
-  void (*draw_prepared)(const Camera& camera, const Prepared& prepared, int first, int last,
-                        Tile& tile);
+  // The second half, for one stop that has a line or a splat.
+  void (*draw_prepared)(const Camera& camera, const Prepared& prepared, int stop, Tile& tile);
 
   // The slab method: a brick's splats and lines by themselves, at most brick_stops of each; how
   // many.
@@ -47,8 +47,12 @@ struct Table {
   // Tells the processor that this brick's samples are wanted soon.
   void (*prefetch)(const Pass& pass, const Brick& brick);
 
-  // Closes the blocks whose largest transmittance is at most `stop`; how many remain open.
-  int (*refresh_open)(Tile& tile, float stop);
+  // How many of the tile's blocks are still open.
+  int (*count_open)(const Tile& tile);
+
+  // The slab method: closes the blocks that let no more than the tile's stop through; how many
+  // remain open.
+  int (*refresh_open)(Tile& tile);
 
   // absorbed = -expm1(-tau) and transmitted = exp(-tau), tau in [0, inf], to about 1e-7.
   void (*attenuate)(int count, const float* tau, float* absorbed, float* transmitted);
@@ -59,6 +63,8 @@ struct Table {
 };
 
 const Table& portable_table();
+const Table& sse4_table();
 const Table& avx2_table();
+const Table& avx512_table();
 
 }  // namespace windsplat::engine::kernels

@@ -1,6 +1,6 @@
 # The kernels, one translation unit an instruction set, chosen at run time (kernels/dispatch.cpp).
-# Correctly rounded arithmetic only: no contraction, no reassociation, so that targets agree bit for
-# bit. Neither errno nor floating-point traps nor the sign of zero are read, and masked samples
+# Highway's vectors, header only. Fused multiply-adds stand where the source says so: no contraction,
+# no reassociation. Neither errno nor floating-point traps nor the sign of zero are read, and masked samples
 # (NaN) are told by their bits before any arithmetic: that lets minima, maxima, square roots and
 # selections be vectorised.
 set(kernel_dir ${CMAKE_CURRENT_LIST_DIR})
@@ -14,10 +14,15 @@ endif()
 target_sources(windsplat_engine PRIVATE ${kernel_dir}/dispatch.cpp ${kernel_dir}/portable.cpp)
 set_source_files_properties(${kernel_dir}/portable.cpp PROPERTIES COMPILE_OPTIONS "${kernel_flags}")
 
-# x86-64-v4 was tried and left out: the compiler makes nothing faster of it, with 256 or 512 bits.
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-  target_sources(windsplat_engine PRIVATE ${kernel_dir}/avx2.cpp)
   target_compile_definitions(windsplat_engine PRIVATE WINDSPLAT_X86_TARGETS=1)
-  set_source_files_properties(${kernel_dir}/avx2.cpp PROPERTIES COMPILE_OPTIONS
-    "${kernel_flags};-march=x86-64-v3")
+  foreach(target IN ITEMS "sse4 x86-64-v2" "avx2 x86-64-v3" "avx512 x86-64-v4")
+    separate_arguments(target)
+    list(GET target 0 name)
+    list(GET target 1 processor)
+    target_sources(windsplat_engine PRIVATE ${kernel_dir}/${name}.cpp)
+    set_source_files_properties(${kernel_dir}/${name}.cpp PROPERTIES
+      COMPILE_OPTIONS "${kernel_flags};-march=${processor}"
+      COMPILE_DEFINITIONS HWY_DISABLE_PCLMUL_AES)
+  endforeach()
 endif()

@@ -1,0 +1,268 @@
+// Part of the kernel body: a brick's stops row by row, one lane a stop: where they stand, and which
+// of them the tile can show.
+#pragma once
+
+#include "server/engine/kernels/body_math.hpp"
+#include "server/engine/kernels/prepared.hpp"
+
+namespace windsplat::engine::kernels {
+namespace {
+
+// A brick's rows run along u. Each entry [axis][i] holds what the axis has at the row's i-th stop:
+// along u they differ, along the others they are all the same. Lanes beyond the last stop repeat
+// it.
+struct Rows {
+  int u_count, v_count;
+  int first[3];     // of the brick's stops along each axis
+  int consecutive;  // a row's samples are neighbours in memory, and there are brick_side of them
+  std::int64_t offset;  // of the row's first sample in the fields
+  std::int64_t along_u[brick_side];
+  alignas(64) std::int32_t sample[3][brick_side];
+  std::int32_t group[3][brick_side];
+  alignas(64) float cell[3][brick_side];
+  alignas(64) float inverse_cell[3][brick_side];
+  alignas(64) float from_eye[3][brick_side];
+  alignas(64) float height[brick_side];
+  alignas(64) double across[3][brick_side];  // right, down, forward: the part of u
+};
+
+inline void fill_axis(const Pass& pass, int a, int i, int stop, Rows& rows) {
+  const Axis& axis = pass.axis[a];
+  rows.sample[a][i] = axis.sample[stop];
+  rows.group[a][i] = axis.group[stop];
+  rows.cell[a][i] = axis.cell[stop];
+  rows.inverse_cell[a][i] = axis.inverse_cell[stop];
+  rows.from_eye[a][i] = axis.from_eye[stop];
+  if (a == 2) rows.height[i] = axis.position[stop];
+}
+
+// Visiting lists name a brick's stops outward from the eye; its rows hold them in world order.
+inline int lowest(const int* visit, int count) {
+  int low = visit[0];
+  for (int i = 1; i < count; ++i) low = visit[i] < low ? visit[i] : low;
+  return low;
+}
+
+void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
+  const Axis& u = pass.axis[pass.u];
+  rows.u_count = brick.u_count;
+  rows.v_count = brick.v_count;
+  rows.first[pass.u] = lowest(u.visit + brick.u_first, brick.u_count);
+  rows.first[pass.v] = lowest(pass.axis[pass.v].visit + brick.v_first, brick.v_count);
+  rows.first[pass.major] = pass.axis[pass.major].visit[brick.slab];
+  const int first = rows.first[pass.u];
+  rows.consecutive = pass.step[pass.u] == 1 && brick.u_count == brick_side ? 1 : 0;
+  for (int i = 0; i < brick_side; ++i) {
+    const int stop = first + (i < brick.u_count ? i : brick.u_count - 1);
+    fill_axis(pass, pass.u, i, stop, rows);
+    fill_axis(pass, pass.major, i, rows.first[pass.major], rows);
+    rows.along_u[i] = pass.step[pass.u] * (u.sample[stop] - u.sample[first]);
+    for (int c = 0; c < 3; ++c) rows.across[c][i] = u.camera[3 * stop + c];
+    if (rows.along_u[i] != i) rows.consecutive = 0;
+  }
+}
+
+void set_row(const Pass& pass, int j, Rows& rows) {
+  const int stop = rows.first[pass.v] + j;
+  for (int i = 0; i < brick_side; ++i) fill_axis(pass, pass.v, i, stop, rows);
+  rows.offset = 0;
+  for (int a = 0; a < 3; ++a) rows.offset += pass.step[a] * rows.sample[a][0];
+}
+
+// Camera coordinates, summed in double so that an eye far away or close by loses nothing.
+void place_row(const Camera& camera, const Pass& pass, int j, const Rows& rows, Stops& stops) {
+  const double* from_slab =
+      pass.axis[pass.major].camera + 3 * static_cast<std::ptrdiff_t>(rows.first[pass.major]);
+  const double* from_v =
+      pass.axis[pass.v].camera + 3 * static_cast<std::ptrdiff_t>(rows.first[pass.v] + j);
+  float* const to[3] = {stops.x + brick_side * j, stops.y + brick_side * j,
+                        stops.z + brick_side * j};
+  for (int c = 0; c < 3; ++c) {
+    const double base = from_slab[c] + from_v[c];
+    for (int i = 0; i < brick_side; ++i) to[c][i] = static_cast<float>(base + rows.across[c][i]);
+  }
+  const double middle = from_slab[2] + from_v[2] - camera.depth_origin;
+  for (int i = 0; i < brick_side; ++i) {
+    stops.depth[brick_side * j + i] = static_cast<float>(middle + rows.across[2][i]);
+  }
+}
+
+inline double dot3(const double a[3], const double b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+// The same for stops that stand where the field says.
+void place_curved_row(const Camera& camera, const Pass& pass, int j, const Rows& rows,
+                      Stops& stops) {
+  for (int i = 0; i < brick_side; ++i) {
+    const float* place = pass.places + 3 * (rows.offset + rows.along_u[i]);
+    double at[3];
+    for (int c = 0; c < 3; ++c) at[c] = static_cast<double>(place[c]) - camera.eye[c];
+    const double z = dot3(camera.world_forward, at);
+    const int l = brick_side * j + i;
+    stops.x[l] = static_cast<float>(dot3(camera.world_right, at));
+    stops.y[l] = static_cast<float>(dot3(camera.world_down, at));
+    stops.z[l] = static_cast<float>(z);
+    stops.depth[l] = static_cast<float>(z - camera.depth_origin);
+  }
+}
+
+// A field's values at a row's stops from lane i on.
+HWY_INLINE Stop fetch(const float* values, const Rows& rows, int i) {
+  if (rows.consecutive != 0) return load_unaligned<Stop>(values + rows.offset + i);
+  alignas(64) float lanes[brick_side];
+  for (int k = 0; k < brick_side; ++k) lanes[k] = values[rows.offset + rows.along_u[k]];
+  return load<Stop>(lanes + i);
+}
+
+// The stops of a row that are there at all.
+inline std::uint32_t row_bits(const Rows& rows) { return (2U << (rows.u_count - 1)) - 1U; }
+
+// How far a brick's kernels reach beyond their stops along right, down and forward.
+void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, float reach[3]) {
+  float cell[3] = {0, 0, 0};
+  const auto widest = [&](int a, int first, int count) {
+    for (int i = first; i < first + count; ++i) {
+      cell[a] = larger(cell[a], pass.axis[a].cell[pass.axis[a].visit[i]]);
+    }
+  };
+  widest(pass.major, brick.slab, 1);
+  widest(pass.u, brick.u_first, brick.u_count);
+  widest(pass.v, brick.v_first, brick.v_count);
+  const float moved = 0.5F * (pass.line.jitter_center + pass.line.jitter_stride);
+  if (pass.places != nullptr) {
+    for (int c = 0; c < 3; ++c) cell[c] = pass.cell_max[c];
+  }
+  const float* const frame[3] = {camera.right, camera.down, camera.forward};
+  for (int c = 0; c < 3; ++c) {
+    float box = 0;    // half the kernel's, along this axis of the camera
+    float shift = 0;  // of its centre
+    float square = 0;
+    for (int a = 0; a < 3; ++a) {
+      box += pass.line.half_span * absolute(frame[c][a]) * cell[a];
+      shift += moved * absolute(frame[c][a]) * cell[a];
+      square += frame[c][a] * frame[c][a] * cell[a] * cell[a];
+    }
+    const float line = smaller(brick.line_reach, box) + shift;
+    if (pass.places != nullptr) square *= 3.0F;
+    const float splat = pass.has_medium != 0 ? footprint_t * square_root(square) : 0.0F;
+    reach[c] = larger(pass.has_lines != 0 ? line : 0.0F, splat) * 1.00001F;
+  }
+}
+
+// Planes through the tile's edges, moved outward by what a kernel reaches.
+struct Frustum {
+  float x0, x1, y0, y1;  // the tile's edges at unit depth, widened by `margin` pixels
+  float left, right, top, bottom;
+  float reach[3];
+  float margin;
+};
+
+template <bool Perspective>
+Frustum frustum_of(const Camera& camera, const Tile& tile, const float reach[3], float margin) {
+  Frustum f = {};
+  f.x0 = (static_cast<float>(tile.x) - margin - camera.half_width_px) * camera.pixel;
+  f.x1 = (static_cast<float>(tile.x + tile.width) + margin - camera.half_width_px) * camera.pixel;
+  f.y0 = (static_cast<float>(tile.y) - margin - camera.half_height_px) * camera.pixel;
+  f.y1 = (static_cast<float>(tile.y + tile.height) + margin - camera.half_height_px) * camera.pixel;
+  const float rz = Perspective ? reach[2] : 0.0F;
+  f.left = reach[0] + absolute(f.x0) * rz;
+  f.right = reach[0] + absolute(f.x1) * rz;
+  f.top = reach[1] + absolute(f.y0) * rz;
+  f.bottom = reach[1] + absolute(f.y1) * rz;
+  for (int c = 0; c < 3; ++c) f.reach[c] = reach[c];
+  f.margin = margin;
+  return f;
+}
+
+// The stops of row j that are not nearer than the near plane and whose kernel may touch the tile.
+template <bool Perspective>
+std::uint32_t seen_in_row(const Camera& camera, const Frustum& f, const Stops& stops, int j) {
+  std::uint32_t bits = 0;
+  for (int i = 0; i < brick_side; i += stop_lanes) {
+    const int l = brick_side * j + i;
+    const Stop x = load<Stop>(stops.x + l);
+    const Stop y = load<Stop>(stops.y + l);
+    const Stop depth = load<Stop>(stops.z + l);
+    const Stop z = Perspective ? depth : all<Stop>(1.0F);
+    // The largest of how far it lies outside any plane.
+    Stop outside = hn::MulSub(all<Stop>(f.x0), z, x) - all<Stop>(f.left);
+    outside = hn::Max(outside, hn::NegMulAdd(all<Stop>(f.x1), z, x) - all<Stop>(f.right));
+    outside = hn::Max(outside, hn::MulSub(all<Stop>(f.y0), z, y) - all<Stop>(f.top));
+    outside = hn::Max(outside, hn::NegMulAdd(all<Stop>(f.y1), z, y) - all<Stop>(f.bottom));
+    auto inside = hn::Le(outside, hn::Zero(StopTag()));
+    if (Perspective) inside = hn::And(inside, hn::Ge(z, all<Stop>(camera.near)));
+    bits |= bits_of<Stop>(inside) << static_cast<unsigned>(i);
+  }
+  return bits;
+}
+
+// First and last block of a row or column; none if last < first.
+struct Range {
+  int first, last;
+};
+
+// Blocks of the tile whose pixel centres may lie between two coordinates in pixels from the tile's
+// edge. Block b holds the centres 4 b + 0.5 to 4 b + 3.5.
+inline Range blocks_between(float low, float high, int blocks) {
+  constexpr float per_block = 1.0F / block_side;
+  constexpr float slack = 1e-3F;
+  const float bound = static_cast<float>(blocks);
+  // Truncation rounds down because nothing below zero is truncated.
+  const float first = limited((low - slack + 0.5F) * per_block, 0.0F, bound);
+  const float last = limited((high + slack - 0.5F) * per_block, -1.0F, bound - 0.5F);
+  return {static_cast<int>(first), static_cast<int>(last + 1.0F) - 1};
+}
+
+inline int blocks_of(int pixels) { return (pixels + block_side - 1) / block_side; }
+
+inline std::uint32_t range_mask(Range range) {
+  if (range.last < range.first) return 0;
+  return (~std::uint32_t{0} >> static_cast<unsigned>(31 - (range.last - range.first)))
+         << static_cast<unsigned>(range.first);
+}
+
+// Where on the screen a box about one point may lie, in pixels along one axis.
+struct Shadow {
+  float low, high;
+};
+
+template <bool Perspective>
+inline Shadow shadow_of(const Camera& camera, float at, float z, float reach, float reach_z) {
+  // The nearest and farthest the kernel reaches widen it most, on either side of the middle.
+  const float near = Perspective ? 1.0F / larger(z - reach_z, camera.near) : 1.0F;
+  const float far = Perspective ? 1.0F / (z + reach_z) : 1.0F;
+  return {smaller((at - reach) * near, (at - reach) * far) * camera.inverse_pixel,
+          larger((at + reach) * near, (at + reach) * far) * camera.inverse_pixel};
+}
+
+// Whether any block that the row's kernels may touch still lets light through. On a straight row
+// the ends reach as far as any stop between them; of a curved one every stop is asked.
+template <bool Perspective>
+bool row_is_open(const Camera& camera, const Frustum& f, const Stops& stops, int j, int u_count,
+                 bool straight, const Tile& tile) {
+  Shadow across = {3e38F, -3e38F};
+  Shadow down = {3e38F, -3e38F};
+  const int step = straight && u_count > 1 ? u_count - 1 : 1;
+  for (int i = 0; i < u_count; i += step) {
+    const int l = brick_side * j + i;
+    // Behind the near plane a row's shadow has no end there.
+    if (Perspective && stops.z[l] < camera.near) return true;
+    const Shadow x = shadow_of<Perspective>(camera, stops.x[l], stops.z[l], f.reach[0], f.reach[2]);
+    const Shadow y = shadow_of<Perspective>(camera, stops.y[l], stops.z[l], f.reach[1], f.reach[2]);
+    across = {smaller(across.low, x.low), larger(across.high, x.high)};
+    down = {smaller(down.low, y.low), larger(down.high, y.high)};
+  }
+  const float left = static_cast<float>(tile.x) - camera.half_width_px;
+  const float top = static_cast<float>(tile.y) - camera.half_height_px;
+  const Range columns = blocks_between(across.low - left - f.margin, across.high - left + f.margin,
+                                       blocks_of(tile.width));
+  const Range rows =
+      blocks_between(down.low - top - f.margin, down.high - top + f.margin, blocks_of(tile.height));
+  std::uint32_t open = 0;
+  for (int row = rows.first; row <= rows.last; ++row) open |= tile.open[row];
+  return (open & range_mask(columns)) != 0;
+}
+
+}  // namespace
+}  // namespace windsplat::engine::kernels

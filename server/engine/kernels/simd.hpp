@@ -1,0 +1,126 @@
+// Part of the kernel body: Highway's vectors, as wide as the target has them. One lane is either a
+// stop of a brick's row or a pixel of a block.
+#pragma once
+
+#include <hwy/highway.h>
+
+#include <cstdint>
+
+#include "server/engine/kernels/frame_data.hpp"
+
+namespace windsplat::engine::kernels {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using StopTag = hn::CappedTag<float, brick_side>;
+using PixelTag = hn::CappedTag<float, block_pixels>;
+using Stop = hn::Vec<StopTag>;    // lanes of stops
+using Pixel = hn::Vec<PixelTag>;  // lanes of pixels
+constexpr int stop_lanes = static_cast<int>(hn::MaxLanes(StopTag()));
+constexpr int pixel_lanes = static_cast<int>(hn::MaxLanes(PixelTag()));
+static_assert(brick_side % stop_lanes == 0 && block_pixels % pixel_lanes == 0);
+
+template <class V>
+using TagOf = hn::DFromV<V>;
+template <class V>
+using SignedOf = hn::Vec<hn::RebindToSigned<TagOf<V>>>;
+template <class V>
+using UnsignedOf = hn::Vec<hn::RebindToUnsigned<TagOf<V>>>;
+template <class V>
+using MaskOf = hn::Mask<TagOf<V>>;
+
+template <class V>
+HWY_INLINE V all(float value) {
+  return hn::Set(TagOf<V>(), value);
+}
+
+template <class V>
+HWY_INLINE V load(const float* from) {
+  return hn::Load(TagOf<V>(), from);
+}
+
+template <class V>
+HWY_INLINE V load_unaligned(const float* from) {
+  return hn::LoadU(TagOf<V>(), from);
+}
+
+template <class V>
+HWY_INLINE void store(V value, float* to) {
+  hn::Store(value, TagOf<V>(), to);
+}
+
+template <class V>
+HWY_INLINE V clamped(V v, V low, V high) {
+  return hn::Min(hn::Max(v, low), high);
+}
+
+template <class V>
+HWY_INLINE V clamped(V v, float low, float high) {
+  return clamped(v, all<V>(low), all<V>(high));
+}
+
+template <class V>
+HWY_INLINE SignedOf<V> truncated(V v) {
+  return hn::ConvertTo(hn::RebindToSigned<TagOf<V>>(), v);
+}
+
+template <class V>
+HWY_INLINE V from_integer(SignedOf<V> v) {
+  return hn::ConvertTo(TagOf<V>(), v);
+}
+
+// The lanes of a mask as the lowest bits of a number.
+template <class V>
+HWY_INLINE std::uint32_t bits_of(MaskOf<V> mask) {
+  std::uint8_t bytes[8] = {0};
+  hn::StoreMaskBits(TagOf<V>(), mask, bytes);
+  std::uint32_t bits = bytes[0];
+  if (hn::MaxLanes(TagOf<V>()) > 8) bits |= static_cast<std::uint32_t>(bytes[1]) << 8U;
+  return bits;
+}
+
+// Masked samples are NaN, told by their bits: arithmetic is compiled as if there were none.
+template <class V>
+HWY_INLINE MaskOf<V> is_masked(V v) {
+  const hn::RebindToSigned<TagOf<V>> integers;
+  const auto magnitude = hn::And(hn::BitCast(integers, v), hn::Set(integers, 0x7fffffff));
+  return hn::RebindMask(TagOf<V>(), hn::Gt(magnitude, hn::Set(integers, 0x7f800000)));
+}
+
+// A divisor that is never zero, its sign kept.
+template <class V>
+HWY_INLINE V divisor(V v) {
+  const V least = all<V>(1e-30F);
+  return hn::IfThenElse(hn::Lt(hn::Abs(v), least), hn::CopySign(least, v), v);
+}
+
+template <class V>
+HWY_INLINE V inverse_of(V v) {
+  return hn::Div(all<V>(1.0F), v);
+}
+
+// Three components of one quantity.
+template <class V>
+struct Three {
+  V x, y, z;
+};
+
+template <class V>
+HWY_INLINE V dot3(const Three<V>& a, const Three<V>& b) {
+  return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, a.x * b.x));
+}
+
+template <class V>
+HWY_INLINE V dot3(const float axis[3], const Three<V>& v) {
+  return hn::MulAdd(all<V>(axis[2]), v.z, hn::MulAdd(all<V>(axis[1]), v.y, all<V>(axis[0]) * v.x));
+}
+
+template <class V>
+HWY_INLINE Three<V> cross3(const Three<V>& a, const Three<V>& b) {
+  return {hn::MulSub(a.y, b.z, a.z * b.y), hn::MulSub(a.z, b.x, a.x * b.z),
+          hn::MulSub(a.x, b.y, a.y * b.x)};
+}
+
+}  // namespace
+}  // namespace windsplat::engine::kernels
