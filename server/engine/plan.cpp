@@ -266,6 +266,7 @@ double cell_along_view(const Scene& scene) {
 void plan_slabs(const Scene& scene, RenderPlan& plan) {
   constexpr double slabs_max = 16384;
   plan.slabs = scene.method == scene::Method::slab;
+  for (PassPlan& pass : plan.passes) pass.kernel.by_depth = 1;
   int stride = 0;
   for (const PassPlan& pass : plan.passes) {
     if (!pass.scalars.empty()) stride = std::max(stride, pass.stride);

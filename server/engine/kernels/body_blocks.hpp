@@ -212,6 +212,7 @@ void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, T
   float reach[3];
   brick_reach(camera, pass, brick, reach);
   const Frustum frustum = frustum_of<Perspective>(camera, tile, reach, Lines ? pass.line.r2 : 0.0F);
+  const bool partly = partly_closed(tile, brick);
   for (int j = 0; j < rows.v_count; ++j) {
     set_row(pass, j, rows);
     if (Curved) {
@@ -221,7 +222,7 @@ void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, T
     }
     std::uint32_t bits = seen_in_row<Perspective>(camera, frustum, stops, j) & row_bits(rows);
     if (bits == 0) continue;
-    if (tile.any_closed != 0 &&
+    if (partly &&
         !row_is_open<Perspective>(camera, frustum, stops, j, rows.u_count, !Curved, tile)) {
       tile.counters.occluded += __builtin_popcount(bits);
       continue;
@@ -273,8 +274,7 @@ HWY_INLINE void note_light(const Light& light, int row, std::uint32_t bit, Tile&
 
 // Composites one line into its blocks; how many.
 template <Depth Along, int Style>
-HWY_INLINE int draw_ribbon(const Ribbon& ribbon, const Footing& f, int l, Tile& tile) {
-  const RibbonLanes lanes = spread(ribbon);
+HWY_INLINE int draw_ribbon(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
   int blocks = 0;
   for (int row = f.line_first[l], k = 0; row <= f.line_last[l]; ++row, ++k) {
     std::uint32_t left = f.line_columns[k][l] & tile.open[row];
@@ -293,14 +293,14 @@ HWY_INLINE int draw_ribbon(const Ribbon& ribbon, const Footing& f, int l, Tile& 
 
 template <bool Perspective, int Style>
 HWY_INLINE void draw_line(const Prepared& p, int l, Tile& tile) {
-  const Ribbon ribbon = ribbon_at(p.pass->line, p.ribbons, l);
+  const RibbonLanes lanes = spread(p.pass->line, p.ribbons, l);
   int blocks = 0;
   if (!Perspective || Style == style_plain) {
-    blocks = draw_ribbon<Depth::flat, Style>(ribbon, p.footing, l, tile);
-  } else if (absolute(ribbon.depth_ratio - 1.0F) <= series_bend_max) {
-    blocks = draw_ribbon<Depth::series, Style>(ribbon, p.footing, l, tile);
+    blocks = draw_ribbon<Depth::flat, Style>(lanes, p.footing, l, tile);
+  } else if (absolute(p.ribbons.depth_ratio[l] - 1.0F) <= series_bend_max) {
+    blocks = draw_ribbon<Depth::series, Style>(lanes, p.footing, l, tile);
   } else {
-    blocks = draw_ribbon<Depth::exact, Style>(ribbon, p.footing, l, tile);
+    blocks = draw_ribbon<Depth::exact, Style>(lanes, p.footing, l, tile);
   }
   tile.counters.pixel_updates += std::int64_t{blocks} * block_pixels;
 }
@@ -384,8 +384,8 @@ void draw_in_order(const Brick& brick, const Prepared& p, Tile& tile) {
   const Pass& pass = *p.pass;
   const int* us = pass.axis[pass.u].visit + brick.u_first;
   const int* vs = pass.axis[pass.v].visit + brick.v_first;
-  const int u_low = lowest(us, brick.u_count);
-  const int v_low = lowest(vs, brick.v_count);
+  const int u_low = lowest(us);
+  const int v_low = lowest(vs);
   const std::uint64_t kept = p.stops.lines | p.stops.splats;
   const Compositor with = compositor_of<Perspective>(pass);
   const int style = style_of(pass.line);

@@ -56,6 +56,42 @@ HWY_INLINE RibbonLanes spread(const Ribbon& r) {
           lanes(r.opacity)};
 }
 
+// The same from a brick's arrays.
+HWY_INLINE RibbonLanes spread(const LineStyle& line, const Ribbons& r, int l) {
+  const auto lanes = [&](const float* v) { return all<Pixel>(v[l]); };
+  const auto one = [](float v) { return all<Pixel>(v); };
+  const float* tail = r.tail[l];
+  const float* rise = r.rise[l];
+  const float steep = line.inverse_ramp * line.opacity;
+  const Pixel ux = lanes(r.ux);
+  const Pixel uy = lanes(r.uy);
+  const Pixel inverse_u2 = lanes(r.inverse_u2);
+  const Pixel ratio = lanes(r.depth_ratio);
+  RibbonLanes out;
+  out.x = lanes(r.x);
+  out.y = lanes(r.y);
+  out.ux = ux;
+  out.uy = uy;
+  out.wx = ux * inverse_u2;
+  out.wy = uy * inverse_u2;
+  out.w0 = lanes(r.w0);
+  out.ratio = ratio;
+  out.bend = ratio - one(1.0F);
+  for (int c = 0; c < 3; ++c) {
+    out.tail[c] = one(tail[c]);
+    out.rise[c] = one(rise[c]);
+  }
+  out.phase = out.phase_rise = hn::Zero(PixelTag());
+  if (line.moving != 0) {
+    out.phase = lanes(r.phase);
+    out.phase_rise = lanes(r.phase_rise);
+  }
+  out.reach = one(line.r2 * steep);
+  out.steep = one(steep);
+  out.opacity = one(line.opacity);
+  return out;
+}
+
 struct RibbonLane {
   Pixel opacity;
   Pixel f;

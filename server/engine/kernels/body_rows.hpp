@@ -26,45 +26,68 @@ struct Rows {
   alignas(64) double across[3][brick_side];  // right, down, forward: the part of u
 };
 
-inline void fill_axis(const Pass& pass, int a, int i, int stop, Rows& rows) {
+// What one stop of an axis has, in all lanes from `first` on.
+inline void fill_axis(const Pass& pass, int a, int stop, int first, Rows& rows) {
   const Axis& axis = pass.axis[a];
-  rows.sample[a][i] = axis.sample[stop];
-  rows.group[a][i] = axis.group[stop];
-  rows.cell[a][i] = axis.cell[stop];
-  rows.inverse_cell[a][i] = axis.inverse_cell[stop];
-  rows.from_eye[a][i] = axis.from_eye[stop];
-  if (a == 2) rows.height[i] = axis.position[stop];
+  const std::int32_t sample = axis.sample[stop];
+  const std::int32_t group = axis.group[stop];
+  const float cell = axis.cell[stop];
+  const float inverse_cell = axis.inverse_cell[stop];
+  const float from_eye = axis.from_eye[stop];
+  const float height = axis.position[stop];
+  for (int i = first; i < brick_side; ++i) rows.sample[a][i] = sample;
+  for (int i = first; i < brick_side; ++i) rows.group[a][i] = group;
+  for (int i = first; i < brick_side; ++i) rows.cell[a][i] = cell;
+  for (int i = first; i < brick_side; ++i) rows.inverse_cell[a][i] = inverse_cell;
+  for (int i = first; i < brick_side; ++i) rows.from_eye[a][i] = from_eye;
+  for (int i = first; a == 2 && i < brick_side; ++i) rows.height[i] = height;
+}
+
+// What the stops of a row have along it.
+inline void fill_along(const Pass& pass, int count, Rows& rows) {
+  const int a = pass.u;
+  const Axis& axis = pass.axis[a];
+  const int first = rows.first[a];
+  for (int i = 0; i < count; ++i) rows.sample[a][i] = axis.sample[first + i];
+  for (int i = 0; i < count; ++i) rows.group[a][i] = axis.group[first + i];
+  for (int i = 0; i < count; ++i) rows.cell[a][i] = axis.cell[first + i];
+  for (int i = 0; i < count; ++i) rows.inverse_cell[a][i] = axis.inverse_cell[first + i];
+  for (int i = 0; i < count; ++i) rows.from_eye[a][i] = axis.from_eye[first + i];
+  for (int i = 0; a == 2 && i < count; ++i) rows.height[i] = axis.position[first + i];
 }
 
 // Visiting lists name a brick's stops outward from the eye; its rows hold them in world order.
-inline int lowest(const int* visit, int count) {
-  int low = visit[0];
-  for (int i = 1; i < count; ++i) low = visit[i] < low ? visit[i] : low;
-  return low;
-}
+inline int lowest(const int* visit) { return visit[0] / brick_side * brick_side; }
 
 void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
   const Axis& u = pass.axis[pass.u];
-  rows.u_count = brick.u_count;
+  const int count = brick.u_count;
+  rows.u_count = count;
   rows.v_count = brick.v_count;
-  rows.first[pass.u] = lowest(u.visit + brick.u_first, brick.u_count);
-  rows.first[pass.v] = lowest(pass.axis[pass.v].visit + brick.v_first, brick.v_count);
+  rows.first[pass.u] = lowest(u.visit + brick.u_first);
+  rows.first[pass.v] = lowest(pass.axis[pass.v].visit + brick.v_first);
   rows.first[pass.major] = pass.axis[pass.major].visit[brick.slab];
   const int first = rows.first[pass.u];
-  rows.consecutive = pass.step[pass.u] == 1 && brick.u_count == brick_side ? 1 : 0;
-  for (int i = 0; i < brick_side; ++i) {
-    const int stop = first + (i < brick.u_count ? i : brick.u_count - 1);
-    fill_axis(pass, pass.u, i, stop, rows);
-    fill_axis(pass, pass.major, i, rows.first[pass.major], rows);
-    rows.along_u[i] = pass.step[pass.u] * (u.sample[stop] - u.sample[first]);
-    for (int c = 0; c < 3; ++c) rows.across[c][i] = u.camera[3 * stop + c];
-    if (rows.along_u[i] != i) rows.consecutive = 0;
+  if (count == brick_side) {
+    fill_along(pass, brick_side, rows);
+  } else {
+    fill_along(pass, count, rows);
+    fill_axis(pass, pass.u, first + count - 1, count, rows);
   }
+  fill_axis(pass, pass.major, rows.first[pass.major], 0, rows);
+  const double* camera = u.camera + 3 * static_cast<std::ptrdiff_t>(first);
+  for (int i = 0; i < brick_side; ++i) {
+    const int at = 3 * (i < count ? i : count - 1);
+    for (int c = 0; c < 3; ++c) rows.across[c][i] = camera[at + c];
+  }
+  const std::int64_t step = pass.step[pass.u];
+  const std::int32_t* sample = rows.sample[pass.u];
+  for (int i = 0; i < brick_side; ++i) rows.along_u[i] = step * (sample[i] - sample[0]);
+  rows.consecutive = rows.along_u[brick_side - 1] == brick_side - 1 ? 1 : 0;
 }
 
 void set_row(const Pass& pass, int j, Rows& rows) {
-  const int stop = rows.first[pass.v] + j;
-  for (int i = 0; i < brick_side; ++i) fill_axis(pass, pass.v, i, stop, rows);
+  fill_axis(pass, pass.v, rows.first[pass.v] + j, 0, rows);
   rows.offset = 0;
   for (int a = 0; a < 3; ++a) rows.offset += pass.step[a] * rows.sample[a][0];
 }
@@ -81,6 +104,7 @@ void place_row(const Camera& camera, const Pass& pass, int j, const Rows& rows, 
     const double base = from_slab[c] + from_v[c];
     for (int i = 0; i < brick_side; ++i) to[c][i] = static_cast<float>(base + rows.across[c][i]);
   }
+  if (pass.by_depth == 0) return;
   const double middle = from_slab[2] + from_v[2] - camera.depth_origin;
   for (int i = 0; i < brick_side; ++i) {
     stops.depth[brick_side * j + i] = static_cast<float>(middle + rows.across[2][i]);
@@ -234,6 +258,31 @@ inline Shadow shadow_of(const Camera& camera, float at, float z, float reach, fl
   const float far = Perspective ? 1.0F / (z + reach_z) : 1.0F;
   return {smaller((at - reach) * near, (at - reach) * far) * camera.inverse_pixel,
           larger((at + reach) * near, (at + reach) * far) * camera.inverse_pixel};
+}
+
+// Blocks of the tile that a brick may touch.
+struct Under {
+  int first, last;  // rows
+  std::uint32_t columns;
+};
+
+inline Under under(const Tile& tile, const Brick& brick) {
+  const int left = tile.x / block_side;
+  const int top = tile.y / block_side;
+  const auto within = [](int v, int last) { return v < 0 ? 0 : v > last ? last : v; };
+  const int last = tile_blocks - 1;
+  return {
+      within(brick.block_y - top, last), within(brick.block_y_last - top, last),
+      range_mask({within(brick.block_x - left, last), within(brick.block_x_last - left, last)})};
+}
+
+// Whether any block there lets no more light through.
+inline bool partly_closed(const Tile& tile, const Brick& brick) {
+  if (tile.any_closed == 0) return false;
+  const Under blocks = under(tile, brick);
+  std::uint32_t open = ~std::uint32_t{0};
+  for (int row = blocks.first; row <= blocks.last; ++row) open &= tile.open[row];
+  return (open & blocks.columns) != blocks.columns;
 }
 
 // Whether any block that the row's kernels may touch still lets light through. On a straight row

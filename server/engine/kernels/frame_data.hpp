@@ -114,6 +114,7 @@ struct Pass {
   int dims[3];           // of the fields
   const float* places;   // 3 a sample, world units, where the lattice is curved; else null
   int compositing;       // scene::Compositing
+  int by_depth;          // stops' depths are wanted
   const float* partial;  // partial_columns x partial_rows, see partial.hpp; the slab method only
 };
 
