@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/engine/stable_sort.hpp"
+
 namespace windsplat::engine {
 
 namespace {
@@ -116,8 +118,8 @@ class Sweep {
         }
       }
     }
-    std::stable_sort(space_.order.begin(), space_.order.end(),
-                     [](const DepthEntry& a, const DepthEntry& b) { return a.depth < b.depth; });
+    stable_sort(space_.order, space_.spare,
+                [](const DepthEntry& a, const DepthEntry& b) { return a.depth < b.depth; });
     for (const DepthEntry& kernel : space_.order) {
       table_.draw_prepared(plan_.camera, *space_.slots[kernel.slot], kernel.stop, kernel.stop + 1,
                            tile_);

@@ -6,12 +6,35 @@
 #include "server/base/thread_pool.hpp"
 #include "server/engine/bins.hpp"
 #include "server/engine/render.hpp"
+#include "server/engine/sweep.hpp"
 
 namespace windsplat::engine {
+
+// A worker's own pixels, used for one tile after the other.
+struct Workspace {
+  std::vector<float> blocks;
+  std::vector<float> rays;
+  SweepSpace sweep;
+};
+
+// What a tile tells the report.
+struct TileWork {
+  kernels::Counters counters{};
+  bool stopped = false;
+  bool closed_blocks = false;
+};
+
+// What draw_tiles needs and a caller keeps between frames.
+struct TileSpace {
+  std::vector<std::uint32_t> order;
+  std::vector<Workspace> workers;
+  std::vector<TileWork> done;
+};
 
 // `image` has the camera's size and is zero. Counts go to `work`. Cancelled, it returns early and
 // the image is worthless.
 void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
-                ThreadPool& pool, const CancelToken& cancel, Image& image, WorkReport& work);
+                ThreadPool& pool, const CancelToken& cancel, TileSpace& space, Image& image,
+                WorkReport& work);
 
 }  // namespace windsplat::engine
