@@ -18,6 +18,7 @@
 #include "server/cli/command.hpp"
 #include "server/cli/picture.hpp"
 #include "server/cli/signals.hpp"
+#include "server/engine/render.hpp"
 
 namespace windsplat::cli {
 namespace {
