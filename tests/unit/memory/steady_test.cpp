@@ -66,7 +66,7 @@ Spent spent_by(const Run& run) {
 
 enum class Look { kernel, slab, globe, winds, clouds };
 
-constexpr int turns = 12;  // of a camera about the data
+constexpr int turns = 6;  // of a camera about the data
 
 std::vector<scene::Scene> orbit(Look look, std::array<int, 3> dims, int width, int height,
                                 double offset = 0) {
@@ -116,7 +116,7 @@ TEST_P(SteadyState, FramesAllocateTheirPlanAlone) {
     std::array<int, 3> dims;
     int width, height;
   };
-  for (const Size& size : {Size{{40, 24, 8}, 160, 120}, Size{{80, 48, 16}, 320, 240}}) {
+  for (const Size& size : {Size{{40, 24, 8}, 160, 120}, Size{{64, 40, 12}, 240, 180}}) {
     const auto scenes = orbit(GetParam(), size.dims, size.width, size.height);
     const Spent plans = spent_by([&] {
       for (const scene::Scene& scene : scenes) engine::make_plan(scene);
@@ -137,14 +137,14 @@ TEST_P(SteadyState, FramesAllocateTheirPlanAlone) {
 // A camera that goes where it never was finds almost everything there: what still grows is far less
 // than a picture a frame.
 TEST_P(SteadyState, AWayNeverTakenBeforeCostsHardlyMore) {
-  const std::array<int, 3> dims{80, 48, 16};
-  const auto warm = orbit(GetParam(), dims, 320, 240);
-  const auto scenes = orbit(GetParam(), dims, 320, 240, 7);
+  const std::array<int, 3> dims{64, 40, 12};
+  const auto warm = orbit(GetParam(), dims, 240, 180);
+  const auto scenes = orbit(GetParam(), dims, 240, 180, 7);
   draw(warm);
   draw(warm);
   const Spent known = spent_by([&] { draw(warm); });
   const Spent fresh = spent_by([&] { draw(scenes); });
-  const std::int64_t picture = std::int64_t{4} * 320 * 240 * static_cast<int>(sizeof(float));
+  const std::int64_t picture = std::int64_t{4} * 240 * 180 * static_cast<int>(sizeof(float));
   EXPECT_LE(fresh.bytes - known.bytes, turns * picture / 8);
 }
 
