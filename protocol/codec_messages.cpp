@@ -173,6 +173,10 @@ Json to_json(const ChosenMessage& message) {
   return out;
 }
 
+Json to_json(const UnchangedMessage& message) {
+  return Json{{"type", "unchanged"}, {"rev", message.rev}, {"seq", message.seq}};
+}
+
 Json to_json(const StatsMessage& message) {
   return Json{{"type", "stats"},
               {"frames", message.frames},

@@ -158,6 +158,11 @@ struct ChosenMessage {
   FrameInfo info;
   std::string view_json;  // the completed view that was drawn, canonical
 };
+// The patch was followed and no frame comes of it.
+struct UnchangedMessage {
+  std::uint32_t rev = 0;  // of the patch, and of every one before it
+  std::uint32_t seq = 0;  // the frame that shows its view already
+};
 struct StatsMessage {
   std::uint64_t frames = 0;
   std::uint64_t dropped = 0;
@@ -170,6 +175,6 @@ struct ErrorMessage {
   Problem problem;
 };
 using ServerMessage = std::variant<HelloMessage, OpenedMessage, ProgressMessage, ChosenMessage,
-                                   StatsMessage, ErrorMessage>;
+                                   UnchangedMessage, StatsMessage, ErrorMessage>;
 
 }  // namespace windsplat::protocol

@@ -1,10 +1,11 @@
-// Workers sleep on a condition variable between loops and draw indices from one atomic counter. A
-// loop is open while indices may be left: a worker that wakes too late finds it closed and goes
-// back to sleep, so that short loops never wait for threads that did nothing.
+// A loop is a gate that is open while indices may be left: who finds it open goes in and draws
+// indices from one atomic counter; who comes too late finds it closed, so that short loops never
+// wait for threads that did nothing. Waiting is a short spin, then sleep on a condition variable.
 #include "server/base/thread_pool.hpp"
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <exception>
@@ -13,45 +14,135 @@
 #include <utility>
 #include <vector>
 
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
 #include "server/base/check.hpp"
 
 namespace windsplat {
 
+namespace {
+
+// The gate's bits: whether it is open, whether the pool ends, how many workers are inside, and
+// which loop it belongs to.
+constexpr std::uint64_t open_bit = 1;
+constexpr std::uint64_t stop_bit = 2;
+constexpr std::uint64_t one_inside = 4;
+constexpr unsigned loop_shift = 32;
+constexpr std::uint64_t inside_mask = (std::uint64_t{1} << loop_shift) - one_inside;
+
+std::uint64_t loop_of(std::uint64_t gate) { return gate >> loop_shift; }
+
+// The pool whose loop this thread is in: a loop started inside another would wait for itself.
+thread_local const void* inside_pool = nullptr;
+
+void pause() {
+#if defined(__SSE2__)
+  _mm_pause();
+#endif
+}
+
+}  // namespace
+
 struct ThreadPool::State {
   std::mutex run_mutex;  // one loop at a time
 
-  std::mutex mutex;  // guards what follows, except for `next`
+  std::atomic<std::uint64_t> gate{0};
+  std::atomic<std::size_t> next{0};
+  // Written while the gate is closed and nobody inside, read by those that went in.
+  std::size_t count = 0;
+  Loop loop;
+
+  std::mutex mutex;  // of those that sleep, and of `failure`
   std::condition_variable wake;
   std::condition_variable idle;
-  std::uint64_t generation = 0;
-  bool open = false;
-  unsigned running = 0;  // workers inside the loop
-  bool stopping = false;
+  std::atomic<unsigned> asleep{0};  // workers
+  std::atomic<bool> caller_asleep{false};
   std::exception_ptr failure;
 
-  // Written before a loop opens, read by those that entered it.
-  std::size_t count = 0;
-  const std::function<void(std::size_t, unsigned)>* body = nullptr;
-  std::atomic<std::size_t> next{0};
-
+  bool spins = false;
   std::vector<std::thread> workers;
 
+  template <class Done>
+  bool spin(const Done& done) const;
+  bool enter(std::uint64_t& seen);
+  void leave();
+  void sleep(std::uint64_t seen);
+  void wait_for_workers();
+  void wake_workers();
   void draw_indices(unsigned worker);
   void work(unsigned worker);
   void stop();
 };
 
-namespace {
+// True as soon as `done` is; false if it was not for too long.
+template <class Done>
+bool ThreadPool::State::spin(const Done& done) const {
+  using Clock = std::chrono::steady_clock;
+  constexpr int looks = 32;  // between looks at the clock
+  if (done()) return true;
+  if (!spins) return false;
+  const Clock::time_point end = Clock::now() + std::chrono::microseconds(spin_us);
+  do {
+    for (int look = 0; look < looks; ++look) {
+      pause();
+      if (done()) return true;
+    }
+  } while (Clock::now() < end);
+  return false;
+}
 
-// The pool whose loop this thread is in: a loop started inside another would wait for itself.
-thread_local const void* inside_pool = nullptr;
+bool ThreadPool::State::enter(std::uint64_t& seen) {
+  std::uint64_t now = gate.load();
+  while ((now & open_bit) != 0 && loop_of(now) != seen) {
+    if (!gate.compare_exchange_weak(now, now + one_inside)) continue;
+    seen = loop_of(now);
+    return true;
+  }
+  return false;
+}
 
-}  // namespace
+// Whoever goes to sleep says so and then looks at the gate once more; whoever changes the gate then
+// looks whether somebody sleeps. One of the two sees the other.
+void ThreadPool::State::leave() {
+  const std::uint64_t before = gate.fetch_sub(one_inside);
+  if ((before & inside_mask) != one_inside || !caller_asleep.load()) return;
+  { const std::lock_guard lock(mutex); }
+  idle.notify_one();
+}
+
+void ThreadPool::State::wake_workers() {
+  if (asleep.load() == 0) return;
+  { const std::lock_guard lock(mutex); }
+  wake.notify_all();
+}
+
+void ThreadPool::State::sleep(std::uint64_t seen) {
+  std::unique_lock lock(mutex);
+  asleep.fetch_add(1);
+  const std::uint64_t now = gate.load();
+  const bool due = (now & stop_bit) != 0 || ((now & open_bit) != 0 && loop_of(now) != seen);
+  // Once woken it spins again: who comes too late for one loop is there for the next.
+  if (!due) wake.wait(lock);
+  asleep.fetch_sub(1);
+}
+
+void ThreadPool::State::wait_for_workers() {
+  const auto empty = [this] { return (gate.load() & inside_mask) == 0; };
+  if (spin(empty)) return;
+  std::unique_lock lock(mutex);
+  caller_asleep.store(true);
+  idle.wait(lock, empty);
+  caller_asleep.store(false);
+}
 
 void ThreadPool::State::draw_indices(unsigned worker) {
   const void* const outer = std::exchange(inside_pool, this);
   try {
-    for (std::size_t i = next.fetch_add(1); i < count; i = next.fetch_add(1)) (*body)(i, worker);
+    for (std::size_t i = next.fetch_add(1); i < count; i = next.fetch_add(1)) {
+      loop.call(loop.body, i, worker);
+    }
   } catch (...) {
     next.store(count);
     const std::lock_guard lock(mutex);
@@ -62,30 +153,33 @@ void ThreadPool::State::draw_indices(unsigned worker) {
 
 void ThreadPool::State::work(unsigned worker) {
   std::uint64_t seen = 0;
-  std::unique_lock lock(mutex);
   while (true) {
-    wake.wait(lock, [&] { return stopping || (open && generation != seen); });
-    if (stopping) return;
-    seen = generation;
-    ++running;
-    lock.unlock();
-    draw_indices(worker);
-    lock.lock();
-    if (--running == 0) idle.notify_one();
+    bool inside = false;
+    const bool due = spin([&] {
+      inside = enter(seen);
+      return inside || (gate.load() & stop_bit) != 0;
+    });
+    if (inside) {
+      draw_indices(worker);
+      leave();
+    } else if (due) {
+      return;
+    } else {
+      sleep(seen);
+    }
   }
 }
 
 void ThreadPool::State::stop() {
-  {
-    const std::lock_guard lock(mutex);
-    stopping = true;
-  }
-  wake.notify_all();
+  gate.fetch_or(stop_bit);
+  wake_workers();
   for (auto& worker : workers) worker.join();
 }
 
 ThreadPool::ThreadPool(unsigned threads) : state_(std::make_unique<State>()) {
-  if (threads == 0) threads = std::max(1U, std::thread::hardware_concurrency());
+  const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
+  if (threads == 0) threads = processors;
+  state_->spins = threads <= processors;
   state_->workers.reserve(threads - 1);
   try {
     for (unsigned worker = 1; worker < threads; ++worker) {
@@ -101,28 +195,29 @@ ThreadPool::~ThreadPool() { state_->stop(); }
 
 unsigned ThreadPool::size() const { return static_cast<unsigned>(state_->workers.size()) + 1; }
 
-void ThreadPool::run(std::size_t count, const std::function<void(std::size_t, unsigned)>& body) {
+void ThreadPool::run_loop(std::size_t count, Loop loop) {
   State& state = *state_;
   WINDSPLAT_CHECK(inside_pool != &state);
   if (count == 0) return;
   const std::lock_guard run_lock(state.run_mutex);
-  {
-    const std::lock_guard lock(state.mutex);
-    state.count = count;
-    state.body = &body;
-    state.next.store(0);
-    state.failure = nullptr;
-    state.open = count > 1;  // one index is the caller's: nobody need wake
-    ++state.generation;
+  state.count = count;
+  state.loop = loop;
+  state.next.store(0);
+  // One index is the caller's: nobody need come.
+  const bool shared = count > 1 && !state.workers.empty();
+  if (shared) {
+    // Closed and empty: only the loop's number and the open bit change.
+    state.gate.fetch_add((std::uint64_t{1} << loop_shift) | open_bit);
+    state.wake_workers();
   }
-  if (count > 1) state.wake.notify_all();
   state.draw_indices(0);
-
+  if (shared) {
+    state.gate.fetch_and(~open_bit);
+    state.wait_for_workers();
+  }
   std::exception_ptr failure;
   {
-    std::unique_lock lock(state.mutex);
-    state.open = false;
-    state.idle.wait(lock, [&] { return state.running == 0; });
+    const std::lock_guard lock(state.mutex);
     failure = std::exchange(state.failure, nullptr);
   }
   if (failure) std::rethrow_exception(failure);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <memory>
 
 namespace windsplat {
@@ -22,11 +21,29 @@ class ThreadPool {
   // returns when all are done. Indices are handed out in ascending order. Loops of different
   // callers run one after another; a loop must not start another in the same pool
   // (std::logic_error). The first exception thrown by body is rethrown here once every worker has
-  // stopped; indices not yet handed out are then left.
-  void run(std::size_t count, const std::function<void(std::size_t index, unsigned worker)>& body);
+  // stopped; indices not yet handed out are then left. Nothing is allocated.
+  //
+  // Whoever waits (a worker for the next loop, the caller for the last worker) looks again and
+  // again for spin_us before it sleeps, unless the pool has more threads than the machine.
+  template <class Body>
+  void run(std::size_t count, const Body& body) {
+    run_loop(count, {&body, [](const void* called, std::size_t index, unsigned worker) {
+                       (*static_cast<const Body*>(called))(index, worker);
+                     }});
+  }
+
+  static constexpr int spin_us = 100;
 
  private:
+  // A loop's body wherever the caller keeps it.
+  struct Loop {
+    const void* body = nullptr;
+    void (*call)(const void* body, std::size_t index, unsigned worker) = nullptr;
+  };
   struct State;
+
+  void run_loop(std::size_t count, Loop loop);
+
   std::unique_ptr<State> state_;
 };
 

@@ -5,13 +5,15 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
+
+#include "server/engine/flush_denormals.hpp"
 
 namespace windsplat::engine {
 
 namespace {
 
 using kernels::Brick;
-using kernels::BrickSummary;
 using kernels::Pass;
 using kernels::tile_blocks;
 using kernels::tile_side;
@@ -27,6 +29,9 @@ struct Box {
   std::array<double, 3> low{};
   std::array<double, 3> high{};
 };
+
+// The first stop of the brick that holds a stop.
+int brick_start(int stop) { return stop / kernels::brick_side * kernels::brick_side; }
 
 // Of a curved lattice: from where its stops really are.
 Box curved_box(const Pass& pass, const Brick& brick) {
@@ -50,17 +55,16 @@ Box curved_box(const Pass& pass, const Brick& brick) {
   return box;
 }
 
+// The brick's stops stand one after another.
 Box stops_box(const PassPlan& plan, const Brick& brick) {
   const Pass& pass = plan.kernel;
   if (pass.places != nullptr) return curved_box(pass, brick);
   Box box;
   const auto extend = [&](int a, int first, int count) {
     const AxisArrays& axis = plan.axis[a];
-    // A brick's stops are consecutive: its extremes are its lowest and highest index.
-    const auto [low, high] =
-        std::minmax_element(axis.visit.begin() + first, axis.visit.begin() + first + count);
-    box.low[a] = axis.position[*low];
-    box.high[a] = axis.position[*high];
+    const int low = count > 1 ? brick_start(axis.visit[first]) : axis.visit[first];
+    box.low[a] = axis.position[low];
+    box.high[a] = axis.position[low + count - 1];
   };
   extend(pass.major, brick.slab, 1);
   extend(pass.u, brick.u_first, brick.u_count);
@@ -88,6 +92,7 @@ std::array<double, 3> kernel_reach(const Pass& pass, double line_reach, bool spl
 // the screen's two edges decide.
 struct Span {
   double low = 0, high = -1;
+  bool behind = false;
 };
 
 struct Corners {
@@ -107,7 +112,7 @@ Span screen_span(const Corners& corners, int across, const kernels::Camera& came
     low = std::min(low, corner[across] / z);
     high = std::max(high, corner[across] / z);
   }
-  if (!behind) return {half + low * scale - margin, half + high * scale + margin};
+  if (!behind) return {half + low * scale - margin, half + high * scale + margin, false};
   // Outside one edge's plane with every corner: not seen at all; otherwise possibly everywhere.
   const double edge = (half + margin) * camera.pixel;
   bool left = true;
@@ -117,13 +122,14 @@ Span screen_span(const Corners& corners, int across, const kernels::Camera& came
     right = right && corner[across] > edge * corner[2];
   }
   if (left || right) return {};
-  return {-margin, 2 * half + margin};
+  return {-margin, 2 * half + margin, true};
 }
 
 // Where kernels may be seen, and how far from the eye.
 struct Projected {
   Rectangle seen;
   double depth_first = 0, depth_last = 0;  // view depths of the kernels' reach
+  bool whole = false;                      // no part of it lies outside the picture
 };
 
 class Projector {
@@ -155,23 +161,14 @@ class Projector {
     if (x.low > x.high || y.low > y.high) return {};
     const Rectangle r{std::max(x.low, 0.0), std::min<double>(x.high, camera_.width),
                       std::max(y.low, 0.0), std::min<double>(y.high, camera_.height)};
-    return {r, nearest, farthest};
+    const bool whole = !x.behind && !y.behind && x.low >= 0 && x.high <= camera_.width &&
+                       y.low >= 0 && y.high <= camera_.height;
+    return {r, nearest, farthest, whole};
   }
 
  private:
   const kernels::Camera& camera_;
   const scene::Camera& view_;
-};
-
-// Bricks of one slab of one pass, with the slab's share of the report.
-struct SlabBricks {
-  std::vector<Brick> bricks;
-  std::int64_t samples = 0;
-  std::int64_t culled = 0;
-  std::int64_t without_line = 0;
-  std::int64_t without_splat = 0;
-  std::int64_t without_both = 0;
-  double left_out = 0;  // alphas of what tolerances left out, summed over pixels, at most
 };
 
 // Pixels a world unit at a view depth, or the nearest that is drawn.
@@ -185,8 +182,8 @@ double scale_at(const kernels::Camera& camera, double depth) {
 // times its volume. All are taken at the brick's nearest, where there are `scale` pixels a world
 // unit. Pixels sample what they show: shapes that are no narrower than a pixel, and lines whose
 // ramp is not, add up to at most this many times their area, over all places and turns.
-double left_out(const RenderPlan& plan, const PassPlan& pass, const BrickSummary& summary,
-                double scale) {
+double left_out(const RenderPlan& plan, const PassPlan& pass, const KeptSummary& summary,
+                double cover, double scale) {
   constexpr double line_sampling = 1.2;
   constexpr double splat_sampling = 1.03;
   if (summary.weak_lines == 0 && summary.thin_medium <= 0) return 0;
@@ -204,7 +201,7 @@ double left_out(const RenderPlan& plan, const PassPlan& pass, const BrickSummary
   const double length = line.length * static_cast<double>(summary.weak_parts) * scale * oblique;
   const double covered = line_sampling * (length * (r1 + r2) + summary.weak_lines * discs);
   const double lines = line.opacity * std::min(covered, summary.weak_lines * pixels);
-  return lines + splat_sampling * static_cast<double>(summary.thin_medium) * oblique;
+  return lines + splat_sampling * static_cast<double>(summary.thin_medium) * cover * oblique;
 }
 
 void set_blocks(const Rectangle& r, const kernels::Camera& camera, Brick& brick) {
@@ -219,86 +216,217 @@ void set_blocks(const Rectangle& r, const kernels::Camera& camera, Brick& brick)
   brick.block_y_last = block(r.y1, camera.height);
 }
 
-void add_brick(const RenderPlan& plan, const kernels::Table& table, const Projector& project,
-               Brick brick, SlabBricks& out) {
-  const PassPlan& pass = plan.passes[brick.pass];
-  const std::int64_t stops = static_cast<std::int64_t>(brick.u_count) * brick.v_count;
-  const Box box = stops_box(pass, brick);
-  out.samples += stops;
-  // First by the longest line that the style allows: what is outside is not even read.
-  const bool lines = pass.kernel.has_lines != 0;
-  const double longest = lines ? 0.5 * pass.kernel.line.length : -1;
-  const bool medium = pass.kernel.has_medium != 0;
-  const Projected whole = project(pass, box, kernel_reach(pass.kernel, longest, medium));
-  if (whole.seen.empty()) {
-    out.culled += stops;
-    return;
-  }
-  BrickSummary summary;
-  const double scale = scale_at(plan.camera, whole.depth_first);
-  table.summarise(pass.kernel, brick, static_cast<float>(scale), summary);
-  out.without_line += summary.without_line;
-  out.without_splat += summary.without_splat;
-  out.without_both += summary.without_both;
-  out.left_out += left_out(plan, pass, summary, scale);
-  if (summary.lines == 0 && summary.splats == 0) return;
-  const double part =
-      std::min(1.0F, summary.magnitude_max * pass.kernel.line.inverse_full_magnitude);
-  const double reach = summary.lines > 0 ? longest * part * 1.00001 : -1;
-  brick.line_reach = static_cast<float>(std::max(reach, 0.0));
-  const Projected found = project(pass, box, kernel_reach(pass.kernel, reach, summary.splats > 0));
-  if (found.seen.empty()) return;
-  set_blocks(found.seen, plan.camera, brick);
-  brick.depth_first = static_cast<float>(found.depth_first - plan.camera.depth_origin);
-  brick.depth_last = static_cast<float>(found.depth_last - plan.camera.depth_origin);
-  out.bricks.push_back(brick);
-}
-
-SlabBricks slab_bricks(const RenderPlan& plan, const kernels::Table& table, int pass_index,
-                       int slab) {
-  const PassPlan& pass = plan.passes[pass_index];
-  const Projector project(plan);
-  SlabBricks out;
-  for (const auto& v : pass.axis[pass.kernel.v].bricks) {
-    for (const auto& u : pass.axis[pass.kernel.u].bricks) {
-      Brick brick{};
-      brick.pass = pass_index;
-      brick.slab = slab;
-      brick.u_first = u[0];
-      brick.u_count = u[1];
-      brick.v_first = v[0];
-      brick.v_count = v[1];
-      add_brick(plan, table, project, brick, out);
+// How many times more of the picture a brick's thin splats may cover, where there are `scale`
+// pixels a world unit, than at a scale of 0: see splat_cover of the kernels, whose largest of three
+// terms this is over the third. Of a brick of uneven cells the widest count.
+double splat_cover(const Pass& pass, const Brick& brick, double scale) {
+  std::array<double, 3> edge{};
+  const auto widest = [&](int a, int first, int count) {
+    for (int i = first; i < first + count; ++i) {
+      edge[a] = std::max<double>(edge[a], pass.axis[a].cell[pass.axis[a].visit[i]]);
     }
+  };
+  if (pass.places != nullptr) {
+    for (int a = 0; a < 3; ++a) edge[a] = pass.cell_max[a];
+    const double section = std::hypot(edge[1] * edge[2], edge[2] * edge[0], edge[0] * edge[1]);
+    const double chord = std::hypot(edge[0], edge[1], edge[2]);
+    return std::max(
+        {edge[0] * edge[1] * edge[2] / chord * scale * scale, section / chord * scale, 1.0});
   }
-  return out;
+  widest(pass.major, brick.slab, 1);
+  widest(pass.u, brick.u_first, brick.u_count);
+  widest(pass.v, brick.v_first, brick.v_count);
+  std::sort(edge.begin(), edge.end());
+  return std::max({edge[0] * edge[1] * scale * scale, edge[1] * scale, 1.0});
 }
 
-// Slabs of all passes front to back: the eye's own and those above it upward, then those below it
-// downward. Passes of different strides are interleaved by distance, lines first.
-struct SlabKey {
-  int side;      // 0 upward, 1 downward
-  int distance;  // samples from the eye's
-  int pass;
-  int slab;
+// One frame's way from bricks of the lattice to those that are drawn.
+class Binner {
+ public:
+  Binner(const RenderPlan& plan, const kernels::Table& table, BinSpace& space)
+      : plan_(plan), table_(table), space_(space), project_(plan) {}
+
+  void begin() {
+    const std::size_t count = plan_.passes.size();
+    if (space_.passes.size() < count) space_.passes.resize(count);
+    space_.summaries.begin_frame();
+    for (std::size_t p = 0; p < count; ++p) {
+      begin_pass(plan_.passes[p], space_.passes[p]);
+    }
+    order_slabs();
+  }
+
+  // Regions of which every brick has the same fate: wholly in sight and blank, or out of sight.
+  // They are counted here and their bricks passed over. Row: of regions along u.
+  [[nodiscard]] std::size_t rows() const {
+    std::size_t sum = 0;
+    for (std::size_t p = 0; p < plan_.passes.size(); ++p) sum += rows_of(p);
+    return sum;
+  }
+  void look_at_row(std::size_t row, BrickCounts& counts);
+
+  void add_slab(const SlabKey& key, SlabBricks& out);
+
+ private:
+  void begin_pass(const PassPlan& pass, PassBins& to);
+  void order_slabs();
+  void add_brick(const PassPlan& pass, PassBins& shared, const Brick& brick, SlabBricks& out);
+  KeptSummary& summary_of(const PassPlan& pass, PassBins& shared, const Brick& brick);
+  [[nodiscard]] std::size_t rows_of(std::size_t p) const {
+    if (plan_.passes[p].kernel.places != nullptr) return 0;
+    const PassSummaries& kept = *space_.passes[p].kept;
+    return static_cast<std::size_t>(kept.regions) * kept.v_bricks;
+  }
+
+  const RenderPlan& plan_;
+  const kernels::Table& table_;
+  BinSpace& space_;
+  const Projector project_;
 };
 
-std::vector<SlabKey> order_slabs(const RenderPlan& plan) {
-  std::vector<SlabKey> keys;
-  for (int p = 0; p < static_cast<int>(plan.passes.size()); ++p) {
-    const PassPlan& pass = plan.passes[p];
+void Binner::begin_pass(const PassPlan& pass, PassBins& to) {
+  to.kept = &space_.summaries.of(pass, table_);
+  to.pass = pass.kernel;
+  for (int a = 0; a < 3; ++a) {
+    to.in_order[a].resize(pass.axis[a].visit.size());
+    std::iota(to.in_order[a].begin(), to.in_order[a].end(), 0);
+    to.pass.axis[a].visit = to.in_order[a].data();
+  }
+  to.longest = pass.kernel.has_lines != 0 ? 0.5 * pass.kernel.line.length : -1;
+  to.reach = kernel_reach(pass.kernel, to.longest, pass.kernel.has_medium != 0);
+  to.done.assign(to.kept->blank_regions.size(), 0);
+}
+
+void Binner::order_slabs() {
+  std::vector<SlabKey>& keys = space_.slabs;
+  keys.clear();
+  for (int p = 0; p < static_cast<int>(plan_.passes.size()); ++p) {
+    const PassPlan& pass = plan_.passes[p];
     const AxisArrays& axis = pass.axis[pass.kernel.major];
     for (int s = 0; s < static_cast<int>(axis.visit.size()); ++s) {
-      const int ahead = axis.sample[axis.visit[s]] - plan.eye_sample;
+      const int ahead = axis.sample[axis.visit[s]] - plan_.eye_sample;
       keys.push_back({ahead >= 0 ? 0 : 1, std::abs(ahead), p, s});
     }
   }
-  std::stable_sort(keys.begin(), keys.end(), [](const SlabKey& a, const SlabKey& b) {
+  // No two are alike.
+  std::sort(keys.begin(), keys.end(), [](const SlabKey& a, const SlabKey& b) {
     if (a.side != b.side) return a.side < b.side;
     if (a.distance != b.distance) return a.distance < b.distance;
     return a.pass < b.pass;
   });
-  return keys;
+}
+
+void Binner::look_at_row(std::size_t row, BrickCounts& counts) {
+  std::size_t p = 0;
+  for (; row >= rows_of(p); ++p) row -= rows_of(p);
+  const PassPlan& pass = plan_.passes[p];
+  const Pass& kernel = pass.kernel;
+  PassBins& shared = space_.passes[p];
+  PassSummaries& kept = *shared.kept;
+  const int layer = static_cast<int>(row / kept.v_bricks);
+  const int v = static_cast<int>(row % kept.v_bricks);
+  Box box;
+  std::int64_t across = 1;
+  const auto extend = [&](int a, int brick) {
+    const int first = brick * kernels::brick_side;
+    const int last = std::min(first + kernels::brick_side, kernel.axis[a].stops);
+    box.low[a] = pass.axis[a].position[first];
+    box.high[a] = pass.axis[a].position[last - 1];
+    return last - first;
+  };
+  across *= extend(kernel.major, layer);
+  across *= extend(kernel.v, v);
+  for (int u = 0; u < kept.u_bricks; ++u) {
+    const std::int64_t stops = across * extend(kernel.u, u);
+    const std::size_t region = kept.region(layer * kernels::brick_side, v, u);
+    const bool blank = kept.blank_regions[region] != 0 || kept.find_blank(layer, v, u);
+    const Projected found = project_(pass, box, shared.reach);
+    const bool unseen = found.seen.empty();
+    if (!unseen && !(blank && found.whole)) continue;
+    shared.done[region] = 1;
+    counts.samples += stops;
+    if (unseen) {
+      counts.culled += stops;
+      continue;
+    }
+    if (kernel.has_lines != 0) counts.without_line += stops;
+    if (kernel.has_medium != 0) counts.without_splat += stops;
+    counts.without_both += stops;
+  }
+}
+
+// Read in the lattice's own order, so that sums do not depend on where the first reader stood.
+KeptSummary& Binner::summary_of(const PassPlan& pass, PassBins& shared, const Brick& brick) {
+  const Pass& kernel = pass.kernel;
+  Brick own = brick;
+  own.slab = pass.axis[kernel.major].visit[brick.slab];
+  own.u_first = brick_start(pass.axis[kernel.u].visit[brick.u_first]);
+  own.v_first = brick_start(pass.axis[kernel.v].visit[brick.v_first]);
+  KeptSummary& kept = shared.kept->bricks[shared.kept->brick(
+      own.slab, own.v_first / kernels::brick_side, own.u_first / kernels::brick_side)];
+  if (!kept.known()) kept = summarise(table_, shared.pass, own);
+  return kept;
+}
+
+void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from, SlabBricks& out) {
+  Brick brick = from;
+  const std::int64_t stops = static_cast<std::int64_t>(brick.u_count) * brick.v_count;
+  const Box box = stops_box(pass, brick);
+  out.counts.samples += stops;
+  // First by the longest line that the style allows: what is outside is not even read.
+  const Projected most = project_(pass, box, shared.reach);
+  if (most.seen.empty()) {
+    out.counts.culled += stops;
+    return;
+  }
+  const KeptSummary& summary = summary_of(pass, shared, brick);
+  if (pass.kernel.has_lines != 0) out.counts.without_line += stops - summary.lines;
+  if (pass.kernel.has_medium != 0) out.counts.without_splat += stops - summary.splats;
+  out.counts.without_both += summary.without_both;
+  if (summary.weak_lines > 0 || summary.thin_medium > 0) {
+    const double scale = scale_at(plan_.camera, most.depth_first);
+    const double cover = summary.thin_medium > 0 ? splat_cover(pass.kernel, brick, scale) : 0;
+    out.counts.left_out += left_out(plan_, pass, summary, cover, scale);
+  }
+  if (summary.lines == 0 && summary.splats == 0) return;
+  const double part =
+      std::min(1.0F, summary.magnitude_max * pass.kernel.line.inverse_full_magnitude);
+  const double reach = summary.lines > 0 ? shared.longest * part * 1.00001 : -1;
+  brick.line_reach = static_cast<float>(std::max(reach, 0.0));
+  const Projected found = project_(pass, box, kernel_reach(pass.kernel, reach, summary.splats > 0));
+  if (found.seen.empty()) return;
+  set_blocks(found.seen, plan_.camera, brick);
+  brick.depth_first = static_cast<float>(found.depth_first - plan_.camera.depth_origin);
+  brick.depth_last = static_cast<float>(found.depth_last - plan_.camera.depth_origin);
+  out.bricks.push_back(brick);
+  out.kernels.push_back(summary.lines + summary.splats);
+}
+
+void Binner::add_slab(const SlabKey& key, SlabBricks& out) {
+  const PassPlan& pass = plan_.passes[key.pass];
+  const Pass& kernel = pass.kernel;
+  PassBins& shared = space_.passes[key.pass];
+  out.bricks.clear();
+  out.kernels.clear();
+  out.counts = {};
+  const int layer = pass.axis[kernel.major].visit[key.slab];
+  const AxisArrays& along_u = pass.axis[kernel.u];
+  const AxisArrays& along_v = pass.axis[kernel.v];
+  for (const auto& v : along_v.bricks) {
+    const int v_brick = along_v.visit[v[0]] / kernels::brick_side;
+    for (const auto& u : along_u.bricks) {
+      const int u_brick = along_u.visit[u[0]] / kernels::brick_side;
+      if (shared.done[shared.kept->region(layer, v_brick, u_brick)] != 0) continue;
+      Brick brick{};
+      brick.pass = key.pass;
+      brick.slab = key.slab;
+      brick.u_first = u[0];
+      brick.u_count = u[1];
+      brick.v_first = v[0];
+      brick.v_count = v[1];
+      add_brick(pass, shared, brick, out);
+    }
+  }
 }
 
 template <class Visit>
@@ -310,7 +438,8 @@ void each_tile(const Bins& bins, const Brick& brick, const Visit& visit) {
   }
 }
 
-void list_by_tile(Bins& bins) {
+void list_by_tile(BinSpace& space) {
+  Bins& bins = space.bins;
   const std::size_t tiles = static_cast<std::size_t>(bins.tiles_x) * bins.tiles_y;
   bins.first.assign(tiles + 1, 0);
   for (const Brick& brick : bins.bricks) {
@@ -318,47 +447,92 @@ void list_by_tile(Bins& bins) {
   }
   for (std::size_t t = 0; t < tiles; ++t) bins.first[t + 1] += bins.first[t];
   bins.entries.resize(bins.first[tiles]);
-  std::vector<std::size_t> next(bins.first.begin(), bins.first.end() - 1);
+  space.next.assign(bins.first.begin(), bins.first.end() - 1);
   for (std::size_t b = 0; b < bins.bricks.size(); ++b) {
     each_tile(bins, bins.bricks[b], [&](std::size_t tile) {
-      bins.entries[next[tile]++] = static_cast<std::uint32_t>(b);
+      bins.entries[space.next[tile]++] = static_cast<std::uint32_t>(b);
     });
   }
 }
 
+void add_load(Bins& bins, const SlabBricks& slab) {
+  constexpr std::int64_t of_a_brick = 8;
+  for (std::size_t b = 0; b < slab.bricks.size(); ++b) {
+    const Brick& brick = slab.bricks[b];
+    const std::int64_t tiles =
+        std::int64_t{brick.block_x_last / tile_blocks - brick.block_x / tile_blocks + 1} *
+        (brick.block_y_last / tile_blocks - brick.block_y / tile_blocks + 1);
+    const std::int64_t load = of_a_brick + slab.kernels[b] / tiles;
+    each_tile(bins, brick, [&](std::size_t tile) { bins.load[tile] += load; });
+  }
+}
+
+// Swept by depth: those that begin first come first, the others as they were.
+void sort_by_depth(BinSpace& space) {
+  std::vector<Brick>& bricks = space.bins.bricks;
+  space.by_depth.resize(bricks.size());
+  for (std::size_t b = 0; b < bricks.size(); ++b) {
+    space.by_depth[b] = {bricks[b].depth_first, static_cast<std::uint32_t>(b)};
+  }
+  std::sort(space.by_depth.begin(), space.by_depth.end(), [](const auto& a, const auto& b) {
+    return a.depth != b.depth ? a.depth < b.depth : a.brick < b.brick;
+  });
+  space.sorted.clear();
+  for (const auto& place : space.by_depth) space.sorted.push_back(bricks[place.brick]);
+  bricks.swap(space.sorted);
+}
+
 }  // namespace
 
-Bins make_bins(const RenderPlan& plan, const kernels::Table& table, ThreadPool& pool,
-               const CancelToken& cancel, WorkReport& work) {
-  Bins bins;
+BrickCounts& BrickCounts::operator+=(const BrickCounts& other) {
+  samples += other.samples;
+  culled += other.culled;
+  without_line += other.without_line;
+  without_splat += other.without_splat;
+  without_both += other.without_both;
+  left_out += other.left_out;
+  return *this;
+}
+
+const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, ThreadPool& pool,
+                      const CancelToken& cancel, BinSpace& space, WorkReport& work) {
+  Bins& bins = space.bins;
   bins.tiles_x = (plan.camera.width + tile_side - 1) / tile_side;
   bins.tiles_y = (plan.camera.height + tile_side - 1) / tile_side;
-  const std::vector<SlabKey> slabs = order_slabs(plan);
-  std::vector<SlabBricks> found(slabs.size());
-  pool.run(slabs.size(), [&](std::size_t i, unsigned) {
-    if (cancel.cancelled()) return;
-    found[i] = slab_bricks(plan, table, slabs[i].pass, slabs[i].slab);
+  bins.bricks.clear();
+  bins.load.assign(static_cast<std::size_t>(bins.tiles_x) * bins.tiles_y, 0);
+  Binner binner(plan, table, space);
+  binner.begin();
+  space.rows.assign(binner.rows(), BrickCounts());
+  pool.run(space.rows.size(), [&](std::size_t row, unsigned) {
+    if (!cancel.cancelled()) binner.look_at_row(row, space.rows[row]);
   });
-  if (cancel.cancelled()) return {};
-  double left_out = 0;
-  for (const SlabBricks& slab : found) {
+  const std::size_t slabs = space.slabs.size();
+  if (space.found.size() < slabs) space.found.resize(slabs);
+  pool.run(slabs, [&](std::size_t i, unsigned) {
+    if (cancel.cancelled()) return;
+    const FlushDenormals flush;
+    binner.add_slab(space.slabs[i], space.found[i]);
+  });
+  if (cancel.cancelled()) return bins;
+  BrickCounts sum;
+  for (const BrickCounts& row : space.rows) sum += row;
+  for (std::size_t i = 0; i < slabs; ++i) {
+    const SlabBricks& slab = space.found[i];
     bins.bricks.insert(bins.bricks.end(), slab.bricks.begin(), slab.bricks.end());
-    work.samples += slab.samples;
-    work.culled += slab.culled;
-    work.skipped_vector += slab.without_line;
-    work.skipped_scalar += slab.without_splat;
-    work.skipped_both += slab.without_both;
-    left_out += slab.left_out;
+    add_load(bins, slab);
+    sum += slab.counts;
   }
+  work.samples += sum.samples;
+  work.culled += sum.culled;
+  work.skipped_vector += sum.without_line;
+  work.skipped_scalar += sum.without_splat;
+  work.skipped_both += sum.without_both;
   // A pixel changes by no more than all of its light.
   work.skipped_bound =
-      std::min(1.0, left_out / (static_cast<double>(plan.camera.width) * plan.camera.height));
-  if (plan.slabs || plan.curved) {
-    // Swept by depth: those that begin first come first.
-    std::stable_sort(bins.bricks.begin(), bins.bricks.end(),
-                     [](const Brick& a, const Brick& b) { return a.depth_first < b.depth_first; });
-  }
-  list_by_tile(bins);
+      std::min(1.0, sum.left_out / (static_cast<double>(plan.camera.width) * plan.camera.height));
+  if (plan.slabs || plan.curved) sort_by_depth(space);
+  list_by_tile(space);
   return bins;
 }
 

@@ -1,6 +1,9 @@
 // Scene -> plan -> bins -> tiles -> Image.
 #include "server/engine/render.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include "server/engine/bins.hpp"
 #include "server/engine/kernels/dispatch.hpp"
 #include "server/engine/plan.hpp"
@@ -8,20 +11,56 @@
 
 namespace windsplat::engine {
 
-Result<Rendered> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel) {
-  auto table = kernels::chosen_table();
+struct RenderSpace::Parts {
+  Image image;
+  BinSpace bins;
+  TileSpace tiles;
+};
+
+RenderSpace::RenderSpace() : parts_(std::make_unique<Parts>()) {}
+RenderSpace::~RenderSpace() = default;
+RenderSpace::RenderSpace(RenderSpace&&) noexcept = default;
+RenderSpace& RenderSpace::operator=(RenderSpace&&) noexcept = default;
+
+Image& RenderSpace::image() { return parts_->image; }
+
+namespace {
+
+void clear_image(const scene::Camera& camera, Image& image) {
+  const std::size_t floats = 4 * static_cast<std::size_t>(camera.width) * camera.height;
+  const std::size_t kept = 4 * RenderSpace::kept_pixels;
+  if (image.rgba.capacity() > std::max(floats, kept)) image.rgba = {};
+  image.width = camera.width;
+  image.height = camera.height;
+  image.rgba.assign(floats, 0.0F);
+}
+
+}  // namespace
+
+Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel,
+                          RenderSpace& space) {
+  const auto table = kernels::chosen_table();
   if (!table) return table.error();
   const RenderPlan plan = make_plan(scene);
-  Rendered out;
-  out.work.variant = plan.variant + " " + (*table)->name;
-  out.image.width = scene.camera.width;
-  out.image.height = scene.camera.height;
-  out.image.rgba.assign(4 * static_cast<std::size_t>(scene.camera.width) * scene.camera.height,
-                        0.0F);
-  const Bins bins = make_bins(plan, **table, pool, cancel, out.work);
-  if (!cancel.cancelled()) draw_tiles(plan, bins, **table, pool, cancel, out.image, out.work);
+  WorkReport work;
+  work.variant = plan.variant + " " + (*table)->name;
+  RenderSpace::Parts& parts = *space.parts_;
+  clear_image(scene.camera, parts.image);
+  if (!plan.passes.empty() && !cancel.cancelled()) {
+    const Bins& bins = make_bins(plan, **table, pool, cancel, parts.bins, work);
+    if (!cancel.cancelled()) {
+      draw_tiles(plan, bins, **table, pool, cancel, parts.tiles, parts.image, work);
+    }
+  }
   if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "the frame was cancelled");
-  return out;
+  return work;
+}
+
+Result<Rendered> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel) {
+  RenderSpace space;
+  auto work = render(scene, pool, cancel, space);
+  if (!work) return work.error();
+  return Rendered{std::move(space.image()), std::move(*work)};
 }
 
 }  // namespace windsplat::engine

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "server/engine/stable_sort.hpp"
 #include "server/engine/sweep.hpp"
 
 namespace windsplat::engine {
@@ -61,7 +62,9 @@ class SlabSweep {
   static void forget(Reached<Record>& of) {
     of.records.clear();
     of.free.clear();
-    for (auto& waiting : of.waiting) waiting.clear();
+    of.behind.clear();
+    of.first.fill(of.none);
+    of.last.fill(of.none);
     of.count = 0;
   }
 
@@ -86,13 +89,29 @@ class SlabSweep {
     return static_cast<float>(static_cast<double>(slab) * plan_.slab_depth);
   }
 
+  template <class Record>
+  static std::int64_t of_slabs(const Reached<Record>& of) {
+    return static_cast<std::int64_t>(of.first.size());
+  }
+
+  template <class Record>
+  static std::size_t place(const Reached<Record>& of, std::int64_t slab) {
+    const std::int64_t slabs = of_slabs(of);
+    return static_cast<std::size_t>((slab % slabs + slabs) % slabs);
+  }
+
   // Puts a record down for the slab that it is next met in, or as near to that as can be told.
   template <class Record>
   void await(Reached<Record>& of, std::uint32_t record, std::int64_t earliest) {
     const std::int64_t wanted = std::max(earliest, slab_of(of.records[record].first));
-    const auto slots = static_cast<std::int64_t>(of.waiting.size());
-    const std::int64_t slab = std::min(wanted, index_ + slots - 1);
-    of.waiting[static_cast<std::size_t>((slab % slots + slots) % slots)].push_back(record);
+    const std::size_t slab = place(of, std::min(wanted, index_ + of_slabs(of) - 1));
+    of.behind[record] = of.none;
+    if (of.first[slab] == of.none) {
+      of.first[slab] = record;
+    } else {
+      of.behind[of.last[slab]] = record;
+    }
+    of.last[slab] = record;
   }
 
   template <class Record>
@@ -102,6 +121,7 @@ class SlabSweep {
       if (of.free.empty()) {
         at = static_cast<std::uint32_t>(of.records.size());
         of.records.push_back(records[n]);
+        of.behind.push_back(of.none);
       } else {
         at = of.free.back();
         of.free.pop_back();
@@ -133,9 +153,12 @@ class SlabSweep {
   // Takes what waits for this slab.
   template <class Record>
   void take(Reached<Record>& of, std::vector<std::uint32_t>& here) {
-    const auto slots = static_cast<std::int64_t>(of.waiting.size());
+    const std::size_t slab = place(of, index_);
     here.clear();
-    here.swap(of.waiting[static_cast<std::size_t>((index_ % slots + slots) % slots)]);
+    for (auto record = of.first[slab]; record != of.none; record = of.behind[record]) {
+      here.push_back(record);
+    }
+    of.first[slab] = of.last[slab] = of.none;
   }
 
   // Once a slab is drawn: what reaches beyond it waits for the next, the rest is forgotten.
@@ -192,9 +215,8 @@ class SlabSweep {
       space_.sorted[space_.next[hit.block]++] = hit;
     }
     for (int b = 0; b < tile_block_count; ++b) {
-      std::stable_sort(space_.sorted.begin() + space_.first[b],
-                       space_.sorted.begin() + space_.first[b + 1],
-                       [](const Hit& p, const Hit& q) { return p.depth < q.depth; });
+      stable_sort(space_.sorted, space_.first[b], space_.first[b + 1], space_.spare_hits,
+                  [](const Hit& p, const Hit& q) { return p.depth < q.depth; });
     }
   }
 

@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 
+#include "server/engine/stable_sort.hpp"
+
 namespace windsplat::engine {
 
 namespace {
@@ -118,8 +120,8 @@ class Sweep {
         }
       }
     }
-    std::stable_sort(space_.order.begin(), space_.order.end(),
-                     [](const DepthEntry& a, const DepthEntry& b) { return a.depth < b.depth; });
+    stable_sort(space_.order, space_.spare,
+                [](const DepthEntry& a, const DepthEntry& b) { return a.depth < b.depth; });
     for (const DepthEntry& kernel : space_.order) {
       table_.draw_prepared(plan_.camera, *space_.slots[kernel.slot], kernel.stop, tile_);
     }

@@ -23,12 +23,17 @@ struct DepthEntry {
 };
 
 // What of splats or lines has been reached and not yet passed: records in memory that is used
-// again, and for each of the next slabs the ones that wait for it.
+// again, and for each of the next slabs a list of those that wait for it, in order of arrival.
 template <class Record>
 struct Reached {
+  static constexpr std::size_t slabs = 256;
+  static constexpr std::uint32_t none = 0xFFFFFFFFU;
+
   std::vector<Record> records;
   std::vector<std::uint32_t> free;
-  std::array<std::vector<std::uint32_t>, 256> waiting;  // by slab, modulo
+  std::vector<std::uint32_t> behind;       // of each record, who arrived after it
+  std::array<std::uint32_t, slabs> first;  // by slab, modulo
+  std::array<std::uint32_t, slabs> last;
   std::size_t count = 0;
 };
 
@@ -39,6 +44,7 @@ struct SweepSpace {
   std::vector<std::int32_t> free;
   std::vector<DepthEntry> active;  // a brick: its last depth and its slot
   std::vector<DepthEntry> order;
+  std::vector<DepthEntry> spare;  // for sorting
   // Slabs.
   std::unique_ptr<kernels::Prepared> prepared;
   Reached<kernels::SplatRecord> splats;
@@ -48,9 +54,31 @@ struct SweepSpace {
   AlignedVector<float> gathered;
   std::vector<kernels::Hit> hits;    // as listed
   std::vector<kernels::Hit> sorted;  // by block, then depth
+  std::vector<kernels::Hit> spare_hits;
   std::vector<std::uint32_t> first;  // of each block, in `sorted`
   std::vector<std::uint32_t> next;
 };
+
+// Calls visit(member) for the vectors that grow with what a tile holds, member(space) each.
+template <class Visit>
+void each_vector(const Visit& visit) {
+  visit([](SweepSpace & s) -> auto& { return s.slots; });
+  visit([](SweepSpace & s) -> auto& { return s.free; });
+  visit([](SweepSpace & s) -> auto& { return s.active; });
+  visit([](SweepSpace & s) -> auto& { return s.order; });
+  visit([](SweepSpace & s) -> auto& { return s.spare; });
+  visit([](SweepSpace & s) -> auto& { return s.splats.records; });
+  visit([](SweepSpace & s) -> auto& { return s.splats.free; });
+  visit([](SweepSpace & s) -> auto& { return s.splats.behind; });
+  visit([](SweepSpace & s) -> auto& { return s.ribbons.records; });
+  visit([](SweepSpace & s) -> auto& { return s.ribbons.free; });
+  visit([](SweepSpace & s) -> auto& { return s.ribbons.behind; });
+  visit([](SweepSpace & s) -> auto& { return s.here; });
+  visit([](SweepSpace & s) -> auto& { return s.lines; });
+  visit([](SweepSpace & s) -> auto& { return s.hits; });
+  visit([](SweepSpace & s) -> auto& { return s.sorted; });
+  visit([](SweepSpace & s) -> auto& { return s.spare_hits; });
+}
 
 // Between looks at whether the tile is done or nobody wants it any more.
 constexpr std::int64_t slabs_between_checks = 4;

@@ -3,14 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <memory>
 
-#include "server/base/aligned_vector.hpp"
-#include "server/engine/sweep.hpp"
-
-#if defined(__SSE__)
-#include <xmmintrin.h>
-#endif
+#include "server/engine/flush_denormals.hpp"
 
 namespace windsplat::engine {
 
@@ -23,40 +18,6 @@ using kernels::Brick;
 using kernels::Tile;
 using kernels::tile_blocks;
 using kernels::tile_side;
-
-// Denormal numbers count as zero while this lives: they cost a hundred times as much, and no
-// picture shows them.
-class FlushDenormals {
- public:
-#if defined(__SSE__)
-  FlushDenormals() : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040U); }
-  ~FlushDenormals() { _mm_setcsr(before_); }
-#else
-  FlushDenormals() = default;
-  ~FlushDenormals() = default;
-#endif
-  FlushDenormals(const FlushDenormals&) = delete;
-  FlushDenormals& operator=(const FlushDenormals&) = delete;
-
- private:
-#if defined(__SSE__)
-  unsigned before_;
-#endif
-};
-
-// A worker's own pixels, used for one tile after the other.
-struct Workspace {
-  AlignedVector<float> blocks;
-  AlignedVector<float> rays;
-  SweepSpace sweep;
-};
-
-// What a tile tells the report.
-struct TileWork {
-  kernels::Counters counters{};
-  bool stopped = false;
-  bool closed_blocks = false;
-};
 
 // The length of every pixel's ray whose forward component is 1.
 void fill_rays(const kernels::Camera& camera, const Tile& tile, AlignedVector<float>& rays) {
@@ -146,15 +107,38 @@ void store_tile(const Tile& tile, Image& image) {
 }
 
 // Longest first, so that no thread is left alone with a long tile at the end.
-std::vector<std::uint32_t> busy_tiles(const Bins& bins) {
-  std::vector<std::uint32_t> order;
+void busy_tiles(const Bins& bins, std::vector<std::uint32_t>& order) {
+  order.clear();
   for (std::size_t t = 0; t + 1 < bins.first.size(); ++t) {
     if (bins.first[t + 1] > bins.first[t]) order.push_back(static_cast<std::uint32_t>(t));
   }
-  const auto length = [&](std::uint32_t t) { return bins.first[t + 1] - bins.first[t]; };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::uint32_t a, std::uint32_t b) { return length(a) > length(b); });
-  return order;
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return bins.load[a] != bins.load[b] ? bins.load[a] > bins.load[b] : a < b;
+  });
+}
+
+// Every worker's memory as large as the largest: which one meets the tile that needs most is a
+// matter of chance, and is not to decide when memory stops growing.
+void level(std::vector<Workspace>& spaces) {
+  if (spaces.size() < 2) return;
+  const auto each = [&](const auto& member) {
+    std::size_t most = 0;
+    for (Workspace& space : spaces) most = std::max(most, member(space.sweep).capacity());
+    for (Workspace& space : spaces) member(space.sweep).reserve(most);
+  };
+  each_vector(each);
+  std::size_t slots = 0;
+  std::size_t hits = 0;
+  for (const Workspace& space : spaces) {
+    slots = std::max(slots, space.sweep.slots.size());
+    hits = std::max(hits, space.sweep.hits.size());
+  }
+  for (Workspace& space : spaces) {
+    while (space.sweep.slots.size() < slots) {
+      space.sweep.slots.push_back(std::make_unique<kernels::Prepared>());
+    }
+    space.sweep.hits.resize(hits);
+  }
 }
 
 }  // namespace
@@ -175,10 +159,14 @@ bool all_closed(const Tile& tile, const Brick& brick) {
 }
 
 void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
-                ThreadPool& pool, const CancelToken& cancel, Image& image, WorkReport& work) {
-  const std::vector<std::uint32_t> order = busy_tiles(bins);
-  std::vector<Workspace> spaces(pool.size());
-  std::vector<TileWork> done(order.size());
+                ThreadPool& pool, const CancelToken& cancel, TileSpace& space, Image& image,
+                WorkReport& work) {
+  busy_tiles(bins, space.order);
+  const std::vector<std::uint32_t>& order = space.order;
+  if (space.workers.size() < pool.size()) space.workers.resize(pool.size());
+  std::vector<Workspace>& spaces = space.workers;
+  std::vector<TileWork>& done = space.done;
+  done.assign(order.size(), TileWork());
   pool.run(order.size(), [&](std::size_t i, unsigned worker) {
     if (cancel.cancelled()) return;
     const FlushDenormals flush;
@@ -193,6 +181,7 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
     done[i].closed_blocks = tile.any_closed != 0;
     store_tile(tile, image);
   });
+  level(spaces);
   work.tiles = static_cast<std::int64_t>(order.size());
   for (const TileWork& tile : done) {
     work.occluded += tile.counters.occluded;

@@ -59,15 +59,16 @@ void name_fields(const scene::Scene& scene, const protocol::View& completed,
   }
 }
 
-Result<engine::Rendered> render_scene(const scene::Scene& scene, ThreadPool& pool,
-                                      const CancelToken& cancel) {
-  if (scene.method != scene::Method::reference) return engine::render(scene, pool, cancel);
+// The picture is space.image().
+Result<engine::WorkReport> render_scene(const scene::Scene& scene, ThreadPool& pool,
+                                        const CancelToken& cancel, engine::RenderSpace& space) {
+  if (scene.method != scene::Method::reference) return engine::render(scene, pool, cancel, space);
   auto truth = engine::reference::render(scene, pool, cancel);
   if (!truth) return truth.error();
-  engine::Rendered rendered;
-  rendered.image = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};
-  rendered.work.variant = "reference double";
-  return rendered;
+  space.image() = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};
+  engine::WorkReport work;
+  work.variant = "reference double";
+  return work;
 }
 
 Result<image::Bytes> encode(const engine::Image& picture, const std::array<float, 3>& background,
@@ -84,6 +85,12 @@ Result<image::Bytes> encode(const engine::Image& picture, const std::array<float
 
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
                       ThreadPool& pool, const CancelToken& cancel) {
+  engine::RenderSpace space;
+  return produce(view, dataset, encoding, pool, cancel, space);
+}
+
+Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
+                      ThreadPool& pool, const CancelToken& cancel, engine::RenderSpace& space) {
   if (encoding.level < 0 || encoding.level > level_max) {
     return make_error(ErrorKind::invalid, "a frame's level is 0 to " + std::to_string(level_max) +
                                               ", not " + std::to_string(encoding.level));
@@ -104,19 +111,20 @@ Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const 
   drawn.image.height = std::max(1, drawn.image.height >> encoding.level);
   const Result<scene::Scene> scene = scene::build_scene(drawn, dataset);
   if (!scene) return scene.error();
-  Result<engine::Rendered> rendered = render_scene(*scene, pool, cancel);
-  if (!rendered) return rendered.error();
+  Result<engine::WorkReport> work = render_scene(*scene, pool, cancel, space);
+  if (!work) return work.error();
+  const engine::Image& picture = space.image();
   const Clock::time_point rendered_at = Clock::now();
 
-  Result<image::Bytes> bytes = encode(rendered->image, scene->background, encoding);
+  Result<image::Bytes> bytes = encode(picture, scene->background, encoding);
   if (!bytes) return bytes.error();
   const Clock::time_point encoded_at = Clock::now();
 
   Frame frame;
   frame.bytes = std::move(*bytes);
-  frame.width = rendered->image.width;
-  frame.height = rendered->image.height;
-  frame.work = std::move(rendered->work);
+  frame.width = picture.width;
+  frame.height = picture.height;
+  frame.work = std::move(*work);
   name_fields(*scene, *completed, frame.work);
   frame.view = std::move(*completed);
   frame.render_us = microseconds(start, rendered_at);

@@ -13,6 +13,10 @@
 #include "server/engine/work.hpp"
 #include "server/image/encode.hpp"
 
+namespace windsplat::engine {
+class RenderSpace;
+}
+
 namespace windsplat::frame {
 
 enum class Format { jpeg, png, npy };
@@ -40,6 +44,11 @@ struct Frame {
 // `view` need not be completed. The report's fields and bytes are those of the volumes shown.
 // Errors: those of the scene and the engine (invalid, out_of_memory, cancelled, ...); invalid for a
 // level outside 0..15, and at /method/name for a reference that is not allowed.
+// Draws with what earlier frames left in `space`.
+Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
+                      ThreadPool& pool, const CancelToken& cancel, engine::RenderSpace& space);
+
+// One frame by itself.
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
                       ThreadPool& pool, const CancelToken& cancel);
 

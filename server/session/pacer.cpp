@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "protocol/codec.hpp"
 #include "protocol/limits.hpp"
 #include "server/session/session.hpp"
 
@@ -24,6 +25,17 @@ protocol::MethodCode method_code(const std::string& name) {
   if (name == "slab") return protocol::MethodCode::slab;
   if (name == "reference") return protocol::MethodCode::reference;
   return protocol::MethodCode::kernel;
+}
+
+// The view but for where it is looked at from.
+std::string without_camera(protocol::View view) {
+  view.camera = {};
+  return protocol::encode_view(view);
+}
+
+// Whether nothing but the background shows. The reference does not tell.
+bool is_blank(const protocol::FrameInfo& info) {
+  return info.method != "reference" && info.tiles == 0;
 }
 
 }  // namespace
@@ -135,8 +147,31 @@ void Session::start(Render render, const protocol::View& view) {
   render_ = render;
 }
 
+void Session::stand() {
+  settle(version_);
+  drawn_version_ = version_;
+  drawn_final_ = true;
+  standing_->view = protocol::encode_view(view_);
+  if (standing_->rev == rev_) return;
+  standing_->rev = rev_;
+  effects_.emplace_back(SendText{protocol::UnchangedMessage{rev_, standing_->seq}});
+}
+
+// Unless something else is on its way, which the viewer would see last.
+void Session::stand_if_same() {
+  if (shown() || !standing_) return;
+  if (render_ && !render_->unwanted && render_->purpose != Purpose::still) return;
+  if (protocol::encode_view(view_) == standing_->view) stand();
+}
+
+bool Session::stands_for(const Render& render, const Drawn& drawn) const {
+  return render.purpose != Purpose::still && render.version == version_ && standing_ &&
+         is_blank(drawn.info) && standing_->without_camera == without_camera(view_);
+}
+
 void Session::send_frame(const Render& render, Drawn drawn) {
   const bool still = render.purpose == Purpose::still;
+  const bool blank = is_blank(drawn.info);
   ++sent_seq_;
   writing_ = true;
   ++stats_.frames;
@@ -172,6 +207,12 @@ void Session::send_frame(const Render& render, Drawn drawn) {
   settle(render.version);
   drawn_version_ = render.version;
   drawn_final_ = render.purpose == Purpose::final;
+  standing_.reset();
+  // A final frame is of the present view: any change would have ended it.
+  if (drawn_final_) {
+    standing_ = {sent_seq_, render.rev, protocol::encode_view(view_),
+                 blank ? without_camera(view_) : std::string()};
+  }
   if (drawn_final_) effects_.emplace_back(SendText{stats_});
 }
 

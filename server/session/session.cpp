@@ -140,6 +140,8 @@ Effects Session::on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros n
   }
   if (render.unwanted) {
     ++stats_.dropped;
+  } else if (stands_for(render, *drawn)) {
+    stand();
   } else {
     send_frame(render, std::move(*drawn));
   }
@@ -354,6 +356,7 @@ Effects Session::finish(Micros now) {
   }
   if (!closed_) {
     advance_step(now);
+    stand_if_same();
     start_next(now);
   }
   return std::exchange(effects_, {});

@@ -9,6 +9,10 @@
 // without a change the view is drawn once more at full resolution and high quality, flagged final;
 // that render is cancelled by the next change.
 //
+// A final frame stands for every later view that looks the same: the same view said in other words
+// or come back to before anything else was sent, or another camera on a scene of which nothing
+// shows before and after. Then no frame is drawn or sent, and `unchanged` names the patch's rev.
+//
 // Stills. `still` draws the present view apart from the stream. Its picture is one binary frame of
 // kind 1 with the final flag, codec png or jpeg; right before it come `progress` with the request's
 // id, phase "still" and done 1, and the frame's `chosen`. Stills count as frames for seq and ack.
@@ -79,6 +83,13 @@ class Session {
     std::uint32_t rev = 0;
     double t = 0;
   };
+  // The final frame that the viewer has, until another one is sent.
+  struct Standing {
+    std::uint32_t seq = 0;
+    std::uint32_t rev = 0;  // told to the viewer last
+    std::string view;
+    std::string without_camera;  // empty where something shows
+  };
   struct Render {
     std::uint64_t ticket = 0;
     Purpose purpose = Purpose::moving;
@@ -119,6 +130,9 @@ class Session {
   void settle_oldest();
   void undo(std::uint64_t version, Micros now);  // that change was refused after all
   void render_failed(const Render& render, const Error& error, Micros now);
+  void stand();  // for the present view
+  void stand_if_same();
+  [[nodiscard]] bool stands_for(const Render& render, const Drawn& drawn) const;
   void send_frame(const Render& render, Drawn drawn);  // with the messages that go with it
   void refuse(const Error& error, std::optional<std::uint32_t> id,
               std::optional<std::uint32_t> rev);
@@ -154,6 +168,8 @@ class Session {
   std::deque<Opening> openings_;
   std::deque<Still> stills_;
   Player player_;
+
+  std::optional<Standing> standing_;
 
   std::optional<Render> render_;
   std::uint64_t tickets_ = 0;

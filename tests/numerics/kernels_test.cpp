@@ -143,11 +143,13 @@ engine::Rendered render_with(const Table& table, const scene::Scene& scene) {
   const CancelToken cancel;
   engine::Rendered out;
   const engine::RenderPlan plan = engine::make_plan(scene);
-  const engine::Bins bins = engine::make_bins(plan, table, pool, cancel, out.work);
+  engine::BinSpace bin_space;
+  engine::TileSpace tile_space;
+  const engine::Bins& bins = engine::make_bins(plan, table, pool, cancel, bin_space, out.work);
   out.image.width = scene.camera.width;
   out.image.height = scene.camera.height;
   out.image.rgba.assign(4 * static_cast<std::size_t>(scene.camera.width) * scene.camera.height, 0);
-  engine::draw_tiles(plan, bins, table, pool, cancel, out.image, out.work);
+  engine::draw_tiles(plan, bins, table, pool, cancel, tile_space, out.image, out.work);
   return out;
 }
 

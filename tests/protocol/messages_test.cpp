@@ -171,6 +171,7 @@ TEST(ServerMessages, FitTheSchemaAndSayTheirType) {
       {"progress", ProgressMessage{std::nullopt, "load", 0.5, std::nullopt}},
       {"progress", ProgressMessage{7, "load", 1, 0.5}},
       {"chosen", ChosenMessage{1, frame_info(), encode_view(View{})}},
+      {"unchanged", UnchangedMessage{5, 9}},
       {"stats", StatsMessage{1, 2, 3, 4'000'000'000'000}},
       {"error", ErrorMessage{1, 2, problem_from(make_error(ErrorKind::busy, "try later"))}}};
   for (const auto& [type, message] : messages) {
@@ -192,6 +193,8 @@ TEST(ServerMessages, CarryTheirValues) {
   const Json progress = Json::parse(encode(ProgressMessage{7, "load", 0.25, 120.5}));
   EXPECT_EQ(progress, Json::parse(R"({"type":"progress","id":7,"phase":"load","done":0.25,
                                       "etaMs":120.5})"));
+  EXPECT_EQ(Json::parse(encode(UnchangedMessage{5, 9})),
+            Json::parse(R"({"type":"unchanged","rev":5,"seq":9})"));
   const Json stats = Json::parse(encode(StatsMessage{1, 2, 3, 4'000'000'000'000}));
   EXPECT_EQ(stats, Json::parse(R"({"type":"stats","frames":1,"dropped":2,"cancelled":3,
                                    "bytes":4000000000000})"));

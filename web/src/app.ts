@@ -34,6 +34,7 @@ import {
   type ErrorMessage,
   type HelloMessage,
   type ServerMessage,
+  type UnchangedMessage,
   type View,
 } from "./protocol";
 import { problemText, type Status } from "./status";
@@ -73,6 +74,8 @@ export class App {
   private opening = false; // `opened` has not come yet
   private readonly chosen = new Map<number, ChosenMessage>();
   private drawn: ChosenMessage | null = null;
+  private shownSeq = 0; // of the frame on the canvas
+  private unchanged: UnchangedMessage | null = null; // its frame is not shown yet
   private playing = false;
   private refusedRev = 0; // of the newest patch that was refused
   private restored = new Set<number>(); // revs of the view that took a refused one's place
@@ -325,6 +328,8 @@ export class App {
     if (!this.datasets.some((dataset) => dataset.id === this.open?.id)) this.open = null;
     this.parts.viewport.newSession();
     this.chosen.clear();
+    this.unchanged = null;
+    this.shownSeq = 0;
     const wanted = this.state.document.dataset;
     const id = wanted ?? this.defaultDataset();
     this.showPicker(id ?? "");
@@ -357,6 +362,10 @@ export class App {
         for (const seq of this.chosen.keys()) {
           if (this.chosen.size > chosenKept) this.chosen.delete(seq);
         }
+        break;
+      case "unchanged":
+        this.unchanged = message;
+        this.settleUnchanged();
         break;
       case "error":
         this.onError(message);
@@ -441,6 +450,7 @@ export class App {
     const { header } = frame;
     const { hud, status } = this.parts;
     this.connection.send({ type: "ack", seq: header.seq, decodeMs: frame.decodeMs });
+    this.shownSeq = header.seq;
     this.state.settle(header.rev);
     this.flowing.answered(header.rev);
     const chosen = this.chosen.get(header.seq) ?? null;
@@ -451,12 +461,26 @@ export class App {
     hud.show(frame, chosen);
     status.clearError("frame");
     if (header.rev > this.refusedRev) status.clearError("view");
+    this.settleUnchanged();
     // Only the first frame that echoes a patch tells how fast the answer to it was.
     if (header.t > 0 && header.t !== this.answeredT) status.responded(performance.now() - header.t);
     this.answeredT = header.t;
     document.documentElement.classList.add("has-picture");
     this.refresh();
     this.showLegend();
+  }
+
+  // A patch changed nothing that shows: once its frame is there, that is the answer to it.
+  private settleUnchanged(): void {
+    if (this.unchanged === null || this.shownSeq < this.unchanged.seq) return;
+    const { canvas } = this.parts.viewport;
+    const { rev } = this.unchanged;
+    this.unchanged = null;
+    this.state.settle(rev);
+    this.flowing.answered(rev);
+    canvas.dataset.rev = String(Math.max(rev, Number(canvas.dataset.rev)));
+    if (rev > this.refusedRev) this.parts.status.clearError("view");
+    this.refresh();
   }
 
   // A frame that is not shown still has to give its credit back.

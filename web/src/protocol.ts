@@ -14,6 +14,7 @@ export type {
   Problem,
   ProgressMessage,
   ServerMessage,
+  UnchangedMessage,
 } from "../generated/messages";
 export type { ScalarView, View } from "../generated/view";
 
@@ -136,6 +137,7 @@ const looksRight: Record<ServerMessage["type"], (message: Json) => boolean> = {
   opened: (m) => Number.isInteger(m.id) && isDataset(m.dataset),
   progress: (m) => typeof m.phase === "string" && typeof m.done === "number",
   chosen: (m) => Number.isInteger(m.seq) && isObject(m.view) && isObject(m.work),
+  unchanged: (m) => Number.isInteger(m.rev) && Number.isInteger(m.seq),
   stats: (m) => typeof m.frames === "number",
   error: (m) => isProblem(m.problem),
 };

@@ -23,6 +23,7 @@ namespace protocol = windsplat::protocol;
 
 inline constexpr Micros ms = 1000;
 inline constexpr int steps = 10;
+inline constexpr double beyond = 1000;  // an eye so far away sees nothing
 
 class Driver {
  public:
@@ -137,6 +138,10 @@ class Driver {
     out.payload = std::make_shared<const std::vector<std::uint8_t>>(100);
     const bool kernel = done.view.method.name == protocol::MethodName::kernel;
     out.info.method = kernel ? "kernel" : "slab";
+    out.info.tiles = 1;
+    for (const double height : done.view.camera.eye.value_or(protocol::Vec3{})) {
+      if (height >= beyond) out.info.tiles = 0;
+    }
     out.info.width = std::max(1, done.view.image.width >> done.encoding.level);
     out.info.height = std::max(1, done.view.image.height >> done.encoding.level);
     out.view_json = "{}";

@@ -295,5 +295,133 @@ TEST(Level, comes_back_when_the_scene_has_become_cheap) {
   EXPECT_EQ(driver.frames.back().header.level, 0);
 }
 
+// --- what changes nothing ------------------------------------------------------------------------
+
+using Revs = std::vector<std::uint32_t>;
+
+Revs unchanged_revs(const Driver& driver) {
+  Revs revs;
+  for (const auto& message : driver.texts_of<protocol::UnchangedMessage>()) {
+    revs.push_back(message.rev);
+  }
+  return revs;
+}
+
+TEST(Unchanged, a_patch_that_says_the_same_is_answered_without_a_frame) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","camera":{"eye":[1,2,3]}})");
+  driver.settle();
+  const std::size_t frames = driver.frames.size();
+  const int renders = driver.renders;
+  driver.patch(2, R"({"camera":{"eye":[1,2,3]}})");
+  driver.patch(3, R"({"step":0})");  // its default, said
+  driver.patch(4, "{}");
+  EXPECT_EQ(unchanged_revs(driver), (Revs{2, 3, 4}));
+  EXPECT_EQ(driver.texts_of<protocol::UnchangedMessage>().back().seq,
+            driver.frames.back().header.seq);
+  driver.wait(3000 * ms);
+  EXPECT_EQ(driver.frames.size(), frames);
+  EXPECT_EQ(driver.renders, renders);
+
+  driver.patch(5, azimuth(2));
+  driver.settle();
+  EXPECT_EQ(driver.frames.back().header.rev, 5U) << "the next change shows";
+  EXPECT_EQ(unchanged_revs(driver), (Revs{2, 3, 4}));
+}
+
+TEST(Unchanged, a_view_that_differs_in_anything_is_drawn) {
+  for (const char* other :
+       {R"({"step":1})", R"({"camera":{"eye":[1,2,4]}})", R"({"image":{"background":"#010101"}})",
+        R"({"image":{"width":99}})", R"({"vector":{"field":null}})", R"({"dataset":"sea"})"}) {
+    Driver driver;
+    driver.patch(1, R"({"dataset":"wind","camera":{"eye":[1,2,3]}})");
+    driver.settle();
+    driver.patch(2, other);
+    EXPECT_TRUE(driver.render) << other;
+    EXPECT_TRUE(unchanged_revs(driver).empty()) << other;
+  }
+}
+
+TEST(Unchanged, a_moving_frame_does_not_stand_for_its_view) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.finish_render();
+  driver.ack(1);
+  driver.patch(2, "{}");
+  EXPECT_TRUE(unchanged_revs(driver).empty());
+  driver.settle();
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  EXPECT_EQ(driver.frames.back().header.rev, 2U);
+}
+
+TEST(Unchanged, back_to_what_was_shown_while_another_view_is_drawn_is_drawn_again) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.patch(2, azimuth(1));
+  ASSERT_TRUE(driver.render);
+  driver.patch(3, R"({"camera":{"eye":null}})");
+  EXPECT_TRUE(unchanged_revs(driver).empty()) << "the frame of rev 2 is still to come";
+  driver.settle();
+  EXPECT_EQ(driver.frames.back().header.rev, 3U);
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+}
+
+TEST(Unchanged, there_and_back_while_the_credit_is_out_needs_no_frame) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.finish_render();
+  driver.wait(200 * ms);
+  ASSERT_TRUE(driver.render);
+  driver.finish_render();  // the final one: two frames, neither acknowledged
+  ASSERT_TRUE(Driver::is_final(driver.frames.back()));
+  driver.patch(2, azimuth(1));
+  EXPECT_FALSE(driver.render);
+  driver.patch(3, R"({"camera":{"eye":null}})");
+  EXPECT_EQ(unchanged_revs(driver), (Revs{3}));
+  driver.ack(2);
+  driver.wait(3000 * ms);
+  EXPECT_EQ(driver.frames.size(), 2U);
+}
+
+TEST(Unchanged, a_camera_that_moves_where_nothing_shows_sends_nothing) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
+  driver.settle();
+  const std::size_t frames = driver.frames.size();
+  for (std::uint32_t rev = 2; rev < 6; ++rev) {
+    driver.patch(rev, azimuth(2000 + static_cast<int>(rev)));
+    driver.settle();
+  }
+  EXPECT_EQ(driver.frames.size(), frames);
+  EXPECT_EQ(unchanged_revs(driver), (Revs{2, 3, 4, 5}));
+  driver.patch(6, azimuth(3));
+  driver.settle();
+  EXPECT_EQ(driver.frames.back().header.rev, 6U) << "now something shows";
+  EXPECT_GT(driver.frames.size(), frames);
+}
+
+TEST(Unchanged, what_shows_nothing_but_differs_by_more_than_the_camera_is_sent) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
+  driver.settle();
+  const std::size_t frames = driver.frames.size();
+  driver.patch(2, R"({"image":{"background":"#ffffff"}})");
+  driver.settle();
+  EXPECT_GT(driver.frames.size(), frames);
+  EXPECT_EQ(driver.frames.back().header.rev, 2U);
+}
+
+TEST(Unchanged, from_something_to_nothing_is_sent) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.patch(2, azimuth(2000));
+  driver.settle();
+  EXPECT_EQ(driver.frames.back().header.rev, 2U);
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  EXPECT_TRUE(unchanged_revs(driver).empty());
+}
+
 }  // namespace
 }  // namespace session_test

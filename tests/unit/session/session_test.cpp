@@ -159,15 +159,30 @@ TEST(Patch, a_fault_beneath_later_patches_is_found_and_the_stream_goes_on) {
 TEST(Patch, that_fails_for_good_is_not_tried_again_and_again) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
-  driver.settle();
+  driver.finish_render();
+  driver.ack(1);
   driver.patch(2, R"({"step":5})");
   driver.fail_render(make_error(ErrorKind::out_of_memory, "no room"));
-  ASSERT_TRUE(driver.render) << "the old view, sharp again";
+  ASSERT_TRUE(driver.render) << "the old view again, of which no final frame was sent";
   driver.fail_render(make_error(ErrorKind::out_of_memory, "no room"));
   const int renders = driver.renders;
   driver.wait(3000 * ms);
   EXPECT_EQ(driver.renders, renders);
   EXPECT_EQ(driver.errors().size(), 2U);
+}
+
+TEST(Patch, that_fails_leaves_the_final_frame_that_stands) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  const int renders = driver.renders;
+  driver.patch(2, R"({"step":5})");
+  driver.fail_render(make_error(ErrorKind::out_of_memory, "no room"));
+  driver.wait(3000 * ms);
+  EXPECT_EQ(driver.renders, renders + 1) << "what the viewer sees is the old view, sharp";
+  ASSERT_EQ(driver.errors().size(), 1U);
+  EXPECT_EQ(driver.errors()[0].rev, 2U);
+  EXPECT_TRUE(driver.texts_of<protocol::UnchangedMessage>().empty()) << "no patch is answered";
 }
 
 // --- acknowledgements ---------------------------------------------------------------------------

@@ -1,0 +1,210 @@
+// Keeps summaries by what they depend on.
+#include "server/engine/summaries.hpp"
+
+#include <algorithm>
+#include <bit>
+
+namespace windsplat::engine {
+
+namespace {
+
+using Field = std::weak_ptr<const data::Volume>;
+
+void add(std::vector<std::uint32_t>& key, float v) {
+  key.push_back(std::bit_cast<std::uint32_t>(v));
+}
+void add(std::vector<std::uint32_t>& key, int v) { key.push_back(static_cast<std::uint32_t>(v)); }
+
+void add(std::vector<std::uint32_t>& key, const float* values, int count) {
+  add(key, values == nullptr ? -1 : count);
+  for (int i = 0; values != nullptr && i < count; ++i) add(key, values[i]);
+}
+
+// Every number that Table::summarise reads besides the fields and the order of visit.
+void write_key(const kernels::Pass& pass, std::vector<std::uint32_t>& key) {
+  key.clear();
+  add(key, pass.major);
+  add(key, pass.places != nullptr ? 1 : 0);
+  for (int a = 0; a < 3; ++a) {
+    const kernels::Axis& axis = pass.axis[a];
+    add(key, pass.dims[a]);
+    add(key, pass.cell_max[a]);
+    add(key, axis.cell, axis.stops);
+    for (int s = 0; s < axis.stops; ++s) add(key, axis.sample[s]);
+  }
+  add(key, pass.has_lines);
+  if (pass.has_lines != 0) {
+    const kernels::LineStyle& line = pass.line;
+    add(key, line.scale, 3);
+    add(key, line.rate_x, pass.dims[1]);
+    add(key, line.rate_y);
+    add(key, line.rate_z, pass.dims[2]);
+    add(key, line.inverse_full_magnitude);
+    add(key, line.min_magnitude);
+  }
+  add(key, pass.has_medium);
+  if (pass.has_medium == 0) return;
+  add(key, pass.medium.layers);
+  add(key, pass.medium.min_optical_depth);
+  for (int k = 0; k < pass.medium.layers; ++k) {
+    const kernels::Extinction& extinction = pass.medium.layer[k].extinction;
+    add(key, extinction.x, extinction.points);
+    add(key, extinction.y, extinction.points);
+    add(key, extinction.slope, extinction.points);
+  }
+}
+
+// The same field, not another one at the same address: a kept weak pointer holds its owner's place.
+// One that nobody owns is never known again.
+bool same_field(const Field& kept, const std::shared_ptr<const data::Volume>& field) {
+  return field.use_count() > 0 && !kept.owner_before(field) && !field.owner_before(kept);
+}
+
+}  // namespace
+
+struct SummaryCache::Entry {
+  const kernels::Table* table = nullptr;
+  std::vector<Field> fields;
+  std::vector<const data::Volume*> volumes;  // an owner may own more than one
+  std::vector<std::uint32_t> key;
+  std::uint64_t used = 0;  // the frame
+  PassSummaries kept;
+
+  [[nodiscard]] std::size_t bytes() const {
+    return kept.bricks.capacity() * sizeof(KeptSummary) + kept.blank_regions.capacity();
+  }
+  [[nodiscard]] bool shows(const PassPlan& pass) const;
+  void forget();
+  void begin(const PassPlan& pass);
+};
+
+namespace {
+
+template <class Visit>
+void each_field(const PassPlan& pass, const Visit& visit) {
+  if (pass.vector != nullptr) visit(pass.vector->field);
+  for (const scene::ScalarLayer* scalar : pass.scalars) visit(scalar->field);
+}
+
+}  // namespace
+
+bool SummaryCache::Entry::shows(const PassPlan& pass) const {
+  std::size_t n = 0;
+  bool same = true;
+  each_field(pass, [&](const std::shared_ptr<const data::Volume>& field) {
+    same = same && n < fields.size() && volumes[n] == field.get() && same_field(fields[n], field);
+    ++n;
+  });
+  return same && n == fields.size();
+}
+
+void SummaryCache::Entry::forget() { *this = Entry(); }
+
+void SummaryCache::Entry::begin(const PassPlan& pass) {
+  fields.clear();
+  volumes.clear();
+  each_field(pass, [&](const std::shared_ptr<const data::Volume>& field) {
+    fields.emplace_back(field);
+    volumes.push_back(field.get());
+  });
+  const kernels::Pass& kernel = pass.kernel;
+  const auto bricks = [](int stops) {
+    return (stops + kernels::brick_side - 1) / kernels::brick_side;
+  };
+  kept.u_bricks = bricks(kernel.axis[kernel.u].stops);
+  kept.v_bricks = bricks(kernel.axis[kernel.v].stops);
+  kept.layers = kernel.axis[kernel.major].stops;
+  kept.regions = bricks(kept.layers);
+  const std::size_t rows = static_cast<std::size_t>(kept.u_bricks) * kept.v_bricks;
+  kept.bricks.assign(rows * kept.layers, KeptSummary());
+  kept.blank_regions.assign(rows * kept.regions, 0);
+}
+
+bool PassSummaries::find_blank(int region_layer, int v, int u) {
+  const int first = region_layer * kernels::brick_side;
+  const int last = std::min(first + kernels::brick_side, layers);
+  for (int layer = first; layer < last; ++layer) {
+    if (!bricks[brick(layer, v, u)].blank()) return false;
+  }
+  blank_regions[region(first, v, u)] = 1;
+  return true;
+}
+
+SummaryCache::SummaryCache() = default;
+SummaryCache::~SummaryCache() = default;
+
+std::size_t SummaryCache::bytes() const {
+  std::size_t sum = 0;
+  for (const auto& entry : entries_) sum += entry->bytes();
+  return sum;
+}
+
+// An empty place, or the one used longest ago that this frame does not need.
+SummaryCache::Entry& SummaryCache::replaceable() {
+  Entry* oldest = nullptr;
+  for (const auto& entry : entries_) {
+    if (entry->used < frame_ && (oldest == nullptr || entry->used < oldest->used)) {
+      oldest = entry.get();
+    }
+  }
+  if (oldest != nullptr && entries_.size() >= passes_max) return *oldest;
+  return *entries_.emplace_back(std::make_unique<Entry>());
+}
+
+// Until as many bytes more stay within the limit.
+void SummaryCache::give_back(std::size_t coming) {
+  while (bytes() + coming > bytes_max) {
+    Entry* oldest = nullptr;
+    for (const auto& entry : entries_) {
+      const bool held = entry->bytes() > 0 && entry->used < frame_;
+      if (held && (oldest == nullptr || entry->used < oldest->used)) oldest = entry.get();
+    }
+    if (oldest == nullptr) return;
+    oldest->forget();
+  }
+}
+
+PassSummaries& SummaryCache::of(const PassPlan& pass, const kernels::Table& table) {
+  write_key(pass.kernel, key_);
+  for (const auto& entry : entries_) {
+    if (entry->table == &table && entry->key == key_ && entry->shows(pass)) {
+      entry->used = frame_;
+      return entry->kept;
+    }
+  }
+  Entry& entry = replaceable();
+  entry.used = frame_;
+  std::size_t bricks = 1;
+  for (int a = 0; a < 3; ++a) {
+    const auto stops = static_cast<std::size_t>(pass.kernel.axis[a].stops);
+    bricks *= a == pass.kernel.major ? stops : (stops + kernels::brick_side - 1) / 8;
+  }
+  const std::size_t needed = bricks * sizeof(KeptSummary);
+  // A place that held far more is not kept for so little.
+  if (entry.bytes() > 4 * needed + 65536) {
+    entry.forget();
+    entry.used = frame_;
+  }
+  give_back(needed > entry.bytes() ? needed - entry.bytes() : 0);
+  entry.table = &table;
+  entry.key = key_;
+  entry.begin(pass);
+  return entry.kept;
+}
+
+KeptSummary summarise(const kernels::Table& table, const kernels::Pass& in_order,
+                      const kernels::Brick& brick) {
+  kernels::BrickSummary found;
+  table.summarise(in_order, brick, 0.0F, found);
+  KeptSummary kept;
+  kept.weak_parts = found.weak_parts;
+  kept.thin_medium = found.thin_medium;
+  kept.magnitude_max = found.magnitude_max;
+  kept.lines = static_cast<std::uint8_t>(found.lines);
+  kept.splats = static_cast<std::uint8_t>(found.splats);
+  kept.without_both = static_cast<std::uint8_t>(found.without_both);
+  kept.weak_lines = static_cast<std::uint8_t>(found.weak_lines);
+  return kept;
+}
+
+}  // namespace windsplat::engine

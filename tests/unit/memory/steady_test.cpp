@@ -1,0 +1,166 @@
+// A frame loop in its steady state allocates nothing but its plans: small blocks, as many as axes
+// and tables, whose size follows the data's edges, neither their samples nor the picture. Every
+// allocation of this program is counted.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <memory>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "server/data/store.hpp"
+#include "server/engine/plan.hpp"
+#include "server/engine/render.hpp"
+#include "server/scene/build.hpp"
+
+namespace {
+
+std::atomic<std::int64_t> blocks{0};
+std::atomic<std::int64_t> bytes{0};
+
+void* counted(std::size_t size) {
+  blocks.fetch_add(1, std::memory_order_relaxed);
+  bytes.fetch_add(static_cast<std::int64_t>(size), std::memory_order_relaxed);
+  if (void* at = std::malloc(size == 0 ? 1 : size)) return at;
+  throw std::bad_alloc();
+}
+
+void* counted(std::size_t size, std::align_val_t alignment) {
+  const auto step = static_cast<std::size_t>(alignment);
+  blocks.fetch_add(1, std::memory_order_relaxed);
+  bytes.fetch_add(static_cast<std::int64_t>(size), std::memory_order_relaxed);
+  if (void* at = std::aligned_alloc(step, (size + step - 1) / step * step)) return at;
+  throw std::bad_alloc();
+}
+
+}  // namespace
+
+// Arrays and the forms that do not throw go through these two.
+void* operator new(std::size_t size) { return counted(size); }
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return counted(size, alignment);
+}
+void operator delete(void* at) noexcept { std::free(at); }
+void operator delete(void* at, std::size_t /*size*/) noexcept { std::free(at); }
+void operator delete(void* at, std::align_val_t /*alignment*/) noexcept { std::free(at); }
+void operator delete(void* at, std::size_t /*size*/, std::align_val_t /*alignment*/) noexcept {
+  std::free(at);
+}
+
+namespace windsplat {
+namespace {
+
+struct Spent {
+  std::int64_t blocks = 0;
+  std::int64_t bytes = 0;
+};
+
+template <class Run>
+Spent spent_by(const Run& run) {
+  const Spent before{blocks, bytes};
+  run();
+  return {blocks - before.blocks, bytes - before.bytes};
+}
+
+enum class Look { kernel, slab, globe, winds, clouds };
+
+constexpr int turns = 6;  // of a camera about the data
+
+std::vector<scene::Scene> orbit(Look look, std::array<int, 3> dims, int width, int height,
+                                double offset = 0) {
+  data::Dataset dataset(data::open_sample("climate", dims, 1).value(), "climate",
+                        std::uint64_t{1} << 30U);
+  protocol::View view = scene::default_view(dataset).value();
+  view.image.width = width;
+  view.image.height = height;
+  if (look == Look::globe) {
+    view.geometry.mapping = protocol::GeometryMapping::sphere;
+    view.camera.eye.reset();
+    view.camera.target.reset();
+    view.camera.height.reset();
+  }
+  if (look == Look::winds) view.scalars.emplace();
+  if (look == Look::clouds) view.vector.field = {protocol::FieldChoice::Kind::none, ""};
+  view.method.name = look == Look::slab ? protocol::MethodName::slab : protocol::MethodName::kernel;
+  const auto placed = scene::place_dataset(view.geometry, dataset).value();
+  std::vector<scene::Scene> scenes;
+  for (int turn = 0; turn < turns; ++turn) {
+    scene::orbit(view, placed->lattice, 360.0 / turns * turn + offset, 25 + offset, 1);
+    scenes.push_back(scene::build_scene(view, dataset).value());
+  }
+  return scenes;
+}
+
+class SteadyState : public testing::TestWithParam<Look> {
+ protected:
+  void draw(const std::vector<scene::Scene>& scenes) {
+    for (const scene::Scene& scene : scenes) {
+      if (!engine::render(scene, pool_, cancel_, space_)) std::abort();
+    }
+  }
+  ThreadPool pool_{2};
+  CancelToken cancel_;
+  engine::RenderSpace space_;
+};
+
+// The plan is made anew for every frame; the report's text is the rest.
+constexpr std::int64_t report_blocks = 3;
+constexpr std::int64_t report_bytes = 256;
+constexpr std::int64_t plan_blocks_max = 250;
+
+// The second time round, and the third, whatever the picture's size.
+TEST_P(SteadyState, FramesAllocateTheirPlanAlone) {
+  struct Size {
+    std::array<int, 3> dims;
+    int width, height;
+  };
+  for (const Size& size : {Size{{40, 24, 8}, 160, 120}, Size{{64, 40, 12}, 240, 180}}) {
+    const auto scenes = orbit(GetParam(), size.dims, size.width, size.height);
+    const Spent plans = spent_by([&] {
+      for (const scene::Scene& scene : scenes) engine::make_plan(scene);
+    });
+    draw(scenes);
+    for (int round = 2; round < 4; ++round) {
+      const Spent spent = spent_by([&] { draw(scenes); });
+      EXPECT_LE(spent.blocks - plans.blocks, turns * report_blocks) << "round " << round;
+      EXPECT_LE(spent.bytes - plans.bytes, turns * report_bytes) << "round " << round;
+    }
+    EXPECT_LE(plans.blocks, turns * plan_blocks_max) << "a plan is a few arrays an axis";
+    // Colour tables, and what a plan keeps of each axis' stops in vectors that double as they grow.
+    const std::int64_t stops = size.dims[0] + size.dims[1] + size.dims[2];
+    EXPECT_LE(plans.bytes, turns * (16384 + 200 * stops)) << plans.bytes / turns;
+  }
+}
+
+// A camera that goes where it never was finds almost everything there: what still grows is far less
+// than a picture a frame.
+TEST_P(SteadyState, AWayNeverTakenBeforeCostsHardlyMore) {
+  const std::array<int, 3> dims{64, 40, 12};
+  const auto warm = orbit(GetParam(), dims, 240, 180);
+  const auto scenes = orbit(GetParam(), dims, 240, 180, 7);
+  draw(warm);
+  draw(warm);
+  const Spent known = spent_by([&] { draw(warm); });
+  const Spent fresh = spent_by([&] { draw(scenes); });
+  const std::int64_t picture = std::int64_t{4} * 240 * 180 * static_cast<int>(sizeof(float));
+  EXPECT_LE(fresh.bytes - known.bytes, turns * picture / 8);
+}
+
+INSTANTIATE_TEST_SUITE_P(Looks, SteadyState,
+                         testing::Values(Look::kernel, Look::slab, Look::globe, Look::winds,
+                                         Look::clouds));
+
+// The counter counts: a vector as large as a picture would be seen.
+TEST(SteadyStateItself, SeesAVector) {
+  const Spent spent = spent_by([] {
+    std::vector<float> picture(4UL * 320 * 240);
+    ASSERT_EQ(picture.back(), 0.0F);
+  });
+  EXPECT_GE(spent.blocks, 1);
+  EXPECT_GE(spent.bytes, static_cast<std::int64_t>(4UL * 320 * 240 * sizeof(float)));
+}
+
+}  // namespace
+}  // namespace windsplat
