@@ -1,5 +1,4 @@
 # The benchmarks: run by hand (HACKING.md). A tiny run of each is a test, so that none can rot.
-find_package(Python3 COMPONENTS Interpreter)
 set(bench_dir ${CMAKE_CURRENT_LIST_DIR}/bench)
 # What the engine is measured against is built plainly, without the vectoriser.
 set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/numerics/naive_renderer.cpp
@@ -20,7 +19,20 @@ windsplat_bench(bench_stages ${bench_dir}/allocations.cpp)
 windsplat_bench(bench_path)
 windsplat_bench(bench_left_out)
 
-foreach(name bench_frame bench_kernels bench_stages)
-  add_test(NAME bench.${name} COMMAND ${name} --smoke)
-  set_tests_properties(bench.${name} PROPERTIES LABELS bench TIMEOUT 300)
-endforeach()
+# windsplat_smoke(<name> <command...>)
+function(windsplat_smoke name)
+  add_test(NAME bench.${name} COMMAND ${ARGN} WORKING_DIRECTORY ${PROJECT_BINARY_DIR})
+  set_tests_properties(bench.${name} PROPERTIES LABELS bench TIMEOUT 300
+    ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+endfunction()
+
+windsplat_smoke(frame bench_frame --smoke)
+windsplat_smoke(kernels bench_kernels --smoke)
+windsplat_smoke(stages bench_stages --smoke)
+file(WRITE ${PROJECT_BINARY_DIR}/bench_views.jsonl "{\"image\":{\"width\":32,\"height\":24}}\n")
+windsplat_smoke(path bench_path tornado bench_views.jsonl bench_view.png)
+windsplat_smoke(memory python3 ${bench_dir}/memory.py --program=$<TARGET_FILE:windsplat>
+  --frames=2 --sessions=2 --size=64x48 --dims=32x16x8)
+# Where there is no VTK it only says so.
+windsplat_smoke(peers python3 ${bench_dir}/peers/compare.py --build=${PROJECT_BINARY_DIR}
+  --frames=1 --sizes=64x48 --dims=32x16x8 --slow)
