@@ -1,10 +1,11 @@
 // The kernels of every target that this processor runs, one at a time on one thread: nanoseconds
-// and time-stamp cycles an item, and a table of targets against portable on stdout:
+// and time-stamp ticks an item, and a table of targets against portable on stdout:
 //
 //   bench_kernels [--markdown=FILE] [--benchmark_out=FILE] [--benchmark_filter=REGEX]
 #include <benchmark/benchmark.h>
 
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -31,24 +32,28 @@ namespace {
 using bench::Workload;
 using engine::kernels::Table;
 
-std::uint64_t cycles() {
+// Ticks of the time-stamp counter a nanosecond; 0 where there is none.
+double ticks_per_ns() {
 #if defined(__x86_64__)
-  return __rdtsc();
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  const std::uint64_t ticks = __rdtsc();
+  while (Clock::now() - start < std::chrono::milliseconds(20)) {
+  }
+  const std::chrono::duration<double, std::nano> passed = Clock::now() - start;
+  return static_cast<double>(__rdtsc() - ticks) / passed.count();
 #else
   return 0;
 #endif
 }
 
-// Runs `body` until the benchmark has enough; it says how many items it did.
+// Runs `body` until the benchmark has enough; it says how many items it did. Processor time.
 template <class Body>
 void time_items(benchmark::State& state, const Body& body) {
   double items = 0;
-  const std::uint64_t start = cycles();
   while (state.KeepRunning()) items += static_cast<double>(body());
-  const auto passed = static_cast<double>(cycles() - start);
   state.counters["s_item"] =
       benchmark::Counter(items, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
-  state.counters["cycles_item"] = passed / items;
   state.counters["items"] = items / static_cast<double>(state.iterations());
 }
 
@@ -177,15 +182,14 @@ class Reporter : public benchmark::ConsoleReporter {
     for (const Run& run : runs) {
       const bool median = run.aggregate_name == "median";
       if (!median && !run.aggregate_name.empty()) continue;
-      const auto value = [&](const char* name) { return run.counters.at(name).value; };
-      items_[run.run_name.function_name] = {1e9 * value("s_item"), value("cycles_item")};
+      items_[run.run_name.function_name] = 1e9 * run.counters.at("s_item").value;
     }
     ConsoleReporter::ReportRuns(runs);
   }
 
   [[nodiscard]] bench::Table table(const std::vector<Case>& all,
                                    const std::vector<const Table*>& targets) const {
-    bench::Row head{"kernel, ns (cycles)"};
+    bench::Row head{"kernel, ns (time-stamp ticks)"};
     for (const Table* target : targets) head.emplace_back(target->name);
     for (const Table* target : targets) {
       if (target != targets.front()) head.push_back("portable/" + std::string(target->name));
@@ -194,16 +198,16 @@ class Reporter : public benchmark::ConsoleReporter {
     for (const Case& one : all) {
       bench::Row row{one.name};
       bench::Row ratios;
-      const Item* first = nullptr;
+      double first = 0;
       for (const Table* target : targets) {
         const auto found = items_.find(std::string(target->name) + ": " + one.name);
         if (found == items_.end()) break;
-        const Item& item = found->second;
-        row.push_back(bench::number("%.2f", item.ns) + bench::number(" (%.1f)", item.cycles));
-        if (first == nullptr) {
-          first = &item;
+        const double ns = found->second;
+        row.push_back(bench::number("%.2f", ns) + bench::number(" (%.1f)", ns * ticks_per_ns_));
+        if (target == targets.front()) {
+          first = ns;
         } else {
-          ratios.push_back(bench::number("%.2fx", first->ns / item.ns));
+          ratios.push_back(bench::number("%.2fx", first / ns));
         }
       }
       row.insert(row.end(), ratios.begin(), ratios.end());
@@ -213,10 +217,8 @@ class Reporter : public benchmark::ConsoleReporter {
   }
 
  private:
-  struct Item {
-    double ns, cycles;
-  };
-  std::map<std::string, Item> items_;
+  double ticks_per_ns_ = ticks_per_ns();
+  std::map<std::string, double> items_;  // ns
 };
 
 int run(int argc, char** argv) {

@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
-"""Peak memory of a real daemon: climate's winds and clouds resident, then sessions at 1280 x 720 that
-turn the camera and take every frame. Table as Markdown on stdout. Linux only (/proc).
+"""Peak memory of a real daemon: climate's winds and clouds resident, then sessions at 1280 x 720
+that turn the camera and take every frame. Table as Markdown on stdout. Linux only (/proc).
 
 Usage: memory.py [--program=windsplat] [--frames=20] [--sessions=4] [--size=1280x720]
-       [--dims=320x160x19] [--max-mb=N]   (exit 1 where the first session's peak is above N MB)"""
+       [--dims=320x160x19 | --built-in] [--max-mb=N]
+
+It serves a netCDF file of the sample; with --built-in the sample itself. Exit 1 where the first
+session's peak is above N MB."""
 import argparse
 import base64
 import json
@@ -155,13 +158,14 @@ def main():
     parser.add_argument("--sessions", type=int, default=4)
     parser.add_argument("--size", default="1280x720")
     parser.add_argument("--dims", default="320x160x19")
+    parser.add_argument("--built-in", action="store_true")
     parser.add_argument("--max-mb", type=float)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         dataset = f"{folder}/climate.nc"
         subprocess.run([options.program, "synth", "climate", "--steps", "1", "--dims", options.dims,
                         "-o", dataset], check=True)
-        daemon = Daemon(options.program, dataset)
+        daemon = Daemon(options.program, "climate" if options.built_in else dataset)
         try:
             rows = measure(daemon, options)
         finally:
@@ -172,7 +176,7 @@ def main():
     voxels = math.prod(map(int, options.dims.split("x")))
     resident = [memory["VmRSS"] for _, memory in rows]
     print(f"\nBytes a voxel resident: {(resident[1] - resident[0]) / voxels:.1f} "
-          "(winds and clouds, with what reading the file leaves behind)")
+          "(winds and clouds, with what reading them leaves behind)")
     if options.sessions > 1:
         more = (resident[3] - resident[2]) / (options.sessions - 1)
         print(f"Bytes a further session: {more / MB:.2f} MB")
