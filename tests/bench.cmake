@@ -1,14 +1,39 @@
-# The benchmarks of whole frames: not tests, run by hand (HACKING.md).
-add_executable(bench_frame
-  ${CMAKE_CURRENT_LIST_DIR}/bench/bench_frame.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/numerics/naive_renderer.cpp)
-target_link_libraries(bench_frame PRIVATE windsplat_engine benchmark::benchmark)
+# The benchmarks: run by hand (HACKING.md). A tiny run of each is a test, so that none can rot.
+set(bench_dir ${CMAKE_CURRENT_LIST_DIR}/bench)
 # What the engine is measured against is built plainly, without the vectoriser.
 set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/numerics/naive_renderer.cpp
   PROPERTIES COMPILE_OPTIONS -O2)
 
-add_executable(bench_left_out ${CMAKE_CURRENT_LIST_DIR}/bench/bench_left_out.cpp)
-target_link_libraries(bench_left_out PRIVATE windsplat_frame benchmark::benchmark)
+add_library(bench_support STATIC ${bench_dir}/support.cpp)
+target_link_libraries(bench_support PUBLIC windsplat_frame benchmark::benchmark)
 
-add_executable(bench_pool ${CMAKE_CURRENT_LIST_DIR}/bench/bench_pool.cpp)
-target_link_libraries(bench_pool PRIVATE windsplat_base benchmark::benchmark)
+# windsplat_bench(<name> <further sources...>)
+function(windsplat_bench name)
+  add_executable(${name} ${bench_dir}/${name}.cpp ${ARGN})
+  target_link_libraries(${name} PRIVATE bench_support)
+endfunction()
+
+windsplat_bench(bench_frame ${CMAKE_CURRENT_LIST_DIR}/numerics/naive_renderer.cpp)
+windsplat_bench(bench_kernels)
+windsplat_bench(bench_stages ${bench_dir}/allocations.cpp)
+windsplat_bench(bench_path)
+windsplat_bench(bench_left_out)
+windsplat_bench(bench_pool)
+
+# windsplat_smoke(<name> <command...>)
+function(windsplat_smoke name)
+  add_test(NAME bench.${name} COMMAND ${ARGN} WORKING_DIRECTORY ${PROJECT_BINARY_DIR})
+  set_tests_properties(bench.${name} PROPERTIES LABELS bench TIMEOUT 300
+    ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+endfunction()
+
+windsplat_smoke(frame bench_frame --smoke)
+windsplat_smoke(kernels bench_kernels --smoke)
+windsplat_smoke(stages bench_stages --smoke)
+file(WRITE ${PROJECT_BINARY_DIR}/bench_views.jsonl "{\"image\":{\"width\":32,\"height\":24}}\n")
+windsplat_smoke(path bench_path tornado bench_views.jsonl bench_view.png)
+windsplat_smoke(memory python3 ${bench_dir}/memory.py --program=$<TARGET_FILE:windsplat>
+  --frames=2 --sessions=2 --size=64x48 --dims=32x16x8)
+# Where there is no VTK it only says so.
+windsplat_smoke(peers python3 ${bench_dir}/peers/compare.py --build=${PROJECT_BINARY_DIR}
+  --frames=1 --sizes=64x48 --dims=32x16x8 --slow)

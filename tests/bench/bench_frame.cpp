@@ -1,81 +1,112 @@
-// Whole frames of the climate sample, engine against naive renderer in one run: times and a table
-// of ratios on stdout, and JSON with machine, compiler and target where asked for:
+// Whole frames, engine against naive renderer in one run: times and a table of ratios on stdout,
+// and JSON with machine, compiler and target where asked for:
 //
-//   bench_frame [--benchmark_out=FILE] [--benchmark_filter=REGEX]
+//   bench_frame [--all] [--markdown=FILE] [--benchmark_out=FILE] [--benchmark_filter=REGEX]
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "server/data/store.hpp"
-#include "server/engine/kernels/dispatch.hpp"
+#include "server/base/thread_pool.hpp"
 #include "server/engine/render.hpp"
+#include "server/image/encode.hpp"
 #include "server/scene/build.hpp"
+#include "tests/bench/support.hpp"
+#include "tests/bench/text_table.hpp"
 #include "tests/numerics/naive_renderer.hpp"
 
 namespace windsplat {
 namespace {
 
-// Everything visible is drawn: every wind above a thousandth of the range has its line, as in the
-// paper's figures, whatever the view's default would leave out for clarity.
-struct Workload {
-  const char* name;
-  const char* preset;
-  int width;
-  int height;
-  bool every_line;
-  scene::Method method = scene::Method::kernel;  // as moving frames are drawn
+using bench::number;
+using bench::value_or_give_up;
+using bench::Workload;
+
+struct Size {
+  int width, height;
 };
 
-constexpr Workload workloads[] = {
-    {"winds 640x480", "winds", 640, 480, true},
-    {"winds+clouds 640x480", "default", 640, 480, true},
-    {"winds 1280x720", "winds", 1280, 720, true},
-    {"winds+clouds 1280x720", "default", 1280, 720, true},
-    {"default view 640x480", "default", 640, 480, false},
-    {"clouds 640x480", "clouds", 640, 480, false},
-    {"winds+clouds by slab", "default", 640, 480, true, scene::Method::slab},
-    {"default view by slab", "default", 640, 480, false, scene::Method::slab},
-};
-
-[[noreturn]] void give_up(const Error& error) {
-  std::fprintf(stderr, "bench_frame: %s\n", error.message.c_str());
-  std::exit(1);  // NOLINT(concurrency-mt-unsafe)
+std::string named(const std::string& what, const Size& size) {
+  return what + " " + std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-template <class T>
-T value_or_give_up(Result<T> result) {
-  if (!result) give_up(result.error());
-  return std::move(*result);
+// The same scene by method slab: no naive row, because the naive renderer is one of kernels.
+Workload by_slab(Workload workload) {
+  workload.name += " slab";
+  workload.method = protocol::MethodName::slab;
+  workload.naive = false;
+  return workload;
 }
 
-data::Dataset& climate() {
-  static data::Dataset dataset(value_or_give_up(data::open_sample("climate")), "climate",
-                               std::uint64_t{4} << 30U);
-  return dataset;
-}
-
-scene::Scene make_scene(const Workload& workload) {
-  data::Dataset& dataset = climate();
-  protocol::View view = value_or_give_up(scene::default_view(dataset));
-  view.image.width = workload.width;
-  view.image.height = workload.height;
-  const auto placed = value_or_give_up(scene::place_dataset(view.geometry, dataset));
-  const scene::Lattice& lattice = placed->lattice;
-  if (auto applied = scene::apply_preset(view, lattice, workload.preset); !applied) {
-    give_up(applied.error());
+void add_climate(const Size& size, bool heavy, std::vector<Workload>& out) {
+  struct Kind {
+    const char* name;
+    const char* preset;
+    bool every_line;
+    bool slab;
+  };
+  constexpr std::array<Kind, 4> kinds = {{{"winds", "winds", true, false},
+                                          {"winds+clouds", "default", true, true},
+                                          {"clouds", "clouds", false, true},
+                                          {"default view", "default", false, true}}};
+  for (const Kind& kind : kinds) {
+    Workload workload;
+    workload.name = named(kind.name, size);
+    workload.preset = kind.preset;
+    workload.width = size.width;
+    workload.height = size.height;
+    workload.every_line = kind.every_line;
+    workload.heavy = heavy;
+    out.push_back(workload);
+    if (kind.slab) out.push_back(by_slab(workload));
   }
-  scene::orbit(view, lattice, 20, 35, 1);
-  scene::Scene scene = value_or_give_up(scene::build_scene(view, dataset));
-  scene.method = workload.method;
-  if (workload.every_line && scene.vector) {
-    scene.vector->min_magnitude = 1e-3 * scene.vector->magnitude_range[1];
+}
+
+void add_large(const Size& size, std::vector<Workload>& out) {
+  Workload tornado;
+  tornado.name = named("tornado 256^3", size);
+  tornado.sample = bench::tornado_256;
+  tornado.width = size.width;
+  tornado.height = size.height;
+  tornado.heavy = true;
+  Workload scalar = tornado;
+  scalar.name = named("scalar 512^3", size);
+  scalar.sample = bench::tornado_512;
+  scalar.preset = "clouds";
+  for (const Workload& workload : {tornado, scalar}) {
+    out.push_back(workload);
+    out.push_back(by_slab(workload));
   }
-  return scene;
+}
+
+std::vector<Workload> all_workloads() {
+  std::vector<Workload> out;
+  add_climate({640, 480}, false, out);
+  add_climate({1280, 720}, false, out);
+  add_climate({1920, 1080}, true, out);
+  add_large({640, 480}, out);
+  add_large({1280, 720}, out);
+  // One dataset is open at a time.
+  std::stable_sort(out.begin(), out.end(), [](const Workload& a, const Workload& b) {
+    return a.sample.dims[0] < b.sample.dims[0];
+  });
+  return out;
+}
+
+// One tiny frame, so that the program is known to run.
+std::vector<Workload> smoke_workloads() {
+  Workload workload;
+  workload.name = "winds+clouds 64x48";
+  workload.sample.dims = {32, 16, 8};
+  workload.width = 64;
+  workload.height = 48;
+  return {workload, by_slab(workload)};
 }
 
 void count_work(benchmark::State& state, const engine::WorkReport& work) {
@@ -85,10 +116,11 @@ void count_work(benchmark::State& state, const engine::WorkReport& work) {
 }
 
 void engine_frame(benchmark::State& state, const Workload& workload, unsigned threads) {
-  const scene::Scene scene = make_scene(workload);
+  const scene::Scene scene = bench::scene_of(workload);
   ThreadPool pool(threads);
   const CancelToken cancel;
-  engine::WorkReport work;
+  // Touches the memory and the samples once.
+  engine::WorkReport work = value_or_give_up(engine::render(scene, pool, cancel)).work;
   while (state.KeepRunning()) {
     auto rendered = value_or_give_up(engine::render(scene, pool, cancel));
     benchmark::DoNotOptimize(rendered.image.rgba.data());
@@ -97,12 +129,48 @@ void engine_frame(benchmark::State& state, const Workload& workload, unsigned th
   count_work(state, work);
 }
 
+// How far two pictures are apart as they are displayed.
+struct Apart {
+  int codes = 0;      // of 255, in the worst channel of the worst pixel
+  double beyond = 0;  // channels that are more than one code apart, of a million
+  double psnr_db;     // over all channels; infinite where they are the same, and then not told
+};
+
+Apart apart(const image::Bytes& a, const image::Bytes& b) {
+  Apart out{};
+  double square = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const int codes = std::abs(int{a[i]} - int{b[i]});
+    out.codes = std::max(out.codes, codes);
+    square += codes * codes;
+    if (codes > 1) out.beyond += 1e6 / static_cast<double>(a.size());
+  }
+  out.psnr_db = 10 * std::log10(255.0 * 255.0 * static_cast<double>(a.size()) / square);
+  return out;
+}
+
 void naive_frame(benchmark::State& state, const Workload& workload) {
-  const scene::Scene scene = make_scene(workload);
+  const scene::Scene scene = bench::scene_of(workload);
   while (state.KeepRunning()) {
     auto picture = naive::render<float>(scene);
     benchmark::DoNotOptimize(picture.rgba.data());
   }
+  // In double precision: the difference is then the engine's own.
+  const naive::Picture<double> exact = naive::render<double>(scene);
+  ThreadPool pool(0);
+  const auto engine = value_or_give_up(engine::render(scene, pool, CancelToken()));
+  const auto shown = [&](const std::vector<float>& rgba) {
+    return image::tone_map(rgba, exact.width, exact.height, scene.background);
+  };
+  const Apart found =
+      apart(shown({exact.rgba.begin(), exact.rgba.end()}), shown(engine.image.rgba));
+  state.counters["codes_apart"] = found.codes;
+  state.counters["channels_beyond_1_ppm"] = found.beyond;
+  if (found.codes > 0) state.counters["psnr_db"] = found.psnr_db;
+}
+
+std::string threads_label(unsigned threads) {
+  return std::to_string(threads) + (threads == 1 ? " thread" : " threads");
 }
 
 // Console output as ever, and the medians for the table.
@@ -111,77 +179,116 @@ class Reporter : public benchmark::ConsoleReporter {
   Reporter() : ConsoleReporter(OO_Tabular) {}
   void ReportRuns(const std::vector<Run>& runs) override {
     for (const Run& run : runs) {
-      if (run.aggregate_name == "median") {
-        medians_[run.run_name.function_name] = {run.GetAdjustedRealTime(),
-                                                run.GetAdjustedCPUTime()};
-      }
+      const bool median = run.aggregate_name == "median";
+      if (!median && !run.aggregate_name.empty()) continue;
+      Frame frame{run.GetAdjustedRealTime(), run.GetAdjustedCPUTime(), {}};
+      for (const auto& [name, counter] : run.counters) frame.counters[name] = counter.value;
+      frames_[run.run_name.function_name] = frame;
     }
     ConsoleReporter::ReportRuns(runs);
   }
 
   // Wall times; the ratio to the naive renderer by processor time, which other programs on the
   // machine disturb less.
-  void print_table() const {
-    std::printf("\n%-24s %10s %10s %10s %9s %9s\n", "frame, ms", "naive", "1 thread", "2 threads",
-                "naive/1", "1/2");
+  [[nodiscard]] bench::Table table(const std::vector<Workload>& workloads) const {
+    bench::Row head{"frame, ms", "naive"};
+    const std::vector<unsigned> counts = bench::thread_counts();
+    for (const unsigned threads : counts) head.push_back(threads_label(threads));
+    head.insert(head.end(),
+                {"naive/1", "1/" + std::to_string(counts.back()), "codes apart", "beyond 1, ppm",
+                 "PSNR, dB", "samples, M", "pixel updates, M", "exponentials, M"});
+    bench::Table out{head};
     for (const Workload& workload : workloads) {
-      const std::string name = workload.name;
-      const auto naive = medians_.find(name + " naive");
-      const auto one = medians_.find(name + " 1 thread");
-      const auto two = medians_.find(name + " 2 threads");
-      if (naive == medians_.end() || one == medians_.end() || two == medians_.end()) continue;
-      std::printf("%-24s %10.1f %10.1f %10.1f %8.1fx %8.2fx\n", workload.name, naive->second.wall,
-                  one->second.wall, two->second.wall,
-                  naive->second.processor / one->second.processor,
-                  one->second.wall / two->second.wall);
+      if (find(workload, threads_label(1)) != nullptr) out.push_back(row(workload, counts));
     }
+    return out;
   }
 
  private:
-  struct Times {
+  struct Frame {
     double wall;
     double processor;
+    std::map<std::string, double> counters;
   };
-  std::map<std::string, Times> medians_;
+
+  [[nodiscard]] const Frame* find(const Workload& workload, const std::string& how) const {
+    const auto found = frames_.find(workload.name + " " + how);
+    return found == frames_.end() ? nullptr : &found->second;
+  }
+
+  [[nodiscard]] bench::Row row(const Workload& workload,
+                               const std::vector<unsigned>& counts) const {
+    const Frame* naive = find(workload, "naive");
+    const Frame& one = *find(workload, threads_label(1));
+    bench::Row out{workload.name, naive != nullptr ? number("%.1f", naive->wall) : ""};
+    const Frame* most = nullptr;
+    for (const unsigned threads : counts) {
+      most = find(workload, threads_label(threads));
+      out.push_back(most != nullptr ? number("%.1f", most->wall) : "");
+    }
+    out.push_back(naive != nullptr ? number("%.1fx", naive->processor / one.processor) : "");
+    out.push_back(most != nullptr ? number("%.2fx", one.wall / most->wall) : "");
+    out.push_back(naive != nullptr ? number("%.0f", naive->counters.at("codes_apart")) : "");
+    out.push_back(naive != nullptr ? number("%.1f", naive->counters.at("channels_beyond_1_ppm"))
+                                   : "");
+    const bool differs = naive != nullptr && naive->counters.count("psnr_db") > 0;
+    out.push_back(differs ? number("%.1f", naive->counters.at("psnr_db")) : "");
+    for (const char* name : {"samples", "pixel_updates", "exponentials"}) {
+      out.push_back(number("%.2f", 1e-6 * one.counters.at(name)));
+    }
+    return out;
+  }
+
+  std::map<std::string, Frame> frames_;
 };
 
-void register_frames() {
-  const auto settle = [](benchmark::internal::Benchmark* frame, int repetitions, int iterations) {
-    frame->Unit(benchmark::kMillisecond)
-        ->UseRealTime()
-        ->Iterations(iterations)
-        ->Repetitions(repetitions)
-        ->ReportAggregatesOnly(true);
-  };
+void settle(benchmark::internal::Benchmark* frame, int repetitions, int iterations) {
+  frame->Unit(benchmark::kMillisecond)
+      ->UseRealTime()
+      ->MeasureProcessCPUTime()
+      ->Iterations(iterations)
+      ->Repetitions(repetitions)
+      ->ReportAggregatesOnly(repetitions > 1);
+}
+
+void register_frames(const std::vector<Workload>& workloads) {
   for (const Workload& workload : workloads) {
-    const std::string name = workload.name;
-    settle(benchmark::RegisterBenchmark(
-               (name + " naive").c_str(),
-               [&workload](benchmark::State& state) { naive_frame(state, workload); }),
-           3, 1);
-    for (const unsigned threads : {1U, 2U}) {
-      const std::string label = name + (threads == 1 ? " 1 thread" : " 2 threads");
-      settle(benchmark::RegisterBenchmark(label.c_str(),
+    if (workload.naive) {
+      settle(benchmark::RegisterBenchmark(
+                 (workload.name + " naive").c_str(),
+                 [&workload](benchmark::State& state) { naive_frame(state, workload); }),
+             workload.heavy ? 1 : 3, 1);
+    }
+    const bool kernel = workload.method == protocol::MethodName::kernel;
+    for (const unsigned threads : bench::thread_counts()) {
+      settle(benchmark::RegisterBenchmark((workload.name + " " + threads_label(threads)).c_str(),
                                           [&workload, threads](benchmark::State& state) {
                                             engine_frame(state, workload, threads);
                                           }),
-             9, 3);
+             workload.heavy ? 3 : 9, kernel && !workload.heavy ? 2 : 1);
     }
   }
 }
 
 int run(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
+  const bool all = !bench::take_option(argc, argv, "--all").empty();
+  const bool smoke = !bench::take_option(argc, argv, "--smoke").empty();
+  const std::string markdown = bench::take_option(argc, argv, "--markdown");
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
-  const auto target = value_or_give_up(engine::kernels::chosen_table());
-  benchmark::AddCustomContext("target", target->name);
-  benchmark::AddCustomContext("compiler", __VERSION__);
-  register_frames();
+  bench::add_context();
+  std::vector<Workload> workloads = smoke ? smoke_workloads() : all_workloads();
+  if (!all) std::erase_if(workloads, [](const Workload& workload) { return workload.heavy; });
+  register_frames(workloads);
   Reporter reporter;
   benchmark::RunSpecifiedBenchmarks(&reporter);
-  reporter.print_table();
+  const bench::Table table = reporter.table(workloads);
+  std::printf("\n%s", bench::plain(table, 1).c_str());
+  if (!markdown.empty())
+    bench::write_file(markdown, bench::machine_line() + bench::markdown(table));
   benchmark::Shutdown();
-  return 0;
+  // A smoke run must have drawn what it was to draw.
+  return smoke && table.size() != 1 + workloads.size() ? 1 : 0;
 }
 
 }  // namespace

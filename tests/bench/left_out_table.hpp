@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <string>
 #include <vector>
 
 #include "server/engine/work.hpp"
+#include "tests/bench/text_table.hpp"
 
 namespace windsplat::bench {
 
@@ -26,16 +26,6 @@ struct Pair {
   Half with, without;
 };
 
-using Row = std::vector<std::string>;
-using Table = std::vector<Row>;  // the first row names the columns
-
-inline double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // The array at the end of an NPY file of float32.
 inline std::vector<float> npy_values(const std::vector<std::uint8_t>& bytes, int width,
                                      int height) {
@@ -44,12 +34,6 @@ inline std::vector<float> npy_values(const std::vector<std::uint8_t>& bytes, int
   const std::size_t size = values.size() * sizeof(float);
   std::memcpy(values.data(), bytes.data() + (bytes.size() - size), size);
   return values;
-}
-
-inline std::string number(const char* format, double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
 }
 
 inline std::string both(const char* format, double with, double without) {
@@ -147,41 +131,6 @@ inline std::vector<Table> tables(const std::vector<Pair>& pairs) {
     if (pair.alike) errors.push_back(error_row(pair));
   }
   return {costs, errors};
-}
-
-inline std::string markdown(const Table& table) {
-  std::string text;
-  for (std::size_t r = 0; r < table.size(); ++r) {
-    text += "|";
-    for (const std::string& cell : table[r]) {
-      text += " ";
-      text += cell;
-      text += " |";
-    }
-    text += "\n";
-    if (r > 0) continue;
-    text += "|";
-    for (std::size_t c = 0; c < table[r].size(); ++c) text += "---|";
-    text += "\n";
-  }
-  return text;
-}
-
-inline std::string plain(const Table& table) {
-  std::vector<std::size_t> widths(table.front().size());
-  for (const Row& row : table) {
-    for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
-  }
-  std::string text;
-  for (const Row& row : table) {
-    for (std::size_t c = 0; c < row.size(); ++c) {
-      const std::string space(widths[c] - row[c].size(), ' ');
-      text += c < 2 ? row[c] + space : space + row[c];
-      text += "  ";
-    }
-    text += "\n";
-  }
-  return text;
 }
 
 }  // namespace windsplat::bench

@@ -1,0 +1,18 @@
+// What a program takes from operator new: linked in, it replaces the global one and counts.
+#pragma once
+
+#include <cstdint>
+
+namespace windsplat::bench {
+
+struct Allocations {
+  std::int64_t count = 0;      // ever
+  std::int64_t bytes = 0;      // ever, as asked for
+  std::int64_t live = 0;       // now, as the heap gives them
+  std::int64_t live_peak = 0;  // since forget_peak()
+};
+
+Allocations allocations();
+void forget_peak();
+
+}  // namespace windsplat::bench

@@ -1,0 +1,82 @@
+// What the benchmarks share: datasets and views of the workloads, the machine they ran on, and an
+// end with a word where something fails.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "protocol/view.hpp"
+#include "server/base/error.hpp"
+#include "server/data/store.hpp"
+#include "server/scene/scene.hpp"
+
+namespace windsplat::bench {
+
+[[noreturn]] void give_up(const std::string& message);
+
+template <class T>
+T value_or_give_up(Result<T> result) {
+  if (!result) give_up(result.error().message);
+  return std::move(*result);
+}
+
+// A built-in sample at a size; {0, 0, 0} is its own.
+struct Sample {
+  const char* name;
+  std::array<int, 3> dims{0, 0, 0};
+};
+
+inline constexpr Sample climate{"climate"};
+inline constexpr Sample tornado_256{"tornado", {256, 256, 256}};
+inline constexpr Sample tornado_512{"tornado", {512, 512, 512}};
+
+// every_line: every wind above a thousandth of the range has its line, as in the paper's figures,
+// whatever the view's default would leave out for clarity.
+struct Workload {
+  std::string name;
+  Sample sample = climate;
+  const char* preset = "default";
+  int width = 640;
+  int height = 480;
+  bool every_line = true;
+  protocol::MethodName method = protocol::MethodName::kernel;  // as moving frames are drawn
+  bool naive = true;   // also by the naive renderer, whose picture is compared
+  bool heavy = false;  // seconds a frame by the naive renderer, or a gigabyte of data
+};
+
+// The first step, opened once and kept until another sample is asked for.
+data::Dataset& dataset_of(const Sample& sample);
+
+// The completed view of the workload: the preset from azimuth 20, elevation 35 (degrees).
+protocol::View view_of(const Workload& workload);
+
+// The same view from another azimuth.
+void turn(protocol::View& view, const Workload& workload, double azimuth);
+
+scene::Scene scene_of(const Workload& workload);
+
+// 1, 2, 4, ... and as many as the hardware has.
+std::vector<unsigned> thread_counts();
+
+// As JSON's "context" tells it: name and value of processor, compiler, targets, version.
+std::vector<std::pair<std::string, std::string>> machine();
+
+// The same as a line above a table, Markdown.
+std::string machine_line();
+
+// Adds machine() to Google Benchmark's context.
+void add_context();
+
+// The value of `--name=value`, or "set" of a bare `--name`; empty where it is absent. The argument
+// is taken out of argv.
+std::string take_option(int& argc, char** argv, const std::string& name);
+
+// Bytes from /proc/self/status, for example of "VmHWM"; 0 where the system has none.
+std::size_t process_bytes(const std::string& key);
+
+void write_file(const std::string& path, const std::string& text);
+
+}  // namespace windsplat::bench
