@@ -59,9 +59,23 @@ void name_fields(const scene::Scene& scene, const protocol::View& completed,
   }
 }
 
+// " level=1,1,0": how often each axis was halved; nothing where none was.
+void name_level(const std::array<int, 3>& level, engine::WorkReport& work) {
+  if (level == std::array{0, 0, 0}) return;
+  work.variant += " level=";
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (a > 0) work.variant += ',';
+    work.variant += std::to_string(level.at(a));
+  }
+}
+
 Result<engine::Rendered> render_scene(const scene::Scene& scene, ThreadPool& pool,
                                       const CancelToken& cancel) {
-  if (scene.method != scene::Method::reference) return engine::render(scene, pool, cancel);
+  if (scene.method != scene::Method::reference) {
+    auto drawn = engine::render(scene, pool, cancel);
+    if (drawn) name_level(scene.level, drawn->work);
+    return drawn;
+  }
   auto truth = engine::reference::render(scene, pool, cancel);
   if (!truth) return truth.error();
   engine::Rendered rendered;
