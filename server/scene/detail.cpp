@@ -48,7 +48,7 @@ std::array<int, 3> choose_level(const Camera& camera, const Lattice& lattice,
     if (slice && slice->axis == static_cast<int>(a)) continue;
     const auto& spacing = lattice.spacing[a];
     while (data::halved(lattice.dims[a], level[a] + 1) >= 2 &&
-           widest_cell(spacing, level[a] + 1) * scale <= coarse_cell_px) {
+           widest_cell(spacing, level[a]) * scale < halved_below_px) {
       ++level[a];
     }
   }

@@ -15,11 +15,12 @@ namespace windsplat::scene {
 // (but not before the near plane).
 double pixels_per_unit(const Camera& camera, const Lattice& lattice);
 
-// How often each axis of a rectilinear lattice may be halved so that no cell's edge, from whatever
-// side it is seen, covers more than coarse_cell_px where the box is nearest. Which way the camera
-// looks does not matter, so that turning it never changes the level. Bent lattices and the axis of
-// a slice are not halved, an axis never below two samples.
-inline constexpr double coarse_cell_px = 1.5;
+// How often each axis of a rectilinear lattice is halved: as long as its widest cell's edge, seen
+// from whatever side, covers less than halved_below_px where the box is nearest. So what is drawn
+// has cells of at most two pixels. Which way the camera looks does not matter: turning it never
+// changes the level. Bent lattices and the axis of a slice are not halved, an axis never below two
+// samples.
+inline constexpr double halved_below_px = 1;
 std::array<int, 3> choose_level(const Camera& camera, const Lattice& lattice,
                                 const std::optional<Slice>& slice);
 
