@@ -93,7 +93,7 @@ class Budget {
     for (auto at = recent_.begin(); at != recent_.end();) {
       const auto next = std::next(at);
       if (std::get<0>(*at) == owner) {
-        drop(*at);
+        drop(at);
       }
       at = next;
     }
@@ -113,12 +113,12 @@ class Budget {
     }
   }
 
-  void drop(const Key key) {
-    const auto at = entries_.find(key);
+  void drop(std::list<Key>::iterator listed) {
+    const auto at = entries_.find(*listed);
     used_ -= at->second->bytes;
     at->second->listed = false;
-    recent_.erase(at->second->place);
     entries_.erase(at);
+    recent_.erase(listed);
   }
 
   // Nobody outside can gain a reference while the lock is held, so a count of one stays one.
@@ -140,9 +140,7 @@ class Budget {
     for (auto at = recent_.end(); at != recent_.begin() && used_ > bytes_max_ - bytes;) {
       --at;
       if (!is_held(*entries_.at(*at))) {
-        const Key key = *at;
-        ++at;
-        drop(key);
+        drop(at++);
       }
     }
     return used_ <= bytes_max_ - bytes;

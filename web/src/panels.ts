@@ -1,7 +1,14 @@
 // The panels at the picture's side: lines, media, geometry, camera, method and quality. Built anew
 // for each dataset.
 import GUI from "lil-gui";
-import { compositingHints, compositingOptions, detailHints, detailOptions, methodHints, methodOptions } from "./controls";
+import {
+  compositingHints,
+  compositingOptions,
+  detailHints,
+  detailOptions,
+  methodHints,
+  methodOptions,
+} from "./controls";
 import { addLines, type FlowSwitch } from "./panel_lines";
 import { addMedia } from "./panel_media";
 import { keyAccess, PanelKit, type PanelHost } from "./panel_kit";
