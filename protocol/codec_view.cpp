@@ -43,6 +43,8 @@ constexpr std::array<Name<Compositing>, 5> compositing_names{{{Compositing::simp
                                                               {Compositing::cd, "cd"},
                                                               {Compositing::analytic, "analytic"},
                                                               {Compositing::cd_euler, "cd-euler"}}};
+constexpr std::array<Name<Detail>, 2> detail_names{
+    {{Detail::automatic, "auto"}, {Detail::full, "full"}}};
 
 constexpr NumberRange fraction{0, 1};
 constexpr NumberRange world{-limits::world_max, limits::world_max};
@@ -302,6 +304,7 @@ MethodView read_method(const Json& json, const std::string& pointer, Faults& fau
   reader.number("slabThickness", method.slab_thickness,
                 {limits::slab_thickness_min, limits::slab_thickness_max});
   reader.number("stopTransmittance", method.stop_transmittance, fraction);
+  reader.choice("detail", method.detail, detail_names);
   reader.finish();
   return method;
 }
@@ -458,7 +461,8 @@ Json view_to_json(const View& view) {
        {{"name", name_of(view.method.name, method_names)},
         {"compositing", name_of(view.method.compositing, compositing_names)},
         {"slabThickness", canonical_number(view.method.slab_thickness)},
-        {"stopTransmittance", canonical_number(view.method.stop_transmittance)}}},
+        {"stopTransmittance", canonical_number(view.method.stop_transmittance)},
+        {"detail", name_of(view.method.detail, detail_names)}}},
       {"quality", {{"budgetMs", number_or_null(view.quality.budget_ms)}, {"maxError", nullptr}}}};
 }
 

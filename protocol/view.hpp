@@ -23,6 +23,7 @@ enum class ColorBy { world_z, screen_z, rise, magnitude, direction, scalar, cons
 enum class MotionMode { still, phase };
 enum class MethodName { kernel, slab, reference };
 enum class Compositing { simple, cd_naive, cd, analytic, cd_euler };
+enum class Detail { automatic, full };
 
 struct CameraView {
   Projection projection = Projection::perspective;
@@ -125,6 +126,7 @@ struct MethodView {
   Compositing compositing = Compositing::analytic;
   double slab_thickness = 1;  // grid cells along the line of sight, `slab` only
   double stop_transmittance = 1.5e-4;
+  Detail detail = Detail::automatic;  // automatic: coarser where cells are below a pixel
 };
 
 struct QualityView {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -121,6 +122,14 @@ class Source {
 Result<std::unique_ptr<Source>> open_sample(const std::string& name,
                                             std::array<int, 3> dims = {0, 0, 0}, int steps = 0);
 std::vector<std::string> sample_names();
+
+// A sample's name with a size of its own: "tornado:256" is a cube, "climate:640x320x38" a box, the
+// bare name {0,0,0}. Empty: no sample is called so.
+struct SizedSample {
+  std::string name;
+  std::array<int, 3> dims{};
+};
+std::optional<SizedSample> sized_sample(const std::string& text);
 
 // Opens a local file by its content, whatever its name. Errors: not_found, bad_data.
 Result<std::unique_ptr<Source>> open_file(const std::string& path);

@@ -16,13 +16,15 @@
 #include <utility>
 
 #include "server/base/log.hpp"
+#include "server/data/digest.hpp"
 
 namespace windsplat::data {
 
 namespace {
 
-// Which volume: the dataset by its number in the budget, field, step.
-using Key = std::tuple<std::uint64_t, std::size_t, std::size_t>;
+// Which volume: the dataset by its number in the budget, field, step, and the digest of how it was
+// coarsened (empty: as it was loaded).
+using Key = std::tuple<std::uint64_t, std::size_t, std::size_t, std::string>;
 using VolumePtr = std::shared_ptr<const Volume>;
 
 std::string megabytes(std::uint64_t bytes) {
@@ -91,7 +93,7 @@ class Budget {
     for (auto at = recent_.begin(); at != recent_.end();) {
       const auto next = std::next(at);
       if (std::get<0>(*at) == owner) {
-        drop(*at);
+        drop(at);
       }
       at = next;
     }
@@ -111,12 +113,12 @@ class Budget {
     }
   }
 
-  void drop(const Key key) {
-    const auto at = entries_.find(key);
+  void drop(std::list<Key>::iterator listed) {
+    const auto at = entries_.find(*listed);
     used_ -= at->second->bytes;
     at->second->listed = false;
-    recent_.erase(at->second->place);
     entries_.erase(at);
+    recent_.erase(listed);
   }
 
   // Nobody outside can gain a reference while the lock is held, so a count of one stays one.
@@ -138,9 +140,7 @@ class Budget {
     for (auto at = recent_.end(); at != recent_.begin() && used_ > bytes_max_ - bytes;) {
       --at;
       if (!is_held(*entries_.at(*at))) {
-        const Key key = *at;
-        ++at;
-        drop(key);
+        drop(at++);
       }
     }
     return used_ <= bytes_max_ - bytes;
@@ -172,11 +172,32 @@ struct Dataset::State {
   std::any kept_value;
   std::atomic<std::uint64_t> loads{0};
 
+  // Checked: where a field and a step are. Errors: not_found.
+  Result<std::size_t> find(const std::string& field, std::size_t step) const {
+    const FieldInfo* found = info.find(field);
+    if (found == nullptr) {
+      return make_error(ErrorKind::not_found, "dataset '" + printable(info.id) +
+                                                  "' has no field '" + printable(field) + "'");
+    }
+    if (step >= info.steps.size()) {
+      return make_error(ErrorKind::not_found, "dataset '" + printable(info.id) + "' has no step " +
+                                                  std::to_string(step) + "; its last is " +
+                                                  std::to_string(info.steps.size() - 1));
+    }
+    return static_cast<std::size_t>(found - info.fields.data());
+  }
+
   Result<VolumePtr> load(std::size_t field, std::size_t step) {
     const std::lock_guard lock(source_mutex);
     loads.fetch_add(1);
+    return guarded(field, [&] { return source->read(field, step); });
+  }
+
+  // Runs what makes a volume; what it throws becomes an error.
+  template <class Make>
+  Result<VolumePtr> guarded(std::size_t field, const Make& make) const {
     try {
-      auto volume = source->read(field, step);
+      Result<Volume> volume = make();
       if (!volume) {
         return volume.error();
       }
@@ -209,21 +230,39 @@ Dataset::~Dataset() { state_->budget->forget(state_->owner); }
 const DatasetInfo& Dataset::info() const { return state_->info; }
 
 Result<std::shared_ptr<const Volume>> Dataset::volume(const std::string& field, std::size_t step) {
+  const Result<std::size_t> index = state_->find(field, step);
+  if (!index) {
+    return index.error();
+  }
   const DatasetInfo& info = state_->info;
-  const FieldInfo* found = info.find(field);
-  if (found == nullptr) {
-    return make_error(ErrorKind::not_found, "dataset '" + printable(info.id) + "' has no field '" +
-                                                printable(field) + "'");
+  const std::uint64_t bytes =
+      info.grid.samples() * info.fields[*index].components.size() * sizeof(float);
+  return state_->budget->get({state_->owner, *index, step, ""}, bytes,
+                             [&] { return state_->load(*index, step); });
+}
+
+Result<std::shared_ptr<const Volume>> Dataset::level(const std::string& field, std::size_t step,
+                                                     const Coarsening& how) {
+  if (how.halvings == std::array{0, 0, 0}) {
+    return volume(field, step);
   }
-  if (step >= info.steps.size()) {
-    return make_error(ErrorKind::not_found, "dataset '" + printable(info.id) + "' has no step " +
-                                                std::to_string(step) + "; its last is " +
-                                                std::to_string(info.steps.size() - 1));
+  const Result<std::size_t> index = state_->find(field, step);
+  if (!index) {
+    return index.error();
   }
-  const auto index = static_cast<std::size_t>(found - info.fields.data());
-  const std::uint64_t bytes = info.grid.samples() * found->components.size() * sizeof(float);
-  return state_->budget->get({state_->owner, index, step}, bytes,
-                             [&] { return state_->load(index, step); });
+  const DatasetInfo& info = state_->info;
+  std::uint64_t bytes = info.fields[*index].components.size() * sizeof(float);
+  for (std::size_t a = 0; a < 3; ++a) {
+    bytes *= static_cast<std::uint64_t>(halved(info.grid.dims()[a], how.halvings[a]));
+  }
+  const auto average = [&]() -> Result<VolumePtr> {
+    const auto fine = volume(field, step);
+    if (!fine) {
+      return fine.error();
+    }
+    return state_->guarded(*index, [&]() -> Result<Volume> { return coarsen(**fine, how); });
+  };
+  return state_->budget->get({state_->owner, *index, step, digest_of(key_of(how))}, bytes, average);
 }
 
 std::any Dataset::kept(const std::string& key) const {
@@ -267,21 +306,20 @@ Store::Store(std::uint64_t bytes_max) : state_(std::make_unique<State>(bytes_max
 Store::~Store() = default;
 
 Result<std::shared_ptr<Dataset>> Store::add(const std::string& sample_or_path) {
-  const std::vector<std::string> samples = sample_names();
-  const bool is_sample = std::find(samples.begin(), samples.end(), sample_or_path) != samples.end();
-  auto source = is_sample ? open_sample(sample_or_path) : open_file(sample_or_path);
+  const auto sample = sized_sample(sample_or_path);
+  auto source = sample ? open_sample(sample->name, sample->dims) : open_file(sample_or_path);
   if (!source) {
     Error error = source.error();
     if (error.kind == ErrorKind::not_found && sample_or_path.find('/') == std::string::npos) {
       error.message += "; the built-in samples are";
-      for (const std::string& sample : samples) {
-        error.message += ' ' + sample;
+      for (const std::string& name : sample_names()) {
+        error.message += ' ' + name;
       }
     }
     return error;
   }
   const std::string wanted =
-      is_sample ? sample_or_path : std::filesystem::path(sample_or_path).stem().native();
+      sample ? sample_or_path : std::filesystem::path(sample_or_path).stem().native();
   const std::lock_guard lock(state_->mutex);
   auto dataset = std::make_shared<Dataset>(std::move(*source), state_->unique_id(printable(wanted)),
                                            state_->budget);

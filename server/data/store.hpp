@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "server/base/error.hpp"
+#include "server/data/coarsen.hpp"
 #include "server/data/dataset.hpp"
 
 namespace windsplat::data {
@@ -28,6 +29,12 @@ class Dataset {
   // The field at the step; loads it if it is not resident. What a caller holds stays valid.
   // Errors: not_found (no such field or step), bad_data, out_of_memory.
   Result<std::shared_ptr<const Volume>> volume(const std::string& field, std::size_t step);
+
+  // The field at the step, coarser: averaged once on first need, shared and counted in the memory
+  // limit like the volume itself, which need not stay resident for it. One that asks while another
+  // averages waits for it. Nothing halved: the volume itself. Errors: those of volume().
+  Result<std::shared_ptr<const Volume>> level(const std::string& field, std::size_t step,
+                                              const Coarsening& how);
 
   // What a caller derived from this dataset and would be slow to derive again: one value, replaced
   // by the next. Empty unless it was kept under this key.
@@ -49,7 +56,8 @@ class Store {
   ~Store();
 
   // Opens and registers; the id is the sample's name or the file's name without its extension,
-  // made unique by -2, -3. A sample is named by its bare name, a file by its path.
+  // made unique by -2, -3. A sample is named by its bare name or with a size of its own (see
+  // sized_sample), a file by its path.
   Result<std::shared_ptr<Dataset>> add(const std::string& sample_or_path);
   [[nodiscard]] Result<std::shared_ptr<Dataset>> find(const std::string& id) const;
   [[nodiscard]] std::vector<std::shared_ptr<Dataset>> all() const;  // in the order they were added

@@ -59,10 +59,24 @@ void name_fields(const scene::Scene& scene, const protocol::View& completed,
   }
 }
 
+// " level=1,1,0": how often each axis was halved; nothing where none was.
+void name_level(const std::array<int, 3>& level, engine::WorkReport& work) {
+  if (level == std::array{0, 0, 0}) return;
+  work.variant += " level=";
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (a > 0) work.variant += ',';
+    work.variant += std::to_string(level.at(a));
+  }
+}
+
 // The picture is space.image().
 Result<engine::WorkReport> render_scene(const scene::Scene& scene, ThreadPool& pool,
                                         const CancelToken& cancel, engine::RenderSpace& space) {
-  if (scene.method != scene::Method::reference) return engine::render(scene, pool, cancel, space);
+  if (scene.method != scene::Method::reference) {
+    auto work = engine::render(scene, pool, cancel, space);
+    if (work) name_level(scene.level, *work);
+    return work;
+  }
   auto truth = engine::reference::render(scene, pool, cancel);
   if (!truth) return truth.error();
   space.image() = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};

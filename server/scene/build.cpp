@@ -6,6 +6,7 @@
 
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"
+#include "server/scene/detail.hpp"
 #include "server/scene/rates.hpp"
 
 namespace windsplat::scene {
@@ -106,18 +107,44 @@ void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
   layer.magnitude_intensity = from.magnitude_intensity;
 }
 
+// Of the level that is drawn: fields are fetched as coarse as it, from wherever the view names
+// them.
+struct Fields {
+  data::Dataset& dataset;
+  std::size_t step;
+  data::Coarsening coarsening;
+  [[nodiscard]] Result<std::shared_ptr<const data::Volume>> get(const std::string& name) const {
+    return dataset.level(name, step, coarsening);
+  }
+};
+
+// How much of the detail a view asks for its picture can show.
+std::array<int, 3> level_of(const View& view, const Scene& full) {
+  const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
+  const bool strided = (lines && view.vector.stride > 1) ||
+                       std::any_of(view.scalars->begin(), view.scalars->end(),
+                                   [](const auto& scalar) { return scalar.stride > 1; });
+  // A stride counts samples of the data, and the truth is that of all of them.
+  if (view.method.detail == protocol::Detail::full || strided ||
+      view.method.name == protocol::MethodName::reference) {
+    return {0, 0, 0};
+  }
+  return choose_level(full.camera, full.lattice, full.slice);
+}
+
 Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
-                                      data::Dataset& dataset) {
+                                      const Fields& fields) {
   const protocol::VectorView& from = view.vector;
   VectorLayer layer;
   layer.scale = {from.scale[0], from.scale[1], from.scale[2]};
   if (from.space == protocol::VectorSpace::world) {
-    auto rates = world_rates(placed.grid, *dataset.info().find(from.field.name), view.geometry,
-                             placed.lattice);
+    const auto rates = world_rates(placed.grid, *fields.dataset.info().find(from.field.name),
+                                   view.geometry, placed.lattice);
     if (!rates) return rates.error();
-    layer.rate_x = std::move(rates->x);
+    const auto& level = fields.coarsening.halvings;
+    layer.rate_x = coarsen_along(rates->x, placed.lattice.spacing[1], level[1]);
     layer.rate_y = rates->y;
-    layer.rate_z = std::move(rates->z);
+    layer.rate_z = coarsen_along(rates->z, placed.lattice.spacing[2], level[2]);
   }
   layer.length = from.length.value();
   layer.span = from.span;
@@ -132,11 +159,11 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
   if (layer.moving) layer.motion_cycles = from.motion_rate * (view.step + from.motion_time);
   layer.epoch = from.jitter.per_step ? static_cast<std::uint32_t>(view.step) : 0U;
   if (layer.color_by == LineColor::scalar) {
-    auto values = dataset.volume(from.color.field.value(), static_cast<std::size_t>(view.step));
+    auto values = fields.get(from.color.field.value());
     if (!values) return values.error();
     layer.color_field = std::move(*values);
   }
-  auto volume = dataset.volume(from.field.name, static_cast<std::size_t>(view.step));
+  auto volume = fields.get(from.field.name);
   if (!volume) return volume.error();
   layer.field = std::move(*volume);
   return layer;
@@ -147,14 +174,13 @@ bool absorbs(const protocol::ScalarView& scalar) {
                      [](const auto& point) { return point[1] > 0; });
 }
 
-Result<ScalarLayer> make_scalar_layer(const protocol::ScalarView& from, int step,
-                                      data::Dataset& dataset) {
+Result<ScalarLayer> make_scalar_layer(const protocol::ScalarView& from, const Fields& fields) {
   ScalarLayer layer;
   layer.color = make_table(from.color.map.value(), from.color.range.value());
   layer.extinction = from.extinction.value();
   layer.min_optical_depth = from.min_optical_depth;
   layer.stride = from.stride;
-  auto volume = dataset.volume(from.field, static_cast<std::size_t>(step));
+  auto volume = fields.get(from.field);
   if (!volume) return volume.error();
   layer.field = std::move(*volume);
   return layer;
@@ -179,15 +205,21 @@ Result<Scene> build_scene(const View& completed, data::Dataset& dataset) {
   const double depth = depths[1] - depths[0];
   scene.depth_cue = {view.depth_cue.strength, depths[0] + view.depth_cue.near * depth,
                      depths[0] + view.depth_cue.far * depth};
+  scene.level = level_of(view, scene);
+  const Fields fields{dataset, static_cast<std::size_t>(view.step),
+                      coarsening_of(scene.lattice, scene.level)};
+  const double pixels = pixels_per_unit(scene.camera, scene.lattice);
+  scene.lattice = coarsen_lattice(scene.lattice, scene.level);
   const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
   if (lines && view.vector.opacity > 0) {
-    auto layer = make_vector_layer(view, **placed, dataset);
+    auto layer = make_vector_layer(view, **placed, fields);
     if (!layer) return layer.error();
+    merge_lines((*placed)->lattice, scene.level, pixels, *layer);
     scene.vector = std::move(*layer);
   }
   for (const protocol::ScalarView& scalar : *view.scalars) {
     if (!absorbs(scalar)) continue;
-    auto layer = make_scalar_layer(scalar, view.step, dataset);
+    auto layer = make_scalar_layer(scalar, fields);
     if (!layer) return layer.error();
     scene.scalars.push_back(std::move(*layer));
   }

@@ -126,7 +126,8 @@ struct Slice {
 
 struct Scene {
   Camera camera;
-  Lattice lattice;
+  Lattice lattice;                    // of the level that is drawn
+  std::array<int, 3> level{0, 0, 0};  // how often each axis of the data was halved
   std::optional<VectorLayer> vector;
   std::vector<ScalarLayer> scalars;
   DepthCue depth_cue;

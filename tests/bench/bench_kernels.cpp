@@ -92,13 +92,15 @@ void jitter(benchmark::State& state, const Table& table) {
 struct Ready {
   Ready(const Workload& workload, const Table& table)
       : scene(bench::scene_of(workload)), plan(engine::make_plan(scene)), pool(1) {
-    bins = engine::make_bins(plan, table, pool, CancelToken(), work);
+    bins = &engine::make_bins(plan, table, pool, CancelToken(), bin_space, work);
   }
   scene::Scene scene;
   engine::RenderPlan plan;
   ThreadPool pool;
   engine::WorkReport work;
-  engine::Bins bins;
+  engine::BinSpace bin_space;
+  engine::TileSpace tile_space;
+  const engine::Bins* bins = nullptr;  // in bin_space
 };
 
 // Per stop of the bricks that are in the picture.
@@ -108,7 +110,7 @@ void summarise(benchmark::State& state, const Table& table, const Workload& work
   const auto scale = static_cast<float>(workload.height);
   time_items(state, [&] {
     std::int64_t stops = 0;
-    for (const auto& brick : ready.bins.bricks) {
+    for (const auto& brick : ready.bins->bricks) {
       engine::kernels::BrickSummary summary{};
       table.summarise(ready.plan.passes[brick.pass].kernel, brick, scale, summary);
       benchmark::DoNotOptimize(summary);
@@ -123,7 +125,8 @@ void bin(benchmark::State& state, const Table& table, const Workload& workload) 
   Ready ready(workload, table);
   time_items(state, [&] {
     engine::WorkReport work;
-    const auto bins = engine::make_bins(ready.plan, table, ready.pool, CancelToken(), work);
+    const auto& bins = engine::make_bins(ready.plan, table, ready.pool, CancelToken(),
+                                         ready.bin_space, work);
     benchmark::DoNotOptimize(bins.entries.data());
     return work.samples;
   });
@@ -137,7 +140,8 @@ void draw(benchmark::State& state, const Table& table, const Workload& workload)
   time_items(state, [&] {
     image.rgba.assign(4 * static_cast<std::size_t>(image.width) * image.height, 0.0F);
     work = ready.work;
-    engine::draw_tiles(ready.plan, ready.bins, table, ready.pool, CancelToken(), image, work);
+    engine::draw_tiles(ready.plan, *ready.bins, table, ready.pool, CancelToken(), ready.tile_space,
+                       image, work);
     benchmark::DoNotOptimize(image.rgba.data());
     return work.samples;
   });

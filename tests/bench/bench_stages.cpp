@@ -55,6 +55,8 @@ constexpr std::array<const char*, 7> stages = {"view",  "scene",    "plan", "bin
 // One frame, stage by stage.
 void staged_frame(const protocol::View& asked, const Workload& workload, ThreadPool& pool,
                   Series& series) {
+  static engine::BinSpace bin_space;
+  static engine::TileSpace tile_space;
   data::Dataset& dataset = bench::dataset_of(workload.sample);
   const auto& table = *value_or_give_up(engine::kernels::chosen_table());
   const CancelToken cancel;
@@ -71,11 +73,11 @@ void staged_frame(const protocol::View& asked, const Workload& workload, ThreadP
   lap();
   const engine::RenderPlan plan = engine::make_plan(scene);
   lap();
-  const engine::Bins bins = engine::make_bins(plan, table, pool, cancel, work);
+  const engine::Bins& bins = engine::make_bins(plan, table, pool, cancel, bin_space, work);
   lap();
   engine::Image image{scene.camera.width, scene.camera.height, {}};
   image.rgba.assign(4 * static_cast<std::size_t>(image.width) * image.height, 0.0F);
-  engine::draw_tiles(plan, bins, table, pool, cancel, image, work);
+  engine::draw_tiles(plan, bins, table, pool, cancel, tile_space, image, work);
   lap();
   const image::Bytes rgb = image::tone_map(image.rgba, image.width, image.height, scene.background);
   lap();

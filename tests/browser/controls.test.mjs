@@ -201,6 +201,9 @@ test("the slab's thickness is asked for only of slabs, and each compositing is e
       assert.equal(await lastPatch(page, "method", "compositing"), word);
       await note(hint).waitFor();
     }
+    await choose(page, "detail", /^full$/);
+    assert.equal(await lastPatch(page, "method", "detail"), "full");
+    await note(/Every sample/).waitFor();
   }));
 
 test("a slice is chosen by axis and layer, and taken away again", () =>

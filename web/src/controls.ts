@@ -33,6 +33,13 @@ export const methodHints: Readonly<Record<string, string>> = {
 // `reference` is not offered: streams are refused it.
 export const methodOptions: Options = { kernel: "kernel", slab: "slab" };
 
+export const detailHints: Readonly<Record<string, string>> = {
+  auto: "Samples closer than a pixel are averaged.",
+  full: "Every sample is drawn.",
+};
+
+export const detailOptions: Options = { auto: "auto", full: "full" };
+
 // What a picker of fields offers.
 export function fieldOptions(dataset: Dataset, kind: Field["kind"]): Options {
   return optionsOf(dataset.fields.filter((field) => field.kind === kind));

@@ -1,7 +1,14 @@
 // The panels at the picture's side: lines, media, geometry, camera, method and quality. Built anew
 // for each dataset.
 import GUI from "lil-gui";
-import { compositingHints, compositingOptions, methodHints, methodOptions } from "./controls";
+import {
+  compositingHints,
+  compositingOptions,
+  detailHints,
+  detailOptions,
+  methodHints,
+  methodOptions,
+} from "./controls";
 import { addLines, type FlowSwitch } from "./panel_lines";
 import { addMedia } from "./panel_media";
 import { keyAccess, PanelKit, type PanelHost } from "./panel_kit";
@@ -74,6 +81,8 @@ function addMethod(gui: GUI, kit: PanelKit): void {
   kit.showWhen((states) => states.slab, thickness);
   kit.choice(folder, "compositing", keyAccess("/method/compositing"), compositingOptions);
   kit.note(folder, () => compositingHints[host.view().method?.compositing ?? ""] ?? "");
+  kit.choice(folder, "detail", keyAccess("/method/detail"), detailOptions);
+  kit.note(folder, () => detailHints[host.view().method?.detail ?? ""] ?? "");
   kit.number(folder, "stop transmittance", keyAccess("/method/stopTransmittance"), {
     min: 0,
     max: 0.05,

@@ -277,6 +277,26 @@ TEST_F(Produce, FrameInfoNamesMethodsAndSlabs) {
   EXPECT_EQ(info.slab_thickness, 0.5);
 }
 
+TEST_F(Produce, ReportTellsTheLevelAndWhatIsReallyDrawn) {
+  view.image.width = 20;
+  view.image.height = 15;
+  const auto coarse = produce_as(Format::png);
+  view.method.detail = protocol::Detail::full;
+  const auto full = produce_as(Format::png);
+  ASSERT_TRUE(coarse && full);
+  EXPECT_EQ(full->work.variant.find("level"), std::string::npos) << full->work.variant;
+  EXPECT_EQ(full->work.samples, 16 * 16 * 16);
+  const std::size_t at = coarse->work.variant.find(" level=");
+  ASSERT_NE(at, std::string::npos) << coarse->work.variant;
+  const int level = std::stoi(coarse->work.variant.substr(at + 7));
+  ASSERT_GE(level, 1);
+  const std::string each = std::to_string(level);
+  EXPECT_EQ(coarse->work.variant.substr(at), " level=" + each + "," + each + "," + each);
+  EXPECT_EQ(coarse->work.samples, full->work.samples >> (3 * level));
+  EXPECT_EQ(coarse->work.bytes, full->work.bytes >> (3 * level));
+  EXPECT_EQ(coarse->work.fields, full->work.fields);
+}
+
 TEST_F(Produce, FrameInfoTellsTheReport) {
   const auto frame = produce_as(Format::jpeg, 1);
   ASSERT_TRUE(frame) << frame.error().message;

@@ -1,0 +1,116 @@
+// Levels of detail: from the size of a cell in pixels to the coarser lattice and its lines.
+#include "server/scene/detail.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "server/scene/build.hpp"
+#include "server/scene/camera.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+// First and past-the-end sample of every group of 2^halvings.
+std::vector<std::array<std::size_t, 2>> groups(std::size_t samples, int halvings) {
+  const std::size_t size = std::size_t{1} << static_cast<unsigned>(halvings);
+  std::vector<std::array<std::size_t, 2>> out;
+  for (std::size_t first = 0; first < samples; first += size) {
+    out.push_back({first, std::min(first + size, samples)});
+  }
+  return out;
+}
+
+double widest_cell(const std::vector<double>& spacing, int halvings) {
+  double widest = 0;
+  for (const auto& [first, end] : groups(spacing.size(), halvings)) {
+    double width = 0;
+    for (std::size_t i = first; i < end; ++i) width += spacing[i];
+    widest = std::max(widest, width);
+  }
+  return widest;
+}
+
+}  // namespace
+
+double pixels_per_unit(const Camera& camera, const Lattice& lattice) {
+  const double scale = 0.5 * camera.height / camera.half_height;
+  return camera.perspective ? scale / view_depths(camera, lattice)[0] : scale;
+}
+
+std::array<int, 3> choose_level(const Camera& camera, const Lattice& lattice,
+                                const std::optional<Slice>& slice) {
+  std::array<int, 3> level{0, 0, 0};
+  if (lattice.places) return level;
+  const double scale = pixels_per_unit(camera, lattice);
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (slice && slice->axis == static_cast<int>(a)) continue;
+    const auto& spacing = lattice.spacing[a];
+    while (data::halved(lattice.dims[a], level[a] + 1) >= 2 &&
+           widest_cell(spacing, level[a]) * scale < halved_below_px) {
+      ++level[a];
+    }
+  }
+  return level;
+}
+
+data::Coarsening coarsening_of(const Lattice& lattice, const std::array<int, 3>& level) {
+  data::Coarsening how;
+  how.halvings = level;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (level[a] > 0) how.widths[a] = lattice.spacing[a];
+  }
+  return how;
+}
+
+std::vector<double> coarsen_along(const std::vector<double>& values,
+                                  const std::vector<double>& widths, int halvings) {
+  std::vector<double> out;
+  for (const auto& [first, end] : groups(values.size(), halvings)) {
+    double sum = 0;
+    double width = 0;
+    for (std::size_t i = first; i < end; ++i) {
+      sum += widths[i] * values[i];
+      width += widths[i];
+    }
+    out.push_back(end - first == 1 ? values[first] : sum / width);
+  }
+  return out;
+}
+
+Lattice coarsen_lattice(const Lattice& lattice, const std::array<int, 3>& level) {
+  Lattice out = lattice;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto& spacing = lattice.spacing[a];
+    out.positions[a] = coarsen_along(lattice.positions[a], spacing, level[a]);
+    out.dims[a] = data::halved(lattice.dims[a], level[a]);
+    out.spacing[a].clear();
+    for (const auto& [first, end] : groups(spacing.size(), level[a])) {
+      double width = 0;
+      for (std::size_t i = first; i < end; ++i) width += spacing[i];
+      out.spacing[a].push_back(width);
+    }
+  }
+  return out;
+}
+
+void merge_lines(const Lattice& fine, const std::array<int, 3>& level, double pixels_per_unit,
+                 VectorLayer& layer) {
+  // The mean over groups, so that an odd last sample does not count as two.
+  double lines = 1;
+  double apart_px = 0;  // from the first to the last of a group, where the box is nearest
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double group = static_cast<double>(fine.dims[a]) / data::halved(fine.dims[a], level[a]);
+    lines *= group;
+    apart_px = std::max(apart_px, (group - 1) * cell_size(fine, a) * pixels_per_unit);
+  }
+  const double together = lines * layer.opacity;
+  layer.opacity = std::min(1.0, together);
+  if (together <= 1) return;
+  const double wider = 0.5 * std::min((together - 1) * (layer.r1 + layer.r2), apart_px);
+  layer.r1 += wider;
+  layer.r2 += wider;
+}
+
+}  // namespace windsplat::scene

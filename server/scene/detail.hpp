@@ -1,0 +1,45 @@
+// Level of detail: how coarse a lattice may be drawn for a camera, and the lattice and lines of
+// that level. Camera + lattice -> halvings -> lattice, averages, opacities.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "server/data/coarsen.hpp"
+#include "server/scene/scene.hpp"
+
+namespace windsplat::scene {
+
+// Pixels that a world unit across the view covers where the lattice's box is nearest to the eye
+// (but not before the near plane).
+double pixels_per_unit(const Camera& camera, const Lattice& lattice);
+
+// How often each axis of a rectilinear lattice is halved: as long as its widest cell's edge, seen
+// from whatever side, covers less than halved_below_px where the box is nearest. So what is drawn
+// has cells of at most two pixels. Which way the camera looks does not matter: turning it never
+// changes the level. Bent lattices and the axis of a slice are not halved, an axis never below two
+// samples.
+inline constexpr double halved_below_px = 1;
+std::array<int, 3> choose_level(const Camera& camera, const Lattice& lattice,
+                                const std::optional<Slice>& slice);
+
+// How to average the lattice's volumes for that level.
+data::Coarsening coarsening_of(const Lattice& lattice, const std::array<int, 3>& level);
+
+// Each group of cells as one: as wide as all of them, its sample at their middle (the mean of the
+// samples' places weighted by width). The box stays.
+Lattice coarsen_lattice(const Lattice& lattice, const std::array<int, 3>& level);
+
+// Means of a quantity along an axis, weighted by the cells' widths.
+std::vector<double> coarsen_along(const std::vector<double>& values,
+                                  const std::vector<double>& widths, int halvings);
+
+// The lines of a layer that is drawn at this level: one stands for as many as its samples, with
+// their opacity together, a' = min(1, n a). What is beyond 1 goes into its width, but no more than
+// the samples' places lie apart on the screen: side by side within a pixel they would hide each
+// other.
+void merge_lines(const Lattice& fine, const std::array<int, 3>& level, double pixels_per_unit,
+                 VectorLayer& layer);
+
+}  // namespace windsplat::scene

@@ -1,0 +1,155 @@
+// A picture at a coarser level against the same picture of every sample: how far they are apart.
+#include "server/scene/detail.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "scenes.hpp"
+#include "server/data/coarsen.hpp"
+
+namespace windsplat::test {
+namespace {
+
+using Level = std::array<int, 3>;
+
+// A cube of 128 samples a side as wide as the picture of 64 pixels: half a pixel a cell.
+scene::Scene small_picture() {
+  scene::Scene scene;
+  const double cell = 2.0 / 128;
+  scene.lattice = even_lattice({128, 128, 128}, {cell, cell, cell});
+  scene.camera = look({0, 0, 0}, {0.35, 1, -0.4}, 5, 64, 64, false, 1.0);
+  scene.stop_transmittance = 0;
+  return scene;
+}
+
+std::shared_ptr<const data::Volume> coarser(const std::shared_ptr<const data::Volume>& fine,
+                                            const data::Coarsening& how) {
+  return std::make_shared<const data::Volume>(data::coarsen(*fine, how));
+}
+
+scene::Scene at_level(const scene::Scene& full, const Level& level) {
+  scene::Scene scene = full;
+  const auto how = scene::coarsening_of(full.lattice, level);
+  scene.lattice = scene::coarsen_lattice(full.lattice, level);
+  scene.level = level;
+  for (auto& layer : scene.scalars) layer.field = coarser(layer.field, how);
+  if (scene.vector) {
+    scene.vector->field = coarser(scene.vector->field, how);
+    scene::merge_lines(full.lattice, level, scene::pixels_per_unit(full.camera, full.lattice),
+                       *scene.vector);
+  }
+  return scene;
+}
+
+double rmse(const engine::Image& a, const engine::Image& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.rgba.size(); ++i) {
+    const double d = static_cast<double>(a.rgba[i]) - b.rgba[i];
+    sum += d * d;
+  }
+  return std::sqrt(sum / static_cast<double>(a.rgba.size()));
+}
+
+double mean_alpha(const engine::Image& image) {
+  double sum = 0;
+  for (std::size_t i = 3; i < image.rgba.size(); i += 4) sum += image.rgba[i];
+  return 4 * sum / static_cast<double>(image.rgba.size());
+}
+
+TEST(Detail, ASmoothBlobLooksTheSameAtAnEighthOfItsSamples) {
+  scene::Scene full = small_picture();
+  const auto blob = [](int, double x, double y, double z) {
+    return static_cast<float>(4 * std::exp(-6 * (x * x + y * y + z * z)));
+  };
+  full.scalars = {medium(make_volume(full.lattice, 1, blob), {0.9F, 0.5F, 0.2F})};
+  full.scalars[0].color = ramp_color(0, 4, {0.9F, 0.2F, 0.1F}, {0.2F, 0.5F, 1.0F});
+  const Level level = scene::choose_level(full.camera, full.lattice, {});
+  ASSERT_EQ(level, (Level{1, 1, 1}));
+  for (const auto method : {scene::Method::kernel, scene::Method::slab}) {
+    full.method = method;
+    const engine::Rendered whole = render(full);
+    ASSERT_GT(mean_alpha(whole.image), 0.1);
+    const engine::Rendered coarse = render(at_level(full, level));
+    EXPECT_EQ(8 * coarse.work.samples, whole.work.samples);
+    const double error = rmse(whole.image, coarse.image);
+    EXPECT_LT(error, 2e-3);
+    // Two levels too many show: the bound above can fail.
+    EXPECT_GT(rmse(whole.image, render(at_level(full, {3, 3, 3})).image), 3 * error);
+  }
+}
+
+// Extinction is per length, so that averages of it keep the light: here at the far end of what a
+// box filter does to unsmooth data, noise from sample to sample.
+TEST(Detail, NoiseKeepsItsMeanOpacity) {
+  scene::Scene full = small_picture();
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> value(0, 1);
+  full.scalars = {medium(
+      make_volume(full.lattice, 1, [&](int, double, double, double) { return value(random); }),
+      {1, 1, 1})};
+  const double whole = mean_alpha(render(full).image);
+  const double coarse = mean_alpha(render(at_level(full, {1, 1, 1})).image);
+  EXPECT_NEAR(coarse, whole, 0.005 * whole);
+}
+
+TEST(Detail, SmallLinesKeepTheirMeanOpacity) {
+  for (const double opacity : {0.002, 0.02, 0.2}) {
+    scene::Scene full = small_picture();
+    // Every sample has a line of a few pixels, each in a direction that turns slowly.
+    const auto swirl = [](int c, double x, double y, double z) {
+      const std::array<double, 3> v{-y, x, 0.5 * std::cos(2 * z)};
+      const double length = std::sqrt(x * x + y * y + 0.25 * std::cos(2 * z) * std::cos(2 * z));
+      return static_cast<float>(v.at(static_cast<std::size_t>(c)) / length);
+    };
+    full.vector = plain_lines(make_volume(full.lattice, 3, swirl), {1, 1, 1});
+    full.vector->length = 0.1;
+    full.vector->r1 = 0;
+    full.vector->r2 = 1;
+    full.vector->opacity = opacity;
+    const double whole = mean_alpha(render(full).image);
+    ASSERT_GT(whole, 0.1) << opacity;
+    EXPECT_NEAR(mean_alpha(render(at_level(full, {1, 1, 1})).image), whole, 0.04 * whole)
+        << opacity;
+    EXPECT_NEAR(mean_alpha(render(at_level(full, {1, 0, 1})).image), whole, 0.04 * whole)
+        << opacity;
+  }
+}
+
+// A thin layer of opaque lines, which leave gaps: merged ones must not let more through.
+TEST(Detail, OpaqueLinesInOneLayerKeepTheirMeanOpacity) {
+  scene::Scene full = small_picture();
+  const auto few = [](int c, double x, double y, double z) {
+    const bool there = std::abs(z) < 0.03 && std::sin(25 * x) * std::sin(25 * y) > 0.5;
+    return c == 0 && there ? 1.0F : 0.0F;
+  };
+  full.vector = plain_lines(make_volume(full.lattice, 3, few), {1, 1, 1});
+  full.vector->length = 0.1;
+  full.vector->opacity = 1;
+  full.vector->min_magnitude = 0.4;
+  for (const double r1 : {0.0, 0.6}) {
+    full.vector->r1 = r1;
+    full.vector->r2 = r1 + 0.8;
+    const double whole = mean_alpha(render(full).image);
+    ASSERT_GT(whole, 0.1);
+    ASSERT_LT(whole, 0.7);
+    EXPECT_NEAR(mean_alpha(render(at_level(full, {1, 1, 1})).image), whole, 0.08 * whole) << r1;
+  }
+}
+
+TEST(Detail, IsTheSameForAnyNumberOfThreads) {
+  scene::Scene full = small_picture();
+  const auto wave = [](int c, double x, double y, double z) {
+    return static_cast<float>(1 + std::sin(5 * x + c) * std::cos(4 * y - z));
+  };
+  full.scalars = {medium(make_volume(full.lattice, 1, wave), {0.9F, 0.5F, 0.2F})};
+  full.vector = plain_lines(make_volume(full.lattice, 3, wave), {0.2F, 0.5F, 0.9F});
+  const auto one = render(at_level(full, {1, 1, 1}), 1);
+  const auto three = render(at_level(full, {1, 1, 1}), 3);
+  EXPECT_EQ(one.image.rgba, three.image.rgba);
+}
+
+}  // namespace
+}  // namespace windsplat::test

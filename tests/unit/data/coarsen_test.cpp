@@ -1,0 +1,208 @@
+// Coarser volumes: what averages keep, what masks do, and how a dataset shares and pays for them.
+#include "server/data/coarsen.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "server/data/store.hpp"
+
+namespace windsplat::data {
+namespace {
+
+constexpr float masked = std::numeric_limits<float>::quiet_NaN();
+
+Volume volume_of(std::array<int, 3> dims, int components, std::vector<float> values) {
+  Volume volume;
+  volume.dims = dims;
+  volume.components = components;
+  volume.values = std::move(values);
+  finish_volume(volume);
+  return volume;
+}
+
+std::vector<double> uneven(int count, std::mt19937& random) {
+  std::uniform_real_distribution<double> width(0.2, 3.0);
+  std::vector<double> out(static_cast<std::size_t>(count));
+  for (double& w : out) w = width(random);
+  return out;
+}
+
+std::vector<double> sums(const std::vector<double>& widths, int halvings) {
+  std::vector<double> out;
+  for (std::size_t i = 0; i < widths.size(); ++i) {
+    if (i % (std::size_t{1} << static_cast<unsigned>(halvings)) == 0) out.push_back(0);
+    out.back() += widths[i];
+  }
+  return out;
+}
+
+// The integral of a component over space, its unmasked cells alone.
+double integral(const Volume& volume, int c, const std::array<std::vector<double>, 3>& widths) {
+  double sum = 0;
+  std::size_t n = 0;
+  for (const double z : widths[2]) {
+    for (const double y : widths[1]) {
+      for (const double x : widths[0]) sum += x * y * z * volume.component(c)[n++];
+    }
+  }
+  return sum;
+}
+
+TEST(Coarsen, KeepsTheIntegralOverUnevenCells) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> value(-2, 5);
+  const std::array<int, 3> dims{11, 6, 5};
+  for (const std::array<int, 3> halvings :
+       {std::array{1, 1, 1}, {0, 1, 0}, {2, 0, 1}, {4, 2, 0}, {0, 0, 3}}) {
+    Coarsening how{halvings, {}};
+    for (std::size_t a = 0; a < 3; ++a) how.widths[a] = uneven(dims[a], random);
+    std::vector<float> values(3 * 11 * 6 * 5);
+    for (float& v : values) v = value(random);
+    const Volume fine = volume_of(dims, 3, values);
+    const Volume coarse = coarsen(fine, how);
+    std::array<std::vector<double>, 3> widths;
+    for (std::size_t a = 0; a < 3; ++a) {
+      widths[a] = sums(how.widths[a], halvings[a]);
+      ASSERT_EQ(coarse.dims[a], static_cast<int>(widths[a].size()));
+    }
+    ASSERT_EQ(coarse.components, 3);
+    for (int c = 0; c < 3; ++c) {
+      const double whole = integral(fine, c, how.widths);
+      EXPECT_NEAR(integral(coarse, c, widths), whole, 1e-5 * std::abs(whole) + 1e-3) << c;
+    }
+  }
+}
+
+TEST(Coarsen, WeighsNeighboursByTheirCells) {
+  const Volume fine = volume_of({3, 1, 1}, 1, {1, 5, 7});
+  const Volume coarse = coarsen(fine, {{1, 0, 0}, {std::vector<double>{3, 1, 2}, {}, {}}});
+  EXPECT_EQ(coarse.dims, (std::array{2, 1, 1}));
+  EXPECT_FLOAT_EQ(coarse.values[0], 2);  // (3 * 1 + 1 * 5) / 4
+  EXPECT_FLOAT_EQ(coarse.values[1], 7);  // the odd one alone
+  EXPECT_FLOAT_EQ(coarse.range[0], 2);
+  EXPECT_FLOAT_EQ(coarse.range[1], 7);
+}
+
+TEST(Coarsen, AConstantStaysConstant) {
+  std::mt19937 random(3);
+  const std::array<int, 3> dims{9, 7, 4};
+  Coarsening how{{2, 1, 1}, {}};
+  for (std::size_t a = 0; a < 3; ++a) how.widths[a] = uneven(dims[a], random);
+  for (const float value : {0.0F, 0.3F, -1e30F, std::numeric_limits<float>::max() / 1.0001F}) {
+    const Volume coarse = coarsen(volume_of(dims, 1, std::vector<float>(9 * 7 * 4, value)), how);
+    EXPECT_EQ(coarse.masked, 0);
+    for (const float v : coarse.values) EXPECT_NEAR(v, value, 1e-5 * std::abs(value));
+  }
+}
+
+TEST(Coarsen, MaskedSamplesCountOnlyWhereAllAre) {
+  const Volume fine = volume_of({4, 2, 1}, 2,
+                                {1, masked, masked, masked, 3, masked, masked, masked,  //
+                                 10, masked, masked, masked, 30, masked, masked, masked});
+  const std::vector<double> even(4, 1.0);
+  const Volume coarse = coarsen(fine, {{1, 1, 0}, {even, {1, 3}, {}}});
+  ASSERT_EQ(coarse.dims, (std::array{2, 1, 1}));
+  EXPECT_FLOAT_EQ(coarse.component(0)[0], 2.5);  // (1 * 1 + 3 * 3) / 4
+  EXPECT_FLOAT_EQ(coarse.component(1)[0], 25);
+  EXPECT_TRUE(std::isnan(coarse.component(0)[1]));
+  EXPECT_TRUE(std::isnan(coarse.component(1)[1]));
+  EXPECT_EQ(coarse.masked, 1);
+}
+
+class Levels : public testing::Test {
+ protected:
+  // Scalars of 16^3: 16 KiB at level 0, 2 KiB at level 1.
+  static constexpr std::uint64_t fine_bytes = 4 * 16 * 16 * 16;
+  static constexpr std::uint64_t coarse_bytes = fine_bytes / 8;
+
+  static std::unique_ptr<Dataset> dataset_within(std::uint64_t bytes) {
+    return std::make_unique<Dataset>(std::move(*open_sample("tornado", {16, 16, 16}, 4)), "t",
+                                     bytes);
+  }
+  static Coarsening halves(double last_width = 1) {
+    Coarsening how{{1, 1, 1}, {}};
+    for (auto& widths : how.widths) widths.assign(16, 1.0);
+    how.widths[2].back() = last_width;
+    return how;
+  }
+};
+
+TEST_F(Levels, AreAveragedOnceAndSharedAndPaidFor) {
+  const auto dataset = dataset_within(1U << 20U);
+  const auto coarse = dataset->level("vorticity", 1, halves());
+  ASSERT_TRUE(coarse) << coarse.error().message;
+  EXPECT_EQ((*coarse)->dims, (std::array{8, 8, 8}));
+  EXPECT_EQ(dataset->resident_bytes(), fine_bytes + coarse_bytes);
+  EXPECT_EQ(dataset->level("vorticity", 1, halves())->get(), coarse->get());
+  EXPECT_NE(dataset->level("vorticity", 1, halves(2))->get(), coarse->get());
+  EXPECT_EQ(dataset->resident_bytes(), fine_bytes + 2 * coarse_bytes);
+  EXPECT_EQ(dataset->loads(), 1U);
+  const auto& fine = *dataset->volume("vorticity", 1).value();
+  EXPECT_FLOAT_EQ((*coarse)->values[0],
+                  (fine.values[0] + fine.values[1] + fine.values[16] + fine.values[17] +
+                   fine.values[256] + fine.values[257] + fine.values[272] + fine.values[273]) /
+                      8);
+}
+
+TEST_F(Levels, NothingHalvedIsTheVolumeItself) {
+  const auto dataset = dataset_within(1U << 20U);
+  const auto same = dataset->level("cloud", 0, Coarsening{});
+  ASSERT_TRUE(same);
+  EXPECT_EQ(same->get(), dataset->volume("cloud", 0)->get());
+  EXPECT_EQ(dataset->resident_bytes(), fine_bytes);
+}
+
+TEST_F(Levels, KeepWithinTheMemoryLimit) {
+  EXPECT_EQ(dataset_within(fine_bytes)->level("cloud", 0, halves()).error().kind,
+            ErrorKind::out_of_memory);
+  // Room for a volume and its level: the next step's evict both.
+  const auto dataset = dataset_within(fine_bytes + coarse_bytes);
+  ASSERT_TRUE(dataset->level("cloud", 0, halves()));
+  ASSERT_TRUE(dataset->level("cloud", 1, halves()));
+  EXPECT_EQ(dataset->resident_bytes(), fine_bytes + coarse_bytes);
+  EXPECT_EQ(dataset->loads(), 2U);
+}
+
+TEST_F(Levels, OutliveTheVolumeTheyComeFrom) {
+  const auto dataset = dataset_within(fine_bytes + 2 * coarse_bytes);
+  const auto held = dataset->level("cloud", 0, halves());
+  ASSERT_TRUE(held);
+  ASSERT_TRUE(dataset->level("vorticity", 0, halves()));
+  EXPECT_EQ(dataset->loads(), 2U);
+  EXPECT_EQ(dataset->level("cloud", 0, halves())->get(), held->get());
+  EXPECT_EQ(dataset->loads(), 2U) << "the cloud is not read again";
+}
+
+TEST_F(Levels, WrongNamesAndStepsAreNotFound) {
+  const auto dataset = dataset_within(1U << 20U);
+  EXPECT_EQ(dataset->level("fog", 0, halves()).error().kind, ErrorKind::not_found);
+  EXPECT_EQ(dataset->level("cloud", 4, halves()).error().kind, ErrorKind::not_found);
+  EXPECT_EQ(dataset->resident_bytes(), 0U);
+}
+
+TEST(SizedSample, SaysHowLargeASampleIs) {
+  EXPECT_EQ(sized_sample("tornado")->dims, (std::array{0, 0, 0}));
+  EXPECT_EQ(sized_sample("tornado:256")->name, "tornado");
+  EXPECT_EQ(sized_sample("tornado:256")->dims, (std::array{256, 256, 256}));
+  EXPECT_EQ(sized_sample("climate:8x6x19")->dims, (std::array{8, 6, 19}));
+  for (const char* no :
+       {"", "fog", "fog:4", "tornado:", "tornado:0", "tornado:4x", "tornado:4x4", "tornado:4x4x",
+        "tornado:4x4x4x4", "tornado:-4", "tornado:4 ", "tornado:4x4x99999999999", "./tornado:4"}) {
+    EXPECT_FALSE(sized_sample(no)) << no;
+  }
+}
+
+TEST(SizedSample, IsADatasetUnderItsOwnName) {
+  Store store(1U << 20U);
+  const auto dataset = store.add("tornado:12x10x8");
+  ASSERT_TRUE(dataset) << dataset.error().message;
+  EXPECT_EQ((*dataset)->info().id, "tornado:12x10x8");
+  EXPECT_EQ((*dataset)->info().grid.dims(), (std::array{12, 10, 8}));
+  EXPECT_EQ(store.add("tornado:99999").error().kind, ErrorKind::invalid);
+}
+
+}  // namespace
+}  // namespace windsplat::data

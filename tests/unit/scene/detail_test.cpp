@@ -1,0 +1,280 @@
+// Levels of detail: which a camera gets, in closed form, and what becomes of lattice and lines.
+#include "server/scene/detail.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "server/scene/build.hpp"
+#include "tests/unit/scene/fake.hpp"
+
+namespace windsplat::scene {
+namespace {
+
+using Level = std::array<int, 3>;
+
+// A box about the origin with cells of these widths.
+Lattice box(const std::array<std::vector<double>, 3>& spacing) {
+  Lattice lattice;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double length = std::accumulate(spacing[a].begin(), spacing[a].end(), 0.0);
+    double edge = -0.5 * length;
+    const int index = static_cast<int>(a);
+    lattice.box_min[index] = edge;
+    lattice.box_max[index] = -edge;
+    lattice.dims[a] = static_cast<int>(spacing[a].size());
+    lattice.spacing[a] = spacing[a];
+    for (const double width : spacing[a]) {
+      lattice.positions[a].push_back(edge + 0.5 * width);
+      edge += width;
+    }
+  }
+  return lattice;
+}
+
+Lattice cube(int side) {
+  const std::vector<double> even(static_cast<std::size_t>(side), 2.0 / side);
+  return box({even, even, even});
+}
+
+// Looks north from so far before the nearest face of a box of edge 2: 100 pixels a unit there.
+Camera before(double distance) {
+  Camera camera;
+  camera.eye = {0, -1 - distance, 0};
+  camera.width = camera.height = 400;
+  camera.half_height = 2 / distance;
+  return camera;
+}
+
+TEST(ChooseLevel, HalvesWhileACellIsBelowAPixel) {
+  const Camera camera = before(8);  // at the face a cell of the cube covers 200 / side pixels
+  EXPECT_NEAR(pixels_per_unit(camera, cube(64)), 100, 1e-9);
+  EXPECT_EQ(choose_level(camera, cube(199), {}), (Level{0, 0, 0}));
+  EXPECT_EQ(choose_level(camera, cube(202), {}), (Level{1, 1, 1}));
+  EXPECT_EQ(choose_level(camera, cube(398), {}), (Level{1, 1, 1}));
+  EXPECT_EQ(choose_level(camera, cube(404), {}), (Level{2, 2, 2}));
+}
+
+TEST(ChooseLevel, RisesByOneWithTwiceTheDistance) {
+  const Lattice lattice = cube(160);  // 1.25 pixels a cell at distance 8
+  for (int doubled = 0; doubled < 6; ++doubled) {
+    Camera camera = before(8);
+    camera.eye.y = -1 - 8 * std::exp2(doubled);
+    const Level level = choose_level(camera, lattice, {});
+    EXPECT_EQ(level, (Level{doubled, doubled, doubled}));
+    const double fine_px = pixels_per_unit(camera, lattice) * 2 / 160;
+    EXPECT_LT(fine_px * std::exp2(level[0]), 2) << "never more than two pixels";
+  }
+}
+
+TEST(ChooseLevel, OrthographicCountsThePicturesHeightAlone) {
+  Camera camera = before(8);
+  camera.perspective = false;
+  camera.half_height = 2;  // 400 pixels for 4 units
+  for (const double away : {1.5, 30.0, 3000.0}) {
+    camera.eye.y = -away;
+    EXPECT_EQ(choose_level(camera, cube(202), {}), (Level{1, 1, 1})) << away;
+    EXPECT_EQ(choose_level(camera, cube(199), {}), (Level{0, 0, 0})) << away;
+  }
+}
+
+TEST(ChooseLevel, DoesNotChangeAsAnOrthographicViewTurns) {
+  Camera camera = before(8);
+  camera.perspective = false;
+  camera.half_height = 2;
+  for (int turn = 0; turn < 12; ++turn) {
+    const double angle = 0.5 * turn;
+    camera.forward = {std::sin(angle), std::cos(angle), 0};
+    camera.right = {std::cos(angle), -std::sin(angle), 0};
+    camera.eye = -9.0 * camera.forward;
+    EXPECT_EQ(choose_level(camera, cube(202), {}), (Level{1, 1, 1})) << angle;
+  }
+}
+
+TEST(ChooseLevel, JudgesEveryAxisByItsWidestCell) {
+  // 400 columns of half a pixel, 19 layers of 1.5 to 1.6, 100 rows of which one is 1.2 wide.
+  std::vector<double> rows(100, 0.004);
+  rows[40] = 0.012;
+  std::vector<double> layers(19, 0.015);
+  layers[3] = 0.016;
+  const Lattice lattice = box({std::vector<double>(400, 0.005), rows, layers});
+  Camera camera = before(8);
+  camera.eye.y = lattice.box_min.y - 8;
+  EXPECT_EQ(choose_level(camera, lattice, {}), (Level{1, 0, 0}));
+}
+
+TEST(ChooseLevel, KeepsSlicedAndBentAndSmallAxes) {
+  Camera camera = before(8);
+  EXPECT_EQ(choose_level(camera, cube(202), Slice{1, 7}), (Level{1, 0, 1}));
+  camera.eye.y = -1e6;
+  const std::vector<double> two(2, 1.0);
+  EXPECT_EQ(choose_level(camera, box({two, std::vector<double>{2.0}, {1.0, 0.5, 0.5}}), {}),
+            (Level{0, 0, 1}));
+  Lattice bent = cube(202);
+  bent.places = std::make_shared<const std::vector<std::array<float, 3>>>();
+  EXPECT_EQ(choose_level(camera, bent, {}), (Level{0, 0, 0}));
+}
+
+TEST(ChooseLevel, AnEyeInsideTheBoxSeesFullDetail) {
+  Camera camera = before(8);
+  camera.eye = {0, 0, 0};
+  EXPECT_EQ(choose_level(camera, cube(202), {}), (Level{0, 0, 0}));
+}
+
+TEST(CoarsenLattice, KeepsTheBoxAndStandsInTheMiddleOfMergedCells) {
+  const Lattice fine = box({std::vector<double>{1, 2, 3, 4, 5}, {1, 1}, {0.5, 0.25, 0.125}});
+  const Lattice coarse = coarsen_lattice(fine, {1, 0, 2});
+  EXPECT_EQ(coarse.dims, (std::array{3, 2, 1}));
+  EXPECT_EQ(coarse.spacing[0], (std::vector<double>{3, 7, 5}));
+  EXPECT_EQ(coarse.spacing[1], fine.spacing[1]);
+  EXPECT_EQ(coarse.positions[1], fine.positions[1]);
+  EXPECT_EQ(coarse.spacing[2], (std::vector<double>{0.875}));
+  EXPECT_EQ(coarse.box_min, fine.box_min);
+  EXPECT_EQ(coarse.box_max, fine.box_max);
+  for (std::size_t a = 0; a < 3; ++a) {
+    double edge = fine.box_min[static_cast<int>(a)];
+    for (std::size_t i = 0; i < coarse.positions[a].size(); ++i) {
+      EXPECT_NEAR(coarse.positions[a][i], edge + 0.5 * coarse.spacing[a][i], 1e-12);
+      edge += coarse.spacing[a][i];
+    }
+    EXPECT_NEAR(edge, fine.box_max[static_cast<int>(a)], 1e-12);
+  }
+}
+
+TEST(MergeLines, AddUpTheirOpacityAndThenTheirWidth) {
+  const Lattice lattice = cube(200);  // at 50 pixels a unit half a pixel a cell
+  VectorLayer layer;
+  layer.opacity = 0.1;
+  layer.r1 = 0.5;
+  layer.r2 = 1.5;
+  VectorLayer merged = layer;
+  merge_lines(lattice, {1, 1, 0}, 50, merged);
+  EXPECT_DOUBLE_EQ(merged.opacity, 0.4);  // four lines in one
+  EXPECT_EQ(merged.r1, layer.r1);
+  EXPECT_EQ(merged.r2, layer.r2);
+
+  // Eight times 0.15 are 1.2 lines of one: a fifth wider than r1 + r2 = 2.
+  merged = layer;
+  merged.opacity = 0.15;
+  merge_lines(lattice, {1, 1, 1}, 50, merged);
+  EXPECT_DOUBLE_EQ(merged.opacity, 1);
+  EXPECT_NEAR(merged.r1 + merged.r2, 2.4, 1e-12);
+  EXPECT_NEAR(merged.r2 - merged.r1, 1, 1e-12);
+
+  // Samples half a pixel apart cannot cover more than half a pixel beside the line.
+  merged = layer;
+  merged.opacity = 1;
+  merge_lines(lattice, {1, 1, 1}, 50, merged);
+  EXPECT_DOUBLE_EQ(merged.opacity, 1);
+  EXPECT_NEAR(merged.r1 + merged.r2, 2.5, 1e-12);
+
+  merged = layer;
+  merge_lines(lattice, {0, 0, 0}, 50, merged);
+  EXPECT_EQ(merged.opacity, layer.opacity);
+}
+
+class LevelOfAScene : public testing::Test {
+ protected:
+  void SetUp() override {
+    dataset = sample_dataset("tornado", {64, 64, 64});
+    view.image.width = 40;
+    view.image.height = 30;
+  }
+  Scene built() {
+    const auto completed = complete_view(view, *dataset);
+    EXPECT_TRUE(completed) << completed.error().message;
+    auto scene = build_scene(*completed, *dataset);
+    EXPECT_TRUE(scene) << scene.error().message;
+    return std::move(*scene);
+  }
+  std::unique_ptr<data::Dataset> dataset;
+  protocol::View view;
+};
+
+TEST_F(LevelOfAScene, FollowsTheSizeOfThePicture) {
+  const Scene small = built();
+  const int level = small.level[0];
+  EXPECT_GE(level, 1);
+  ASSERT_TRUE(small.vector);
+  ASSERT_FALSE(small.scalars.empty());
+  const int side = 64 >> level;
+  EXPECT_EQ(small.lattice.dims, (std::array{side, side, side}));
+  EXPECT_EQ(small.vector->field->dims, small.lattice.dims);
+  EXPECT_EQ(small.scalars[0].field->dims, small.lattice.dims);
+  view.image.width *= 2;
+  view.image.height *= 2;
+  EXPECT_EQ(built().level[0], level - 1);
+}
+
+TEST_F(LevelOfAScene, IsFullWhereTheViewOrItsMethodOrAStrideSaysSo) {
+  const Scene reduced = built();
+  const std::uint64_t resident = dataset->resident_bytes();
+  const auto expect_full = [&](const char* why) {
+    const Scene scene = built();
+    EXPECT_EQ(scene.level, (Level{0, 0, 0})) << why;
+    EXPECT_EQ(scene.lattice.dims, (std::array{64, 64, 64})) << why;
+    EXPECT_EQ(scene.vector->field->dims, scene.lattice.dims) << why;
+    EXPECT_EQ(dataset->resident_bytes(), resident) << why << ": no level is made";
+  };
+  view.method.detail = protocol::Detail::full;
+  expect_full("full");
+  view.method.detail = protocol::Detail::automatic;
+  view.method.name = protocol::MethodName::reference;
+  expect_full("reference");
+  view.method.name = protocol::MethodName::slab;
+  view.vector.stride = 2;
+  expect_full("stride");
+  EXPECT_NE(reduced.level, (Level{0, 0, 0}));
+}
+
+TEST_F(LevelOfAScene, KeepsTheCameraAndItsCue) {
+  const Scene coarse = built();
+  view.method.detail = protocol::Detail::full;
+  const Scene full = built();
+  EXPECT_EQ(coarse.camera.eye, full.camera.eye);
+  EXPECT_EQ(coarse.camera.near, full.camera.near);
+  EXPECT_EQ(coarse.depth_cue.near, full.depth_cue.near);
+  EXPECT_EQ(coarse.vector->length, full.vector->length);
+  EXPECT_EQ(coarse.vector->min_magnitude, full.vector->min_magnitude);
+}
+
+TEST_F(LevelOfAScene, MakesNoLevelOfWhatIsNotShown) {
+  view.vector.field.kind = protocol::FieldChoice::Kind::none;
+  const Scene scene = built();
+  ASSERT_EQ(scene.level[0], scene.level[2]);
+  const std::uint64_t fine = 4ULL * 64 * 64 * 64;
+  ASSERT_EQ(scene.scalars.size(), 1U);
+  EXPECT_EQ(dataset->resident_bytes(), fine + (fine >> (3 * scene.level[0])));
+}
+
+TEST(LevelOfRates, AreMeansOfTheRowsAndLayersMerged) {
+  std::vector<double> latitudes;
+  for (int j = 0; j < 64; ++j) latitudes.push_back(-63 + 2 * j);
+  std::vector<double> longitudes;
+  for (int i = 0; i < 128; ++i) longitudes.push_back(2 * i);
+  data::Grid grid;
+  grid.axes = {axis(data::AxisKind::longitude, "degrees_east", longitudes),
+               axis(data::AxisKind::latitude, "degrees_north", latitudes),
+               axis(data::AxisKind::pressure, "hPa", {1000, 500, 250})};
+  auto dataset =
+      dataset_of(std::make_unique<FakeSource>(grid, std::vector<data::FieldInfo>{wind_info()}, 1));
+  protocol::View view;
+  view.vector.space = protocol::VectorSpace::world;
+  view.image.width = view.image.height = 100;
+  const Scene coarse = build_scene(*complete_view(view, *dataset), *dataset).value();
+  ASSERT_EQ(coarse.level, (Level{1, 1, 0})) << "three layers stay three";
+  view.method.detail = protocol::Detail::full;
+  const Scene full = build_scene(*complete_view(view, *dataset), *dataset).value();
+  ASSERT_EQ(coarse.vector->rate_x.size(), 32U);
+  for (std::size_t j = 0; j < 32; ++j) {
+    EXPECT_NEAR(coarse.vector->rate_x[j],
+                0.5 * (full.vector->rate_x[2 * j] + full.vector->rate_x[2 * j + 1]),
+                1e-9 * full.vector->rate_x[2 * j]);
+  }
+  EXPECT_EQ(coarse.vector->rate_z, full.vector->rate_z);
+  EXPECT_EQ(coarse.vector->rate_y, full.vector->rate_y);
+}
+
+}  // namespace
+}  // namespace windsplat::scene
