@@ -15,8 +15,6 @@ namespace {
 
 using kernels::Brick;
 using kernels::Pass;
-using kernels::tile_blocks;
-using kernels::tile_side;
 
 // A rectangle of the picture in pixels; empty when first > last.
 struct Rectangle {
@@ -429,41 +427,52 @@ void Binner::add_slab(const SlabKey& key, SlabBricks& out) {
   }
 }
 
+// The tiles that a brick may touch, both ends included.
+struct TileRange {
+  int x0, x1, y0, y1;
+};
+
+TileRange tiles_of(const RenderPlan& plan, const Brick& brick) {
+  const int wide = plan.tile_width / kernels::block_side;
+  const int tall = plan.tile_height / kernels::block_side;
+  return {brick.block_x / wide, brick.block_x_last / wide, brick.block_y / tall,
+          brick.block_y_last / tall};
+}
+
 template <class Visit>
-void each_tile(const Bins& bins, const Brick& brick, const Visit& visit) {
-  for (int y = brick.block_y / tile_blocks; y <= brick.block_y_last / tile_blocks; ++y) {
-    for (int x = brick.block_x / tile_blocks; x <= brick.block_x_last / tile_blocks; ++x) {
+void each_tile(const Bins& bins, const TileRange& range, const Visit& visit) {
+  for (int y = range.y0; y <= range.y1; ++y) {
+    for (int x = range.x0; x <= range.x1; ++x) {
       visit(static_cast<std::size_t>(y) * bins.tiles_x + x);
     }
   }
 }
 
-void list_by_tile(BinSpace& space) {
+void list_by_tile(const RenderPlan& plan, BinSpace& space) {
   Bins& bins = space.bins;
   const std::size_t tiles = static_cast<std::size_t>(bins.tiles_x) * bins.tiles_y;
   bins.first.assign(tiles + 1, 0);
   for (const Brick& brick : bins.bricks) {
-    each_tile(bins, brick, [&](std::size_t tile) { ++bins.first[tile + 1]; });
+    each_tile(bins, tiles_of(plan, brick), [&](std::size_t tile) { ++bins.first[tile + 1]; });
   }
   for (std::size_t t = 0; t < tiles; ++t) bins.first[t + 1] += bins.first[t];
   bins.entries.resize(bins.first[tiles]);
   space.next.assign(bins.first.begin(), bins.first.end() - 1);
   for (std::size_t b = 0; b < bins.bricks.size(); ++b) {
-    each_tile(bins, bins.bricks[b], [&](std::size_t tile) {
+    each_tile(bins, tiles_of(plan, bins.bricks[b]), [&](std::size_t tile) {
       bins.entries[space.next[tile]++] = static_cast<std::uint32_t>(b);
     });
   }
 }
 
-void add_load(Bins& bins, const SlabBricks& slab) {
+void add_load(const RenderPlan& plan, Bins& bins, const SlabBricks& slab) {
   constexpr std::int64_t of_a_brick = 8;
   for (std::size_t b = 0; b < slab.bricks.size(); ++b) {
     const Brick& brick = slab.bricks[b];
-    const std::int64_t tiles =
-        std::int64_t{brick.block_x_last / tile_blocks - brick.block_x / tile_blocks + 1} *
-        (brick.block_y_last / tile_blocks - brick.block_y / tile_blocks + 1);
+    const TileRange range = tiles_of(plan, brick);
+    const std::int64_t tiles = std::int64_t{range.x1 - range.x0 + 1} * (range.y1 - range.y0 + 1);
     const std::int64_t load = of_a_brick + slab.kernels[b] / tiles;
-    each_tile(bins, brick, [&](std::size_t tile) { bins.load[tile] += load; });
+    each_tile(bins, range, [&](std::size_t tile) { bins.load[tile] += load; });
   }
 }
 
@@ -497,8 +506,8 @@ BrickCounts& BrickCounts::operator+=(const BrickCounts& other) {
 const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, ThreadPool& pool,
                       const CancelToken& cancel, BinSpace& space, WorkReport& work) {
   Bins& bins = space.bins;
-  bins.tiles_x = (plan.camera.width + tile_side - 1) / tile_side;
-  bins.tiles_y = (plan.camera.height + tile_side - 1) / tile_side;
+  bins.tiles_x = (plan.camera.width + plan.tile_width - 1) / plan.tile_width;
+  bins.tiles_y = (plan.camera.height + plan.tile_height - 1) / plan.tile_height;
   bins.bricks.clear();
   bins.load.assign(static_cast<std::size_t>(bins.tiles_x) * bins.tiles_y, 0);
   Binner binner(plan, table, space);
@@ -520,7 +529,7 @@ const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, Threa
   for (std::size_t i = 0; i < slabs; ++i) {
     const SlabBricks& slab = space.found[i];
     bins.bricks.insert(bins.bricks.end(), slab.bricks.begin(), slab.bricks.end());
-    add_load(bins, slab);
+    add_load(plan, bins, slab);
     sum += slab.counts;
   }
   work.samples += sum.samples;
@@ -532,7 +541,7 @@ const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, Threa
   work.skipped_bound =
       std::min(1.0, sum.left_out / (static_cast<double>(plan.camera.width) * plan.camera.height));
   if (plan.slabs || plan.curved) sort_by_depth(space);
-  list_by_tile(space);
+  list_by_tile(plan, space);
   return bins;
 }
 

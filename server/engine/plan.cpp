@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <numeric>
 
@@ -412,6 +413,8 @@ RenderPlan make_plan(const Scene& scene) {
   plan.eye_sample = eye_stop(scene.camera, major, scene.lattice.positions[major]);
   for (PassPlan& pass : plan.passes) finish_pass(scene, major, pass);
   if (scene.method == scene::Method::slab || plan.curved) plan_slabs(scene, plan);
+  plan.tile_width = getenv("TW") ? atoi(getenv("TW")) : 64;
+  plan.tile_height = getenv("TH") ? atoi(getenv("TH")) : 64;
   plan.variant = describe(scene, plan);
   return plan;
 }

@@ -76,6 +76,8 @@ struct RenderPlan {
   int compositing = 0;              // scene::Compositing
   double slab_depth = 1;            // of a slab along the view, world units
   float stop_transmittance = 0;
+  int tile_width = 0;  // pixels, at most kernels::tile_side: see tile_sides
+  int tile_height = 0;
   std::string variant;
 
   RenderPlan() = default;

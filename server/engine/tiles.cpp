@@ -17,7 +17,6 @@ using kernels::block_side;
 using kernels::Brick;
 using kernels::Tile;
 using kernels::tile_blocks;
-using kernels::tile_side;
 
 // The length of every pixel's ray whose forward component is 1.
 void fill_rays(const kernels::Camera& camera, const Tile& tile, AlignedVector<float>& rays) {
@@ -37,10 +36,10 @@ void open_tile(const RenderPlan& plan, const Bins& bins, std::size_t index, Work
                Tile& tile) {
   const int tx = static_cast<int>(index) % bins.tiles_x;
   const int ty = static_cast<int>(index) / bins.tiles_x;
-  tile.x = tx * tile_side;
-  tile.y = ty * tile_side;
-  tile.width = std::min(tile_side, plan.camera.width - tile.x);
-  tile.height = std::min(tile_side, plan.camera.height - tile.y);
+  tile.x = tx * plan.tile_width;
+  tile.y = ty * plan.tile_height;
+  tile.width = std::min(plan.tile_width, plan.camera.width - tile.x);
+  tile.height = std::min(plan.tile_height, plan.camera.height - tile.y);
   constexpr std::size_t blocks = static_cast<std::size_t>(tile_blocks) * tile_blocks;
   space.blocks.assign(blocks * block_floats, 0.0F);
   for (std::size_t b = 0; b < blocks; ++b) {
@@ -64,28 +63,42 @@ std::int64_t stops_of(const Brick& brick) {
   return static_cast<std::int64_t>(brick.u_count) * brick.v_count;
 }
 
+// A tile's bricks in order, without those that touch closed blocks alone.
+class OpenBricks {
+ public:
+  OpenBricks(const Bins& bins, std::size_t index, Tile& tile)
+      : bins_(bins), tile_(tile), at_(bins.first[index]), last_(bins.first[index + 1]) {}
+
+  const Brick* next() {
+    while (at_ < last_) {
+      const Brick& brick = bins_.bricks[bins_.entries[at_++]];
+      if (!all_closed(tile_, brick)) return &brick;
+      tile_.counters.occluded += stops_of(brick);
+    }
+    return nullptr;
+  }
+
+ private:
+  const Bins& bins_;
+  Tile& tile_;
+  std::size_t at_;
+  std::size_t last_;
+};
+
 void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
                const CancelToken& cancel, std::size_t index, Tile& tile, TileWork& work) {
-  // Between looks at the clock of light and of the caller's patience.
+  // Between looks at the caller's patience.
   constexpr std::size_t bricks_between_checks = 16;
-  const std::size_t first = bins.first[index];
-  const std::size_t last = bins.first[index + 1];
-  for (std::size_t e = first; e < last; ++e) {
-    if ((e - first) % bricks_between_checks == bricks_between_checks - 1) {
-      if (cancel.cancelled()) return;
-      work.stopped = table.count_open(tile) == 0;
-    }
-    if (e + 1 < last) {
-      const Brick& next = bins.bricks[bins.entries[e + 1]];
-      table.prefetch(plan.passes[next.pass].kernel, next);
-    }
-    const Brick& brick = bins.bricks[bins.entries[e]];
-    if (work.stopped || all_closed(tile, brick)) {
-      tile.counters.occluded += stops_of(brick);
-      continue;
-    }
+  OpenBricks bricks(bins, index, tile);
+  const Brick* next = bricks.next();
+  for (std::size_t drawn = 1; next != nullptr; ++drawn) {
+    if (drawn % bricks_between_checks == 0 && cancel.cancelled()) return;
+    const Brick& brick = *next;
+    next = bricks.next();
+    if (next != nullptr) table.prefetch(plan.passes[next->pass].kernel, *next);
     table.draw(plan.camera, plan.passes[brick.pass].kernel, brick, tile);
   }
+  work.stopped = table.count_open(tile) == 0;
 }
 
 void store_tile(const Tile& tile, Image& image) {
@@ -147,9 +160,9 @@ bool all_closed(const Tile& tile, const Brick& brick) {
   const int bx = tile.x / block_side;
   const int by = tile.y / block_side;
   const int x0 = std::max(brick.block_x - bx, 0);
-  const int x1 = std::min(brick.block_x_last - bx, tile_blocks - 1);
+  const int x1 = std::min(brick.block_x_last - bx, (tile.width - 1) / block_side);
   const int y0 = std::max(brick.block_y - by, 0);
-  const int y1 = std::min(brick.block_y_last - by, tile_blocks - 1);
+  const int y1 = std::min(brick.block_y_last - by, (tile.height - 1) / block_side);
   const std::uint32_t columns = ((2U << static_cast<unsigned>(x1 - x0)) - 1U)
                                 << static_cast<unsigned>(x0);
   for (int row = y0; row <= y1; ++row) {

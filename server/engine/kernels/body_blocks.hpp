@@ -67,6 +67,10 @@ HWY_INLINE std::uint32_t find_line_blocks(const LineStyle& line, const Ribbons& 
   const int most = hn::GetLane(
       hn::MaxOfLanes(StopIntegers(), hn::IfThenZeroElse(missing, range.last - range.first)));
   const Stop first = from_integer<Stop>(range.first);
+  const hn::RebindToUnsigned<StopTag> masks;
+  const auto column = hn::BitCast(masks, across.first);
+  auto low = hn::Zero(masks);
+  auto high = hn::Zero(masks);
   for (int k = 0; k <= most; ++k) {
     const Stop row = first + all<Stop>(static_cast<float>(k));
     const Stop top = hn::MulAdd(row, all<Stop>(block_side), all<Stop>(0.5F)) - y;
@@ -76,9 +80,26 @@ HWY_INLINE std::uint32_t find_line_blocks(const LineStyle& line, const Ribbons& 
     const Stop to = clamped(hn::Max(a, b) + widen, zero, one);
     const Stop xa = hn::MulAdd(from, ux, x);
     const Stop xb = hn::MulAdd(to, ux, x);
-    const Ranges here = blocks_between(hn::Min(xa, xb) - radius, hn::Max(xa, xb) + radius, columns);
-    hn::Store(range_masks(here), hn::RebindToUnsigned<StopTag>(), f.line_columns[k] + l);
+    const auto here =
+        range_masks(blocks_between(hn::Min(xa, xb) - radius, hn::Max(xa, xb) + radius, columns));
+    hn::Store(here, masks, f.line_columns[k] + l);
+    // Lines that end before row k may have bits here; so have those that reach beyond the window.
+    const auto ends = hn::Gt(hn::Set(StopIntegers(), k), range.last - range.first);
+    const auto shifted = hn::IfThenZeroElse(hn::RebindMask(masks, ends), hn::Shr(here, column));
+    if (k < 4) {
+      low = low | hn::ShiftLeftSame(shifted, 8 * k);
+    } else if (k < window_side) {
+      high = high | hn::ShiftLeftSame(shifted, 8 * (k - 4));
+    }
   }
+  hn::Store(across.first, StopIntegers(), f.line_column + l);
+  hn::Store(low, masks, f.window_low + l);
+  hn::Store(high, masks, f.window_high + l);
+  const auto within = hn::Set(StopIntegers(), window_side);
+  const auto windowed =
+      hn::And(hn::Lt(range.last - range.first, within), hn::Lt(across.last - across.first, within));
+  f.windowed |= static_cast<std::uint64_t>(bits_of<Stop>(hn::RebindMask(StopTag(), windowed)))
+                << static_cast<unsigned>(l);
   return bits;
 }
 
@@ -163,8 +184,15 @@ struct RowMaker {
   const Tile& tile;
   Hash3<std::uint32_t> key;
   Prepared& out;
-  Rows rows;
+  Rows rows;  // both are filled row by row
   Cells cells;
+
+  RowMaker(const Camera& of_camera, const Pass& of_pass, const Tile& of_tile, Prepared& into)
+      : camera(of_camera),
+        pass(of_pass),
+        tile(of_tile),
+        key(hash_key(of_pass.line.seed, of_pass.line.epoch)),
+        out(into) {}
 
   // What of the lanes from i on (`bits`) has a line or a splat, made ready at stop l.
   HWY_INLINE void make(int i, int l, std::uint32_t bits) {
@@ -201,11 +229,10 @@ struct RowMaker {
 template <bool Lines, bool Medium, bool Perspective, bool Curved>
 void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
                    Prepared& out) {
-  RowMaker<Lines, Medium, Perspective, Curved> maker = {
-      camera, pass, tile, hash_key(pass.line.seed, pass.line.epoch), out, {}, {}};
+  RowMaker<Lines, Medium, Perspective, Curved> maker(camera, pass, tile, out);
   Rows& rows = maker.rows;
   Stops& stops = out.stops;
-  stops.lines = stops.splats = 0;
+  stops.lines = stops.splats = out.footing.windowed = 0;
   out.pass = &pass;
   out.near = camera.near;
   open_rows(pass, brick, rows);
@@ -266,15 +293,72 @@ inline float top_of(const Tile& tile, int row) {
 }
 
 // A block that lets nothing through any more is closed for all that lies behind.
-HWY_INLINE void note_light(const Light& light, int row, std::uint32_t bit, Tile& tile) {
-  if (light.above(tile.stop)) return;
+inline void close_block(int row, std::uint32_t bit, Tile& tile) {
   tile.open[row] &= ~bit;
   tile.any_closed = 1;
 }
 
+HWY_INLINE void note_light(const Light& light, int row, std::uint32_t bit, Tile& tile) {
+  if (!light.above(tile.stop)) close_block(row, bit, tile);
+}
+
+// The tile's open blocks within a window, as Footing has them.
+inline std::uint64_t open_window(const Tile& tile, int row, int column) {
+  std::uint64_t open = 0;
+  for (int k = 0; k < window_side && row + k < tile_blocks; ++k) {
+    const std::uint64_t here = tile.open[row + k] >> static_cast<unsigned>(column) & 0xffU;
+    open |= here << static_cast<unsigned>(window_side * k);
+  }
+  return open;
+}
+
+// Pixels from a window's corner to each of its blocks.
+struct WindowOffsets {
+  float x[window_side * window_side];
+  float y[window_side * window_side];
+};
+
+constexpr WindowOffsets window_offsets() {
+  WindowOffsets offsets = {};
+  for (int b = 0; b < window_side * window_side; ++b) {
+    offsets.x[b] = static_cast<float>(b % window_side * block_side);
+    offsets.y[b] = static_cast<float>(b / window_side * block_side);
+  }
+  return offsets;
+}
+
+constexpr WindowOffsets offsets_in_window = window_offsets();
+
 // Composites one line into its blocks; how many.
 template <Depth Along, int Style>
-HWY_INLINE int draw_ribbon(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
+HWY_INLINE int draw_windowed(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
+  const int row = f.line_first[l];
+  const int column = f.line_column[l];
+  std::uint64_t left = static_cast<std::uint64_t>(f.window_high[l]) << 32U | f.window_low[l];
+  if (tile.any_closed != 0) left &= open_window(tile, row, column);
+  const int blocks = __builtin_popcountll(left);
+  const BlockPixels from_line = {all<Pixel>(left_of(tile, column)) - lanes.x,
+                                 all<Pixel>(top_of(tile, row)) - lanes.y};
+  float* corner = block_at(tile, row, column);
+  for (; left != 0; left &= left - 1U) {
+    const int at = __builtin_ctzll(left);
+    const int down = at / window_side;
+    const int across = at % window_side;
+    const Light light = line_block<Along, Style>(
+        lanes,
+        {from_line.x + all<Pixel>(offsets_in_window.x[at]),
+         from_line.y + all<Pixel>(offsets_in_window.y[at])},
+        corner + static_cast<std::ptrdiff_t>(down * tile_blocks + across) * block_floats);
+    if (!light.above(tile.stop)) {
+      close_block(row + down, 1U << static_cast<unsigned>(column + across), tile);
+    }
+  }
+  return blocks;
+}
+
+// The same for one that reaches farther than a window does.
+template <Depth Along, int Style>
+int draw_ribbon(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
   int blocks = 0;
   for (int row = f.line_first[l], k = 0; row <= f.line_last[l]; ++row, ++k) {
     std::uint32_t left = f.line_columns[k][l] & tile.open[row];
@@ -283,9 +367,10 @@ HWY_INLINE int draw_ribbon(const RibbonLanes& lanes, const Footing& f, int l, Ti
       const int column = __builtin_ctz(left);
       const std::uint32_t bit = left & (~left + 1U);
       left ^= bit;
-      note_light(line_block<Along, Style>(lanes, left_of(tile, column), top_of(tile, row),
-                                          block_at(tile, row, column)),
-                 row, bit, tile);
+      const BlockPixels from_line = {all<Pixel>(left_of(tile, column)) - lanes.x,
+                                     all<Pixel>(top_of(tile, row)) - lanes.y};
+      note_light(line_block<Along, Style>(lanes, from_line, block_at(tile, row, column)), row, bit,
+                 tile);
     }
   }
   return blocks;
@@ -294,13 +379,16 @@ HWY_INLINE int draw_ribbon(const RibbonLanes& lanes, const Footing& f, int l, Ti
 template <bool Perspective, int Style>
 HWY_INLINE void draw_line(const Prepared& p, int l, Tile& tile) {
   const RibbonLanes lanes = spread(p.pass->line, p.ribbons, l);
+  const Footing& f = p.footing;
+  constexpr Depth general = Perspective && Style != style_plain ? Depth::exact : Depth::flat;
   int blocks = 0;
-  if (!Perspective || Style == style_plain) {
-    blocks = draw_ribbon<Depth::flat, Style>(lanes, p.footing, l, tile);
-  } else if (absolute(p.ribbons.depth_ratio[l] - 1.0F) <= series_bend_max) {
-    blocks = draw_ribbon<Depth::series, Style>(lanes, p.footing, l, tile);
+  if (!has(f.windowed, l)) {
+    blocks = draw_ribbon<general, Style>(lanes, f, l, tile);
+  } else if (general == Depth::exact &&
+             absolute(p.ribbons.depth_ratio[l] - 1.0F) <= series_bend_max) {
+    blocks = draw_windowed<Depth::series, Style>(lanes, f, l, tile);
   } else {
-    blocks = draw_ribbon<Depth::exact, Style>(lanes, p.footing, l, tile);
+    blocks = draw_windowed<general, Style>(lanes, f, l, tile);
   }
   tile.counters.pixel_updates += std::int64_t{blocks} * block_pixels;
 }
@@ -360,9 +448,10 @@ void draw_kernel(const Prepared& p, const Compositor& with, int style, int l, Ti
         note_light(splat_function(splat, x, y, ray, block), row, bit, tile);
       } else {
         const RibbonLanes lanes = spread(ribbon);
+        const BlockPixels at = {all<Pixel>(x) - lanes.x, all<Pixel>(y) - lanes.y};
         constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
-        note_light(style == style_moving ? line_block<along, style_moving>(lanes, x, y, block)
-                                         : line_block<along, style_head>(lanes, x, y, block),
+        note_light(style == style_moving ? line_block<along, style_moving>(lanes, at, block)
+                                         : line_block<along, style_head>(lanes, at, block),
                    row, bit, tile);
       }
     }
@@ -399,6 +488,12 @@ void draw_in_order(const Brick& brick, const Prepared& p, Tile& tile) {
   }
 }
 
+// A row's samples lie on one cache line or two.
+inline void prefetch_row(const float* from, std::int64_t length) {
+  __builtin_prefetch(from);
+  __builtin_prefetch(from + length - 1);
+}
+
 // Brings a brick's samples closer while the one before it is drawn: rows of a brick are far apart
 // in memory, which no processor guesses.
 void prefetch_brick(const Pass& pass, const Brick& brick) {
@@ -406,16 +501,16 @@ void prefetch_brick(const Pass& pass, const Brick& brick) {
   const Axis& v = pass.axis[pass.v];
   const Axis& major = pass.axis[pass.major];
   const std::int64_t slab = pass.step[pass.major] * major.sample[major.visit[brick.slab]];
-  const std::int64_t first = slab + pass.step[pass.u] * u.sample[u.visit[brick.u_first]];
+  const std::int64_t first = slab + pass.step[pass.u] * u.sample[lowest(u.visit + brick.u_first)];
   for (int j = 0; j < brick.v_count; ++j) {
     const std::int64_t at = first + pass.step[pass.v] * v.sample[v.visit[brick.v_first + j]];
     if (pass.has_lines != 0) {
       for (const float* values : pass.line.velocity) {
-        if (values != nullptr) __builtin_prefetch(values + at);
+        if (values != nullptr) prefetch_row(values + at, brick.u_count);
       }
     }
     for (int k = 0; k < pass.medium.layers; ++k) {
-      __builtin_prefetch(pass.medium.layer[k].values + at);
+      prefetch_row(pass.medium.layer[k].values + at, brick.u_count);
     }
   }
 }

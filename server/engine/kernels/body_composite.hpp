@@ -113,11 +113,10 @@ HWY_INLINE Pixel along_ribbon(const RibbonLanes& r, Pixel w) {
   return w;
 }
 
+// dx, dy: pixels from the line's f = 0.
 template <Depth Along, int Style>
-HWY_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel px, Pixel py) {
+HWY_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
   const Pixel zero = hn::Zero(PixelTag());
-  const Pixel dx = px - r.x;
-  const Pixel dy = py - r.y;
   const Pixel w = clamped(hn::MulAdd(dx, r.wx, hn::MulAdd(dy, r.wy, r.w0)), zero, all<Pixel>(1.0F));
   const Pixel ex = hn::NegMulAdd(w, r.ux, dx);
   const Pixel ey = hn::NegMulAdd(w, r.uy, dy);
@@ -256,14 +255,19 @@ HWY_INLINE Pixel light_before(const Attenuation<Pixel>& medium, Pixel tau, Pixel
   return hn::NegMulAdd(place, medium.absorbed, all<Pixel>(1.0F));
 }
 
+// Pixels from a point of the picture to a block's corner.
+struct BlockPixels {
+  Pixel x, y;
+};
+
 template <Depth Along, int Style>
-HWY_INLINE Light line_block(const RibbonLanes& r, float x, float y, float* HWY_RESTRICT block) {
+HWY_INLINE Light line_block(const RibbonLanes& r, const BlockPixels& corner,
+                            float* HWY_RESTRICT block) {
   const Channels to = channels_of(block);
   Light light;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
-    const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
-    const RibbonLane lane = ribbon_lane<Along, Style>(r, px, py);
+    const RibbonLane lane = ribbon_lane<Along, Style>(r, corner.x + load<Pixel>(lane_x + l),
+                                                      corner.y + load<Pixel>(lane_y + l));
     const Pixel t = load<Pixel>(to.transmittance + l);
     const Pixel a = t * lane.opacity;
     for (int c = 0; c < 3; ++c) {
@@ -332,13 +336,13 @@ Light both_block(const Ribbon& ribbon, const Splat& splat, float x, float y,
   const SplatLanes s = spread(splat);
   const Pixel depth = all<Pixel>(ribbon.depth);
   const Pixel depth_rise = all<Pixel>(ribbon.depth_rise);
+  constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
   const Channels to = channels_of(block);
   Light light;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
     const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
     const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
-    const RibbonLane line = ribbon_lane < Perspective ? Depth::exact : Depth::flat,
-                     Style > (r, px, py);
+    const RibbonLane line = ribbon_lane<along, Style>(r, px - r.x, py - r.y);
     const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
     const SplatLane lane = splat_lane<Perspective, Start>(s, px, py, length);
     const Attenuation<Pixel> medium = attenuation_by<Compositing>(lane.tau);

@@ -269,11 +269,12 @@ struct Under {
 inline Under under(const Tile& tile, const Brick& brick) {
   const int left = tile.x / block_side;
   const int top = tile.y / block_side;
-  const auto within = [](int v, int last) { return v < 0 ? 0 : v > last ? last : v; };
-  const int last = tile_blocks - 1;
+  const auto within = [](int v, int blocks) { return v < 0 ? 0 : v < blocks ? v : blocks - 1; };
+  const int wide = blocks_of(tile.width);
+  const int tall = blocks_of(tile.height);
   return {
-      within(brick.block_y - top, last), within(brick.block_y_last - top, last),
-      range_mask({within(brick.block_x - left, last), within(brick.block_x_last - left, last)})};
+      within(brick.block_y - top, tall), within(brick.block_y_last - top, tall),
+      range_mask({within(brick.block_x - left, wide), within(brick.block_x_last - left, wide)})};
 }
 
 // Whether any block there lets no more light through.

@@ -143,7 +143,7 @@ int pack_ribbons(const Prepared& p, RibbonRecord* out) {
     to.row_last = static_cast<std::int16_t>(f.line_last[l]);
     to.moving = p.pass->line.moving;
     for (int k = 0; k <= to.row_last - to.row_first; ++k) {
-      to.columns[k] = static_cast<std::uint16_t>(f.line_columns[k][l]);
+      to.columns[k] = f.line_columns[k][l];
     }
     to.ribbon = ribbon_at(p.pass->line, p.ribbons, l);
   }
@@ -241,11 +241,11 @@ HWY_INLINE void meet_line(const RibbonRecord& line, const Slab& slab, float x, f
   const Pixel rise = all<Pixel>(line.ribbon.depth_rise);
   const Pixel front = all<Pixel>(slab.front);
   const Pixel back = all<Pixel>(slab.back);
+  constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
     const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
     const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
-    const RibbonLane lane = ribbon_lane < Perspective ? Depth::exact : Depth::flat,
-                     Style > (r, px, py);
+    const RibbonLane lane = ribbon_lane<along, Style>(r, px - r.x, py - r.y);
     const Pixel depth = hn::MulAdd(lane.f, rise, first);
     store(clamped((depth - front) * inverse, 0.0F, 1.0F), m.place + l);
     const auto here = hn::And(hn::Ge(depth, front), hn::Lt(depth, back));

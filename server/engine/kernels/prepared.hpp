@@ -67,6 +67,8 @@ struct Splats {
   alignas(64) float half_depth[brick_stops];  // of the silhouette along the view, world units
 };
 
+constexpr int window_side = 8;
+
 // Rows and columns of the tile's blocks that each stop's line and splat may touch, both ends
 // included; none if last < first.
 struct Footing {
@@ -74,6 +76,12 @@ struct Footing {
   alignas(64) std::int32_t line_last[brick_stops];
   // Bit set: the column of the line's k-th row.
   alignas(64) std::uint32_t line_columns[tile_blocks][brick_stops];
+  // The same of lines that stay within window_side rows and columns: rows are bytes, the first four
+  // in `low`, columns count from line_column.
+  std::uint64_t windowed;  // bit l set: stop l's line does
+  alignas(64) std::int32_t line_column[brick_stops];
+  alignas(64) std::uint32_t window_low[brick_stops];
+  alignas(64) std::uint32_t window_high[brick_stops];
   alignas(64) std::int32_t row_first[brick_stops];
   alignas(64) std::int32_t row_last[brick_stops];
   alignas(64) std::int32_t column_first[brick_stops];
@@ -133,10 +141,10 @@ struct RibbonRecord {
   float centre;  // of its kernel
   std::int16_t row_first, row_last;
   int moving;
-  std::uint16_t columns[tile_blocks];  // bit set: the column of its k-th row
+  std::uint32_t columns[tile_blocks];  // bit set: the column of its k-th row
   Ribbon ribbon;
 };
-static_assert(tile_blocks <= 16);
+static_assert(tile_blocks <= 32);
 
 // One line's meeting with one block.
 struct Hit {
