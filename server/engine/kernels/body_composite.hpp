@@ -1,8 +1,8 @@
 // Part of the kernel body: one line, one splat or both composited into one block of pixels.
 #pragma once
 
-#include "server/engine/kernels/body_lines.hpp"
-#include "server/engine/kernels/body_splats.hpp"
+#include "server/engine/kernels/body_math.hpp"
+#include "server/engine/kernels/prepared.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {

@@ -236,10 +236,20 @@ HWY_INLINE void shade(float dim, float grey, float more, float* tail, float* ris
   }
 }
 
+// What of the lines' colours is told by all stops of a vector together.
+struct Shades {
+  alignas(64) std::int32_t entry[brick_stops];  // of the table, and the way to the next
+  alignas(64) float part[brick_stops];
+  alignas(64) float dim[brick_stops];
+  alignas(64) float grey[brick_stops];
+  alignas(64) float more[brick_stops];
+  std::uint64_t unknown;  // bit l set: stop l has no value there
+};
+
 // Colour by the table, dimmed by magnitude and by view distance.
-HWY_INLINE void color_ribbons(const Camera& camera, const LineStyle& line, const Rows& rows,
+HWY_INLINE void shade_ribbons(const Camera& camera, const LineStyle& line, const Rows& rows,
                               const Stops& stops, const Winds& winds, const Segments& s, int i,
-                              int l, std::uint32_t bits, Ribbons& r) {
+                              int l, Shades& shades) {
   const Stop distance = load<Stop>(stops.z + l) + dot3(camera.forward, s.offset);
   const Stop one = all<Stop>(1.0F);
   const Stop strong =
@@ -256,41 +266,43 @@ HWY_INLINE void color_ribbons(const Camera& camera, const LineStyle& line, const
   const Stop place = clamped((known - all<Stop>(table.low)) * all<Stop>(table.scale), 0.0F,
                              static_cast<float>(table.entries - 1));
   const SignedOf<Stop> entry = truncated(place);
-  alignas(64) std::int32_t entries[brick_side];
-  alignas(64) float parts[brick_side], dims[brick_side], greys[brick_side], mores[brick_side];
-  hn::Store(entry, hn::RebindToSigned<StopTag>(), entries);
-  store(place - from_integer<Stop>(entry), parts);
-  store(dim, dims);
+  hn::Store(entry, hn::RebindToSigned<StopTag>(), shades.entry + l);
+  store(place - from_integer<Stop>(entry), shades.part + l);
+  store(dim, shades.dim + l);
   const Stop desaturation = all<Stop>(line.head_desaturation);
-  store(desaturation * (s.low + all<Stop>(0.5F)), greys);
-  store(desaturation * (s.high - s.low), mores);
-  const std::uint32_t unknown = bits_of<Stop>(masked);
-  for (; bits != 0; bits &= bits - 1U) {
-    const int k = __builtin_ctz(bits);
-    float* tail = r.tail[l + k];
-    if ((unknown >> static_cast<unsigned>(k) & 1U) == 0) {
-      blend(table.rgb + color_floats * static_cast<std::ptrdiff_t>(entries[k]), parts[k], tail);
-    } else {
-      tail[0] = tail[1] = tail[2] = 0.5F;
-      tail[3] = 0;
-    }
-    shade(dims[k], greys[k], mores[k], tail, r.rise[l + k]);
+  store(desaturation * (s.low + all<Stop>(0.5F)), shades.grey + l);
+  store(desaturation * (s.high - s.low), shades.more + l);
+  shades.unknown |= static_cast<std::uint64_t>(bits_of<Stop>(masked)) << static_cast<unsigned>(l);
+}
+
+// The colours of the lines that are left.
+inline void color_ribbons(const ColorTable& table, const Shades& shades, std::uint64_t lines,
+                          Ribbons& r) {
+  for (std::uint64_t left = lines; left != 0; left &= left - 1U) {
+    const int l = __builtin_ctzll(left);
+    blend(table.rgb + color_floats * static_cast<std::ptrdiff_t>(shades.entry[l]), shades.part[l],
+          r.tail[l]);
+    shade(shades.dim[l], shades.grey[l], shades.more[l], r.tail[l], r.rise[l]);
+  }
+  // Where the field that tells the colour is masked: mid-grey.
+  for (std::uint64_t left = lines & shades.unknown; left != 0; left &= left - 1U) {
+    const int l = __builtin_ctzll(left);
+    for (float& c : r.tail[l]) c = 0.5F;
+    shade(shades.dim[l], shades.grey[l], shades.more[l], r.tail[l], r.rise[l]);
   }
 }
 
-// A row's lines from lane i on, made ready; which of `bits` are left.
+// A vector of lines made ready; which lanes have one on the screen.
 template <bool Perspective, bool Curved>
 HWY_INLINE std::uint32_t prepare_ribbons(const Camera& camera, const Pass& pass, const Rows& rows,
                                          const Stops& stops, const CellLanes<Curved>& cells,
                                          const Winds& winds, const Hash3<std::uint32_t>& key, int i,
-                                         int l, std::uint32_t bits, Ribbons& ribbons) {
+                                         int l, Shades& shades, Ribbons& ribbons) {
   Segments s = place_segments<Curved>(pass.line, rows, cells, winds, key, i);
   const auto shown = project_segments<Perspective>(camera, pass.line, stops, l, winds, s, ribbons);
-  bits &= bits_of<Stop>(shown);
-  if (bits == 0) return 0;
-  color_ribbons(camera, pass.line, rows, stops, winds, s, i, l, bits, ribbons);
+  shade_ribbons(camera, pass.line, rows, stops, winds, s, i, l, shades);
   if (pass.line.moving != 0) phase_ribbons(pass.line, winds, s, l, ribbons);
-  return bits;
+  return bits_of<Stop>(shown);
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 // slab of view depth, then the slab's medium and the lines in it are composited, block by block.
 #pragma once
 
-#include "server/engine/kernels/body_blocks.hpp"
+#include "server/engine/kernels/body_draw.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {

@@ -80,6 +80,7 @@ struct Footing {
   // in `low`, columns count from line_column.
   std::uint64_t windowed;  // bit l set: stop l's line does
   alignas(64) std::int32_t line_column[brick_stops];
+  alignas(64) std::int32_t line_last_column[brick_stops];
   alignas(64) std::uint32_t window_low[brick_stops];
   alignas(64) std::uint32_t window_high[brick_stops];
   alignas(64) std::int32_t row_first[brick_stops];

@@ -1,124 +1,12 @@
-// Part of the kernel body: a brick's stops made ready for a tile, and composited into its blocks,
+// Part of the kernel body: a brick's prepared lines and splats composited into a tile's blocks,
 // front to back.
 #pragma once
 
 #include "server/engine/kernels/body_composite.hpp"
+#include "server/engine/kernels/body_prepare.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {
-
-using StopIntegers = hn::RebindToSigned<StopTag>;
-using StopInteger = hn::Vec<StopIntegers>;
-
-// blocks_between for a row of stops.
-struct Ranges {
-  StopInteger first, last;
-};
-
-HWY_INLINE Ranges blocks_between(Stop low, Stop high, int blocks) {
-  constexpr float per_block = 1.0F / block_side;
-  constexpr float slack = 1e-3F;
-  const float bound = static_cast<float>(blocks);
-  const Stop first = clamped((low + all<Stop>(0.5F - slack)) * all<Stop>(per_block), 0.0F, bound);
-  const Stop last =
-      clamped((high + all<Stop>(slack - 0.5F)) * all<Stop>(per_block), -1.0F, bound - 0.5F);
-  return {truncated(first), truncated(last + all<Stop>(1.0F)) - hn::Set(StopIntegers(), 1)};
-}
-
-// The bits from first to last; none if last < first.
-HWY_INLINE UnsignedOf<Stop> range_masks(const Ranges& range) {
-  const hn::RebindToUnsigned<StopTag> tag;
-  const auto one = hn::Set(tag, 1U);
-  const auto above =
-      hn::Shl(one + one, hn::BitCast(tag, hn::Max(range.last, hn::Zero(StopIntegers()))));
-  const auto below = hn::Shl(one, hn::BitCast(tag, range.first));
-  const auto bits = hn::AndNot(below - one, above - one);
-  const auto none = hn::Gt(range.first, range.last);
-  return hn::IfThenZeroElse(hn::RebindMask(tag, none), bits);
-}
-
-// Rows and columns of blocks that a row's lines may touch. In a row of blocks that is the part of
-// the segment within r2 of the row's pixel centres, widened by r2.
-HWY_INLINE std::uint32_t find_line_blocks(const LineStyle& line, const Ribbons& r, const Tile& tile,
-                                          int l, std::uint32_t bits, Footing& f) {
-  const int rows = blocks_of(tile.height);
-  const int columns = blocks_of(tile.width);
-  const Stop radius = all<Stop>(line.r2);
-  const Stop x = load<Stop>(r.x + l) - all<Stop>(static_cast<float>(tile.x));
-  const Stop y = load<Stop>(r.y + l) - all<Stop>(static_cast<float>(tile.y));
-  const Stop ux = load<Stop>(r.ux + l);
-  const Stop uy = load<Stop>(r.uy + l);
-  const Stop end = y + uy;
-  const Ranges range = blocks_between(hn::Min(y, end) - radius, hn::Max(y, end) + radius, rows);
-  const Stop other_end = x + ux;
-  const Ranges across =
-      blocks_between(hn::Min(x, other_end) - radius, hn::Max(x, other_end) + radius, columns);
-  const auto missing = hn::Or(hn::Gt(range.first, range.last), hn::Gt(across.first, across.last));
-  bits &= ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
-  if (bits == 0) return 0;
-  hn::Store(range.first, StopIntegers(), f.line_first + l);
-  hn::Store(range.last, StopIntegers(), f.line_last + l);
-  // A level line's whole length counts in every row.
-  const auto level = hn::Le(hn::Abs(uy), all<Stop>(1e-3F));
-  const Stop inverse = inverse_of(hn::IfThenElse(level, all<Stop>(1.0F), uy));
-  const Stop widen = hn::IfThenElseZero(level, all<Stop>(1e6F));
-  const Stop zero = hn::Zero(StopTag());
-  const Stop one = all<Stop>(1.0F);
-  const int most = hn::GetLane(
-      hn::MaxOfLanes(StopIntegers(), hn::IfThenZeroElse(missing, range.last - range.first)));
-  const Stop first = from_integer<Stop>(range.first);
-  const hn::RebindToUnsigned<StopTag> masks;
-  const auto column = hn::BitCast(masks, across.first);
-  auto low = hn::Zero(masks);
-  auto high = hn::Zero(masks);
-  for (int k = 0; k <= most; ++k) {
-    const Stop row = first + all<Stop>(static_cast<float>(k));
-    const Stop top = hn::MulAdd(row, all<Stop>(block_side), all<Stop>(0.5F)) - y;
-    const Stop a = (top - radius) * inverse;
-    const Stop b = (top + all<Stop>(block_side - 1) + radius) * inverse;
-    const Stop from = clamped(hn::Min(a, b) - widen, zero, one);
-    const Stop to = clamped(hn::Max(a, b) + widen, zero, one);
-    const Stop xa = hn::MulAdd(from, ux, x);
-    const Stop xb = hn::MulAdd(to, ux, x);
-    const auto here =
-        range_masks(blocks_between(hn::Min(xa, xb) - radius, hn::Max(xa, xb) + radius, columns));
-    hn::Store(here, masks, f.line_columns[k] + l);
-    // Lines that end before row k may have bits here; so have those that reach beyond the window.
-    const auto ends = hn::Gt(hn::Set(StopIntegers(), k), range.last - range.first);
-    const auto shifted = hn::IfThenZeroElse(hn::RebindMask(masks, ends), hn::Shr(here, column));
-    if (k < 4) {
-      low = low | hn::ShiftLeftSame(shifted, 8 * k);
-    } else if (k < window_side) {
-      high = high | hn::ShiftLeftSame(shifted, 8 * (k - 4));
-    }
-  }
-  hn::Store(across.first, StopIntegers(), f.line_column + l);
-  hn::Store(low, masks, f.window_low + l);
-  hn::Store(high, masks, f.window_high + l);
-  const auto within = hn::Set(StopIntegers(), window_side);
-  const auto windowed =
-      hn::And(hn::Lt(range.last - range.first, within), hn::Lt(across.last - across.first, within));
-  f.windowed |= static_cast<std::uint64_t>(bits_of<Stop>(hn::RebindMask(StopTag(), windowed)))
-                << static_cast<unsigned>(l);
-  return bits;
-}
-
-// Rows and columns of blocks that a row's splats may touch; which of `bits` touch any.
-HWY_INLINE std::uint32_t find_splat_blocks(const Outline& outline, const Tile& tile, int l,
-                                           std::uint32_t bits, Footing& f) {
-  const Stop left = all<Stop>(static_cast<float>(tile.x));
-  const Stop top = all<Stop>(static_cast<float>(tile.y));
-  const Ranges across =
-      blocks_between(outline.x.low - left, outline.x.high - left, blocks_of(tile.width));
-  const Ranges down =
-      blocks_between(outline.y.low - top, outline.y.high - top, blocks_of(tile.height));
-  hn::Store(across.first, StopIntegers(), f.column_first + l);
-  hn::Store(across.last, StopIntegers(), f.column_last + l);
-  hn::Store(down.first, StopIntegers(), f.row_first + l);
-  hn::Store(down.last, StopIntegers(), f.row_last + l);
-  const auto missing = hn::Or(hn::Gt(across.first, across.last), hn::Gt(down.first, down.last));
-  return bits & ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
-}
 
 inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
   Ribbon out = {r.x[l],
@@ -172,108 +60,6 @@ inline Splat splat_at(const Prepared& p, int l) {
   out.strength = s.strength[l];
   for (int c = 0; c < 3; ++c) out.color[c] = p.densities.color[l][c];
   return out;
-}
-
-inline bool has(std::uint64_t bits, int l) { return (bits >> static_cast<unsigned>(l) & 1U) != 0; }
-
-// One vector of a row of stops, made ready: see prepare_brick.
-template <bool Lines, bool Medium, bool Perspective, bool Curved>
-struct RowMaker {
-  const Camera& camera;
-  const Pass& pass;
-  const Tile& tile;
-  Hash3<std::uint32_t> key;
-  Prepared& out;
-  Rows rows;  // both are filled row by row
-  Cells cells;
-
-  RowMaker(const Camera& of_camera, const Pass& of_pass, const Tile& of_tile, Prepared& into)
-      : camera(of_camera),
-        pass(of_pass),
-        tile(of_tile),
-        key(hash_key(of_pass.line.seed, of_pass.line.epoch)),
-        out(into) {}
-
-  // What of the lanes from i on (`bits`) has a line or a splat, made ready at stop l.
-  HWY_INLINE void make(int i, int l, std::uint32_t bits) {
-    const CellLanes<Curved> cell(rows, cells, i);
-    if (Lines) {
-      const Winds winds = read_winds(pass, rows, i);
-      std::uint32_t lines =
-          bits & bits_of<Stop>(hn::Ge(winds.magnitude, all<Stop>(least_magnitude(pass.line))));
-      if (lines != 0) {
-        lines = prepare_ribbons<Perspective, Curved>(camera, pass, rows, out.stops, cell, winds,
-                                                     key, i, l, lines, out.ribbons);
-      }
-      if (lines != 0) lines = find_line_blocks(pass.line, out.ribbons, tile, l, lines, out.footing);
-      out.stops.lines |= static_cast<std::uint64_t>(lines) << static_cast<unsigned>(l);
-    }
-    if (Medium) {
-      const Extinctions found = read_extinctions(pass, rows, i);
-      std::uint32_t splats = bits & bits_of<Stop>(found.kept);
-      if (splats == 0) return;
-      store(found.rho, out.densities.rho + l);
-      const Outline outline =
-          prepare_splats<Perspective, Curved>(camera, out.stops, cell, l, found.rho, out.splats);
-      splats = find_splat_blocks(outline, tile, l, splats, out.footing);
-      out.stops.splats |= static_cast<std::uint64_t>(splats) << static_cast<unsigned>(l);
-      for (; splats != 0; splats &= splats - 1U) {
-        const int k = __builtin_ctz(splats);
-        color_density(pass, rows.offset + rows.along_u[i + k], out.densities.color[l + k]);
-      }
-    }
-  }
-};
-
-// Everything up to the pixels: what of a brick may touch the tile's open blocks, made ready.
-template <bool Lines, bool Medium, bool Perspective, bool Curved>
-void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
-                   Prepared& out) {
-  RowMaker<Lines, Medium, Perspective, Curved> maker(camera, pass, tile, out);
-  Rows& rows = maker.rows;
-  Stops& stops = out.stops;
-  stops.lines = stops.splats = out.footing.windowed = 0;
-  out.pass = &pass;
-  out.near = camera.near;
-  open_rows(pass, brick, rows);
-  float reach[3];
-  brick_reach(camera, pass, brick, reach);
-  const Frustum frustum = frustum_of<Perspective>(camera, tile, reach, Lines ? pass.line.r2 : 0.0F);
-  const bool partly = partly_closed(tile, brick);
-  for (int j = 0; j < rows.v_count; ++j) {
-    set_row(pass, j, rows);
-    if (Curved) {
-      place_curved_row(camera, pass, j, rows, stops);
-    } else {
-      place_row(camera, pass, j, rows, stops);
-    }
-    std::uint32_t bits = seen_in_row<Perspective>(camera, frustum, stops, j) & row_bits(rows);
-    if (bits == 0) continue;
-    if (partly &&
-        !row_is_open<Perspective>(camera, frustum, stops, j, rows.u_count, !Curved, tile)) {
-      tile.counters.occluded += __builtin_popcount(bits);
-      continue;
-    }
-    if (Curved) {
-      fill_cells(camera, pass, rows, maker.cells);
-      bits &= maker.cells.solid;
-    }
-    for (int i = 0; i < brick_side; i += stop_lanes) {
-      const std::uint32_t here = bits >> static_cast<unsigned>(i) & ((2U << (stop_lanes - 1)) - 1U);
-      if (here != 0) maker.make(i, brick_side * j + i, here);
-    }
-  }
-  stops.count = __builtin_popcountll(stops.lines | stops.splats);
-}
-
-template <bool Lines, bool Medium, bool Perspective>
-void prepare_on(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
-                Prepared& out) {
-  if (pass.places != nullptr) {
-    prepare_brick<Lines, Medium, Perspective, true>(camera, pass, brick, tile, out);
-  } else {
-    prepare_brick<Lines, Medium, Perspective, false>(camera, pass, brick, tile, out);
-  }
 }
 
 inline float* block_at(const Tile& tile, int row, int column) {
@@ -467,25 +253,189 @@ HWY_INLINE void draw_stop(const Prepared& p, const Compositor& with, int style, 
   }
 }
 
-// A brick's kernels in visibility order: rows outward from the eye's, stops outward in each.
-template <bool Perspective>
-void draw_in_order(const Brick& brick, const Prepared& p, Tile& tile) {
-  const Pass& pass = *p.pass;
+// A brick's stops in visibility order: rows outward from the eye's, stops outward in each; how
+// many.
+inline int order_stops(const Brick& brick, const Pass& pass, std::uint64_t kept,
+                       std::uint8_t* order) {
   const int* us = pass.axis[pass.u].visit + brick.u_first;
   const int* vs = pass.axis[pass.v].visit + brick.v_first;
   const int u_low = lowest(us);
   const int v_low = lowest(vs);
-  const std::uint64_t kept = p.stops.lines | p.stops.splats;
-  const Compositor with = compositor_of<Perspective>(pass);
-  const int style = style_of(pass.line);
+  int n = 0;
   for (int j = 0; j < brick.v_count; ++j) {
     const int row = brick_side * (vs[j] - v_low);
-    if ((kept >> static_cast<unsigned>(row) & 0xffU) == 0) continue;
+    if (row_at(kept, vs[j] - v_low) == 0) continue;
     for (int i = 0; i < brick.u_count; ++i) {
       const int l = row + us[i] - u_low;
-      if (has(kept, l)) draw_stop<Perspective>(p, with, style, l, tile);
+      order[n] = static_cast<std::uint8_t>(l);
+      n += has(kept, l) ? 1 : 0;
     }
   }
+  return n;
+}
+
+// The blocks of a tile that a brick's kernels may touch, as a window of at most wide_side rows and
+// columns; and for each of them which kernels do: bit i for the i-th in visibility order.
+constexpr int wide_side = 16;
+
+struct Touched {
+  int row, column;  // of the window's corner
+  int rows, columns;
+  std::uint64_t by[wide_side * wide_side + 1];  // the last takes what is put down for nothing
+};
+
+// Room for the kernels that are left; false if they reach farther than the window does.
+inline bool open_touched(const Footing& f, const std::uint8_t* order, int count, Touched& t) {
+  int last_row = 0;
+  int last_column = 0;
+  t.row = tile_blocks;
+  t.column = tile_blocks;
+  for (int i = 0; i < count; ++i) {
+    const int l = order[i];
+    t.row = smaller(t.row, f.line_first[l]);
+    t.column = smaller(t.column, f.line_column[l]);
+    last_row = larger(last_row, f.line_last[l]);
+    last_column = larger(last_column, f.line_last_column[l]);
+  }
+  t.rows = last_row - t.row + 1;
+  t.columns = last_column - t.column + 1;
+  if (t.rows > wide_side || t.columns > wide_side) return false;
+  for (int r = 0; r < t.rows; ++r) {
+    for (int c = 0; c < t.columns; ++c) t.by[wide_side * r + c] = 0;
+  }
+  return true;
+}
+
+// Most lines touch few blocks: those are put down without asking how many they are.
+inline void list_touches(const Footing& f, const std::uint8_t* order, int count, Touched& t) {
+  constexpr int unasked = 2;
+  for (int i = 0; i < count; ++i) {
+    const int l = order[i];
+    const std::uint64_t bit = std::uint64_t{1} << static_cast<unsigned>(i);
+    const int corner = wide_side * (f.line_first[l] - t.row) + f.line_column[l] - t.column;
+    std::uint64_t left = static_cast<std::uint64_t>(f.window_high[l]) << 32U | f.window_low[l];
+    const auto put = [&] {
+      const int at = __builtin_ctzll(left);
+      t.by[corner + wide_side * (at / window_side) + at % window_side] |= bit;
+      left &= left - 1U;
+    };
+    for (int k = 0; k < unasked; ++k) {
+      if (left == 0) break;
+      put();
+    }
+    while (left != 0) put();
+  }
+}
+
+// A block's pixels while kernels are composited into them.
+struct Held {
+  Pixel transmittance, alpha, red, green, blue;
+};
+
+HWY_INLINE Held hold(const float* block, int l) {
+  constexpr int lanes = block_pixels;
+  return {load<Pixel>(block + l), load<Pixel>(block + lanes + l),
+          load<Pixel>(block + 2 * lanes + l), load<Pixel>(block + 3 * lanes + l),
+          load<Pixel>(block + 4 * lanes + l)};
+}
+
+HWY_INLINE void release(const Held& held, float* block, int l) {
+  constexpr int lanes = block_pixels;
+  store(held.transmittance, block + l);
+  store(held.alpha, block + lanes + l);
+  store(held.red, block + 2 * lanes + l);
+  store(held.green, block + 3 * lanes + l);
+  store(held.blue, block + 4 * lanes + l);
+}
+
+template <Depth Along, int Style>
+HWY_INLINE void add_line(const LineStyle& line, const Ribbons& ribbons, int l, Pixel px, Pixel py,
+                         Held& held) {
+  const RibbonLanes r = spread(line, ribbons, l);
+  const RibbonLane lane = ribbon_lane<Along, Style>(r, px - r.x, py - r.y);
+  const Pixel a = held.transmittance * lane.opacity;
+  const auto color = [&](int c) {
+    return Style != style_plain ? hn::MulAdd(lane.f, r.rise[c], r.tail[c]) : r.tail[c];
+  };
+  held.red = hn::MulAdd(a, color(0), held.red);
+  held.green = hn::MulAdd(a, color(1), held.green);
+  held.blue = hn::MulAdd(a, color(2), held.blue);
+  held.alpha = held.alpha + a;
+  held.transmittance = held.transmittance - a;
+}
+
+// Composites the lines of a brick that has lines alone into one block.
+template <Depth Along, int Style>
+HWY_INLINE void draw_lines_in_block(const Prepared& p, const std::uint8_t* order,
+                                    std::uint64_t lines, int row, int column, Tile& tile) {
+  float* block = block_at(tile, row, column);
+  Light light;
+  for (int v = 0; v < block_pixels; v += pixel_lanes) {
+    const Pixel px = all<Pixel>(left_of(tile, column)) + load<Pixel>(lane_x + v);
+    const Pixel py = all<Pixel>(top_of(tile, row)) + load<Pixel>(lane_y + v);
+    Held held = hold(block, v);
+    for (std::uint64_t left = lines; left != 0; left &= left - 1U) {
+      add_line<Along, Style>(p.pass->line, p.ribbons, order[__builtin_ctzll(left)], px, py, held);
+    }
+    release(held, block, v);
+    light.see(held.transmittance);
+  }
+  note_light(light, row, 1U << static_cast<unsigned>(column), tile);
+  tile.counters.pixel_updates += std::int64_t{__builtin_popcountll(lines)} * block_pixels;
+}
+
+// Block by block, so that each is loaded and stored once.
+template <Depth Along, int Style>
+void draw_touches(const Prepared& p, const std::uint8_t* order, int count, Tile& tile) {
+  Touched touched;
+  if (!open_touched(p.footing, order, count, touched)) __builtin_trap();
+  list_touches(p.footing, order, count, touched);
+  for (int r = 0; r < touched.rows; ++r) {
+    const int row = touched.row + r;
+    for (int c = 0; c < touched.columns; ++c) {
+      const int column = touched.column + c;
+      const std::uint64_t lines = touched.by[wide_side * r + c];
+      if (lines == 0 || (tile.open[row] >> static_cast<unsigned>(column) & 1U) == 0) continue;
+      draw_lines_in_block<Along, Style>(p, order, lines, row, column, tile);
+    }
+  }
+}
+
+// Whether the series tells the depth along all of a brick's lines.
+inline bool all_nearly_flat(const Ribbons& r, std::uint64_t lines) {
+  float most = 0;
+  for (int l = 0; l < brick_stops; ++l) {
+    const float bend = absolute(r.depth_ratio[l] - 1.0F);
+    most = has(lines, l) ? larger(most, bend) : most;
+  }
+  return most <= series_bend_max;
+}
+
+template <bool Perspective, int Style>
+void draw_lines(const Prepared& p, const std::uint8_t* order, int count, Tile& tile) {
+  if (!Perspective || Style == style_plain) {
+    draw_touches<Depth::flat, Style>(p, order, count, tile);
+  } else if (all_nearly_flat(p.ribbons, p.stops.lines)) {
+    draw_touches<Depth::series, Style>(p, order, count, tile);
+  } else {
+    draw_touches<Depth::exact, Style>(p, order, count, tile);
+  }
+}
+
+template <bool Perspective>
+void draw_in_order(const Brick& brick, const Prepared& p, Tile& tile) {
+  const Pass& pass = *p.pass;
+  const std::uint64_t lines = p.stops.lines;
+  const int style = style_of(pass.line);
+  std::uint8_t order[brick_stops + 1];
+  const int count = order_stops(brick, pass, lines | p.stops.splats, order);
+  if (p.stops.splats == 0 && (lines & ~p.footing.windowed) == 0) {
+    if (style == style_head) return draw_lines<Perspective, style_head>(p, order, count, tile);
+    if (style == style_plain) return draw_lines<Perspective, style_plain>(p, order, count, tile);
+    return draw_lines<Perspective, style_moving>(p, order, count, tile);
+  }
+  const Compositor with = compositor_of<Perspective>(pass);
+  for (int i = 0; i < count; ++i) draw_stop<Perspective>(p, with, style, order[i], tile);
 }
 
 // A row's samples lie on one cache line or two.
@@ -512,27 +462,6 @@ void prefetch_brick(const Pass& pass, const Brick& brick) {
     for (int k = 0; k < pass.medium.layers; ++k) {
       prefetch_row(pass.medium.layer[k].values + at, brick.u_count);
     }
-  }
-}
-
-template <bool Perspective>
-void prepare_projected(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
-                       Prepared& out) {
-  if (pass.has_lines != 0 && pass.has_medium != 0) {
-    prepare_on<true, true, Perspective>(camera, pass, brick, tile, out);
-  } else if (pass.has_lines != 0) {
-    prepare_on<true, false, Perspective>(camera, pass, brick, tile, out);
-  } else {
-    prepare_on<false, true, Perspective>(camera, pass, brick, tile, out);
-  }
-}
-
-void prepare(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
-             Prepared& out) {
-  if (camera.perspective != 0) {
-    prepare_projected<true>(camera, pass, brick, tile, out);
-  } else {
-    prepare_projected<false>(camera, pass, brick, tile, out);
   }
 }
 

@@ -1,0 +1,148 @@
+// Part of the kernel body: the blocks of a tile that a row's lines and splats may touch.
+#pragma once
+
+#include "server/engine/kernels/body_lines.hpp"
+#include "server/engine/kernels/body_splats.hpp"
+
+namespace windsplat::engine::kernels {
+namespace {
+
+using StopIntegers = hn::RebindToSigned<StopTag>;
+using StopInteger = hn::Vec<StopIntegers>;
+
+// blocks_between for a row of stops.
+struct Ranges {
+  StopInteger first, last;
+};
+
+HWY_INLINE Ranges blocks_between(Stop low, Stop high, int blocks) {
+  constexpr float per_block = 1.0F / block_side;
+  constexpr float slack = 1e-3F;
+  const float bound = static_cast<float>(blocks);
+  const Stop first = clamped((low + all<Stop>(0.5F - slack)) * all<Stop>(per_block), 0.0F, bound);
+  const Stop last =
+      clamped((high + all<Stop>(slack - 0.5F)) * all<Stop>(per_block), -1.0F, bound - 0.5F);
+  return {truncated(first), truncated(last + all<Stop>(1.0F)) - hn::Set(StopIntegers(), 1)};
+}
+
+// The bits from first to last; none if last < first.
+HWY_INLINE UnsignedOf<Stop> range_masks(const Ranges& range) {
+  const hn::RebindToUnsigned<StopTag> tag;
+  const auto one = hn::Set(tag, 1U);
+  const auto above =
+      hn::Shl(one + one, hn::BitCast(tag, hn::Max(range.last, hn::Zero(StopIntegers()))));
+  const auto below = hn::Shl(one, hn::BitCast(tag, range.first));
+  const auto bits = hn::AndNot(below - one, above - one);
+  const auto none = hn::Gt(range.first, range.last);
+  return hn::IfThenZeroElse(hn::RebindMask(tag, none), bits);
+}
+
+// A row's lines from lane 0 of l on, as segments from the tile's corner.
+struct LineSpans {
+  Stop x, y, ux, uy;
+  Ranges rows, columns;
+};
+
+HWY_INLINE LineSpans line_spans(const LineStyle& line, const Ribbons& r, const Tile& tile, int l) {
+  const Stop radius = all<Stop>(line.r2);
+  LineSpans s;
+  s.x = load<Stop>(r.x + l) - all<Stop>(static_cast<float>(tile.x));
+  s.y = load<Stop>(r.y + l) - all<Stop>(static_cast<float>(tile.y));
+  s.ux = load<Stop>(r.ux + l);
+  s.uy = load<Stop>(r.uy + l);
+  const Stop bottom = s.y + s.uy;
+  const Stop end = s.x + s.ux;
+  s.rows = blocks_between(hn::Min(s.y, bottom) - radius, hn::Max(s.y, bottom) + radius,
+                          blocks_of(tile.height));
+  s.columns =
+      blocks_between(hn::Min(s.x, end) - radius, hn::Max(s.x, end) + radius, blocks_of(tile.width));
+  return s;
+}
+
+HWY_INLINE void store(StopInteger value, std::int32_t* to) { hn::Store(value, StopIntegers(), to); }
+
+// The rows of blocks that a row's lines may touch; which of `bits` touch any. `most` becomes the
+// largest number of rows of a line so far.
+HWY_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons& r, const Tile& tile,
+                                        int l, std::uint32_t bits, StopInteger& most, Footing& f) {
+  const LineSpans s = line_spans(line, r, tile, l);
+  const auto missing =
+      hn::Or(hn::Gt(s.rows.first, s.rows.last), hn::Gt(s.columns.first, s.columns.last));
+  const StopInteger tall = s.rows.last - s.rows.first;
+  const auto within = hn::Set(StopIntegers(), window_side);
+  const auto windowed =
+      hn::And(hn::Lt(tall, within), hn::Lt(s.columns.last - s.columns.first, within));
+  const std::uint64_t small = bits_of<Stop>(hn::RebindMask(StopTag(), windowed));
+  f.windowed |= small << static_cast<unsigned>(l);
+  store(s.rows.first, f.line_first + l);
+  store(s.rows.last, f.line_last + l);
+  store(s.columns.first, f.line_column + l);
+  store(s.columns.last, f.line_last_column + l);
+  const std::uint32_t touching = bits & ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
+  if (touching != 0) most = hn::Max(most, hn::IfThenZeroElse(missing, tall));
+  return touching;
+}
+
+// The columns of blocks that a row's lines may touch in each of their rows, up to `most` beyond the
+// first: of the part of the segment within r2 of the row's pixel centres, widened by r2.
+HWY_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, const Tile& tile, int l,
+                                  int most, Footing& f) {
+  const LineSpans s = line_spans(line, r, tile, l);
+  const int columns = blocks_of(tile.width);
+  const Stop radius = all<Stop>(line.r2);
+  const Stop zero = hn::Zero(StopTag());
+  const Stop one = all<Stop>(1.0F);
+  // A level line's whole length counts in every row.
+  const auto level = hn::Le(hn::Abs(s.uy), all<Stop>(1e-3F));
+  const Stop inverse = inverse_of(hn::IfThenElse(level, one, s.uy));
+  const Stop widen = hn::IfThenElseZero(level, all<Stop>(1e6F));
+  const Stop first = from_integer<Stop>(s.rows.first);
+  const StopInteger tall = s.rows.last - s.rows.first;
+  const hn::RebindToUnsigned<StopTag> masks;
+  const auto column = hn::BitCast(masks, s.columns.first);
+  auto low = hn::Zero(masks);
+  auto high = hn::Zero(masks);
+  for (int k = 0; k <= most; ++k) {
+    const Stop row = first + all<Stop>(static_cast<float>(k));
+    const Stop top = hn::MulAdd(row, all<Stop>(block_side), all<Stop>(0.5F)) - s.y;
+    const Stop a = (top - radius) * inverse;
+    const Stop b = (top + all<Stop>(block_side - 1) + radius) * inverse;
+    const Stop from = clamped(hn::Min(a, b) - widen, zero, one);
+    const Stop to = clamped(hn::Max(a, b) + widen, zero, one);
+    const Stop xa = hn::MulAdd(from, s.ux, s.x);
+    const Stop xb = hn::MulAdd(to, s.ux, s.x);
+    const auto here =
+        range_masks(blocks_between(hn::Min(xa, xb) - radius, hn::Max(xa, xb) + radius, columns));
+    hn::Store(here, masks, f.line_columns[k] + l);
+    // Lines that end before row k may have bits here.
+    const auto ends = hn::Gt(hn::Set(StopIntegers(), k), tall);
+    const auto shifted = hn::IfThenZeroElse(hn::RebindMask(masks, ends), hn::Shr(here, column));
+    if (k < 4) {
+      low = low | hn::ShiftLeftSame(shifted, window_side * k);
+    } else if (k < window_side) {
+      high = high | hn::ShiftLeftSame(shifted, window_side * (k - 4));
+    }
+  }
+  hn::Store(low, masks, f.window_low + l);
+  hn::Store(high, masks, f.window_high + l);
+}
+
+// Rows and columns of blocks that a row's splats may touch; which of `bits` touch any.
+HWY_INLINE std::uint32_t find_splat_blocks(const Outline& outline, const Tile& tile, int l,
+                                           std::uint32_t bits, Footing& f) {
+  const Stop left = all<Stop>(static_cast<float>(tile.x));
+  const Stop top = all<Stop>(static_cast<float>(tile.y));
+  const Ranges across =
+      blocks_between(outline.x.low - left, outline.x.high - left, blocks_of(tile.width));
+  const Ranges down =
+      blocks_between(outline.y.low - top, outline.y.high - top, blocks_of(tile.height));
+  store(across.first, f.column_first + l);
+  store(across.last, f.column_last + l);
+  store(down.first, f.row_first + l);
+  store(down.last, f.row_last + l);
+  const auto missing = hn::Or(hn::Gt(across.first, across.last), hn::Gt(down.first, down.last));
+  return bits & ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
+}
+
+}  // namespace
+}  // namespace windsplat::engine::kernels

@@ -1,0 +1,195 @@
+// Part of the kernel body: a brick made ready for a tile. Each stage goes through all rows before
+// the next begins, so that rows do not wait for each other's branches.
+#pragma once
+
+#include "server/engine/kernels/body_footing.hpp"
+
+namespace windsplat::engine::kernels {
+namespace {
+
+inline bool has(std::uint64_t bits, int l) { return (bits >> static_cast<unsigned>(l) & 1U) != 0; }
+
+// The bits of the vector of stops that begins at l.
+inline std::uint32_t lanes_at(std::uint64_t bits, int l) {
+  constexpr std::uint64_t lanes = (std::uint64_t{2} << (stop_lanes - 1)) - 1U;
+  return static_cast<std::uint32_t>(bits >> static_cast<unsigned>(l) & lanes);
+}
+
+inline std::uint32_t row_at(std::uint64_t bits, int j) {
+  return static_cast<std::uint32_t>(bits >> static_cast<unsigned>(brick_side * j) & 0xffU);
+}
+
+// Places a brick's stops; those whose kernel may touch an open block of the tile.
+template <bool Perspective, bool Curved>
+std::uint64_t place_stops(const Camera& camera, const Pass& pass, const Brick& brick,
+                          const Frustum& frustum, Rows& rows, Tile& tile, Stops& stops) {
+  const bool partly = partly_closed(tile, brick);
+  std::uint64_t seen = 0;
+  for (int j = 0; j < rows.v_count; ++j) {
+    if (Curved) {
+      set_row(pass, j, rows);
+      place_curved_row(camera, pass, j, rows, stops);
+    } else {
+      place_row(camera, pass, j, rows, stops);
+    }
+    const std::uint64_t bits = seen_in_row<Perspective>(camera, frustum, stops, j) & row_bits(rows);
+    seen |= bits << static_cast<unsigned>(brick_side * j);
+  }
+  for (int j = 0; partly && j < rows.v_count; ++j) {
+    const std::uint32_t bits = row_at(seen, j);
+    if (bits == 0 ||
+        row_is_open<Perspective>(camera, frustum, stops, j, rows.u_count, !Curved, tile)) {
+      continue;
+    }
+    tile.counters.occluded += __builtin_popcount(bits);
+    seen &= ~(std::uint64_t{0xff} << static_cast<unsigned>(brick_side * j));
+  }
+  return seen;
+}
+
+template <bool Lines, bool Medium, bool Perspective, bool Curved>
+struct BrickMaker {
+  const Camera& camera;
+  const Pass& pass;
+  Tile& tile;
+  Prepared& out;
+  Hash3<std::uint32_t> key;
+  Rows rows;  // the two are filled row by row
+  Cells cells;
+  Shades shades;
+
+  BrickMaker(const Camera& of_camera, const Pass& of_pass, Tile& of_tile, Prepared& into)
+      : camera(of_camera),
+        pass(of_pass),
+        tile(of_tile),
+        out(into),
+        key(hash_key(of_pass.line.seed, of_pass.line.epoch)) {}
+
+  // The lines of a vector of stops; which of `bits` have one.
+  HWY_INLINE std::uint32_t make_lines(const CellLanes<Curved>& cell, int i, int l,
+                                      std::uint32_t bits) {
+    const Winds winds = read_winds(pass, rows, i);
+    const Stop least = all<Stop>(least_magnitude(pass.line));
+    const std::uint32_t lines = bits & bits_of<Stop>(hn::Ge(winds.magnitude, least));
+    if (lines == 0) return 0;
+    return lines & prepare_ribbons<Perspective, Curved>(camera, pass, rows, out.stops, cell, winds,
+                                                        key, i, l, shades, out.ribbons);
+  }
+
+  HWY_INLINE std::uint32_t make_splats(const CellLanes<Curved>& cell, int i, int l,
+                                       std::uint32_t bits) {
+    const Extinctions found = read_extinctions(pass, rows, i);
+    const std::uint32_t splats = bits & bits_of<Stop>(found.kept);
+    if (splats == 0) return 0;
+    store(found.rho, out.densities.rho + l);
+    const Outline outline =
+        prepare_splats<Perspective, Curved>(camera, out.stops, cell, l, found.rho, out.splats);
+    return find_splat_blocks(outline, tile, l, splats, out.footing);
+  }
+
+  void make_row(int j, std::uint32_t bits) {
+    set_row(pass, j, rows);
+    if (Curved) {
+      fill_cells(camera, pass, rows, cells);
+      bits &= cells.solid;
+    }
+    for (int i = 0; i < brick_side; i += stop_lanes) {
+      const int l = brick_side * j + i;
+      const std::uint32_t here = lanes_at(bits, i);
+      if (here == 0) continue;
+      const CellLanes<Curved> cell(rows, cells, i);
+      if (Lines) {
+        const std::uint64_t lines = make_lines(cell, i, l, here);
+        out.stops.lines |= lines << static_cast<unsigned>(l);
+      }
+      if (Medium) {
+        const std::uint64_t splats = make_splats(cell, i, l, here);
+        out.stops.splats |= splats << static_cast<unsigned>(l);
+        color_row(splats, i, l);
+      }
+    }
+  }
+
+  void color_row(std::uint64_t splats, int i, int l) {
+    for (; splats != 0; splats &= splats - 1U) {
+      const int k = __builtin_ctzll(splats);
+      color_density(pass, rows.offset + rows.along_u[i + k], out.densities.color[l + k]);
+    }
+  }
+
+  void find_lines() {
+    StopInteger most = hn::Zero(StopIntegers());
+    std::uint64_t touching = 0;
+    for (int l = 0; l < brick_stops; l += stop_lanes) {
+      const std::uint32_t bits = lanes_at(out.stops.lines, l);
+      if (bits == 0) continue;
+      const std::uint64_t here =
+          find_line_rows(pass.line, out.ribbons, tile, l, bits, most, out.footing);
+      touching |= here << static_cast<unsigned>(l);
+    }
+    out.stops.lines = touching;
+    const int rows_most = hn::GetLane(hn::MaxOfLanes(StopIntegers(), most));
+    for (int l = 0; l < brick_stops; l += stop_lanes) {
+      if (lanes_at(touching, l) == 0) continue;
+      find_line_columns(pass.line, out.ribbons, tile, l, rows_most, out.footing);
+    }
+    color_ribbons(pass.line.color, shades, touching, out.ribbons);
+  }
+};
+
+// Everything up to the pixels: what of a brick may touch the tile's open blocks, made ready.
+template <bool Lines, bool Medium, bool Perspective, bool Curved>
+void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
+                   Prepared& out) {
+  BrickMaker<Lines, Medium, Perspective, Curved> maker(camera, pass, tile, out);
+  Stops& stops = out.stops;
+  stops.lines = stops.splats = out.footing.windowed = 0;
+  out.pass = &pass;
+  out.near = camera.near;
+  open_rows(pass, brick, maker.rows);
+  float reach[3];
+  brick_reach(camera, pass, brick, reach);
+  const Frustum frustum = frustum_of<Perspective>(camera, tile, reach, Lines ? pass.line.r2 : 0.0F);
+  const std::uint64_t seen =
+      place_stops<Perspective, Curved>(camera, pass, brick, frustum, maker.rows, tile, stops);
+  maker.shades.unknown = 0;
+  for (int j = 0; j < brick.v_count; ++j) {
+    if (row_at(seen, j) != 0) maker.make_row(j, row_at(seen, j));
+  }
+  if (Lines && stops.lines != 0) maker.find_lines();
+  stops.count = __builtin_popcountll(stops.lines | stops.splats);
+}
+
+template <bool Lines, bool Medium, bool Perspective>
+void prepare_on(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
+                Prepared& out) {
+  if (pass.places != nullptr) {
+    prepare_brick<Lines, Medium, Perspective, true>(camera, pass, brick, tile, out);
+  } else {
+    prepare_brick<Lines, Medium, Perspective, false>(camera, pass, brick, tile, out);
+  }
+}
+
+template <bool Perspective>
+void prepare_projected(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
+                       Prepared& out) {
+  if (pass.has_lines != 0 && pass.has_medium != 0) {
+    prepare_on<true, true, Perspective>(camera, pass, brick, tile, out);
+  } else if (pass.has_lines != 0) {
+    prepare_on<true, false, Perspective>(camera, pass, brick, tile, out);
+  } else {
+    prepare_on<false, true, Perspective>(camera, pass, brick, tile, out);
+  }
+}
+
+void prepare(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
+             Prepared& out) {
+  if (camera.perspective != 0) {
+    prepare_projected<true>(camera, pass, brick, tile, out);
+  } else {
+    prepare_projected<false>(camera, pass, brick, tile, out);
+  }
+}
+
+}  // namespace
+}  // namespace windsplat::engine::kernels
