@@ -433,10 +433,9 @@ struct TileRange {
 };
 
 TileRange tiles_of(const RenderPlan& plan, const Brick& brick) {
-  const int wide = plan.tile_width / kernels::block_side;
-  const int tall = plan.tile_height / kernels::block_side;
-  return {brick.block_x / wide, brick.block_x_last / wide, brick.block_y / tall,
-          brick.block_y_last / tall};
+  const int side = plan.tile_pixels / kernels::block_side;
+  return {brick.block_x / side, brick.block_x_last / side, brick.block_y / side,
+          brick.block_y_last / side};
 }
 
 template <class Visit>
@@ -506,8 +505,8 @@ BrickCounts& BrickCounts::operator+=(const BrickCounts& other) {
 const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, ThreadPool& pool,
                       const CancelToken& cancel, BinSpace& space, WorkReport& work) {
   Bins& bins = space.bins;
-  bins.tiles_x = (plan.camera.width + plan.tile_width - 1) / plan.tile_width;
-  bins.tiles_y = (plan.camera.height + plan.tile_height - 1) / plan.tile_height;
+  bins.tiles_x = (plan.camera.width + plan.tile_pixels - 1) / plan.tile_pixels;
+  bins.tiles_y = (plan.camera.height + plan.tile_pixels - 1) / plan.tile_pixels;
   bins.bricks.clear();
   bins.load.assign(static_cast<std::size_t>(bins.tiles_x) * bins.tiles_y, 0);
   Binner binner(plan, table, space);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <numeric>
 
@@ -144,6 +143,8 @@ void style_lines(const Scene& scene, const scene::VectorLayer& from, kernels::Li
   to.r2 = static_cast<float>(from.r2);
   to.inverse_ramp = static_cast<float>(1.0 / std::max(from.r2 - from.r1, 1e-6));
   to.opacity = static_cast<float>(from.opacity);
+  to.steep = to.inverse_ramp * to.opacity;
+  to.reach = to.r2 * to.steep;
   to.head_desaturation = static_cast<float>(from.head_desaturation);
   to.intensity_low = bounded(from.magnitude_range[0]);
   to.intensity_scale = ramp_scale(from.magnitude_range[0], from.magnitude_range[1]);
@@ -317,6 +318,14 @@ void finish_pass(const Scene& scene, int major, PassPlan& pass) {
   if (!pass.scalars.empty()) add_medium(scene, pass);
 }
 
+// A kernel is made ready once for every tile that it may touch: the fewer of those, the larger
+// tiles are. Small pictures take small ones, so that there are enough for all threads.
+int tile_pixels(int width, int height) {
+  const std::int64_t pixels = std::int64_t{width} * height;
+  if (pixels >= 600'000) return kernels::tile_side;
+  return pixels >= 200'000 ? 96 : 64;
+}
+
 std::string describe(const Scene& scene, const RenderPlan& plan) {
   std::string variant;
   const bool vector = scene.vector.has_value();
@@ -413,7 +422,7 @@ RenderPlan make_plan(const Scene& scene) {
   plan.eye_sample = eye_stop(scene.camera, major, scene.lattice.positions[major]);
   for (PassPlan& pass : plan.passes) finish_pass(scene, major, pass);
   if (scene.method == scene::Method::slab || plan.curved) plan_slabs(scene, plan);
-  plan.tile_width = getenv("TW") ? atoi(getenv("TW")) : 64;
+  plan.tile_pixels = tile_pixels(scene.camera.width, scene.camera.height);
   plan.tile_height = getenv("TH") ? atoi(getenv("TH")) : 64;
   plan.variant = describe(scene, plan);
   return plan;

@@ -76,8 +76,7 @@ struct RenderPlan {
   int compositing = 0;              // scene::Compositing
   double slab_depth = 1;            // of a slab along the view, world units
   float stop_transmittance = 0;
-  int tile_width = 0;  // pixels, at most kernels::tile_side: see tile_sides
-  int tile_height = 0;
+  int tile_pixels = 0;  // along a tile's side, at most kernels::tile_side
   std::string variant;
 
   RenderPlan() = default;

@@ -36,10 +36,10 @@ void open_tile(const RenderPlan& plan, const Bins& bins, std::size_t index, Work
                Tile& tile) {
   const int tx = static_cast<int>(index) % bins.tiles_x;
   const int ty = static_cast<int>(index) / bins.tiles_x;
-  tile.x = tx * plan.tile_width;
-  tile.y = ty * plan.tile_height;
-  tile.width = std::min(plan.tile_width, plan.camera.width - tile.x);
-  tile.height = std::min(plan.tile_height, plan.camera.height - tile.y);
+  tile.x = tx * plan.tile_pixels;
+  tile.y = ty * plan.tile_pixels;
+  tile.width = std::min(plan.tile_pixels, plan.camera.width - tile.x);
+  tile.height = std::min(plan.tile_pixels, plan.camera.height - tile.y);
   constexpr std::size_t blocks = static_cast<std::size_t>(tile_blocks) * tile_blocks;
   space.blocks.assign(blocks * block_floats, 0.0F);
   for (std::size_t b = 0; b < blocks; ++b) {

@@ -37,22 +37,21 @@ struct RibbonLanes {
 
 HWY_INLINE RibbonLanes spread(const Ribbon& r) {
   const auto lanes = [](float v) { return all<Pixel>(v); };
-  const float steep = r.inverse_ramp * r.opacity;
   return {lanes(r.x),
           lanes(r.y),
           lanes(r.ux),
           lanes(r.uy),
-          lanes(r.ux * r.inverse_u2),
-          lanes(r.uy * r.inverse_u2),
+          lanes(r.wx),
+          lanes(r.wy),
           lanes(r.w0),
           lanes(r.depth_ratio),
-          lanes(r.depth_ratio - 1.0F),
+          lanes(r.bend),
           {lanes(r.tail[0]), lanes(r.tail[1]), lanes(r.tail[2])},
           {lanes(r.rise[0]), lanes(r.rise[1]), lanes(r.rise[2])},
           lanes(r.phase),
           lanes(r.phase_rise),
-          lanes(r.r2 * steep),
-          lanes(steep),
+          lanes(r.reach),
+          lanes(r.steep),
           lanes(r.opacity)};
 }
 
@@ -62,21 +61,16 @@ HWY_INLINE RibbonLanes spread(const LineStyle& line, const Ribbons& r, int l) {
   const auto one = [](float v) { return all<Pixel>(v); };
   const float* tail = r.tail[l];
   const float* rise = r.rise[l];
-  const float steep = line.inverse_ramp * line.opacity;
-  const Pixel ux = lanes(r.ux);
-  const Pixel uy = lanes(r.uy);
-  const Pixel inverse_u2 = lanes(r.inverse_u2);
-  const Pixel ratio = lanes(r.depth_ratio);
   RibbonLanes out;
   out.x = lanes(r.x);
   out.y = lanes(r.y);
-  out.ux = ux;
-  out.uy = uy;
-  out.wx = ux * inverse_u2;
-  out.wy = uy * inverse_u2;
+  out.ux = lanes(r.ux);
+  out.uy = lanes(r.uy);
+  out.wx = lanes(r.wx);
+  out.wy = lanes(r.wy);
   out.w0 = lanes(r.w0);
-  out.ratio = ratio;
-  out.bend = ratio - one(1.0F);
+  out.ratio = lanes(r.depth_ratio);
+  out.bend = lanes(r.bend);
   for (int c = 0; c < 3; ++c) {
     out.tail[c] = one(tail[c]);
     out.rise[c] = one(rise[c]);
@@ -86,8 +80,8 @@ HWY_INLINE RibbonLanes spread(const LineStyle& line, const Ribbons& r, int l) {
     out.phase = lanes(r.phase);
     out.phase_rise = lanes(r.phase_rise);
   }
-  out.reach = one(line.r2 * steep);
-  out.steep = one(steep);
+  out.reach = one(line.reach);
+  out.steep = one(line.steep);
   out.opacity = one(line.opacity);
   return out;
 }

@@ -13,17 +13,19 @@ inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
                 r.y[l],
                 r.ux[l],
                 r.uy[l],
-                r.inverse_u2[l],
+                r.wx[l],
+                r.wy[l],
                 r.w0[l],
                 r.depth_ratio[l],
+                r.bend[l],
                 {r.tail[l][0], r.tail[l][1], r.tail[l][2]},
                 {r.rise[l][0], r.rise[l][1], r.rise[l][2]},
                 r.depth[l],
                 r.depth_rise[l],
                 0,
                 0,
-                line.r2,
-                line.inverse_ramp,
+                line.reach,
+                line.steep,
                 line.opacity};
   if (line.moving != 0) {
     out.phase = r.phase[l];
@@ -170,8 +172,7 @@ HWY_INLINE void draw_line(const Prepared& p, int l, Tile& tile) {
   int blocks = 0;
   if (!has(f.windowed, l)) {
     blocks = draw_ribbon<general, Style>(lanes, f, l, tile);
-  } else if (general == Depth::exact &&
-             absolute(p.ribbons.depth_ratio[l] - 1.0F) <= series_bend_max) {
+  } else if (general == Depth::exact && absolute(p.ribbons.bend[l]) <= series_bend_max) {
     blocks = draw_windowed<Depth::series, Style>(lanes, f, l, tile);
   } else {
     blocks = draw_windowed<general, Style>(lanes, f, l, tile);
@@ -253,18 +254,44 @@ HWY_INLINE void draw_stop(const Prepared& p, const Compositor& with, int style, 
   }
 }
 
+// For each set of a row's stops: their places, one a byte, ascending.
+struct RowPlaces {
+  std::uint64_t of[256];
+};
+
+constexpr RowPlaces make_row_places() {
+  RowPlaces places = {};
+  for (unsigned bits = 0; bits < 256; ++bits) {
+    unsigned n = 0;
+    for (unsigned i = 0; i < brick_side; ++i) {
+      if ((bits >> i & 1U) != 0) places.of[bits] |= std::uint64_t{i} << (8 * n++);
+    }
+  }
+  return places;
+}
+
+constexpr RowPlaces row_places = make_row_places();
+
 // A brick's stops in visibility order: rows outward from the eye's, stops outward in each; how
-// many.
+// many. `order` has room for brick_side more.
 inline int order_stops(const Brick& brick, const Pass& pass, std::uint64_t kept,
                        std::uint8_t* order) {
   const int* us = pass.axis[pass.u].visit + brick.u_first;
   const int* vs = pass.axis[pass.v].visit + brick.v_first;
   const int u_low = lowest(us);
   const int v_low = lowest(vs);
+  const bool ascending = us[0] == u_low;
   int n = 0;
   for (int j = 0; j < brick.v_count; ++j) {
+    const std::uint32_t bits = row_at(kept, vs[j] - v_low);
     const int row = brick_side * (vs[j] - v_low);
-    if (row_at(kept, vs[j] - v_low) == 0) continue;
+    if (ascending) {
+      const std::uint64_t places =
+          row_places.of[bits] + static_cast<std::uint64_t>(row) * 0x0101010101010101U;
+      __builtin_memcpy(order + n, &places, sizeof places);
+      n += __builtin_popcount(bits);
+      continue;
+    }
     for (int i = 0; i < brick.u_count; ++i) {
       const int l = row + us[i] - u_low;
       order[n] = static_cast<std::uint8_t>(l);
@@ -274,166 +301,12 @@ inline int order_stops(const Brick& brick, const Pass& pass, std::uint64_t kept,
   return n;
 }
 
-// The blocks of a tile that a brick's kernels may touch, as a window of at most wide_side rows and
-// columns; and for each of them which kernels do: bit i for the i-th in visibility order.
-constexpr int wide_side = 16;
-
-struct Touched {
-  int row, column;  // of the window's corner
-  int rows, columns;
-  std::uint64_t by[wide_side * wide_side + 1];  // the last takes what is put down for nothing
-};
-
-// Room for the kernels that are left; false if they reach farther than the window does.
-inline bool open_touched(const Footing& f, const std::uint8_t* order, int count, Touched& t) {
-  int last_row = 0;
-  int last_column = 0;
-  t.row = tile_blocks;
-  t.column = tile_blocks;
-  for (int i = 0; i < count; ++i) {
-    const int l = order[i];
-    t.row = smaller(t.row, f.line_first[l]);
-    t.column = smaller(t.column, f.line_column[l]);
-    last_row = larger(last_row, f.line_last[l]);
-    last_column = larger(last_column, f.line_last_column[l]);
-  }
-  t.rows = last_row - t.row + 1;
-  t.columns = last_column - t.column + 1;
-  if (t.rows > wide_side || t.columns > wide_side) return false;
-  for (int r = 0; r < t.rows; ++r) {
-    for (int c = 0; c < t.columns; ++c) t.by[wide_side * r + c] = 0;
-  }
-  return true;
-}
-
-// Most lines touch few blocks: those are put down without asking how many they are.
-inline void list_touches(const Footing& f, const std::uint8_t* order, int count, Touched& t) {
-  constexpr int unasked = 2;
-  for (int i = 0; i < count; ++i) {
-    const int l = order[i];
-    const std::uint64_t bit = std::uint64_t{1} << static_cast<unsigned>(i);
-    const int corner = wide_side * (f.line_first[l] - t.row) + f.line_column[l] - t.column;
-    std::uint64_t left = static_cast<std::uint64_t>(f.window_high[l]) << 32U | f.window_low[l];
-    const auto put = [&] {
-      const int at = __builtin_ctzll(left);
-      t.by[corner + wide_side * (at / window_side) + at % window_side] |= bit;
-      left &= left - 1U;
-    };
-    for (int k = 0; k < unasked; ++k) {
-      if (left == 0) break;
-      put();
-    }
-    while (left != 0) put();
-  }
-}
-
-// A block's pixels while kernels are composited into them.
-struct Held {
-  Pixel transmittance, alpha, red, green, blue;
-};
-
-HWY_INLINE Held hold(const float* block, int l) {
-  constexpr int lanes = block_pixels;
-  return {load<Pixel>(block + l), load<Pixel>(block + lanes + l),
-          load<Pixel>(block + 2 * lanes + l), load<Pixel>(block + 3 * lanes + l),
-          load<Pixel>(block + 4 * lanes + l)};
-}
-
-HWY_INLINE void release(const Held& held, float* block, int l) {
-  constexpr int lanes = block_pixels;
-  store(held.transmittance, block + l);
-  store(held.alpha, block + lanes + l);
-  store(held.red, block + 2 * lanes + l);
-  store(held.green, block + 3 * lanes + l);
-  store(held.blue, block + 4 * lanes + l);
-}
-
-template <Depth Along, int Style>
-HWY_INLINE void add_line(const LineStyle& line, const Ribbons& ribbons, int l, Pixel px, Pixel py,
-                         Held& held) {
-  const RibbonLanes r = spread(line, ribbons, l);
-  const RibbonLane lane = ribbon_lane<Along, Style>(r, px - r.x, py - r.y);
-  const Pixel a = held.transmittance * lane.opacity;
-  const auto color = [&](int c) {
-    return Style != style_plain ? hn::MulAdd(lane.f, r.rise[c], r.tail[c]) : r.tail[c];
-  };
-  held.red = hn::MulAdd(a, color(0), held.red);
-  held.green = hn::MulAdd(a, color(1), held.green);
-  held.blue = hn::MulAdd(a, color(2), held.blue);
-  held.alpha = held.alpha + a;
-  held.transmittance = held.transmittance - a;
-}
-
-// Composites the lines of a brick that has lines alone into one block.
-template <Depth Along, int Style>
-HWY_INLINE void draw_lines_in_block(const Prepared& p, const std::uint8_t* order,
-                                    std::uint64_t lines, int row, int column, Tile& tile) {
-  float* block = block_at(tile, row, column);
-  Light light;
-  for (int v = 0; v < block_pixels; v += pixel_lanes) {
-    const Pixel px = all<Pixel>(left_of(tile, column)) + load<Pixel>(lane_x + v);
-    const Pixel py = all<Pixel>(top_of(tile, row)) + load<Pixel>(lane_y + v);
-    Held held = hold(block, v);
-    for (std::uint64_t left = lines; left != 0; left &= left - 1U) {
-      add_line<Along, Style>(p.pass->line, p.ribbons, order[__builtin_ctzll(left)], px, py, held);
-    }
-    release(held, block, v);
-    light.see(held.transmittance);
-  }
-  note_light(light, row, 1U << static_cast<unsigned>(column), tile);
-  tile.counters.pixel_updates += std::int64_t{__builtin_popcountll(lines)} * block_pixels;
-}
-
-// Block by block, so that each is loaded and stored once.
-template <Depth Along, int Style>
-void draw_touches(const Prepared& p, const std::uint8_t* order, int count, Tile& tile) {
-  Touched touched;
-  if (!open_touched(p.footing, order, count, touched)) __builtin_trap();
-  list_touches(p.footing, order, count, touched);
-  for (int r = 0; r < touched.rows; ++r) {
-    const int row = touched.row + r;
-    for (int c = 0; c < touched.columns; ++c) {
-      const int column = touched.column + c;
-      const std::uint64_t lines = touched.by[wide_side * r + c];
-      if (lines == 0 || (tile.open[row] >> static_cast<unsigned>(column) & 1U) == 0) continue;
-      draw_lines_in_block<Along, Style>(p, order, lines, row, column, tile);
-    }
-  }
-}
-
-// Whether the series tells the depth along all of a brick's lines.
-inline bool all_nearly_flat(const Ribbons& r, std::uint64_t lines) {
-  float most = 0;
-  for (int l = 0; l < brick_stops; ++l) {
-    const float bend = absolute(r.depth_ratio[l] - 1.0F);
-    most = has(lines, l) ? larger(most, bend) : most;
-  }
-  return most <= series_bend_max;
-}
-
-template <bool Perspective, int Style>
-void draw_lines(const Prepared& p, const std::uint8_t* order, int count, Tile& tile) {
-  if (!Perspective || Style == style_plain) {
-    draw_touches<Depth::flat, Style>(p, order, count, tile);
-  } else if (all_nearly_flat(p.ribbons, p.stops.lines)) {
-    draw_touches<Depth::series, Style>(p, order, count, tile);
-  } else {
-    draw_touches<Depth::exact, Style>(p, order, count, tile);
-  }
-}
-
 template <bool Perspective>
 void draw_in_order(const Brick& brick, const Prepared& p, Tile& tile) {
   const Pass& pass = *p.pass;
-  const std::uint64_t lines = p.stops.lines;
   const int style = style_of(pass.line);
-  std::uint8_t order[brick_stops + 1];
-  const int count = order_stops(brick, pass, lines | p.stops.splats, order);
-  if (p.stops.splats == 0 && (lines & ~p.footing.windowed) == 0) {
-    if (style == style_head) return draw_lines<Perspective, style_head>(p, order, count, tile);
-    if (style == style_plain) return draw_lines<Perspective, style_plain>(p, order, count, tile);
-    return draw_lines<Perspective, style_moving>(p, order, count, tile);
-  }
+  std::uint8_t order[brick_stops + brick_side];
+  const int count = order_stops(brick, pass, p.stops.lines | p.stops.splats, order);
   const Compositor with = compositor_of<Perspective>(pass);
   for (int i = 0; i < count; ++i) draw_stop<Perspective>(p, with, style, order[i], tile);
 }

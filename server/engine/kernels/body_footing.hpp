@@ -62,7 +62,7 @@ HWY_INLINE LineSpans line_spans(const LineStyle& line, const Ribbons& r, const T
 HWY_INLINE void store(StopInteger value, std::int32_t* to) { hn::Store(value, StopIntegers(), to); }
 
 // The rows of blocks that a row's lines may touch; which of `bits` touch any. `most` becomes the
-// largest number of rows of a line so far.
+// largest number of rows, beyond the first, of a line so far.
 HWY_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons& r, const Tile& tile,
                                         int l, std::uint32_t bits, StopInteger& most, Footing& f) {
   const LineSpans s = line_spans(line, r, tile, l);
@@ -77,9 +77,9 @@ HWY_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons& r,
   store(s.rows.first, f.line_first + l);
   store(s.rows.last, f.line_last + l);
   store(s.columns.first, f.line_column + l);
-  store(s.columns.last, f.line_last_column + l);
   const std::uint32_t touching = bits & ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
-  if (touching != 0) most = hn::Max(most, hn::IfThenZeroElse(missing, tall));
+  if (touching == 0) return 0;
+  most = hn::Max(most, hn::IfThenZeroElse(missing, tall));
   return touching;
 }
 

@@ -136,9 +136,12 @@ HWY_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyle& 
   store(y0 + all<Stop>(camera.half_height_px), r.y + l);
   store(ux, r.ux + l);
   store(uy, r.uy + l);
-  store(inverse_u2, r.inverse_u2 + l);
+  store(ux * inverse_u2, r.wx + l);
+  store(uy * inverse_u2, r.wy + l);
   store(hn::NegMulAdd(all<Stop>(0.5F), u2 * inverse_u2, all<Stop>(0.5F)), r.w0 + l);
-  store(Perspective ? z0 * inverse_z1 : one, r.depth_ratio + l);
+  const Stop ratio = Perspective ? z0 * inverse_z1 : one;
+  store(ratio, r.depth_ratio + l);
+  store(ratio - one, r.bend + l);
   store(hn::MulAdd(s.low, vz, dz), r.depth + l);
   store((s.high - s.low) * vz, r.depth_rise + l);
   return hn::Ge(shown, hn::Zero(StopTag()));

@@ -7,8 +7,6 @@ namespace windsplat::engine::kernels {
 namespace {
 
 inline float smaller(float a, float b) { return a < b ? a : b; }
-inline int smaller(int a, int b) { return a < b ? a : b; }
-inline int larger(int a, int b) { return a > b ? a : b; }
 inline float larger(float a, float b) { return a > b ? a : b; }
 inline float limited(float v, float low, float high) { return smaller(larger(v, low), high); }
 inline float absolute(float v) { return __builtin_fabsf(v); }

@@ -153,7 +153,7 @@ int pack_ribbons(const Prepared& p, RibbonRecord* out) {
 // A line's view depth where it passes a point of the picture, from the camera's depth origin.
 template <bool Perspective>
 inline float ribbon_depth(const Ribbon& r, float centre, float px, float py) {
-  const float along = ((px - r.x) * r.ux + (py - r.y) * r.uy) * r.inverse_u2 + r.w0;
+  const float along = (px - r.x) * r.wx + (py - r.y) * r.wy + r.w0;
   const float w = limited(along, 0.0F, 1.0F);
   const float f = Perspective ? w * r.depth_ratio / (1.0F + w * (r.depth_ratio - 1.0F)) : w;
   return centre + r.depth + f * r.depth_rise;
@@ -164,7 +164,7 @@ inline float ribbon_depth(const Ribbon& r, float centre, float px, float py) {
 inline float depth_slack(const Ribbon& r) {
   constexpr float farthest = 2.2F;  // pixels
   const float steepest = larger(r.depth_ratio, 1.0F / larger(r.depth_ratio, 1e-6F));
-  const float along = farthest * square_root(r.inverse_u2) * steepest;
+  const float along = farthest * square_root(r.wx * r.wx + r.wy * r.wy) * steepest;
   return absolute(r.depth_rise) * smaller(along, 1.0F) * 1.001F;
 }
 

@@ -8,7 +8,7 @@ namespace windsplat::engine::kernels {
 
 constexpr int block_side = 4;                          // pixels
 constexpr int block_pixels = block_side * block_side;  // lanes of one update
-constexpr int tile_side = 128;                         // pixels
+constexpr int tile_side = 128;                         // pixels, at most
 constexpr int tile_blocks = tile_side / block_side;    // blocks along a tile's side
 constexpr int block_channels = 5;                      // transmittance, alpha, red, green, blue
 constexpr int block_floats = block_channels * block_pixels;
@@ -51,6 +51,7 @@ struct LineStyle {
   float r1, r2;     // pixels
   float inverse_ramp;
   float opacity;
+  float reach, steep;  // opacity of a pixel: clamp(reach - steep distance, 0, opacity)
   float head_desaturation;
   float intensity_low, intensity_scale, intensity;
   float cue_near, cue_scale, cue_strength;

@@ -26,10 +26,12 @@ struct Ribbons {
   alignas(64) float y[brick_stops];
   alignas(64) float ux[brick_stops];  // from f = 0 to 1, pixels
   alignas(64) float uy[brick_stops];
-  alignas(64) float inverse_u2[brick_stops];
+  alignas(64) float wx[brick_stops];  // u / |u|^2
+  alignas(64) float wy[brick_stops];
   // Where along itself a line is met at its start: 0; a dot everywhere: 1/2.
   alignas(64) float w0[brick_stops];
   alignas(64) float depth_ratio[brick_stops];  // view distance at f = 0 over that at f = 1
+  alignas(64) float bend[brick_stops];         // that minus 1
   alignas(64) float depth[brick_stops];        // view distance at f = 0 minus the kernel's centre's
   alignas(64) float depth_rise[brick_stops];
   // q + 3/2 - phase at f = 0, in [0, 2]; only where lines move.
@@ -80,7 +82,6 @@ struct Footing {
   // in `low`, columns count from line_column.
   std::uint64_t windowed;  // bit l set: stop l's line does
   alignas(64) std::int32_t line_column[brick_stops];
-  alignas(64) std::int32_t line_last_column[brick_stops];
   alignas(64) std::uint32_t window_low[brick_stops];
   alignas(64) std::uint32_t window_high[brick_stops];
   alignas(64) std::int32_t row_first[brick_stops];
@@ -112,11 +113,11 @@ constexpr int gathered_floats = 4 * block_pixels;
 
 // One line's constants, see Ribbons.
 struct Ribbon {
-  float x, y, ux, uy, inverse_u2, w0, depth_ratio;
+  float x, y, ux, uy, wx, wy, w0, depth_ratio, bend;
   float tail[3], rise[3];
   float depth, depth_rise;
   float phase, phase_rise;
-  float r2, inverse_ramp, opacity;
+  float reach, steep, opacity;
 };
 
 // One splat's constants, see Splats.
