@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/image/encode.hpp"
+#include "server/image/ycc_rows.hpp"
 
 namespace windsplat::image {
 
@@ -46,12 +47,15 @@ class YccPicture {
   [[nodiscard]] const std::array<Plane, 3>& planes() const { return planes_; }
 
  private:
-  void pad(const Part& part);
+  // Pixels of `part` from its column x on: `count` are there, `stored` columns are written.
+  void put_full(const Part& part, int x, int count, int stored);
+  void put_halved(const Part& part, int x, int count, int stored);
+  void repeat_last_row(int x, int x_end);
 
   int width_ = 0;
   int height_ = 0;
   Subsampling subsampling_ = Subsampling::s420;
-  std::array<float, 3> background_{};
+  Background background_;
   std::array<Plane, 3> planes_{};
   std::array<std::vector<std::uint8_t>, 3> storage_;
 };

@@ -102,7 +102,7 @@ double worst_sample(const Pixels& pixels, const Colour& background, const YccPic
   return worst;
 }
 
-// Half a code is the error of perfect rounding; the table's bins and 14-bit weights add the rest.
+// Half a code is the error of perfect rounding; the polynomial adds 1/12 of one to each channel.
 constexpr double tolerance = 0.5 + 0.15;
 
 TEST(Ycc, IsTheFormulaAtEverySizeAndPastTheEdges) {
@@ -227,9 +227,14 @@ TEST(Ycc, DecodedPictureIsThatOfTheRgbPath) {
       const auto a = decode_jpeg(*one_piece, width, height);
       const auto b = decode_jpeg(bytes, width, height);
       ASSERT_TRUE(a && b);
+      double sum = 0;
       for (std::size_t i = 0; i < a->size(); ++i) {
-        ASSERT_NEAR((*a)[i], (*b)[i], subsampling == Subsampling::s444 ? 2 : 3) << width;
+        // Rounded in other places, and once more by the transforms: two codes of luma and chroma
+        // at most, and blue shows chroma 1.77 times.
+        ASSERT_NEAR((*a)[i], (*b)[i], 5) << width;
+        sum += std::abs((*a)[i] - (*b)[i]);
       }
+      EXPECT_LE(sum / static_cast<double>(a->size()), 1) << width;
     }
   }
 }
