@@ -47,6 +47,7 @@ class FlushDenormals {
 struct Workspace {
   std::vector<float> blocks;
   std::vector<float> rays;
+  std::vector<float> pixels;  // of a finished tile, by rows
   SweepSpace sweep;
 };
 
@@ -125,10 +126,12 @@ void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& t
   }
 }
 
-void store_tile(const Tile& tile, Image& image) {
+// Block order -> rows.
+void deliver_tile(const Tile& tile, std::vector<float>& pixels, const TileSink& sink) {
+  constexpr std::size_t stride = std::size_t{4} * tile_side;
+  pixels.resize(stride * tile_side);
   for (int y = 0; y < tile.height; ++y) {
-    float* to =
-        image.rgba.data() + 4 * (static_cast<std::size_t>(tile.y + y) * image.width + tile.x);
+    float* to = pixels.data() + static_cast<std::size_t>(y) * stride;
     for (int x = 0; x < tile.width; ++x, to += 4) {
       const int block = y / block_side * tile_blocks + x / block_side;
       const int lane = y % block_side * block_side + x % block_side;
@@ -141,6 +144,7 @@ void store_tile(const Tile& tile, Image& image) {
       to[3] = alpha > 1.0F && alpha < 1.0F + rounding ? 1.0F : alpha;
     }
   }
+  sink({tile.x, tile.y, tile.width, tile.height, pixels.data(), stride});
 }
 
 // Longest first, so that no thread is left alone with a long tile at the end.
@@ -173,7 +177,8 @@ bool all_closed(const Tile& tile, const Brick& brick) {
 }
 
 void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
-                ThreadPool& pool, const CancelToken& cancel, Image& image, WorkReport& work) {
+                ThreadPool& pool, const CancelToken& cancel, const TileSink& sink,
+                WorkReport& work) {
   const std::vector<std::uint32_t> order = busy_tiles(bins);
   std::vector<Workspace> spaces(pool.size());
   std::vector<TileWork> done(order.size());
@@ -189,7 +194,7 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
     }
     done[i].counters = tile.counters;
     done[i].closed_blocks = tile.any_closed != 0;
-    store_tile(tile, image);
+    deliver_tile(tile, spaces[worker].pixels, sink);
   });
   work.tiles = static_cast<std::int64_t>(order.size());
   for (const TileWork& tile : done) {

@@ -1,5 +1,5 @@
-// Bins -> Image: tiles are drawn on the pool, each by one thread, its bricks always in the same
-// order, so that the number of threads cannot change a bit of the picture.
+// Bins -> finished tiles: they are drawn on the pool, each by one thread, its bricks always in the
+// same order, so that the number of threads cannot change a bit of the picture.
 #pragma once
 
 #include "server/base/cancel.hpp"
@@ -9,9 +9,10 @@
 
 namespace windsplat::engine {
 
-// `image` has the camera's size and is zero. Counts go to `work`. Cancelled, it returns early and
-// the image is worthless.
+// Every tile with a brick goes to `sink` once. Counts go to `work`. Cancelled, it returns early and
+// what was delivered is worthless.
 void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
-                ThreadPool& pool, const CancelToken& cancel, Image& image, WorkReport& work);
+                ThreadPool& pool, const CancelToken& cancel, const TileSink& sink,
+                WorkReport& work);
 
 }  // namespace windsplat::engine

@@ -1,4 +1,4 @@
-// View -> completed view -> scene -> linear image -> encoded bytes, each stage timed.
+// View -> completed view -> scene -> linear pixels -> encoded bytes, each stage timed.
 #include "server/frame/frame.hpp"
 
 #include <algorithm>
@@ -8,7 +8,6 @@
 
 #include "server/base/check.hpp"
 #include "server/engine/reference/reference.hpp"
-#include "server/engine/render.hpp"
 #include "server/scene/build.hpp"
 
 namespace windsplat::frame {
@@ -59,31 +58,57 @@ void name_fields(const scene::Scene& scene, const protocol::View& completed,
   }
 }
 
-Result<engine::Rendered> render_scene(const scene::Scene& scene, ThreadPool& pool,
-                                      const CancelToken& cancel) {
-  if (scene.method != scene::Method::reference) return engine::render(scene, pool, cancel);
-  auto truth = engine::reference::render(scene, pool, cancel);
-  if (!truth) return truth.error();
-  engine::Rendered rendered;
-  rendered.image = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};
-  rendered.work.variant = "reference double";
-  return rendered;
+// A JPEG's pixels become codes tile by tile, while they are near; the other formats need them all.
+Result<engine::WorkReport> render_scene(const scene::Scene& scene, ThreadPool& pool,
+                                        const CancelToken& cancel, Drawn& drawn) {
+  const bool jpeg = drawn.encoding.format == Format::jpeg;
+  const int width = scene.camera.width;
+  const int height = scene.camera.height;
+  image::YccPicture& planes = drawn.planes;
+  if (jpeg) planes.reset(width, height, drawn.encoding.subsampling, scene.background);
+  if (scene.method == scene::Method::reference) {
+    auto truth = engine::reference::render(scene, pool, cancel);
+    if (!truth) return truth.error();
+    drawn.picture = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};
+    const std::size_t stride = std::size_t{4} * static_cast<std::size_t>(width);
+    if (jpeg) planes.put({0, 0, width, height, drawn.picture.rgba.data(), stride});
+    engine::WorkReport work;
+    work.variant = "reference double";
+    return work;
+  }
+  if (jpeg) {
+    return engine::render(scene, pool, cancel, [&planes](const engine::TilePixels& tile) {
+      planes.put({tile.x, tile.y, tile.width, tile.height, tile.rgba, tile.stride});
+    });
+  }
+  engine::Image& picture = drawn.picture;
+  picture.width = width;
+  picture.height = height;
+  picture.rgba.assign(4 * static_cast<std::size_t>(width) * height, 0.0F);
+  return engine::render(scene, pool, cancel, engine::sink_into(picture));
 }
 
-Result<image::Bytes> encode(const engine::Image& picture, const std::array<float, 3>& background,
-                            const Encoding& encoding) {
+Result<image::Bytes> bytes_of(const Drawn& drawn, image::JpegEncoder& jpeg, ThreadPool& pool) {
+  const Encoding& encoding = drawn.encoding;
+  const engine::Image& picture = drawn.picture;
   const int width = picture.width;
   const int height = picture.height;
+  if (encoding.format == Format::jpeg) {
+    image::Bytes bytes;
+    if (auto done = jpeg.encode(drawn.planes, encoding.quality, pool, bytes); !done) {
+      return done.error();
+    }
+    return bytes;
+  }
   if (encoding.format == Format::npy) return image::encode_npy(picture.rgba, width, height);
-  const image::Bytes rgb = image::tone_map(picture.rgba, width, height, background);
-  if (encoding.format == Format::png) return image::encode_png(rgb, width, height);
-  return image::encode_jpeg(rgb, width, height, encoding.quality, encoding.subsampling);
+  return image::encode_png(image::tone_map(picture.rgba, width, height, drawn.background), width,
+                           height);
 }
 
 }  // namespace
 
-Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
-                      ThreadPool& pool, const CancelToken& cancel) {
+Result<void> draw(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
+                  ThreadPool& pool, const CancelToken& cancel, Drawn& drawn) {
   if (encoding.level < 0 || encoding.level > level_max) {
     return make_error(ErrorKind::invalid, "a frame's level is 0 to " + std::to_string(level_max) +
                                               ", not " + std::to_string(encoding.level));
@@ -99,29 +124,46 @@ Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const 
 
   // Defaults come from the whole picture, so that every level frames the volume alike; radii follow
   // the height that is drawn.
-  protocol::View drawn = *completed;
-  drawn.image.width = std::max(1, drawn.image.width >> encoding.level);
-  drawn.image.height = std::max(1, drawn.image.height >> encoding.level);
-  const Result<scene::Scene> scene = scene::build_scene(drawn, dataset);
+  protocol::View leveled = *completed;
+  leveled.image.width = std::max(1, leveled.image.width >> encoding.level);
+  leveled.image.height = std::max(1, leveled.image.height >> encoding.level);
+  const Result<scene::Scene> scene = scene::build_scene(leveled, dataset);
   if (!scene) return scene.error();
-  Result<engine::Rendered> rendered = render_scene(*scene, pool, cancel);
-  if (!rendered) return rendered.error();
-  const Clock::time_point rendered_at = Clock::now();
+  drawn.encoding = encoding;
+  drawn.background = scene->background;
+  Result<engine::WorkReport> work = render_scene(*scene, pool, cancel, drawn);
+  if (!work) return work.error();
 
-  Result<image::Bytes> bytes = encode(rendered->image, scene->background, encoding);
+  drawn.frame = Frame();
+  drawn.frame.width = scene->camera.width;
+  drawn.frame.height = scene->camera.height;
+  drawn.frame.work = std::move(*work);
+  name_fields(*scene, *completed, drawn.frame.work);
+  drawn.frame.view = std::move(*completed);
+  drawn.frame.render_us = microseconds(start, Clock::now());
+  return {};
+}
+
+Result<Frame> encode(Drawn& drawn, image::JpegEncoder& jpeg, ThreadPool& pool) {
+  const Clock::time_point start = Clock::now();
+  Result<image::Bytes> bytes = bytes_of(drawn, jpeg, pool);
   if (!bytes) return bytes.error();
-  const Clock::time_point encoded_at = Clock::now();
+  drawn.frame.bytes = std::move(*bytes);
+  drawn.frame.encode_us = microseconds(start, Clock::now());
+  return std::move(drawn.frame);
+}
 
-  Frame frame;
-  frame.bytes = std::move(*bytes);
-  frame.width = rendered->image.width;
-  frame.height = rendered->image.height;
-  frame.work = std::move(rendered->work);
-  name_fields(*scene, *completed, frame.work);
-  frame.view = std::move(*completed);
-  frame.render_us = microseconds(start, rendered_at);
-  frame.encode_us = microseconds(rendered_at, encoded_at);
-  return frame;
+Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
+                      ThreadPool& pool, const CancelToken& cancel, Workspace& workspace) {
+  auto drawn = draw(view, dataset, encoding, pool, cancel, workspace.drawn);
+  if (!drawn) return drawn.error();
+  return encode(workspace.drawn, workspace.jpeg, pool);
+}
+
+Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
+                      ThreadPool& pool, const CancelToken& cancel) {
+  Workspace workspace;
+  return produce(view, dataset, encoding, pool, cancel, workspace);
 }
 
 }  // namespace windsplat::frame

@@ -110,7 +110,7 @@ Result<protocol::View> resolve(const Picture& picture, data::Dataset& dataset) {
   return scene::complete_view(*view, dataset);
 }
 
-Result<Response> draw(const Services& services, const Picture& picture, data::Dataset& dataset,
+Result<Response> draw(Services& services, const Picture& picture, data::Dataset& dataset,
                       std::int64_t queue_us, const CancelToken& cancel) {
   const auto view = resolve(picture, dataset);
   if (!view) return view.error();
@@ -126,7 +126,8 @@ Result<Response> draw(const Services& services, const Picture& picture, data::Da
       return response;
     }
   }
-  auto drawn = frame::produce(*view, dataset, picture.encoding, *services.pool, cancel);
+  auto drawn =
+      frame::produce(*view, dataset, picture.encoding, *services.pool, cancel, services.frames);
   if (!drawn) return drawn.error();
   response.content_type = media_type(picture.encoding.format);
   response.headers.emplace_back("Server-Timing",
@@ -143,7 +144,7 @@ Result<Response> draw(const Services& services, const Picture& picture, data::Da
   return response;
 }
 
-Response draw_guarded(const Services& services, const Picture& picture, data::Dataset& dataset,
+Response draw_guarded(Services& services, const Picture& picture, data::Dataset& dataset,
                       std::int64_t queue_us, const CancelToken& cancel) {
   if (cancel.cancelled()) {
     return problem_response(make_error(ErrorKind::cancelled, "nobody waits for the answer"));

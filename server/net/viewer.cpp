@@ -24,13 +24,13 @@ frame::Encoding frame_encoding(const session::Encoding& wanted) {
 
 Error nobody_waits() { return make_error(ErrorKind::cancelled, "nobody waits for the answer"); }
 
-Result<session::Drawn> draw(const Services& services, const session::StartRender& wanted,
+Result<session::Drawn> draw(Services& services, const session::StartRender& wanted,
                             std::int64_t queue_us, const CancelToken& cancel) {
   const auto dataset = services.catalogue.find(wanted.view.dataset);
   if (!dataset) return dataset.error();
   const std::uint64_t loads = (*dataset)->loads();
   auto drawn = frame::produce(wanted.view, **dataset, frame_encoding(wanted.encoding),
-                              *services.pool, cancel);
+                              *services.pool, cancel, services.frames);
   if (!drawn) return drawn.error();
   session::Drawn out;
   out.info = frame::frame_info(*drawn, drawn->view);
