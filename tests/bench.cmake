@@ -11,4 +11,4 @@ add_executable(bench_left_out ${CMAKE_CURRENT_LIST_DIR}/bench/bench_left_out.cpp
 target_link_libraries(bench_left_out PRIVATE windsplat_frame benchmark::benchmark)
 
 add_executable(bench_picture ${CMAKE_CURRENT_LIST_DIR}/bench/bench_picture.cpp)
-target_link_libraries(bench_picture PRIVATE windsplat_image benchmark::benchmark)
+target_link_libraries(bench_picture PRIVATE windsplat_frame benchmark::benchmark)

@@ -1,5 +1,5 @@
 // From linear pixels to JPEG bytes, by planes and strips and by rounded RGB in one piece, in one
-// run: Mpixel/s of each stage on stdout, and JSON where asked for:
+// run, and whole frames with and without overlap: rates on stdout, and JSON where asked for:
 //
 //   bench_picture [--benchmark_out=FILE] [--benchmark_filter=REGEX]
 #include <benchmark/benchmark.h>
@@ -9,10 +9,16 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
+#include "server/data/store.hpp"
+#include "server/frame/frame.hpp"
 #include "server/image/jpeg_encoder.hpp"
+#include "server/scene/build.hpp"
 
 namespace windsplat::image {
 namespace {
@@ -127,11 +133,83 @@ void jpeg_rgb(benchmark::State& state, Size size, Setting setting) {
   state.counters["bytes"] = static_cast<double>(bytes);
 }
 
+// The climate sample as it moves, `frames` of them an iteration.
+class Loop {
+ public:
+  Loop(Size size, unsigned threads) : pool_(threads) {
+    auto source = data::open_sample("climate");
+    if (!source) give_up(source.error());
+    dataset_.emplace(std::move(*source), "climate", std::uint64_t{1} << 30U);
+    auto view = scene::default_view(*dataset_);
+    if (!view) give_up(view.error());
+    view_ = *view;
+    view_.image.width = size.width;
+    view_.image.height = size.height;
+    view_.method.name = protocol::MethodName::kernel;
+    draw(space_.drawn);  // loads
+  }
+
+  void draw(frame::Drawn& drawn) {
+    const frame::Encoding moving{frame::Format::jpeg, 80, Subsampling::s420};
+    auto done = frame::draw(view_, *dataset_, moving, pool_, CancelToken(), drawn);
+    if (!done) give_up(done.error());
+  }
+
+  void encode(frame::Drawn& drawn, ThreadPool& pool) {
+    auto frame = frame::encode(drawn, space_.jpeg, pool);
+    if (!frame) give_up(frame.error());
+    benchmark::DoNotOptimize(frame->bytes.data());
+  }
+
+  void one_after_the_other() {
+    for (int n = 0; n < frames; ++n) {
+      draw(space_.drawn);
+      encode(space_.drawn, pool_);
+    }
+  }
+
+  // The last frame is encoded by a thread of its own while all threads draw the next.
+  void side_by_side() {
+    draw(space_.drawn);
+    for (int n = 1; n <= frames; ++n) {
+      std::thread encoder([&] { encode(space_.drawn, alone_); });
+      if (n < frames) draw(next_);
+      encoder.join();
+      std::swap(space_.drawn, next_);
+    }
+  }
+
+  static constexpr int frames = 8;
+
+ private:
+  ThreadPool pool_;
+  ThreadPool alone_{1};
+  std::optional<data::Dataset> dataset_;
+  protocol::View view_;
+  frame::Workspace space_;
+  frame::Drawn next_;
+};
+
+void frame_loop(benchmark::State& state, Size size, unsigned threads, bool overlapped) {
+  Loop loop(size, threads);
+  for (auto _ : state) {
+    if (overlapped) {
+      loop.side_by_side();
+    } else {
+      loop.one_after_the_other();
+    }
+  }
+  state.counters["ms/frame"] =
+      benchmark::Counter(1e-3 * static_cast<double>(state.iterations()) * Loop::frames,
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+
 template <class Function, class... Arguments>
 void add(const std::string& name, Function function, Arguments... arguments) {
   benchmark::RegisterBenchmark(name.c_str(), function, arguments...)
       ->Unit(benchmark::kMicrosecond)
-      ->UseRealTime();
+      ->UseRealTime()
+      ->MeasureProcessCPUTime();
 }
 
 void register_all() {
@@ -149,6 +227,14 @@ void register_all() {
           threads);
       add(std::string("tone map, 444 in tiles").append(on), tone_map_tiles, size, Subsampling::s444,
           threads);
+    }
+    for (const unsigned threads : {1U, 2U}) {
+      std::string on = at;
+      on += " threads ";
+      on += std::to_string(threads);
+      add(std::string("frames, one after the other").append(on), frame_loop, size, threads, false);
+      add(std::string("frames, encode beside the next").append(on), frame_loop, size, threads,
+          true);
     }
     for (const Setting& setting : settings) {
       std::string what = setting.name;
