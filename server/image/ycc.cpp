@@ -8,6 +8,8 @@
 namespace windsplat::image {
 namespace {
 
+constexpr std::size_t row_floats = std::size_t{4} * row_pixels;
+
 std::uint8_t* at(const YccPicture::Plane& plane, int x, int y) {
   return plane.samples + static_cast<std::ptrdiff_t>(y) * plane.width + x;
 }
@@ -17,14 +19,14 @@ class RowReader {
  public:
   const float* operator()(const float* row, int count) {
     if (count == row_pixels) return row;
-    std::copy_n(row, 4 * count, filled_.begin());
-    const float* last = row + std::ptrdiff_t{4} * (count - 1);
-    for (int i = count; i < row_pixels; ++i) std::copy_n(last, 4, filled_.begin() + 4 * i);
+    float* to = std::copy_n(row, 4 * count, filled_.data());
+    const float* last = to - 4;
+    for (int i = count; i < row_pixels; ++i) to = std::copy_n(last, 4, to);
     return filled_.data();
   }
 
  private:
-  alignas(64) std::array<float, 4 * row_pixels> filled_;
+  alignas(64) std::array<float, row_floats> filled_;
 };
 
 // Past the last pair of pixels its mean is repeated, not the last pixel.
@@ -45,7 +47,7 @@ void YccPicture::reset(int width, int height, Subsampling subsampling,
   const int mcu = mcu_side();
   const int columns = (width + mcu - 1) / mcu;
   const int rows = (height + mcu - 1) / mcu;
-  const std::array<float, 4 * row_pixels> nothing{};
+  const std::array<float, row_floats> nothing{};
   YccRow row;
   convert_row(nothing.data(), background_, row);
   const std::array<std::uint8_t, 3> codes{row.luma[0], row.blue[0], row.red[0]};

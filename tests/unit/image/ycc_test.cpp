@@ -2,6 +2,7 @@
 #include "server/image/ycc.hpp"
 
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
 
 #include <algorithm>
 #include <cmath>
@@ -179,6 +180,52 @@ TEST(Ycc, GreysHaveNoChromaAndPrimariesTheExtremes) {
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
   EXPECT_EQ(codes({infinity, 7, infinity}), codes({1, 1, 1}));
   EXPECT_EQ(codes({-infinity, -7, nan}), codes({0, 0, 0}));
+}
+
+// A row of vectors that have nothing in all of one channel, or in all but one.
+TEST(Ycc, OnlyPixelsWithNothingAtAllAreSkipped) {
+  const Colour background{0.9F, 0.5F, 0.2F};
+  YccPicture picture;
+  for (int channel = 0; channel < 4; ++channel) {
+    for (const bool alone : {false, true}) {
+      Pixels pixels{64, 2, std::vector<float>(std::size_t{4} * 128, alone ? 0.0F : 0.5F)};
+      for (std::size_t i = channel; i < pixels.rgba.size(); i += 4) {
+        pixels.rgba[i] = alone ? 0.5F : 0.0F;
+      }
+      picture.reset(64, 2, Subsampling::s444, background);
+      put_tiles(pixels, picture);
+      EXPECT_LE(worst_sample(pixels, background, picture), tolerance) << channel;
+    }
+  }
+}
+
+Bytes samples_of(const YccPicture& picture) {
+  Bytes samples;
+  for (const auto& plane : picture.planes()) {
+    samples.insert(samples.end(), plane.samples,
+                   plane.samples + std::ptrdiff_t{1} * plane.width * plane.height);
+  }
+  return samples;
+}
+
+// Every instruction set of this processor; those with a fused multiply-add (on x86 AVX2 and what is
+// above it, of lower bits) agree to the bit.
+TEST(Ycc, InstructionSetsAgree) {
+  const Pixels pixels = busy(200, 131, 7);
+  const Colour background{0.02F, 0.3F, 0.9F};
+  std::vector<Bytes> fused;
+  const std::int64_t all = hwy::SupportedTargets() & HWY_TARGETS;
+  for (std::int64_t left = all; left != 0; left &= left - 1) {
+    const std::int64_t target = left & -left;
+    hwy::GetChosenTarget().Update(target);
+    YccPicture picture;
+    picture.reset(200, 131, Subsampling::s420, background);
+    put_tiles(pixels, picture);
+    EXPECT_LE(worst_sample(pixels, background, picture), tolerance) << hwy::TargetName(target);
+    if (HWY_ARCH_X86 && target <= HWY_AVX2) fused.push_back(samples_of(picture));
+  }
+  hwy::GetChosenTarget().DeInit();
+  for (const Bytes& samples : fused) EXPECT_EQ(samples, fused.front());
 }
 
 // A second picture of another size and background finds nothing of the first.
