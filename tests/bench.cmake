@@ -19,6 +19,7 @@ windsplat_bench(bench_stages ${bench_dir}/allocations.cpp)
 windsplat_bench(bench_path)
 windsplat_bench(bench_left_out)
 windsplat_bench(bench_pool)
+windsplat_bench(bench_picture)
 
 # windsplat_smoke(<name> <command...>)
 function(windsplat_smoke name)

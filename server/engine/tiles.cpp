@@ -19,6 +19,18 @@ using kernels::Tile;
 using kernels::tile_blocks;
 using kernels::tile_side;
 
+constexpr std::size_t blocks_of_tile = static_cast<std::size_t>(tile_blocks) * tile_blocks;
+constexpr std::size_t row_floats = std::size_t{4} * tile_side;
+
+// Every worker's, whichever of them come to draw a tile.
+void make_room(const RenderPlan& plan, std::vector<Workspace>& spaces) {
+  for (Workspace& space : spaces) {
+    space.blocks.resize(blocks_of_tile * block_floats);
+    space.pixels.resize(row_floats * tile_side);
+    if (plan.perspective_medium) space.rays.resize(blocks_of_tile * block_pixels);
+  }
+}
+
 // The length of every pixel's ray whose forward component is 1.
 void fill_rays(const kernels::Camera& camera, const Tile& tile, AlignedVector<float>& rays) {
   for (int block = 0; block < tile_blocks * tile_blocks; ++block) {
@@ -41,16 +53,12 @@ void open_tile(const RenderPlan& plan, const Bins& bins, std::size_t index, Work
   tile.y = ty * tile_side;
   tile.width = std::min(tile_side, plan.camera.width - tile.x);
   tile.height = std::min(tile_side, plan.camera.height - tile.y);
-  constexpr std::size_t blocks = static_cast<std::size_t>(tile_blocks) * tile_blocks;
-  space.blocks.assign(blocks * block_floats, 0.0F);
-  for (std::size_t b = 0; b < blocks; ++b) {
+  std::fill(space.blocks.begin(), space.blocks.end(), 0.0F);
+  for (std::size_t b = 0; b < blocks_of_tile; ++b) {
     std::fill_n(space.blocks.begin() + static_cast<std::ptrdiff_t>(b * block_floats), block_pixels,
                 1.0F);
   }
-  if (plan.perspective_medium) {
-    space.rays.resize(blocks * block_pixels);
-    fill_rays(plan.camera, tile, space.rays);
-  }
+  if (plan.perspective_medium) fill_rays(plan.camera, tile, space.rays);
   tile.blocks = space.blocks.data();
   tile.rays = space.rays.data();
   tile.stop = plan.stop_transmittance;
@@ -88,10 +96,10 @@ void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& t
   }
 }
 
-void store_tile(const Tile& tile, Image& image) {
+// Block order -> rows.
+void deliver_tile(const Tile& tile, AlignedVector<float>& pixels, TileSink sink) {
   for (int y = 0; y < tile.height; ++y) {
-    float* to =
-        image.rgba.data() + 4 * (static_cast<std::size_t>(tile.y + y) * image.width + tile.x);
+    float* to = pixels.data() + static_cast<std::size_t>(y) * row_floats;
     for (int x = 0; x < tile.width; ++x, to += 4) {
       const int block = y / block_side * tile_blocks + x / block_side;
       const int lane = y % block_side * block_side + x % block_side;
@@ -104,6 +112,7 @@ void store_tile(const Tile& tile, Image& image) {
       to[3] = alpha > 1.0F && alpha < 1.0F + rounding ? 1.0F : alpha;
     }
   }
+  sink({tile.x, tile.y, tile.width, tile.height, pixels.data(), row_floats});
 }
 
 // Longest first, so that no thread is left alone with a long tile at the end.
@@ -159,12 +168,13 @@ bool all_closed(const Tile& tile, const Brick& brick) {
 }
 
 void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
-                ThreadPool& pool, const CancelToken& cancel, TileSpace& space, Image& image,
+                ThreadPool& pool, const CancelToken& cancel, TileSpace& space, TileSink sink,
                 WorkReport& work) {
   busy_tiles(bins, space.order);
   const std::vector<std::uint32_t>& order = space.order;
   if (space.workers.size() < pool.size()) space.workers.resize(pool.size());
   std::vector<Workspace>& spaces = space.workers;
+  make_room(plan, spaces);
   std::vector<TileWork>& done = space.done;
   done.assign(order.size(), TileWork());
   pool.run(order.size(), [&](std::size_t i, unsigned worker) {
@@ -179,7 +189,7 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
     }
     done[i].counters = tile.counters;
     done[i].closed_blocks = tile.any_closed != 0;
-    store_tile(tile, image);
+    deliver_tile(tile, spaces[worker].pixels, sink);
   });
   level(spaces);
   work.tiles = static_cast<std::int64_t>(order.size());

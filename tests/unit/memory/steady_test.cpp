@@ -130,7 +130,7 @@ TEST_P(SteadyState, FramesAllocateTheirPlanAlone) {
     EXPECT_LE(plans.blocks, turns * plan_blocks_max) << "a plan is a few arrays an axis";
     // Colour tables, and what a plan keeps of each axis' stops in vectors that double as they grow.
     const std::int64_t stops = size.dims[0] + size.dims[1] + size.dims[2];
-    EXPECT_LE(plans.bytes, turns * (16384 + 200 * stops)) << plans.bytes / turns;
+    EXPECT_LE(plans.bytes, turns * (21845 + 200 * stops)) << plans.bytes / turns;
   }
 }
 
