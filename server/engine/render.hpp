@@ -33,13 +33,13 @@ struct TilePixels {
 };
 
 // Where finished tiles go: anything that takes a TilePixels. Called from the pool's threads,
-// several at once, once for every tile that has anything in it: what is never delivered is clear.
-// It only points at what it calls, which outlives it.
+// several at once, a few rows of a tile at a time; every pixel of a tile that has anything in it
+// comes once, and what never comes is clear. It only points at what it calls, which outlives it.
 class TileSink {
  public:
-  template <class Call>
-  requires std::is_invocable_v<const Call&, const TilePixels&> TileSink(
-      const Call& call)  // NOLINT(google-explicit-constructor): a lambda is one
+  template <class Call,
+            class = std::enable_if_t<std::is_invocable_v<const Call&, const TilePixels&>>>
+  TileSink(const Call& call)  // NOLINT(google-explicit-constructor): a lambda is one
       : called_(&call), call_([](const void* called, const TilePixels& tile) {
           (*static_cast<const Call*>(called))(tile);
         }) {}

@@ -21,12 +21,13 @@ using kernels::tile_side;
 
 constexpr std::size_t blocks_of_tile = static_cast<std::size_t>(tile_blocks) * tile_blocks;
 constexpr std::size_t row_floats = std::size_t{4} * tile_side;
+constexpr int rows_delivered = 8;  // at a time; even
 
 // Every worker's, whichever of them come to draw a tile.
 void make_room(const RenderPlan& plan, std::vector<Workspace>& spaces) {
   for (Workspace& space : spaces) {
     space.blocks.resize(blocks_of_tile * block_floats);
-    space.pixels.resize(row_floats * tile_side);
+    space.rows.resize(row_floats * rows_delivered);
     if (plan.perspective_medium) space.rays.resize(blocks_of_tile * block_pixels);
   }
 }
@@ -96,23 +97,29 @@ void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& t
   }
 }
 
-// Block order -> rows.
-void deliver_tile(const Tile& tile, AlignedVector<float>& pixels, TileSink sink) {
-  for (int y = 0; y < tile.height; ++y) {
-    float* to = pixels.data() + static_cast<std::size_t>(y) * row_floats;
-    for (int x = 0; x < tile.width; ++x, to += 4) {
-      const int block = y / block_side * tile_blocks + x / block_side;
-      const int lane = y % block_side * block_side + x % block_side;
-      const float* from = tile.blocks + static_cast<std::ptrdiff_t>(block) * block_floats + lane;
-      for (int c = 0; c < 3; ++c) to[c] = from[static_cast<std::ptrdiff_t>(2 + c) * block_pixels];
-      // A sum of many parts of what was left may pass 1 by a rounding; what passes it by more has
-      // diverged, and is to be seen.
-      constexpr float rounding = 1e-4F;
-      const float alpha = from[block_pixels];
-      to[3] = alpha > 1.0F && alpha < 1.0F + rounding ? 1.0F : alpha;
-    }
+void copy_row(const Tile& tile, int y, float* to) {
+  for (int x = 0; x < tile.width; ++x, to += 4) {
+    const int block = y / block_side * tile_blocks + x / block_side;
+    const int lane = y % block_side * block_side + x % block_side;
+    const float* from = tile.blocks + static_cast<std::ptrdiff_t>(block) * block_floats + lane;
+    for (int c = 0; c < 3; ++c) to[c] = from[static_cast<std::ptrdiff_t>(2 + c) * block_pixels];
+    // A sum of many parts of what was left may pass 1 by a rounding; what passes it by more has
+    // diverged, and is to be seen.
+    constexpr float rounding = 1e-4F;
+    const float alpha = from[block_pixels];
+    to[3] = alpha > 1.0F && alpha < 1.0F + rounding ? 1.0F : alpha;
   }
-  sink({tile.x, tile.y, tile.width, tile.height, pixels.data(), row_floats});
+}
+
+// Block order -> rows, a few at a time, so that the sink finds them in the nearest cache.
+void deliver_tile(const Tile& tile, AlignedVector<float>& rows, TileSink sink) {
+  for (int y = 0; y < tile.height; y += rows_delivered) {
+    const int count = std::min(rows_delivered, tile.height - y);
+    for (int row = 0; row < count; ++row) {
+      copy_row(tile, y + row, rows.data() + static_cast<std::size_t>(row) * row_floats);
+    }
+    sink({tile.x, tile.y + y, tile.width, count, rows.data(), row_floats});
+  }
 }
 
 // Longest first, so that no thread is left alone with a long tile at the end.
@@ -189,7 +196,7 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
     }
     done[i].counters = tile.counters;
     done[i].closed_blocks = tile.any_closed != 0;
-    deliver_tile(tile, spaces[worker].pixels, sink);
+    deliver_tile(tile, spaces[worker].rows, sink);
   });
   level(spaces);
   work.tiles = static_cast<std::int64_t>(order.size());

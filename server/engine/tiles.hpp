@@ -15,7 +15,7 @@ namespace windsplat::engine {
 struct Workspace {
   AlignedVector<float> blocks;
   AlignedVector<float> rays;
-  AlignedVector<float> pixels;  // of a finished tile, by rows
+  AlignedVector<float> rows;  // of a finished tile
   SweepSpace sweep;
 };
 
@@ -33,8 +33,8 @@ struct TileSpace {
   std::vector<TileWork> done;
 };
 
-// Every tile with a brick goes to `sink` once. Counts go to `work`. Cancelled, it returns early and
-// what was delivered is worthless.
+// Every pixel of a tile with a brick goes to `sink` once. Counts go to `work`. Cancelled, it
+// returns early and what was delivered is worthless.
 void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
                 ThreadPool& pool, const CancelToken& cancel, TileSpace& space, TileSink sink,
                 WorkReport& work);
