@@ -17,7 +17,8 @@ RUN cmake --preset release -DWINDSPLAT_TESTS=OFF -DWINDSPLAT_WERROR=OFF \
 FROM ${BASE}
 RUN apt-get -q update \
     && DEBIAN_FRONTEND=noninteractive apt-get -q -y install --no-install-recommends \
-        libboost-url1.81.0 libfmt9 libnetcdf19 libspdlog1.10 libspng0 libstdc++6 libturbojpeg0 \
+        libboost-url1.81.0 libfmt9 libhwy1 libnetcdf19 libspdlog1.10 libspng0 libstdc++6 \
+        libturbojpeg0 \
     && rm -rf /var/lib/apt/lists/* /var/cache/apt/* /var/log/apt /var/log/dpkg.log \
     && useradd --system --uid 10001 --user-group --no-create-home --home-dir /nonexistent \
         --shell /usr/sbin/nologin windsplat

@@ -19,6 +19,7 @@ windsplat_bench(bench_stages ${bench_dir}/allocations.cpp)
 windsplat_bench(bench_path)
 windsplat_bench(bench_left_out)
 windsplat_bench(bench_pool)
+windsplat_bench(bench_picture)
 
 # windsplat_smoke(<name> <command...>)
 function(windsplat_smoke name)
@@ -27,13 +28,20 @@ function(windsplat_smoke name)
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endfunction()
 
+# Sanitizers need memory of their own.
+set(memory_limit --max-mb=80)
+if(WINDSPLAT_SANITIZE)
+  set(memory_limit --size=64x48 --dims=32x16x8)
+endif()
+
 windsplat_smoke(frame bench_frame --smoke)
 windsplat_smoke(kernels bench_kernels --smoke)
 windsplat_smoke(stages bench_stages --smoke)
+windsplat_smoke(picture bench_picture --benchmark_filter=640x480 --benchmark_min_time=0.001)
 file(WRITE ${PROJECT_BINARY_DIR}/bench_views.jsonl "{\"image\":{\"width\":32,\"height\":24}}\n")
 windsplat_smoke(path bench_path tornado bench_views.jsonl bench_view.png)
 windsplat_smoke(memory python3 ${bench_dir}/memory.py --program=$<TARGET_FILE:windsplat>
-  --frames=2 --sessions=2 --size=64x48 --dims=32x16x8)
+  --frames=4 --sessions=2 ${memory_limit})
 # Where there is no VTK it only says so.
 windsplat_smoke(peers python3 ${bench_dir}/peers/compare.py --build=${PROJECT_BINARY_DIR}
   --frames=1 --sizes=64x48 --dims=32x16x8 --slow)

@@ -219,7 +219,7 @@ Result<void> animate(const Arguments& arguments, const CancelToken& cancel) {
 
   const frame::Encoding encoding = file_encoding(plan->format, arguments.view.quality);
   ThreadPool pool(arguments.threads);
-  engine::RenderSpace space;
+  frame::Workspace workspace;
   const int total = plan->steps.count() * plan->per_step;
   const double motion_start = view.vector.motion_time;
   Progress progress(total);
@@ -229,7 +229,7 @@ Result<void> animate(const Arguments& arguments, const CancelToken& cancel) {
     // Of the way to the next step that is drawn, so that the phase does not jump there.
     const double part = static_cast<double>(n % plan->per_step) / plan->per_step;
     view.vector.motion_time = motion_start + plan->steps.stride * part;
-    const auto picture = frame::produce(view, **dataset, encoding, pool, cancel, space);
+    const auto picture = frame::produce(view, **dataset, encoding, pool, cancel, workspace);
     if (cancel.cancelled()) return interrupted(n, total);
     if (!picture) return picture.error();
     if (auto done = write_output(plan->pattern.name(n), picture->bytes); !done) return done;

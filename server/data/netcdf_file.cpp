@@ -336,6 +336,19 @@ std::vector<std::size_t> File::chunk(int variable) const {
   return lengths;
 }
 
+void File::forget_chunks(int variable) const {
+  if (classic_) return;
+  const LibraryLock lock;
+  std::size_t size = 0;
+  std::size_t slots = 0;
+  float preemption = 0;
+  // To be told the size of its cache, even the same, the library opens the variable anew. Where it
+  // refuses, memory is all that is lost.
+  if (nc_get_var_chunk_cache(ncid_, variable, &size, &slots, &preemption) == NC_NOERR) {
+    nc_set_var_chunk_cache(ncid_, variable, size, slots, preemption);
+  }
+}
+
 Result<void> File::scan() {
   const LibraryLock lock;
   contents_.title = text(NC_GLOBAL, "title");

@@ -51,6 +51,9 @@ class File {
   // Chunk length along each dimension; 1 where the variable is not chunked.
   [[nodiscard]] std::vector<std::size_t> chunk(int variable) const;
 
+  // Frees the chunks that the library keeps of a variable, up to 16 MiB each.
+  void forget_chunks(int variable) const;
+
   // Reads a block of a numeric variable as doubles. start, count: one a dimension, slowest first.
   // Errors: bad_data if the library fails or the file changed since it was opened.
   Result<void> read(int variable, const std::vector<std::size_t>& start,

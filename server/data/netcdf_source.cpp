@@ -26,7 +26,9 @@ namespace windsplat::data::netcdf {
 
 namespace {
 
-constexpr std::size_t block_values = std::size_t{4} << 20;  // doubles read at a time: 32 MiB
+// Doubles read at a time: 32 MiB where whole chunks are wanted, otherwise 2 MiB.
+constexpr std::size_t chunked_values = std::size_t{4} << 20;
+constexpr std::size_t plain_values = std::size_t{1} << 18;
 constexpr std::size_t axis_max = std::size_t{1} << 24;
 
 // One dimension of a variable on its way into the volume.
@@ -68,6 +70,8 @@ void scatter(const cf::Packing& packing, const double* block, const std::vector<
 // How much of each dimension a block spans: whole inner dimensions, some of one, single outer ones.
 std::vector<std::size_t> block_counts(const std::vector<Way>& ways,
                                       const std::vector<std::size_t>& chunk) {
+  const bool chunked = std::any_of(chunk.begin(), chunk.end(), [](auto n) { return n > 1; });
+  const std::size_t block_values = chunked ? chunked_values : plain_values;
   std::vector<std::size_t> count(ways.size(), 1);
   std::size_t values = 1;
   for (std::size_t d = ways.size(); d-- > 0;) {
@@ -309,7 +313,8 @@ class NetcdfSource final : public Source {
     std::ptrdiff_t origin = 0;
     const std::vector<Way> ways = ways_of(variable, step, origin);
     const std::size_t rank = ways.size();
-    const std::vector<std::size_t> block = block_counts(ways, file_->chunk(variable));
+    const std::vector<std::size_t> chunk = file_->chunk(variable);
+    const std::vector<std::size_t> block = block_counts(ways, chunk);
     const cf::Packing packing = cf::packing_of(*file_, variable);
     std::size_t values = 1;
     for (const std::size_t n : block) {
@@ -339,9 +344,17 @@ class NetcdfSource final : public Source {
         index[d - 1] = 0;
       }
       if (d == 0) {
+        if (!hold_other_steps(variable, chunk)) file_->forget_chunks(variable);
         return {};
       }
     }
+  }
+
+  // The next step may then find what this one decompressed.
+  [[nodiscard]] bool hold_other_steps(int variable, const std::vector<std::size_t>& chunk) const {
+    const auto& dims = file_->contents().variables[static_cast<std::size_t>(variable)].dims;
+    const auto time = std::find(dims.begin(), dims.end(), choice_.time);
+    return time != dims.end() && chunk[static_cast<std::size_t>(time - dims.begin())] > 1;
   }
 
   std::unique_ptr<File> file_;

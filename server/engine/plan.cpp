@@ -423,7 +423,6 @@ RenderPlan make_plan(const Scene& scene) {
   for (PassPlan& pass : plan.passes) finish_pass(scene, major, pass);
   if (scene.method == scene::Method::slab || plan.curved) plan_slabs(scene, plan);
   plan.tile_pixels = tile_pixels(scene.camera.width, scene.camera.height);
-  plan.tile_height = getenv("TH") ? atoi(getenv("TH")) : 64;
   plan.variant = describe(scene, plan);
   return plan;
 }

@@ -1,4 +1,4 @@
-// Scene -> plan -> bins -> tiles -> Image.
+// Scene -> plan -> bins -> tiles -> sink, or Image.
 #include "server/engine/render.hpp"
 
 #include <algorithm>
@@ -24,6 +24,15 @@ RenderSpace& RenderSpace::operator=(RenderSpace&&) noexcept = default;
 
 Image& RenderSpace::image() { return parts_->image; }
 
+void TileCopier::operator()(const TilePixels& tile) const {
+  const auto columns = static_cast<std::size_t>(image_->width);
+  for (int row = 0; row < tile.height; ++row) {
+    const std::size_t to = static_cast<std::size_t>(tile.y + row) * columns + tile.x;
+    std::copy_n(tile.rgba + static_cast<std::size_t>(row) * tile.stride, 4 * tile.width,
+                image_->rgba.data() + 4 * to);
+  }
+}
+
 namespace {
 
 void clear_image(const scene::Camera& camera, Image& image) {
@@ -38,22 +47,27 @@ void clear_image(const scene::Camera& camera, Image& image) {
 }  // namespace
 
 Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel,
-                          RenderSpace& space) {
+                          RenderSpace& space, TileSink sink) {
   const auto table = kernels::chosen_table();
   if (!table) return table.error();
   const RenderPlan plan = make_plan(scene);
   WorkReport work;
   work.variant = plan.variant + " " + (*table)->name;
   RenderSpace::Parts& parts = *space.parts_;
-  clear_image(scene.camera, parts.image);
   if (!plan.passes.empty() && !cancel.cancelled()) {
     const Bins& bins = make_bins(plan, **table, pool, cancel, parts.bins, work);
     if (!cancel.cancelled()) {
-      draw_tiles(plan, bins, **table, pool, cancel, parts.tiles, parts.image, work);
+      draw_tiles(plan, bins, **table, pool, cancel, parts.tiles, sink, work);
     }
   }
   if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "the frame was cancelled");
   return work;
+}
+
+Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel,
+                          RenderSpace& space) {
+  clear_image(scene.camera, space.image());
+  return render(scene, pool, cancel, space, sink_into(space.image()));
 }
 
 Result<Rendered> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel) {

@@ -18,17 +18,39 @@ using kernels::Brick;
 using kernels::Tile;
 using kernels::tile_blocks;
 
-// The length of every pixel's ray whose forward component is 1.
-void fill_rays(const kernels::Camera& camera, const Tile& tile, AlignedVector<float>& rays) {
-  for (int block = 0; block < tile_blocks * tile_blocks; ++block) {
-    float* ray = rays.data() + static_cast<std::size_t>(block) * block_pixels;
-    for (int l = 0; l < block_pixels; ++l) {
-      const int px = tile.x + block % tile_blocks * block_side + l % block_side;
-      const int py = tile.y + block / tile_blocks * block_side + l / block_side;
-      const double x = (px + 0.5 - camera.half_width_px) * camera.pixel;
-      const double y = (py + 0.5 - camera.half_height_px) * camera.pixel;
-      ray[l] = static_cast<float>(std::sqrt(1 + x * x + y * y));
-    }
+constexpr std::size_t blocks_of_tile = static_cast<std::size_t>(tile_blocks) * tile_blocks;
+constexpr std::size_t row_floats = std::size_t{4} * kernels::tile_side;
+constexpr int rows_delivered = 8;  // at a time; even
+
+// Every worker's, whichever of them come to draw a tile.
+void make_room(const RenderPlan& plan, std::vector<Workspace>& spaces) {
+  for (Workspace& space : spaces) {
+    space.blocks.resize(blocks_of_tile * block_floats);
+    space.rows.resize(row_floats * rows_delivered);
+    if (plan.perspective_medium) space.rays.resize(blocks_of_tile * block_pixels);
+  }
+}
+
+// Blocks along a tile's width or height.
+int blocks_along(int pixels) { return (pixels + block_side - 1) / block_side; }
+
+// The length of every pixel's ray of a row of blocks whose forward component is 1.
+void fill_rays(const kernels::Camera& camera, const Tile& tile, int row, float* ray) {
+  const int count = blocks_along(tile.width) * block_pixels;
+  for (int i = 0; i < count; ++i) {
+    const int px = tile.x + i / block_pixels * block_side + i % block_side;
+    const int py = tile.y + row * block_side + i % block_pixels / block_side;
+    const double x = (px + 0.5 - camera.half_width_px) * camera.pixel;
+    const double y = (py + 0.5 - camera.half_height_px) * camera.pixel;
+    ray[i] = static_cast<float>(std::sqrt(1 + x * x + y * y));
+  }
+}
+
+// Every pixel of a row of blocks lets all light through.
+void clear_row(float* blocks, int count) {
+  std::fill_n(blocks, static_cast<std::ptrdiff_t>(count) * block_floats, 0.0F);
+  for (int b = 0; b < count; ++b) {
+    std::fill_n(blocks + static_cast<std::ptrdiff_t>(b) * block_floats, block_pixels, 1.0F);
   }
 }
 
@@ -40,23 +62,19 @@ void open_tile(const RenderPlan& plan, const Bins& bins, std::size_t index, Work
   tile.y = ty * plan.tile_pixels;
   tile.width = std::min(plan.tile_pixels, plan.camera.width - tile.x);
   tile.height = std::min(plan.tile_pixels, plan.camera.height - tile.y);
-  constexpr std::size_t blocks = static_cast<std::size_t>(tile_blocks) * tile_blocks;
-  space.blocks.assign(blocks * block_floats, 0.0F);
-  for (std::size_t b = 0; b < blocks; ++b) {
-    std::fill_n(space.blocks.begin() + static_cast<std::ptrdiff_t>(b * block_floats), block_pixels,
-                1.0F);
-  }
-  if (plan.perspective_medium) {
-    space.rays.resize(blocks * block_pixels);
-    fill_rays(plan.camera, tile, space.rays);
-  }
   tile.blocks = space.blocks.data();
   tile.rays = space.rays.data();
   tile.stop = plan.stop_transmittance;
-  const int columns = (tile.width + block_side - 1) / block_side;
-  const int rows = (tile.height + block_side - 1) / block_side;
   std::fill(std::begin(tile.open), std::end(tile.open), 0U);
-  std::fill_n(std::begin(tile.open), rows, (2U << static_cast<unsigned>(columns - 1)) - 1U);
+  const int columns = blocks_along(tile.width);
+  for (int row = 0; row < blocks_along(tile.height); ++row) {
+    const std::ptrdiff_t first = std::ptrdiff_t{row} * tile_blocks;
+    clear_row(tile.blocks + first * block_floats, columns);
+    if (plan.perspective_medium) {
+      fill_rays(plan.camera, tile, row, space.rays.data() + first * block_pixels);
+    }
+    tile.open[row] = (2U << static_cast<unsigned>(columns - 1)) - 1U;
+  }
 }
 
 std::int64_t stops_of(const Brick& brick) {
@@ -101,21 +119,28 @@ void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& t
   work.stopped = table.count_open(tile) == 0;
 }
 
-void store_tile(const Tile& tile, Image& image) {
-  for (int y = 0; y < tile.height; ++y) {
-    float* to =
-        image.rgba.data() + 4 * (static_cast<std::size_t>(tile.y + y) * image.width + tile.x);
-    for (int x = 0; x < tile.width; ++x, to += 4) {
-      const int block = y / block_side * tile_blocks + x / block_side;
-      const int lane = y % block_side * block_side + x % block_side;
-      const float* from = tile.blocks + static_cast<std::ptrdiff_t>(block) * block_floats + lane;
-      for (int c = 0; c < 3; ++c) to[c] = from[static_cast<std::ptrdiff_t>(2 + c) * block_pixels];
-      // A sum of many parts of what was left may pass 1 by a rounding; what passes it by more has
-      // diverged, and is to be seen.
-      constexpr float rounding = 1e-4F;
-      const float alpha = from[block_pixels];
-      to[3] = alpha > 1.0F && alpha < 1.0F + rounding ? 1.0F : alpha;
+void copy_row(const Tile& tile, int y, float* to) {
+  for (int x = 0; x < tile.width; ++x, to += 4) {
+    const int block = y / block_side * tile_blocks + x / block_side;
+    const int lane = y % block_side * block_side + x % block_side;
+    const float* from = tile.blocks + static_cast<std::ptrdiff_t>(block) * block_floats + lane;
+    for (int c = 0; c < 3; ++c) to[c] = from[static_cast<std::ptrdiff_t>(2 + c) * block_pixels];
+    // A sum of many parts of what was left may pass 1 by a rounding; what passes it by more has
+    // diverged, and is to be seen.
+    constexpr float rounding = 1e-4F;
+    const float alpha = from[block_pixels];
+    to[3] = alpha > 1.0F && alpha < 1.0F + rounding ? 1.0F : alpha;
+  }
+}
+
+// Block order -> rows, a few at a time, so that the sink finds them in the nearest cache.
+void deliver_tile(const Tile& tile, AlignedVector<float>& rows, TileSink sink) {
+  for (int y = 0; y < tile.height; y += rows_delivered) {
+    const int count = std::min(rows_delivered, tile.height - y);
+    for (int row = 0; row < count; ++row) {
+      copy_row(tile, y + row, rows.data() + static_cast<std::size_t>(row) * row_floats);
     }
+    sink({tile.x, tile.y + y, tile.width, count, rows.data(), row_floats});
   }
 }
 
@@ -172,12 +197,13 @@ bool all_closed(const Tile& tile, const Brick& brick) {
 }
 
 void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
-                ThreadPool& pool, const CancelToken& cancel, TileSpace& space, Image& image,
+                ThreadPool& pool, const CancelToken& cancel, TileSpace& space, TileSink sink,
                 WorkReport& work) {
   busy_tiles(bins, space.order);
   const std::vector<std::uint32_t>& order = space.order;
   if (space.workers.size() < pool.size()) space.workers.resize(pool.size());
   std::vector<Workspace>& spaces = space.workers;
+  make_room(plan, spaces);
   std::vector<TileWork>& done = space.done;
   done.assign(order.size(), TileWork());
   pool.run(order.size(), [&](std::size_t i, unsigned worker) {
@@ -192,7 +218,7 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
     }
     done[i].counters = tile.counters;
     done[i].closed_blocks = tile.any_closed != 0;
-    store_tile(tile, image);
+    deliver_tile(tile, spaces[worker].rows, sink);
   });
   level(spaces);
   work.tiles = static_cast<std::int64_t>(order.size());

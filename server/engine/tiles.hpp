@@ -1,5 +1,5 @@
-// Bins -> Image: tiles are drawn on the pool, each by one thread, its bricks always in the same
-// order, so that the number of threads cannot change a bit of the picture.
+// Bins -> finished tiles: they are drawn on the pool, each by one thread, its bricks always in the
+// same order, so that the number of threads cannot change a bit of the picture.
 #pragma once
 
 #include "server/base/aligned_vector.hpp"
@@ -15,6 +15,7 @@ namespace windsplat::engine {
 struct Workspace {
   AlignedVector<float> blocks;
   AlignedVector<float> rays;
+  AlignedVector<float> rows;  // of a finished tile
   SweepSpace sweep;
 };
 
@@ -32,10 +33,10 @@ struct TileSpace {
   std::vector<TileWork> done;
 };
 
-// `image` has the camera's size and is zero. Counts go to `work`. Cancelled, it returns early and
-// the image is worthless.
+// Every pixel of a tile with a brick goes to `sink` once. Counts go to `work`. Cancelled, it
+// returns early and what was delivered is worthless.
 void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
-                ThreadPool& pool, const CancelToken& cancel, TileSpace& space, Image& image,
+                ThreadPool& pool, const CancelToken& cancel, TileSpace& space, TileSink sink,
                 WorkReport& work);
 
 }  // namespace windsplat::engine

@@ -1,4 +1,4 @@
-// View -> completed view -> scene -> linear image -> encoded bytes, each stage timed.
+// View -> completed view -> scene -> linear pixels -> encoded bytes, each stage timed.
 #include "server/frame/frame.hpp"
 
 #include <algorithm>
@@ -8,7 +8,6 @@
 
 #include "server/base/check.hpp"
 #include "server/engine/reference/reference.hpp"
-#include "server/engine/render.hpp"
 #include "server/scene/build.hpp"
 
 namespace windsplat::frame {
@@ -69,42 +68,62 @@ void name_level(const std::array<int, 3>& level, engine::WorkReport& work) {
   }
 }
 
-// The picture is space.image().
-Result<engine::WorkReport> render_scene(const scene::Scene& scene, ThreadPool& pool,
-                                        const CancelToken& cancel, engine::RenderSpace& space) {
-  if (scene.method != scene::Method::reference) {
-    auto work = engine::render(scene, pool, cancel, space);
-    if (work) name_level(scene.level, *work);
-    return work;
-  }
+Result<engine::WorkReport> render_reference(const scene::Scene& scene, ThreadPool& pool,
+                                            const CancelToken& cancel, engine::Image& picture) {
   auto truth = engine::reference::render(scene, pool, cancel);
   if (!truth) return truth.error();
-  space.image() = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};
+  picture = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};
   engine::WorkReport work;
   work.variant = "reference double";
   return work;
 }
 
-Result<image::Bytes> encode(const engine::Image& picture, const std::array<float, 3>& background,
-                            const Encoding& encoding) {
-  const int width = picture.width;
-  const int height = picture.height;
-  if (encoding.format == Format::npy) return image::encode_npy(picture.rgba, width, height);
-  const image::Bytes rgb = image::tone_map(picture.rgba, width, height, background);
-  if (encoding.format == Format::png) return image::encode_png(rgb, width, height);
-  return image::encode_jpeg(rgb, width, height, encoding.quality, encoding.subsampling);
+// A JPEG's pixels become codes tile by tile, while they are near; the other formats need them all.
+Result<engine::WorkReport> render_scene(const scene::Scene& scene, ThreadPool& pool,
+                                        const CancelToken& cancel, Workspace& workspace) {
+  engine::Image& picture = workspace.space.image();
+  image::YccPicture& planes = workspace.planes;
+  const bool jpeg = workspace.encoding.format == Format::jpeg;
+  if (jpeg) {
+    picture = {};
+    planes.reset(scene.camera.width, scene.camera.height, workspace.encoding.subsampling,
+                 scene.background);
+  }
+  if (scene.method == scene::Method::reference) {
+    auto work = render_reference(scene, pool, cancel, picture);
+    const std::size_t stride = std::size_t{4} * static_cast<std::size_t>(picture.width);
+    if (work && jpeg) {
+      planes.put({0, 0, picture.width, picture.height, picture.rgba.data(), stride});
+    }
+    return work;
+  }
+  const auto to_planes = [&planes](const engine::TilePixels& tile) {
+    planes.put({tile.x, tile.y, tile.width, tile.height, tile.rgba, tile.stride});
+  };
+  auto work = jpeg ? engine::render(scene, pool, cancel, workspace.space, to_planes)
+                   : engine::render(scene, pool, cancel, workspace.space);
+  if (work) name_level(scene.level, *work);
+  return work;
+}
+
+Result<image::Bytes> bytes_of(Workspace& workspace, ThreadPool& pool) {
+  const Encoding& encoding = workspace.encoding;
+  if (encoding.format == Format::jpeg) {
+    image::Bytes bytes;
+    auto done = workspace.jpeg.encode(workspace.planes, encoding.quality, pool, bytes);
+    if (!done) return done.error();
+    return bytes;
+  }
+  const auto& [width, height, rgba] = workspace.space.image();
+  if (encoding.format == Format::npy) return image::encode_npy(rgba, width, height);
+  return image::encode_png(image::tone_map(rgba, width, height, workspace.background), width,
+                           height);
 }
 
 }  // namespace
 
-Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
-                      ThreadPool& pool, const CancelToken& cancel) {
-  engine::RenderSpace space;
-  return produce(view, dataset, encoding, pool, cancel, space);
-}
-
-Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
-                      ThreadPool& pool, const CancelToken& cancel, engine::RenderSpace& space) {
+Result<void> draw(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
+                  ThreadPool& pool, const CancelToken& cancel, Workspace& workspace) {
   if (encoding.level < 0 || encoding.level > level_max) {
     return make_error(ErrorKind::invalid, "a frame's level is 0 to " + std::to_string(level_max) +
                                               ", not " + std::to_string(encoding.level));
@@ -120,30 +139,49 @@ Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const 
 
   // Defaults come from the whole picture, so that every level frames the volume alike; radii follow
   // the height that is drawn.
-  protocol::View drawn = *completed;
-  drawn.image.width = std::max(1, drawn.image.width >> encoding.level);
-  drawn.image.height = std::max(1, drawn.image.height >> encoding.level);
-  const Result<scene::Scene> scene = scene::build_scene(drawn, dataset);
+  protocol::View leveled = *completed;
+  leveled.image.width = std::max(1, leveled.image.width >> encoding.level);
+  leveled.image.height = std::max(1, leveled.image.height >> encoding.level);
+  const Result<scene::Scene> scene = scene::build_scene(leveled, dataset);
   if (!scene) return scene.error();
-  Result<engine::WorkReport> work = render_scene(*scene, pool, cancel, space);
+  workspace.encoding = encoding;
+  workspace.background = scene->background;
+  Result<engine::WorkReport> work = render_scene(*scene, pool, cancel, workspace);
   if (!work) return work.error();
-  const engine::Image& picture = space.image();
-  const Clock::time_point rendered_at = Clock::now();
 
-  Result<image::Bytes> bytes = encode(picture, scene->background, encoding);
+  Frame& drawn = workspace.drawn;
+  drawn = Frame();
+  drawn.width = scene->camera.width;
+  drawn.height = scene->camera.height;
+  drawn.work = std::move(*work);
+  name_fields(*scene, *completed, drawn.work);
+  drawn.view = std::move(*completed);
+  drawn.render_us = microseconds(start, Clock::now());
+  return {};
+}
+
+Result<Frame> encode(Workspace& workspace, ThreadPool& pool) {
+  const Clock::time_point start = Clock::now();
+  Result<image::Bytes> bytes = bytes_of(workspace, pool);
   if (!bytes) return bytes.error();
-  const Clock::time_point encoded_at = Clock::now();
-
-  Frame frame;
+  Frame frame = std::move(workspace.drawn);
   frame.bytes = std::move(*bytes);
-  frame.width = picture.width;
-  frame.height = picture.height;
-  frame.work = std::move(*work);
-  name_fields(*scene, *completed, frame.work);
-  frame.view = std::move(*completed);
-  frame.render_us = microseconds(start, rendered_at);
-  frame.encode_us = microseconds(rendered_at, encoded_at);
+  frame.encode_us = microseconds(start, Clock::now());
   return frame;
+}
+
+Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
+                      ThreadPool& pool, const CancelToken& cancel, Workspace& workspace) {
+  if (auto drawn = draw(view, dataset, encoding, pool, cancel, workspace); !drawn) {
+    return drawn.error();
+  }
+  return encode(workspace, pool);
+}
+
+Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
+                      ThreadPool& pool, const CancelToken& cancel) {
+  Workspace workspace;
+  return produce(view, dataset, encoding, pool, cancel, workspace);
 }
 
 }  // namespace windsplat::frame

@@ -2,6 +2,7 @@
 // command line share.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -10,12 +11,10 @@
 #include "server/base/error.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/data/store.hpp"
-#include "server/engine/work.hpp"
+#include "server/engine/render.hpp"
 #include "server/image/encode.hpp"
-
-namespace windsplat::engine {
-class RenderSpace;
-}
+#include "server/image/jpeg_encoder.hpp"
+#include "server/image/ycc.hpp"
 
 namespace windsplat::frame {
 
@@ -37,16 +36,33 @@ struct Frame {
   int width = 0;        // as rendered
   int height = 0;
   engine::WorkReport work;
-  std::int64_t render_us = 0;  // scene and engine
+  std::int64_t render_us = 0;  // scene and engine, a JPEG's tone map in its tiles among it
   std::int64_t encode_us = 0;
+};
+
+// What a loop of frames keeps from one to the next, and the frame between its two steps. One frame
+// at a time.
+struct Workspace {
+  engine::RenderSpace space;  // with the picture of every format but JPEG
+  image::YccPicture planes;   // of a JPEG
+  image::JpegEncoder jpeg;
+  Frame drawn;  // has no bytes yet
+  Encoding encoding;
+  std::array<float, 3> background{};  // linear
 };
 
 // `view` need not be completed. The report's fields and bytes are those of the volumes shown.
 // Errors: those of the scene and the engine (invalid, out_of_memory, cancelled, ...); invalid for a
 // level outside 0..15, and at /method/name for a reference that is not allowed.
-// Draws with what earlier frames left in `space`.
+Result<void> draw(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
+                  ThreadPool& pool, const CancelToken& cancel, Workspace& workspace);
+
+// The bytes of what was drawn, once. Errors: too_large (for the format).
+Result<Frame> encode(Workspace& workspace, ThreadPool& pool);
+
+// Both, one after the other.
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
-                      ThreadPool& pool, const CancelToken& cancel, engine::RenderSpace& space);
+                      ThreadPool& pool, const CancelToken& cancel, Workspace& workspace);
 
 // One frame by itself.
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,

@@ -18,7 +18,7 @@ Bytes tone_map(std::span<const float> rgba, int width, int height,
 
 enum class Subsampling { s444, s420 };
 
-// quality 1..100.
+// quality 1..100. In one piece, from rounded codes.
 Result<Bytes> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height, int quality,
                           Subsampling subsampling);
 Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int height);

@@ -1,13 +1,18 @@
-// 8-bit RGB -> JPEG by libjpeg-turbo; the only file that knows it. A compressor lives for one call:
-// making one takes microseconds, and calls share nothing.
+// 8-bit RGB or planes of YCbCr -> JPEG by libjpeg-turbo; the only file that knows its compressor.
 #include <turbojpeg.h>
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 #include "server/base/check.hpp"
 #include "server/image/encode.hpp"
+#include "server/image/jpeg_encoder.hpp"
+#include "server/image/jpeg_parts.hpp"
 
 namespace windsplat::image {
 namespace {
@@ -21,10 +26,22 @@ struct Free {
   void operator()(unsigned char* bytes) const { tjFree(bytes); }
 };
 
-}  // namespace
+using Compressor = std::unique_ptr<std::remove_pointer_t<tjhandle>, Destroy>;
 
-Result<Bytes> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height, int quality,
-                          Subsampling subsampling) {
+// The settled picture (4:4:4) takes the accurate transform, the moving one the fast.
+int transform_of(Subsampling subsampling) {
+  return subsampling == Subsampling::s444 ? TJFLAG_ACCURATEDCT : TJFLAG_FASTDCT;
+}
+
+int library_name(Subsampling subsampling) {
+  return subsampling == Subsampling::s444 ? TJSAMP_444 : TJSAMP_420;
+}
+
+Error fault_of(const Compressor& compressor) {
+  return make_error(ErrorKind::internal, std::string("JPEG: ") + tjGetErrorStr2(compressor.get()));
+}
+
+Result<void> check(int width, int height, int quality) {
   if (width < 1 || height < 1 || width > edge_max || height > edge_max) {
     return make_error(ErrorKind::too_large, "a JPEG has 1 to " + std::to_string(edge_max) +
                                                 " pixels a side, not " + std::to_string(width) +
@@ -34,25 +51,133 @@ Result<Bytes> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int heig
     return make_error(ErrorKind::invalid,
                       "JPEG quality is 1 to 100, not " + std::to_string(quality));
   }
+  return {};
+}
+
+// How a picture is cut, by its size alone: rows of MCUs a strip, the last one may have fewer.
+struct Cut {
+  int mcu_columns = 0;
+  int mcu_rows = 0;
+  int strip_rows = 0;
+  int strips = 0;
+};
+
+Cut cut_of(const YccPicture& picture) {
+  constexpr std::int64_t strip_pixels = 1 << 16;  // to begin a strip costs as much as a few hundred
+  constexpr std::int64_t strips_max = 16;
+  constexpr int interval_max = 0xFFFF;  // MCUs
+  Cut cut;
+  cut.mcu_columns = picture.planes()[1].width / 8;
+  cut.mcu_rows = picture.planes()[1].height / 8;
+  const std::int64_t pixels = std::int64_t{picture.width()} * picture.height();
+  const auto wanted =
+      static_cast<int>(std::clamp<std::int64_t>(pixels / strip_pixels, 1, strips_max));
+  cut.strip_rows = std::min((cut.mcu_rows + wanted - 1) / wanted, interval_max / cut.mcu_columns);
+  cut.strips = (cut.mcu_rows + cut.strip_rows - 1) / cut.strip_rows;
+  return cut;
+}
+
+struct Strip {
+  std::unique_ptr<unsigned char[]> jpeg;  // left as it comes: what is not written is never resident
+  std::size_t capacity = 0;
+  std::size_t size = 0;
+};
+
+}  // namespace
+
+struct JpegEncoder::State {
+  std::vector<Compressor> compressors;  // one a thread
+  std::vector<Strip> strips;
+  std::vector<std::span<const std::uint8_t>> pieces;
+  std::vector<int> failed;  // by thread
+
+  // The strip is told to be as wide as its MCUs, so that the library copies no row to pad it.
+  bool compress(const YccPicture& picture, const Cut& cut, int quality, int index,
+                const Compressor& compressor) {
+    const int mcu = picture.mcu_side();
+    const int first = index * cut.strip_rows;
+    const int rows = std::min(cut.strip_rows, cut.mcu_rows - first);
+    std::array<const unsigned char*, 3> planes{};
+    std::array<int, 3> strides{};
+    for (std::size_t p = 0; p < 3; ++p) {
+      const YccPicture::Plane& plane = picture.planes()[p];
+      const int side = p == 0 ? mcu : 8;
+      planes[p] = plane.samples + static_cast<std::ptrdiff_t>(first) * side * plane.width;
+      strides[p] = plane.width;
+    }
+    const int name = library_name(picture.subsampling());
+    Strip& strip = strips[static_cast<std::size_t>(index)];
+    const int width = cut.mcu_columns * mcu;
+    const std::size_t capacity = tjBufSize(width, rows * mcu, name);
+    if (strip.capacity < capacity) {
+      strip.jpeg = std::make_unique_for_overwrite<unsigned char[]>(capacity);
+      strip.capacity = capacity;
+    }
+    unsigned char* jpeg = strip.jpeg.get();
+    unsigned long size = 0;  // NOLINT(google-runtime-int): the library's type
+    const int flags = transform_of(picture.subsampling()) | TJFLAG_NOREALLOC;
+    if (tjCompressFromYUVPlanes(compressor.get(), planes.data(), width, strides.data(), rows * mcu,
+                                name, &jpeg, &size, quality, flags) != 0) {
+      return false;
+    }
+    strip.size = size;
+    return true;
+  }
+};
+
+JpegEncoder::JpegEncoder() : state_(std::make_unique<State>()) {}
+JpegEncoder::~JpegEncoder() = default;
+
+Result<void> JpegEncoder::encode(const YccPicture& picture, int quality, ThreadPool& pool,
+                                 Bytes& bytes) {
+  const YccPicture::Plane& luma = picture.planes()[0];
+  if (auto fits = check(luma.width, luma.height, quality); !fits) return fits;
+  const Cut cut = cut_of(picture);
+  State& state = *state_;
+  while (state.compressors.size() < pool.size()) {
+    state.compressors.emplace_back(tjInitCompress());
+    if (!state.compressors.back()) {
+      state.compressors.pop_back();
+      return make_error(ErrorKind::internal, std::string("JPEG: ") + tjGetErrorStr2(nullptr));
+    }
+  }
+  const auto count = static_cast<std::size_t>(cut.strips);
+  if (state.strips.size() < count) state.strips.resize(count);
+  state.failed.assign(pool.size(), 0);
+  pool.run(count, [&](std::size_t index, unsigned worker) {
+    if (state.failed[worker] != 0) return;
+    if (!state.compress(picture, cut, quality, static_cast<int>(index),
+                        state.compressors[worker])) {
+      state.failed[worker] = 1;
+    }
+  });
+  for (std::size_t worker = 0; worker < state.failed.size(); ++worker) {
+    if (state.failed[worker] != 0) return fault_of(state.compressors[worker]);
+  }
+  state.pieces.clear();
+  for (std::size_t s = 0; s < count; ++s) {
+    state.pieces.emplace_back(state.strips[s].jpeg.get(), state.strips[s].size);
+  }
+  return stitch(state.pieces, {picture.width(), picture.height(), cut.mcu_columns * cut.strip_rows},
+                bytes);
+}
+
+Result<Bytes> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height, int quality,
+                          Subsampling subsampling) {
+  if (auto fits = check(width, height, quality); !fits) return fits.error();
   WINDSPLAT_CHECK(rgb.size() ==
                   3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-
-  const std::unique_ptr<std::remove_pointer_t<tjhandle>, Destroy> compressor(tjInitCompress());
+  const Compressor compressor(tjInitCompress());
   if (!compressor) {
     return make_error(ErrorKind::internal, std::string("JPEG: ") + tjGetErrorStr2(nullptr));
   }
-  // The settled picture (4:4:4) takes the accurate transform, the moving one the fast.
-  const bool settled = subsampling == Subsampling::s444;
   unsigned char* jpeg = nullptr;
   unsigned long jpeg_bytes = 0;  // NOLINT(google-runtime-int): the library's type
-  const int failed = tjCompress2(compressor.get(), rgb.data(), width, 0, height, TJPF_RGB, &jpeg,
-                                 &jpeg_bytes, settled ? TJSAMP_444 : TJSAMP_420, quality,
-                                 settled ? TJFLAG_ACCURATEDCT : TJFLAG_FASTDCT);
+  const int failed =
+      tjCompress2(compressor.get(), rgb.data(), width, 0, height, TJPF_RGB, &jpeg, &jpeg_bytes,
+                  library_name(subsampling), quality, transform_of(subsampling));
   const std::unique_ptr<unsigned char, Free> owner(jpeg);
-  if (failed != 0) {
-    return make_error(ErrorKind::internal,
-                      std::string("JPEG: ") + tjGetErrorStr2(compressor.get()));
-  }
+  if (failed != 0) return fault_of(compressor);
   return Bytes(jpeg, jpeg + jpeg_bytes);
 }
 

@@ -127,7 +127,7 @@ Result<Response> draw(Services& services, const Picture& picture, data::Dataset&
     }
   }
   auto drawn =
-      frame::produce(*view, dataset, picture.encoding, *services.pool, cancel, services.space);
+      frame::produce(*view, dataset, picture.encoding, *services.pool, cancel, services.frames);
   if (!drawn) return drawn.error();
   response.content_type = media_type(picture.encoding.format);
   response.headers.emplace_back("Server-Timing",

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "server/base/thread_pool.hpp"
-#include "server/engine/render.hpp"
+#include "server/frame/frame.hpp"
 #include "server/net/catalogue.hpp"
 #include "server/net/exchange.hpp"
 #include "server/net/render_service.hpp"
@@ -23,7 +23,7 @@ struct Services {
   ServerOptions options;  // base_path normal
   Catalogue catalogue;
   std::shared_ptr<ThreadPool> pool;
-  engine::RenderSpace space;  // of the renderer's thread alone
+  frame::Workspace frames;  // of the renderer's thread alone
   std::atomic<bool> draining{false};
   RenderService renderer;  // last: its thread uses the others
 };

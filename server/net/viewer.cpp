@@ -30,7 +30,7 @@ Result<session::Drawn> draw(Services& services, const session::StartRender& want
   if (!dataset) return dataset.error();
   const std::uint64_t loads = (*dataset)->loads();
   auto drawn = frame::produce(wanted.view, **dataset, frame_encoding(wanted.encoding),
-                              *services.pool, cancel, services.space);
+                              *services.pool, cancel, services.frames);
   if (!drawn) return drawn.error();
   session::Drawn out;
   out.info = frame::frame_info(*drawn, drawn->view);

@@ -120,11 +120,11 @@ void engine_frame(benchmark::State& state, const Workload& workload, unsigned th
   ThreadPool pool(threads);
   const CancelToken cancel;
   // Touches the memory and the samples once.
-  engine::WorkReport work = value_or_give_up(engine::render(scene, pool, cancel)).work;
+  engine::RenderSpace space;
+  engine::WorkReport work = value_or_give_up(engine::render(scene, pool, cancel, space));
   while (state.KeepRunning()) {
-    auto rendered = value_or_give_up(engine::render(scene, pool, cancel));
-    benchmark::DoNotOptimize(rendered.image.rgba.data());
-    work = rendered.work;
+    work = value_or_give_up(engine::render(scene, pool, cancel, space));
+    benchmark::DoNotOptimize(space.image().rgba.data());
   }
   count_work(state, work);
 }

@@ -125,8 +125,8 @@ void bin(benchmark::State& state, const Table& table, const Workload& workload) 
   Ready ready(workload, table);
   time_items(state, [&] {
     engine::WorkReport work;
-    const auto& bins = engine::make_bins(ready.plan, table, ready.pool, CancelToken(),
-                                         ready.bin_space, work);
+    const auto& bins =
+        engine::make_bins(ready.plan, table, ready.pool, CancelToken(), ready.bin_space, work);
     benchmark::DoNotOptimize(bins.entries.data());
     return work.samples;
   });
@@ -141,7 +141,7 @@ void draw(benchmark::State& state, const Table& table, const Workload& workload)
     image.rgba.assign(4 * static_cast<std::size_t>(image.width) * image.height, 0.0F);
     work = ready.work;
     engine::draw_tiles(ready.plan, *ready.bins, table, ready.pool, CancelToken(), ready.tile_space,
-                       image, work);
+                       engine::sink_into(image), work);
     benchmark::DoNotOptimize(image.rgba.data());
     return work.samples;
   });

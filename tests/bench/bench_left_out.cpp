@@ -194,15 +194,15 @@ void draw_once(const View& view, data::Dataset& dataset, Half& half) {
 }
 
 // One thread's processor time: what else runs on the machine disturbs it least.
-double time_frame(const scene::Scene& scene, ThreadPool& pool) {
+double time_frame(const scene::Scene& scene, ThreadPool& pool, engine::RenderSpace& space) {
   const auto now = [] {
     timespec at{};
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &at);
     return 1e3 * static_cast<double>(at.tv_sec) + 1e-6 * static_cast<double>(at.tv_nsec);
   };
   const double start = now();
-  const auto rendered = value_or_give_up(engine::render(scene, pool, CancelToken()));
-  benchmark::DoNotOptimize(rendered.image.rgba.data());
+  value_or_give_up(engine::render(scene, pool, CancelToken(), space));
+  benchmark::DoNotOptimize(space.image().rgba.data());
   return now() - start;
 }
 
@@ -218,11 +218,12 @@ void run_pair(benchmark::State& state, const Feature& feature, protocol::MethodN
     scenes[i] = value_or_give_up(scene::build_scene(view, dataset));
   }
   ThreadPool pool(1);
+  std::array<engine::RenderSpace, 2> spaces;
   std::size_t first = 0;
   while (state.KeepRunning()) {
     std::array<double, 2> ms{};
-    ms[first] = time_frame(scenes[first], pool);
-    ms[1 - first] = time_frame(scenes[1 - first], pool);
+    ms[first] = time_frame(scenes[first], pool, spaces[first]);
+    ms[1 - first] = time_frame(scenes[1 - first], pool, spaces[1 - first]);
     first = 1 - first;
     pair.with.ms.push_back(ms[0]);
     pair.without.ms.push_back(ms[1]);

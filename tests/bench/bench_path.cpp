@@ -47,15 +47,17 @@ void draw(data::Dataset& dataset, const std::vector<protocol::View>& views, unsi
           const std::string& picture) {
   ThreadPool pool(threads);
   const CancelToken cancel;
+  frame::Workspace workspace;  // kept from frame to frame, as a daemon does
   frame::Encoding encoding;
   encoding.quality = 80;
   encoding.subsampling = image::Subsampling::s420;
-  value_or_give_up(frame::produce(views.front(), dataset, encoding, pool, cancel));
+  value_or_give_up(frame::produce(views.front(), dataset, encoding, pool, cancel, workspace));
   std::string frames;
   for (const protocol::View& view : views) {
     const double cpu = cpu_ms();
     const auto start = std::chrono::steady_clock::now();
-    const auto frame = value_or_give_up(frame::produce(view, dataset, encoding, pool, cancel));
+    const auto frame =
+        value_or_give_up(frame::produce(view, dataset, encoding, pool, cancel, workspace));
     const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - start;
     char text[128];
     std::snprintf(text, sizeof text, R"(%s{"wall_ms":%.3f,"cpu_ms":%.3f,"render_ms":%.3f})",
@@ -66,7 +68,7 @@ void draw(data::Dataset& dataset, const std::vector<protocol::View>& views, unsi
   const std::size_t peak = bench::process_bytes("VmHWM");
   encoding.format = frame::Format::png;
   const auto first =
-      value_or_give_up(frame::produce(views.front(), dataset, encoding, pool, cancel));
+      value_or_give_up(frame::produce(views.front(), dataset, encoding, pool, cancel, workspace));
   bench::write_file(picture, {first.bytes.begin(), first.bytes.end()});
   std::string names;
   for (const auto& [name, value] : bench::machine()) names += ",\"" + name + "\":\"" + value + "\"";

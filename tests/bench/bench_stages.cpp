@@ -1,5 +1,6 @@
 // Where a frame's time and memory go while the camera moves: every stage by itself, the whole from
-// a changed view to JPEG bytes, and what the frame takes from the heap:
+// a changed view to JPEG bytes, and what the frame takes from the heap. What a daemon keeps between
+// frames is kept here:
 //
 //   bench_stages [--markdown=FILE] [--benchmark_out=FILE] [--benchmark_filter=REGEX]
 #include <benchmark/benchmark.h>
@@ -49,14 +50,23 @@ class Series {
   std::map<std::string, std::vector<double>> values_;
 };
 
-constexpr std::array<const char*, 7> stages = {"view",  "scene",    "plan", "bins",
-                                               "tiles", "tone map", "JPEG"};
+// Pixels become codes of YCbCr as a tile is finished.
+constexpr std::array<const char*, 7> stages = {"view",         "scene",           "plan", "bins",
+                                               "clear planes", "tiles, tone map", "JPEG"};
+
+// What a daemon's renderer keeps, and the same for the frame that is drawn stage by stage.
+struct Kept {
+  frame::Workspace whole;
+  engine::RenderSpace engine;
+  engine::BinSpace bins;
+  engine::TileSpace tiles;
+  image::YccPicture planes;
+  image::JpegEncoder jpeg;
+};
 
 // One frame, stage by stage.
 void staged_frame(const protocol::View& asked, const Workload& workload, ThreadPool& pool,
-                  Series& series) {
-  static engine::BinSpace bin_space;
-  static engine::TileSpace tile_space;
+                  Kept& kept, Series& series) {
   data::Dataset& dataset = bench::dataset_of(workload.sample);
   const auto& table = *value_or_give_up(engine::kernels::chosen_table());
   const CancelToken cancel;
@@ -73,22 +83,26 @@ void staged_frame(const protocol::View& asked, const Workload& workload, ThreadP
   lap();
   const engine::RenderPlan plan = engine::make_plan(scene);
   lap();
-  const engine::Bins& bins = engine::make_bins(plan, table, pool, cancel, bin_space, work);
+  const engine::Bins& bins = engine::make_bins(plan, table, pool, cancel, kept.bins, work);
   lap();
-  engine::Image image{scene.camera.width, scene.camera.height, {}};
-  image.rgba.assign(4 * static_cast<std::size_t>(image.width) * image.height, 0.0F);
-  engine::draw_tiles(plan, bins, table, pool, cancel, tile_space, image, work);
+  kept.planes.reset(scene.camera.width, scene.camera.height, image::Subsampling::s420,
+                    scene.background);
   lap();
-  const image::Bytes rgb = image::tone_map(image.rgba, image.width, image.height, scene.background);
+  const auto to_planes = [&kept](const engine::TilePixels& tile) {
+    kept.planes.put({tile.x, tile.y, tile.width, tile.height, tile.rgba, tile.stride});
+  };
+  engine::draw_tiles(plan, bins, table, pool, cancel, kept.tiles, to_planes, work);
   lap();
-  const image::Bytes jpeg = value_or_give_up(
-      image::encode_jpeg(rgb, image.width, image.height, jpeg_quality, image::Subsampling::s420));
+  image::Bytes jpeg;
+  if (auto done = kept.jpeg.encode(kept.planes, jpeg_quality, pool, jpeg); !done) {
+    bench::give_up(done.error().message);
+  }
   lap();
   benchmark::DoNotOptimize(jpeg.data());
 }
 
 // The same as the stream has it, and what it takes from the heap.
-void whole_frame(const protocol::View& view, const Workload& workload, ThreadPool& pool,
+void whole_frame(const protocol::View& view, const Workload& workload, ThreadPool& pool, Kept& kept,
                  Series& series) {
   frame::Encoding encoding;
   encoding.quality = jpeg_quality;
@@ -96,8 +110,8 @@ void whole_frame(const protocol::View& view, const Workload& workload, ThreadPoo
   bench::forget_peak();
   const bench::Allocations before = bench::allocations();
   const auto start = Clock::now();
-  const frame::Frame frame = value_or_give_up(
-      frame::produce(view, bench::dataset_of(workload.sample), encoding, pool, CancelToken()));
+  const frame::Frame frame = value_or_give_up(frame::produce(
+      view, bench::dataset_of(workload.sample), encoding, pool, CancelToken(), kept.whole));
   series.add("to JPEG", ms_since(start));
   const bench::Allocations after = bench::allocations();
   series.add("allocations", static_cast<double>(after.count - before.count));
@@ -108,12 +122,12 @@ void whole_frame(const protocol::View& view, const Workload& workload, ThreadPoo
 
 // The engine alone, which the steady state of a frame loop should not make allocate.
 void engine_frame(const protocol::View& view, const Workload& workload, ThreadPool& pool,
-                  Series& series) {
+                  Kept& kept, Series& series) {
   const scene::Scene scene =
       value_or_give_up(scene::build_scene(view, bench::dataset_of(workload.sample)));
   const bench::Allocations before = bench::allocations();
-  const auto rendered = value_or_give_up(engine::render(scene, pool, CancelToken()));
-  benchmark::DoNotOptimize(rendered.image.rgba.data());
+  value_or_give_up(engine::render(scene, pool, CancelToken(), kept.engine));
+  benchmark::DoNotOptimize(kept.engine.image().rgba.data());
   const bench::Allocations after = bench::allocations();
   series.add("engine allocations", static_cast<double>(after.count - before.count));
   series.add("engine allocated MB", 1e-6 * static_cast<double>(after.bytes - before.bytes));
@@ -122,17 +136,20 @@ void engine_frame(const protocol::View& view, const Workload& workload, ThreadPo
 void frames(benchmark::State& state, const Workload& workload, unsigned threads) {
   ThreadPool pool(threads);
   protocol::View view = bench::view_of(workload);
+  Kept kept;
   Series warm_up;
-  whole_frame(view, workload, pool, warm_up);
+  whole_frame(view, workload, pool, kept, warm_up);
+  staged_frame(view, workload, pool, kept, warm_up);
+  engine_frame(view, workload, pool, kept, warm_up);
   Series series;
   double azimuth = 20;
   while (state.KeepRunning()) {
     bench::turn(view, workload, azimuth += 1);
     const auto start = Clock::now();
-    whole_frame(view, workload, pool, series);
+    whole_frame(view, workload, pool, kept, series);
     state.SetIterationTime(1e-3 * ms_since(start));
-    staged_frame(view, workload, pool, series);
-    engine_frame(view, workload, pool, series);
+    staged_frame(view, workload, pool, kept, series);
+    engine_frame(view, workload, pool, kept, series);
   }
   series.count(state);
   const data::Dataset& dataset = bench::dataset_of(workload.sample);

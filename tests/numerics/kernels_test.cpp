@@ -149,7 +149,8 @@ engine::Rendered render_with(const Table& table, const scene::Scene& scene) {
   out.image.width = scene.camera.width;
   out.image.height = scene.camera.height;
   out.image.rgba.assign(4 * static_cast<std::size_t>(scene.camera.width) * scene.camera.height, 0);
-  engine::draw_tiles(plan, bins, table, pool, cancel, tile_space, out.image, out.work);
+  engine::draw_tiles(plan, bins, table, pool, cancel, tile_space, engine::sink_into(out.image),
+                     out.work);
   return out;
 }
 

@@ -1,10 +1,13 @@
 // The work report, cancelling, and scenes with little or nothing in them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "tests/numerics/scenes.hpp"
 
@@ -154,6 +157,40 @@ scene::Scene both(const scene::Lattice& lattice, float wind, float rho) {
   scene.vector->length = 0.3;
   scene.scalars.push_back(medium(s, {0.2F, 0.5F, 1.0F}));
   return scene;
+}
+
+// Tiles: once each, cut at even pixels, clear where none comes, and the very bits of the image;
+// none comes where the camera sees nothing.
+TEST(Tiles, AreDeliveredOnceAndAreTheImage) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {67, 65}, {300, 201}}) {
+    for (const auto method : {scene::Method::kernel, scene::Method::slab}) {
+      scene::Scene scene = both(even_lattice({9, 9, 9}, {0.1, 0.1, 0.1}), 0.7F, 2.0F);
+      scene.method = method;
+      scene.camera = look({0.3, 0, 0.2}, {0.3, 1, -0.4}, 3, width, height, true, 0.5);
+      const engine::Image whole = render(scene, 2).image;
+      std::vector<float> pieces(whole.rgba.size());
+      std::vector<int> times(pieces.size() / 4);
+      ThreadPool pool(2);
+      engine::RenderSpace space;
+      const auto work =
+          engine::render(scene, pool, CancelToken(), space, [&](const engine::TilePixels& tile) {
+            EXPECT_TRUE(tile.x % 2 == 0 && tile.y % 2 == 0);
+            for (int row = 0; row < tile.height; ++row) {
+              const std::size_t at = static_cast<std::size_t>(tile.y + row) * width + tile.x;
+              std::copy_n(tile.rgba + row * tile.stride, 4 * tile.width, &pieces[4 * at]);
+              for (int column = 0; column < tile.width; ++column) ++times[at + column];
+            }
+          });
+      ASSERT_TRUE(work);
+      EXPECT_EQ(pieces, whole.rgba);
+      EXPECT_EQ(*std::max_element(times.begin(), times.end()), 1);
+      EXPECT_GT(work->tiles, 0);
+      scene.camera = look({90, 0, 0}, {0.3, 1, -0.4}, 3, width, height, true, 0.5);
+      const auto nothing = engine::render(scene, pool, CancelToken(), space,
+                                          [](const engine::TilePixels&) { ADD_FAILURE(); });
+      ASSERT_TRUE(nothing);
+    }
+  }
 }
 
 TEST(Extremes, ThinLatticesOnePixelAndMaskedFields) {

@@ -31,6 +31,7 @@ CONFINED = [
     ("nlohmann/", r"nlohmann/", r"protocol/codec\w*\.[ch]pp|tests/.*"),
     ("netCDF", r"netcdf(_\w+)?\.h", r"server/data/.*|tests/.*"),
     ("an image library", r"(turbojpeg|jpeglib|spng|png)\.h", r"server/image/.*|tests/.*"),
+    ("Highway", r"hwy/", r"server/engine/kernels/.*|server/image/ycc_rows\.cpp|tests/.*"),
     ("Beast or Asio", r"boost/(beast|asio)[/.]", r"server/net/.*|tests/.*"),
     ("CLI11", r"CLI/", r"server/cli/.*|server/main\.cpp"),
 ]

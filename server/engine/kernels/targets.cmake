@@ -1,8 +1,8 @@
 # The kernels, one translation unit an instruction set, chosen at run time (kernels/dispatch.cpp).
-# Highway's vectors, header only. Fused multiply-adds stand where the source says so: no contraction,
-# no reassociation. Neither errno nor floating-point traps nor the sign of zero are read, and masked samples
-# (NaN) are told by their bits before any arithmetic: that lets minima, maxima, square roots and
-# selections be vectorised.
+# Of Highway's vectors only the headers: the flags choose their target. Fused multiply-adds stand
+# where the source says so: no contraction, no reassociation. Neither errno nor floating-point traps
+# nor the sign of zero are read, and masked samples (NaN) are told by their bits before any
+# arithmetic: that lets minima, maxima, square roots and selections be vectorised.
 set(kernel_dir ${CMAKE_CURRENT_LIST_DIR})
 set(kernel_flags -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math -fno-signed-zeros
     -ffinite-math-only)

@@ -204,6 +204,37 @@ TEST(NetcdfValues, EveryFormatHoldsTheSame) {
   }
 }
 
+// Without chunks a read is smaller: 13 x 150 x 200 doubles are more than one, cut between levels.
+// With them what the library kept of a field is let go, and the field is read again and again.
+TEST(NetcdfValues, BlocksAndStepsReadAgainAreTheSame) {
+  const Folder folder;
+  const std::array<std::size_t, 4> lengths{2, 13, 150, 200};
+  const std::size_t samples = lengths[1] * lengths[2] * lengths[3];
+  for (const std::vector<std::size_t>& chunk :
+       {std::vector<std::size_t>{}, {1, 5, 60, 200}, {2, 13, 50, 50}}) {
+    const auto path = folder / ("again" + std::to_string(chunk.empty() ? 0 : chunk[0]) + ".nc");
+    {
+      NetcdfMaker file(path);
+      const int t = file.axis("time", counting(lengths[0]), "hours since 2000-01-01");
+      const int z = file.axis("lev", counting(lengths[1], 1), "m");
+      const int y = file.axis("lat", counting(lengths[2], -75), "degrees_north");
+      const int x = file.axis("lon", counting(lengths[3]), "degrees_east");
+      const int f = file.variable("f", NC_INT, {t, z, y, x}, counting(2 * samples));
+      if (!chunk.empty()) {
+        file.chunk(f, chunk);
+        file.deflate(f);
+      }
+    }
+    auto source = open_file(path);
+    ASSERT_TRUE(source) << source.error().message;
+    for (const std::size_t step : {0U, 1U, 0U, 0U}) {
+      const auto volume = (*source)->read(0, step);
+      ASSERT_TRUE(volume) << volume.error().message;
+      expect_values(*volume, counting(samples, static_cast<double>(step * samples)));
+    }
+  }
+}
+
 TEST(NetcdfValues, AVolumeReadInManyBlocksIsWhole) {
   // 40 x 300 x 500 doubles are more than one read's worth; chunks do not divide the levels.
   const Folder folder;

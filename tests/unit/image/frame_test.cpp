@@ -7,10 +7,12 @@
 #include <cstring>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/data/store.hpp"
 #include "server/frame/frame_info.hpp"
+#include "server/image/decode.hpp"
 #include "tests/unit/scene/fake.hpp"
 
 namespace windsplat::frame {
@@ -145,6 +147,58 @@ TEST_F(Produce, AnyNumberOfThreadsGivesTheSameBytes) {
   const auto shared = produce_as(Format::png);
   ASSERT_TRUE(alone && shared);
   EXPECT_EQ(alone->bytes, shared->bytes);
+}
+
+// The two ways from the engine to bytes: a JPEG's tile by tile, the PNG's by way of an image.
+TEST_F(Produce, JpegShowsWhatPngShows) {
+  view.image.background = "#305070";
+  for (const auto& [width, height] : {std::pair{96, 64}, {131, 67}, {1, 1}, {3, 70}}) {
+    for (const auto method : {protocol::MethodName::slab, protocol::MethodName::reference}) {
+      if (method == protocol::MethodName::reference && width * height > 300) continue;
+      view.method.name = method;
+      view.image.width = width;
+      view.image.height = height;
+      const Encoding exact{Format::png, 0, image::Subsampling::s444, true};
+      const Encoding near{Format::jpeg, 100, image::Subsampling::s444, true};
+      const auto png = produce(view, *dataset, exact, pool, cancel);
+      const auto jpeg = produce(view, *dataset, near, pool, cancel);
+      ASSERT_TRUE(png && jpeg);
+      const std::size_t size = std::size_t{3} * width * height;
+      std::vector<std::uint8_t> truth(size);
+      spng_ctx* decoder = spng_ctx_new(0);
+      ASSERT_EQ(spng_set_png_buffer(decoder, png->bytes.data(), png->bytes.size()), 0);
+      ASSERT_EQ(spng_decode_image(decoder, truth.data(), size, SPNG_FMT_RGB8, 0), 0);
+      spng_ctx_free(decoder);
+      const auto found = image::decode_jpeg(jpeg->bytes, width, height);
+      ASSERT_TRUE(found) << found.error().message;
+      for (std::size_t i = 0; i < size; ++i) ASSERT_NEAR((*found)[i], truth[i], 5) << i;
+    }
+  }
+}
+
+// A workspace that other frames were drawn into gives what a new one gives, and a step apart too.
+TEST_F(Produce, AWorkspaceCarriesNothingOver) {
+  Workspace used;
+  ThreadPool one(1);
+  const Encoding moving{Format::jpeg, 80, image::Subsampling::s420};
+  const Encoding settled{Format::jpeg, 90, image::Subsampling::s444};
+  for (const auto& [width, height] : {std::pair{200, 150}, {96, 64}, {161, 99}}) {
+    view.image.width = width;
+    view.image.height = height;
+    for (const Encoding& encoding : {moving, settled, Encoding{Format::png}}) {
+      const auto fresh = produce(view, *dataset, encoding, pool, cancel);
+      const auto again = produce(view, *dataset, encoding, one, cancel, used);
+      ASSERT_TRUE(fresh && again);
+      EXPECT_EQ(fresh->bytes, again->bytes) << width;
+      EXPECT_EQ(again->width, width);
+      EXPECT_EQ(fresh->work.fields, again->work.fields);
+    }
+  }
+  CancelToken raised;
+  raised.cancel();
+  ASSERT_FALSE(produce(view, *dataset, moving, pool, raised, used));
+  EXPECT_EQ(produce(view, *dataset, moving, pool, cancel, used)->bytes,
+            produce(view, *dataset, moving, pool, cancel)->bytes);
 }
 
 TEST_F(Produce, WrongViewsAndCancelledFramesAreErrors) {
