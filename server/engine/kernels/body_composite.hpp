@@ -156,9 +156,10 @@ struct SplatLane {
   Pixel behind;  // how far beyond the centre's view depth the ray is closest to it
 };
 
-// From: the rays' beginning. `eye`: far before the splat. `near_plane`: the splat reaches it, and
+// From: the rays' beginning. `eye`: far before the splat. `eye_inside`: the same, and the splat's
+// centre lies in the picture, so that (ex, ey) is (x, y). `near_plane`: the splat reaches it, and
 // the part of it that lies before counts no more, as if the splat were even over one cell.
-enum class From { eye, near_plane };
+enum class From { eye, eye_inside, near_plane };
 
 template <bool Perspective, From Start>
 HWY_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixel ray) {
@@ -169,8 +170,8 @@ HWY_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixel r
   const Pixel top =
       hn::Max(hn::MulAdd(s.xx, dx * dx, hn::MulAdd(s.xy, dx * dy, s.yy * (dy * dy))), zero);
   if constexpr (Perspective) {
-    const Pixel ex = px - s.ex;
-    const Pixel ey = py - s.ey;
+    const Pixel ex = Start == From::eye_inside ? dx : px - s.ex;
+    const Pixel ey = Start == From::eye_inside ? dy : py - s.ey;
     const Pixel bent = hn::MulAdd(s.dxx, ex * ex, hn::MulAdd(s.dxy, ex * ey, s.dyy * (ey * ey)));
     const Pixel length2 =
         hn::Max(s.d0 + hn::MulAdd(s.dx, ex, hn::MulAdd(s.dy, ey, bent)), s.d2_least);
@@ -249,6 +250,44 @@ HWY_INLINE Pixel light_before(const Attenuation<Pixel>& medium, Pixel tau, Pixel
   return hn::NegMulAdd(place, medium.absorbed, all<Pixel>(1.0F));
 }
 
+inline float* block_at(const Tile& tile, int row, int column) {
+  return tile.blocks + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * block_floats;
+}
+
+inline const float* rays_at(const Tile& tile, int row, int column) {
+  return tile.rays + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * block_pixels;
+}
+
+inline float left_of(const Tile& tile, int column) {
+  return static_cast<float>(tile.x + column * block_side);
+}
+
+inline float top_of(const Tile& tile, int row) {
+  return static_cast<float>(tile.y + row * block_side);
+}
+
+// A block that lets nothing through any more is closed for all that lies behind.
+inline void close_block(int row, std::uint32_t bit, Tile& tile) {
+  tile.open[row] &= ~bit;
+  tile.any_closed = 1;
+}
+
+HWY_INLINE void note_light(const Light& light, int row, std::uint32_t bit, Tile& tile) {
+  if (!light.above(tile.stop)) close_block(row, bit, tile);
+}
+
+// Composites into each of a row's blocks, whose bits are set, what add(x, y, ray, block) does.
+template <bool Perspective, class Add>
+HWY_INLINE void each_block(int row, std::uint32_t blocks, Tile& tile, const Add& add) {
+  const float y = top_of(tile, row);
+  for (; blocks != 0; blocks &= blocks - 1U) {
+    const int column = __builtin_ctz(blocks);
+    const float* ray = Perspective ? rays_at(tile, row, column) : nullptr;
+    const Light light = add(left_of(tile, column), y, ray, block_at(tile, row, column));
+    note_light(light, row, 1U << static_cast<unsigned>(column), tile);
+  }
+}
+
 // Pixels from a point of the picture to a block's corner.
 struct BlockPixels {
   Pixel x, y;
@@ -278,9 +317,8 @@ HWY_INLINE Light line_block(const RibbonLanes& r, const BlockPixels& corner,
 }
 
 template <bool Perspective, int Compositing, From Start>
-Light splat_block(const Splat& splat, float x, float y, const float* HWY_RESTRICT ray,
-                  float* HWY_RESTRICT block) {
-  const SplatLanes s = spread(splat);
+HWY_INLINE Light splat_block(const SplatLanes& s, float x, float y, const float* HWY_RESTRICT ray,
+                             float* HWY_RESTRICT block) {
   const Channels to = channels_of(block);
   Light light;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
@@ -324,12 +362,9 @@ HWY_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const Ri
 // A line inside its homogeneous cell, at x = tf / tau of the way through it:
 // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tf) (c_v - c_s).
 template <bool Perspective, int Compositing, int Style, From Start>
-Light both_block(const Ribbon& ribbon, const Splat& splat, float x, float y,
-                 const float* HWY_RESTRICT ray, float* HWY_RESTRICT block) {
-  const RibbonLanes r = spread(ribbon);
-  const SplatLanes s = spread(splat);
-  const Pixel depth = all<Pixel>(ribbon.depth);
-  const Pixel depth_rise = all<Pixel>(ribbon.depth_rise);
+HWY_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_rise,
+                            const SplatLanes& s, float x, float y, const float* HWY_RESTRICT ray,
+                            float* HWY_RESTRICT block) {
   constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
   const Channels to = channels_of(block);
   Light light;
@@ -363,14 +398,48 @@ Light both_block(const Ribbon& ribbon, const Splat& splat, float x, float y,
   return light;
 }
 
-using SplatFunction = Light (*)(const Splat& s, float x, float y, const float* ray, float* block);
-using BothFunction = Light (*)(const Ribbon& r, const Splat& s, float x, float y, const float* ray,
-                               float* block);
+template <bool Perspective, int Compositing, From Start>
+void splat_row(const Splat& splat, int row, std::uint32_t blocks, Tile& tile) {
+  const SplatLanes s = spread(splat);
+  each_block<Perspective>(row, blocks, tile, [&](float x, float y, const float* ray, float* block) {
+    return splat_block<Perspective, Compositing, Start>(s, x, y, ray, block);
+  });
+}
 
-// The functions that a pass composites its medium with, chosen once a brick.
+template <bool Perspective, int Compositing, int Style, From Start>
+void both_row(const Ribbon& ribbon, const Splat& splat, int row, std::uint32_t blocks, Tile& tile) {
+  const RibbonLanes r = spread(ribbon);
+  const SplatLanes s = spread(splat);
+  const Pixel depth = all<Pixel>(ribbon.depth);
+  const Pixel depth_rise = all<Pixel>(ribbon.depth_rise);
+  each_block<Perspective>(row, blocks, tile, [&](float x, float y, const float* ray, float* block) {
+    return both_block<Perspective, Compositing, Style, Start>(r, depth, depth_rise, s, x, y, ray,
+                                                              block);
+  });
+}
+
+template <bool Perspective, int Style>
+void line_row(const Ribbon& ribbon, int row, std::uint32_t blocks, Tile& tile) {
+  const RibbonLanes r = spread(ribbon);
+  each_block<false>(row, blocks, tile, [&](float x, float y, const float* /*ray*/, float* block) {
+    constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
+    return line_block<along, Style>(r, {all<Pixel>(x) - r.x, all<Pixel>(y) - r.y}, block);
+  });
+}
+
+using LineFunction = void (*)(const Ribbon& r, int row, std::uint32_t blocks, Tile& tile);
+using SplatFunction = void (*)(const Splat& s, int row, std::uint32_t blocks, Tile& tile);
+using BothFunction = void (*)(const Ribbon& r, const Splat& s, int row, std::uint32_t blocks,
+                              Tile& tile);
+
+constexpr int from_count = 3;
+
+// The functions that a pass composites kernels with a splat with, chosen once a brick: into the
+// blocks of one row whose bits are set. Splats by where their rays begin.
 struct Compositor {
-  SplatFunction splat, near_splat;
-  BothFunction both, near_both;
+  LineFunction line;
+  SplatFunction splat[from_count];
+  BothFunction both[from_count];
   int splat_exponentials;  // a pixel
   int both_exponentials;
 };
@@ -380,23 +449,26 @@ inline int style_of(const LineStyle& line) {
   return line.head_desaturation > 0 ? style_head : style_plain;
 }
 
+template <bool Perspective, int Compositing, int Style>
+inline Compositor compositor_with() {
+  constexpr From inside = Perspective ? From::eye_inside : From::eye;
+  constexpr From near = Perspective ? From::near_plane : From::eye;
+  constexpr int splat = Compositing == compositing_cd_euler ? 0 : 1;
+  return {line_row<Perspective, Style>,
+          {splat_row<Perspective, Compositing, From::eye>,
+           splat_row<Perspective, Compositing, inside>, splat_row<Perspective, Compositing, near>},
+          {both_row<Perspective, Compositing, Style, From::eye>,
+           both_row<Perspective, Compositing, Style, inside>,
+           both_row<Perspective, Compositing, Style, near>},
+          splat,
+          Compositing == compositing_analytic ? 2 : splat};
+}
+
+// A plain line is one whose head is like its tail.
 template <bool Perspective, int Compositing>
 inline Compositor compositor_with(int style) {
-  constexpr From near = Perspective ? From::near_plane : From::eye;
-  constexpr bool euler = Compositing == compositing_cd_euler;
-  constexpr int splat = euler ? 0 : 1;
-  constexpr int both = Compositing == compositing_analytic ? 2 : splat;
-  Compositor c = {splat_block<Perspective, Compositing, From::eye>,
-                  splat_block<Perspective, Compositing, near>,
-                  both_block<Perspective, Compositing, style_head, From::eye>,
-                  both_block<Perspective, Compositing, style_head, near>,
-                  splat,
-                  both};
-  if (style == style_moving) {
-    c.both = both_block<Perspective, Compositing, style_moving, From::eye>;
-    c.near_both = both_block<Perspective, Compositing, style_moving, near>;
-  }
-  return c;
+  return style == style_moving ? compositor_with<Perspective, Compositing, style_moving>()
+                               : compositor_with<Perspective, Compositing, style_head>();
 }
 
 template <bool Perspective>

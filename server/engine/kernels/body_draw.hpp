@@ -64,32 +64,6 @@ inline Splat splat_at(const Prepared& p, int l) {
   return out;
 }
 
-inline float* block_at(const Tile& tile, int row, int column) {
-  return tile.blocks + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * block_floats;
-}
-
-inline const float* rays_at(const Tile& tile, int row, int column) {
-  return tile.rays + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * block_pixels;
-}
-
-inline float left_of(const Tile& tile, int column) {
-  return static_cast<float>(tile.x + column * block_side);
-}
-
-inline float top_of(const Tile& tile, int row) {
-  return static_cast<float>(tile.y + row * block_side);
-}
-
-// A block that lets nothing through any more is closed for all that lies behind.
-inline void close_block(int row, std::uint32_t bit, Tile& tile) {
-  tile.open[row] &= ~bit;
-  tile.any_closed = 1;
-}
-
-HWY_INLINE void note_light(const Light& light, int row, std::uint32_t bit, Tile& tile) {
-  if (!light.above(tile.stop)) close_block(row, bit, tile);
-}
-
 // The tile's open blocks within a window, as Footing has them.
 inline std::uint64_t open_window(const Tile& tile, int row, int column) {
   std::uint64_t open = 0;
@@ -191,64 +165,47 @@ void draw_styled(const Prepared& p, int style, int l, Tile& tile) {
   }
 }
 
-// A kernel whose splat the near plane may cut.
+// Where the rays that meet a kernel's splat begin.
 template <bool Perspective>
-inline bool is_near(const Prepared& p, int l) {
-  return Perspective && p.stops.z[l] - 2.0F * p.splats.half_depth[l] < p.near;
+inline From from_of(const Prepared& p, int l) {
+  if (!Perspective) return From::eye;
+  const Splats& s = p.splats;
+  if (p.stops.z[l] - 2.0F * s.half_depth[l] < p.near) return From::near_plane;
+  return s.ex[l] == s.x[l] && s.ey[l] == s.y[l] ? From::eye_inside : From::eye;
 }
 
 // Composites one kernel that has a splat, and perhaps a line.
 template <bool Perspective>
-void draw_kernel(const Prepared& p, const Compositor& with, int style, int l, Tile& tile) {
+void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
   const Footing& f = p.footing;
   const bool lined = has(p.stops.lines, l);
   const Splat splat = splat_at<Perspective>(p, l);
   Ribbon ribbon;
   if (lined) ribbon = ribbon_at(p.pass->line, p.ribbons, l);
-  const bool near = is_near<Perspective>(p, l);
-  const SplatFunction splat_function = near ? with.near_splat : with.splat;
-  const BothFunction both_function = near ? with.near_both : with.both;
+  const int from = static_cast<int>(from_of<Perspective>(p, l));
   const std::uint32_t columns = range_mask({f.column_first[l], f.column_last[l]});
   const int first = lined && f.line_first[l] < f.row_first[l] ? f.line_first[l] : f.row_first[l];
   const int last = lined && f.line_last[l] > f.row_last[l] ? f.line_last[l] : f.row_last[l];
   for (int row = first; row <= last; ++row) {
+    const std::uint32_t open = tile.open[row];
     const bool with_line = lined && row >= f.line_first[l] && row <= f.line_last[l];
-    const std::uint32_t lines = with_line ? f.line_columns[row - f.line_first[l]][l] : 0;
-    const std::uint32_t splats = row >= f.row_first[l] && row <= f.row_last[l] ? columns : 0;
-    std::uint32_t left = (lines | splats) & tile.open[row];
-    tile.counters.pixel_updates += std::int64_t{__builtin_popcount(left)} * block_pixels;
-    tile.counters.exponentials +=
-        std::int64_t{__builtin_popcount(left & splats & ~lines) * with.splat_exponentials +
-                     __builtin_popcount(left & splats & lines) * with.both_exponentials} *
-        block_pixels;
-    while (left != 0) {
-      const int column = __builtin_ctz(left);
-      const std::uint32_t bit = left & (~left + 1U);
-      left ^= bit;
-      const float x = left_of(tile, column);
-      const float y = top_of(tile, row);
-      const float* ray = Perspective ? rays_at(tile, row, column) : nullptr;
-      float* block = block_at(tile, row, column);
-      if ((lines & splats & bit) != 0) {
-        note_light(both_function(ribbon, splat, x, y, ray, block), row, bit, tile);
-      } else if ((splats & bit) != 0) {
-        note_light(splat_function(splat, x, y, ray, block), row, bit, tile);
-      } else {
-        const RibbonLanes lanes = spread(ribbon);
-        const BlockPixels at = {all<Pixel>(x) - lanes.x, all<Pixel>(y) - lanes.y};
-        constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
-        note_light(style == style_moving ? line_block<along, style_moving>(lanes, at, block)
-                                         : line_block<along, style_head>(lanes, at, block),
-                   row, bit, tile);
-      }
-    }
+    const std::uint32_t lines = with_line ? open & f.line_columns[row - f.line_first[l]][l] : 0;
+    const std::uint32_t splats = row >= f.row_first[l] && row <= f.row_last[l] ? open & columns : 0;
+    const std::uint32_t both = lines & splats;
+    if (both != 0) with.both[from](ribbon, splat, row, both, tile);
+    if (splats != both) with.splat[from](splat, row, splats & ~both, tile);
+    if (lines != both) with.line(ribbon, row, lines & ~both, tile);
+    const int with_splat = __builtin_popcount(splats & ~both) * with.splat_exponentials;
+    const int with_both = __builtin_popcount(both) * with.both_exponentials;
+    tile.counters.pixel_updates += std::int64_t{__builtin_popcount(lines | splats)} * block_pixels;
+    tile.counters.exponentials += std::int64_t{with_splat + with_both} * block_pixels;
   }
 }
 
 template <bool Perspective>
 HWY_INLINE void draw_stop(const Prepared& p, const Compositor& with, int style, int l, Tile& tile) {
   if (has(p.stops.splats, l)) {
-    draw_kernel<Perspective>(p, with, style, l, tile);
+    draw_kernel<Perspective>(p, with, l, tile);
   } else {
     draw_styled<Perspective>(p, style, l, tile);
   }
