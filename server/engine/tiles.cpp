@@ -34,18 +34,6 @@ void make_room(const RenderPlan& plan, std::vector<Workspace>& spaces) {
 // Blocks along a tile's width or height.
 int blocks_along(int pixels) { return (pixels + block_side - 1) / block_side; }
 
-// The length of every pixel's ray of a row of blocks whose forward component is 1.
-void fill_rays(const kernels::Camera& camera, const Tile& tile, int row, float* ray) {
-  const int count = blocks_along(tile.width) * block_pixels;
-  for (int i = 0; i < count; ++i) {
-    const int px = tile.x + i / block_pixels * block_side + i % block_side;
-    const int py = tile.y + row * block_side + i % block_pixels / block_side;
-    const double x = (px + 0.5 - camera.half_width_px) * camera.pixel;
-    const double y = (py + 0.5 - camera.half_height_px) * camera.pixel;
-    ray[i] = static_cast<float>(std::sqrt(1 + x * x + y * y));
-  }
-}
-
 // Every pixel of a row of blocks lets all light through.
 void clear_row(float* blocks, int count) {
   std::fill_n(blocks, static_cast<std::ptrdiff_t>(count) * block_floats, 0.0F);
@@ -54,8 +42,8 @@ void clear_row(float* blocks, int count) {
   }
 }
 
-void open_tile(const RenderPlan& plan, const Bins& bins, std::size_t index, Workspace& space,
-               Tile& tile) {
+void open_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
+               std::size_t index, Workspace& space, Tile& tile) {
   const int tx = static_cast<int>(index) % bins.tiles_x;
   const int ty = static_cast<int>(index) / bins.tiles_x;
   tile.x = tx * plan.tile_pixels;
@@ -70,11 +58,9 @@ void open_tile(const RenderPlan& plan, const Bins& bins, std::size_t index, Work
   for (int row = 0; row < blocks_along(tile.height); ++row) {
     const std::ptrdiff_t first = std::ptrdiff_t{row} * tile_blocks;
     clear_row(tile.blocks + first * block_floats, columns);
-    if (plan.perspective_medium) {
-      fill_rays(plan.camera, tile, row, space.rays.data() + first * block_pixels);
-    }
     tile.open[row] = (2U << static_cast<unsigned>(columns - 1)) - 1U;
   }
+  if (plan.perspective_medium) table.fill_rays(plan.camera, tile, space.rays.data());
 }
 
 std::int64_t stops_of(const Brick& brick) {
@@ -210,7 +196,7 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
     if (cancel.cancelled()) return;
     const FlushDenormals flush;
     Tile tile{};
-    open_tile(plan, bins, order[i], spaces[worker], tile);
+    open_tile(plan, bins, table, order[i], spaces[worker], tile);
     if (plan.slabs || plan.curved) {
       done[i].stopped = sweep_tile(plan, bins, table, cancel, order[i], spaces[worker].sweep, tile);
     } else {

@@ -315,6 +315,24 @@ void draw(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile
   }
 }
 
+// Lengths of pixels' rays at unit depth.
+void fill_rays(const Camera& camera, const Tile& tile, float* rays) {
+  const Pixel pixel = all<Pixel>(camera.pixel);
+  const Pixel one = all<Pixel>(1.0F);
+  for (int row = 0; row < blocks_of(tile.height); ++row) {
+    const float top = top_of(tile, row) - camera.half_height_px;
+    for (int column = 0; column < blocks_of(tile.width); ++column) {
+      const float left = left_of(tile, column) - camera.half_width_px;
+      float* to = rays + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * block_pixels;
+      for (int l = 0; l < block_pixels; l += pixel_lanes) {
+        const Pixel x = (all<Pixel>(left) + load<Pixel>(lane_x + l)) * pixel;
+        const Pixel y = (all<Pixel>(top) + load<Pixel>(lane_y + l)) * pixel;
+        store(hn::Sqrt(hn::MulAdd(x, x, hn::MulAdd(y, y, one))), to + l);
+      }
+    }
+  }
+}
+
 int count_open(const Tile& tile) {
   int open = 0;
   for (const std::uint32_t row : tile.open) open += __builtin_popcount(row);

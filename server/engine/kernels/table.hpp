@@ -47,6 +47,9 @@ struct Table {
   // Tells the processor that this brick's samples are wanted soon.
   void (*prefetch)(const Pass& pass, const Brick& brick);
 
+  // The length of each pixel's ray whose forward component is 1, in blocks as the tile's are.
+  void (*fill_rays)(const Camera& camera, const Tile& tile, float* rays);
+
   // How many of the tile's blocks are still open.
   int (*count_open)(const Tile& tile);
 
