@@ -22,19 +22,41 @@ struct DepthEntry {
   std::int32_t stop = 0;
 };
 
-// What of splats or lines has been reached and not yet passed: records in memory that is used
-// again, and for each of the next slabs a list of those that wait for it, in order of arrival.
-template <class Record>
-struct Reached {
+// Splats that have been reached and not yet passed: records in memory that is used again, and for
+// each of the next slabs a list of those that wait for it, in order of arrival.
+struct WaitingSplats {
   static constexpr std::size_t slabs = 256;
   static constexpr std::uint32_t none = 0xFFFFFFFFU;
 
-  std::vector<Record> records;
+  std::vector<kernels::SplatRecord> records;
   std::vector<std::uint32_t> free;
   std::vector<std::uint32_t> behind;       // of each record, who arrived after it
   std::array<std::uint32_t, slabs> first;  // by slab, modulo
   std::array<std::uint32_t, slabs> last;
   std::size_t count = 0;
+};
+
+struct WaitingHit {
+  kernels::Hit hit;
+  std::uint32_t before;  // who arrived before it
+};
+
+// The same for lines: for each block of each of the next slabs a list of the lines that may be met
+// there. A line's record is kept while it has hits that wait.
+struct WaitingLines {
+  static constexpr std::size_t slabs = 32;
+  static constexpr std::size_t blocks =
+      static_cast<std::size_t>(kernels::tile_blocks) * kernels::tile_blocks;
+  static constexpr std::uint32_t none = 0xFFFFFFFFU;
+
+  std::vector<kernels::RibbonRecord> records;
+  std::vector<std::uint32_t> free;
+  std::vector<std::uint32_t> waiting;  // of each record, how many hits
+  std::vector<WaitingHit> hits;
+  std::vector<std::uint32_t> free_hits;
+  std::vector<std::uint32_t> last;  // by slab, modulo, and block: who arrived last
+  std::array<std::array<std::uint32_t, kernels::tile_blocks>, slabs> rows;  // bit set: a list
+  std::size_t count = 0;                                                    // hits
 };
 
 // A worker's own memory, used for one tile after the other.
@@ -47,16 +69,13 @@ struct SweepSpace {
   std::vector<DepthEntry> spare;  // for sorting
   // Slabs.
   std::unique_ptr<kernels::Prepared> prepared;
-  Reached<kernels::SplatRecord> splats;
-  Reached<kernels::RibbonRecord> ribbons;
-  std::vector<std::uint32_t> here;  // of one kind, in the slab at hand
-  std::vector<std::uint32_t> lines;
-  AlignedVector<float> gathered;
-  std::vector<kernels::Hit> hits;    // as listed
-  std::vector<kernels::Hit> sorted;  // by block, then depth
-  std::vector<kernels::Hit> spare_hits;
-  std::vector<std::uint32_t> first;  // of each block, in `sorted`
-  std::vector<std::uint32_t> next;
+  WaitingSplats splats;
+  WaitingLines lines;
+  std::vector<std::uint32_t> here;       // splats in the slab at hand
+  AlignedVector<float> gathered;         // by slab, modulo
+  std::vector<kernels::Hit> listed;      // of one brick
+  std::vector<kernels::Hit> met;         // in one block of the slab at hand
+  std::vector<kernels::Hit> spare_hits;  // for sorting
 };
 
 // Calls visit(member) for the vectors that grow with what a tile holds, member(space) each.
@@ -70,13 +89,13 @@ void each_vector(const Visit& visit) {
   visit([](SweepSpace & s) -> auto& { return s.splats.records; });
   visit([](SweepSpace & s) -> auto& { return s.splats.free; });
   visit([](SweepSpace & s) -> auto& { return s.splats.behind; });
-  visit([](SweepSpace & s) -> auto& { return s.ribbons.records; });
-  visit([](SweepSpace & s) -> auto& { return s.ribbons.free; });
-  visit([](SweepSpace & s) -> auto& { return s.ribbons.behind; });
+  visit([](SweepSpace & s) -> auto& { return s.lines.records; });
+  visit([](SweepSpace & s) -> auto& { return s.lines.free; });
+  visit([](SweepSpace & s) -> auto& { return s.lines.waiting; });
+  visit([](SweepSpace & s) -> auto& { return s.lines.hits; });
+  visit([](SweepSpace & s) -> auto& { return s.lines.free_hits; });
   visit([](SweepSpace & s) -> auto& { return s.here; });
-  visit([](SweepSpace & s) -> auto& { return s.lines; });
-  visit([](SweepSpace & s) -> auto& { return s.hits; });
-  visit([](SweepSpace & s) -> auto& { return s.sorted; });
+  visit([](SweepSpace & s) -> auto& { return s.met; });
   visit([](SweepSpace & s) -> auto& { return s.spare_hits; });
 }
 

@@ -128,16 +128,11 @@ void level(std::vector<Workspace>& spaces) {
   };
   each_vector(each);
   std::size_t slots = 0;
-  std::size_t hits = 0;
-  for (const Workspace& space : spaces) {
-    slots = std::max(slots, space.sweep.slots.size());
-    hits = std::max(hits, space.sweep.hits.size());
-  }
+  for (const Workspace& space : spaces) slots = std::max(slots, space.sweep.slots.size());
   for (Workspace& space : spaces) {
     while (space.sweep.slots.size() < slots) {
       space.sweep.slots.push_back(std::make_unique<kernels::Prepared>());
     }
-    space.sweep.hits.resize(hits);
   }
 }
 

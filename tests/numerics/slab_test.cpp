@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 
 #include "server/engine/kernels/frame_data.hpp"
 #include "server/engine/partial.hpp"
@@ -48,13 +50,19 @@ Scene blobs(double density, int size, double azimuth, bool perspective) {
 
 TEST(PartialFootprint, EndsAtNothingAndAllAndGrows) {
   const auto& table = engine::partial_footprints();
-  constexpr int columns = engine::kernels::partial_columns;
+  constexpr int columns = engine::kernels::partial_columns - 1;
+  constexpr auto one = static_cast<std::int32_t>(engine::kernels::partial_one);
+  ASSERT_EQ(table.size(), static_cast<std::size_t>(engine::kernels::partial_rows) * columns);
+  const auto here = [&](int r, int c) { return table[r * columns + c] & 0xffff; };
+  const auto next = [&](int r, int c) {
+    return static_cast<std::int32_t>(static_cast<std::uint32_t>(table[r * columns + c]) >> 16U);
+  };
   for (int r = 0; r < engine::kernels::partial_rows; ++r) {
-    const float* row = table.data() + static_cast<std::ptrdiff_t>(r) * columns;
-    EXPECT_EQ(row[0], 0.0F);
-    EXPECT_EQ(row[columns - 1], 1.0F);
-    EXPECT_NEAR(row[columns / 2], 0.5F, 1e-7);
-    for (int c = 1; c < columns; ++c) EXPECT_GT(row[c], row[c - 1]);
+    EXPECT_EQ(here(r, 0), 0);
+    EXPECT_EQ(next(r, columns - 1), one);
+    EXPECT_NEAR(here(r, columns / 2), 0.5 * one, 1);
+    for (int c = 0; c < columns; ++c) EXPECT_GE(next(r, c), here(r, c));
+    for (int c = 1; c < columns; ++c) EXPECT_EQ(next(r, c - 1), here(r, c));
   }
 }
 

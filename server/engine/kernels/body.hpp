@@ -14,10 +14,19 @@
 namespace windsplat::engine::kernels {
 
 const Table& WINDSPLAT_KERNEL_TABLE() {
-  static constexpr Table table{
-      WINDSPLAT_KERNEL_NAME, summarise,    draw,         prepare,   draw_prepared,
-      pack_splats,           pack_ribbons, gather,       list_hits, close_slab,
-      prefetch_brick,        count_open,   refresh_open, attenuate, jitter};
+  static constexpr Table table{WINDSPLAT_KERNEL_NAME,
+                               summarise,
+                               draw,
+                               prepare,
+                               draw_prepared,
+                               pack_splats,
+                               pack_lines,
+                               gather,
+                               close_slab,
+                               prefetch_brick,
+                               count_open,
+                               attenuate,
+                               jitter};
   return table;
 }
 
