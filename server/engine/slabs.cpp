@@ -18,6 +18,7 @@ namespace {
 using kernels::Brick;
 using kernels::brick_stops;
 using kernels::Hit;
+using kernels::MetLine;
 using kernels::RibbonRecord;
 using kernels::Slab;
 using kernels::slabs_ahead;
@@ -26,7 +27,7 @@ using kernels::Tile;
 using kernels::tile_blocks;
 
 constexpr std::size_t bricks_between_looks = 64;
-constexpr std::size_t tile_block_count = WaitingLines::blocks;
+constexpr std::size_t tile_block_count = std::size_t{tile_blocks} * tile_blocks;
 
 // The lists' place of a slab, which may be before the camera's depth origin.
 std::size_t modulo(std::int64_t slab, std::size_t slabs) {
@@ -102,10 +103,10 @@ class Lines {
     of_.records.clear();
     of_.free.clear();
     of_.waiting.clear();
-    of_.hits.clear();
-    of_.free_hits.clear();
-    of_.last.assign(WaitingLines::slabs * tile_block_count, WaitingLines::none);
-    of_.rows = {};
+    of_.chunks.clear();
+    of_.free_chunks.clear();
+    of_.first.fill(WaitingLines::none);
+    of_.last.fill(WaitingLines::none);
     of_.count = 0;
   }
 
@@ -119,7 +120,7 @@ class Lines {
       of_.records.emplace_back();
       of_.waiting.push_back(0);
     }
-    std::copy(of_.free.rbegin(), of_.free.rbegin() + brick_stops, slots);
+    std::copy_n(of_.free.rbegin(), brick_stops, slots);
     return of_.records.data();
   }
 
@@ -128,57 +129,59 @@ class Lines {
     of_.free.resize(of_.free.size() - static_cast<std::size_t>(lines));
     for (int n = 0; n < lines; ++n) {
       of_.waiting[slots[n]] = static_cast<std::uint32_t>(counts[n]);
+      of_.count += static_cast<std::size_t>(counts[n]);
     }
   }
 
-  void add(const Hit& hit, std::int64_t slab) {
-    std::uint32_t at = 0;
-    if (of_.free_hits.empty()) {
-      at = static_cast<std::uint32_t>(of_.hits.size());
-      of_.hits.push_back({hit, WaitingLines::none});
-    } else {
-      at = of_.free_hits.back();
-      of_.free_hits.pop_back();
-      of_.hits[at].hit = hit;
+  void await(const Hit& hit, std::int64_t index) {
+    const std::size_t slab = modulo(index, WaitingLines::slabs);
+    std::uint32_t last = of_.last[slab];
+    if (last == WaitingLines::none || of_.chunks[last].count == HitChunk::size) {
+      last = add_chunk(slab);
     }
-    ++of_.count;
-    await(at, slab);
+    HitChunk& chunk = of_.chunks[last];
+    chunk.hits[chunk.count++] = hit;
   }
 
-  // The blocks of one row that have hits in the slab, as bits; none any more.
-  std::uint32_t take_row(std::int64_t index, int row) {
-    std::uint32_t& bits = of_.rows[modulo(index, WaitingLines::slabs)][row];
-    return std::exchange(bits, 0U);
-  }
-
-  // Calls visit(hit) for what waits in a block of the slab, the last arrival first. It returns the
-  // slab in which the hit is wanted next, `index` if none.
+  // Calls visit(hit) for what waits for the slab. It returns the slab for which the hit waits next,
+  // `index` if for none.
   template <class Visit>
-  void take(std::int64_t index, std::size_t block, const Visit& visit) {
-    const std::size_t list = modulo(index, WaitingLines::slabs) * tile_block_count + block;
-    std::uint32_t at = std::exchange(of_.last[list], WaitingLines::none);
+  void take(std::int64_t index, const Visit& visit) {
+    const std::size_t slab = modulo(index, WaitingLines::slabs);
+    std::uint32_t at = std::exchange(of_.first[slab], WaitingLines::none);
+    of_.last[slab] = WaitingLines::none;
     while (at != WaitingLines::none) {
-      const std::uint32_t before = of_.hits[at].before;
-      const Hit& hit = of_.hits[at].hit;
-      const std::int64_t next = visit(hit);
-      if (next != index) {
-        await(at, next);
-      } else {
-        if (--of_.waiting[hit.line] == 0) of_.free.push_back(hit.line);
-        of_.free_hits.push_back(at);
-        --of_.count;
+      const std::uint32_t count = of_.chunks[at].count;
+      for (std::uint32_t n = 0; n < count; ++n) {
+        const Hit hit = of_.chunks[at].hits[n];
+        const std::int64_t next = visit(hit);
+        if (next != index) {
+          await(hit, next);
+        } else {
+          --of_.count;
+          if (--of_.waiting[hit.line] == 0) of_.free.push_back(hit.line);
+        }
       }
-      at = before;
+      of_.free_chunks.push_back(at);
+      at = of_.chunks[at].behind;
     }
   }
 
  private:
-  void await(std::uint32_t at, std::int64_t index) {
-    WaitingHit& hit = of_.hits[at];
-    const std::size_t slab = modulo(index, WaitingLines::slabs);
-    const auto block = static_cast<std::size_t>(hit.hit.block);
-    hit.before = std::exchange(of_.last[slab * tile_block_count + block], at);
-    of_.rows[slab][block / tile_blocks] |= std::uint32_t{1} << block % tile_blocks;
+  std::uint32_t add_chunk(std::size_t slab) {
+    std::uint32_t at = 0;
+    if (of_.free_chunks.empty()) {
+      at = static_cast<std::uint32_t>(of_.chunks.size());
+      of_.chunks.emplace_back();
+    } else {
+      at = of_.free_chunks.back();
+      of_.free_chunks.pop_back();
+    }
+    of_.chunks[at].count = 0;
+    of_.chunks[at].behind = WaitingLines::none;
+    const std::uint32_t last = std::exchange(of_.last[slab], at);
+    (last == WaitingLines::none ? of_.first[slab] : of_.chunks[last].behind) = at;
+    return at;
   }
 
   WaitingLines& of_;
@@ -295,7 +298,7 @@ class SlabSweep {
     lines_.take_room(slots, lines, counts);
     const Hit* hit = space_.listed.data();
     for (int n = 0; n < lines; ++n) {
-      for (const Hit* last = hit + counts[n]; hit < last; ++hit) lines_.add(*hit, slab_of(*hit));
+      for (const Hit* last = hit + counts[n]; hit < last; ++hit) lines_.await(*hit, slab_of(*hit));
     }
   }
 
@@ -325,35 +328,55 @@ class SlabSweep {
   // Composites the slab, block by block.
   void close() {
     Slab& slab = slab_at(index_);
+    for (std::uint32_t& row : lined_) row = 0;
+    if (lines_.count() > 0) meet(slab);
     for (int row = 0; row < tile_blocks; ++row) {
-      const std::uint32_t lined = lines_.take_row(index_, row);
-      for (std::uint32_t left = lined | slab.touched[row]; left != 0; left &= left - 1U) {
+      std::uint32_t left = (lined_[row] | slab.touched[row]) & tile_.open[row];
+      for (; left != 0; left &= left - 1U) {
         const int column = __builtin_ctz(left);
         const int block = row * tile_blocks + column;
-        const bool open = (tile_.open[row] >> static_cast<unsigned>(column) & 1U) != 0;
-        space_.met.clear();
-        if ((lined >> static_cast<unsigned>(column) & 1U) != 0) meet(slab, block, open);
-        const bool touched = (slab.touched[row] >> static_cast<unsigned>(column) & 1U) != 0;
-        if (!open || (!touched && space_.met.empty())) continue;
+        const bool lined = (lined_[row] >> static_cast<unsigned>(column) & 1U) != 0;
+        const auto [first, last] = lined ? lines_at(block) : std::pair<std::size_t, std::size_t>();
         table_.close_slab(plan_.camera, plan_.compositing, slab, lines_.records(),
-                          space_.met.data(), static_cast<int>(space_.met.size()), block, tile_);
+                          space_.met.data() + first, static_cast<int>(last - first), block, tile_);
       }
       slab.touched[row] = 0;
     }
   }
 
-  // What lines the block meets in the slab, nearest first.
-  void meet(const Slab& slab, int block, bool open) {
-    std::vector<Hit>& met = space_.met;
-    lines_.take(index_, static_cast<std::size_t>(block), [&](const Hit& hit) {
-      if (!open) return index_;
+  // Finds the lines that open blocks meet in the slab: space_.met, block by block, up to where
+  // met_until_ tells.
+  void meet(const Slab& slab) {
+    std::vector<Hit>& hits = space_.hits;
+    hits.clear();
+    std::fill(std::begin(met_until_), std::end(met_until_), 0U);
+    lines_.take(index_, [&](const Hit& hit) {
+      const auto row = static_cast<unsigned>(hit.block) / tile_blocks;
+      const std::uint32_t bit = std::uint32_t{1} << static_cast<unsigned>(hit.block) % tile_blocks;
+      if ((tile_.open[row] & bit) == 0) return index_;
       if (hit.first >= slab.back) return std::max(slab_of(hit), index_ + 1);
-      met.push_back(hit);
+      hits.push_back(hit);
+      lined_[row] |= bit;
+      ++met_until_[hit.block];
       return hit.last >= slab.back ? index_ + 1 : index_;
     });
-    std::reverse(met.begin(), met.end());
-    stable_sort(met, 0, met.size(), space_.spare_hits,
-                [](const Hit& p, const Hit& q) { return p.first + p.last < q.first + q.last; });
+    std::uint32_t sum = 0;
+    for (std::uint32_t& until : met_until_) sum = std::exchange(until, sum) + sum;
+    if (space_.met.size() < hits.size()) space_.met.resize(hits.size());
+    for (const Hit& hit : hits) {
+      space_.met[met_until_[hit.block]++] = {0.5F * (hit.first + hit.last), hit.line};
+    }
+  }
+
+  // A block's part of space_.met: first and end.
+  std::pair<std::size_t, std::size_t> lines_at(int block) {
+    const std::size_t first = block == 0 ? 0 : met_until_[block - 1];
+    const std::size_t last = met_until_[block];
+    if (last - first > kernels::met_lines_sorted_max) {
+      stable_sort(space_.met, first, last, space_.spare_met,
+                  [](const MetLine& p, const MetLine& q) { return p.depth < q.depth; });
+    }
+    return {first, last};
   }
 
   const RenderPlan& plan_;
@@ -364,6 +387,8 @@ class SlabSweep {
   Splats splats_;
   Lines lines_;
   Slab slabs_[slabs_ahead] = {};
+  std::uint32_t lined_[tile_blocks] = {};  // bit set: the block may meet lines in the slab at hand
+  std::uint32_t met_until_[tile_block_count] = {};
   float inverse_depth_ = static_cast<float>(1.0 / plan_.slab_depth);
   std::int64_t index_ = 0;
   std::int64_t gathered_until_ = std::numeric_limits<std::int64_t>::min();

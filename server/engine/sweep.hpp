@@ -36,27 +36,29 @@ struct WaitingSplats {
   std::size_t count = 0;
 };
 
-struct WaitingHit {
-  kernels::Hit hit;
-  std::uint32_t before;  // who arrived before it
+// Hits that wait for the same slab, and where more of them are.
+struct HitChunk {
+  static constexpr std::uint32_t size = 63;
+
+  std::uint32_t count;
+  std::uint32_t behind;
+  kernels::Hit hits[size];
 };
 
-// The same for lines: for each block of each of the next slabs a list of the lines that may be met
-// there. A line's record is kept while it has hits that wait.
+// The same for lines, which wait block by block. A line's record is kept while it has hits that
+// wait.
 struct WaitingLines {
   static constexpr std::size_t slabs = 32;
-  static constexpr std::size_t blocks =
-      static_cast<std::size_t>(kernels::tile_blocks) * kernels::tile_blocks;
   static constexpr std::uint32_t none = 0xFFFFFFFFU;
 
   std::vector<kernels::RibbonRecord> records;
   std::vector<std::uint32_t> free;
   std::vector<std::uint32_t> waiting;  // of each record, how many hits
-  std::vector<WaitingHit> hits;
-  std::vector<std::uint32_t> free_hits;
-  std::vector<std::uint32_t> last;  // by slab, modulo, and block: who arrived last
-  std::array<std::array<std::uint32_t, kernels::tile_blocks>, slabs> rows;  // bit set: a list
-  std::size_t count = 0;                                                    // hits
+  std::vector<HitChunk> chunks;
+  std::vector<std::uint32_t> free_chunks;
+  std::array<std::uint32_t, slabs> first;  // by slab, modulo
+  std::array<std::uint32_t, slabs> last;
+  std::size_t count = 0;  // hits
 };
 
 // A worker's own memory, used for one tile after the other.
@@ -71,11 +73,12 @@ struct SweepSpace {
   std::unique_ptr<kernels::Prepared> prepared;
   WaitingSplats splats;
   WaitingLines lines;
-  std::vector<std::uint32_t> here;       // splats in the slab at hand
-  AlignedVector<float> gathered;         // by slab, modulo
-  std::vector<kernels::Hit> listed;      // of one brick
-  std::vector<kernels::Hit> met;         // in one block of the slab at hand
-  std::vector<kernels::Hit> spare_hits;  // for sorting
+  std::vector<std::uint32_t> here;          // splats in the slab at hand
+  AlignedVector<float> gathered;            // by slab, modulo
+  std::vector<kernels::Hit> listed;         // of one brick
+  std::vector<kernels::Hit> hits;           // in the slab at hand
+  std::vector<kernels::MetLine> met;        // the same by block
+  std::vector<kernels::MetLine> spare_met;  // for sorting
 };
 
 // Calls visit(member) for the vectors that grow with what a tile holds, member(space) each.
@@ -92,11 +95,12 @@ void each_vector(const Visit& visit) {
   visit([](SweepSpace & s) -> auto& { return s.lines.records; });
   visit([](SweepSpace & s) -> auto& { return s.lines.free; });
   visit([](SweepSpace & s) -> auto& { return s.lines.waiting; });
-  visit([](SweepSpace & s) -> auto& { return s.lines.hits; });
-  visit([](SweepSpace & s) -> auto& { return s.lines.free_hits; });
+  visit([](SweepSpace & s) -> auto& { return s.lines.chunks; });
+  visit([](SweepSpace & s) -> auto& { return s.lines.free_chunks; });
   visit([](SweepSpace & s) -> auto& { return s.here; });
+  visit([](SweepSpace & s) -> auto& { return s.hits; });
   visit([](SweepSpace & s) -> auto& { return s.met; });
-  visit([](SweepSpace & s) -> auto& { return s.spare_hits; });
+  visit([](SweepSpace & s) -> auto& { return s.spare_met; });
 }
 
 // Between looks at whether the tile is done or nobody wants it any more.

@@ -347,12 +347,19 @@ struct Met {
 
 template <Depth Along, int Style>
 HWY_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
-  const RibbonLane lane = ribbon_lane<Along, Style>(spread(line), px, py);
-  const Pixel depth = hn::MulAdd(lane.f, all<Pixel>(line.depth_rise), all<Pixel>(line.depth));
+  const RibbonLanes r = spread(line);
+  const Pixel zero = hn::Zero(PixelTag());
+  const Pixel w =
+      clamped(hn::MulAdd(px - r.x, r.wx, hn::MulAdd(py - r.y, r.wy, r.w0)), zero, all<Pixel>(1.0F));
+  const Pixel f = along_ribbon<Along>(r, w);
+  const Pixel depth = hn::MulAdd(f, all<Pixel>(line.depth_rise), all<Pixel>(line.depth));
   const auto inside =
       hn::And(hn::Ge(depth, all<Pixel>(slab.front)), hn::Lt(depth, all<Pixel>(slab.back)));
-  const auto here = hn::And(inside, hn::Gt(lane.opacity, hn::Zero(PixelTag())));
-  return {here, hn::IfThenElseZero(here, lane.opacity), depth, lane.f};
+  // Most lines that may be met are not: they pass the block in another slab.
+  if (hn::AllFalse(PixelTag(), inside)) return {inside, zero, depth, f};
+  const Pixel opacity = ribbon_lane<Along, Style>(r, px, py).opacity;
+  const auto here = hn::And(inside, hn::Gt(opacity, zero));
+  return {here, hn::IfThenElseZero(here, opacity), depth, f};
 }
 
 template <bool Perspective>
@@ -512,12 +519,33 @@ HWY_INLINE void pass_lines(const Meeting* m, int count, Passage* p) {
 struct Closing {
   const Slab& slab;
   const RibbonRecord* lines;
-  const Hit* hits;
+  const MetLine* met;
   int count;
   float x, y;  // the block's corner, pixels
   float stop;
   const float* transmittance;  // before the slab
 };
+
+// Sorts a few lines by depth: each goes where as many others are as come before it. Equals keep
+// their order.
+inline void sort_met(const MetLine* met, int count, MetLine* sorted) {
+  alignas(64) float depth[met_lines_sorted_max];
+  int filled = 0;
+  for (; filled < count; ++filled) depth[filled] = met[filled].depth;
+  for (; filled % pixel_lanes != 0; ++filled) depth[filled] = __builtin_inff();
+  for (int n = 0; n < count; ++n) {
+    const Pixel own = all<Pixel>(met[n].depth);
+    const Pixel place = all<Pixel>(static_cast<float>(n));
+    std::size_t before = 0;
+    for (int l = 0; l < filled; l += pixel_lanes) {
+      const Pixel other = load<Pixel>(depth + l);
+      const auto earlier = hn::Lt(hn::Iota(PixelTag(), l), place);
+      const auto equal = hn::And(hn::Eq(other, own), earlier);
+      before += hn::CountTrue(PixelTag(), hn::Or(hn::Lt(other, own), equal));
+    }
+    sorted[before] = met[n];
+  }
+}
 
 enum class Outcome { done, dark, out_of_order };
 
@@ -536,7 +564,7 @@ HWY_INLINE Outcome pass_in_order(const Closing& with, Passage* passage) {
       Passage p = passage[v];
       Pixel far = farthest[v];
       for (int h = from; h < to; ++h) {
-        const RibbonRecord& line = with.lines[with.hits[h].line];
+        const RibbonRecord& line = with.lines[with.met[h].line];
         const Met met = meet<Perspective>(line, with.slab, px, py);
         if (hn::AllFalse(PixelTag(), met.here)) continue;
         if (!hn::AllFalse(PixelTag(), hn::And(met.here, hn::Lt(met.depth, far)))) {
@@ -563,7 +591,7 @@ Outcome pass_sorted(const Closing& with, Passage* passage) {
   Meeting meetings[meetings_max];
   int held = 0;
   for (int h = 0; h < with.count; ++h) {
-    const RibbonRecord& line = with.lines[with.hits[h].line];
+    const RibbonRecord& line = with.lines[with.met[h].line];
     if (!meet_line<Perspective>(line, with.slab, with.x, with.y, meetings[held])) continue;
     if (++held < meetings_max) continue;
     // The nearer half passes, the farther one may still be met by lines to come.
@@ -622,15 +650,20 @@ void close_slab_on(int compositing, const Closing& with, const float* gathered, 
 }
 
 void close_slab(const Camera& camera, int compositing, const Slab& slab, const RibbonRecord* lines,
-                const Hit* hits, int count, int index, Tile& tile) {
+                const MetLine* met, int count, int index, Tile& tile) {
   const int row = index / tile_blocks;
   const int column = index % tile_blocks;
   const bool medium = (slab.touched[row] >> static_cast<unsigned>(column) & 1U) != 0;
   const float* gathered =
       medium ? slab.gathered + static_cast<std::ptrdiff_t>(index) * gathered_floats : nullptr;
+  MetLine sorted[met_lines_sorted_max];
+  if (count > 1 && count <= met_lines_sorted_max) {
+    sort_met(met, count, sorted);
+    met = sorted;
+  }
   const Closing with = {slab,
                         lines,
-                        hits,
+                        met,
                         count,
                         left_of(tile, column),
                         top_of(tile, row),

@@ -151,4 +151,11 @@ struct Hit {
 };
 constexpr int hits_of_brick_max = brick_stops * tile_blocks * tile_blocks;
 
+// A line that a block may meet in the slab at hand.
+struct MetLine {
+  float depth;  // where, about
+  std::uint32_t line;
+};
+constexpr int met_lines_sorted_max = 64;
+
 }  // namespace windsplat::engine::kernels

@@ -42,10 +42,11 @@ struct Table {
   void (*gather)(const Camera& camera, const SplatRecord& record, Slab* slabs, int first,
                  Tile& tile);
 
-  // Composites one open block of the slab: its gathered medium with `count` lines, nearest first.
-  // compositing is scene::Compositing.
+  // Composites one open block of the slab: its gathered medium with `count` lines, in any order if
+  // they are at most met_lines_sorted_max, else by their depths. compositing is scene::Compositing.
   void (*close_slab)(const Camera& camera, int compositing, const Slab& slab,
-                     const RibbonRecord* lines, const Hit* hits, int count, int block, Tile& tile);
+                     const RibbonRecord* lines, const MetLine* met, int count, int block,
+                     Tile& tile);
 
   // Tells the processor that this brick's samples are wanted soon.
   void (*prefetch)(const Pass& pass, const Brick& brick);
