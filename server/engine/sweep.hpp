@@ -98,6 +98,8 @@ void each_vector(const Visit& visit) {
   visit([](SweepSpace & s) -> auto& { return s.lines.chunks; });
   visit([](SweepSpace & s) -> auto& { return s.lines.free_chunks; });
   visit([](SweepSpace & s) -> auto& { return s.here; });
+  visit([](SweepSpace & s) -> auto& { return s.gathered; });
+  visit([](SweepSpace & s) -> auto& { return s.listed; });
   visit([](SweepSpace & s) -> auto& { return s.hits; });
   visit([](SweepSpace & s) -> auto& { return s.met; });
   visit([](SweepSpace & s) -> auto& { return s.spare_met; });

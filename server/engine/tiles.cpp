@@ -128,8 +128,15 @@ void level(std::vector<Workspace>& spaces) {
   };
   each_vector(each);
   std::size_t slots = 0;
-  for (const Workspace& space : spaces) slots = std::max(slots, space.sweep.slots.size());
+  bool prepared = false;
+  for (const Workspace& space : spaces) {
+    slots = std::max(slots, space.sweep.slots.size());
+    prepared = prepared || space.sweep.prepared;
+  }
   for (Workspace& space : spaces) {
+    if (prepared && !space.sweep.prepared) {
+      space.sweep.prepared = std::make_unique<kernels::Prepared>();
+    }
     while (space.sweep.slots.size() < slots) {
       space.sweep.slots.push_back(std::make_unique<kernels::Prepared>());
     }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "server/engine/kernels/frame_data.hpp"
 #include "server/engine/partial.hpp"
@@ -97,6 +98,31 @@ TEST(Slab, HalvingTheThicknessQuartersTheError) {
         EXPECT_NEAR(std::log2(last / error), 2.0, 0.3);
       }
       last = error;
+    }
+  }
+}
+
+// Lines are in exact order whatever the slabs: also where a brick lies in hundreds of them, and
+// where all lines lie in one.
+TEST(Slab, LinesDoNotDependOnTheThickness) {
+  for (const bool perspective : {false, true}) {
+    Scene scene = blobs(6, 64, 0.4, perspective);
+    scene.scalars.clear();
+    const auto winds = make_volume(scene.lattice, 3, [](int c, double x, double y, double z) {
+      return static_cast<float>(std::sin(5 * x + 3 * y + 2 * c) + std::cos(7 * z - 2 * x + c));
+    });
+    scene.vector = plain_lines(winds, {1, 1, 1});
+    scene.vector->length = 0.4;
+    scene.vector->opacity = 0.6;
+    scene.vector->color_by = scene::LineColor::world_z;
+    scene.vector->color = ramp_color(0, 1, {1, 0, 0}, {0, 0.5F, 1});
+    scene.method = Method::slab;
+    scene.slab_thickness = 0.5;
+    const engine::Rendered expected = render(scene);
+    EXPECT_GT(rms(expected.image, engine::Image{64, 64, std::vector<float>(4UL * 64 * 64)}), 0.1);
+    for (const double thickness : {0.1, 0.004}) {
+      scene.slab_thickness = thickness;
+      EXPECT_LT(rms(render(scene).image, expected.image), 1e-6) << thickness << perspective;
     }
   }
 }
