@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 
 #include "server/engine/kernels/frame_data.hpp"
 
@@ -30,7 +31,9 @@ std::vector<double> integrals(double b2, int count) {
   const double chord = std::sqrt(std::max(t * t - b2, 0.0));
   const double h = chord / (count * pieces);
   const double node = 0.5 / std::sqrt(3.0);
-  std::vector<double> sums{0.0};
+  std::vector<double> sums;
+  sums.reserve(static_cast<std::size_t>(count) + 1);
+  sums.push_back(0.0);
   double sum = 0;
   for (int step = 0; step < count; ++step) {
     for (int piece = 0; piece < pieces; ++piece) {
@@ -45,19 +48,30 @@ std::vector<double> integrals(double b2, int count) {
   return sums;
 }
 
-std::vector<float> tabulate() {
+// F at the columns of one row, in parts of partial_one.
+std::vector<std::uint32_t> row_of(double b2) {
+  constexpr int half = (kernels::partial_columns - 1) / 2;
+  const std::vector<double> sums = integrals(b2, half);
+  std::vector<std::uint32_t> out;
+  out.reserve(kernels::partial_columns);
+  for (int c = -half; c <= half; ++c) {
+    const double from_middle = 0.5 * sums[std::abs(c)] / sums[half];
+    const double before = c < 0 ? 0.5 - from_middle : 0.5 + from_middle;
+    out.push_back(static_cast<std::uint32_t>(std::lround(before * kernels::partial_one)));
+  }
+  return out;
+}
+
+std::vector<std::int32_t> tabulate() {
   constexpr int rows = kernels::partial_rows;
-  constexpr int columns = kernels::partial_columns;
-  constexpr int half = (columns - 1) / 2;
-  std::vector<float> table(static_cast<std::size_t>(rows) * columns);
+  std::vector<std::int32_t> table;
+  table.reserve(static_cast<std::size_t>(rows) * (kernels::partial_columns - 1));
   for (int r = 0; r < rows; ++r) {
     // The last row is the limit of the rays that graze the kernel.
     const double part = std::min(static_cast<double>(r) / (rows - 1), 1 - 1e-6);
-    const std::vector<double> sums = integrals(t * t * part, half);
-    for (int c = 0; c < columns; ++c) {
-      const double from_middle = 0.5 * sums[std::abs(c - half)] / sums[half];
-      table[static_cast<std::size_t>(r) * columns + c] =
-          static_cast<float>(c < half ? 0.5 - from_middle : 0.5 + from_middle);
+    const std::vector<std::uint32_t> row = row_of(t * t * part);
+    for (std::size_t c = 0; c + 1 < row.size(); ++c) {
+      table.push_back(static_cast<std::int32_t>(row[c] | row[c + 1] << 16U));
     }
   }
   return table;
@@ -65,8 +79,8 @@ std::vector<float> tabulate() {
 
 }  // namespace
 
-const std::vector<float>& partial_footprints() {
-  static const std::vector<float> table = tabulate();
+const std::vector<std::int32_t>& partial_footprints() {
+  static const std::vector<std::int32_t> table = tabulate();
   return table;
 }
 

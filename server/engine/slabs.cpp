@@ -2,7 +2,11 @@
 // both are composited block by block.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <memory>
+#include <utility>
+#include <vector>
 
 #include "server/engine/stable_sort.hpp"
 #include "server/engine/sweep.hpp"
@@ -14,61 +18,223 @@ namespace {
 using kernels::Brick;
 using kernels::brick_stops;
 using kernels::Hit;
+using kernels::MetLine;
+using kernels::RibbonRecord;
 using kernels::Slab;
+using kernels::slabs_ahead;
+using kernels::SplatRecord;
 using kernels::Tile;
 using kernels::tile_blocks;
 
 constexpr std::size_t bricks_between_looks = 64;
-constexpr int tile_block_count = tile_blocks * tile_blocks;
+constexpr std::size_t tile_block_count = std::size_t{tile_blocks} * tile_blocks;
+
+// The lists' place of a slab, which may be before the camera's depth origin.
+std::size_t modulo(std::int64_t slab, std::size_t slabs) {
+  const auto count = static_cast<std::int64_t>(slabs);
+  return static_cast<std::size_t>((slab % count + count) % count);
+}
+
+// The splats of a sweep, each waiting for the slab in which it is drawn next.
+class Splats {
+ public:
+  explicit Splats(WaitingSplats& of) : of_(of) {
+    of_.records.clear();
+    of_.free.clear();
+    of_.behind.clear();
+    of_.first.fill(WaitingSplats::none);
+    of_.last.fill(WaitingSplats::none);
+    of_.count = 0;
+  }
+
+  [[nodiscard]] std::size_t count() const { return of_.count; }
+  [[nodiscard]] const SplatRecord& operator[](std::uint32_t at) const { return of_.records[at]; }
+
+  std::uint32_t add(const SplatRecord& record) {
+    ++of_.count;
+    if (of_.free.empty()) {
+      of_.records.push_back(record);
+      of_.behind.push_back(WaitingSplats::none);
+      return static_cast<std::uint32_t>(of_.records.size() - 1);
+    }
+    const std::uint32_t at = of_.free.back();
+    of_.free.pop_back();
+    of_.records[at] = record;
+    return at;
+  }
+
+  void remove(std::uint32_t at) {
+    of_.free.push_back(at);
+    --of_.count;
+  }
+
+  // Puts a record down for `wanted`, or as near to that as lists reach from slab `now`.
+  void await(std::uint32_t record, std::int64_t wanted, std::int64_t now) {
+    const auto reach = static_cast<std::int64_t>(WaitingSplats::slabs) - 1;
+    const std::size_t slab = modulo(std::min(wanted, now + reach), WaitingSplats::slabs);
+    of_.behind[record] = WaitingSplats::none;
+    if (of_.first[slab] == WaitingSplats::none) {
+      of_.first[slab] = record;
+    } else {
+      of_.behind[of_.last[slab]] = record;
+    }
+    of_.last[slab] = record;
+  }
+
+  // Takes what waits for this slab.
+  void take(std::int64_t index, std::vector<std::uint32_t>& here) {
+    const std::size_t slab = modulo(index, WaitingSplats::slabs);
+    here.clear();
+    for (std::uint32_t record = of_.first[slab]; record != WaitingSplats::none;
+         record = of_.behind[record]) {
+      here.push_back(record);
+    }
+    of_.first[slab] = of_.last[slab] = WaitingSplats::none;
+  }
+
+ private:
+  WaitingSplats& of_;
+};
+
+// The lines of a sweep, each waiting in the blocks that it may touch.
+class Lines {
+ public:
+  explicit Lines(WaitingLines& of) : of_(of) {
+    of_.records.clear();
+    of_.free.clear();
+    of_.waiting.clear();
+    of_.chunks.clear();
+    of_.free_chunks.clear();
+    of_.first.fill(WaitingLines::none);
+    of_.last.fill(WaitingLines::none);
+    of_.count = 0;
+  }
+
+  [[nodiscard]] std::size_t count() const { return of_.count; }
+  [[nodiscard]] const RibbonRecord* records() const { return of_.records.data(); }
+
+  // Room for a brick's lines; `slots` are brick_stops places that are free.
+  RibbonRecord* make_room(std::uint32_t* slots) {
+    while (of_.free.size() < brick_stops) {
+      of_.free.push_back(static_cast<std::uint32_t>(of_.records.size()));
+      of_.records.emplace_back();
+      of_.waiting.push_back(0);
+    }
+    std::copy_n(of_.free.rbegin(), brick_stops, slots);
+    return of_.records.data();
+  }
+
+  // The first `lines` of those places are taken, each by the next counts[n] hits.
+  void take_room(const std::uint32_t* slots, int lines, const int* counts) {
+    of_.free.resize(of_.free.size() - static_cast<std::size_t>(lines));
+    for (int n = 0; n < lines; ++n) {
+      of_.waiting[slots[n]] = static_cast<std::uint32_t>(counts[n]);
+      of_.count += static_cast<std::size_t>(counts[n]);
+    }
+  }
+
+  void await(const Hit& hit, std::int64_t index) {
+    const std::size_t slab = modulo(index, WaitingLines::slabs);
+    std::uint32_t last = of_.last[slab];
+    if (last == WaitingLines::none || of_.chunks[last].count == HitChunk::size) {
+      last = add_chunk(slab);
+    }
+    HitChunk& chunk = of_.chunks[last];
+    chunk.hits[chunk.count++] = hit;
+  }
+
+  // Calls visit(hit) for what waits for the slab. It returns the slab for which the hit waits next,
+  // `index` if for none.
+  template <class Visit>
+  void take(std::int64_t index, const Visit& visit) {
+    const std::size_t slab = modulo(index, WaitingLines::slabs);
+    std::uint32_t at = std::exchange(of_.first[slab], WaitingLines::none);
+    of_.last[slab] = WaitingLines::none;
+    while (at != WaitingLines::none) {
+      const std::uint32_t count = of_.chunks[at].count;
+      for (std::uint32_t n = 0; n < count; ++n) {
+        const Hit hit = of_.chunks[at].hits[n];
+        const std::int64_t next = visit(hit);
+        if (next != index) {
+          await(hit, next);
+        } else {
+          --of_.count;
+          if (--of_.waiting[hit.line] == 0) of_.free.push_back(hit.line);
+        }
+      }
+      of_.free_chunks.push_back(at);
+      at = of_.chunks[at].behind;
+    }
+  }
+
+ private:
+  std::uint32_t add_chunk(std::size_t slab) {
+    std::uint32_t at = 0;
+    if (of_.free_chunks.empty()) {
+      at = static_cast<std::uint32_t>(of_.chunks.size());
+      of_.chunks.emplace_back();
+    } else {
+      at = of_.free_chunks.back();
+      of_.free_chunks.pop_back();
+    }
+    of_.chunks[at].count = 0;
+    of_.chunks[at].behind = WaitingLines::none;
+    const std::uint32_t last = std::exchange(of_.last[slab], at);
+    (last == WaitingLines::none ? of_.first[slab] : of_.chunks[last].behind) = at;
+    return at;
+  }
+
+  WaitingLines& of_;
+};
 
 class SlabSweep {
  public:
   SlabSweep(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
             SweepSpace& space, Tile& tile)
-      : plan_(plan), bins_(bins), table_(table), space_(space), tile_(tile) {
-    forget(space_.splats);
-    forget(space_.ribbons);
+      : plan_(plan),
+        bins_(bins),
+        table_(table),
+        space_(space),
+        tile_(tile),
+        splats_(space.splats),
+        lines_(space.lines) {
     if (!space_.prepared) space_.prepared = std::make_unique<kernels::Prepared>();
-    space_.gathered.resize(static_cast<std::size_t>(tile_block_count) * kernels::gathered_floats);
-    slab_.gathered = space_.gathered.data();
-    slab_.stop = plan_.stop_transmittance;
+    constexpr std::size_t floats = tile_block_count * kernels::gathered_floats;
+    space_.gathered.resize(slabs_ahead * floats);
+    space_.listed.resize(kernels::hits_of_brick_max);
+    for (std::size_t n = 0; n < slabs_ahead; ++n) {
+      slabs_[n].gathered = space_.gathered.data() + n * floats;
+    }
   }
 
   bool run(const CancelToken& cancel, std::size_t first, std::size_t last) {
     next_ = first;
     last_ = last;
-    for (std::int64_t done = 0; next_ < last_ || reached() > 0; ++done, ++index_) {
-      if (reached() == 0) {
+    for (bool begun = false; next_ < last_ || waiting(); begun = true, ++index_) {
+      if (!waiting()) {
         const std::int64_t begins = slab_of(brick(next_).depth_first);
-        index_ = done == 0 ? begins : std::max(index_, begins);
+        index_ = begun ? std::max(index_, begins) : begins;
       }
-      slab_.front = depth_of(index_);
-      slab_.back = depth_of(index_ + 1);
+      for (std::int64_t n = index_; n < index_ + slabs_ahead; ++n) {
+        slab_at(n).front = depth_of(n);
+        slab_at(n).back = depth_of(n + 1);
+      }
       activate(cancel);
-      draw();
+      gather();
+      close();
       if (cancel.cancelled()) return false;
-      if (done % slabs_between_checks == slabs_between_checks - 1) {
-        if (table_.refresh_open(tile_) == 0) {
-          for (; next_ < last_; ++next_) count_occluded(brick(next_));
-          return true;
-        }
+      if (table_.count_open(tile_) == 0) {
+        for (; next_ < last_; ++next_) count_occluded(brick(next_));
+        return true;
       }
     }
     return false;
   }
 
  private:
-  template <class Record>
-  static void forget(Reached<Record>& of) {
-    of.records.clear();
-    of.free.clear();
-    of.behind.clear();
-    of.first.fill(of.none);
-    of.last.fill(of.none);
-    of.count = 0;
+  [[nodiscard]] bool waiting() const {
+    return splats_.count() + lines_.count() > 0 || index_ <= gathered_until_;
   }
-
-  [[nodiscard]] std::size_t reached() const { return space_.splats.count + space_.ribbons.count; }
 
   [[nodiscard]] const Brick& brick(std::size_t entry) const {
     return bins_.bricks[bins_.entries[entry]];
@@ -89,53 +255,17 @@ class SlabSweep {
     return static_cast<float>(static_cast<double>(slab) * plan_.slab_depth);
   }
 
-  template <class Record>
-  static std::int64_t of_slabs(const Reached<Record>& of) {
-    return static_cast<std::int64_t>(of.first.size());
-  }
+  Slab& slab_at(std::int64_t index) { return slabs_[modulo(index, slabs_ahead)]; }
 
-  template <class Record>
-  static std::size_t place(const Reached<Record>& of, std::int64_t slab) {
-    const std::int64_t slabs = of_slabs(of);
-    return static_cast<std::size_t>((slab % slabs + slabs) % slabs);
-  }
-
-  // Puts a record down for the slab that it is next met in, or as near to that as can be told.
-  template <class Record>
-  void await(Reached<Record>& of, std::uint32_t record, std::int64_t earliest) {
-    const std::int64_t wanted = std::max(earliest, slab_of(of.records[record].first));
-    const std::size_t slab = place(of, std::min(wanted, index_ + of_slabs(of) - 1));
-    of.behind[record] = of.none;
-    if (of.first[slab] == of.none) {
-      of.first[slab] = record;
-    } else {
-      of.behind[of.last[slab]] = record;
-    }
-    of.last[slab] = record;
-  }
-
-  template <class Record>
-  void add(Reached<Record>& of, const Record* records, int count) {
-    for (int n = 0; n < count; ++n) {
-      std::uint32_t at = 0;
-      if (of.free.empty()) {
-        at = static_cast<std::uint32_t>(of.records.size());
-        of.records.push_back(records[n]);
-        of.behind.push_back(of.none);
-      } else {
-        at = of.free.back();
-        of.free.pop_back();
-        of.records[at] = records[n];
-      }
-      ++of.count;
-      await(of, at, index_);
-    }
+  // The slab of those in the lists' reach where a line is met first.
+  std::int64_t slab_of(const Hit& hit) {
+    constexpr auto farthest = static_cast<float>(WaitingLines::slabs - 1);
+    const float slabs = (hit.first - slab_at(index_).front) * inverse_depth_;
+    return index_ + static_cast<std::int64_t>(std::clamp(slabs, 0.0F, farthest));
   }
 
   void activate(const CancelToken& cancel) {
-    kernels::SplatRecord splats[brick_stops];
-    kernels::RibbonRecord ribbons[brick_stops];
-    for (; next_ < last_ && brick(next_).depth_first < slab_.back; ++next_) {
+    for (; next_ < last_ && brick(next_).depth_first < slab_at(index_).back; ++next_) {
       if (next_ % bricks_between_looks == 0 && cancel.cancelled()) return;
       const Brick& here = brick(next_);
       if (all_closed(tile_, here)) {
@@ -144,80 +274,109 @@ class SlabSweep {
       }
       kernels::Prepared& prepared = *space_.prepared;
       table_.prepare(plan_.camera, plan_.passes[here.pass].kernel, here, tile_, prepared);
-      if (prepared.stops.count == 0) continue;
-      add(space_.splats, splats, table_.pack_splats(plan_.camera, prepared, splats));
-      add(space_.ribbons, ribbons, table_.pack_ribbons(prepared, ribbons));
+      if (prepared.stops.splats != 0) add_splats(prepared);
+      if (prepared.stops.lines != 0) add_lines(prepared);
     }
   }
 
-  // Takes what waits for this slab.
-  template <class Record>
-  void take(Reached<Record>& of, std::vector<std::uint32_t>& here) {
-    const std::size_t slab = place(of, index_);
-    here.clear();
-    for (auto record = of.first[slab]; record != of.none; record = of.behind[record]) {
-      here.push_back(record);
+  void add_splats(const kernels::Prepared& prepared) {
+    SplatRecord splats[brick_stops];
+    const int count = table_.pack_splats(plan_.camera, prepared, splats);
+    for (int n = 0; n < count; ++n) {
+      const std::int64_t first = std::max(slab_of(splats[n].first), index_);
+      splats_.await(splats_.add(splats[n]), first, index_);
     }
-    of.first[slab] = of.last[slab] = of.none;
   }
 
-  // Once a slab is drawn: what reaches beyond it waits for the next, the rest is forgotten.
-  template <class Record>
-  void pass(Reached<Record>& of, const std::vector<std::uint32_t>& here) {
-    for (const std::uint32_t record : here) {
-      if (of.records[record].last >= slab_.back) {
-        await(of, record, index_ + 1);
+  void add_lines(const kernels::Prepared& prepared) {
+    std::uint32_t slots[brick_stops];
+    int counts[brick_stops];
+    RibbonRecord* records = lines_.make_room(slots);
+    const int lines =
+        table_.pack_lines(plan_.camera, prepared, static_cast<float>(plan_.slab_depth), slots,
+                          tile_, records, space_.listed.data(), counts);
+    lines_.take_room(slots, lines, counts);
+    const Hit* hit = space_.listed.data();
+    for (int n = 0; n < lines; ++n) {
+      for (const Hit* last = hit + counts[n]; hit < last; ++hit) lines_.await(*hit, slab_of(*hit));
+    }
+  }
+
+  // Splats that begin here give their parts to this slab and those behind it.
+  void gather() {
+    splats_.take(index_, space_.here);
+    const std::int64_t farthest = index_ + slabs_ahead - 1;
+    for (const std::uint32_t at : space_.here) {
+      const SplatRecord& splat = splats_[at];
+      const std::int64_t first = slab_of(splat.first);
+      if (first > index_) {
+        splats_.await(at, first, index_);
+        continue;
+      }
+      table_.gather(plan_.camera, splat, slabs_, static_cast<int>(modulo(index_, slabs_ahead)),
+                    tile_);
+      const std::int64_t last = slab_of(splat.last);
+      gathered_until_ = std::max(gathered_until_, std::min(last, farthest));
+      if (last > farthest) {
+        splats_.await(at, farthest + 1, index_);
       } else {
-        of.free.push_back(record);
-        --of.count;
+        splats_.remove(at);
       }
     }
   }
 
-  void draw() {
-    std::fill(std::begin(slab_.touched), std::end(slab_.touched), 0U);
-    take(space_.splats, space_.here);
-    for (const std::uint32_t splat : space_.here) {
-      table_.gather(plan_.camera, space_.splats.records[splat], slab_, tile_);
-    }
-    pass(space_.splats, space_.here);
-    take(space_.ribbons, space_.lines);
-    std::size_t hits = 0;
-    for (const std::uint32_t line : space_.lines) {
-      if (space_.hits.size() < hits + kernels::hits_of_line_max) {
-        space_.hits.resize(2 * hits + kernels::hits_of_line_max);
+  // Composites the slab, block by block.
+  void close() {
+    Slab& slab = slab_at(index_);
+    for (std::uint32_t& row : lined_) row = 0;
+    if (lines_.count() > 0) meet(slab);
+    for (int row = 0; row < tile_blocks; ++row) {
+      std::uint32_t left = (lined_[row] | slab.touched[row]) & tile_.open[row];
+      for (; left != 0; left &= left - 1U) {
+        const int column = __builtin_ctz(left);
+        const int block = row * tile_blocks + column;
+        const bool lined = (lined_[row] >> static_cast<unsigned>(column) & 1U) != 0;
+        const auto [first, last] = lined ? lines_at(block) : std::pair<std::size_t, std::size_t>();
+        table_.close_slab(plan_.camera, plan_.compositing, slab, lines_.records(),
+                          space_.met.data() + first, static_cast<int>(last - first), block, tile_);
       }
-      hits += static_cast<std::size_t>(table_.list_hits(plan_.camera, space_.ribbons.records[line],
-                                                        slab_, tile_, space_.hits.data() + hits));
+      slab.touched[row] = 0;
     }
-    sort_hits(hits);
-    for (int block = 0; block < tile_block_count; ++block) {
-      const std::uint32_t from = space_.first[block];
-      const auto count = static_cast<int>(space_.first[block + 1] - from);
-      const std::uint32_t row = slab_.touched[block / tile_blocks];
-      const bool touched = (row >> static_cast<unsigned>(block % tile_blocks) & 1U) != 0;
-      if (!touched && count == 0) continue;
-      table_.close_slab(plan_.camera, plan_.compositing, slab_, space_.sorted.data() + from, count,
-                        block, tile_);
-    }
-    pass(space_.ribbons, space_.lines);
   }
 
-  // By block, then from front to back.
-  void sort_hits(std::size_t count) {
-    space_.first.assign(tile_block_count + 1, 0);
-    for (std::size_t h = 0; h < count; ++h) ++space_.first[space_.hits[h].block + 1];
-    for (int b = 0; b < tile_block_count; ++b) space_.first[b + 1] += space_.first[b];
-    space_.sorted.resize(count);
-    space_.next.assign(space_.first.begin(), space_.first.end() - 1);
-    for (std::size_t h = 0; h < count; ++h) {
-      const Hit& hit = space_.hits[h];
-      space_.sorted[space_.next[hit.block]++] = hit;
+  // Finds the lines that open blocks meet in the slab: space_.met, block by block, up to where
+  // met_until_ tells.
+  void meet(const Slab& slab) {
+    std::vector<Hit>& hits = space_.hits;
+    hits.clear();
+    std::fill(std::begin(met_until_), std::end(met_until_), 0U);
+    lines_.take(index_, [&](const Hit& hit) {
+      const auto row = static_cast<unsigned>(hit.block) / tile_blocks;
+      const std::uint32_t bit = std::uint32_t{1} << static_cast<unsigned>(hit.block) % tile_blocks;
+      if ((tile_.open[row] & bit) == 0) return index_;
+      if (hit.first >= slab.back) return std::max(slab_of(hit), index_ + 1);
+      hits.push_back(hit);
+      lined_[row] |= bit;
+      ++met_until_[hit.block];
+      return hit.last >= slab.back ? index_ + 1 : index_;
+    });
+    std::uint32_t sum = 0;
+    for (std::uint32_t& until : met_until_) sum = std::exchange(until, sum) + sum;
+    if (space_.met.size() < hits.size()) space_.met.resize(hits.size());
+    for (const Hit& hit : hits) {
+      space_.met[met_until_[hit.block]++] = {0.5F * (hit.first + hit.last), hit.line};
     }
-    for (int b = 0; b < tile_block_count; ++b) {
-      stable_sort(space_.sorted, space_.first[b], space_.first[b + 1], space_.spare_hits,
-                  [](const Hit& p, const Hit& q) { return p.depth < q.depth; });
+  }
+
+  // A block's part of space_.met: first and end.
+  std::pair<std::size_t, std::size_t> lines_at(int block) {
+    const std::size_t first = block == 0 ? 0 : met_until_[block - 1];
+    const std::size_t last = met_until_[block];
+    if (last - first > kernels::met_lines_sorted_max) {
+      stable_sort(space_.met, first, last, space_.spare_met,
+                  [](const MetLine& p, const MetLine& q) { return p.depth < q.depth; });
     }
+    return {first, last};
   }
 
   const RenderPlan& plan_;
@@ -225,8 +384,14 @@ class SlabSweep {
   const kernels::Table& table_;
   SweepSpace& space_;
   Tile& tile_;
-  Slab slab_{};
+  Splats splats_;
+  Lines lines_;
+  Slab slabs_[slabs_ahead] = {};
+  std::uint32_t lined_[tile_blocks] = {};  // bit set: the block may meet lines in the slab at hand
+  std::uint32_t met_until_[tile_block_count] = {};
+  float inverse_depth_ = static_cast<float>(1.0 / plan_.slab_depth);
   std::int64_t index_ = 0;
+  std::int64_t gathered_until_ = std::numeric_limits<std::int64_t>::min();
   std::size_t next_ = 0;
   std::size_t last_ = 0;
 };

@@ -22,19 +22,43 @@ struct DepthEntry {
   std::int32_t stop = 0;
 };
 
-// What of splats or lines has been reached and not yet passed: records in memory that is used
-// again, and for each of the next slabs a list of those that wait for it, in order of arrival.
-template <class Record>
-struct Reached {
+// Splats that have been reached and not yet passed: records in memory that is used again, and for
+// each of the next slabs a list of those that wait for it, in order of arrival.
+struct WaitingSplats {
   static constexpr std::size_t slabs = 256;
   static constexpr std::uint32_t none = 0xFFFFFFFFU;
 
-  std::vector<Record> records;
+  std::vector<kernels::SplatRecord> records;
   std::vector<std::uint32_t> free;
   std::vector<std::uint32_t> behind;       // of each record, who arrived after it
   std::array<std::uint32_t, slabs> first;  // by slab, modulo
   std::array<std::uint32_t, slabs> last;
   std::size_t count = 0;
+};
+
+// Hits that wait for the same slab, and where more of them are.
+struct HitChunk {
+  static constexpr std::uint32_t size = 63;
+
+  std::uint32_t count;
+  std::uint32_t behind;
+  kernels::Hit hits[size];
+};
+
+// The same for lines, which wait block by block. A line's record is kept while it has hits that
+// wait.
+struct WaitingLines {
+  static constexpr std::size_t slabs = 32;
+  static constexpr std::uint32_t none = 0xFFFFFFFFU;
+
+  std::vector<kernels::RibbonRecord> records;
+  std::vector<std::uint32_t> free;
+  std::vector<std::uint32_t> waiting;  // of each record, how many hits
+  std::vector<HitChunk> chunks;
+  std::vector<std::uint32_t> free_chunks;
+  std::array<std::uint32_t, slabs> first;  // by slab, modulo
+  std::array<std::uint32_t, slabs> last;
+  std::size_t count = 0;  // hits
 };
 
 // A worker's own memory, used for one tile after the other.
@@ -47,16 +71,14 @@ struct SweepSpace {
   std::vector<DepthEntry> spare;  // for sorting
   // Slabs.
   std::unique_ptr<kernels::Prepared> prepared;
-  Reached<kernels::SplatRecord> splats;
-  Reached<kernels::RibbonRecord> ribbons;
-  std::vector<std::uint32_t> here;  // of one kind, in the slab at hand
-  std::vector<std::uint32_t> lines;
-  AlignedVector<float> gathered;
-  std::vector<kernels::Hit> hits;    // as listed
-  std::vector<kernels::Hit> sorted;  // by block, then depth
-  std::vector<kernels::Hit> spare_hits;
-  std::vector<std::uint32_t> first;  // of each block, in `sorted`
-  std::vector<std::uint32_t> next;
+  WaitingSplats splats;
+  WaitingLines lines;
+  std::vector<std::uint32_t> here;          // splats in the slab at hand
+  AlignedVector<float> gathered;            // by slab, modulo
+  std::vector<kernels::Hit> listed;         // of one brick
+  std::vector<kernels::Hit> hits;           // in the slab at hand
+  std::vector<kernels::MetLine> met;        // the same by block
+  std::vector<kernels::MetLine> spare_met;  // for sorting
 };
 
 // Calls visit(member) for the vectors that grow with what a tile holds, member(space) each.
@@ -70,14 +92,17 @@ void each_vector(const Visit& visit) {
   visit([](SweepSpace & s) -> auto& { return s.splats.records; });
   visit([](SweepSpace & s) -> auto& { return s.splats.free; });
   visit([](SweepSpace & s) -> auto& { return s.splats.behind; });
-  visit([](SweepSpace & s) -> auto& { return s.ribbons.records; });
-  visit([](SweepSpace & s) -> auto& { return s.ribbons.free; });
-  visit([](SweepSpace & s) -> auto& { return s.ribbons.behind; });
+  visit([](SweepSpace & s) -> auto& { return s.lines.records; });
+  visit([](SweepSpace & s) -> auto& { return s.lines.free; });
+  visit([](SweepSpace & s) -> auto& { return s.lines.waiting; });
+  visit([](SweepSpace & s) -> auto& { return s.lines.chunks; });
+  visit([](SweepSpace & s) -> auto& { return s.lines.free_chunks; });
   visit([](SweepSpace & s) -> auto& { return s.here; });
-  visit([](SweepSpace & s) -> auto& { return s.lines; });
+  visit([](SweepSpace & s) -> auto& { return s.gathered; });
+  visit([](SweepSpace & s) -> auto& { return s.listed; });
   visit([](SweepSpace & s) -> auto& { return s.hits; });
-  visit([](SweepSpace & s) -> auto& { return s.sorted; });
-  visit([](SweepSpace & s) -> auto& { return s.spare_hits; });
+  visit([](SweepSpace & s) -> auto& { return s.met; });
+  visit([](SweepSpace & s) -> auto& { return s.spare_met; });
 }
 
 // Between looks at whether the tile is done or nobody wants it any more.

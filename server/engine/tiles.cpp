@@ -152,16 +152,18 @@ void level(std::vector<Workspace>& spaces) {
   };
   each_vector(each);
   std::size_t slots = 0;
-  std::size_t hits = 0;
+  bool prepared = false;
   for (const Workspace& space : spaces) {
     slots = std::max(slots, space.sweep.slots.size());
-    hits = std::max(hits, space.sweep.hits.size());
+    prepared = prepared || space.sweep.prepared;
   }
   for (Workspace& space : spaces) {
+    if (prepared && !space.sweep.prepared) {
+      space.sweep.prepared = std::make_unique<kernels::Prepared>();
+    }
     while (space.sweep.slots.size() < slots) {
       space.sweep.slots.push_back(std::make_unique<kernels::Prepared>());
     }
-    space.sweep.hits.resize(hits);
   }
 }
 

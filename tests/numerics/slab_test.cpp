@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include "server/engine/kernels/frame_data.hpp"
 #include "server/engine/partial.hpp"
@@ -48,13 +51,19 @@ Scene blobs(double density, int size, double azimuth, bool perspective) {
 
 TEST(PartialFootprint, EndsAtNothingAndAllAndGrows) {
   const auto& table = engine::partial_footprints();
-  constexpr int columns = engine::kernels::partial_columns;
+  constexpr int columns = engine::kernels::partial_columns - 1;
+  constexpr auto one = static_cast<std::int32_t>(engine::kernels::partial_one);
+  ASSERT_EQ(table.size(), static_cast<std::size_t>(engine::kernels::partial_rows) * columns);
+  const auto here = [&](int r, int c) { return table[r * columns + c] & 0xffff; };
+  const auto next = [&](int r, int c) {
+    return static_cast<std::int32_t>(static_cast<std::uint32_t>(table[r * columns + c]) >> 16U);
+  };
   for (int r = 0; r < engine::kernels::partial_rows; ++r) {
-    const float* row = table.data() + static_cast<std::ptrdiff_t>(r) * columns;
-    EXPECT_EQ(row[0], 0.0F);
-    EXPECT_EQ(row[columns - 1], 1.0F);
-    EXPECT_NEAR(row[columns / 2], 0.5F, 1e-7);
-    for (int c = 1; c < columns; ++c) EXPECT_GT(row[c], row[c - 1]);
+    EXPECT_EQ(here(r, 0), 0);
+    EXPECT_EQ(next(r, columns - 1), one);
+    EXPECT_NEAR(here(r, columns / 2), 0.5 * one, 1);
+    for (int c = 0; c < columns; ++c) EXPECT_GE(next(r, c), here(r, c));
+    for (int c = 1; c < columns; ++c) EXPECT_EQ(next(r, c - 1), here(r, c));
   }
 }
 
@@ -89,6 +98,31 @@ TEST(Slab, HalvingTheThicknessQuartersTheError) {
         EXPECT_NEAR(std::log2(last / error), 2.0, 0.3);
       }
       last = error;
+    }
+  }
+}
+
+// Lines are in exact order whatever the slabs: also where a brick lies in hundreds of them, and
+// where all lines lie in one.
+TEST(Slab, LinesDoNotDependOnTheThickness) {
+  for (const bool perspective : {false, true}) {
+    Scene scene = blobs(6, 64, 0.4, perspective);
+    scene.scalars.clear();
+    const auto winds = make_volume(scene.lattice, 3, [](int c, double x, double y, double z) {
+      return static_cast<float>(std::sin(5 * x + 3 * y + 2 * c) + std::cos(7 * z - 2 * x + c));
+    });
+    scene.vector = plain_lines(winds, {1, 1, 1});
+    scene.vector->length = 0.4;
+    scene.vector->opacity = 0.6;
+    scene.vector->color_by = scene::LineColor::world_z;
+    scene.vector->color = ramp_color(0, 1, {1, 0, 0}, {0, 0.5F, 1});
+    scene.method = Method::slab;
+    scene.slab_thickness = 0.5;
+    const engine::Rendered expected = render(scene);
+    EXPECT_GT(rms(expected.image, engine::Image{64, 64, std::vector<float>(4UL * 64 * 64)}), 0.1);
+    for (const double thickness : {0.1, 0.004}) {
+      scene.slab_thickness = thickness;
+      EXPECT_LT(rms(render(scene).image, expected.image), 1e-6) << thickness << perspective;
     }
   }
 }

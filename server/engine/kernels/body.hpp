@@ -20,14 +20,12 @@ const Table& WINDSPLAT_KERNEL_TABLE() {
                                prepare,
                                draw_prepared,
                                pack_splats,
-                               pack_ribbons,
+                               pack_lines,
                                gather,
-                               list_hits,
                                close_slab,
                                prefetch_brick,
                                fill_rays,
                                count_open,
-                               refresh_open,
                                attenuate,
                                jitter};
   return table;

@@ -267,13 +267,13 @@ inline float top_of(const Tile& tile, int row) {
 }
 
 // A block that lets nothing through any more is closed for all that lies behind.
-inline void close_block(int row, std::uint32_t bit, Tile& tile) {
+inline void mark_closed(int row, std::uint32_t bit, Tile& tile) {
   tile.open[row] &= ~bit;
   tile.any_closed = 1;
 }
 
 HWY_INLINE void note_light(const Light& light, int row, std::uint32_t bit, Tile& tile) {
-  if (!light.above(tile.stop)) close_block(row, bit, tile);
+  if (!light.above(tile.stop)) mark_closed(row, bit, tile);
 }
 
 // Composites into each of a row's blocks, whose bits are set, what add(x, y, ray, block) does.

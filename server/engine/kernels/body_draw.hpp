@@ -112,7 +112,7 @@ HWY_INLINE int draw_windowed(const RibbonLanes& lanes, const Footing& f, int l, 
          from_line.y + all<Pixel>(offsets_in_window.y[at])},
         corner + static_cast<std::ptrdiff_t>(down * tile_blocks + across) * block_floats);
     if (!light.above(tile.stop)) {
-      close_block(row + down, 1U << static_cast<unsigned>(column + across), tile);
+      mark_closed(row + down, 1U << static_cast<unsigned>(column + across), tile);
     }
   }
   return blocks;

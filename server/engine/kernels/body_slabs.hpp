@@ -1,201 +1,102 @@
-// Part of the kernel body: the slab method. Splats add the part of their footprint that lies in a
-// slab of view depth, then the slab's medium and the lines in it are composited, block by block.
+// Part of the kernel body: the slab method's second half. Lines are put down for the blocks that
+// they pass, then a slab's gathered medium and the lines in it are composited, block by block.
 #pragma once
 
-#include "server/engine/kernels/body_draw.hpp"
+#include "server/engine/kernels/body_gather.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {
 
-// F(b^2, v) by linear interpolation in both; row is where the table's row begins, v in [-1, 1].
-HWY_INLINE Pixel partial_at(const float* partial, SignedOf<Pixel> row, Pixel row_part, Pixel v) {
-  const Pixel place = (v + all<Pixel>(1.0F)) * all<Pixel>(0.5F * (partial_columns - 1));
-  const Pixel inside = hn::Min(place, all<Pixel>(static_cast<float>(partial_columns - 1) - 0.001F));
-  const SignedOf<Pixel> column = truncated(inside);
-  const Pixel part = inside - from_integer<Pixel>(column);
-  const SignedOf<Pixel> at = row + column;
-  const PixelTag tag;
-  const Pixel a = hn::GatherIndex(tag, partial, at);
-  const Pixel b = hn::GatherIndex(tag, partial + 1, at);
-  const Pixel c = hn::GatherIndex(tag, partial + partial_columns, at);
-  const Pixel d = hn::GatherIndex(tag, partial + partial_columns + 1, at);
-  const Pixel upper = hn::MulAdd(part, b - a, a);
-  const Pixel lower = hn::MulAdd(part, d - c, c);
-  return hn::MulAdd(row_part, lower - upper, upper);
+inline RibbonRecord ribbon_record(const LineStyle& line, const Prepared& p, int l) {
+  RibbonRecord out = {ribbon_at(line, p.ribbons, l), line.moving, 0};
+  out.ribbon.depth += p.stops.depth[l];
+  out.bent = absolute(out.ribbon.bend) > series_bend_max ? 1 : 0;
+  return out;
 }
 
-// Adds what of the splat lies between two view depths, given from the splat's centre.
-template <bool Perspective>
-HWY_INLINE void gather_block(const SplatLanes& s, const float* HWY_RESTRICT partial, float front,
-                             float back, float x, float y, const float* HWY_RESTRICT ray,
-                             float* HWY_RESTRICT gathered) {
-  constexpr float t2 = footprint_t * footprint_t;
-  constexpr float rows_per_t2 = static_cast<float>(partial_rows - 1) / t2;
-  const hn::RebindToSigned<PixelTag> integers;
-  for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
-    const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
-    const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
-    const SplatLane lane = splat_lane<Perspective, From::eye>(s, px, py, length);
-    // Half the chord in cells, and with it the slab's faces in half chords from the middle.
-    const Pixel chord2 = hn::Max(all<Pixel>(t2) - lane.r2, all<Pixel>(1e-6F));
-    const Pixel scale = lane.cells / hn::Sqrt(chord2);
-    const Pixel v0 = clamped((all<Pixel>(front) - lane.behind) * scale, -1.0F, 1.0F);
-    const Pixel v1 = clamped((all<Pixel>(back) - lane.behind) * scale, -1.0F, 1.0F);
-    const Pixel place =
-        hn::Min(lane.r2 * all<Pixel>(rows_per_t2), all<Pixel>(partial_rows - 1.001F));
-    const SignedOf<Pixel> row = truncated(place);
-    const Pixel row_part = place - from_integer<Pixel>(row);
-    const SignedOf<Pixel> at = row * hn::Set(integers, partial_columns);
-    const Pixel after = partial_at(partial, at, row_part, v1);
-    const Pixel before = partial_at(partial, at, row_part, v0);
-    const Pixel tau = lane.tau * hn::Max(after - before, hn::Zero(PixelTag()));
-    add_to(gathered + l, tau);
-    for (int c = 0; c < 3; ++c) {
-      add_product(gathered + static_cast<std::ptrdiff_t>(1 + c) * block_pixels + l, tau,
-                  s.color[c]);
-    }
-  }
-}
-
-// The block's gathered medium, emptied when it is first touched in this slab.
-inline float* touch(Slab& slab, int row, int column) {
-  float* at =
-      slab.gathered + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * gathered_floats;
-  const std::uint32_t bit = std::uint32_t{1} << static_cast<unsigned>(column);
-  if ((slab.touched[row] & bit) == 0) {
-    slab.touched[row] |= bit;
-    for (int i = 0; i < gathered_floats; ++i) at[i] = 0;
-  }
-  return at;
-}
-
-// What lies before the near plane does not count.
-template <bool Perspective>
-void gather_on(const Camera& camera, const SplatRecord& record, Slab& slab, Tile& tile) {
-  const auto near = static_cast<float>(static_cast<double>(camera.near) - camera.depth_origin);
-  const float front = Perspective ? larger(slab.front, near) : slab.front;
-  const float back = slab.back;
-  if (back <= front || record.last <= front || record.first >= back) return;
-  const std::uint32_t columns = range_mask({record.column_first, record.column_last});
-  const SplatLanes lanes = spread(record.splat);
-  for (int row = record.row_first; row <= record.row_last; ++row) {
-    std::uint32_t left = columns & tile.open[row];
-    while (left != 0) {
-      const int column = __builtin_ctz(left);
-      left &= left - 1U;
-      const std::ptrdiff_t index = row * tile_blocks + column;
-      const float* ray = Perspective ? tile.rays + index * block_pixels : nullptr;
-      gather_block<Perspective>(lanes, record.partial, front - record.middle, back - record.middle,
-                                static_cast<float>(tile.x + column * block_side),
-                                static_cast<float>(tile.y + row * block_side), ray,
-                                touch(slab, row, column));
-      tile.counters.pixel_updates += block_pixels;
-    }
-  }
-}
-
-void gather(const Camera& camera, const SplatRecord& record, Slab& slab, Tile& tile) {
-  if (camera.perspective != 0) {
-    gather_on<true>(camera, record, slab, tile);
-  } else {
-    gather_on<false>(camera, record, slab, tile);
-  }
-}
+// The depths between which a line passes the pixels of the blocks of one row, a lane a column.
+struct DepthRange {
+  Pixel first, last;
+};
 
 template <bool Perspective>
-int pack_splats_on(const Prepared& p, SplatRecord* out) {
-  const Footing& f = p.footing;
+HWY_INLINE DepthRange row_depths(const Ribbon& r, float margin, Pixel x, float y) {
+  constexpr float farthest = 0.5F * (block_side - 1);  // pixel centres from a block's middle
+  const auto depth_at = [&](Pixel along) {
+    const Pixel w = clamped(along, 0.0F, 1.0F);
+    const Pixel one = all<Pixel>(1.0F);
+    const Pixel f =
+        Perspective ? w * all<Pixel>(r.depth_ratio) / hn::MulAdd(w, all<Pixel>(r.bend), one) : w;
+    return hn::MulAdd(f, all<Pixel>(r.depth_rise), all<Pixel>(r.depth));
+  };
+  const Pixel w =
+      hn::MulAdd(x - all<Pixel>(r.x), all<Pixel>(r.wx), all<Pixel>((y - r.y) * r.wy + r.w0));
+  const Pixel reach = all<Pixel>(farthest * (absolute(r.wx) + absolute(r.wy)));
+  const Pixel a = depth_at(w - reach);
+  const Pixel b = depth_at(w + reach);
+  // Beyond every rounding of the line's depth and of the slabs' faces.
+  constexpr float rounding = 1e-6F;
+  const Pixel slack =
+      hn::MulAdd(hn::Max(hn::Abs(a), hn::Abs(b)), all<Pixel>(rounding), all<Pixel>(margin));
+  return {hn::Min(a, b) - slack, hn::Max(a, b) + slack};
+}
+
+// Lists the open blocks that stop l's line may touch; how many.
+template <bool Perspective>
+HWY_INLINE int list_hits(const RibbonRecord& line, const Footing& f, int l, std::uint32_t slot,
+                         float margin, const Tile& tile, Hit* hits) {
+  constexpr float middle = 0.5F * block_side;
   int n = 0;
-  for (std::uint64_t left = p.stops.splats; left != 0; left &= left - 1U) {
-    const int l = __builtin_ctzll(left);
-    const float middle = p.stops.depth[l];
-    const float half = p.splats.half_depth[l];
-    out[n++] = {p.pass->partial,
-                middle - half,
-                middle + half,
-                middle,
-                splat_at<Perspective>(p, l),
-                static_cast<std::int16_t>(f.row_first[l]),
-                static_cast<std::int16_t>(f.row_last[l]),
-                static_cast<std::int16_t>(f.column_first[l]),
-                static_cast<std::int16_t>(f.column_last[l])};
+  for (int row = f.line_first[l], k = 0; row <= f.line_last[l]; ++row, ++k) {
+    std::uint32_t left = f.line_columns[k][l] & tile.open[row];
+    while (left != 0) {
+      const int from = __builtin_ctz(left);
+      const Pixel x = hn::MulAdd(hn::Iota(PixelTag(), 0), all<Pixel>(block_side),
+                                 all<Pixel>(left_of(tile, from) + middle));
+      const DepthRange range =
+          row_depths<Perspective>(line.ribbon, margin, x, top_of(tile, row) + middle);
+      alignas(64) float first[block_pixels];
+      alignas(64) float last[block_pixels];
+      store(range.first, first);
+      store(range.last, last);
+      std::uint32_t here = left >> static_cast<unsigned>(from) & ((2U << (pixel_lanes - 1)) - 1U);
+      left &= ~(here << static_cast<unsigned>(from));
+      for (; here != 0; here &= here - 1U) {
+        const int c = __builtin_ctz(here);
+        hits[n++] = {slot, row * tile_blocks + from + c, first[c], last[c]};
+      }
+    }
   }
   return n;
 }
 
-int pack_splats(const Camera& camera, const Prepared& p, SplatRecord* out) {
-  return camera.perspective != 0 ? pack_splats_on<true>(p, out) : pack_splats_on<false>(p, out);
-}
-
-int pack_ribbons(const Prepared& p, RibbonRecord* out) {
-  const Footing& f = p.footing;
+template <bool Perspective>
+int pack_lines_on(const Prepared& p, float slab_depth, const std::uint32_t* slots, const Tile& tile,
+                  RibbonRecord* records, Hit* hits, int* counts) {
+  const float margin = 1e-4F * slab_depth;
   int n = 0;
   for (std::uint64_t left = p.stops.lines; left != 0; left &= left - 1U) {
     const int l = __builtin_ctzll(left);
-    const float tail = p.stops.depth[l] + p.ribbons.depth[l];
-    const float head = tail + p.ribbons.depth_rise[l];
-    RibbonRecord& to = out[n++];
-    to.first = smaller(tail, head);
-    to.last = larger(tail, head);
-    to.centre = p.stops.depth[l];
-    to.row_first = static_cast<std::int16_t>(f.line_first[l]);
-    to.row_last = static_cast<std::int16_t>(f.line_last[l]);
-    to.moving = p.pass->line.moving;
-    for (int k = 0; k <= to.row_last - to.row_first; ++k) {
-      to.columns[k] = f.line_columns[k][l];
-    }
-    to.ribbon = ribbon_at(p.pass->line, p.ribbons, l);
+    RibbonRecord& record = records[slots[n]];
+    record = ribbon_record(p.pass->line, p, l);
+    const int count = list_hits<Perspective>(record, p.footing, l, slots[n], margin, tile, hits);
+    if (count == 0) continue;
+    hits += count;
+    counts[n++] = count;
   }
   return n;
 }
 
-// A line's view depth where it passes a point of the picture, from the camera's depth origin.
-template <bool Perspective>
-inline float ribbon_depth(const Ribbon& r, float centre, float px, float py) {
-  const float along = (px - r.x) * r.wx + (py - r.y) * r.wy + r.w0;
-  const float w = limited(along, 0.0F, 1.0F);
-  const float f = Perspective ? w * r.depth_ratio / (1.0F + w * (r.depth_ratio - 1.0F)) : w;
-  return centre + r.depth + f * r.depth_rise;
+int pack_lines(const Camera& camera, const Prepared& p, float slab_depth,
+               const std::uint32_t* slots, const Tile& tile, RibbonRecord* records, Hit* hits,
+               int* counts) {
+  return camera.perspective != 0
+             ? pack_lines_on<true>(p, slab_depth, slots, tile, records, hits, counts)
+             : pack_lines_on<false>(p, slab_depth, slots, tile, records, hits, counts);
 }
 
-// How far a line's depth anywhere in a block may be from that at the block's middle: the way of f
-// over the farthest pixel's distance.
-inline float depth_slack(const Ribbon& r) {
-  constexpr float farthest = 2.2F;  // pixels
-  const float steepest = larger(r.depth_ratio, 1.0F / larger(r.depth_ratio, 1e-6F));
-  const float along = farthest * square_root(r.wx * r.wx + r.wy * r.wy) * steepest;
-  return absolute(r.depth_rise) * smaller(along, 1.0F) * 1.001F;
-}
-
-// Lists the blocks that a line may touch within the slab. `hits` has room for hits_of_line_max.
-template <bool Perspective>
-int list_hits_on(const RibbonRecord& line, const Slab& slab, const Tile& tile, Hit* hits) {
-  if (line.last < slab.front || line.first >= slab.back) return 0;
-  const Ribbon& ribbon = line.ribbon;
-  const float slack = depth_slack(ribbon);
-  int n = 0;
-  for (int row = line.row_first; row <= line.row_last; ++row) {
-    std::uint32_t left = line.columns[row - line.row_first] & tile.open[row];
-    while (left != 0) {
-      const int column = __builtin_ctz(left);
-      left &= left - 1U;
-      constexpr float middle = 0.5F * block_side;
-      const float depth = ribbon_depth<Perspective>(
-          ribbon, line.centre, static_cast<float>(tile.x + column * block_side) + middle,
-          static_cast<float>(tile.y + row * block_side) + middle);
-      if (depth + slack < slab.front || depth - slack >= slab.back) continue;
-      hits[n++] = {&line, depth, row * tile_blocks + column};
-    }
-  }
-  return n;
-}
-
-int list_hits(const Camera& camera, const RibbonRecord& line, const Slab& slab, const Tile& tile,
-              Hit* hits) {
-  return camera.perspective != 0 ? list_hits_on<true>(line, slab, tile, hits)
-                                 : list_hits_on<false>(line, slab, tile, hits);
-}
+// A slab without a medium at hand: all ways of compositing are the same.
+constexpr int compositing_no_medium = -1;
 
 // What has happened to the light of a vector of a block's pixels within the slab at hand.
 struct Passage {
@@ -221,7 +122,7 @@ HWY_INLINE Passage open_passage(const float* gathered, int l) {
   const Pixel zero = hn::Zero(PixelTag());
   const Pixel one = all<Pixel>(1.0F);
   Passage p = {zero, {zero, one}, {zero, zero, zero}, {zero, zero, zero}, one, zero, one};
-  if (gathered == nullptr) return p;
+  if (Compositing == compositing_no_medium) return p;
   p.tau = load<Pixel>(gathered + l);
   p.medium = attenuation_by<Compositing>(p.tau);
   const Pixel inverse = inverse_of(hn::Max(p.tau, all<Pixel>(1e-37F)));
@@ -232,26 +133,69 @@ HWY_INLINE Passage open_passage(const float* gathered, int l) {
   return p;
 }
 
-template <bool Perspective, int Style>
-HWY_INLINE void meet_line(const RibbonRecord& line, const Slab& slab, float x, float y,
-                          Meeting& m) {
+// A line as a vector of a block's pixels meets it within the slab.
+struct Met {
+  MaskOf<Pixel> here;  // the line covers the pixel, in this slab
+  Pixel opacity;       // elsewhere 0
+  Pixel depth;
+  Pixel f;
+};
+
+template <Depth Along, int Style>
+HWY_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
   const RibbonLanes r = spread(line.ribbon);
+  const Pixel zero = hn::Zero(PixelTag());
+  const Pixel w =
+      clamped(hn::MulAdd(px - r.x, r.wx, hn::MulAdd(py - r.y, r.wy, r.w0)), zero, all<Pixel>(1.0F));
+  const Pixel f = along_ribbon<Along>(r, w);
+  const Pixel depth =
+      hn::MulAdd(f, all<Pixel>(line.ribbon.depth_rise), all<Pixel>(line.ribbon.depth));
+  const auto inside =
+      hn::And(hn::Ge(depth, all<Pixel>(slab.front)), hn::Lt(depth, all<Pixel>(slab.back)));
+  // Most lines that may be met are not: they pass the block in another slab.
+  if (hn::AllFalse(PixelTag(), inside)) return {inside, zero, depth, f};
+  const Pixel opacity = ribbon_lane<Along, Style>(r, px - r.x, py - r.y).opacity;
+  const auto here = hn::And(inside, hn::Gt(opacity, zero));
+  return {here, hn::IfThenElseZero(here, opacity), depth, f};
+}
+
+template <bool Perspective>
+HWY_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
+  if (!Perspective) {
+    return line.moving != 0 ? meet<Depth::flat, style_moving>(line, slab, px, py)
+                            : meet<Depth::flat, style_head>(line, slab, px, py);
+  }
+  if (line.bent == 0) {
+    return line.moving != 0 ? meet<Depth::series, style_moving>(line, slab, px, py)
+                            : meet<Depth::series, style_head>(line, slab, px, py);
+  }
+  return line.moving != 0 ? meet<Depth::exact, style_moving>(line, slab, px, py)
+                          : meet<Depth::exact, style_head>(line, slab, px, py);
+}
+
+HWY_INLINE Pixel place_in(const Slab& slab, Pixel depth) {
   const Pixel inverse = all<Pixel>(1.0F / (slab.back - slab.front));
-  const Pixel first = all<Pixel>(line.centre + line.ribbon.depth);
-  const Pixel rise = all<Pixel>(line.ribbon.depth_rise);
-  const Pixel front = all<Pixel>(slab.front);
-  const Pixel back = all<Pixel>(slab.back);
-  constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
+  return clamped((depth - all<Pixel>(slab.front)) * inverse, 0.0F, 1.0F);
+}
+
+// Whether any pixel meets the line at all.
+template <bool Perspective>
+HWY_INLINE bool meet_line(const RibbonRecord& line, const Slab& slab, float x, float y,
+                          Meeting& m) {
+  bool met = false;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
     const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
     const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
-    const RibbonLane lane = ribbon_lane<along, Style>(r, px - r.x, py - r.y);
-    const Pixel depth = hn::MulAdd(lane.f, rise, first);
-    store(clamped((depth - front) * inverse, 0.0F, 1.0F), m.place + l);
-    const auto here = hn::And(hn::Ge(depth, front), hn::Lt(depth, back));
-    store(hn::IfThenElseZero(here, lane.opacity), m.opacity + l);
-    for (int c = 0; c < 3; ++c) store(hn::MulAdd(lane.f, r.rise[c], r.tail[c]), m.color[c] + l);
+    const Met at = meet<Perspective>(line, slab, px, py);
+    met = met || !hn::AllFalse(PixelTag(), at.here);
+    store(place_in(slab, at.depth), m.place + l);
+    store(at.opacity, m.opacity + l);
+    for (int c = 0; c < 3; ++c) {
+      store(hn::MulAdd(at.f, all<Pixel>(line.ribbon.rise[c]), all<Pixel>(line.ribbon.tail[c])),
+            m.color[c] + l);
+    }
   }
+  return met;
 }
 
 // Puts two neighbours in order, each pixel by itself; whether any pixel had them the other way.
@@ -283,10 +227,8 @@ inline void sort_meetings(Meeting* m, int count) {
 }
 
 template <int Compositing>
-HWY_INLINE void pass_line(const Meeting& m, int l, Passage& p) {
+HWY_INLINE void pass_line(Pixel opacity, Pixel place, const Pixel color[3], Passage& p) {
   const Pixel one = all<Pixel>(1.0F);
-  const Pixel opacity = load<Pixel>(m.opacity + l);
-  const Pixel place = load<Pixel>(m.place + l);
   if (Compositing == compositing_cd_naive) {
     // Only a pixel that the line covers is followed up to it.
     const Pixel next =
@@ -294,23 +236,34 @@ HWY_INLINE void pass_line(const Meeting& m, int l, Passage& p) {
     const Pixel part = (next - p.reached) * p.medium.absorbed;
     const Pixel behind = p.left * (one - part);
     for (int c = 0; c < 3; ++c) {
-      const Pixel own = behind * opacity * load<Pixel>(m.color[c] + l);
+      const Pixel own = behind * opacity * color[c];
       p.rgb[c] = p.rgb[c] + hn::MulAdd(p.left * part, p.color[c], own);
     }
     p.left = behind * (one - opacity);
     p.reached = next;
     return;
   }
-  const Pixel own = p.through * opacity * light_before<Compositing>(p.medium, p.tau, place);
-  for (int c = 0; c < 3; ++c) {
-    p.rgb[c] = hn::MulAdd(own, load<Pixel>(m.color[c] + l) - p.color[c], p.rgb[c]);
+  Pixel own = p.through * opacity;
+  if (Compositing == compositing_no_medium) {
+    for (int c = 0; c < 3; ++c) p.rgb[c] = hn::MulAdd(own, color[c], p.rgb[c]);
+  } else {
+    own = own * light_before<Compositing>(p.medium, p.tau, place);
+    for (int c = 0; c < 3; ++c) p.rgb[c] = hn::MulAdd(own, color[c] - p.color[c], p.rgb[c]);
   }
   p.through = p.through * (one - opacity);
 }
 
-// I = c_s (1 - P exp(-tau)) + sum_k prod_(j<k) (1 - a_j) a_k exp(-tau x_k) (c_k - c_s).
 template <int Compositing>
-HWY_INLINE void close_passage(const Passage& p, int l, float* block) {
+HWY_INLINE void pass_line(const Meeting& m, int l, Passage& p) {
+  const Pixel color[3] = {load<Pixel>(m.color[0] + l), load<Pixel>(m.color[1] + l),
+                          load<Pixel>(m.color[2] + l)};
+  pass_line<Compositing>(load<Pixel>(m.opacity + l), load<Pixel>(m.place + l), color, p);
+}
+
+// I = c_s (1 - P exp(-tau)) + sum_k prod_(j<k) (1 - a_j) a_k exp(-tau x_k) (c_k - c_s).
+// Returns the light that is left.
+template <int Compositing>
+HWY_INLINE Pixel close_passage(const Passage& p, int l, float* block) {
   const Channels to = channels_of(block);
   const Pixel one = all<Pixel>(1.0F);
   const Pixel t = load<Pixel>(to.transmittance + l);
@@ -322,14 +275,22 @@ HWY_INLINE void close_passage(const Passage& p, int l, float* block) {
     }
     add_product(to.alpha + l, t, one - left);
     store(t * left, to.transmittance + l);
-    return;
+    return t * left;
+  }
+  if (Compositing == compositing_no_medium) {
+    for (int c = 0; c < 3; ++c) add_product(to.rgb[c] + l, t, p.rgb[c]);
+    add_product(to.alpha + l, t, one - p.through);
+    store(t * p.through, to.transmittance + l);
+    return t * p.through;
   }
   const Pixel absorbed = hn::MulAdd(one - p.through, p.medium.transmitted, p.medium.absorbed);
   for (int c = 0; c < 3; ++c) {
     add_product(to.rgb[c] + l, t, hn::MulAdd(p.color[c], absorbed, p.rgb[c]));
   }
   add_product(to.alpha + l, t, absorbed);
-  store(bounded_light<Compositing>(t * (p.through * p.medium.transmitted)), to.transmittance + l);
+  const Pixel left = bounded_light<Compositing>(t * (p.through * p.medium.transmitted));
+  store(left, to.transmittance + l);
+  return left;
 }
 
 constexpr int block_vectors = block_pixels / pixel_lanes;
@@ -338,7 +299,8 @@ constexpr int block_vectors = block_pixels / pixel_lanes;
 inline bool is_dark(const float* transmittance, const Passage* p, float stop) {
   Light light;
   for (int v = 0; v < block_vectors; ++v) {
-    light.see(load<Pixel>(transmittance + v * pixel_lanes) * p[v].through * p[v].left);
+    light.see(load<Pixel>(transmittance + static_cast<std::ptrdiff_t>(v) * pixel_lanes) *
+              p[v].through * p[v].left);
   }
   return !light.above(stop);
 }
@@ -352,99 +314,170 @@ HWY_INLINE void pass_lines(const Meeting* m, int count, Passage* p) {
   }
 }
 
-template <bool Perspective, int Compositing>
-void close_slab_block(const Slab& slab, const Hit* hits, int count, int index, Tile& tile) {
-  const int row = index / tile_blocks;
-  const int column = index % tile_blocks;
-  const bool medium = (slab.touched[row] >> static_cast<unsigned>(column) & 1U) != 0;
-  const float* gathered =
-      medium ? slab.gathered + static_cast<std::ptrdiff_t>(index) * gathered_floats : nullptr;
-  const float x = static_cast<float>(tile.x + column * block_side);
-  const float y = static_cast<float>(tile.y + row * block_side);
-  float* block = tile.blocks + static_cast<std::ptrdiff_t>(index) * block_floats;
-  Passage passage[block_vectors];
-  for (int v = 0; v < block_vectors; ++v) {
-    passage[v] = open_passage<Compositing>(gathered, v * pixel_lanes);
+// What a block of the slab is closed with.
+struct Closing {
+  const Slab& slab;
+  const RibbonRecord* lines;
+  const MetLine* met;
+  int count;
+  float x, y;  // the block's corner, pixels
+  float stop;
+  const float* transmittance;  // before the slab
+};
+
+// Sorts a few lines by depth: each goes where as many others are as come before it. Equals keep
+// their order.
+inline void sort_met(const MetLine* met, int count, MetLine* sorted) {
+  alignas(64) float depth[met_lines_sorted_max];
+  int filled = 0;
+  for (; filled < count; ++filled) depth[filled] = met[filled].depth;
+  for (; filled % pixel_lanes != 0; ++filled) depth[filled] = __builtin_inff();
+  for (int n = 0; n < count; ++n) {
+    const Pixel own = all<Pixel>(met[n].depth);
+    const Pixel place = all<Pixel>(static_cast<float>(n));
+    std::size_t before = 0;
+    for (int l = 0; l < filled; l += pixel_lanes) {
+      const Pixel other = load<Pixel>(depth + l);
+      const auto earlier = hn::Lt(hn::Iota(PixelTag(), l), place);
+      const auto equal = hn::And(hn::Eq(other, own), earlier);
+      before += hn::CountTrue(PixelTag(), hn::Or(hn::Lt(other, own), equal));
+    }
+    sorted[before] = met[n];
   }
+}
+
+enum class Outcome { done, dark, out_of_order };
+
+// Composites the lines as they come. They come by their depth in the middle of the block; where
+// that is not the order in some pixel the passage is worth nothing.
+template <bool Perspective, int Compositing>
+HWY_INLINE Outcome pass_in_order(const Closing& with, Passage* passage) {
+  constexpr int between_looks = 16;
+  Pixel farthest[block_vectors];
+  for (Pixel& depth : farthest) depth = all<Pixel>(with.slab.front);
+  for (int from = 0; from < with.count; from += between_looks) {
+    const int to = from + between_looks < with.count ? from + between_looks : with.count;
+    for (int v = 0, l = 0; v < block_vectors; ++v, l += pixel_lanes) {
+      const Pixel px = all<Pixel>(with.x) + load<Pixel>(lane_x + l);
+      const Pixel py = all<Pixel>(with.y) + load<Pixel>(lane_y + l);
+      Passage p = passage[v];
+      Pixel far = farthest[v];
+      for (int h = from; h < to; ++h) {
+        const RibbonRecord& line = with.lines[with.met[h].line];
+        const Met met = meet<Perspective>(line, with.slab, px, py);
+        if (hn::AllFalse(PixelTag(), met.here)) continue;
+        if (!hn::AllFalse(PixelTag(), hn::And(met.here, hn::Lt(met.depth, far)))) {
+          return Outcome::out_of_order;
+        }
+        far = hn::IfThenElse(met.here, met.depth, far);
+        Pixel color[3];
+        for (int c = 0; c < 3; ++c) {
+          color[c] =
+              hn::MulAdd(met.f, all<Pixel>(line.ribbon.rise[c]), all<Pixel>(line.ribbon.tail[c]));
+        }
+        pass_line<Compositing>(met.opacity, place_in(with.slab, met.depth), color, p);
+      }
+      farthest[v] = far;
+      passage[v] = p;
+    }
+    if (to < with.count && is_dark(with.transmittance, passage, with.stop)) return Outcome::dark;
+  }
+  return Outcome::done;
+}
+
+// The same, the lines put in order in every pixel first.
+template <bool Perspective, int Compositing>
+Outcome pass_sorted(const Closing& with, Passage* passage) {
   Meeting meetings[meetings_max];
   int held = 0;
-  for (int h = 0; h < count; ++h) {
-    const RibbonRecord& line = *hits[h].line;
-    if (line.moving != 0) {
-      meet_line<Perspective, style_moving>(line, slab, x, y, meetings[held]);
-    } else {
-      meet_line<Perspective, style_head>(line, slab, x, y, meetings[held]);
-    }
-    if (++held < meetings_max || h + 1 == count) continue;
+  for (int h = 0; h < with.count; ++h) {
+    const RibbonRecord& line = with.lines[with.met[h].line];
+    if (!meet_line<Perspective>(line, with.slab, with.x, with.y, meetings[held])) continue;
+    if (++held < meetings_max) continue;
     // The nearer half passes, the farther one may still be met by lines to come.
     sort_meetings(meetings, held);
     held = meetings_max / 2;
     pass_lines<Compositing>(meetings, held, passage);
     for (int n = 0; n < held; ++n) meetings[n] = meetings[n + held];
-    if (is_dark(block, passage, slab.stop)) {
-      tile.any_closed = 1;  // what is behind was left out
-      held = 0;
-      break;
-    }
+    if (is_dark(with.transmittance, passage, with.stop)) return Outcome::dark;
   }
   sort_meetings(meetings, held);
   pass_lines<Compositing>(meetings, held, passage);
-  for (int v = 0; v < block_vectors; ++v) {
-    close_passage<Compositing>(passage[v], v * pixel_lanes, block);
-  }
-  constexpr bool euler = Compositing == compositing_cd_euler;
-  const int own = medium && !euler ? 1 : 0;
-  const int each = medium && Compositing == compositing_analytic ? count : 0;
-  tile.counters.pixel_updates += std::int64_t{1 + count} * block_pixels;
-  tile.counters.exponentials += std::int64_t{own + each} * block_pixels;
+  return Outcome::done;
 }
 
-int refresh_open(Tile& tile) {
-  int open = 0;
-  const int rows = blocks_of(tile.height);
-  for (int row = 0; row < rows; ++row) {
-    std::uint32_t left = tile.open[row];
-    open += __builtin_popcount(left);
-    while (left != 0) {
-      const int column = __builtin_ctz(left);
-      const std::uint32_t bit = left & (~left + 1U);
-      left ^= bit;
-      const float* transmittance = block_at(tile, row, column);
-      Light light;
-      for (int l = 0; l < block_pixels; l += pixel_lanes) light.see(load<Pixel>(transmittance + l));
-      if (light.above(tile.stop)) continue;
-      tile.open[row] ^= bit;
-      tile.any_closed = 1;
-      --open;
+template <bool Perspective, int Compositing>
+void close_block(const Closing& with, const float* gathered, int row, int column, Tile& tile) {
+  Passage passage[block_vectors];
+  const auto open = [&] {
+    for (int v = 0; v < block_vectors; ++v) {
+      passage[v] = open_passage<Compositing>(gathered, v * pixel_lanes);
     }
+  };
+  open();
+  Outcome outcome = pass_in_order<Perspective, Compositing>(with, passage);
+  if (outcome == Outcome::out_of_order) {
+    open();
+    outcome = pass_sorted<Perspective, Compositing>(with, passage);
   }
-  return open;
+  if (outcome == Outcome::dark) tile.any_closed = 1;  // what is behind was left out
+  float* block = block_at(tile, row, column);
+  Light light;
+  for (int v = 0; v < block_vectors; ++v) {
+    light.see(close_passage<Compositing>(passage[v], v * pixel_lanes, block));
+  }
+  note_light(light, row, std::uint32_t{1} << static_cast<unsigned>(column), tile);
 }
 
 template <bool Perspective>
-void close_slab_on(int compositing, const Slab& slab, const Hit* hits, int count, int index,
+void close_slab_on(int compositing, const Closing& with, const float* gathered, int row, int column,
                    Tile& tile) {
+  if (gathered == nullptr) {
+    return close_block<Perspective, compositing_no_medium>(with, gathered, row, column, tile);
+  }
   switch (compositing) {
     case compositing_simple:
-      return close_slab_block<Perspective, compositing_simple>(slab, hits, count, index, tile);
+      return close_block<Perspective, compositing_simple>(with, gathered, row, column, tile);
     case compositing_cd_naive:
-      return close_slab_block<Perspective, compositing_cd_naive>(slab, hits, count, index, tile);
+      return close_block<Perspective, compositing_cd_naive>(with, gathered, row, column, tile);
     case compositing_cd:
-      return close_slab_block<Perspective, compositing_cd>(slab, hits, count, index, tile);
+      return close_block<Perspective, compositing_cd>(with, gathered, row, column, tile);
     case compositing_cd_euler:
-      return close_slab_block<Perspective, compositing_cd_euler>(slab, hits, count, index, tile);
+      return close_block<Perspective, compositing_cd_euler>(with, gathered, row, column, tile);
     default:
-      return close_slab_block<Perspective, compositing_analytic>(slab, hits, count, index, tile);
+      return close_block<Perspective, compositing_analytic>(with, gathered, row, column, tile);
   }
 }
 
-void close_slab(const Camera& camera, int compositing, const Slab& slab, const Hit* hits, int count,
-                int index, Tile& tile) {
-  if (camera.perspective != 0) {
-    close_slab_on<true>(compositing, slab, hits, count, index, tile);
-  } else {
-    close_slab_on<false>(compositing, slab, hits, count, index, tile);
+void close_slab(const Camera& camera, int compositing, const Slab& slab, const RibbonRecord* lines,
+                const MetLine* met, int count, int index, Tile& tile) {
+  const int row = index / tile_blocks;
+  const int column = index % tile_blocks;
+  const bool medium = (slab.touched[row] >> static_cast<unsigned>(column) & 1U) != 0;
+  const float* gathered =
+      medium ? slab.gathered + static_cast<std::ptrdiff_t>(index) * gathered_floats : nullptr;
+  MetLine sorted[met_lines_sorted_max];
+  if (count > 1 && count <= met_lines_sorted_max) {
+    sort_met(met, count, sorted);
+    met = sorted;
   }
+  const Closing with = {slab,
+                        lines,
+                        met,
+                        count,
+                        left_of(tile, column),
+                        top_of(tile, row),
+                        tile.stop,
+                        block_at(tile, row, column)};
+  if (camera.perspective != 0) {
+    close_slab_on<true>(compositing, with, gathered, row, column, tile);
+  } else {
+    close_slab_on<false>(compositing, with, gathered, row, column, tile);
+  }
+  const int own = medium && compositing != compositing_cd_euler ? 1 : 0;
+  const int each = medium && compositing == compositing_analytic ? count : 0;
+  tile.counters.pixel_updates += std::int64_t{1 + count} * block_pixels;
+  tile.counters.exponentials += std::int64_t{own + each} * block_pixels;
 }
 
 }  // namespace

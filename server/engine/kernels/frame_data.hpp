@@ -111,18 +111,19 @@ struct Pass {
   int has_medium;
   LineStyle line;
   Medium medium;
-  float cell_max[3];     // the widest cell along each axis; curved: the farthest any reaches
-  int dims[3];           // of the fields
-  const float* places;   // 3 a sample, world units, where the lattice is curved; else null
-  int compositing;       // scene::Compositing
-  int by_depth;          // stops' depths are wanted
-  const float* partial;  // partial_columns x partial_rows, see partial.hpp; the slab method only
+  float cell_max[3];            // the widest cell along each axis; curved: the farthest any reaches
+  int dims[3];                  // of the fields
+  const float* places;          // 3 a sample, world units, where the lattice is curved; else null
+  int compositing;              // scene::Compositing
+  int by_depth;                 // stops' depths are wanted
+  const std::int32_t* partial;  // see partial.hpp; the slab method only
 };
 
 // F(b^2, v): the part of a splat's footprint that lies before v half chords beyond its middle, on a
 // ray that passes at b strides. Rows: b^2 from 0 to t^2; columns: v from -1 to 1.
 constexpr int partial_rows = 33;
 constexpr int partial_columns = 65;
+constexpr float partial_one = 65535;  // the table's 1
 
 // A brick of 8 x 8 x 1 stops, as ranges of the visit lists.
 struct Brick {

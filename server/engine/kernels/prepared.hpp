@@ -100,11 +100,13 @@ struct Prepared {
   Footing footing;
 };
 
+// Slabs that a splat gives its parts to in one go.
+constexpr int slabs_ahead = 8;
+
 // One slab of view depth and what its medium has gathered in a tile: optical depth, then colour
 // weighted by it, 4 floats a pixel in blocks as the tile's are.
 struct Slab {
   float front, back;  // view depths from the camera's depth origin, world units
-  float stop;         // transmittance from which on nothing behind counts
   float* gathered;
   std::uint32_t touched[tile_blocks];  // bit set: the block holds something
 };
@@ -128,10 +130,11 @@ struct Splat {
   float color[3];
 };
 
-// A splat and a line by themselves, for a sweep that meets each in several slabs. Depths are from
-// the camera's depth origin; rows and columns are the tile's blocks, both ends included.
+// A splat and a line by themselves, for a sweep that meets them when it comes to their depths,
+// which are from the camera's depth origin; rows and columns are the tile's blocks, both ends
+// included.
 struct SplatRecord {
-  const float* partial;
+  const std::int32_t* partial;
   float first, last;  // where it begins and ends
   float middle;
   Splat splat;
@@ -139,21 +142,24 @@ struct SplatRecord {
 };
 
 struct RibbonRecord {
-  float first, last;
-  float centre;  // of its kernel
-  std::int16_t row_first, row_last;
+  Ribbon ribbon;  // its depth from the camera's depth origin
   int moving;
-  std::uint32_t columns[tile_blocks];  // bit set: the column of its k-th row
-  Ribbon ribbon;
+  int bent;  // perspective bends it along the view by more than a series can tell
 };
-static_assert(tile_blocks <= 32);
 
-// One line's meeting with one block.
+// One line's meeting with one block: between which depths its pixels may meet it.
 struct Hit {
-  const RibbonRecord* line;
-  float depth;  // at the block's middle
-  int block;
+  std::uint32_t line;  // its record
+  std::int32_t block;
+  float first, last;
 };
-constexpr int hits_of_line_max = tile_blocks * tile_blocks;
+constexpr int hits_of_brick_max = brick_stops * tile_blocks * tile_blocks;
+
+// A line that a block may meet in the slab at hand.
+struct MetLine {
+  float depth;  // where, about
+  std::uint32_t line;
+};
+constexpr int met_lines_sorted_max = 64;
 
 }  // namespace windsplat::engine::kernels

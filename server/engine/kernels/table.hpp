@@ -27,22 +27,26 @@ struct Table {
   // The second half, for one stop that has a line or a splat.
   void (*draw_prepared)(const Camera& camera, const Prepared& prepared, int stop, Tile& tile);
 
-  // The slab method: a brick's splats and lines by themselves, at most brick_stops of each; how
-  // many.
+  // The slab method: a brick's splats by themselves, at most brick_stops; how many.
   int (*pack_splats)(const Camera& camera, const Prepared& prepared, SplatRecord* out);
-  int (*pack_ribbons)(const Prepared& prepared, RibbonRecord* out);
 
-  // Adds the part of the splat that lies in the slab.
-  void (*gather)(const Camera& camera, const SplatRecord& record, Slab& slab, Tile& tile);
+  // A brick's lines by themselves and their meetings with the tile's open blocks, at most
+  // hits_of_brick_max; how many lines there are. The n-th becomes records[slots[n]] and has the
+  // next counts[n] of the hits; slab_depth, world units, is what roundings are measured against.
+  int (*pack_lines)(const Camera& camera, const Prepared& prepared, float slab_depth,
+                    const std::uint32_t* slots, const Tile& tile, RibbonRecord* records, Hit* hits,
+                    int* counts);
 
-  // Lists the blocks that the line may touch within the slab; how many. Room for hits_of_line_max.
-  int (*list_hits)(const Camera& camera, const RibbonRecord& line, const Slab& slab,
-                   const Tile& tile, Hit* hits);
+  // Adds to each of slabs_ahead slabs the part of the splat that lies in it. The nearest is
+  // slabs[first], those behind it follow, modulo slabs_ahead.
+  void (*gather)(const Camera& camera, const SplatRecord& record, Slab* slabs, int first,
+                 Tile& tile);
 
-  // Composites one block of the slab: its gathered medium with `count` lines, nearest first.
-  // compositing is scene::Compositing.
-  void (*close_slab)(const Camera& camera, int compositing, const Slab& slab, const Hit* hits,
-                     int count, int block, Tile& tile);
+  // Composites one open block of the slab: its gathered medium with `count` lines, in any order if
+  // they are at most met_lines_sorted_max, else by their depths. compositing is scene::Compositing.
+  void (*close_slab)(const Camera& camera, int compositing, const Slab& slab,
+                     const RibbonRecord* lines, const MetLine* met, int count, int block,
+                     Tile& tile);
 
   // Tells the processor that this brick's samples are wanted soon.
   void (*prefetch)(const Pass& pass, const Brick& brick);
@@ -52,10 +56,6 @@ struct Table {
 
   // How many of the tile's blocks are still open.
   int (*count_open)(const Tile& tile);
-
-  // The slab method: closes the blocks that let no more than the tile's stop through; how many
-  // remain open.
-  int (*refresh_open)(Tile& tile);
 
   // absorbed = -expm1(-tau) and transmitted = exp(-tau), tau in [0, inf], to about 1e-7.
   void (*attenuate)(int count, const float* tau, float* absorbed, float* transmitted);

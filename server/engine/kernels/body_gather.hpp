@@ -1,0 +1,172 @@
+// Part of the kernel body: what of a splat lies in each slab of view depth, for the slab method.
+#pragma once
+
+#include "server/engine/kernels/body_draw.hpp"
+
+namespace windsplat::engine::kernels {
+namespace {
+
+// Rows of the table of partial footprints, and where between two of them a vector's rays pass.
+struct PartialRows {
+  SignedOf<Pixel> at;
+  Pixel part;
+};
+
+HWY_INLINE PartialRows partial_rows_at(Pixel r2) {
+  constexpr float rows_per_t2 = static_cast<float>(partial_rows - 1) / (footprint_t * footprint_t);
+  const Pixel place = hn::Min(r2 * all<Pixel>(rows_per_t2), all<Pixel>(partial_rows - 1.001F));
+  const SignedOf<Pixel> row = truncated(place);
+  const hn::RebindToSigned<PixelTag> integers;
+  return {row * hn::Set(integers, partial_columns - 1), place - from_integer<Pixel>(row)};
+}
+
+// An entry's two neighbours in v, interpolated.
+HWY_INLINE Pixel between_columns(SignedOf<Pixel> entry, Pixel part) {
+  const hn::RebindToSigned<PixelTag> integers;
+  const hn::RebindToUnsigned<PixelTag> bits;
+  const SignedOf<Pixel> low = hn::And(entry, hn::Set(integers, 0xffff));
+  const auto high = hn::BitCast(integers, hn::ShiftRight<16>(hn::BitCast(bits, entry)));
+  const Pixel a = from_integer<Pixel>(low);
+  return hn::MulAdd(part, from_integer<Pixel>(high) - a, a);
+}
+
+// F(b^2, v) in parts of partial_one, by linear interpolation in both; v in [-1, 1].
+HWY_INLINE Pixel partial_at(const std::int32_t* HWY_RESTRICT partial, const PartialRows& rows,
+                            Pixel v) {
+  const hn::RebindToSigned<PixelTag> integers;
+  const Pixel one = all<Pixel>(1.0F);
+  // Rays that the face passes before or behind altogether.
+  if (hn::AllTrue(PixelTag(), hn::Le(v, hn::Neg(one)))) return hn::Zero(PixelTag());
+  if (hn::AllTrue(PixelTag(), hn::Ge(v, one))) return all<Pixel>(partial_one);
+  const Pixel place = (v + one) * all<Pixel>(0.5F * (partial_columns - 1));
+  const SignedOf<Pixel> column = hn::Min(truncated(place), hn::Set(integers, partial_columns - 2));
+  const Pixel part = place - from_integer<Pixel>(column);
+  const SignedOf<Pixel> at = rows.at + column;
+  const Pixel upper = between_columns(hn::GatherIndex(integers, partial, at), part);
+  const Pixel lower =
+      between_columns(hn::GatherIndex(integers, partial + (partial_columns - 1), at), part);
+  return hn::MulAdd(rows.part, lower - upper, upper);
+}
+
+// The block's gathered medium, emptied when it is first touched in this slab.
+HWY_INLINE float* touch(Slab& slab, int row, int column) {
+  float* at =
+      slab.gathered + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * gathered_floats;
+  const std::uint32_t bit = std::uint32_t{1} << static_cast<unsigned>(column);
+  if ((slab.touched[row] & bit) == 0) {
+    slab.touched[row] |= bit;
+    for (int i = 0; i < gathered_floats; i += pixel_lanes) store(hn::Zero(PixelTag()), at + i);
+  }
+  return at;
+}
+
+// A splat's way through the slabs in reach, depths given from its centre.
+struct Faces {
+  int count;                     // slabs
+  float depth[slabs_ahead + 1];  // their faces, front to back
+  Slab* slab[slabs_ahead];
+};
+
+// Adds to one block what of the splat lies in each slab; how many slabs get something.
+template <bool Perspective>
+HWY_INLINE int gather_block(const SplatLanes& s, const std::int32_t* HWY_RESTRICT partial,
+                            const Faces& faces, const Tile& tile, int row, int column) {
+  constexpr float t2 = footprint_t * footprint_t;
+  const float* ray = Perspective ? rays_at(tile, row, column) : nullptr;
+  std::uint32_t met = 0;
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const Pixel px = all<Pixel>(left_of(tile, column)) + load<Pixel>(lane_x + l);
+    const Pixel py = all<Pixel>(top_of(tile, row)) + load<Pixel>(lane_y + l);
+    const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
+    const SplatLane lane = splat_lane<Perspective, From::eye>(s, px, py, length);
+    if (hn::AllFalse(PixelTag(), hn::Lt(lane.r2, all<Pixel>(t2)))) continue;
+    // Half the chord in cells, and with it the slabs' faces in half chords from the middle.
+    const Pixel chord2 = hn::Max(all<Pixel>(t2) - lane.r2, all<Pixel>(1e-6F));
+    const Pixel scale = lane.cells / hn::Sqrt(chord2);
+    const Pixel whole = lane.tau * all<Pixel>(1.0F / partial_one);
+    const PartialRows rows = partial_rows_at(lane.r2);
+    const auto at_face = [&](int n) {
+      return clamped((all<Pixel>(faces.depth[n]) - lane.behind) * scale, -1.0F, 1.0F);
+    };
+    Pixel before = partial_at(partial, rows, at_face(0));
+    for (int n = 0; n < faces.count; ++n) {
+      const Pixel after = partial_at(partial, rows, at_face(n + 1));
+      const Pixel tau = whole * hn::Max(after - before, hn::Zero(PixelTag()));
+      before = after;
+      if (hn::AllFalse(PixelTag(), hn::Gt(tau, hn::Zero(PixelTag())))) continue;
+      met |= std::uint32_t{1} << static_cast<unsigned>(n);
+      float* gathered = touch(*faces.slab[n], row, column) + l;
+      add_to(gathered, tau);
+      for (int c = 0; c < 3; ++c)
+        add_product(gathered + static_cast<std::ptrdiff_t>(1 + c) * block_pixels, tau, s.color[c]);
+    }
+  }
+  return __builtin_popcount(met);
+}
+
+// What lies before the near plane does not count.
+template <bool Perspective>
+void gather_on(const Camera& camera, const SplatRecord& record, Slab* slabs, int first,
+               Tile& tile) {
+  const auto near = static_cast<float>(static_cast<double>(camera.near) - camera.depth_origin);
+  const auto depth_of = [&](float face) {
+    return (Perspective ? larger(face, near) : face) - record.middle;
+  };
+  Faces faces;
+  faces.count = 0;
+  for (int n = 0; n < slabs_ahead; ++n) {
+    Slab& slab = slabs[(first + n) % slabs_ahead];
+    if (record.last <= slab.front) break;
+    faces.depth[n] = depth_of(slab.front);
+    faces.depth[n + 1] = depth_of(slab.back);
+    faces.slab[faces.count++] = &slab;
+  }
+  if (faces.count == 0 || record.last - record.middle <= faces.depth[0]) return;
+  const std::uint32_t columns = range_mask({record.column_first, record.column_last});
+  const SplatLanes lanes = spread(record.splat);
+  for (int row = record.row_first; row <= record.row_last; ++row) {
+    std::uint32_t left = columns & tile.open[row];
+    while (left != 0) {
+      const int column = __builtin_ctz(left);
+      left &= left - 1U;
+      const int met = gather_block<Perspective>(lanes, record.partial, faces, tile, row, column);
+      tile.counters.pixel_updates += std::int64_t{met} * block_pixels;
+    }
+  }
+}
+
+void gather(const Camera& camera, const SplatRecord& record, Slab* slabs, int first, Tile& tile) {
+  if (camera.perspective != 0) {
+    gather_on<true>(camera, record, slabs, first, tile);
+  } else {
+    gather_on<false>(camera, record, slabs, first, tile);
+  }
+}
+
+template <bool Perspective>
+int pack_splats_on(const Prepared& p, SplatRecord* out) {
+  const Footing& f = p.footing;
+  int n = 0;
+  for (std::uint64_t left = p.stops.splats; left != 0; left &= left - 1U) {
+    const int l = __builtin_ctzll(left);
+    const float middle = p.stops.depth[l];
+    const float half = p.splats.half_depth[l];
+    out[n++] = {p.pass->partial,
+                middle - half,
+                middle + half,
+                middle,
+                splat_at<Perspective>(p, l),
+                static_cast<std::int16_t>(f.row_first[l]),
+                static_cast<std::int16_t>(f.row_last[l]),
+                static_cast<std::int16_t>(f.column_first[l]),
+                static_cast<std::int16_t>(f.column_last[l])};
+  }
+  return n;
+}
+
+int pack_splats(const Camera& camera, const Prepared& p, SplatRecord* out) {
+  return camera.perspective != 0 ? pack_splats_on<true>(p, out) : pack_splats_on<false>(p, out);
+}
+
+}  // namespace
+}  // namespace windsplat::engine::kernels
