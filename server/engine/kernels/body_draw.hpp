@@ -83,8 +83,10 @@ struct WindowOffsets {
 constexpr WindowOffsets window_offsets() {
   WindowOffsets offsets = {};
   for (int b = 0; b < window_side * window_side; ++b) {
-    offsets.x[b] = static_cast<float>(b % window_side * block_side);
-    offsets.y[b] = static_cast<float>(b / window_side * block_side);
+    const int row = b / window_side;
+    const int column = b % window_side;
+    offsets.x[b] = static_cast<float>(column * block_side);
+    offsets.y[b] = static_cast<float>(row * block_side);
   }
   return offsets;
 }

@@ -12,18 +12,18 @@ namespace {
 // along u they differ, along the others they are all the same. Lanes beyond the last stop repeat
 // it.
 struct Rows {
+  alignas(64) double across[3][brick_side];  // right, down, forward: the part of u
+  alignas(32) float cell[3][brick_side];
+  alignas(32) float inverse_cell[3][brick_side];
+  alignas(32) float from_eye[3][brick_side];
+  alignas(32) float height[brick_side];
+  alignas(32) std::int32_t sample[3][brick_side];
+  std::int32_t group[3][brick_side];
+  std::int64_t along_u[brick_side];
+  std::int64_t offset;  // of the row's first sample in the fields
   int u_count, v_count;
   int first[3];     // of the brick's stops along each axis
   int consecutive;  // a row's samples are neighbours in memory, and there are brick_side of them
-  std::int64_t offset;  // of the row's first sample in the fields
-  std::int64_t along_u[brick_side];
-  alignas(64) std::int32_t sample[3][brick_side];
-  std::int32_t group[3][brick_side];
-  alignas(64) float cell[3][brick_side];
-  alignas(64) float inverse_cell[3][brick_side];
-  alignas(64) float from_eye[3][brick_side];
-  alignas(64) float height[brick_side];
-  alignas(64) double across[3][brick_side];  // right, down, forward: the part of u
 };
 
 // What one stop of an axis has, in all lanes from `first` on.
@@ -98,8 +98,8 @@ void place_row(const Camera& camera, const Pass& pass, int j, const Rows& rows, 
       pass.axis[pass.major].camera + 3 * static_cast<std::ptrdiff_t>(rows.first[pass.major]);
   const double* from_v =
       pass.axis[pass.v].camera + 3 * static_cast<std::ptrdiff_t>(rows.first[pass.v] + j);
-  float* const to[3] = {stops.x + brick_side * j, stops.y + brick_side * j,
-                        stops.z + brick_side * j};
+  const std::ptrdiff_t row = std::ptrdiff_t{brick_side} * j;
+  float* const to[3] = {stops.x + row, stops.y + row, stops.z + row};
   for (int c = 0; c < 3; ++c) {
     const double base = from_slab[c] + from_v[c];
     for (int i = 0; i < brick_side; ++i) to[c][i] = static_cast<float>(base + rows.across[c][i]);
@@ -107,7 +107,7 @@ void place_row(const Camera& camera, const Pass& pass, int j, const Rows& rows, 
   if (pass.by_depth == 0) return;
   const double middle = from_slab[2] + from_v[2] - camera.depth_origin;
   for (int i = 0; i < brick_side; ++i) {
-    stops.depth[brick_side * j + i] = static_cast<float>(middle + rows.across[2][i]);
+    stops.depth[row + i] = static_cast<float>(middle + rows.across[2][i]);
   }
 }
 

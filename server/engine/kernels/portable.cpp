@@ -4,4 +4,6 @@
 #define WINDSPLAT_KERNEL_NAME "portable"
 #include "server/engine/kernels/body.hpp"
 
-static_assert(HWY_TARGET == HWY_SCALAR, "chosen above");
+#if HWY_TARGET != HWY_SCALAR
+#error "the target is chosen above"
+#endif
