@@ -101,7 +101,7 @@ template <>
 struct CellLanes<false> {
   Three<Stop> edge, inverse, from_eye;
 
-  HWY_INLINE CellLanes(const Rows& rows, const Cells& /*cells*/, int i)
+  KERNEL_INLINE CellLanes(const Rows& rows, const Cells& /*cells*/, int i)
       : edge{load<Stop>(rows.cell[0] + i), load<Stop>(rows.cell[1] + i),
              load<Stop>(rows.cell[2] + i)},
         inverse{load<Stop>(rows.inverse_cell[0] + i), load<Stop>(rows.inverse_cell[1] + i),
@@ -109,22 +109,22 @@ struct CellLanes<false> {
         from_eye{load<Stop>(rows.from_eye[0] + i), load<Stop>(rows.from_eye[1] + i),
                  load<Stop>(rows.from_eye[2] + i)} {}
 
-  HWY_INLINE Three<Stop> to_world(const Three<Stop>& grid) const {
+  KERNEL_INLINE Three<Stop> to_world(const Three<Stop>& grid) const {
     return {edge.x * grid.x, edge.y * grid.y, edge.z * grid.z};
   }
-  HWY_INLINE Three<Stop> to_grid(const Three<Stop>& world) const {
+  KERNEL_INLINE Three<Stop> to_grid(const Three<Stop>& world) const {
     return {inverse.x * world.x, inverse.y * world.y, inverse.z * world.z};
   }
-  HWY_INLINE Three<Stop> to_grid(const float world[3]) const {
+  KERNEL_INLINE Three<Stop> to_grid(const float world[3]) const {
     return {inverse.x * all<Stop>(world[0]), inverse.y * all<Stop>(world[1]),
             inverse.z * all<Stop>(world[2])};
   }
   // The edge along axis a, seen along a direction.
-  HWY_INLINE Stop edge_along(int a, const float direction[3]) const {
+  KERNEL_INLINE Stop edge_along(int a, const float direction[3]) const {
     const Stop& width = a == 0 ? edge.x : a == 1 ? edge.y : edge.z;
     return width * all<Stop>(direction[a]);
   }
-  HWY_INLINE Stop edges2() const { return kernels::dot3(edge, edge); }
+  KERNEL_INLINE Stop edges2() const { return kernels::dot3(edge, edge); }
 };
 
 template <>
@@ -133,7 +133,7 @@ struct CellLanes<true> {
   Three<Stop> inverse[3];
   Three<Stop> from_eye;
 
-  HWY_INLINE CellLanes(const Rows& /*rows*/, const Cells& cells, int i) {
+  KERNEL_INLINE CellLanes(const Rows& /*rows*/, const Cells& cells, int i) {
     for (int a = 0; a < 3; ++a) {
       edge[a] = {load<Stop>(cells.edge[a][0] + i), load<Stop>(cells.edge[a][1] + i),
                  load<Stop>(cells.edge[a][2] + i)};
@@ -144,25 +144,25 @@ struct CellLanes<true> {
                 load<Stop>(cells.from_eye[2] + i)};
   }
 
-  HWY_INLINE Three<Stop> to_world(const Three<Stop>& grid) const {
+  KERNEL_INLINE Three<Stop> to_world(const Three<Stop>& grid) const {
     const auto sum = [&](Stop a, Stop b, Stop c) {
       return hn::MulAdd(c, grid.z, hn::MulAdd(b, grid.y, a * grid.x));
     };
     return {sum(edge[0].x, edge[1].x, edge[2].x), sum(edge[0].y, edge[1].y, edge[2].y),
             sum(edge[0].z, edge[1].z, edge[2].z)};
   }
-  HWY_INLINE Three<Stop> to_grid(const Three<Stop>& world) const {
+  KERNEL_INLINE Three<Stop> to_grid(const Three<Stop>& world) const {
     return {kernels::dot3(inverse[0], world), kernels::dot3(inverse[1], world),
             kernels::dot3(inverse[2], world)};
   }
-  HWY_INLINE Three<Stop> to_grid(const float world[3]) const {
+  KERNEL_INLINE Three<Stop> to_grid(const float world[3]) const {
     return {kernels::dot3(world, inverse[0]), kernels::dot3(world, inverse[1]),
             kernels::dot3(world, inverse[2])};
   }
-  HWY_INLINE Stop edge_along(int a, const float direction[3]) const {
+  KERNEL_INLINE Stop edge_along(int a, const float direction[3]) const {
     return kernels::dot3(direction, edge[a]);
   }
-  HWY_INLINE Stop edges2() const {
+  KERNEL_INLINE Stop edges2() const {
     return kernels::dot3(edge[0], edge[0]) + kernels::dot3(edge[1], edge[1]) +
            kernels::dot3(edge[2], edge[2]);
   }
@@ -170,8 +170,8 @@ struct CellLanes<true> {
 
 // Directions along a curved cell's own east, north and up become the world's, of the same length:
 // of a slice's, what lies in its plane.
-HWY_INLINE Three<Stop> bent_direction(const LineStyle& line, const CellLanes<true>& cells,
-                                      const Three<Stop>& direction) {
+KERNEL_INLINE Three<Stop> bent_direction(const LineStyle& line, const CellLanes<true>& cells,
+                                         const Three<Stop>& direction) {
   const Stop kept[3] = {direction.x * all<Stop>(line.keep[0]),
                         direction.y * all<Stop>(line.keep[1]),
                         direction.z * all<Stop>(line.keep[2])};

@@ -35,7 +35,7 @@ struct RibbonLanes {
   Pixel reach, steep, opacity;  // the ramp: clamp(reach - steep distance, 0, opacity)
 };
 
-HWY_INLINE RibbonLanes spread(const Ribbon& r) {
+KERNEL_INLINE RibbonLanes spread(const Ribbon& r) {
   const auto lanes = [](float v) { return all<Pixel>(v); };
   return {lanes(r.x),
           lanes(r.y),
@@ -56,7 +56,7 @@ HWY_INLINE RibbonLanes spread(const Ribbon& r) {
 }
 
 // The same from a brick's arrays.
-HWY_INLINE RibbonLanes spread(const LineStyle& line, const Ribbons& r, int l) {
+KERNEL_INLINE RibbonLanes spread(const LineStyle& line, const Ribbons& r, int l) {
   const auto lanes = [&](const float* v) { return all<Pixel>(v[l]); };
   const auto one = [](float v) { return all<Pixel>(v); };
   const float* tail = r.tail[l];
@@ -97,7 +97,7 @@ enum class Depth { flat, series, exact };
 constexpr float series_bend_max = 4e-3F;
 
 template <Depth Along>
-HWY_INLINE Pixel along_ribbon(const RibbonLanes& r, Pixel w) {
+KERNEL_INLINE Pixel along_ribbon(const RibbonLanes& r, Pixel w) {
   const Pixel one = all<Pixel>(1.0F);
   if (Along == Depth::exact) return w * r.ratio / hn::MulAdd(w, r.bend, one);
   if (Along == Depth::series) {
@@ -109,7 +109,7 @@ HWY_INLINE Pixel along_ribbon(const RibbonLanes& r, Pixel w) {
 
 // dx, dy: pixels from the line's f = 0.
 template <Depth Along, int Style>
-HWY_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
+KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
   const Pixel zero = hn::Zero(PixelTag());
   const Pixel w = clamped(hn::MulAdd(dx, r.wx, hn::MulAdd(dy, r.wy, r.w0)), zero, all<Pixel>(1.0F));
   const Pixel ex = hn::NegMulAdd(w, r.ux, dx);
@@ -136,7 +136,7 @@ struct SplatLanes {
   Pixel color[3];
 };
 
-HWY_INLINE SplatLanes spread(const Splat& s) {
+KERNEL_INLINE SplatLanes spread(const Splat& s) {
   const auto lanes = [](float v) { return all<Pixel>(v); };
   return {
       lanes(s.x),    lanes(s.y),        lanes(s.ex),
@@ -162,7 +162,7 @@ struct SplatLane {
 enum class From { eye, eye_inside, near_plane };
 
 template <bool Perspective, From Start>
-HWY_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixel ray) {
+KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixel ray) {
   const Pixel zero = hn::Zero(PixelTag());
   const Pixel dx = px - s.x;
   const Pixel dy = py - s.y;
@@ -199,16 +199,16 @@ struct Channels {
   float* rgb[3];
 };
 
-HWY_INLINE Channels channels_of(float* block) {
+KERNEL_INLINE Channels channels_of(float* block) {
   constexpr std::ptrdiff_t lanes = block_pixels;
   return {block, block + lanes, {block + 2 * lanes, block + 3 * lanes, block + 4 * lanes}};
 }
 
-HWY_INLINE void add_to(float* channel, Pixel value) {
+KERNEL_INLINE void add_to(float* channel, Pixel value) {
   store(load<Pixel>(channel) + value, channel);
 }
 
-HWY_INLINE void add_product(float* channel, Pixel a, Pixel b) {
+KERNEL_INLINE void add_product(float* channel, Pixel a, Pixel b) {
   store(hn::MulAdd(a, b, load<Pixel>(channel)), channel);
 }
 
@@ -216,34 +216,34 @@ HWY_INLINE void add_product(float* channel, Pixel a, Pixel b) {
 struct Light {
   Pixel most = hn::Zero(PixelTag());
 
-  HWY_INLINE void see(Pixel transmittance) { most = hn::Max(most, hn::Abs(transmittance)); }
-  HWY_INLINE bool above(float stop) const {
+  KERNEL_INLINE void see(Pixel transmittance) { most = hn::Max(most, hn::Abs(transmittance)); }
+  KERNEL_INLINE bool above(float stop) const {
     return !hn::AllFalse(PixelTag(), hn::Gt(most, all<Pixel>(stop)));
   }
 };
 
 // Forward Euler takes the optical depth itself for the absorbed part: stable below 1 alone. Bounded
 // so that a picture that diverges stays a number.
-HWY_INLINE Attenuation<Pixel> euler_attenuation(Pixel tau) {
+KERNEL_INLINE Attenuation<Pixel> euler_attenuation(Pixel tau) {
   const Pixel bounded = hn::Min(tau, all<Pixel>(1e6F));
   return {bounded, all<Pixel>(1.0F) - bounded};
 }
 
 template <int Compositing>
-HWY_INLINE Attenuation<Pixel> attenuation_by(Pixel tau) {
+KERNEL_INLINE Attenuation<Pixel> attenuation_by(Pixel tau) {
   if (Compositing == compositing_cd_euler) return euler_attenuation(tau);
   return attenuation(tau);
 }
 
 template <int Compositing>
-HWY_INLINE Pixel bounded_light(Pixel transmittance) {
+KERNEL_INLINE Pixel bounded_light(Pixel transmittance) {
   if (Compositing != compositing_cd_euler) return transmittance;
   return clamped(transmittance, -1e12F, 1e12F);
 }
 
 // What is left of a line's light in front of which the part `place` of the medium lies.
 template <int Compositing>
-HWY_INLINE Pixel light_before(const Attenuation<Pixel>& medium, Pixel tau, Pixel place) {
+KERNEL_INLINE Pixel light_before(const Attenuation<Pixel>& medium, Pixel tau, Pixel place) {
   if (Compositing == compositing_simple) return medium.transmitted;
   // tau is finite (the plan bounds extinctions), so that 0 times it is 0.
   if (Compositing == compositing_analytic) return attenuation(tau * place).transmitted;
@@ -272,13 +272,13 @@ inline void mark_closed(int row, std::uint32_t bit, Tile& tile) {
   tile.any_closed = 1;
 }
 
-HWY_INLINE void note_light(const Light& light, int row, std::uint32_t bit, Tile& tile) {
+KERNEL_INLINE void note_light(const Light& light, int row, std::uint32_t bit, Tile& tile) {
   if (!light.above(tile.stop)) mark_closed(row, bit, tile);
 }
 
 // Composites into each of a row's blocks, whose bits are set, what add(x, y, ray, block) does.
 template <bool Perspective, class Add>
-HWY_INLINE void each_block(int row, std::uint32_t blocks, Tile& tile, const Add& add) {
+KERNEL_INLINE void each_block(int row, std::uint32_t blocks, Tile& tile, const Add& add) {
   const float y = top_of(tile, row);
   for (; blocks != 0; blocks &= blocks - 1U) {
     const int column = __builtin_ctz(blocks);
@@ -294,8 +294,8 @@ struct BlockPixels {
 };
 
 template <Depth Along, int Style>
-HWY_INLINE Light line_block(const RibbonLanes& r, const BlockPixels& corner,
-                            float* HWY_RESTRICT block) {
+KERNEL_INLINE Light line_block(const RibbonLanes& r, const BlockPixels& corner,
+                               float* HWY_RESTRICT block) {
   const Channels to = channels_of(block);
   Light light;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
@@ -317,8 +317,8 @@ HWY_INLINE Light line_block(const RibbonLanes& r, const BlockPixels& corner,
 }
 
 template <bool Perspective, int Compositing, From Start>
-HWY_INLINE Light splat_block(const SplatLanes& s, float x, float y, const float* HWY_RESTRICT ray,
-                             float* HWY_RESTRICT block) {
+KERNEL_INLINE Light splat_block(const SplatLanes& s, float x, float y,
+                                const float* HWY_RESTRICT ray, float* HWY_RESTRICT block) {
   const Channels to = channels_of(block);
   Light light;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
@@ -340,9 +340,9 @@ HWY_INLINE Light splat_block(const SplatLanes& s, float x, float y, const float*
 
 // The paper's first form: front part, line and back part one over the other, where the ray meets
 // the line at all.
-HWY_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const RibbonLane& line,
-                             const Attenuation<Pixel>& medium, Pixel place, const Channels& to,
-                             int l) {
+KERNEL_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const RibbonLane& line,
+                                const Attenuation<Pixel>& medium, Pixel place, const Channels& to,
+                                int l) {
   const Pixel one = all<Pixel>(1.0F);
   const Pixel met = hn::IfThenElse(hn::Gt(line.opacity, hn::Zero(PixelTag())), place, one);
   const Pixel front = met * medium.absorbed;
@@ -362,9 +362,9 @@ HWY_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const Ri
 // A line inside its homogeneous cell, at x = tf / tau of the way through it:
 // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tf) (c_v - c_s).
 template <bool Perspective, int Compositing, int Style, From Start>
-HWY_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_rise,
-                            const SplatLanes& s, float x, float y, const float* HWY_RESTRICT ray,
-                            float* HWY_RESTRICT block) {
+KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_rise,
+                               const SplatLanes& s, float x, float y, const float* HWY_RESTRICT ray,
+                               float* HWY_RESTRICT block) {
   constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
   const Channels to = channels_of(block);
   Light light;

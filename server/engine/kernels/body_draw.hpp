@@ -95,7 +95,7 @@ constexpr WindowOffsets offsets_in_window = window_offsets();
 
 // Composites one line into its blocks; how many.
 template <Depth Along, int Style>
-HWY_INLINE int draw_windowed(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
+KERNEL_INLINE int draw_windowed(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
   const int row = f.line_first[l];
   const int column = f.line_column[l];
   std::uint64_t left = static_cast<std::uint64_t>(f.window_high[l]) << 32U | f.window_low[l];
@@ -141,7 +141,7 @@ int draw_ribbon(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
 }
 
 template <bool Perspective, int Style>
-HWY_INLINE void draw_line(const Prepared& p, int l, Tile& tile) {
+KERNEL_INLINE void draw_line(const Prepared& p, int l, Tile& tile) {
   const RibbonLanes lanes = spread(p.pass->line, p.ribbons, l);
   const Footing& f = p.footing;
   constexpr Depth general = Perspective && Style != style_plain ? Depth::exact : Depth::flat;
@@ -205,7 +205,8 @@ void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
 }
 
 template <bool Perspective>
-HWY_INLINE void draw_stop(const Prepared& p, const Compositor& with, int style, int l, Tile& tile) {
+KERNEL_INLINE void draw_stop(const Prepared& p, const Compositor& with, int style, int l,
+                             Tile& tile) {
   if (has(p.stops.splats, l)) {
     draw_kernel<Perspective>(p, with, l, tile);
   } else {

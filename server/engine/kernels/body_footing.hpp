@@ -15,7 +15,7 @@ struct Ranges {
   StopInteger first, last;
 };
 
-HWY_INLINE Ranges blocks_between(Stop low, Stop high, int blocks) {
+KERNEL_INLINE Ranges blocks_between(Stop low, Stop high, int blocks) {
   constexpr float per_block = 1.0F / block_side;
   constexpr float slack = 1e-3F;
   const float bound = static_cast<float>(blocks);
@@ -26,7 +26,7 @@ HWY_INLINE Ranges blocks_between(Stop low, Stop high, int blocks) {
 }
 
 // The bits from first to last; none if last < first.
-HWY_INLINE UnsignedOf<Stop> range_masks(const Ranges& range) {
+KERNEL_INLINE UnsignedOf<Stop> range_masks(const Ranges& range) {
   const hn::RebindToUnsigned<StopTag> tag;
   const auto one = hn::Set(tag, 1U);
   const auto above =
@@ -43,7 +43,8 @@ struct LineSpans {
   Ranges rows, columns;
 };
 
-HWY_INLINE LineSpans line_spans(const LineStyle& line, const Ribbons& r, const Tile& tile, int l) {
+KERNEL_INLINE LineSpans line_spans(const LineStyle& line, const Ribbons& r, const Tile& tile,
+                                   int l) {
   const Stop radius = all<Stop>(line.r2);
   LineSpans s;
   s.x = load<Stop>(r.x + l) - all<Stop>(static_cast<float>(tile.x));
@@ -59,12 +60,15 @@ HWY_INLINE LineSpans line_spans(const LineStyle& line, const Ribbons& r, const T
   return s;
 }
 
-HWY_INLINE void store(StopInteger value, std::int32_t* to) { hn::Store(value, StopIntegers(), to); }
+KERNEL_INLINE void store(StopInteger value, std::int32_t* to) {
+  hn::Store(value, StopIntegers(), to);
+}
 
 // The rows of blocks that a row's lines may touch; which of `bits` touch any. `most` becomes the
 // largest number of rows, beyond the first, of a line so far.
-HWY_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons& r, const Tile& tile,
-                                        int l, std::uint32_t bits, StopInteger& most, Footing& f) {
+KERNEL_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons& r,
+                                           const Tile& tile, int l, std::uint32_t bits,
+                                           StopInteger& most, Footing& f) {
   const LineSpans s = line_spans(line, r, tile, l);
   const auto missing =
       hn::Or(hn::Gt(s.rows.first, s.rows.last), hn::Gt(s.columns.first, s.columns.last));
@@ -85,8 +89,8 @@ HWY_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons& r,
 
 // The columns of blocks that a row's lines may touch in each of their rows, up to `most` beyond the
 // first: of the part of the segment within r2 of the row's pixel centres, widened by r2.
-HWY_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, const Tile& tile, int l,
-                                  int most, Footing& f) {
+KERNEL_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, const Tile& tile,
+                                     int l, int most, Footing& f) {
   const LineSpans s = line_spans(line, r, tile, l);
   const int columns = blocks_of(tile.width);
   const Stop radius = all<Stop>(line.r2);
@@ -128,8 +132,8 @@ HWY_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, const
 }
 
 // Rows and columns of blocks that a row's splats may touch; which of `bits` touch any.
-HWY_INLINE std::uint32_t find_splat_blocks(const Outline& outline, const Tile& tile, int l,
-                                           std::uint32_t bits, Footing& f) {
+KERNEL_INLINE std::uint32_t find_splat_blocks(const Outline& outline, const Tile& tile, int l,
+                                              std::uint32_t bits, Footing& f) {
   const Stop left = all<Stop>(static_cast<float>(tile.x));
   const Stop top = all<Stop>(static_cast<float>(tile.y));
   const Ranges across =

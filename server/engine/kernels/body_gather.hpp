@@ -12,7 +12,7 @@ struct PartialRows {
   Pixel part;
 };
 
-HWY_INLINE PartialRows partial_rows_at(Pixel r2) {
+KERNEL_INLINE PartialRows partial_rows_at(Pixel r2) {
   constexpr float rows_per_t2 = static_cast<float>(partial_rows - 1) / (footprint_t * footprint_t);
   const Pixel place = hn::Min(r2 * all<Pixel>(rows_per_t2), all<Pixel>(partial_rows - 1.001F));
   const SignedOf<Pixel> row = truncated(place);
@@ -21,7 +21,7 @@ HWY_INLINE PartialRows partial_rows_at(Pixel r2) {
 }
 
 // An entry's two neighbours in v, interpolated.
-HWY_INLINE Pixel between_columns(SignedOf<Pixel> entry, Pixel part) {
+KERNEL_INLINE Pixel between_columns(SignedOf<Pixel> entry, Pixel part) {
   const hn::RebindToSigned<PixelTag> integers;
   const hn::RebindToUnsigned<PixelTag> bits;
   const SignedOf<Pixel> low = hn::And(entry, hn::Set(integers, 0xffff));
@@ -31,8 +31,8 @@ HWY_INLINE Pixel between_columns(SignedOf<Pixel> entry, Pixel part) {
 }
 
 // F(b^2, v) in parts of partial_one, by linear interpolation in both; v in [-1, 1].
-HWY_INLINE Pixel partial_at(const std::int32_t* HWY_RESTRICT partial, const PartialRows& rows,
-                            Pixel v) {
+KERNEL_INLINE Pixel partial_at(const std::int32_t* HWY_RESTRICT partial, const PartialRows& rows,
+                               Pixel v) {
   const hn::RebindToSigned<PixelTag> integers;
   const Pixel one = all<Pixel>(1.0F);
   // Rays that the face passes before or behind altogether.
@@ -49,7 +49,7 @@ HWY_INLINE Pixel partial_at(const std::int32_t* HWY_RESTRICT partial, const Part
 }
 
 // The block's gathered medium, emptied when it is first touched in this slab.
-HWY_INLINE float* touch(Slab& slab, int row, int column) {
+KERNEL_INLINE float* touch(Slab& slab, int row, int column) {
   float* at =
       slab.gathered + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * gathered_floats;
   const std::uint32_t bit = std::uint32_t{1} << static_cast<unsigned>(column);
@@ -69,8 +69,8 @@ struct Faces {
 
 // Adds to one block what of the splat lies in each slab; how many slabs get something.
 template <bool Perspective>
-HWY_INLINE int gather_block(const SplatLanes& s, const std::int32_t* HWY_RESTRICT partial,
-                            const Faces& faces, const Tile& tile, int row, int column) {
+KERNEL_INLINE int gather_block(const SplatLanes& s, const std::int32_t* HWY_RESTRICT partial,
+                               const Faces& faces, const Tile& tile, int row, int column) {
   constexpr float t2 = footprint_t * footprint_t;
   const float* ray = Perspective ? rays_at(tile, row, column) : nullptr;
   std::uint32_t met = 0;

@@ -16,15 +16,15 @@ struct Segments {
   Stop phase;  // of the texture's motion
 };
 
-HWY_INLINE UnsignedOf<Stop> hashed_sample(const Rows& rows, int a, int i, std::uint32_t key) {
+KERNEL_INLINE UnsignedOf<Stop> hashed_sample(const Rows& rows, int a, int i, std::uint32_t key) {
   const hn::RebindToUnsigned<StopTag> tag;
   const hn::RebindToSigned<StopTag> integers;
   return hn::BitCast(tag, hn::Load(integers, rows.sample[a] + i)) + hn::Set(tag, key);
 }
 
 // Liang-Barsky against the kernel box: per axis |in_box + q along| <= half the box.
-HWY_INLINE void clip_to_box(float half_span, const Three<Stop>& in_box, const Three<Stop>& along,
-                            Segments& s) {
+KERNEL_INLINE void clip_to_box(float half_span, const Three<Stop>& in_box, const Three<Stop>& along,
+                               Segments& s) {
   s.low = all<Stop>(-0.5F);
   s.high = all<Stop>(0.5F);
   const Stop half = all<Stop>(half_span);
@@ -48,8 +48,8 @@ HWY_INLINE void clip_to_box(float half_span, const Three<Stop>& in_box, const Th
 
 // The drawn vector, in the world; a slice keeps what lies in its plane.
 template <bool Curved>
-HWY_INLINE Three<Stop> extent_of(const LineStyle& line, const CellLanes<Curved>& cells,
-                                 const Winds& winds) {
+KERNEL_INLINE Three<Stop> extent_of(const LineStyle& line, const CellLanes<Curved>& cells,
+                                    const Winds& winds) {
   const Stop part = clamped(winds.magnitude * all<Stop>(line.inverse_full_magnitude), 0.0F, 1.0F);
   const Stop length = all<Stop>(line.length) * part;
   if constexpr (Curved) {
@@ -63,9 +63,9 @@ HWY_INLINE Three<Stop> extent_of(const LineStyle& line, const CellLanes<Curved>&
 }
 
 template <bool Curved>
-HWY_INLINE Segments place_segments(const LineStyle& line, const Rows& rows,
-                                   const CellLanes<Curved>& cells, const Winds& winds,
-                                   const Hash3<std::uint32_t>& key, int i) {
+KERNEL_INLINE Segments place_segments(const LineStyle& line, const Rows& rows,
+                                      const CellLanes<Curved>& cells, const Winds& winds,
+                                      const Hash3<std::uint32_t>& key, int i) {
   const Hash3<UnsignedOf<Stop>> kernel = pcg3d(
       Hash3<UnsignedOf<Stop>>{hashed_sample(rows, 0, i, key.x), hashed_sample(rows, 1, i, key.y),
                               hashed_sample(rows, 2, i, key.z)});
@@ -91,9 +91,9 @@ HWY_INLINE Segments place_segments(const LineStyle& line, const Rows& rows,
 
 // On the screen; which lanes have a line there.
 template <bool Perspective>
-HWY_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyle& line,
-                                         const Stops& stops, int l, const Winds& winds, Segments& s,
-                                         Ribbons& r) {
+KERNEL_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyle& line,
+                                            const Stops& stops, int l, const Winds& winds,
+                                            Segments& s, Ribbons& r) {
   const Stop vx = dot3(camera.right, s.extent);
   const Stop vy = dot3(camera.down, s.extent);
   const Stop vz = dot3(camera.forward, s.extent);
@@ -167,7 +167,7 @@ void phase_ribbons(const LineStyle& line, const Winds& winds, const Segments& s,
 
 // The compass bearing of a vector in degrees, 0 along y, 90 along x, in [0, 360). atan on [0, 1] by
 // a polynomial (1e-6 radians).
-HWY_INLINE Stop bearing(Stop x, Stop y) {
+KERNEL_INLINE Stop bearing(Stop x, Stop y) {
   const Stop ax = hn::Abs(x);
   const Stop ay = hn::Abs(y);
   const Stop t = hn::Min(ax, ay) / hn::Max(hn::Max(ax, ay), all<Stop>(1e-30F));
@@ -188,8 +188,8 @@ HWY_INLINE Stop bearing(Stop x, Stop y) {
 }
 
 // What the colour tells. Height is that of the unbent lattice on a curved one.
-HWY_INLINE Stop color_value(const LineStyle& line, const Rows& rows, const Winds& winds,
-                            const Segments& s, Stop view_distance, int i) {
+KERNEL_INLINE Stop color_value(const LineStyle& line, const Rows& rows, const Winds& winds,
+                               const Segments& s, Stop view_distance, int i) {
   const Stop z = hn::MulAdd(s.lift, load<Stop>(rows.cell[2] + i), load<Stop>(rows.height + i));
   switch (line.color_by) {
     case 0:
@@ -217,7 +217,7 @@ HWY_INLINE Stop color_value(const LineStyle& line, const Rows& rows, const Winds
 using ColorTag = hn::CappedTag<float, color_floats>;
 
 // Red, green and blue between a table's entry and the next.
-HWY_INLINE void blend(const float* entry, float part, float* rgb) {
+KERNEL_INLINE void blend(const float* entry, float part, float* rgb) {
   const ColorTag tag;
   for (std::size_t c = 0; c < color_floats; c += hn::MaxLanes(tag)) {
     const auto a = hn::LoadU(tag, entry + c);
@@ -228,7 +228,7 @@ HWY_INLINE void blend(const float* entry, float part, float* rgb) {
 
 // One line's colours: `tail` holds its table's. It is dimmed, and towards the head it turns grey by
 // `grey` at its start and by `more` on the way.
-HWY_INLINE void shade(float dim, float grey, float more, float* tail, float* rise) {
+KERNEL_INLINE void shade(float dim, float grey, float more, float* tail, float* rise) {
   const ColorTag tag;
   const float top = dim * larger(larger(tail[0], tail[1]), tail[2]);
   for (std::size_t c = 0; c < color_floats; c += hn::MaxLanes(tag)) {
@@ -250,9 +250,9 @@ struct Shades {
 };
 
 // Colour by the table, dimmed by magnitude and by view distance.
-HWY_INLINE void shade_ribbons(const Camera& camera, const LineStyle& line, const Rows& rows,
-                              const Stops& stops, const Winds& winds, const Segments& s, int i,
-                              int l, Shades& shades) {
+KERNEL_INLINE void shade_ribbons(const Camera& camera, const LineStyle& line, const Rows& rows,
+                                 const Stops& stops, const Winds& winds, const Segments& s, int i,
+                                 int l, Shades& shades) {
   const Stop distance = load<Stop>(stops.z + l) + dot3(camera.forward, s.offset);
   const Stop one = all<Stop>(1.0F);
   const Stop strong =
@@ -297,10 +297,11 @@ inline void color_ribbons(const ColorTable& table, const Shades& shades, std::ui
 
 // A vector of lines made ready; which lanes have one on the screen.
 template <bool Perspective, bool Curved>
-HWY_INLINE std::uint32_t prepare_ribbons(const Camera& camera, const Pass& pass, const Rows& rows,
-                                         const Stops& stops, const CellLanes<Curved>& cells,
-                                         const Winds& winds, const Hash3<std::uint32_t>& key, int i,
-                                         int l, Shades& shades, Ribbons& ribbons) {
+KERNEL_INLINE std::uint32_t prepare_ribbons(const Camera& camera, const Pass& pass,
+                                            const Rows& rows, const Stops& stops,
+                                            const CellLanes<Curved>& cells, const Winds& winds,
+                                            const Hash3<std::uint32_t>& key, int i, int l,
+                                            Shades& shades, Ribbons& ribbons) {
   Segments s = place_segments<Curved>(pass.line, rows, cells, winds, key, i);
   const auto shown = project_segments<Perspective>(camera, pass.line, stops, l, winds, s, ribbons);
   shade_ribbons(camera, pass.line, rows, stops, winds, s, i, l, shades);

@@ -25,7 +25,7 @@ struct Attenuation {
 // tau = n ln2 + r, |r| <= ln2 / 2; expm1(-r) by a polynomial (2.5e-8 relative). With n = 0 nothing
 // is subtracted from 1, so tau = 1e-30 absorbs 1e-30; from tau = 17 on exactly 1 is absorbed.
 template <class V>
-HWY_INLINE Attenuation<V> attenuation(V tau) {
+KERNEL_INLINE Attenuation<V> attenuation(V tau) {
   const V t = clamped(tau, 0.0F, 88.0F);  // there 2^-n is 0
   // Never negative: truncation rounds to the nearest.
   const auto n = truncated(hn::MulAdd(t, all<V>(1.44269504F), all<V>(0.5F)));
@@ -49,7 +49,7 @@ constexpr float footprint_t = static_cast<float>(footprint_radius);
 constexpr float footprint_integral = 1.4476982547F;
 
 template <class V>
-HWY_INLINE V footprint(V r2) {
+KERNEL_INLINE V footprint(V r2) {
   const V r = hn::Sqrt(r2);
   const V inner = hn::NegMulAdd(r2, all<V>(1.0F / (footprint_s * footprint_t)), all<V>(1.0F));
   const V rest = hn::Max(all<V>(footprint_t) - r, hn::Zero(TagOf<V>()));
@@ -65,17 +65,17 @@ struct Hash3 {
 
 inline std::uint32_t high_half(std::uint32_t v) { return v >> 16U; }
 template <class U>
-HWY_INLINE U high_half(U v) {
+KERNEL_INLINE U high_half(U v) {
   return hn::ShiftRight<16>(v);
 }
 inline std::uint32_t repeated(std::uint32_t value, std::uint32_t /*like*/) { return value; }
 template <class U>
-HWY_INLINE U repeated(std::uint32_t value, U /*like*/) {
+KERNEL_INLINE U repeated(std::uint32_t value, U /*like*/) {
   return hn::Set(TagOf<U>(), value);
 }
 
 template <class U>
-HWY_INLINE Hash3<U> pcg3d(Hash3<U> v) {
+KERNEL_INLINE Hash3<U> pcg3d(Hash3<U> v) {
   const U factor = repeated(1664525U, v.x);
   const U term = repeated(1013904223U, v.x);
   v.x = v.x * factor + term;
@@ -103,7 +103,7 @@ inline float unit_interval(std::uint32_t bits) {
 }
 
 template <class V>
-HWY_INLINE V unit_interval(UnsignedOf<V> bits) {
+KERNEL_INLINE V unit_interval(UnsignedOf<V> bits) {
   const hn::RebindToSigned<TagOf<V>> integers;
   return from_integer<V>(hn::BitCast(integers, hn::ShiftRight<8>(bits))) * all<V>(0x1p-24F);
 }

@@ -66,8 +66,8 @@ struct BrickMaker {
         key(hash_key(of_pass.line.seed, of_pass.line.epoch)) {}
 
   // The lines of a vector of stops; which of `bits` have one.
-  HWY_INLINE std::uint32_t make_lines(const CellLanes<Curved>& cell, int i, int l,
-                                      std::uint32_t bits) {
+  KERNEL_INLINE std::uint32_t make_lines(const CellLanes<Curved>& cell, int i, int l,
+                                         std::uint32_t bits) {
     const Winds winds = read_winds(pass, rows, i);
     const Stop least = all<Stop>(least_magnitude(pass.line));
     const std::uint32_t lines = bits & bits_of<Stop>(hn::Ge(winds.magnitude, least));
@@ -76,8 +76,8 @@ struct BrickMaker {
                                                         key, i, l, shades, out.ribbons);
   }
 
-  HWY_INLINE std::uint32_t make_splats(const CellLanes<Curved>& cell, int i, int l,
-                                       std::uint32_t bits) {
+  KERNEL_INLINE std::uint32_t make_splats(const CellLanes<Curved>& cell, int i, int l,
+                                          std::uint32_t bits) {
     const Extinctions found = read_extinctions(pass, rows, i);
     const std::uint32_t splats = bits & bits_of<Stop>(found.kept);
     if (splats == 0) return 0;

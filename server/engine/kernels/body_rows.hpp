@@ -132,7 +132,7 @@ void place_curved_row(const Camera& camera, const Pass& pass, int j, const Rows&
 }
 
 // A field's values at a row's stops from lane i on.
-HWY_INLINE Stop fetch(const float* values, const Rows& rows, int i) {
+KERNEL_INLINE Stop fetch(const float* values, const Rows& rows, int i) {
   if (rows.consecutive != 0) return load_unaligned<Stop>(values + rows.offset + i);
   alignas(64) float lanes[brick_side];
   for (int k = 0; k < brick_side; ++k) lanes[k] = values[rows.offset + rows.along_u[k]];

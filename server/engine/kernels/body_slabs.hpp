@@ -20,7 +20,7 @@ struct DepthRange {
 };
 
 template <bool Perspective>
-HWY_INLINE DepthRange row_depths(const Ribbon& r, float margin, Pixel x, float y) {
+KERNEL_INLINE DepthRange row_depths(const Ribbon& r, float margin, Pixel x, float y) {
   constexpr float farthest = 0.5F * (block_side - 1);  // pixel centres from a block's middle
   const auto depth_at = [&](Pixel along) {
     const Pixel w = clamped(along, 0.0F, 1.0F);
@@ -43,8 +43,8 @@ HWY_INLINE DepthRange row_depths(const Ribbon& r, float margin, Pixel x, float y
 
 // Lists the open blocks that stop l's line may touch; how many.
 template <bool Perspective>
-HWY_INLINE int list_hits(const RibbonRecord& line, const Footing& f, int l, std::uint32_t slot,
-                         float margin, const Tile& tile, Hit* hits) {
+KERNEL_INLINE int list_hits(const RibbonRecord& line, const Footing& f, int l, std::uint32_t slot,
+                            float margin, const Tile& tile, Hit* hits) {
   constexpr float middle = 0.5F * block_side;
   int n = 0;
   for (int row = f.line_first[l], k = 0; row <= f.line_last[l]; ++row, ++k) {
@@ -118,7 +118,7 @@ struct Meeting {
 constexpr int meetings_max = 64;  // put in order together; a line moves by half of that at most
 
 template <int Compositing>
-HWY_INLINE Passage open_passage(const float* gathered, int l) {
+KERNEL_INLINE Passage open_passage(const float* gathered, int l) {
   const Pixel zero = hn::Zero(PixelTag());
   const Pixel one = all<Pixel>(1.0F);
   Passage p = {zero, {zero, one}, {zero, zero, zero}, {zero, zero, zero}, one, zero, one};
@@ -142,7 +142,7 @@ struct Met {
 };
 
 template <Depth Along, int Style>
-HWY_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
+KERNEL_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
   const RibbonLanes r = spread(line.ribbon);
   const Pixel zero = hn::Zero(PixelTag());
   const Pixel w =
@@ -160,7 +160,7 @@ HWY_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel 
 }
 
 template <bool Perspective>
-HWY_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
+KERNEL_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
   if (!Perspective) {
     return line.moving != 0 ? meet<Depth::flat, style_moving>(line, slab, px, py)
                             : meet<Depth::flat, style_head>(line, slab, px, py);
@@ -173,15 +173,15 @@ HWY_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel 
                           : meet<Depth::exact, style_head>(line, slab, px, py);
 }
 
-HWY_INLINE Pixel place_in(const Slab& slab, Pixel depth) {
+KERNEL_INLINE Pixel place_in(const Slab& slab, Pixel depth) {
   const Pixel inverse = all<Pixel>(1.0F / (slab.back - slab.front));
   return clamped((depth - all<Pixel>(slab.front)) * inverse, 0.0F, 1.0F);
 }
 
 // Whether any pixel meets the line at all.
 template <bool Perspective>
-HWY_INLINE bool meet_line(const RibbonRecord& line, const Slab& slab, float x, float y,
-                          Meeting& m) {
+KERNEL_INLINE bool meet_line(const RibbonRecord& line, const Slab& slab, float x, float y,
+                             Meeting& m) {
   bool met = false;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
     const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
@@ -199,7 +199,7 @@ HWY_INLINE bool meet_line(const RibbonRecord& line, const Slab& slab, float x, f
 }
 
 // Puts two neighbours in order, each pixel by itself; whether any pixel had them the other way.
-HWY_INLINE bool put_in_order(Meeting& first, Meeting& second) {
+KERNEL_INLINE bool put_in_order(Meeting& first, Meeting& second) {
   bool swapped = false;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
     const auto wrong = hn::Gt(load<Pixel>(first.place + l), load<Pixel>(second.place + l));
@@ -227,7 +227,7 @@ inline void sort_meetings(Meeting* m, int count) {
 }
 
 template <int Compositing>
-HWY_INLINE void pass_line(Pixel opacity, Pixel place, const Pixel color[3], Passage& p) {
+KERNEL_INLINE void pass_line(Pixel opacity, Pixel place, const Pixel color[3], Passage& p) {
   const Pixel one = all<Pixel>(1.0F);
   if (Compositing == compositing_cd_naive) {
     // Only a pixel that the line covers is followed up to it.
@@ -254,7 +254,7 @@ HWY_INLINE void pass_line(Pixel opacity, Pixel place, const Pixel color[3], Pass
 }
 
 template <int Compositing>
-HWY_INLINE void pass_line(const Meeting& m, int l, Passage& p) {
+KERNEL_INLINE void pass_line(const Meeting& m, int l, Passage& p) {
   const Pixel color[3] = {load<Pixel>(m.color[0] + l), load<Pixel>(m.color[1] + l),
                           load<Pixel>(m.color[2] + l)};
   pass_line<Compositing>(load<Pixel>(m.opacity + l), load<Pixel>(m.place + l), color, p);
@@ -263,7 +263,7 @@ HWY_INLINE void pass_line(const Meeting& m, int l, Passage& p) {
 // I = c_s (1 - P exp(-tau)) + sum_k prod_(j<k) (1 - a_j) a_k exp(-tau x_k) (c_k - c_s).
 // Returns the light that is left.
 template <int Compositing>
-HWY_INLINE Pixel close_passage(const Passage& p, int l, float* block) {
+KERNEL_INLINE Pixel close_passage(const Passage& p, int l, float* block) {
   const Channels to = channels_of(block);
   const Pixel one = all<Pixel>(1.0F);
   const Pixel t = load<Pixel>(to.transmittance + l);
@@ -306,7 +306,7 @@ inline bool is_dark(const float* transmittance, const Passage* p, float stop) {
 }
 
 template <int Compositing>
-HWY_INLINE void pass_lines(const Meeting* m, int count, Passage* p) {
+KERNEL_INLINE void pass_lines(const Meeting* m, int count, Passage* p) {
   for (int v = 0; v < block_vectors; ++v) {
     Passage passage = p[v];
     for (int n = 0; n < count; ++n) pass_line<Compositing>(m[n], v * pixel_lanes, passage);
@@ -351,7 +351,7 @@ enum class Outcome { done, dark, out_of_order };
 // Composites the lines as they come. They come by their depth in the middle of the block; where
 // that is not the order in some pixel the passage is worth nothing.
 template <bool Perspective, int Compositing>
-HWY_INLINE Outcome pass_in_order(const Closing& with, Passage* passage) {
+KERNEL_INLINE Outcome pass_in_order(const Closing& with, Passage* passage) {
   constexpr int between_looks = 16;
   Pixel farthest[block_vectors];
   for (Pixel& depth : farthest) depth = all<Pixel>(with.slab.front);

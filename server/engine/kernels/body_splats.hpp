@@ -13,7 +13,7 @@ struct Extent {
   Stop low, high;
 };
 
-HWY_INLINE Extent silhouette(Stop v, Stop z, Stop s11, Stop s13, Stop s33) {
+KERNEL_INLINE Extent silhouette(Stop v, Stop z, Stop s11, Stop s13, Stop s33) {
   const Stop z2 = z * z;
   const Stop m33 = z2 - s33;
   const Stop inner =
@@ -34,7 +34,7 @@ struct Facing {
 };
 
 template <bool Curved>
-HWY_INLINE Facing face(const Camera& camera, const CellLanes<Curved>& cells) {
+KERNEL_INLINE Facing face(const Camera& camera, const CellLanes<Curved>& cells) {
   const Stop zero = hn::Zero(StopTag());
   Facing f = {zero, zero, zero, zero, zero, {}, {}};
   for (int a = 0; a < 3; ++a) {
@@ -62,8 +62,9 @@ struct Outline {
 };
 
 template <bool Curved>
-HWY_INLINE Outline perspective_splats(const Camera& camera, const Stops& stops,
-                                      const CellLanes<Curved>& cells, int l, Stop rho, Splats& s) {
+KERNEL_INLINE Outline perspective_splats(const Camera& camera, const Stops& stops,
+                                         const CellLanes<Curved>& cells, int l, Stop rho,
+                                         Splats& s) {
   const Facing f = face<Curved>(camera, cells);
   const Stop x = load<Stop>(stops.x + l);
   const Stop y = load<Stop>(stops.y + l);
@@ -124,8 +125,9 @@ HWY_INLINE Outline perspective_splats(const Camera& camera, const Stops& stops,
 }
 
 template <bool Curved>
-HWY_INLINE Outline orthographic_splats(const Camera& camera, const Stops& stops,
-                                       const CellLanes<Curved>& cells, int l, Stop rho, Splats& s) {
+KERNEL_INLINE Outline orthographic_splats(const Camera& camera, const Stops& stops,
+                                          const CellLanes<Curved>& cells, int l, Stop rho,
+                                          Splats& s) {
   const Facing f = face<Curved>(camera, cells);
   const Three<Stop> forward = cells.to_grid(camera.forward);
   const Stop length2 = dot3(forward, forward);
@@ -152,8 +154,8 @@ HWY_INLINE Outline orthographic_splats(const Camera& camera, const Stops& stops,
 
 // A row's splats from lane i on, made ready.
 template <bool Perspective, bool Curved>
-HWY_INLINE Outline prepare_splats(const Camera& camera, const Stops& stops,
-                                  const CellLanes<Curved>& cells, int l, Stop rho, Splats& s) {
+KERNEL_INLINE Outline prepare_splats(const Camera& camera, const Stops& stops,
+                                     const CellLanes<Curved>& cells, int l, Stop rho, Splats& s) {
   if (Perspective) return perspective_splats<Curved>(camera, stops, cells, l, rho, s);
   return orthographic_splats<Curved>(camera, stops, cells, l, rho, s);
 }

@@ -15,7 +15,7 @@ struct Winds {
 };
 
 // Magnitude without overflow or underflow: the largest component is taken out first.
-HWY_INLINE Stop magnitude_of(const Three<Stop>& v) {
+KERNEL_INLINE Stop magnitude_of(const Three<Stop>& v) {
   const Stop top = hn::Max(hn::Max(hn::Abs(v.x), hn::Abs(v.y)), hn::Abs(v.z));
   const Stop inverse = inverse_of(hn::Max(top, all<Stop>(magnitude_least)));
   const Three<Stop> unit = {v.x * inverse, v.y * inverse, v.z * inverse};
@@ -23,7 +23,7 @@ HWY_INLINE Stop magnitude_of(const Three<Stop>& v) {
 }
 
 // A row's vectors in the field; zero if masked (a masked sample is masked in every component).
-HWY_INLINE Three<Stop> fetch_winds(const Pass& pass, const Rows& rows, int i) {
+KERNEL_INLINE Three<Stop> fetch_winds(const Pass& pass, const Rows& rows, int i) {
   const LineStyle& line = pass.line;
   const Stop zero = hn::Zero(StopTag());
   const Stop x = fetch(line.velocity[0], rows, i);
@@ -35,7 +35,7 @@ HWY_INLINE Three<Stop> fetch_winds(const Pass& pass, const Rows& rows, int i) {
 }
 
 // The rates that turn a row's vectors into the picture's.
-HWY_INLINE Stop rate_of(const float* rates, const Rows& rows, int a, int i) {
+KERNEL_INLINE Stop rate_of(const float* rates, const Rows& rows, int a, int i) {
   if (rates == nullptr) return all<Stop>(1.0F);
   alignas(64) float lanes[brick_side];
   for (int k = 0; k < brick_side; ++k) lanes[k] = rates[rows.sample[a][k]];
@@ -44,7 +44,7 @@ HWY_INLINE Stop rate_of(const float* rates, const Rows& rows, int a, int i) {
 
 // Unit directions as drawn, and magnitudes; a masked sample or one without a direction gets a
 // negative magnitude.
-HWY_INLINE Winds read_winds(const Pass& pass, const Rows& rows, int i) {
+KERNEL_INLINE Winds read_winds(const Pass& pass, const Rows& rows, int i) {
   const LineStyle& line = pass.line;
   const Three<Stop> v = fetch_winds(pass, rows, i);
   const Stop least = all<Stop>(magnitude_least);
@@ -66,7 +66,7 @@ inline float least_magnitude(const LineStyle& line) {
 }
 
 // The widest a ray's cell can be, over all view directions: the stop's longest edge.
-HWY_INLINE Stop cell_longest(const Rows& rows, int i) {
+KERNEL_INLINE Stop cell_longest(const Rows& rows, int i) {
   const Stop x = load<Stop>(rows.cell[0] + i);
   const Stop y = load<Stop>(rows.cell[1] + i);
   return hn::Max(hn::Max(x, y), load<Stop>(rows.cell[2] + i));
@@ -77,7 +77,7 @@ struct Extinctions {
   MaskOf<Stop> kept;  // no lane whose optical depth stays below tolerance from every side
 };
 
-HWY_INLINE Extinctions read_extinctions(const Pass& pass, const Rows& rows, int i) {
+KERNEL_INLINE Extinctions read_extinctions(const Pass& pass, const Rows& rows, int i) {
   const Medium& medium = pass.medium;
   const Stop zero = hn::Zero(StopTag());
   Stop total = zero;

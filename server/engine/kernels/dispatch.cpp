@@ -11,7 +11,7 @@ namespace {
 Result<const Table*> choose() {
   const std::vector<const Table*> usable = usable_tables();
   const char* wanted = std::getenv("WINDSPLAT_TARGET");  // NOLINT(concurrency-mt-unsafe)
-  if (wanted == nullptr) return usable.back();
+  if (wanted == nullptr || *wanted == '\0') return usable.back();
   std::string names;
   for (const Table* table : usable) {
     if (std::string(wanted) == table->name) return table;
@@ -25,19 +25,23 @@ Result<const Table*> choose() {
 
 std::vector<const Table*> usable_tables() {
   std::vector<const Table*> usable{&portable_table()};
-#ifdef WINDSPLAT_X86_TARGETS
+#ifdef WINDSPLAT_KERNELS_SSE4
   if (__builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt") &&
       __builtin_cpu_supports("ssse3")) {
     usable.push_back(&sse4_table());
   }
+#endif
+#ifdef WINDSPLAT_KERNELS_AVX2
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
       __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2")) {
     usable.push_back(&avx2_table());
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-        __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512vl")) {
-      usable.push_back(&avx512_table());
-    }
+  }
+#endif
+#ifdef WINDSPLAT_KERNELS_AVX512
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+      __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512vl")) {
+    usable.push_back(&avx512_table());
   }
 #endif
   return usable;

@@ -8,6 +8,14 @@
 
 #include "server/engine/kernels/frame_data.hpp"
 
+// What hot loops are made of: never called, but built into their loops. Sanitizers' builds leave
+// that to the compiler, which would take minutes over what it becomes with all their checks.
+#if defined(WINDSPLAT_SANITIZED)
+#define KERNEL_INLINE inline
+#else
+#define KERNEL_INLINE HWY_INLINE
+#endif
+
 namespace windsplat::engine::kernels {
 namespace {
 
@@ -31,48 +39,48 @@ template <class V>
 using MaskOf = hn::Mask<TagOf<V>>;
 
 template <class V>
-HWY_INLINE V all(float value) {
+KERNEL_INLINE V all(float value) {
   return hn::Set(TagOf<V>(), value);
 }
 
 template <class V>
-HWY_INLINE V load(const float* from) {
+KERNEL_INLINE V load(const float* from) {
   return hn::Load(TagOf<V>(), from);
 }
 
 template <class V>
-HWY_INLINE V load_unaligned(const float* from) {
+KERNEL_INLINE V load_unaligned(const float* from) {
   return hn::LoadU(TagOf<V>(), from);
 }
 
 template <class V>
-HWY_INLINE void store(V value, float* to) {
+KERNEL_INLINE void store(V value, float* to) {
   hn::Store(value, TagOf<V>(), to);
 }
 
 template <class V>
-HWY_INLINE V clamped(V v, V low, V high) {
+KERNEL_INLINE V clamped(V v, V low, V high) {
   return hn::Min(hn::Max(v, low), high);
 }
 
 template <class V>
-HWY_INLINE V clamped(V v, float low, float high) {
+KERNEL_INLINE V clamped(V v, float low, float high) {
   return clamped(v, all<V>(low), all<V>(high));
 }
 
 template <class V>
-HWY_INLINE SignedOf<V> truncated(V v) {
+KERNEL_INLINE SignedOf<V> truncated(V v) {
   return hn::ConvertTo(hn::RebindToSigned<TagOf<V>>(), v);
 }
 
 template <class V>
-HWY_INLINE V from_integer(SignedOf<V> v) {
+KERNEL_INLINE V from_integer(SignedOf<V> v) {
   return hn::ConvertTo(TagOf<V>(), v);
 }
 
 // The lanes of a mask as the lowest bits of a number.
 template <class V>
-HWY_INLINE std::uint32_t bits_of(MaskOf<V> mask) {
+KERNEL_INLINE std::uint32_t bits_of(MaskOf<V> mask) {
   std::uint8_t bytes[8] = {0};
   hn::StoreMaskBits(TagOf<V>(), mask, bytes);
   std::uint32_t bits = bytes[0];
@@ -82,7 +90,7 @@ HWY_INLINE std::uint32_t bits_of(MaskOf<V> mask) {
 
 // Masked samples are NaN, told by their bits: arithmetic is compiled as if there were none.
 template <class V>
-HWY_INLINE MaskOf<V> is_masked(V v) {
+KERNEL_INLINE MaskOf<V> is_masked(V v) {
   const hn::RebindToSigned<TagOf<V>> integers;
   const auto magnitude = hn::And(hn::BitCast(integers, v), hn::Set(integers, 0x7fffffff));
   return hn::RebindMask(TagOf<V>(), hn::Gt(magnitude, hn::Set(integers, 0x7f800000)));
@@ -90,13 +98,13 @@ HWY_INLINE MaskOf<V> is_masked(V v) {
 
 // A divisor that is never zero, its sign kept.
 template <class V>
-HWY_INLINE V divisor(V v) {
+KERNEL_INLINE V divisor(V v) {
   const V least = all<V>(1e-30F);
   return hn::IfThenElse(hn::Lt(hn::Abs(v), least), hn::CopySign(least, v), v);
 }
 
 template <class V>
-HWY_INLINE V inverse_of(V v) {
+KERNEL_INLINE V inverse_of(V v) {
   return hn::Div(all<V>(1.0F), v);
 }
 
@@ -107,17 +115,17 @@ struct Three {
 };
 
 template <class V>
-HWY_INLINE V dot3(const Three<V>& a, const Three<V>& b) {
+KERNEL_INLINE V dot3(const Three<V>& a, const Three<V>& b) {
   return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, a.x * b.x));
 }
 
 template <class V>
-HWY_INLINE V dot3(const float axis[3], const Three<V>& v) {
+KERNEL_INLINE V dot3(const float axis[3], const Three<V>& v) {
   return hn::MulAdd(all<V>(axis[2]), v.z, hn::MulAdd(all<V>(axis[1]), v.y, all<V>(axis[0]) * v.x));
 }
 
 template <class V>
-HWY_INLINE Three<V> cross3(const Three<V>& a, const Three<V>& b) {
+KERNEL_INLINE Three<V> cross3(const Three<V>& a, const Three<V>& b) {
   return {hn::MulSub(a.y, b.z, a.z * b.y), hn::MulSub(a.z, b.x, a.x * b.z),
           hn::MulSub(a.x, b.y, a.y * b.x)};
 }
