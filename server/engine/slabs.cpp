@@ -364,7 +364,7 @@ class SlabSweep {
     for (std::uint32_t& until : met_until_) sum = std::exchange(until, sum) + sum;
     if (space_.met.size() < hits.size()) space_.met.resize(hits.size());
     for (const Hit& hit : hits) {
-      space_.met[met_until_[hit.block]++] = {0.5F * (hit.first + hit.last), hit.line};
+      space_.met[met_until_[hit.block]++] = {0.5F * (hit.first + hit.last), hit.first, hit.line};
     }
   }
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -17,13 +18,17 @@ enum class What { vectors, scalars, both, two_scalars, strides, fine_medium };
 
 class SceneMaker {
  public:
-  explicit SceneMaker(std::uint32_t seed) : random_(seed) {}
+  explicit SceneMaker(std::uint32_t seed, const std::array<int, 3>& dims = {0, 0, 0})
+      : random_(seed), wanted_(dims) {}
 
   Scene make(What what, bool perspective, bool eye_inside) {
     Scene scene;
     std::array<std::vector<double>, 3> spacing;
     const double cell[3] = {between(0.03, 0.08), between(0.03, 0.08), between(0.05, 0.2)};
-    const int dims[3] = {whole(9, 26), whole(7, 19), whole(3, 12)};
+    int dims[3] = {whole(9, 26), whole(7, 19), whole(3, 12)};
+    for (int a = 0; a < 3; ++a) {
+      if (wanted_[a] > 0) dims[a] = wanted_[a];
+    }
     for (int a = 0; a < 3; ++a) {
       for (int i = 0; i < dims[a]; ++i) spacing[a].push_back(cell[a] * between(0.6, 1.4));
     }
@@ -112,6 +117,7 @@ class SceneMaker {
   }
 
   std::mt19937 random_;
+  std::array<int, 3> wanted_;  // 0: any
 };
 
 int srgb_code(double linear) {
@@ -157,6 +163,36 @@ TEST_P(RandomView, EqualsTheNaiveRenderer) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomView, testing::Range(1U, 85U));
 
+// Rows that are not full, and rows whose first and last sample lie as far apart as in a full one of
+// neighbours: nothing between them may be read.
+struct Rows {
+  std::array<int, 3> dims;
+  int stride;
+  glm::dvec3 forward;
+};
+
+class AwkwardRows : public testing::TestWithParam<Rows> {};
+
+TEST_P(AwkwardRows, EqualTheNaiveRenderer) {
+  const Rows& rows = GetParam();
+  for (const std::uint32_t seed : {1U, 2U, 3U}) {
+    Scene scene = SceneMaker(seed, rows.dims).make(What::both, true, false);
+    scene.slice.reset();
+    scene.vector->stride = scene.scalars[0].stride = rows.stride;
+    scene.camera = look({0, 0, 0}, rows.forward, 2.0, 90, 70, true, 0.4);
+    const Difference d = compare(render(scene, 2).image, naive::render<double>(scene));
+    EXPECT_LE(d.linear, 5e-4) << seed;
+    EXPECT_GT(d.brightest, 0.02);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Lattices, AwkwardRows,
+    testing::Values(Rows{{7, 10, 9}, 1, {1, 0.2, 0.1}}, Rows{{7, 18, 12}, 1, {-1, 0.1, 0.2}},
+                    Rows{{9, 12, 16}, 4, {0.1, 0.2, 1}}, Rows{{41, 12, 9}, 4, {0.1, 1, 0.3}},
+                    Rows{{14, 13, 12}, 7, {0.1, 0.2, -1}}, Rows{{14, 13, 22}, 8, {0.2, 1, 0.1}},
+                    Rows{{15, 9, 22}, 9, {0.1, 0.2, 1}}));
+
 // Forward Euler doubles what differs wherever tau passes 1: compared below that.
 TEST(Euler, EqualsTheNaiveRendererWhereItIsStable) {
   for (const std::uint32_t seed : {2U, 3U, 8U, 15U}) {
@@ -167,6 +203,34 @@ TEST(Euler, EqualsTheNaiveRendererWhereItIsStable) {
     EXPECT_LE(d.linear, 5e-4) << seed;
     EXPECT_GT(d.brightest, 0.02);
   }
+}
+
+// Lines that cross come in another order in some pixel than in the middle of their block: a slab
+// may end early only where all that is left lies behind.
+TEST(Slabs, EndEarlyWithinTheBoundTheyReport) {
+  int ended = 0;
+  for (std::uint32_t seed = 1; seed <= 60; ++seed) {
+    Scene scene = SceneMaker(seed).make(What::both, seed % 2 == 0, false);
+    scene.slice.reset();
+    scene.method = scene::Method::slab;
+    scene.slab_thickness = 12;
+    scene.vector->opacity = 1;
+    scene.vector->length = 1.5;
+    scene.vector->span = 9;
+    scene.vector->min_magnitude = 0;
+    scene.camera.width = 48;
+    scene.camera.height = 36;
+    const engine::Rendered early = render(scene);
+    scene.stop_transmittance = 0;
+    const engine::Rendered whole = render(scene);
+    float most = 0;
+    for (std::size_t i = 0; i < whole.image.rgba.size(); ++i) {
+      most = std::max(most, std::abs(whole.image.rgba[i] - early.image.rgba[i]));
+    }
+    EXPECT_LE(most, early.work.stop_bound + 2e-5) << seed;
+    ended += early.work.stop_bound > 0 ? 1 : 0;
+  }
+  EXPECT_GT(ended, 20);
 }
 
 TEST(Threads, AnyNumberGivesTheSameBits) {

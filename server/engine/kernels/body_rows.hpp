@@ -83,7 +83,8 @@ void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
   const std::int64_t step = pass.step[pass.u];
   const std::int32_t* sample = rows.sample[pass.u];
   for (int i = 0; i < brick_side; ++i) rows.along_u[i] = step * (sample[i] - sample[0]);
-  rows.consecutive = rows.along_u[brick_side - 1] == brick_side - 1 ? 1 : 0;
+  const bool full = count == brick_side;
+  rows.consecutive = full && rows.along_u[brick_side - 1] == brick_side - 1 ? 1 : 0;
 }
 
 void set_row(const Pass& pass, int j, Rows& rows) {
@@ -296,8 +297,8 @@ bool row_is_open(const Camera& camera, const Frustum& f, const Stops& stops, int
   const int step = straight && u_count > 1 ? u_count - 1 : 1;
   for (int i = 0; i < u_count; i += step) {
     const int l = brick_side * j + i;
-    // Behind the near plane a row's shadow has no end there.
-    if (Perspective && stops.z[l] < camera.near) return true;
+    // A kernel that reaches behind the near plane casts a shadow without an end there.
+    if (Perspective && stops.z[l] - f.reach[2] < camera.near) return true;
     const Shadow x = shadow_of<Perspective>(camera, stops.x[l], stops.z[l], f.reach[0], f.reach[2]);
     const Shadow y = shadow_of<Perspective>(camera, stops.y[l], stops.z[l], f.reach[1], f.reach[2]);
     across = {smaller(across.low, x.low), larger(across.high, x.high)};

@@ -346,6 +346,17 @@ inline void sort_met(const MetLine* met, int count, MetLine* sorted) {
   }
 }
 
+// Whether all lines from `from` on lie behind a depth: then, if it is dark there, they do not
+// count.
+inline bool rest_is_behind(const Closing& with, int from, float depth) {
+  for (int h = from; h < with.count; ++h) {
+    if (with.met[h].first < depth) return false;
+  }
+  return true;
+}
+
+KERNEL_INLINE float largest_of(Pixel v) { return hn::GetLane(hn::MaxOfLanes(PixelTag(), v)); }
+
 enum class Outcome { done, dark, out_of_order };
 
 // Composites the lines as they come. They come by their depth in the middle of the block; where
@@ -380,9 +391,20 @@ KERNEL_INLINE Outcome pass_in_order(const Closing& with, Passage* passage) {
       farthest[v] = far;
       passage[v] = p;
     }
-    if (to < with.count && is_dark(with.transmittance, passage, with.stop)) return Outcome::dark;
+    if (to == with.count || !is_dark(with.transmittance, passage, with.stop)) continue;
+    Pixel most = farthest[0];
+    for (const Pixel& depth : farthest) most = hn::Max(most, depth);
+    if (rest_is_behind(with, to, largest_of(most))) return Outcome::dark;
   }
   return Outcome::done;
+}
+
+inline float farthest_place(const Meeting& m) {
+  Pixel most = hn::Zero(PixelTag());
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    most = hn::Max(most, load<Pixel>(m.place + l));
+  }
+  return largest_of(most);
 }
 
 // The same, the lines put in order in every pixel first.
@@ -398,8 +420,12 @@ Outcome pass_sorted(const Closing& with, Passage* passage) {
     sort_meetings(meetings, held);
     held = meetings_max / 2;
     pass_lines<Compositing>(meetings, held, passage);
+    const float depth = farthest_place(meetings[held - 1]) * (with.slab.back - with.slab.front);
     for (int n = 0; n < held; ++n) meetings[n] = meetings[n + held];
-    if (is_dark(with.transmittance, passage, with.stop)) return Outcome::dark;
+    if (is_dark(with.transmittance, passage, with.stop) &&
+        rest_is_behind(with, h + 1, with.slab.front + depth)) {
+      return Outcome::dark;
+    }
   }
   sort_meetings(meetings, held);
   pass_lines<Compositing>(meetings, held, passage);

@@ -158,6 +158,7 @@ constexpr int hits_of_brick_max = brick_stops * tile_blocks * tile_blocks;
 // A line that a block may meet in the slab at hand.
 struct MetLine {
   float depth;  // where, about
+  float first;  // nowhere before
   std::uint32_t line;
 };
 constexpr int met_lines_sorted_max = 64;
