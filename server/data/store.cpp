@@ -171,6 +171,7 @@ struct Dataset::State {
   std::string kept_key;
   std::any kept_value;
   std::atomic<std::uint64_t> loads{0};
+  std::atomic<std::uint64_t> averages{0};
 
   // Checked: where a field and a step are. Errors: not_found.
   Result<std::size_t> find(const std::string& field, std::size_t step) const {
@@ -260,6 +261,7 @@ Result<std::shared_ptr<const Volume>> Dataset::level(const std::string& field, s
     if (!fine) {
       return fine.error();
     }
+    state_->averages.fetch_add(1);
     return state_->guarded(*index, [&]() -> Result<Volume> { return coarsen(**fine, how); });
   };
   return state_->budget->get({state_->owner, *index, step, digest_of(key_of(how))}, bytes, average);
@@ -279,6 +281,8 @@ void Dataset::keep(std::string key, std::any value) {
 std::uint64_t Dataset::resident_bytes() const { return state_->budget->bytes_of(state_->owner); }
 
 std::uint64_t Dataset::loads() const { return state_->loads.load(); }
+
+std::uint64_t Dataset::averages() const { return state_->averages.load(); }
 
 struct Store::State {
   explicit State(std::uint64_t bytes_max) : budget(std::make_shared<Budget>(bytes_max)) {}

@@ -42,7 +42,8 @@ class Dataset {
   void keep(std::string key, std::any value);
 
   [[nodiscard]] std::uint64_t resident_bytes() const;
-  [[nodiscard]] std::uint64_t loads() const;  // how many volumes were ever read from the source
+  [[nodiscard]] std::uint64_t loads() const;     // how many volumes were ever read from the source
+  [[nodiscard]] std::uint64_t averages() const;  // how many levels were ever averaged
 
  private:
   struct State;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/base/kept.hpp"
 #include "server/engine/bins.hpp"
 #include "server/engine/kernels/dispatch.hpp"
 #include "server/engine/plan.hpp"
@@ -37,8 +38,7 @@ namespace {
 
 void clear_image(const scene::Camera& camera, Image& image) {
   const std::size_t floats = 4 * static_cast<std::size_t>(camera.width) * camera.height;
-  const std::size_t kept = 4 * RenderSpace::kept_pixels;
-  if (image.rgba.capacity() > std::max(floats, kept)) image.rgba = {};
+  give_back(image.rgba, floats, 4 * kept_pixels);
   image.width = camera.width;
   image.height = camera.height;
   image.rgba.assign(floats, 0.0F);

@@ -74,8 +74,6 @@ struct Rendered {
 // smaller one.
 class RenderSpace {
  public:
-  static constexpr std::size_t kept_pixels = std::size_t{1920} * 1080;
-
   RenderSpace();
   ~RenderSpace();
   RenderSpace(RenderSpace&&) noexcept;

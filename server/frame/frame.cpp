@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/base/check.hpp"
+#include "server/base/kept.hpp"
 #include "server/engine/reference/reference.hpp"
 #include "server/scene/build.hpp"
 
@@ -163,6 +164,8 @@ Result<void> draw(const protocol::View& view, data::Dataset& dataset, const Enco
 Result<Frame> encode(Workspace& workspace, ThreadPool& pool) {
   const Clock::time_point start = Clock::now();
   Result<image::Bytes> bytes = bytes_of(workspace, pool);
+  // Nobody needs the pixels any more, and many of them are not kept.
+  give_back(workspace.space.image().rgba, 0, 4 * kept_pixels);
   if (!bytes) return bytes.error();
   Frame frame = std::move(workspace.drawn);
   frame.bytes = std::move(*bytes);

@@ -18,6 +18,7 @@ namespace windsplat::image {
 namespace {
 
 constexpr int edge_max = 65500;  // pixels, of the library
+constexpr std::int64_t strips_max = 16;
 
 struct Destroy {
   void operator()(void* compressor) const { tjDestroy(compressor); }
@@ -64,8 +65,7 @@ struct Cut {
 
 Cut cut_of(const YccPicture& picture) {
   constexpr std::int64_t strip_pixels = 1 << 16;  // to begin a strip costs as much as a few hundred
-  constexpr std::int64_t strips_max = 16;
-  constexpr int interval_max = 0xFFFF;  // MCUs
+  constexpr int interval_max = 0xFFFF;            // MCUs
   Cut cut;
   cut.mcu_columns = picture.planes()[1].width / 8;
   cut.mcu_rows = picture.planes()[1].height / 8;
@@ -91,7 +91,21 @@ struct JpegEncoder::State {
   std::vector<std::span<const std::uint8_t>> pieces;
   std::vector<int> failed;  // by thread
 
-  // The strip is told to be as wide as its MCUs, so that the library copies no row to pad it.
+  // What the strips of one huge picture took is given back by the next smaller one.
+  void make_room(const Cut& cut, int mcu) {
+    // Of a picture of kept_pixels at 4:4:4, cut into as many strips as there may be.
+    const std::size_t kept = strips_max * tjBufSize(1920, 80, TJSAMP_444);
+    const auto count = static_cast<std::size_t>(cut.strips);
+    const std::size_t needed = count * tjBufSize(cut.mcu_columns * mcu, cut.strip_rows * mcu,
+                                                 mcu == 8 ? TJSAMP_444 : TJSAMP_420);
+    std::size_t held = 0;
+    for (const Strip& strip : strips) held += strip.capacity;
+    if (held > std::max(needed, kept)) strips.clear();
+    if (strips.size() < count) strips.resize(count);
+  }
+
+  // The strip is told to be as wide as its MCUs, so that the library copies no row to pad it; but
+  // no edge longer than the library takes, which then repeats what the planes repeat.
   bool compress(const YccPicture& picture, const Cut& cut, int quality, int index,
                 const Compressor& compressor) {
     const int mcu = picture.mcu_side();
@@ -107,8 +121,9 @@ struct JpegEncoder::State {
     }
     const int name = library_name(picture.subsampling());
     Strip& strip = strips[static_cast<std::size_t>(index)];
-    const int width = cut.mcu_columns * mcu;
-    const std::size_t capacity = tjBufSize(width, rows * mcu, name);
+    const int width = std::min(cut.mcu_columns * mcu, edge_max);
+    const int height = std::min(rows * mcu, edge_max);
+    const std::size_t capacity = tjBufSize(width, height, name);
     if (strip.capacity < capacity) {
       strip.jpeg = std::make_unique_for_overwrite<unsigned char[]>(capacity);
       strip.capacity = capacity;
@@ -116,7 +131,7 @@ struct JpegEncoder::State {
     unsigned char* jpeg = strip.jpeg.get();
     unsigned long size = 0;  // NOLINT(google-runtime-int): the library's type
     const int flags = transform_of(picture.subsampling()) | TJFLAG_NOREALLOC;
-    if (tjCompressFromYUVPlanes(compressor.get(), planes.data(), width, strides.data(), rows * mcu,
+    if (tjCompressFromYUVPlanes(compressor.get(), planes.data(), width, strides.data(), height,
                                 name, &jpeg, &size, quality, flags) != 0) {
       return false;
     }
@@ -130,8 +145,7 @@ JpegEncoder::~JpegEncoder() = default;
 
 Result<void> JpegEncoder::encode(const YccPicture& picture, int quality, ThreadPool& pool,
                                  Bytes& bytes) {
-  const YccPicture::Plane& luma = picture.planes()[0];
-  if (auto fits = check(luma.width, luma.height, quality); !fits) return fits;
+  if (auto fits = check(picture.width(), picture.height(), quality); !fits) return fits;
   const Cut cut = cut_of(picture);
   State& state = *state_;
   while (state.compressors.size() < pool.size()) {
@@ -142,7 +156,7 @@ Result<void> JpegEncoder::encode(const YccPicture& picture, int quality, ThreadP
     }
   }
   const auto count = static_cast<std::size_t>(cut.strips);
-  if (state.strips.size() < count) state.strips.resize(count);
+  state.make_room(cut, picture.mcu_side());
   state.failed.assign(pool.size(), 0);
   pool.run(count, [&](std::size_t index, unsigned worker) {
     if (state.failed[worker] != 0) return;

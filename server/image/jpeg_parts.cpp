@@ -1,6 +1,7 @@
 // JPEGs of strips -> one JPEG: segments are walked by their lengths, scans are copied as they are.
 #include "server/image/jpeg_parts.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <string>
@@ -65,6 +66,18 @@ Result<Layout> layout_of(std::span<const std::uint8_t> jpeg) {
   return broken("has no scan");
 }
 
+// Up to their scans' data the strips differ in the frame's height alone: what one's tables code the
+// other's would not read.
+bool same_header(std::span<const std::uint8_t> first, const Layout& a,
+                 std::span<const std::uint8_t> other, const Layout& b) {
+  if (a.frame != b.frame || a.scan != b.scan || a.data != b.data) return false;
+  const std::size_t height = a.frame + 5;
+  const auto same = [&](std::size_t from, std::size_t to) {
+    return std::ranges::equal(first.subspan(from, to - from), other.subspan(from, to - from));
+  };
+  return same(0, height) && same(height + 2, a.data);
+}
+
 void append(Bytes& bytes, std::span<const std::uint8_t> more) {
   bytes.insert(bytes.end(), more.begin(), more.end());
 }
@@ -84,10 +97,15 @@ Result<void> stitch(std::span<const std::span<const std::uint8_t>> strips,
   for (const auto& strip : strips) size += strip.size();
   bytes.clear();
   bytes.reserve(size);
+  Layout first;
   for (std::size_t s = 0; s < strips.size(); ++s) {
     const auto& strip = strips[s];
     const auto layout = layout_of(strip);
     if (!layout) return layout.error();
+    if (s == 0) first = *layout;
+    if (!same_header(strips[0], first, strip, *layout)) {
+      return broken("has another header than the first");
+    }
     if (s == 0) {
       append(bytes, strip.first(layout->scan));
       put_number(bytes, layout->frame + 5, stitching.height);

@@ -18,7 +18,8 @@ struct Stitching {
 // Every strip is a baseline JPEG of one scan without restarts, all of the same tables, and as wide
 // as the picture in MCUs. The result begins with the first one's header, told the picture's size
 // and the restart interval, and has a restart marker between any two strips: there the prediction
-// of DC starts anew, as it did in each strip. Errors: internal (a strip is not such a JPEG).
+// of DC starts anew, as it did in each strip. Errors: internal (a strip is not such a JPEG,
+// or its header is not the first one's but for the height).
 Result<void> stitch(std::span<const std::span<const std::uint8_t>> strips,
                     const Stitching& stitching, Bytes& bytes);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "server/base/check.hpp"
+#include "server/base/kept.hpp"
 
 namespace windsplat::image {
 namespace {
@@ -29,8 +30,8 @@ class RowReader {
   alignas(64) std::array<float, row_floats> filled_;
 };
 
-// Past the last pair of pixels its mean is repeated, not the last pixel.
-void store_chroma(const RowCodes& codes, int count, int stored, std::uint8_t* to) {
+// Past the last code it is repeated: of chroma the last pair's mean, not the last pixel's.
+void store(const RowCodes& codes, int count, int stored, std::uint8_t* to) {
   std::copy_n(codes.data(), count, to);
   if (stored > count) std::fill_n(to + count, stored - count, codes[count - 1]);
 }
@@ -55,7 +56,9 @@ void YccPicture::reset(int width, int height, Subsampling subsampling,
     const int side = p == 0 ? mcu : 8;
     planes_[p].width = columns * side;
     planes_[p].height = rows * side;
-    storage_[p].assign(static_cast<std::size_t>(planes_[p].width) * planes_[p].height, codes[p]);
+    const std::size_t samples = static_cast<std::size_t>(planes_[p].width) * planes_[p].height;
+    give_back(storage_[p], samples, kept_pixels);
+    storage_[p].assign(samples, codes[p]);
     planes_[p].samples = storage_[p].data();
   }
 }
@@ -70,7 +73,7 @@ void YccPicture::put(const Part& part) {
                    (part.height % 2 == 0 || bottom)));
   for (int x = 0; x < part.width; x += row_pixels) {
     const int count = std::min(row_pixels, part.width - x);
-    // A last row of fewer pixels has enough repeated ones to fill its MCU.
+    // The last pixels of a row fill its last MCU, which may begin before them.
     const bool last = right && x + count == part.width;
     const int stored = last ? planes_[0].width - (part.x + x) : count;
     if (subsampling_ == Subsampling::s420) {
@@ -88,9 +91,9 @@ void YccPicture::put_full(const Part& part, int x, int count, int stored) {
   for (int y = 0; y < part.height; ++y) {
     const float* row = part.rgba + static_cast<std::size_t>(y) * part.stride;
     convert_row(pixels(row + std::ptrdiff_t{4} * x, count), background_, codes);
-    std::copy_n(codes.luma.data(), stored, at(planes_[0], part.x + x, part.y + y));
-    std::copy_n(codes.blue.data(), stored, at(planes_[1], part.x + x, part.y + y));
-    std::copy_n(codes.red.data(), stored, at(planes_[2], part.x + x, part.y + y));
+    store(codes.luma, count, stored, at(planes_[0], part.x + x, part.y + y));
+    store(codes.blue, count, stored, at(planes_[1], part.x + x, part.y + y));
+    store(codes.red, count, stored, at(planes_[2], part.x + x, part.y + y));
   }
 }
 
@@ -105,11 +108,11 @@ void YccPicture::put_halved(const Part& part, int x, int count, int stored) {
         part.rgba + static_cast<std::size_t>(y) * part.stride + std::ptrdiff_t{4} * x;
     const float* above = upper(row, count);
     convert_pair(above, both ? lower(row + part.stride, count) : above, background_, codes);
-    std::copy_n(codes.upper.data(), stored, at(planes_[0], part.x + x, part.y + y));
-    if (both) std::copy_n(codes.lower.data(), stored, at(planes_[0], part.x + x, part.y + y + 1));
+    store(codes.upper, count, stored, at(planes_[0], part.x + x, part.y + y));
+    if (both) store(codes.lower, count, stored, at(planes_[0], part.x + x, part.y + y + 1));
     const int cy = (part.y + y) / 2;
-    store_chroma(codes.blue, (count + 1) / 2, (stored + 1) / 2, at(planes_[1], cx, cy));
-    store_chroma(codes.red, (count + 1) / 2, (stored + 1) / 2, at(planes_[2], cx, cy));
+    store(codes.blue, (count + 1) / 2, (stored + 1) / 2, at(planes_[1], cx, cy));
+    store(codes.red, (count + 1) / 2, (stored + 1) / 2, at(planes_[2], cx, cy));
   }
 }
 

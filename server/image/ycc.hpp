@@ -31,12 +31,12 @@ class YccPicture {
     int height = 0;
   };
 
-  // Every pixel becomes the linear background. Storage is kept and grows as needed.
+  // Every pixel becomes the linear background. Storage is kept up to kept_pixels.
   void reset(int width, int height, Subsampling subsampling,
              const std::array<float, 3>& background);
 
-  // Pixels over the background of reset(). Disjoint parts may come from several threads at once if
-  // they are cut at even columns and rows.
+  // Pixels over the background of reset(). Disjoint parts may come from several threads at once,
+  // cut at any column and row of 4:4:4, at even ones of 4:2:0.
   void put(const Part& part);
 
   [[nodiscard]] int width() const { return width_; }

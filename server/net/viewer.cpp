@@ -24,11 +24,16 @@ frame::Encoding frame_encoding(const session::Encoding& wanted) {
 
 Error nobody_waits() { return make_error(ErrorKind::cancelled, "nobody waits for the answer"); }
 
+// What the next frame of the same data need not do again.
+std::uint64_t preparations(const data::Dataset& dataset) {
+  return dataset.loads() + dataset.averages();
+}
+
 Result<session::Drawn> draw(Services& services, const session::StartRender& wanted,
                             std::int64_t queue_us, const CancelToken& cancel) {
   const auto dataset = services.catalogue.find(wanted.view.dataset);
   if (!dataset) return dataset.error();
-  const std::uint64_t loads = (*dataset)->loads();
+  const std::uint64_t before = preparations(**dataset);
   auto drawn = frame::produce(wanted.view, **dataset, frame_encoding(wanted.encoding),
                               *services.pool, cancel, services.frames);
   if (!drawn) return drawn.error();
@@ -40,7 +45,7 @@ Result<session::Drawn> draw(Services& services, const session::StartRender& want
   out.render_us = drawn->render_us;
   out.encode_us = drawn->encode_us;
   // Nobody else loads while the renderer's thread is here.
-  out.loaded = (*dataset)->loads() != loads;
+  out.loaded = preparations(**dataset) != before;
   return out;
 }
 

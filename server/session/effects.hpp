@@ -61,7 +61,8 @@ struct Drawn {
   std::int64_t queue_us = 0;
   std::int64_t render_us = 0;
   std::int64_t encode_us = 0;
-  bool loaded = false;  // fields were read for it: its time says nothing of the next one's
+  bool loaded =
+      false;  // fields were read or averaged for it: its time says nothing of the next one's
 };
 
 }  // namespace windsplat::session

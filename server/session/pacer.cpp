@@ -152,7 +152,9 @@ void Session::stand() {
   drawn_version_ = version_;
   drawn_final_ = true;
   standing_->view = protocol::encode_view(view_);
-  if (standing_->rev == rev_) return;
+  // An undo may have gone back to a rev that was never told.
+  if (!unanswered_ && standing_->rev == rev_) return;
+  unanswered_.reset();
   standing_->rev = rev_;
   effects_.emplace_back(SendText{protocol::UnchangedMessage{rev_, standing_->seq}});
 }
@@ -164,7 +166,13 @@ void Session::stand_if_same() {
   if (protocol::encode_view(view_) == standing_->view) stand();
 }
 
-bool Session::stands_for(const Render& render, const Drawn& drawn) const {
+void Session::withhold(const Render& render) {
+  settle(render.version);
+  drawn_version_ = render.version;
+  drawn_final_ = false;
+}
+
+bool Session::looks_standing(const Render& render, const Drawn& drawn) const {
   return render.purpose != Purpose::still && render.version == version_ && standing_ &&
          is_blank(drawn.info) && standing_->without_camera == without_camera(view_);
 }
@@ -205,6 +213,7 @@ void Session::send_frame(const Render& render, Drawn drawn) {
   if (still) return;
   if (!stills_.empty()) still_turn_ = true;
   settle(render.version);
+  answered(render.version);
   drawn_version_ = render.version;
   drawn_final_ = render.purpose == Purpose::final;
   standing_.reset();

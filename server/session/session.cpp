@@ -140,8 +140,8 @@ Effects Session::on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros n
   }
   if (render.unwanted) {
     ++stats_.dropped;
-  } else if (stands_for(render, *drawn)) {
-    stand();
+  } else if (looks_standing(render, *drawn)) {
+    render.purpose == Purpose::final ? stand() : withhold(render);
   } else {
     send_frame(render, std::move(*drawn));
   }
@@ -200,6 +200,7 @@ void Session::follow(const protocol::PatchMessage& message, Micros now) {
   t_ = message.t;
   rev_ = message.rev;
   change(std::move(*next), message.rev, message.patch_json, now);
+  unanswered_ = version_;
 }
 
 void Session::follow(const protocol::StillMessage& message, Micros /*now*/) {
@@ -292,6 +293,10 @@ void Session::settle(std::uint64_t version) {
   while (!changes_.empty() && changes_.front().version <= version) settle_oldest();
 }
 
+void Session::answered(std::uint64_t version) {
+  if (unanswered_ && *unanswered_ <= version) unanswered_.reset();
+}
+
 void Session::undo(std::uint64_t version, Micros now) {
   const auto refused = std::find_if(changes_.begin(), changes_.end(),
                                     [&](const Change& kept) { return kept.version == version; });
@@ -299,9 +304,11 @@ void Session::undo(std::uint64_t version, Micros now) {
   changes_.erase(refused);
   protocol::ViewDocument next = proved_;
   rev_ = proved_rev_;
+  unanswered_.reset();
   for (const Change& kept : changes_) {
     if (auto patched = next.patched(kept.patch_json)) next = std::move(*patched);
     rev_ = kept.rev.value_or(rev_);
+    if (kept.rev) unanswered_ = kept.version;
   }
   show(std::move(next), now);
 }
@@ -327,6 +334,7 @@ void Session::render_failed(const Render& render, const Error& error, Micros now
   }
   // Nothing to go back to: say so and wait for a change.
   refuse(error, std::nullopt, render.rev);
+  answered(render.version);
   player_.stop();
   drawn_version_ = render.version;
   drawn_final_ = true;

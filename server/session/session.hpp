@@ -12,6 +12,11 @@
 // A final frame stands for every later view that looks the same: the same view said in other words
 // or come back to before anything else was sent, or another camera on a scene of which nothing
 // shows before and after. Then no frame is drawn or sent, and `unchanged` names the patch's rev.
+// Only a final frame tells that nothing shows: a moving one with nothing in it may be too coarse
+// for what there is, so it is kept back, and the final one decides.
+//
+// Every patch that is followed is answered by a frame of its rev or a later one, or by `unchanged`,
+// also where a client says the same rev again.
 //
 // Stills. `still` draws the present view apart from the stream. Its picture is one binary frame of
 // kind 1 with the final flag, codec png or jpeg; right before it come `progress` with the request's
@@ -128,11 +133,13 @@ class Session {
   void show(protocol::ViewDocument next, Micros now);
   void settle(std::uint64_t version);  // the view of that version can be drawn
   void settle_oldest();
+  void answered(std::uint64_t version);          // patches up to that version
   void undo(std::uint64_t version, Micros now);  // that change was refused after all
   void render_failed(const Render& render, const Error& error, Micros now);
   void stand();  // for the present view
   void stand_if_same();
-  [[nodiscard]] bool stands_for(const Render& render, const Drawn& drawn) const;
+  void withhold(const Render& render);  // its frame looks as the standing one, as far as it shows
+  [[nodiscard]] bool looks_standing(const Render& render, const Drawn& drawn) const;
   void send_frame(const Render& render, Drawn drawn);  // with the messages that go with it
   void refuse(const Error& error, std::optional<std::uint32_t> id,
               std::optional<std::uint32_t> rev);
@@ -170,6 +177,7 @@ class Session {
   Player player_;
 
   std::optional<Standing> standing_;
+  std::optional<std::uint64_t> unanswered_;  // version of the newest patch, until it is answered
 
   std::optional<Render> render_;
   std::uint64_t tickets_ = 0;

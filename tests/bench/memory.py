@@ -36,6 +36,7 @@ class Viewer:
     def __init__(self, port):
         self.socket = socket.create_connection(("127.0.0.1", port), timeout=120)
         self.buffer = b""
+        self.final_bytes = {}  # by seq, of the newest
         key = base64.b64encode(os.urandom(16)).decode()
         self.socket.sendall((
             "GET /v1/stream HTTP/1.1\r\n"
@@ -94,18 +95,22 @@ class Viewer:
                 return opcode, payload
 
     def final_frame(self, rev):
-        """Takes frames until the final one of that revision; its payload's bytes."""
+        """Takes frames until the final one that shows that revision; its payload's bytes."""
         while True:
             opcode, payload = self.message()
             if opcode == 1:
                 message = json.loads(payload)
                 if message["type"] == "error":
                     raise RuntimeError(message)
+                if message["type"] == "unchanged" and message["rev"] == rev:
+                    return self.final_bytes[message["seq"]]
                 continue
             seq, frame_rev, _, flags = struct.unpack_from("<4I", payload, 8)
             self.say({"type": "ack", "seq": seq, "decodeMs": 1})
-            if flags & FINAL and frame_rev == rev:
-                return len(payload) - 64
+            if flags & FINAL:
+                self.final_bytes = {seq: len(payload) - 64}
+                if frame_rev == rev:
+                    return self.final_bytes[seq]
 
     def turn(self, view, frames):
         for rev in range(1, frames + 1):

@@ -140,6 +140,7 @@ TEST_F(Levels, AreAveragedOnceAndSharedAndPaidFor) {
   EXPECT_NE(dataset->level("vorticity", 1, halves(2))->get(), coarse->get());
   EXPECT_EQ(dataset->resident_bytes(), fine_bytes + 2 * coarse_bytes);
   EXPECT_EQ(dataset->loads(), 1U);
+  EXPECT_EQ(dataset->averages(), 2U);
   const auto& fine = *dataset->volume("vorticity", 1).value();
   EXPECT_FLOAT_EQ((*coarse)->values[0],
                   (fine.values[0] + fine.values[1] + fine.values[16] + fine.values[17] +

@@ -204,6 +204,44 @@ TEST(JpegStrips, RefuseWhatTheFormatCannotHold) {
   EXPECT_EQ(encoder.encode(picture, 80, pool, bytes).error().kind, ErrorKind::too_large);
 }
 
+// Its MCUs reach beyond what the library takes.
+TEST(JpegStrips, HoldTheLongestEdgeOfTheFormat) {
+  ThreadPool pool(1);
+  JpegEncoder encoder;
+  Bytes bytes;
+  const std::vector<std::pair<int, int>> longest{{65500, 3}, {65497, 17}, {3, 65500}};
+  for (const auto& [width, height] : longest) {
+    for (const Subsampling subsampling : {Subsampling::s420, Subsampling::s444}) {
+      const YccPicture picture = waves(width, height, subsampling);
+      const auto done = encoder.encode(picture, 80, pool, bytes);
+      ASSERT_TRUE(done) << done.error().message;
+      const int name = subsampling == Subsampling::s444 ? TJSAMP_444 : TJSAMP_420;
+      EXPECT_EQ(decode(bytes, width, height, name),
+                decode(in_one_piece(picture, 80), width, height, name))
+          << width << " x " << height;
+    }
+  }
+}
+
+// A decoder reads all of them by the first one's tables.
+TEST(JpegStitch, RefusesStripsOfOtherTables) {
+  ThreadPool pool(1);
+  JpegEncoder encoder;
+  Bytes first;
+  Bytes other;
+  const YccPicture picture = waves(64, 16, Subsampling::s420);
+  ASSERT_TRUE(encoder.encode(picture, 80, pool, first));
+  ASSERT_TRUE(encoder.encode(picture, 70, pool, other));
+  Bytes out;
+  const auto done =
+      stitch(std::vector<std::span<const std::uint8_t>>{first, other}, {64, 32, 4}, out);
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().kind, ErrorKind::internal);
+  // A last strip of another height is as it should be.
+  ASSERT_TRUE(encoder.encode(waves(64, 9, Subsampling::s420), 80, pool, other));
+  EXPECT_TRUE(stitch(std::vector<std::span<const std::uint8_t>>{first, other}, {64, 25, 4}, out));
+}
+
 TEST(JpegStitch, RefusesStripsOfAnotherForm) {
   ThreadPool pool(1);
   JpegEncoder encoder;

@@ -128,6 +128,24 @@ TEST(Ycc, IsTheFormulaAtEverySizeAndPastTheEdges) {
   }
 }
 
+// Wherever a chroma sample ends: the last part may begin within the last MCU, or long before it.
+TEST(Ycc, PartsMayBeCutWithinAnMcu) {
+  const Colour background{0.02F, 0.3F, 0.9F};
+  YccPicture picture;
+  for (const int width : {66, 67, 81, 130}) {
+    const Pixels pixels = busy(width, 18, static_cast<unsigned>(width));
+    for (int cut = 2; cut < width; cut += 2) {
+      for (const Subsampling subsampling : {Subsampling::s420, Subsampling::s444}) {
+        picture.reset(width, 18, subsampling, background);
+        const std::size_t stride = std::size_t{4} * width;
+        picture.put({0, 0, cut, 18, pixels.rgba.data(), stride});
+        picture.put({cut, 0, width - cut, 18, pixels.rgba.data() + std::size_t{4} * cut, stride});
+        ASSERT_LE(worst_sample(pixels, background, picture), tolerance) << width << " at " << cut;
+      }
+    }
+  }
+}
+
 TEST(Ycc, PlanesReachToWholeMcus) {
   YccPicture picture;
   picture.reset(17, 33, Subsampling::s420, {});

@@ -2,6 +2,7 @@
 // and tables, whose size follows the data's edges, neither their samples nor the picture. Every
 // allocation of this program is counted.
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <atomic>
 #include <cstdlib>
@@ -20,11 +21,23 @@ namespace {
 
 std::atomic<std::int64_t> blocks{0};
 std::atomic<std::int64_t> bytes{0};
+std::atomic<std::int64_t> held{0};  // bytes not yet given back
+
+void* hold(void* at) {
+  held.fetch_add(static_cast<std::int64_t>(malloc_usable_size(at)), std::memory_order_relaxed);
+  return at;
+}
+
+void give_up(void* at) {
+  if (at == nullptr) return;
+  held.fetch_sub(static_cast<std::int64_t>(malloc_usable_size(at)), std::memory_order_relaxed);
+  std::free(at);
+}
 
 void* counted(std::size_t size) {
   blocks.fetch_add(1, std::memory_order_relaxed);
   bytes.fetch_add(static_cast<std::int64_t>(size), std::memory_order_relaxed);
-  if (void* at = std::malloc(size == 0 ? 1 : size)) return at;
+  if (void* at = std::malloc(size == 0 ? 1 : size)) return hold(at);
   throw std::bad_alloc();
 }
 
@@ -32,7 +45,7 @@ void* counted(std::size_t size, std::align_val_t alignment) {
   const auto step = static_cast<std::size_t>(alignment);
   blocks.fetch_add(1, std::memory_order_relaxed);
   bytes.fetch_add(static_cast<std::int64_t>(size), std::memory_order_relaxed);
-  if (void* at = std::aligned_alloc(step, (size + step - 1) / step * step)) return at;
+  if (void* at = std::aligned_alloc(step, (size + step - 1) / step * step)) return hold(at);
   throw std::bad_alloc();
 }
 
@@ -43,11 +56,11 @@ void* operator new(std::size_t size) { return counted(size); }
 void* operator new(std::size_t size, std::align_val_t alignment) {
   return counted(size, alignment);
 }
-void operator delete(void* at) noexcept { std::free(at); }
-void operator delete(void* at, std::size_t /*size*/) noexcept { std::free(at); }
-void operator delete(void* at, std::align_val_t /*alignment*/) noexcept { std::free(at); }
+void operator delete(void* at) noexcept { give_up(at); }
+void operator delete(void* at, std::size_t /*size*/) noexcept { give_up(at); }
+void operator delete(void* at, std::align_val_t /*alignment*/) noexcept { give_up(at); }
 void operator delete(void* at, std::size_t /*size*/, std::align_val_t /*alignment*/) noexcept {
-  std::free(at);
+  give_up(at);
 }
 
 namespace windsplat {
@@ -192,6 +205,69 @@ TEST(SteadyStateItself, AJpegCostsItsOwnBytes) {
     EXPECT_LE(spent.bytes - plans.bytes, turns * 8192 + sent);
     EXPECT_GE(spent.bytes - plans.bytes, sent);
     EXPECT_LE(spent.blocks - plans.blocks, turns * 100);
+  }
+}
+
+// Half as many pixels again as are kept.
+constexpr int huge_width = 2048;
+constexpr int huge_height = 1536;
+constexpr std::int64_t huge_pixels = std::int64_t{huge_width} * huge_height;
+
+TEST(HugePicture, FloatsAreGivenBackByTheNextSmallerOne) {
+  const auto huge = orbit(Look::kernel, {8, 8, 4}, huge_width, huge_height);
+  const auto small = orbit(Look::kernel, {8, 8, 4}, 160, 120);
+  ThreadPool pool(2);
+  engine::RenderSpace space;
+  ASSERT_TRUE(engine::render(huge[0], pool, CancelToken(), space));
+  ASSERT_GE(space.image().rgba.capacity(), static_cast<std::size_t>(4 * huge_pixels));
+  ASSERT_TRUE(engine::render(small[0], pool, CancelToken(), space));
+  EXPECT_LT(space.image().rgba.capacity(), std::size_t{4} * 1920 * 1080);
+}
+
+TEST(HugePicture, FloatsOfAPngAreGivenBackWhenItIsEncoded) {
+  data::Dataset dataset(data::open_sample("climate", {8, 8, 4}, 1).value(), "climate",
+                        std::uint64_t{1} << 30U);
+  protocol::View view = scene::default_view(dataset).value();
+  ThreadPool pool(2);
+  frame::Workspace workspace;
+  for (const int width : {320, huge_width}) {
+    view.image.width = width;
+    view.image.height = 3 * width / 4;
+    const frame::Encoding encoding{frame::Format::png};
+    ASSERT_TRUE(frame::produce(view, dataset, encoding, pool, CancelToken(), workspace));
+    const bool kept = workspace.space.image().rgba.capacity() > 0;
+    EXPECT_EQ(kept, width < huge_width) << width;
+  }
+}
+
+// What a workspace of planes and strips holds after one huge picture and a small one.
+TEST(HugePicture, PlanesAndStripsAreGivenBackByTheNextSmallerOne) {
+  ThreadPool pool(2);
+  for (const auto subsampling : {image::Subsampling::s420, image::Subsampling::s444}) {
+    image::YccPicture planes;
+    image::JpegEncoder encoder;
+    image::Bytes jpeg;
+    const auto encode = [&](int width, int height) {
+      planes.reset(width, height, subsampling, {});
+      ASSERT_TRUE(encoder.encode(planes, 80, pool, jpeg));
+    };
+    encode(160, 120);
+    const std::int64_t small = held;
+    encode(4 * huge_width, huge_height);
+    const std::int64_t huge = held;
+    EXPECT_GT(huge - small, 4 * huge_pixels) << "what is given back is worth the trouble";
+    planes.reset(160, 120, subsampling, {});
+    const std::int64_t without_planes = held;
+    EXPECT_LE(without_planes, huge - 4 * huge_pixels) << "one sample a pixel at least";
+    encode(160, 120);
+    EXPECT_LE(held, without_planes - 4 * huge_pixels) << "strips";
+    jpeg = image::Bytes();
+    EXPECT_LE(held, small + 65536);
+    // A picture of a common size stays, whatever is drawn between.
+    encode(1920, 1080);
+    const std::int64_t common = held;
+    encode(960, 540);
+    EXPECT_GE(held, common);
   }
 }
 

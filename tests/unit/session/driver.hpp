@@ -24,6 +24,7 @@ namespace protocol = windsplat::protocol;
 inline constexpr Micros ms = 1000;
 inline constexpr int steps = 10;
 inline constexpr double beyond = 1000;  // an eye so far away sees nothing
+inline constexpr double faint = 500;    // nor this one in a moving frame
 
 class Driver {
  public:
@@ -139,8 +140,9 @@ class Driver {
     const bool kernel = done.view.method.name == protocol::MethodName::kernel;
     out.info.method = kernel ? "kernel" : "slab";
     out.info.tiles = 1;
+    const bool moving = !done.encoding.full_chroma;
     for (const double height : done.view.camera.eye.value_or(protocol::Vec3{})) {
-      if (height >= beyond) out.info.tiles = 0;
+      if (height >= beyond || (moving && height >= faint)) out.info.tiles = 0;
     }
     out.info.width = std::max(1, done.view.image.width >> done.encoding.level);
     out.info.height = std::max(1, done.view.image.height >> done.encoding.level);

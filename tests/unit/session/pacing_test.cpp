@@ -401,6 +401,52 @@ TEST(Unchanged, a_camera_that_moves_where_nothing_shows_sends_nothing) {
   EXPECT_GT(driver.frames.size(), frames);
 }
 
+TEST(Unchanged, a_moving_frame_with_nothing_in_it_does_not_stand_for_the_final_one) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
+  driver.settle(200 * ms);
+  const std::size_t frames = driver.frames.size();
+  driver.patch(2, azimuth(600));
+  ASSERT_TRUE(driver.render);
+  EXPECT_FALSE(driver.render->encoding.full_chroma) << "a moving frame goes first";
+  driver.finish_render(10 * ms);
+  EXPECT_EQ(driver.frames.size(), frames);
+  EXPECT_TRUE(unchanged_revs(driver).empty()) << "that is not known yet";
+  driver.settle(200 * ms);
+  ASSERT_EQ(driver.frames.size(), frames + 1);
+  EXPECT_EQ(driver.frames.back().header.rev, 2U);
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  EXPECT_TRUE(unchanged_revs(driver).empty());
+}
+
+TEST(Unchanged, a_rev_that_is_said_again_is_answered_again) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  const std::size_t frames = driver.frames.size();
+  driver.patch(1, "{}");
+  driver.patch(1, R"({"dataset":"wind"})");
+  EXPECT_EQ(unchanged_revs(driver), (Revs{1, 1}));
+  driver.patch(1, azimuth(1));
+  driver.settle();
+  EXPECT_GT(driver.frames.size(), frames);
+  EXPECT_EQ(unchanged_revs(driver), (Revs{1, 1})) << "this one by frames";
+  driver.wait(3000 * ms);
+  EXPECT_EQ(unchanged_revs(driver), (Revs{1, 1})) << "no patch, no answer";
+}
+
+TEST(Unchanged, going_back_after_a_refusal_answers_what_was_not_answered_and_no_more) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  driver.patch(2, azimuth(1));
+  driver.fail_render(make_error(ErrorKind::bad_data, ""));
+  driver.settle();
+  ASSERT_EQ(driver.errors().size(), 1U);
+  EXPECT_EQ(driver.errors()[0].rev, 2U);
+  EXPECT_TRUE(unchanged_revs(driver).empty()) << "rev 1 was answered long ago";
+}
+
 TEST(Unchanged, what_shows_nothing_but_differs_by_more_than_the_camera_is_sent) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
