@@ -132,8 +132,9 @@ std::string key_of(const Coarsening& how) {
   for (std::size_t a = 0; a < 3; ++a) {
     key += std::to_string(how.halvings[a]) + ':';
     if (how.halvings[a] == 0) continue;
-    const auto& widths = how.widths[a];
-    key.append(reinterpret_cast<const char*>(widths.data()), widths.size() * sizeof(double));
+    const auto samples = static_cast<int>(how.widths[a].size());
+    const std::vector<float> weights = shares(how.widths[a], samples, how.halvings[a]);
+    key.append(reinterpret_cast<const char*>(weights.data()), weights.size() * sizeof(float));
   }
   return key;
 }

@@ -25,7 +25,8 @@ int halved(int samples, int halvings);
 // O(samples), one pass over the source.
 Volume coarsen(const Volume& fine, const Coarsening& how);
 
-// Same text, same weights: what a coarser volume is kept under.
+// Same text, same weights: what a coarser volume is kept under. Of widths it holds each one's share
+// of its group, rounded as coarsen() has it, so the unit that they are in does not matter.
 std::string key_of(const Coarsening& how);
 
 }  // namespace windsplat::data

@@ -46,13 +46,8 @@ class Budget {
   template <class Load>
   Result<VolumePtr> get(const Key& key, std::uint64_t bytes, const Load& load) {
     std::unique_lock lock(mutex_);
-    if (const auto found = entries_.find(key); found != entries_.end()) {
-      const std::shared_ptr<Entry> entry = found->second;
-      arrived_.wait(lock, [&] { return entry->answer.has_value(); });
-      if (entry->answer->has_value()) {
-        touch(*entry);
-      }
-      return *entry->answer;
+    if (const auto there = wait_for(key, lock)) {
+      return *there;
     }
     if (!make_room(bytes)) {
       return no_room(bytes);
@@ -77,6 +72,12 @@ class Budget {
     entry->answer.emplace(answer);
     arrived_.notify_all();
     return answer;
+  }
+
+  // The same for a volume that is there or on its way; none if nobody has asked for it.
+  std::optional<Result<VolumePtr>> find(const Key& key) {
+    std::unique_lock lock(mutex_);
+    return wait_for(key, lock);
   }
 
   [[nodiscard]] std::uint64_t bytes_of(std::uint64_t owner) const {
@@ -106,6 +107,19 @@ class Budget {
     std::list<Key>::iterator place;           // in recent_, if listed
     bool listed = false;
   };
+
+  std::optional<Result<VolumePtr>> wait_for(const Key& key, std::unique_lock<std::mutex>& lock) {
+    const auto found = entries_.find(key);
+    if (found == entries_.end()) {
+      return std::nullopt;
+    }
+    const std::shared_ptr<Entry> entry = found->second;
+    arrived_.wait(lock, [&] { return entry->answer.has_value(); });
+    if (entry->answer->has_value()) {
+      touch(*entry);
+    }
+    return entry->answer;
+  }
 
   void touch(Entry& entry) {
     if (entry.listed) {
@@ -256,15 +270,18 @@ Result<std::shared_ptr<const Volume>> Dataset::level(const std::string& field, s
   for (std::size_t a = 0; a < 3; ++a) {
     bytes *= static_cast<std::uint64_t>(halved(info.grid.dims()[a], how.halvings[a]));
   }
-  const auto average = [&]() -> Result<VolumePtr> {
-    const auto fine = volume(field, step);
-    if (!fine) {
-      return fine.error();
-    }
-    state_->averages.fetch_add(1);
+  const Key key{state_->owner, *index, step, digest_of(key_of(how))};
+  if (const auto there = state_->budget->find(key)) {
+    return *there;
+  }
+  // Held first, so that it is never evicted for a level that could not then be made of it.
+  const auto fine = volume(field, step);
+  if (!fine) {
+    return fine.error();
+  }
+  return state_->budget->get(key, bytes, [&] {
     return state_->guarded(*index, [&]() -> Result<Volume> { return coarsen(**fine, how); });
-  };
-  return state_->budget->get({state_->owner, *index, step, digest_of(key_of(how))}, bytes, average);
+  });
 }
 
 std::any Dataset::kept(const std::string& key) const {

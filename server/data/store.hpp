@@ -32,7 +32,8 @@ class Dataset {
 
   // The field at the step, coarser: averaged once on first need, shared and counted in the memory
   // limit like the volume itself, which need not stay resident for it. One that asks while another
-  // averages waits for it. Nothing halved: the volume itself. Errors: those of volume().
+  // averages waits for it. Nothing halved: the volume itself. Errors: those of volume();
+  // out_of_memory also where there is room for the volume but not for its level beside it.
   Result<std::shared_ptr<const Volume>> level(const std::string& field, std::size_t step,
                                               const Coarsening& how);
 

@@ -186,6 +186,30 @@ Result<ScalarLayer> make_scalar_layer(const protocol::ScalarView& from, const Fi
   return layer;
 }
 
+// The scene, whose lattice has every sample so far, at a level: its layers and what they need.
+Result<Scene> at_level(Scene scene, const std::array<int, 3>& level, const View& view,
+                       const Placed& placed, data::Dataset& dataset) {
+  scene.level = level;
+  const Fields fields{dataset, static_cast<std::size_t>(view.step),
+                      coarsening_of(placed.lattice, level)};
+  const double pixels = pixels_per_unit(scene.camera, placed.lattice);
+  scene.lattice = coarsen_lattice(placed.lattice, level);
+  const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
+  if (lines && view.vector.opacity > 0) {
+    auto layer = make_vector_layer(view, placed, fields);
+    if (!layer) return layer.error();
+    merge_lines(placed.lattice, level, pixels, *layer);
+    scene.vector = std::move(*layer);
+  }
+  for (const protocol::ScalarView& scalar : *view.scalars) {
+    if (!absorbs(scalar)) continue;
+    auto layer = make_scalar_layer(scalar, fields);
+    if (!layer) return layer.error();
+    scene.scalars.push_back(std::move(*layer));
+  }
+  return scene;
+}
+
 }  // namespace
 
 Result<Scene> build_scene(const View& completed, data::Dataset& dataset) {
@@ -205,30 +229,17 @@ Result<Scene> build_scene(const View& completed, data::Dataset& dataset) {
   const double depth = depths[1] - depths[0];
   scene.depth_cue = {view.depth_cue.strength, depths[0] + view.depth_cue.near * depth,
                      depths[0] + view.depth_cue.far * depth};
-  scene.level = level_of(view, scene);
-  const Fields fields{dataset, static_cast<std::size_t>(view.step),
-                      coarsening_of(scene.lattice, scene.level)};
-  const double pixels = pixels_per_unit(scene.camera, scene.lattice);
-  scene.lattice = coarsen_lattice(scene.lattice, scene.level);
-  const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
-  if (lines && view.vector.opacity > 0) {
-    auto layer = make_vector_layer(view, **placed, fields);
-    if (!layer) return layer.error();
-    merge_lines((*placed)->lattice, scene.level, pixels, *layer);
-    scene.vector = std::move(*layer);
-  }
-  for (const protocol::ScalarView& scalar : *view.scalars) {
-    if (!absorbs(scalar)) continue;
-    auto layer = make_scalar_layer(scalar, fields);
-    if (!layer) return layer.error();
-    scene.scalars.push_back(std::move(*layer));
-  }
   scene.method = engine_method(view.method.name);
   scene.compositing = engine_compositing(view.method.compositing);
   scene.slab_thickness = view.method.slab_thickness;
   scene.stop_transmittance = view.method.stop_transmittance;
   scene.background = parse_color(view.image.background).value();
-  return scene;
+  const auto level = level_of(view, scene);
+  auto built = at_level(scene, level, view, **placed, dataset);
+  const bool reduced = level != std::array{0, 0, 0};
+  if (built || !reduced || built.error().kind != ErrorKind::out_of_memory) return built;
+  // Where volumes fit but not their levels beside them, every sample is drawn, as the frame tells.
+  return at_level(std::move(scene), {0, 0, 0}, view, **placed, dataset);
 }
 
 }  // namespace windsplat::scene

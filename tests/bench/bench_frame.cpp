@@ -44,6 +44,14 @@ Workload by_slab(Workload workload) {
   return workload;
 }
 
+// Samples closer than a pixel averaged, as a view's default has it; against the row of all of them.
+Workload with_auto_detail(Workload workload) {
+  workload.name += " auto detail";
+  workload.detail = protocol::Detail::automatic;
+  workload.naive = false;
+  return workload;
+}
+
 void add_climate(const Size& size, bool heavy, std::vector<Workload>& out) {
   struct Kind {
     const char* name;
@@ -85,6 +93,29 @@ void add_large(const Size& size, std::vector<Workload>& out) {
   }
 }
 
+// Where a cell is smaller than a pixel.
+void add_levels(std::vector<Workload>& out) {
+  Workload scalar;
+  scalar.name = "scalar 512^3 640x480";
+  scalar.sample = bench::tornado_512;
+  scalar.preset = "clouds";
+  scalar.heavy = true;
+  Workload tornado;
+  tornado.name = "tornado 256^3 320x240";
+  tornado.sample = bench::tornado_256;
+  tornado.width = 320;
+  tornado.height = 240;
+  tornado.heavy = true;
+  tornado.naive = false;
+  out.push_back(tornado);
+  out.push_back(by_slab(tornado));
+  for (const Workload& workload : {scalar, tornado}) {
+    const Workload reduced = with_auto_detail(workload);
+    out.push_back(reduced);
+    out.push_back(by_slab(reduced));
+  }
+}
+
 std::vector<Workload> all_workloads() {
   std::vector<Workload> out;
   add_climate({640, 480}, false, out);
@@ -92,6 +123,7 @@ std::vector<Workload> all_workloads() {
   add_climate({1920, 1080}, true, out);
   add_large({640, 480}, out);
   add_large({1280, 720}, out);
+  add_levels(out);
   // One dataset is open at a time.
   std::stable_sort(out.begin(), out.end(), [](const Workload& a, const Workload& b) {
     return a.sample.dims[0] < b.sample.dims[0];
@@ -99,14 +131,14 @@ std::vector<Workload> all_workloads() {
   return out;
 }
 
-// One tiny frame, so that the program is known to run.
+// One tiny frame, so that the program is known to run. Its cells are smaller than a pixel.
 std::vector<Workload> smoke_workloads() {
   Workload workload;
   workload.name = "winds+clouds 64x48";
-  workload.sample.dims = {32, 16, 8};
+  workload.sample.dims = {128, 64, 8};
   workload.width = 64;
   workload.height = 48;
-  return {workload, by_slab(workload)};
+  return {workload, by_slab(workload), with_auto_detail(workload)};
 }
 
 void count_work(benchmark::State& state, const engine::WorkReport& work) {
@@ -204,6 +236,14 @@ class Reporter : public benchmark::ConsoleReporter {
     return out;
   }
 
+  // Whether a row visited every sample of its dataset: all but those of automatic detail shall.
+  [[nodiscard]] bool drew_all_of(const Workload& workload) const {
+    const Frame* frame = find(workload, threads_label(1));
+    double samples = 1;
+    for (const int side : workload.sample.dims) samples *= side;
+    return frame != nullptr && frame->counters.at("samples") == samples;
+  }
+
  private:
   struct Frame {
     double wall;
@@ -287,8 +327,12 @@ int run(int argc, char** argv) {
   if (!markdown.empty())
     bench::write_file(markdown, bench::machine_line() + bench::markdown(table));
   benchmark::Shutdown();
+  if (!smoke) return 0;
   // A smoke run must have drawn what it was to draw.
-  return smoke && table.size() != 1 + workloads.size() ? 1 : 0;
+  const bool each_right = std::all_of(workloads.begin(), workloads.end(), [&](const Workload& row) {
+    return reporter.drew_all_of(row) == (row.detail == protocol::Detail::full);
+  });
+  return table.size() == 1 + workloads.size() && each_right ? 0 : 1;
 }
 
 }  // namespace

@@ -53,6 +53,7 @@ protocol::View view_of(const Workload& workload) {
   }
   scene::orbit(view, placed->lattice, 20, 35, 1);
   view.method.name = workload.method;
+  view.method.detail = workload.detail;
   if (workload.every_line && view.vector.magnitude_range) {
     view.vector.min_magnitude = 1e-3 * (*view.vector.magnitude_range)[1];
   }

@@ -43,6 +43,7 @@ struct Workload {
   int height = 480;
   bool every_line = true;
   protocol::MethodName method = protocol::MethodName::kernel;  // as moving frames are drawn
+  protocol::Detail detail = protocol::Detail::full;  // every sample, whatever the picture's size
   bool naive = true;   // also by the naive renderer, whose picture is compared
   bool heavy = false;  // seconds a frame by the naive renderer, or a gigabyte of data
 };

@@ -122,7 +122,7 @@ class Bench:
         return {"camera": {"eye": eye, "target": [0, 0, 0], "fovY": FOV_Y},
                 "image": {"width": size[0], "height": size[1]},
                 "geometry": {"vertical": "index"}, "vector": vector, "scalars": scalars,
-                "depthCue": {"strength": 0}, "method": {"name": method}}
+                "depthCue": {"strength": 0}, "method": {"name": method, "detail": "full"}}
 
     def windsplat(self, size, scene, method):
         path = f"{self.folder}/views.jsonl"
@@ -207,7 +207,10 @@ def main():
     parser.add_argument("--only", default="", help="VTK configurations whose name has this text")
     options = parser.parse_args()
     configs = VTK_CONFIGS + (SLOW_CONFIGS if options.slow else [])
+    names = ", ".join(config[0] for config in configs)
     configs = [config for config in configs if options.only in config[0]]
+    if not configs:
+        parser.error(f"no VTK configuration has '{options.only}' in its name; there are: {names}")
     try:
         python = vtk_python()
         with Display() as display, tempfile.TemporaryDirectory() as folder:

@@ -167,6 +167,29 @@ TEST_F(Levels, KeepWithinTheMemoryLimit) {
   EXPECT_EQ(dataset->loads(), 2U);
 }
 
+TEST_F(Levels, NeverCostTheVolumeThatTheyAreMadeOf) {
+  const auto dataset = dataset_within(fine_bytes + coarse_bytes - 1);
+  ASSERT_TRUE(dataset->volume("cloud", 0));
+  for (int again = 0; again < 2; ++again) {
+    EXPECT_EQ(dataset->level("cloud", 0, halves()).error().kind, ErrorKind::out_of_memory);
+    EXPECT_EQ(dataset->resident_bytes(), fine_bytes);
+  }
+  EXPECT_EQ(dataset->loads(), 1U) << "no room for a level is no reason to read the volume again";
+}
+
+TEST_F(Levels, AreTheSameInAnyUnitOfWidth) {
+  const auto dataset = dataset_within(1U << 20U);
+  const auto coarse = dataset->level("cloud", 0, halves(2));
+  for (const double unit : {1e-3, 1 / 3.0, 0.1, 7.3}) {
+    Coarsening how = halves(2);
+    for (auto& widths : how.widths) {
+      for (double& width : widths) width *= unit;
+    }
+    EXPECT_EQ(dataset->level("cloud", 0, how)->get(), coarse->get()) << unit;
+  }
+  EXPECT_EQ(dataset->resident_bytes(), fine_bytes + coarse_bytes);
+}
+
 TEST_F(Levels, OutliveTheVolumeTheyComeFrom) {
   const auto dataset = dataset_within(fine_bytes + 2 * coarse_bytes);
   const auto held = dataset->level("cloud", 0, halves());

@@ -248,6 +248,55 @@ TEST_F(LevelOfAScene, MakesNoLevelOfWhatIsNotShown) {
   EXPECT_EQ(dataset->resident_bytes(), fine + (fine >> (3 * scene.level[0])));
 }
 
+// The cloud alone, of 64^3 samples, in a store of so many bytes.
+class LevelWithin : public LevelOfAScene {
+ protected:
+  static constexpr std::uint64_t fine = 4ULL * 64 * 64 * 64;
+  void open_within(std::uint64_t bytes_max) {
+    auto source = data::open_sample("tornado", {64, 64, 64});
+    dataset = std::make_unique<data::Dataset>(std::move(*source), "tornado", bytes_max);
+    view.vector.field.kind = protocol::FieldChoice::Kind::none;
+  }
+};
+
+TEST_F(LevelWithin, EverySampleIsDrawnWhereALevelHasNoRoomBesideThem) {
+  open_within(fine);
+  for (int again = 0; again < 2; ++again) {
+    const Scene scene = built();
+    EXPECT_EQ(scene.level, (Level{0, 0, 0}));
+    EXPECT_EQ(scene.lattice.dims, (std::array{64, 64, 64}));
+    ASSERT_EQ(scene.scalars.size(), 1U);
+    EXPECT_EQ(scene.scalars[0].field->dims, scene.lattice.dims);
+  }
+  EXPECT_EQ(dataset->loads(), 1U) << "the next frame finds the volume";
+}
+
+TEST_F(LevelWithin, ALevelIsDrawnWhereThereIsRoom) {
+  open_within(fine + fine / 8);
+  EXPECT_GE(built().level[0], 1);
+}
+
+TEST_F(LevelWithin, WhatFullDetailRefusesIsRefused) {
+  open_within(fine);
+  const auto completed = complete_view(view, *dataset).value();
+  open_within(fine - 1);
+  EXPECT_EQ(build_scene(completed, *dataset).error().kind, ErrorKind::out_of_memory);
+}
+
+TEST_F(LevelOfAScene, IsTheSameWhereOnlyTheScaleOfHeightChanges) {
+  const Scene first = built();
+  const std::uint64_t resident = dataset->resident_bytes();
+  for (const double z : {0.97, 0.9, 0.83, 0.7}) {
+    view.geometry.scale[2] = z;
+    const Scene scene = built();
+    ASSERT_EQ(scene.level, first.level) << z;
+    ASSERT_NE(scene.lattice.spacing[2][0], first.lattice.spacing[2][0]) << z;
+    EXPECT_EQ(scene.vector->field, first.vector->field) << z;
+    EXPECT_EQ(scene.scalars[0].field, first.scalars[0].field) << z;
+    EXPECT_EQ(dataset->resident_bytes(), resident) << z;
+  }
+}
+
 TEST(LevelOfRates, AreMeansOfTheRowsAndLayersMerged) {
   std::vector<double> latitudes;
   for (int j = 0; j < 64; ++j) latitudes.push_back(-63 + 2 * j);
