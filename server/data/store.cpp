@@ -280,6 +280,7 @@ Result<std::shared_ptr<const Volume>> Dataset::level(const std::string& field, s
     return fine.error();
   }
   return state_->budget->get(key, bytes, [&] {
+    state_->averages.fetch_add(1);
     return state_->guarded(*index, [&]() -> Result<Volume> { return coarsen(**fine, how); });
   });
 }

@@ -129,7 +129,8 @@ std::array<int, 3> level_of(const View& view, const Scene& full) {
       view.method.name == protocol::MethodName::reference) {
     return {0, 0, 0};
   }
-  return choose_level(full.camera, full.lattice, full.slice);
+  return choose_level(full.camera, full.lattice, full.slice,
+                      lines ? halved_with_lines_below_px : halved_below_px);
 }
 
 Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,

@@ -40,7 +40,7 @@ double pixels_per_unit(const Camera& camera, const Lattice& lattice) {
 }
 
 std::array<int, 3> choose_level(const Camera& camera, const Lattice& lattice,
-                                const std::optional<Slice>& slice) {
+                                const std::optional<Slice>& slice, double below_px) {
   std::array<int, 3> level{0, 0, 0};
   if (lattice.places) return level;
   const double scale = pixels_per_unit(camera, lattice);
@@ -48,7 +48,7 @@ std::array<int, 3> choose_level(const Camera& camera, const Lattice& lattice,
     if (slice && slice->axis == static_cast<int>(a)) continue;
     const auto& spacing = lattice.spacing[a];
     while (data::halved(lattice.dims[a], level[a] + 1) >= 2 &&
-           widest_cell(spacing, level[a]) * scale < halved_below_px) {
+           widest_cell(spacing, level[a]) * scale < below_px) {
       ++level[a];
     }
   }

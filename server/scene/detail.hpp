@@ -16,13 +16,18 @@ namespace windsplat::scene {
 double pixels_per_unit(const Camera& camera, const Lattice& lattice);
 
 // How often each axis of a rectilinear lattice is halved: as long as its widest cell's edge, seen
-// from whatever side, covers less than halved_below_px where the box is nearest. So what is drawn
-// has cells of at most two pixels. Which way the camera looks does not matter: turning it never
-// changes the level. Bent lattices and the axis of a slice are not halved, an axis never below two
-// samples.
+// from whatever side, covers less than `below_px` where the box is nearest. Which way the camera
+// looks does not matter: turning it never changes the level. Bent lattices and the axis of a slice
+// are not halved, an axis never below two samples.
+//
+// A medium is smooth: below a pixel a sample it is averaged, so that what is drawn has cells of at
+// most two pixels. Lines are not: fewer and thicker ones are grainier, so that where there are any
+// two cells have to fit in a pixel.
 inline constexpr double halved_below_px = 1;
+inline constexpr double halved_with_lines_below_px = 0.5;
 std::array<int, 3> choose_level(const Camera& camera, const Lattice& lattice,
-                                const std::optional<Slice>& slice);
+                                const std::optional<Slice>& slice,
+                                double below_px = halved_below_px);
 
 // How to average the lattice's volumes for that level.
 data::Coarsening coarsening_of(const Lattice& lattice, const std::array<int, 3>& level);

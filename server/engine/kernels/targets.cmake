@@ -8,7 +8,8 @@ set(kernel_speed -O3)
 if(WINDSPLAT_SANITIZE)
   set(kernel_speed -O1 -DWINDSPLAT_SANITIZED)
 endif()
-set(kernel_flags ${kernel_speed} -ffp-contract=off -fno-math-errno -fno-trapping-math -fno-signed-zeros
+set(kernel_flags ${kernel_speed} -ffp-contract=off -fno-math-errno -fno-trapping-math
+    -fno-signed-zeros
     -ffinite-math-only)
 # GCC 12 takes a function that fills a brick's arrays for one without effect and drops the call
 # (tests/numerics/curved_test.cpp sees an empty picture); without these two analyses it does not.
