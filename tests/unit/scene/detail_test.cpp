@@ -310,7 +310,7 @@ TEST(LevelOfRates, AreMeansOfTheRowsAndLayersMerged) {
       dataset_of(std::make_unique<FakeSource>(grid, std::vector<data::FieldInfo>{wind_info()}, 1));
   protocol::View view;
   view.vector.space = protocol::VectorSpace::world;
-  view.image.width = view.image.height = 100;
+  view.image.width = view.image.height = 50;
   const Scene coarse = build_scene(*complete_view(view, *dataset), *dataset).value();
   ASSERT_EQ(coarse.level, (Level{1, 1, 0})) << "three layers stay three";
   view.method.detail = protocol::Detail::full;
