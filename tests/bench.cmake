@@ -5,6 +5,11 @@ set(bench_dir ${CMAKE_CURRENT_LIST_DIR}/bench)
 set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/numerics/naive_renderer.cpp
   PROPERTIES COMPILE_OPTIONS -O2)
 
+# Times under a sanitizer tell nothing.
+if(WINDSPLAT_SANITIZE)
+  return()
+endif()
+
 add_library(bench_support STATIC ${bench_dir}/support.cpp)
 target_link_libraries(bench_support PUBLIC windsplat_frame benchmark::benchmark)
 

@@ -332,8 +332,8 @@ TEST_F(Produce, FrameInfoNamesMethodsAndSlabs) {
 }
 
 TEST_F(Produce, ReportTellsTheLevelAndWhatIsReallyDrawn) {
-  view.image.width = 20;
-  view.image.height = 15;
+  view.image.width = 10;
+  view.image.height = 8;
   const auto coarse = produce_as(Format::png);
   view.method.detail = protocol::Detail::full;
   const auto full = produce_as(Format::png);

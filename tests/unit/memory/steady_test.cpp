@@ -51,7 +51,10 @@ void* counted(std::size_t size, std::align_val_t alignment) {
 
 }  // namespace
 
-// Arrays and the forms that do not throw go through these two.
+// The forms that do not throw go through these; so do arrays, but not under every sanitizer.
+void* operator new[](std::size_t size) { return counted(size); }
+void operator delete[](void* at) noexcept { give_up(at); }
+void operator delete[](void* at, std::size_t /*size*/) noexcept { give_up(at); }
 void* operator new(std::size_t size) { return counted(size); }
 void* operator new(std::size_t size, std::align_val_t alignment) {
   return counted(size, alignment);
