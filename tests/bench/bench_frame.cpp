@@ -101,10 +101,10 @@ void add_levels(std::vector<Workload>& out) {
   scalar.preset = "clouds";
   scalar.heavy = true;
   Workload tornado;
-  tornado.name = "tornado 256^3 320x240";
+  tornado.name = "tornado 256^3 160x120";
   tornado.sample = bench::tornado_256;
-  tornado.width = 320;
-  tornado.height = 240;
+  tornado.width = 160;
+  tornado.height = 120;
   tornado.heavy = true;
   tornado.naive = false;
   out.push_back(tornado);
@@ -135,7 +135,7 @@ std::vector<Workload> all_workloads() {
 std::vector<Workload> smoke_workloads() {
   Workload workload;
   workload.name = "winds+clouds 64x48";
-  workload.sample.dims = {128, 64, 8};
+  workload.sample.dims = {256, 128, 8};
   workload.width = 64;
   workload.height = 48;
   return {workload, by_slab(workload), with_auto_detail(workload)};
