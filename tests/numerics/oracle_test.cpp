@@ -209,17 +209,20 @@ TEST(Euler, EqualsTheNaiveRendererWhereItIsStable) {
 // may end early only where all that is left lies behind.
 TEST(Slabs, EndEarlyWithinTheBoundTheyReport) {
   int ended = 0;
-  for (std::uint32_t seed = 1; seed <= 60; ++seed) {
+  for (std::uint32_t seed = 1; seed <= 120; ++seed) {
     Scene scene = SceneMaker(seed).make(What::both, seed % 2 == 0, false);
     scene.slice.reset();
     scene.method = scene::Method::slab;
-    scene.slab_thickness = 12;
-    scene.vector->opacity = 1;
-    scene.vector->length = 1.5;
+    scene.slab_thickness = 2 + seed % 7;
+    scene.vector->opacity = 0.5 + 0.1 * (seed % 6);
+    scene.vector->length = 0.5 + 0.25 * (seed % 5);
     scene.vector->span = 9;
+    scene.vector->r1 = 2 + seed % 7;
+    scene.vector->r2 = scene.vector->r1 + 1;
+    scene.vector->jitter_center = scene.vector->jitter_stride = 1;
     scene.vector->min_magnitude = 0;
-    scene.camera.width = 48;
-    scene.camera.height = 36;
+    scene.camera.width = 24;
+    scene.camera.height = 16;
     const engine::Rendered early = render(scene);
     scene.stop_transmittance = 0;
     const engine::Rendered whole = render(scene);
