@@ -105,26 +105,13 @@ void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& t
   work.stopped = table.count_open(tile) == 0;
 }
 
-void copy_row(const Tile& tile, int y, float* to) {
-  for (int x = 0; x < tile.width; ++x, to += 4) {
-    const int block = y / block_side * tile_blocks + x / block_side;
-    const int lane = y % block_side * block_side + x % block_side;
-    const float* from = tile.blocks + static_cast<std::ptrdiff_t>(block) * block_floats + lane;
-    for (int c = 0; c < 3; ++c) to[c] = from[static_cast<std::ptrdiff_t>(2 + c) * block_pixels];
-    // A sum of many parts of what was left may pass 1 by a rounding; what passes it by more has
-    // diverged, and is to be seen.
-    constexpr float rounding = 1e-4F;
-    const float alpha = from[block_pixels];
-    to[3] = alpha > 1.0F && alpha < 1.0F + rounding ? 1.0F : alpha;
-  }
-}
-
 // Block order -> rows, a few at a time, so that the sink finds them in the nearest cache.
-void deliver_tile(const Tile& tile, AlignedVector<float>& rows, TileSink sink) {
+void deliver_tile(const kernels::Table& table, const Tile& tile, AlignedVector<float>& rows,
+                  TileSink sink) {
   for (int y = 0; y < tile.height; y += rows_delivered) {
     const int count = std::min(rows_delivered, tile.height - y);
     for (int row = 0; row < count; ++row) {
-      copy_row(tile, y + row, rows.data() + static_cast<std::size_t>(row) * row_floats);
+      table.copy_row(tile, y + row, rows.data() + static_cast<std::size_t>(row) * row_floats);
     }
     sink({tile.x, tile.y + y, tile.width, count, rows.data(), row_floats});
   }
@@ -170,6 +157,7 @@ void level(std::vector<Workspace>& spaces) {
 }  // namespace
 
 bool all_closed(const Tile& tile, const Brick& brick) {
+  if (tile.any_closed == 0) return false;
   const int bx = tile.x / block_side;
   const int by = tile.y / block_side;
   const int x0 = std::max(brick.block_x - bx, 0);
@@ -206,7 +194,7 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
     }
     done[i].counters = tile.counters;
     done[i].closed_blocks = tile.any_closed != 0;
-    deliver_tile(tile, spaces[worker].rows, sink);
+    deliver_tile(table, tile, spaces[worker].rows, sink);
   });
   level(spaces);
   work.tiles = static_cast<std::int64_t>(order.size());

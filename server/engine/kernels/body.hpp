@@ -25,6 +25,7 @@ const Table& WINDSPLAT_KERNEL_TABLE() {
                                close_slab,
                                prefetch_brick,
                                fill_rays,
+                               copy_row,
                                count_open,
                                attenuate,
                                jitter};

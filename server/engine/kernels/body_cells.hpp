@@ -1,4 +1,4 @@
-// Part of the kernel body: the cells that a row's stops stand for, from grid strides to the world
+// Part of the kernel body: the cells that stops stand for, from grid strides to the world
 // and back.
 #pragma once
 
@@ -7,12 +7,12 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// Of a curved lattice's row: world = sum over axes a of edge[a] * grid[a]; grid[a] = inverse[a] .
-// world. Components of the world come second, lanes last.
+// Of a curved lattice's pair of rows: world = sum over axes a of edge[a] * grid[a]; grid[a] =
+// inverse[a] . world. Components of the world come second, lanes last.
 struct Cells {
-  alignas(64) float edge[3][3][brick_side];
-  alignas(64) float inverse[3][3][brick_side];
-  alignas(64) float from_eye[3][brick_side];  // of the stop, world units
+  alignas(64) float edge[3][3][pair_stops];
+  alignas(64) float inverse[3][3][pair_stops];
+  alignas(64) float from_eye[3][pair_stops];  // of the stop, world units
   std::uint32_t solid;                        // bit clear: the cell spans no volume
 };
 
@@ -35,7 +35,7 @@ inline bool edge_between(const Pass& pass, const Rows& rows, int a, int i, float
   const int at = rows.sample[a][i];
   const int before = at > 0 ? 1 : 0;
   const int after = at + 1 < dim ? 1 : 0;
-  const std::int64_t offset = rows.offset + rows.along_u[i];
+  const std::int64_t offset = offset_of(rows, i);
   const float* p = pass.places + 3 * (offset - before * pass.step[a]);
   const float* q = pass.places + 3 * (offset + after * pass.step[a]);
   const float scale = static_cast<float>(rows.group[a][i]) / static_cast<float>(before + after);
@@ -84,8 +84,8 @@ inline void fill_curved_cell(const Pass& pass, const Rows& rows, int i, Cells& c
 
 void fill_cells(const Camera& camera, const Pass& pass, const Rows& rows, Cells& cells) {
   cells.solid = 0;
-  for (int i = 0; i < brick_side; ++i) {
-    const float* place = pass.places + 3 * (rows.offset + rows.along_u[i]);
+  for (int i = 0; i < pair_stops; ++i) {
+    const float* place = pass.places + 3 * offset_of(rows, i);
     for (int c = 0; c < 3; ++c) {
       cells.from_eye[c][i] = static_cast<float>(static_cast<double>(place[c]) - camera.eye[c]);
     }

@@ -92,7 +92,7 @@ struct RibbonLane {
 };
 
 // How f follows from w, the place along the line on the screen: 1/z is linear there. The series is
-// good to bend^3 / 7.
+// good to bend^2 / 6.
 enum class Depth { flat, series, exact };
 constexpr float series_bend_max = 4e-3F;
 
@@ -101,8 +101,7 @@ KERNEL_INLINE Pixel along_ribbon(const RibbonLanes& r, Pixel w) {
   const Pixel one = all<Pixel>(1.0F);
   if (Along == Depth::exact) return w * r.ratio / hn::MulAdd(w, r.bend, one);
   if (Along == Depth::series) {
-    const Pixel bent = hn::NegMulAdd(w * r.bend, r.bend, r.bend);
-    return hn::MulAdd(hn::NegMulAdd(w, w, w), bent, w);
+    return hn::MulAdd(hn::NegMulAdd(w, w, w), r.bend, w);
   }
   return w;
 }
@@ -175,7 +174,7 @@ KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixe
     const Pixel bent = hn::MulAdd(s.dxx, ex * ex, hn::MulAdd(s.dxy, ex * ey, s.dyy * (ey * ey)));
     const Pixel length2 =
         hn::Max(s.d0 + hn::MulAdd(s.dx, ex, hn::MulAdd(s.dy, ey, bent)), s.d2_least);
-    const Pixel inverse = inverse_of(hn::Sqrt(length2));
+    const Pixel inverse = inverse_root(length2);
     const Pixel inverse2 = inverse * inverse;
     const Pixel r2 = top * inverse2;
     const Pixel tau = s.strength * footprint(r2) * (inverse * ray);
@@ -195,13 +194,12 @@ KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixe
 
 struct Channels {
   float* transmittance;
-  float* alpha;
   float* rgb[3];
 };
 
 KERNEL_INLINE Channels channels_of(float* block) {
   constexpr std::ptrdiff_t lanes = block_pixels;
-  return {block, block + lanes, {block + 2 * lanes, block + 3 * lanes, block + 4 * lanes}};
+  return {block, {block + lanes, block + 2 * lanes, block + 3 * lanes}};
 }
 
 KERNEL_INLINE void add_to(float* channel, Pixel value) {
@@ -216,7 +214,10 @@ KERNEL_INLINE void add_product(float* channel, Pixel a, Pixel b) {
 struct Light {
   Pixel most = hn::Zero(PixelTag());
 
-  KERNEL_INLINE void see(Pixel transmittance) { most = hn::Max(most, hn::Abs(transmittance)); }
+  KERNEL_INLINE void see(Pixel transmittance) {
+    const Pixel here = hn::Abs(transmittance);
+    most = pixel_lanes == block_pixels ? here : hn::Max(most, here);
+  }
   KERNEL_INLINE bool above(float stop) const {
     return !hn::AllFalse(PixelTag(), hn::Gt(most, all<Pixel>(stop)));
   }
@@ -276,14 +277,32 @@ KERNEL_INLINE void note_light(const Light& light, int row, std::uint32_t bit, Ti
   if (!light.above(tile.stop)) mark_closed(row, bit, tile);
 }
 
-// Composites into each of a row's blocks, whose bits are set, what add(x, y, ray, block) does.
+// Blocks of a tile within 8 x 8 of them: bit 8 j + i is the one in row + j and column + i.
+struct Window {
+  int row, column;
+  std::uint64_t blocks;
+};
+
+// Which of a window's blocks are open.
+inline std::uint64_t open_window(const Tile& tile, int row, int column) {
+  std::uint64_t open = 0;
+  for (int k = 0; k < window_side && row + k < tile_blocks; ++k) {
+    const std::uint64_t here = tile.open[row + k] >> static_cast<unsigned>(column) & 0xffU;
+    open |= here << static_cast<unsigned>(window_side * k);
+  }
+  return open;
+}
+
+// Composites into each of a window's blocks what add(left, top, ray, block) does.
 template <bool Perspective, class Add>
-KERNEL_INLINE void each_block(int row, std::uint32_t blocks, Tile& tile, const Add& add) {
-  const float y = top_of(tile, row);
-  for (; blocks != 0; blocks &= blocks - 1U) {
-    const int column = __builtin_ctz(blocks);
+KERNEL_INLINE void each_block(const Window& window, Tile& tile, const Add& add) {
+  for (std::uint64_t blocks = window.blocks; blocks != 0; blocks &= blocks - 1U) {
+    const int at = __builtin_ctzll(blocks);
+    const int row = window.row + at / window_side;
+    const int column = window.column + at % window_side;
     const float* ray = Perspective ? rays_at(tile, row, column) : nullptr;
-    const Light light = add(left_of(tile, column), y, ray, block_at(tile, row, column));
+    const Light light =
+        add(left_of(tile, column), top_of(tile, row), ray, block_at(tile, row, column));
     note_light(light, row, 1U << static_cast<unsigned>(column), tile);
   }
 }
@@ -308,7 +327,6 @@ KERNEL_INLINE Light line_block(const RibbonLanes& r, const BlockPixels& corner,
           Style != style_plain ? hn::MulAdd(lane.f, r.rise[c], r.tail[c]) : r.tail[c];
       add_product(to.rgb[c] + l, a, color);
     }
-    add_to(to.alpha + l, a);
     const Pixel left = hn::NegMulAdd(t, lane.opacity, t);
     store(left, to.transmittance + l);
     light.see(left);
@@ -330,7 +348,6 @@ KERNEL_INLINE Light splat_block(const SplatLanes& s, float x, float y,
     const Pixel t = load<Pixel>(to.transmittance + l);
     const Pixel a = t * medium.absorbed;
     for (int c = 0; c < 3; ++c) add_product(to.rgb[c] + l, a, s.color[c]);
-    add_to(to.alpha + l, a);
     const Pixel left = bounded_light<Compositing>(t * medium.transmitted);
     store(left, to.transmittance + l);
     light.see(left);
@@ -355,7 +372,6 @@ KERNEL_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const
     const Pixel color = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
     add_product(to.rgb[c] + l, t, hn::MulAdd(own, color, s.color[c] * absorbed));
   }
-  add_product(to.alpha + l, t, absorbed + own);
   return t * (rest * (one - back));
 }
 
@@ -388,7 +404,6 @@ KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_ri
         const Pixel color = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
         add_product(to.rgb[c] + l, t, hn::MulAdd(own, color - s.color[c], s.color[c] * a));
       }
-      add_product(to.alpha + l, t, a);
       left = t * (medium.transmitted * (all<Pixel>(1.0F) - line.opacity));
     }
     left = bounded_light<Compositing>(left);
@@ -399,43 +414,42 @@ KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_ri
 }
 
 template <bool Perspective, int Compositing, From Start>
-void splat_row(const Splat& splat, int row, std::uint32_t blocks, Tile& tile) {
+void splat_window(const Splat& splat, const Window& window, Tile& tile) {
   const SplatLanes s = spread(splat);
-  each_block<Perspective>(row, blocks, tile, [&](float x, float y, const float* ray, float* block) {
+  each_block<Perspective>(window, tile, [&](float x, float y, const float* ray, float* block) {
     return splat_block<Perspective, Compositing, Start>(s, x, y, ray, block);
   });
 }
 
 template <bool Perspective, int Compositing, int Style, From Start>
-void both_row(const Ribbon& ribbon, const Splat& splat, int row, std::uint32_t blocks, Tile& tile) {
+void both_window(const Ribbon& ribbon, const Splat& splat, const Window& window, Tile& tile) {
   const RibbonLanes r = spread(ribbon);
   const SplatLanes s = spread(splat);
   const Pixel depth = all<Pixel>(ribbon.depth);
   const Pixel depth_rise = all<Pixel>(ribbon.depth_rise);
-  each_block<Perspective>(row, blocks, tile, [&](float x, float y, const float* ray, float* block) {
+  each_block<Perspective>(window, tile, [&](float x, float y, const float* ray, float* block) {
     return both_block<Perspective, Compositing, Style, Start>(r, depth, depth_rise, s, x, y, ray,
                                                               block);
   });
 }
 
 template <bool Perspective, int Style>
-void line_row(const Ribbon& ribbon, int row, std::uint32_t blocks, Tile& tile) {
+void line_window(const Ribbon& ribbon, const Window& window, Tile& tile) {
   const RibbonLanes r = spread(ribbon);
-  each_block<false>(row, blocks, tile, [&](float x, float y, const float* /*ray*/, float* block) {
+  each_block<false>(window, tile, [&](float x, float y, const float* /*ray*/, float* block) {
     constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
     return line_block<along, Style>(r, {all<Pixel>(x) - r.x, all<Pixel>(y) - r.y}, block);
   });
 }
 
-using LineFunction = void (*)(const Ribbon& r, int row, std::uint32_t blocks, Tile& tile);
-using SplatFunction = void (*)(const Splat& s, int row, std::uint32_t blocks, Tile& tile);
-using BothFunction = void (*)(const Ribbon& r, const Splat& s, int row, std::uint32_t blocks,
-                              Tile& tile);
+using LineFunction = void (*)(const Ribbon& r, const Window& window, Tile& tile);
+using SplatFunction = void (*)(const Splat& s, const Window& window, Tile& tile);
+using BothFunction = void (*)(const Ribbon& r, const Splat& s, const Window& window, Tile& tile);
 
 constexpr int from_count = 3;
 
-// The functions that a pass composites kernels with a splat with, chosen once a brick: into the
-// blocks of one row whose bits are set. Splats by where their rays begin.
+// The functions that a pass composites kernels with a splat with, chosen once a brick. Splats by
+// where their rays begin.
 struct Compositor {
   LineFunction line;
   SplatFunction splat[from_count];
@@ -454,12 +468,13 @@ inline Compositor compositor_with() {
   constexpr From inside = Perspective ? From::eye_inside : From::eye;
   constexpr From near = Perspective ? From::near_plane : From::eye;
   constexpr int splat = Compositing == compositing_cd_euler ? 0 : 1;
-  return {line_row<Perspective, Style>,
-          {splat_row<Perspective, Compositing, From::eye>,
-           splat_row<Perspective, Compositing, inside>, splat_row<Perspective, Compositing, near>},
-          {both_row<Perspective, Compositing, Style, From::eye>,
-           both_row<Perspective, Compositing, Style, inside>,
-           both_row<Perspective, Compositing, Style, near>},
+  return {line_window<Perspective, Style>,
+          {splat_window<Perspective, Compositing, From::eye>,
+           splat_window<Perspective, Compositing, inside>,
+           splat_window<Perspective, Compositing, near>},
+          {both_window<Perspective, Compositing, Style, From::eye>,
+           both_window<Perspective, Compositing, Style, inside>,
+           both_window<Perspective, Compositing, Style, near>},
           splat,
           Compositing == compositing_analytic ? 2 : splat};
 }

@@ -64,16 +64,6 @@ inline Splat splat_at(const Prepared& p, int l) {
   return out;
 }
 
-// The tile's open blocks within a window, as Footing has them.
-inline std::uint64_t open_window(const Tile& tile, int row, int column) {
-  std::uint64_t open = 0;
-  for (int k = 0; k < window_side && row + k < tile_blocks; ++k) {
-    const std::uint64_t here = tile.open[row + k] >> static_cast<unsigned>(column) & 0xffU;
-    open |= here << static_cast<unsigned>(window_side * k);
-  }
-  return open;
-}
-
 // Pixels from a window's corner to each of its blocks.
 struct WindowOffsets {
   float x[window_side * window_side];
@@ -176,31 +166,111 @@ inline From from_of(const Prepared& p, int l) {
   return s.ex[l] == s.x[l] && s.ey[l] == s.y[l] ? From::eye_inside : From::eye;
 }
 
-// Composites one kernel that has a splat, and perhaps a line.
+// Rows and columns of blocks, both ends included.
+struct Box {
+  int row, row_last, column, column_last;
+};
+
+inline Box splat_box(const Footing& f, int l) {
+  return {f.row_first[l], f.row_last[l], f.column_first[l], f.column_last[l]};
+}
+
+inline Box line_box(const Footing& f, int l) {
+  return {f.line_first[l], f.line_last[l], f.line_column[l], f.line_column_last[l]};
+}
+
+inline Box united(const Box& a, const Box& b) {
+  return {a.row < b.row ? a.row : b.row, a.row_last > b.row_last ? a.row_last : b.row_last,
+          a.column < b.column ? a.column : b.column,
+          a.column_last > b.column_last ? a.column_last : b.column_last};
+}
+
+inline bool within_window(const Box& box) {
+  return box.row_last - box.row < window_side && box.column_last - box.column < window_side;
+}
+
+inline std::uint64_t joined(std::uint32_t high, std::uint32_t low) {
+  return static_cast<std::uint64_t>(high) << 32U | low;
+}
+
+// A window's blocks as another window's, whose corner is not right of or below its own and which
+// holds them all.
+inline std::uint64_t moved(std::uint64_t blocks, const Box& from, const Window& to) {
+  return blocks << static_cast<unsigned>(window_side * (from.row - to.row) + from.column -
+                                         to.column);
+}
+
+// The blocks of a window that row_of(row) has set, for what reaches beyond one.
+template <class RowOf>
+inline std::uint64_t in_window(const Box& box, const Window& window, const RowOf& row_of) {
+  std::uint64_t blocks = 0;
+  for (int k = 0; k < window_side; ++k) {
+    const int row = window.row + k;
+    if (row < box.row || row > box.row_last) continue;
+    const std::uint64_t here = row_of(row) >> static_cast<unsigned>(window.column) & 0xffU;
+    blocks |= here << static_cast<unsigned>(window_side * k);
+  }
+  return blocks;
+}
+
+// A kernel that has a splat, and perhaps a line.
+template <bool Perspective>
+struct KernelDrawing {
+  const Compositor& with;
+  Tile& tile;
+  Splat splat;
+  Ribbon ribbon;
+  int from;
+
+  // `lines` and `splats`: the window's blocks that each may touch.
+  KERNEL_INLINE void draw(int row, int column, std::uint64_t lines, std::uint64_t splats) const {
+    if (tile.any_closed != 0) {
+      const std::uint64_t open = open_window(tile, row, column);
+      lines &= open;
+      splats &= open;
+    }
+    const std::uint64_t both = lines & splats;
+    const std::uint64_t splat_alone = splats & ~both;
+    const std::uint64_t line_alone = lines & ~both;
+    if (both != 0) with.both[from](ribbon, splat, {row, column, both}, tile);
+    if (splat_alone != 0) with.splat[from](splat, {row, column, splat_alone}, tile);
+    if (line_alone != 0) with.line(ribbon, {row, column, line_alone}, tile);
+    const int exponentials = __builtin_popcountll(splat_alone) * with.splat_exponentials +
+                             __builtin_popcountll(both) * with.both_exponentials;
+    tile.counters.pixel_updates +=
+        std::int64_t{__builtin_popcountll(lines | splats)} * block_pixels;
+    tile.counters.exponentials += std::int64_t{exponentials} * block_pixels;
+  }
+};
+
 template <bool Perspective>
 void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
   const Footing& f = p.footing;
   const bool lined = has(p.stops.lines, l);
-  const Splat splat = splat_at<Perspective>(p, l);
-  Ribbon ribbon;
-  if (lined) ribbon = ribbon_at(p.pass->line, p.ribbons, l);
-  const int from = static_cast<int>(from_of<Perspective>(p, l));
-  const std::uint32_t columns = range_mask({f.column_first[l], f.column_last[l]});
-  const int first = lined && f.line_first[l] < f.row_first[l] ? f.line_first[l] : f.row_first[l];
-  const int last = lined && f.line_last[l] > f.row_last[l] ? f.line_last[l] : f.row_last[l];
-  for (int row = first; row <= last; ++row) {
-    const std::uint32_t open = tile.open[row];
-    const bool with_line = lined && row >= f.line_first[l] && row <= f.line_last[l];
-    const std::uint32_t lines = with_line ? open & f.line_columns[row - f.line_first[l]][l] : 0;
-    const std::uint32_t splats = row >= f.row_first[l] && row <= f.row_last[l] ? open & columns : 0;
-    const std::uint32_t both = lines & splats;
-    if (both != 0) with.both[from](ribbon, splat, row, both, tile);
-    if (splats != both) with.splat[from](splat, row, splats & ~both, tile);
-    if (lines != both) with.line(ribbon, row, lines & ~both, tile);
-    const int with_splat = __builtin_popcount(splats & ~both) * with.splat_exponentials;
-    const int with_both = __builtin_popcount(both) * with.both_exponentials;
-    tile.counters.pixel_updates += std::int64_t{__builtin_popcount(lines | splats)} * block_pixels;
-    tile.counters.exponentials += std::int64_t{with_splat + with_both} * block_pixels;
+  KernelDrawing<Perspective> kernel = {
+      with, tile, splat_at<Perspective>(p, l), {}, static_cast<int>(from_of<Perspective>(p, l))};
+  if (lined) kernel.ribbon = ribbon_at(p.pass->line, p.ribbons, l);
+  const Box splat = splat_box(f, l);
+  const Box line = line_box(f, l);
+  const Box box = lined ? united(splat, line) : splat;
+  if (within_window(box)) {
+    const Window window = {box.row, box.column, 0};
+    const std::uint64_t lines =
+        lined ? moved(joined(f.window_high[l], f.window_low[l]), line, window) : 0;
+    const std::uint64_t splats = moved(joined(f.splat_high[l], f.splat_low[l]), splat, window);
+    kernel.draw(box.row, box.column, lines, splats);
+    return;
+  }
+  const std::uint32_t columns = range_mask({splat.column, splat.column_last});
+  for (int row = box.row; row <= box.row_last; row += window_side) {
+    for (int column = box.column; column <= box.column_last; column += window_side) {
+      const Window window = {row, column, 0};
+      std::uint64_t lines = 0;
+      if (lined) {
+        lines = in_window(line, window, [&](int at) { return f.line_columns[at - line.row][l]; });
+      }
+      kernel.draw(row, column, lines, in_window(splat, window, [&](int) { return columns; }));
+    }
   }
 }
 
@@ -273,8 +343,13 @@ void draw_in_order(const Brick& brick, const Prepared& p, Tile& tile) {
 
 // A row's samples lie on one cache line or two.
 inline void prefetch_row(const float* from, std::int64_t length) {
+  const float* last = from + length - 1;
   __builtin_prefetch(from);
-  __builtin_prefetch(from + length - 1);
+  constexpr std::uintptr_t line = 64;  // bytes
+  if (reinterpret_cast<std::uintptr_t>(from) / line !=
+      reinterpret_cast<std::uintptr_t>(last) / line) {
+    __builtin_prefetch(last);
+  }
 }
 
 // Brings a brick's samples closer while the one before it is drawn: rows of a brick are far apart
@@ -332,6 +407,21 @@ void fill_rays(const Camera& camera, const Tile& tile, float* rays) {
         const Pixel y = (all<Pixel>(top) + load<Pixel>(lane_y + l)) * pixel;
         store(hn::Sqrt(hn::MulAdd(x, x, hn::MulAdd(y, y, one))), to + l);
       }
+    }
+  }
+}
+
+// Whatever is not let through is absorbed. Forward Euler may let less than nothing through: what
+// has diverged is to be seen.
+void copy_row(const Tile& tile, int y, float* rgba) {
+  const hn::CappedTag<float, block_side> tag;
+  constexpr int lanes = static_cast<int>(hn::MaxLanes(tag));
+  const auto one = hn::Set(tag, 1.0F);
+  const float* block = block_at(tile, y / block_side, 0) + y % block_side * block_side;
+  for (int column = 0; column < blocks_of(tile.width); ++column, block += block_floats) {
+    for (int i = 0; i < block_side; i += lanes, rgba += std::ptrdiff_t{4} * lanes) {
+      const auto channel = [&](int c) { return hn::LoadU(tag, block + c * block_pixels + i); };
+      hn::StoreInterleaved4(channel(1), channel(2), channel(3), one - channel(0), tag, rgba);
     }
   }
 }

@@ -7,24 +7,6 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-using StopIntegers = hn::RebindToSigned<StopTag>;
-using StopInteger = hn::Vec<StopIntegers>;
-
-// blocks_between for a row of stops.
-struct Ranges {
-  StopInteger first, last;
-};
-
-KERNEL_INLINE Ranges blocks_between(Stop low, Stop high, int blocks) {
-  constexpr float per_block = 1.0F / block_side;
-  constexpr float slack = 1e-3F;
-  const float bound = static_cast<float>(blocks);
-  const Stop first = clamped((low + all<Stop>(0.5F - slack)) * all<Stop>(per_block), 0.0F, bound);
-  const Stop last =
-      clamped((high + all<Stop>(slack - 0.5F)) * all<Stop>(per_block), -1.0F, bound - 0.5F);
-  return {truncated(first), truncated(last + all<Stop>(1.0F)) - hn::Set(StopIntegers(), 1)};
-}
-
 // The bits from first to last; none if last < first.
 KERNEL_INLINE UnsignedOf<Stop> range_masks(const Ranges& range) {
   const hn::RebindToUnsigned<StopTag> tag;
@@ -35,6 +17,13 @@ KERNEL_INLINE UnsignedOf<Stop> range_masks(const Ranges& range) {
   const auto bits = hn::AndNot(below - one, above - one);
   const auto none = hn::Gt(range.first, range.last);
   return hn::IfThenZeroElse(hn::RebindMask(tag, none), bits);
+}
+
+// The largest of the lanes that are among `bits`, at least 0.
+KERNEL_INLINE int most_of(StopInteger value, std::uint32_t bits) {
+  const auto among = hn::RebindMask(StopIntegers(), mask_of<Stop>(bits));
+  return hn::GetLane(hn::MaxOfLanes(
+      StopIntegers(), hn::Max(hn::IfThenElseZero(among, value), hn::Zero(StopIntegers()))));
 }
 
 // A row's lines from lane 0 of l on, as segments from the tile's corner.
@@ -60,10 +49,6 @@ KERNEL_INLINE LineSpans line_spans(const LineStyle& line, const Ribbons& r, cons
   return s;
 }
 
-KERNEL_INLINE void store(StopInteger value, std::int32_t* to) {
-  hn::Store(value, StopIntegers(), to);
-}
-
 // The rows of blocks that a row's lines may touch; which of `bits` touch any. `most` becomes the
 // largest number of rows, beyond the first, of a line so far.
 KERNEL_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons& r,
@@ -81,6 +66,7 @@ KERNEL_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons&
   store(s.rows.first, f.line_first + l);
   store(s.rows.last, f.line_last + l);
   store(s.columns.first, f.line_column + l);
+  store(s.columns.last, f.line_column_last + l);
   const std::uint32_t touching = bits & ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
   if (touching == 0) return 0;
   most = hn::Max(most, hn::IfThenZeroElse(missing, tall));
@@ -121,17 +107,63 @@ KERNEL_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, co
     // Lines that end before row k may have bits here.
     const auto ends = hn::Gt(hn::Set(StopIntegers(), k), tall);
     const auto shifted = hn::IfThenZeroElse(hn::RebindMask(masks, ends), hn::Shr(here, column));
-    if (k < 4) {
+    if (k < window_side / 2) {
       low = low | hn::ShiftLeftSame(shifted, window_side * k);
     } else if (k < window_side) {
-      high = high | hn::ShiftLeftSame(shifted, window_side * (k - 4));
+      high = high | hn::ShiftLeftSame(shifted, window_side * (k - window_side / 2));
     }
   }
   hn::Store(low, masks, f.window_low + l);
   hn::Store(high, masks, f.window_high + l);
 }
 
-// Rows and columns of blocks that a row's splats may touch; which of `bits` touch any.
+// What of an oval lies between two heights below its middle, as distances right of it. Its
+// rightmost and leftmost points are at heights `turn` and -turn.
+KERNEL_INLINE Extent oval_between(const Oval& o, Stop top, Stop bottom) {
+  const Stop turn = o.shear * o.half_width;
+  const auto chord = [&](Stop y, Stop side) {
+    const Stop half2 =
+        hn::Max(hn::NegMulAdd(o.narrowing, y * y, o.half_chord2), hn::Zero(StopTag()));
+    return hn::MulAdd(side, hn::Sqrt(half2), o.lean * y);
+  };
+  const Stop one = all<Stop>(1.0F);
+  return {chord(clamped(hn::Neg(turn), top, bottom), hn::Neg(one)),
+          chord(clamped(turn, top, bottom), one)};
+}
+
+// Of each row of blocks of a splat's box: the columns that its oval meets.
+KERNEL_INLINE void find_splat_columns(const Outline& outline, const Ranges& across,
+                                      const Ranges& down, const Tile& tile, int l, int most,
+                                      Footing& f) {
+  const hn::RebindToUnsigned<StopTag> masks;
+  const int columns = blocks_of(tile.width);
+  const Stop x = outline.oval.x - all<Stop>(static_cast<float>(tile.x));
+  const Stop from_middle = hn::MulAdd(from_integer<Stop>(down.first), all<Stop>(block_side),
+                                      all<Stop>(0.5F + static_cast<float>(tile.y))) -
+                           outline.oval.y;
+  const StopInteger tall = down.last - down.first;
+  const auto column = hn::BitCast(masks, across.first);
+  const auto box = range_masks(across);
+  auto low = hn::Zero(masks);
+  auto high = hn::Zero(masks);
+  for (int k = 0; k <= most; ++k) {
+    const Stop top = from_middle + all<Stop>(static_cast<float>(k * block_side));
+    const Extent here = oval_between(outline.oval, top, top + all<Stop>(block_side - 1));
+    const auto met = range_masks(blocks_between(x + here.low, x + here.high, columns));
+    const auto kept = hn::IfThenElse(hn::RebindMask(masks, outline.oval.known), box & met, box);
+    const auto ends = hn::Gt(hn::Set(StopIntegers(), k), tall);
+    const auto shifted = hn::IfThenZeroElse(hn::RebindMask(masks, ends), hn::Shr(kept, column));
+    if (k < window_side / 2) {
+      low = low | hn::ShiftLeftSame(shifted, window_side * k);
+    } else {
+      high = high | hn::ShiftLeftSame(shifted, window_side * (k - window_side / 2));
+    }
+  }
+  hn::Store(low, masks, f.splat_low + l);
+  hn::Store(high, masks, f.splat_high + l);
+}
+
+// The blocks that a row's splats may touch; which of `bits` touch any.
 KERNEL_INLINE std::uint32_t find_splat_blocks(const Outline& outline, const Tile& tile, int l,
                                               std::uint32_t bits, Footing& f) {
   const Stop left = all<Stop>(static_cast<float>(tile.x));
@@ -145,7 +177,16 @@ KERNEL_INLINE std::uint32_t find_splat_blocks(const Outline& outline, const Tile
   store(down.first, f.row_first + l);
   store(down.last, f.row_last + l);
   const auto missing = hn::Or(hn::Gt(across.first, across.last), hn::Gt(down.first, down.last));
-  return bits & ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
+  const std::uint32_t touching = bits & ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
+  if (touching == 0) return 0;
+  const auto within = hn::Set(StopIntegers(), window_side);
+  const StopInteger tall = down.last - down.first;
+  const auto small = hn::And(hn::Lt(tall, within), hn::Lt(across.last - across.first, within));
+  const std::uint64_t windowed = bits_of<Stop>(hn::RebindMask(StopTag(), small));
+  f.splat_windowed |= windowed << static_cast<unsigned>(l);
+  const StopInteger rows = hn::IfThenElseZero(small, tall);
+  find_splat_columns(outline, across, down, tile, l, most_of(rows, touching), f);
+  return touching;
 }
 
 }  // namespace

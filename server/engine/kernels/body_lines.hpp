@@ -1,4 +1,4 @@
-// Part of the kernel body: oriented lines, from a row's winds to ribbons on the screen.
+// Part of the kernel body: oriented lines, from winds to ribbons on the screen.
 #pragma once
 
 #include "server/engine/kernels/body_cells.hpp"
@@ -33,13 +33,15 @@ KERNEL_INLINE void clip_to_box(float half_span, const Three<Stop>& in_box, const
   };
   const Stop most = hn::Max(hn::Max(reach(in_box.x, along.x), reach(in_box.y, along.y)),
                             reach(in_box.z, along.z));
-  if (hn::AllTrue(StopTag(), hn::Le(most, half))) return;
+  // Asked lane by lane: what a line is does not hang on its neighbours.
+  const auto inside = hn::Le(most, half);
+  if (hn::AllTrue(StopTag(), inside)) return;
   const auto clip = [&](Stop at, Stop way) {
     const Stop inverse = inverse_of(divisor(way));
     const Stop enter = (hn::Neg(half) - at) * inverse;
     const Stop leave = (half - at) * inverse;
-    s.low = hn::Max(s.low, hn::Min(enter, leave));
-    s.high = hn::Min(s.high, hn::Max(enter, leave));
+    s.low = hn::Max(s.low, hn::IfThenElse(inside, s.low, hn::Min(enter, leave)));
+    s.high = hn::Min(s.high, hn::IfThenElse(inside, s.high, hn::Max(enter, leave)));
   };
   clip(in_box.x, along.x);
   clip(in_box.y, along.y);
@@ -109,12 +111,15 @@ KERNEL_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyl
   Stop z0 = one;
   Stop z1 = one;
   if (Perspective) {
-    if (!hn::AllTrue(StopTag(), hn::Ge(pz - half_way, near))) {
+    const auto beyond = hn::Ge(pz - half_way, near);
+    if (!hn::AllTrue(StopTag(), beyond)) {
       // The near plane takes off the end that is nearer to the eye.
       const Stop q_near = (near - pz) / divisor(vz);
       const Stop zero = hn::Zero(StopTag());
-      s.low = hn::Max(s.low, hn::IfThenElse(hn::Gt(vz, zero), q_near, all<Stop>(-0.5F)));
-      s.high = hn::Min(s.high, hn::IfThenElse(hn::Lt(vz, zero), q_near, all<Stop>(0.5F)));
+      const auto tail_off = hn::AndNot(beyond, hn::Gt(vz, zero));
+      const auto head_off = hn::AndNot(beyond, hn::Lt(vz, zero));
+      s.low = hn::Max(s.low, hn::IfThenElse(tail_off, q_near, all<Stop>(-0.5F)));
+      s.high = hn::Min(s.high, hn::IfThenElse(head_off, q_near, all<Stop>(0.5F)));
       shown = hn::Min(winds.magnitude, s.high - s.low);
       shown = hn::Min(shown, pz + half_way - near);
     }
@@ -150,7 +155,7 @@ KERNEL_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyl
 // Where along its texture each line begins: a line at full magnitude runs through motion_cycles.
 void phase_ribbons(const LineStyle& line, const Winds& winds, const Segments& s, int l,
                    Ribbons& r) {
-  alignas(64) float magnitude[brick_side], phase[brick_side], low[brick_side], high[brick_side];
+  alignas(64) float magnitude[pair_stops], phase[pair_stops], low[pair_stops], high[pair_stops];
   store(winds.magnitude, magnitude);
   store(s.phase, phase);
   store(s.low, low);

@@ -19,32 +19,46 @@ inline std::uint32_t row_at(std::uint64_t bits, int j) {
   return static_cast<std::uint32_t>(bits >> static_cast<unsigned>(brick_side * j) & 0xffU);
 }
 
+inline std::uint32_t pair_at(std::uint64_t bits, int pair) {
+  return static_cast<std::uint32_t>(bits >> static_cast<unsigned>(pair_stops * pair) & 0xffffU);
+}
+
+// 0xff in each byte whose bit is set.
+inline std::uint64_t bytes_of(std::uint32_t bits) {
+  const std::uint64_t spread = (bits * std::uint64_t{0x0101010101010101U}) & 0x8040201008040201U;
+  const std::uint64_t lowest = ((spread + 0x7f7f7f7f7f7f7f7fU) >> 7U) & 0x0101010101010101U;
+  return lowest * 0xffU;
+}
+
+// The stops of a brick that are there at all.
+inline std::uint64_t brick_bits(const Rows& rows) {
+  const std::uint64_t row = row_bits(rows);
+  const std::uint64_t all = row * 0x0101010101010101U;
+  return all >> static_cast<unsigned>(brick_side * (brick_side - rows.v_count));
+}
+
 // Places a brick's stops; those whose kernel may touch an open block of the tile.
 template <bool Perspective, bool Curved>
 std::uint64_t place_stops(const Camera& camera, const Pass& pass, const Brick& brick,
                           const Frustum& frustum, Rows& rows, Tile& tile, Stops& stops) {
   const bool partly = partly_closed(tile, brick);
   std::uint64_t seen = 0;
-  for (int j = 0; j < rows.v_count; ++j) {
+  for (int pair = 0; pair < rows.pairs; ++pair) {
     if (Curved) {
-      set_row(pass, j, rows);
-      place_curved_row(camera, pass, j, rows, stops);
+      set_pair(pass, pair, rows);
+      place_curved_pair(camera, pass, pair, rows, stops);
     } else {
-      place_row(camera, pass, j, rows, stops);
+      place_pair(camera, pass, pair, rows, stops);
     }
-    const std::uint64_t bits = seen_in_row<Perspective>(camera, frustum, stops, j) & row_bits(rows);
-    seen |= bits << static_cast<unsigned>(brick_side * j);
+    const std::uint64_t bits = seen_in_pair<Perspective>(camera, frustum, stops, pair);
+    seen |= bits << static_cast<unsigned>(pair_stops * pair);
   }
-  for (int j = 0; partly && j < rows.v_count; ++j) {
-    const std::uint32_t bits = row_at(seen, j);
-    if (bits == 0 ||
-        row_is_open<Perspective>(camera, frustum, stops, j, rows.u_count, !Curved, tile)) {
-      continue;
-    }
-    tile.counters.occluded += __builtin_popcount(bits);
-    seen &= ~(std::uint64_t{0xff} << static_cast<unsigned>(brick_side * j));
-  }
-  return seen;
+  seen &= brick_bits(rows);
+  if (!partly || seen == 0) return seen;
+  const std::uint32_t open = rows_to_see<Perspective>(camera, frustum, stops, rows, !Curved, tile);
+  const std::uint64_t kept = seen & bytes_of(open);
+  tile.counters.occluded += __builtin_popcountll(seen & ~kept);
+  return kept;
 }
 
 template <bool Lines, bool Medium, bool Perspective, bool Curved>
@@ -54,7 +68,7 @@ struct BrickMaker {
   Tile& tile;
   Prepared& out;
   Hash3<std::uint32_t> key;
-  Rows rows;  // the two are filled row by row
+  Rows rows;  // the two are filled pair by pair
   Cells cells;
   Shades shades;
 
@@ -87,14 +101,14 @@ struct BrickMaker {
     return find_splat_blocks(outline, tile, l, splats, out.footing);
   }
 
-  void make_row(int j, std::uint32_t bits) {
-    set_row(pass, j, rows);
+  void make_pair(int pair, std::uint32_t bits) {
+    set_pair(pass, pair, rows);
     if (Curved) {
       fill_cells(camera, pass, rows, cells);
       bits &= cells.solid;
     }
-    for (int i = 0; i < brick_side; i += stop_lanes) {
-      const int l = brick_side * j + i;
+    for (int i = 0; i < pair_stops; i += stop_lanes) {
+      const int l = pair_stops * pair + i;
       const std::uint32_t here = lanes_at(bits, i);
       if (here == 0) continue;
       const CellLanes<Curved> cell(rows, cells, i);
@@ -105,15 +119,15 @@ struct BrickMaker {
       if (Medium) {
         const std::uint64_t splats = make_splats(cell, i, l, here);
         out.stops.splats |= splats << static_cast<unsigned>(l);
-        color_row(splats, i, l);
+        color_splats(splats, i, l);
       }
     }
   }
 
-  void color_row(std::uint64_t splats, int i, int l) {
+  void color_splats(std::uint64_t splats, int i, int l) {
     for (; splats != 0; splats &= splats - 1U) {
       const int k = __builtin_ctzll(splats);
-      color_density(pass, rows.offset + rows.along_u[i + k], out.densities.color[l + k]);
+      color_density(pass, offset_of(rows, i + k), out.densities.color[l + k]);
     }
   }
 
@@ -143,18 +157,18 @@ void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, T
                    Prepared& out) {
   BrickMaker<Lines, Medium, Perspective, Curved> maker(camera, pass, tile, out);
   Stops& stops = out.stops;
-  stops.lines = stops.splats = out.footing.windowed = 0;
+  stops.lines = stops.splats = out.footing.windowed = out.footing.splat_windowed = 0;
   out.pass = &pass;
   out.near = camera.near;
   open_rows(pass, brick, maker.rows);
   float reach[3];
-  brick_reach(camera, pass, brick, reach);
+  brick_reach(camera, pass, brick, maker.rows, reach);
   const Frustum frustum = frustum_of<Perspective>(camera, tile, reach, Lines ? pass.line.r2 : 0.0F);
   const std::uint64_t seen =
       place_stops<Perspective, Curved>(camera, pass, brick, frustum, maker.rows, tile, stops);
   maker.shades.unknown = 0;
-  for (int j = 0; j < brick.v_count; ++j) {
-    if (row_at(seen, j) != 0) maker.make_row(j, row_at(seen, j));
+  for (int pair = 0; pair < maker.rows.pairs; ++pair) {
+    if (pair_at(seen, pair) != 0) maker.make_pair(pair, pair_at(seen, pair));
   }
   if (Lines && stops.lines != 0) maker.find_lines();
   stops.count = __builtin_popcountll(stops.lines | stops.splats);

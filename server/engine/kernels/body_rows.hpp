@@ -1,5 +1,5 @@
-// Part of the kernel body: a brick's stops row by row, one lane a stop: where they stand, and which
-// of them the tile can show.
+// Part of the kernel body: a brick's stops two rows at a time, one lane a stop: where they stand,
+// and which of them the tile can show.
 #pragma once
 
 #include "server/engine/kernels/body_math.hpp"
@@ -8,26 +8,29 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// A brick's rows run along u. Each entry [axis][i] holds what the axis has at the row's i-th stop:
-// along u they differ, along the others they are all the same. Lanes beyond the last stop repeat
-// it.
+// A brick's rows run along u; two neighbours are a pair. Each entry [axis][i] holds what the axis
+// has at the pair's i-th stop, brick_side of the first row and then those of the second: along u
+// they differ, along v by row, along the third they are all the same. What lies beyond a row's last
+// stop repeats it, and so does a row beyond the last.
 struct Rows {
   alignas(64) double across[3][brick_side];  // right, down, forward: the part of u
-  alignas(32) float cell[3][brick_side];
-  alignas(32) float inverse_cell[3][brick_side];
-  alignas(32) float from_eye[3][brick_side];
-  alignas(32) float height[brick_side];
-  alignas(32) std::int32_t sample[3][brick_side];
-  std::int32_t group[3][brick_side];
+  alignas(64) float cell[3][pair_stops];
+  alignas(64) float inverse_cell[3][pair_stops];
+  alignas(64) float from_eye[3][pair_stops];
+  alignas(64) float height[pair_stops];
+  alignas(64) std::int32_t sample[3][pair_stops];
+  std::int32_t group[3][pair_stops];
   std::int64_t along_u[brick_side];
-  std::int64_t offset;  // of the row's first sample in the fields
-  int u_count, v_count;
+  std::int64_t offset[2];  // of each row's first sample in the fields
+  int u_count, v_count, pairs;
+  int there;        // rows of the pair that are there
   int first[3];     // of the brick's stops along each axis
   int consecutive;  // a row's samples are neighbours in memory, and there are brick_side of them
 };
 
-// What one stop of an axis has, in all lanes from `first` on.
-inline void fill_axis(const Pass& pass, int a, int stop, int first, Rows& rows) {
+// What one stop of an axis has, in a row's lanes from First on.
+template <int First>
+KERNEL_INLINE void fill_row(const Pass& pass, int a, int stop, Rows& rows) {
   const Axis& axis = pass.axis[a];
   const std::int32_t sample = axis.sample[stop];
   const std::int32_t group = axis.group[stop];
@@ -35,25 +38,27 @@ inline void fill_axis(const Pass& pass, int a, int stop, int first, Rows& rows) 
   const float inverse_cell = axis.inverse_cell[stop];
   const float from_eye = axis.from_eye[stop];
   const float height = axis.position[stop];
-  for (int i = first; i < brick_side; ++i) rows.sample[a][i] = sample;
-  for (int i = first; i < brick_side; ++i) rows.group[a][i] = group;
-  for (int i = first; i < brick_side; ++i) rows.cell[a][i] = cell;
-  for (int i = first; i < brick_side; ++i) rows.inverse_cell[a][i] = inverse_cell;
-  for (int i = first; i < brick_side; ++i) rows.from_eye[a][i] = from_eye;
-  for (int i = first; a == 2 && i < brick_side; ++i) rows.height[i] = height;
+  constexpr int last = First + brick_side;
+  for (int i = First; i < last; ++i) rows.sample[a][i] = sample;
+  for (int i = First; i < last; ++i) rows.group[a][i] = group;
+  for (int i = First; i < last; ++i) rows.cell[a][i] = cell;
+  for (int i = First; i < last; ++i) rows.inverse_cell[a][i] = inverse_cell;
+  for (int i = First; i < last; ++i) rows.from_eye[a][i] = from_eye;
+  for (int i = First; a == 2 && i < last; ++i) rows.height[i] = height;
 }
 
-// What the stops of a row have along it.
-inline void fill_along(const Pass& pass, int count, Rows& rows) {
+// What the stops of a row have along it; stop_of(i): the one in lane i.
+template <class StopOf>
+KERNEL_INLINE void fill_along(const Pass& pass, Rows& rows, const StopOf& stop_of) {
   const int a = pass.u;
   const Axis& axis = pass.axis[a];
-  const int first = rows.first[a];
-  for (int i = 0; i < count; ++i) rows.sample[a][i] = axis.sample[first + i];
-  for (int i = 0; i < count; ++i) rows.group[a][i] = axis.group[first + i];
-  for (int i = 0; i < count; ++i) rows.cell[a][i] = axis.cell[first + i];
-  for (int i = 0; i < count; ++i) rows.inverse_cell[a][i] = axis.inverse_cell[first + i];
-  for (int i = 0; i < count; ++i) rows.from_eye[a][i] = axis.from_eye[first + i];
-  for (int i = 0; a == 2 && i < count; ++i) rows.height[i] = axis.position[first + i];
+  const auto both = [](auto* to, int i, auto value) { to[i] = to[brick_side + i] = value; };
+  for (int i = 0; i < brick_side; ++i) both(rows.sample[a], i, axis.sample[stop_of(i)]);
+  for (int i = 0; i < brick_side; ++i) both(rows.group[a], i, axis.group[stop_of(i)]);
+  for (int i = 0; i < brick_side; ++i) both(rows.cell[a], i, axis.cell[stop_of(i)]);
+  for (int i = 0; i < brick_side; ++i) both(rows.inverse_cell[a], i, axis.inverse_cell[stop_of(i)]);
+  for (int i = 0; i < brick_side; ++i) both(rows.from_eye[a], i, axis.from_eye[stop_of(i)]);
+  for (int i = 0; a == 2 && i < brick_side; ++i) both(rows.height, i, axis.position[stop_of(i)]);
 }
 
 // Visiting lists name a brick's stops outward from the eye; its rows hold them in world order.
@@ -64,17 +69,18 @@ void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
   const int count = brick.u_count;
   rows.u_count = count;
   rows.v_count = brick.v_count;
+  rows.pairs = (brick.v_count + 1) / 2;
   rows.first[pass.u] = lowest(u.visit + brick.u_first);
   rows.first[pass.v] = lowest(pass.axis[pass.v].visit + brick.v_first);
   rows.first[pass.major] = pass.axis[pass.major].visit[brick.slab];
   const int first = rows.first[pass.u];
   if (count == brick_side) {
-    fill_along(pass, brick_side, rows);
+    fill_along(pass, rows, [first](int i) { return first + i; });
   } else {
-    fill_along(pass, count, rows);
-    fill_axis(pass, pass.u, first + count - 1, count, rows);
+    fill_along(pass, rows, [&](int i) { return first + (i < count ? i : count - 1); });
   }
-  fill_axis(pass, pass.major, rows.first[pass.major], 0, rows);
+  fill_row<0>(pass, pass.major, rows.first[pass.major], rows);
+  fill_row<brick_side>(pass, pass.major, rows.first[pass.major], rows);
   const double* camera = u.camera + 3 * static_cast<std::ptrdiff_t>(first);
   for (int i = 0; i < brick_side; ++i) {
     const int at = 3 * (i < count ? i : count - 1);
@@ -87,19 +93,36 @@ void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
   rows.consecutive = full && rows.along_u[brick_side - 1] == brick_side - 1 ? 1 : 0;
 }
 
-void set_row(const Pass& pass, int j, Rows& rows) {
-  fill_axis(pass, pass.v, rows.first[pass.v] + j, 0, rows);
-  rows.offset = 0;
-  for (int a = 0; a < 3; ++a) rows.offset += pass.step[a] * rows.sample[a][0];
+// A pair's second row, or its first where that is the brick's last.
+inline int second_row(const Rows& rows, int pair) {
+  return 2 * pair + 1 < rows.v_count ? 2 * pair + 1 : 2 * pair;
 }
 
-// Camera coordinates, summed in double so that an eye far away or close by loses nothing.
-void place_row(const Camera& camera, const Pass& pass, int j, const Rows& rows, Stops& stops) {
+void set_pair(const Pass& pass, int pair, Rows& rows) {
+  const int second = second_row(rows, pair);
+  fill_row<0>(pass, pass.v, rows.first[pass.v] + 2 * pair, rows);
+  fill_row<brick_side>(pass, pass.v, rows.first[pass.v] + second, rows);
+  rows.there = second - 2 * pair + 1;
+  for (int k = 0; k < 2; ++k) {
+    rows.offset[k] = 0;
+    for (int a = 0; a < 3; ++a) rows.offset[k] += pass.step[a] * rows.sample[a][k * brick_side];
+  }
+}
+
+// Where a pair's i-th stop has its sample in the fields.
+inline std::int64_t offset_of(const Rows& rows, int i) {
+  return rows.offset[i / brick_side] + rows.along_u[i % brick_side];
+}
+
+// Camera coordinates of a row, as row `to_row`, summed in double so that an eye far away or close
+// by loses nothing.
+void place_row(const Camera& camera, const Pass& pass, int j, int to_row, const Rows& rows,
+               Stops& stops) {
   const double* from_slab =
       pass.axis[pass.major].camera + 3 * static_cast<std::ptrdiff_t>(rows.first[pass.major]);
   const double* from_v =
       pass.axis[pass.v].camera + 3 * static_cast<std::ptrdiff_t>(rows.first[pass.v] + j);
-  const std::ptrdiff_t row = std::ptrdiff_t{brick_side} * j;
+  const std::ptrdiff_t row = std::ptrdiff_t{brick_side} * to_row;
   float* const to[3] = {stops.x + row, stops.y + row, stops.z + row};
   for (int c = 0; c < 3; ++c) {
     const double base = from_slab[c] + from_v[c];
@@ -112,19 +135,24 @@ void place_row(const Camera& camera, const Pass& pass, int j, const Rows& rows, 
   }
 }
 
+void place_pair(const Camera& camera, const Pass& pass, int pair, const Rows& rows, Stops& stops) {
+  place_row(camera, pass, 2 * pair, 2 * pair, rows, stops);
+  place_row(camera, pass, second_row(rows, pair), 2 * pair + 1, rows, stops);
+}
+
 inline double dot3(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 // The same for stops that stand where the field says.
-void place_curved_row(const Camera& camera, const Pass& pass, int j, const Rows& rows,
-                      Stops& stops) {
-  for (int i = 0; i < brick_side; ++i) {
-    const float* place = pass.places + 3 * (rows.offset + rows.along_u[i]);
+void place_curved_pair(const Camera& camera, const Pass& pass, int pair, const Rows& rows,
+                       Stops& stops) {
+  for (int i = 0; i < pair_stops; ++i) {
+    const float* place = pass.places + 3 * offset_of(rows, i);
     double at[3];
     for (int c = 0; c < 3; ++c) at[c] = static_cast<double>(place[c]) - camera.eye[c];
     const double z = dot3(camera.world_forward, at);
-    const int l = brick_side * j + i;
+    const int l = pair_stops * pair + i;
     stops.x[l] = static_cast<float>(dot3(camera.world_right, at));
     stops.y[l] = static_cast<float>(dot3(camera.world_down, at));
     stops.z[l] = static_cast<float>(z);
@@ -132,28 +160,52 @@ void place_curved_row(const Camera& camera, const Pass& pass, int j, const Rows&
   }
 }
 
-// A field's values at a row's stops from lane i on.
+// Values at a pair's consecutive samples from lane i on.
+KERNEL_INLINE Stop fetch_consecutive(const float* values, const Rows& rows, int i) {
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (stop_lanes == pair_stops) {
+    const hn::Half<StopTag> half;
+    return hn::Combine(StopTag(), hn::LoadU(half, values + rows.offset[1]),
+                       hn::LoadU(half, values + rows.offset[0]));
+  }
+#endif
+  return load_unaligned<Stop>(values + rows.offset[i / brick_side] + i % brick_side);
+}
+
+// A field's values at a pair's stops from lane i on.
 KERNEL_INLINE Stop fetch(const float* values, const Rows& rows, int i) {
-  if (rows.consecutive != 0) return load_unaligned<Stop>(values + rows.offset + i);
-  alignas(64) float lanes[brick_side];
-  for (int k = 0; k < brick_side; ++k) lanes[k] = values[rows.offset + rows.along_u[k]];
+  if (rows.consecutive != 0) return fetch_consecutive(values, rows, i);
+  alignas(64) float lanes[pair_stops];
+  for (int k = 0; k < pair_stops; ++k) lanes[k] = values[offset_of(rows, k)];
   return load<Stop>(lanes + i);
 }
 
-// The stops of a row that are there at all.
+// The stops of a row that are there at all, and those of a pair.
 inline std::uint32_t row_bits(const Rows& rows) { return (2U << (rows.u_count - 1)) - 1U; }
+inline std::uint32_t pair_bits(const Rows& rows) {
+  return rows.there == 2 ? row_bits(rows) | row_bits(rows) << brick_side : row_bits(rows);
+}
 
 // How far a brick's kernels reach beyond their stops along right, down and forward.
-void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, float reach[3]) {
-  float cell[3] = {0, 0, 0};
+void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, const Rows& rows,
+                 float reach[3]) {
+  float cell[3];
   const auto widest = [&](int a, int first, int count) {
-    for (int i = first; i < first + count; ++i) {
-      cell[a] = larger(cell[a], pass.axis[a].cell[pass.axis[a].visit[i]]);
+    const hn::CappedTag<float, brick_side> tag;
+    const float* cells = pass.axis[a].cell + first;
+    auto most = hn::Set(tag, cells[0]);
+    if (count == brick_side) {
+      for (std::size_t i = 0; i < brick_side; i += hn::MaxLanes(tag)) {
+        most = hn::Max(most, hn::LoadU(tag, cells + i));
+      }
+    } else {
+      for (int i = 1; i < count; ++i) most = hn::Max(most, hn::Set(tag, cells[i]));
     }
+    cell[a] = hn::GetLane(hn::MaxOfLanes(tag, most));
   };
-  widest(pass.major, brick.slab, 1);
-  widest(pass.u, brick.u_first, brick.u_count);
-  widest(pass.v, brick.v_first, brick.v_count);
+  cell[pass.major] = pass.axis[pass.major].cell[rows.first[pass.major]];
+  widest(pass.u, rows.first[pass.u], brick.u_count);
+  widest(pass.v, rows.first[pass.v], brick.v_count);
   const float moved = 0.5F * (pass.line.jitter_center + pass.line.jitter_stride);
   if (pass.places != nullptr) {
     for (int c = 0; c < 3; ++c) cell[c] = pass.cell_max[c];
@@ -200,12 +252,12 @@ Frustum frustum_of(const Camera& camera, const Tile& tile, const float reach[3],
   return f;
 }
 
-// The stops of row j that are not nearer than the near plane and whose kernel may touch the tile.
+// The stops of a pair that are not nearer than the near plane and whose kernel may touch the tile.
 template <bool Perspective>
-std::uint32_t seen_in_row(const Camera& camera, const Frustum& f, const Stops& stops, int j) {
+std::uint32_t seen_in_pair(const Camera& camera, const Frustum& f, const Stops& stops, int pair) {
   std::uint32_t bits = 0;
-  for (int i = 0; i < brick_side; i += stop_lanes) {
-    const int l = brick_side * j + i;
+  for (int i = 0; i < pair_stops; i += stop_lanes) {
+    const int l = pair_stops * pair + i;
     const Stop x = load<Stop>(stops.x + l);
     const Stop y = load<Stop>(stops.y + l);
     const Stop depth = load<Stop>(stops.z + l);
@@ -227,16 +279,29 @@ struct Range {
   int first, last;
 };
 
+using StopIntegers = hn::RebindToSigned<StopTag>;
+using StopInteger = hn::Vec<StopIntegers>;
+
+// The same for a vector of them.
+struct Ranges {
+  StopInteger first, last;
+};
+
 // Blocks of the tile whose pixel centres may lie between two coordinates in pixels from the tile's
 // edge. Block b holds the centres 4 b + 0.5 to 4 b + 3.5.
-inline Range blocks_between(float low, float high, int blocks) {
+KERNEL_INLINE Ranges blocks_between(Stop low, Stop high, int blocks) {
   constexpr float per_block = 1.0F / block_side;
   constexpr float slack = 1e-3F;
   const float bound = static_cast<float>(blocks);
   // Truncation rounds down because nothing below zero is truncated.
-  const float first = limited((low - slack + 0.5F) * per_block, 0.0F, bound);
-  const float last = limited((high + slack - 0.5F) * per_block, -1.0F, bound - 0.5F);
-  return {static_cast<int>(first), static_cast<int>(last + 1.0F) - 1};
+  const Stop first = clamped((low + all<Stop>(0.5F - slack)) * all<Stop>(per_block), 0.0F, bound);
+  const Stop last =
+      clamped((high + all<Stop>(slack - 0.5F)) * all<Stop>(per_block), -1.0F, bound - 0.5F);
+  return {truncated(first), truncated(last + all<Stop>(1.0F)) - hn::Set(StopIntegers(), 1)};
+}
+
+KERNEL_INLINE void store(StopInteger value, std::int32_t* to) {
+  hn::Store(value, StopIntegers(), to);
 }
 
 inline int blocks_of(int pixels) { return (pixels + block_side - 1) / block_side; }
@@ -247,19 +312,19 @@ inline std::uint32_t range_mask(Range range) {
          << static_cast<unsigned>(range.first);
 }
 
-// Where on the screen a box about one point may lie, in pixels along one axis.
+// Where on the screen boxes about points may lie, in pixels along one axis.
 struct Shadow {
-  float low, high;
-};
+  Stop low, high;
 
-template <bool Perspective>
-inline Shadow shadow_of(const Camera& camera, float at, float z, float reach, float reach_z) {
-  // The nearest and farthest the kernel reaches widen it most, on either side of the middle.
-  const float near = Perspective ? 1.0F / larger(z - reach_z, camera.near) : 1.0F;
-  const float far = Perspective ? 1.0F / (z + reach_z) : 1.0F;
-  return {smaller((at - reach) * near, (at - reach) * far) * camera.inverse_pixel,
-          larger((at + reach) * near, (at + reach) * far) * camera.inverse_pixel};
-}
+  // Widened by a box as far as `reach` about `at`; near, far: the inverse depths of its ends, one
+  // of which widens it most, on either side of the middle.
+  KERNEL_INLINE void add(Stop at, float reach, Stop near, Stop far) {
+    const Stop from = at - all<Stop>(reach);
+    const Stop to = at + all<Stop>(reach);
+    low = hn::Min(low, hn::Min(from * near, from * far));
+    high = hn::Max(high, hn::Max(to * near, to * far));
+  }
+};
 
 // Blocks of the tile that a brick may touch.
 struct Under {
@@ -287,32 +352,76 @@ inline bool partly_closed(const Tile& tile, const Brick& brick) {
   return (open & blocks.columns) != blocks.columns;
 }
 
-// Whether any block that the row's kernels may touch still lets light through. On a straight row
-// the ends reach as far as any stop between them; of a curved one every stop is asked.
-template <bool Perspective>
-bool row_is_open(const Camera& camera, const Frustum& f, const Stops& stops, int j, int u_count,
-                 bool straight, const Tile& tile) {
-  Shadow across = {3e38F, -3e38F};
-  Shadow down = {3e38F, -3e38F};
-  const int step = straight && u_count > 1 ? u_count - 1 : 1;
-  for (int i = 0; i < u_count; i += step) {
-    const int l = brick_side * j + i;
-    // A kernel that reaches behind the near plane casts a shadow without an end there.
-    if (Perspective && stops.z[l] - f.reach[2] < camera.near) return true;
-    const Shadow x = shadow_of<Perspective>(camera, stops.x[l], stops.z[l], f.reach[0], f.reach[2]);
-    const Shadow y = shadow_of<Perspective>(camera, stops.y[l], stops.z[l], f.reach[1], f.reach[2]);
-    across = {smaller(across.low, x.low), larger(across.high, x.high)};
-    down = {smaller(down.low, y.low), larger(down.high, y.high)};
+// The i-th stops of a brick's rows from row j on, a lane a row; lanes beyond the last repeat it.
+KERNEL_INLINE Stop across_rows(const float* stops, int i, int j, int v_count) {
+  alignas(64) float lanes[stop_lanes];
+  for (int k = 0; k < stop_lanes; ++k) {
+    lanes[k] = stops[brick_side * (j + k < v_count ? j + k : v_count - 1) + i];
   }
-  const float left = static_cast<float>(tile.x) - camera.half_width_px;
-  const float top = static_cast<float>(tile.y) - camera.half_height_px;
-  const Range columns = blocks_between(across.low - left - f.margin, across.high - left + f.margin,
-                                       blocks_of(tile.width));
-  const Range rows =
-      blocks_between(down.low - top - f.margin, down.high - top + f.margin, blocks_of(tile.height));
-  std::uint32_t open = 0;
-  for (int row = rows.first; row <= rows.last; ++row) open |= tile.open[row];
-  return (open & range_mask(columns)) != 0;
+  return load<Stop>(lanes);
+}
+
+// The blocks that rows' kernels may touch, a lane a row.
+struct Footprints {
+  Ranges rows, columns;
+};
+
+// On straight rows the ends reach as far as any stop between them; of curved ones every stop is
+// asked. A kernel that reaches behind the near plane casts a shadow without an end there.
+template <bool Perspective>
+KERNEL_INLINE Footprints footprints_of(const Camera& camera, const Frustum& f, const Stops& stops,
+                                       int j, const Rows& rows, bool straight, const Tile& tile) {
+  Shadow across = {all<Stop>(3e38F), all<Stop>(-3e38F)};
+  Shadow down = across;
+  Stop nearest = all<Stop>(3e38F);
+  const int step = straight && rows.u_count > 1 ? rows.u_count - 1 : 1;
+  for (int i = 0; i < rows.u_count; i += step) {
+    const Stop z = across_rows(stops.z, i, j, rows.v_count);
+    const Stop least = all<Stop>(camera.near);
+    const Stop one = all<Stop>(1.0F);
+    nearest = hn::Min(nearest, z);
+    const Stop reach = all<Stop>(f.reach[2]);
+    const Stop near = Perspective ? inverse_of(hn::Max(z - reach, least)) : one;
+    const Stop far = Perspective ? inverse_of(z + reach) : one;
+    across.add(across_rows(stops.x, i, j, rows.v_count), f.reach[0], near, far);
+    down.add(across_rows(stops.y, i, j, rows.v_count), f.reach[1], near, far);
+  }
+  const Stop scale = all<Stop>(camera.inverse_pixel);
+  const auto blocks = [&](const Shadow& shadow, float middle, int first, int pixels) {
+    const float offset = middle - static_cast<float>(first);
+    Stop low = hn::MulAdd(shadow.low, scale, all<Stop>(offset - f.margin));
+    Stop high = hn::MulAdd(shadow.high, scale, all<Stop>(offset + f.margin));
+    if (Perspective) {
+      const auto endless = hn::Lt(nearest, all<Stop>(camera.near + f.reach[2]));
+      low = hn::IfThenElse(endless, all<Stop>(-1e6F), low);
+      high = hn::IfThenElse(endless, all<Stop>(1e6F), high);
+    }
+    return blocks_between(low, high, blocks_of(pixels));
+  };
+  return {blocks(down, camera.half_height_px, tile.y, tile.height),
+          blocks(across, camera.half_width_px, tile.x, tile.width)};
+}
+
+// The rows of a brick whose kernels may touch a block that still lets light through: bit j set.
+template <bool Perspective>
+std::uint32_t rows_to_see(const Camera& camera, const Frustum& f, const Stops& stops,
+                          const Rows& rows, bool straight, const Tile& tile) {
+  std::uint32_t seen = 0;
+  for (int j = 0; j < rows.v_count; j += stop_lanes) {
+    const Footprints under = footprints_of<Perspective>(camera, f, stops, j, rows, straight, tile);
+    alignas(64) std::int32_t first[stop_lanes], last[stop_lanes], left[stop_lanes],
+        right[stop_lanes];
+    store(under.rows.first, first);
+    store(under.rows.last, last);
+    store(under.columns.first, left);
+    store(under.columns.last, right);
+    for (int k = 0; k < stop_lanes && j + k < rows.v_count; ++k) {
+      std::uint32_t open = 0;
+      for (int row = first[k]; row <= last[k]; ++row) open |= tile.open[row];
+      if ((open & range_mask({left[k], right[k]})) != 0) seen |= 1U << static_cast<unsigned>(j + k);
+    }
+  }
+  return seen;
 }
 
 }  // namespace

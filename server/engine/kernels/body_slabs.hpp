@@ -273,13 +273,11 @@ KERNEL_INLINE Pixel close_passage(const Passage& p, int l, float* block) {
     for (int c = 0; c < 3; ++c) {
       add_product(to.rgb[c] + l, t, hn::MulAdd(p.left * part, p.color[c], p.rgb[c]));
     }
-    add_product(to.alpha + l, t, one - left);
     store(t * left, to.transmittance + l);
     return t * left;
   }
   if (Compositing == compositing_no_medium) {
     for (int c = 0; c < 3; ++c) add_product(to.rgb[c] + l, t, p.rgb[c]);
-    add_product(to.alpha + l, t, one - p.through);
     store(t * p.through, to.transmittance + l);
     return t * p.through;
   }
@@ -287,7 +285,6 @@ KERNEL_INLINE Pixel close_passage(const Passage& p, int l, float* block) {
   for (int c = 0; c < 3; ++c) {
     add_product(to.rgb[c] + l, t, hn::MulAdd(p.color[c], absorbed, p.rgb[c]));
   }
-  add_product(to.alpha + l, t, absorbed);
   const Pixel left = bounded_light<Compositing>(t * (p.through * p.medium.transmitted));
   store(left, to.transmittance + l);
   return left;

@@ -56,9 +56,39 @@ KERNEL_INLINE Facing face(const Camera& camera, const CellLanes<Curved>& cells) 
   return f;
 }
 
-// Where on the picture the silhouette lies, pixels.
+// An ellipse about a splat's projected centre, pixels: what lies at height y below its middle is
+// within sqrt(half_chord2 - narrowing y^2) of lean y; its rightmost point lies half_width right and
+// shear half_width below the middle. Not known: where the picture shows no ellipse, or not from
+// near its middle.
+struct Oval {
+  MaskOf<Stop> known;
+  Stop x, y;
+  Stop half_chord2, narrowing, lean, half_width, shear;
+};
+
+// t^2, and room for rounding.
+constexpr float oval_limit = 1.002F * footprint_t * footprint_t;
+
+// xx dx^2 + xy dx dy + yy dy^2 <= limit; det = xx yy - xy^2 / 4, told apart so that it never
+// cancels.
+KERNEL_INLINE Oval oval_of(Stop xx, Stop xy, Stop yy, Stop det, Stop limit) {
+  Oval o;
+  const Stop least = all<Stop>(1e-36F);
+  const Stop inverse = inverse_of(hn::Max(xx, least));
+  const Stop half = all<Stop>(-0.5F) * xy;
+  o.half_chord2 = limit * inverse;
+  o.narrowing = det * inverse * inverse;
+  o.lean = half * inverse;
+  o.half_width = hn::Sqrt(yy * limit * inverse_of(hn::Max(det, least)));
+  o.shear = half * inverse_of(hn::Max(yy, least));
+  o.known = hn::And(hn::Gt(hn::Min(xx, yy), least), hn::Gt(det, least));
+  return o;
+}
+
+// Where on the picture the silhouette lies, pixels: its box, and an ellipse that it lies in.
 struct Outline {
   Extent x, y;
+  Oval oval;
 };
 
 template <bool Curved>
@@ -73,9 +103,12 @@ KERNEL_INLINE Outline perspective_splats(const Camera& camera, const Stops& stop
   const Three<Stop> o = cells.to_grid(cells.from_eye);
   const Three<Stop> ox = cross3(o, f.right);
   const Three<Stop> oy = cross3(o, f.down);
-  store(dot3(ox, ox), s.xx + l);
-  store(two * dot3(ox, oy), s.xy + l);
-  store(dot3(oy, oy), s.yy + l);
+  const Stop xx = dot3(ox, ox);
+  const Stop xy = two * dot3(ox, oy);
+  const Stop yy = dot3(oy, oy);
+  store(xx, s.xx + l);
+  store(xy, s.xy + l);
+  store(yy, s.yy + l);
   const Stop half_width = all<Stop>(camera.half_width_px);
   const Stop half_height = all<Stop>(camera.half_height_px);
   const Stop inverse_z = inverse_of(z);
@@ -107,21 +140,39 @@ KERNEL_INLINE Outline perspective_splats(const Camera& camera, const Stops& stop
   store(d0, s.d0 + l);
   store(dx, s.dx + l);
   store(dy, s.dy + l);
-  store(dot3(f.right, f.right), s.dxx + l);
-  store(two * dot3(f.right, f.down), s.dxy + l);
-  store(dot3(f.down, f.down), s.dyy + l);
+  const Stop dxx = dot3(f.right, f.right);
+  const Stop dxy = two * dot3(f.right, f.down);
+  const Stop dyy = dot3(f.down, f.down);
+  const Stop d2_least = inverse_of(cells.edges2());
+  store(dxx, s.dxx + l);
+  store(dxy, s.dxy + l);
+  store(dyy, s.dyy + l);
   store(hn::IfThenElse(inside, hn::Zero(StopTag()), dot3(o, d) - z * d0), s.b0 + l);
   store(dot3(o, f.right) - z * dx, s.bx + l);
   store(dot3(o, f.down) - z * dy, s.by + l);
-  store(inverse_of(cells.edges2()), s.d2_least + l);
+  store(d2_least, s.d2_least + l);
   store(hn::Sqrt(f.s33), s.half_depth + l);
   store(rho * all<Stop>(1.0F / footprint_integral), s.strength + l);
   const Extent across = silhouette(x, z, f.s11, f.s13, f.s33);
   const Extent along = silhouette(y, z, f.s22, f.s23, f.s33);
-  return {{hn::MulAdd(across.low, per_pixel, half_width),
-           hn::MulAdd(across.high, per_pixel, half_width)},
-          {hn::MulAdd(along.low, per_pixel, half_height),
-           hn::MulAdd(along.high, per_pixel, half_height)}};
+  Outline out = {{hn::MulAdd(across.low, per_pixel, half_width),
+                  hn::MulAdd(across.high, per_pixel, half_width)},
+                 {hn::MulAdd(along.low, per_pixel, half_height),
+                  hn::MulAdd(along.high, per_pixel, half_height)},
+                 {}};
+  // |d|^2 within the box is no more than this.
+  const Stop w = hn::Max(px - out.x.low, out.x.high - px);
+  const Stop h = hn::Max(py - out.y.low, out.y.high - py);
+  const Stop bent = hn::MulAdd(dxx, w * w, hn::MulAdd(hn::Abs(dxy), w * h, dyy * h * h));
+  const Stop most =
+      hn::Max(d0 + hn::MulAdd(hn::Abs(dx), w, hn::MulAdd(hn::Abs(dy), h, bent)), d2_least);
+  const Three<Stop> normal = cross3(ox, oy);
+  out.oval = oval_of(xx, xy, yy, dot3(normal, normal), all<Stop>(oval_limit) * most);
+  out.oval.x = px;
+  out.oval.y = py;
+  const auto bounded = hn::Lt(hn::Max(w, h), all<Stop>(1e4F));
+  out.oval.known = hn::And(out.oval.known, hn::And(inside, bounded));
+  return out;
 }
 
 template <bool Curved>
@@ -134,9 +185,12 @@ KERNEL_INLINE Outline orthographic_splats(const Camera& camera, const Stops& sto
   const Stop inverse2 = inverse_of(length2);
   const Three<Stop> ox = cross3(f.right, forward);
   const Three<Stop> oy = cross3(f.down, forward);
-  store(dot3(ox, ox) * inverse2, s.xx + l);
-  store(all<Stop>(2.0F) * dot3(ox, oy) * inverse2, s.xy + l);
-  store(dot3(oy, oy) * inverse2, s.yy + l);
+  const Stop xx = dot3(ox, ox) * inverse2;
+  const Stop xy = all<Stop>(2.0F) * dot3(ox, oy) * inverse2;
+  const Stop yy = dot3(oy, oy) * inverse2;
+  store(xx, s.xx + l);
+  store(xy, s.xy + l);
+  store(yy, s.yy + l);
   store(length2, s.d0 + l);
   store(hn::Neg(dot3(f.right, forward)) * inverse2, s.bx + l);
   store(hn::Neg(dot3(f.down, forward)) * inverse2, s.by + l);
@@ -149,7 +203,12 @@ KERNEL_INLINE Outline orthographic_splats(const Camera& camera, const Stops& sto
   store(y, s.y + l);
   const Stop wide = hn::Sqrt(f.s11) * scale;
   const Stop tall = hn::Sqrt(f.s22) * scale;
-  return {{x - wide, x + wide}, {y - tall, y + tall}};
+  const Three<Stop> normal = cross3(ox, oy);
+  Outline out = {{x - wide, x + wide}, {y - tall, y + tall}, {}};
+  out.oval = oval_of(xx, xy, yy, dot3(normal, normal) * inverse2 * inverse2, all<Stop>(oval_limit));
+  out.oval.x = x;
+  out.oval.y = y;
+  return out;
 }
 
 // A row's splats from lane i on, made ready.

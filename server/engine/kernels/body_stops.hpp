@@ -8,21 +8,36 @@ namespace {
 
 constexpr float magnitude_least = 1.17549435e-38F;  // denormal vectors count as zero
 
-// What a row's lines need of the field.
+// What a pair's lines need of the field.
 struct Winds {
   Stop magnitude;         // of the raw data; negative: no line
   Three<Stop> direction;  // a unit vector along the cell's own axes
 };
 
-// Magnitude without overflow or underflow: the largest component is taken out first.
-KERNEL_INLINE Stop magnitude_of(const Three<Stop>& v) {
+// Lengths, and their inverses: of a vector shorter than magnitude_least, some finite number.
+struct Norm {
+  Stop length, inverse;
+};
+
+// Without overflow or underflow: the largest component is taken out first, unless every lane's is
+// zero or far from either.
+KERNEL_INLINE Norm norm_of(const Three<Stop>& v) {
   const Stop top = hn::Max(hn::Max(hn::Abs(v.x), hn::Abs(v.y)), hn::Abs(v.z));
-  const Stop inverse = inverse_of(hn::Max(top, all<Stop>(magnitude_least)));
-  const Three<Stop> unit = {v.x * inverse, v.y * inverse, v.z * inverse};
-  return top * hn::Sqrt(dot3(unit, unit));
+  const auto moderate = hn::And(hn::Ge(top, all<Stop>(1e-15F)), hn::Le(top, all<Stop>(1e15F)));
+  const auto nothing = hn::Le(top, hn::Zero(StopTag()));
+  if (HWY_LIKELY(hn::AllTrue(StopTag(), hn::Or(moderate, nothing)))) {
+    const Stop square = dot3(v, v);
+    const Stop inverse = inverse_root(hn::Max(square, all<Stop>(1e-30F)));
+    return {square * inverse, inverse};
+  }
+  const Stop least = all<Stop>(magnitude_least);
+  const Stop scale = inverse_of(hn::Max(top, least));
+  const Three<Stop> unit = {v.x * scale, v.y * scale, v.z * scale};
+  const Stop length = top * hn::Sqrt(dot3(unit, unit));
+  return {length, inverse_of(hn::Max(length, least))};
 }
 
-// A row's vectors in the field; zero if masked (a masked sample is masked in every component).
+// Vectors in the field; zero if masked (a masked sample is masked in every component).
 KERNEL_INLINE Three<Stop> fetch_winds(const Pass& pass, const Rows& rows, int i) {
   const LineStyle& line = pass.line;
   const Stop zero = hn::Zero(StopTag());
@@ -34,11 +49,11 @@ KERNEL_INLINE Three<Stop> fetch_winds(const Pass& pass, const Rows& rows, int i)
           hn::IfThenElse(masked, zero, z)};
 }
 
-// The rates that turn a row's vectors into the picture's.
+// The rates that turn a pair's vectors into the picture's.
 KERNEL_INLINE Stop rate_of(const float* rates, const Rows& rows, int a, int i) {
   if (rates == nullptr) return all<Stop>(1.0F);
-  alignas(64) float lanes[brick_side];
-  for (int k = 0; k < brick_side; ++k) lanes[k] = rates[rows.sample[a][k]];
+  alignas(64) float lanes[pair_stops];
+  for (int k = 0; k < pair_stops; ++k) lanes[k] = rates[rows.sample[a][k]];
   return load<Stop>(lanes + i);
 }
 
@@ -47,18 +62,16 @@ KERNEL_INLINE Stop rate_of(const float* rates, const Rows& rows, int a, int i) {
 KERNEL_INLINE Winds read_winds(const Pass& pass, const Rows& rows, int i) {
   const LineStyle& line = pass.line;
   const Three<Stop> v = fetch_winds(pass, rows, i);
-  const Stop least = all<Stop>(magnitude_least);
-  const Stop m = magnitude_of(v);
+  const Norm raw = norm_of(v);
   // Scaled by 1/m first: the products stay finite for any data.
-  const Stop inverse = inverse_of(hn::Max(m, least));
   const Three<Stop> drawn = {
-      v.x * inverse * all<Stop>(line.scale[0]) * rate_of(line.rate_x, rows, 1, i),
-      v.y * inverse * all<Stop>(line.scale[1]) * all<Stop>(line.rate_y),
-      v.z * inverse * all<Stop>(line.scale[2]) * rate_of(line.rate_z, rows, 2, i)};
-  const Stop length = magnitude_of(drawn);
-  const Stop unit = inverse_of(hn::Max(length, least));
-  return {hn::IfThenElse(hn::Ge(length, least), m, all<Stop>(-1.0F)),
-          {drawn.x * unit, drawn.y * unit, drawn.z * unit}};
+      v.x * raw.inverse * all<Stop>(line.scale[0]) * rate_of(line.rate_x, rows, 1, i),
+      v.y * raw.inverse * all<Stop>(line.scale[1]) * all<Stop>(line.rate_y),
+      v.z * raw.inverse * all<Stop>(line.scale[2]) * rate_of(line.rate_z, rows, 2, i)};
+  const Norm shown = norm_of(drawn);
+  const auto known = hn::Ge(shown.length, all<Stop>(magnitude_least));
+  return {hn::IfThenElse(known, raw.length, all<Stop>(-1.0F)),
+          {drawn.x * shown.inverse, drawn.y * shown.inverse, drawn.z * shown.inverse}};
 }
 
 inline float least_magnitude(const LineStyle& line) {
@@ -143,17 +156,17 @@ inline float splat_cover(const Pass& pass, const Rows& rows, int i, float scale)
   return larger(larger(volume * scale * scale, section * scale), chord);
 }
 
-// Adds a row's lines to the summary; which stops have one.
+// Adds a pair's lines to the summary; which stops have one.
 std::uint32_t summarise_lines(const Pass& pass, const Rows& rows, BrickSummary& summary) {
   const Stop least = all<Stop>(least_magnitude(pass.line));
   std::uint32_t lines = 0;
-  for (int i = 0; i < brick_side; i += stop_lanes) {
-    const std::uint32_t here = row_bits(rows) >> static_cast<unsigned>(i);
+  for (int i = 0; i < pair_stops; i += stop_lanes) {
+    const std::uint32_t here = pair_bits(rows) >> static_cast<unsigned>(i);
     const Winds winds = read_winds(pass, rows, i);
     const auto drawn = hn::Ge(winds.magnitude, least);
     const std::uint32_t bits = bits_of<Stop>(drawn) & here;
     lines |= bits << static_cast<unsigned>(i);
-    alignas(64) float magnitude[brick_side];
+    alignas(64) float magnitude[pair_stops];
     store(winds.magnitude, magnitude);
     for (int k = 0; k < stop_lanes; ++k) {
       if ((bits >> static_cast<unsigned>(k) & 1U) != 0) {
@@ -171,15 +184,15 @@ std::uint32_t summarise_lines(const Pass& pass, const Rows& rows, BrickSummary& 
 std::uint32_t summarise_splats(const Pass& pass, const Rows& rows, float scale,
                                BrickSummary& summary) {
   std::uint32_t splats = 0;
-  for (int i = 0; i < brick_side; i += stop_lanes) {
+  for (int i = 0; i < pair_stops; i += stop_lanes) {
     const Extinctions found = read_extinctions(pass, rows, i);
-    const std::uint32_t here = row_bits(rows) >> static_cast<unsigned>(i);
+    const std::uint32_t here = pair_bits(rows) >> static_cast<unsigned>(i);
     const std::uint32_t kept = bits_of<Stop>(found.kept) & here;
     splats |= kept << static_cast<unsigned>(i);
     const auto there = hn::Gt(found.rho, hn::Zero(StopTag()));
     std::uint32_t thin = bits_of<Stop>(there) & here & ~kept;
     if (thin == 0) continue;
-    alignas(64) float rho[brick_side];
+    alignas(64) float rho[pair_stops];
     store(found.rho, rho);
     for (; thin != 0; thin &= thin - 1U) {
       const int k = __builtin_ctz(thin);
@@ -193,14 +206,14 @@ void summarise(const Pass& pass, const Brick& brick, float scale, BrickSummary& 
   Rows rows;
   open_rows(pass, brick, rows);
   summary = {};
-  for (int j = 0; j < rows.v_count; ++j) {
-    set_row(pass, j, rows);
+  for (int pair = 0; pair < rows.pairs; ++pair) {
+    set_pair(pass, pair, rows);
     const std::uint32_t lines = pass.has_lines != 0 ? summarise_lines(pass, rows, summary) : 0;
     const std::uint32_t splats =
         pass.has_medium != 0 ? summarise_splats(pass, rows, scale, summary) : 0;
     summary.lines += __builtin_popcount(lines);
     summary.splats += __builtin_popcount(splats);
-    summary.without_both += __builtin_popcount(row_bits(rows) & ~(lines | splats));
+    summary.without_both += __builtin_popcount(pair_bits(rows) & ~(lines | splats));
   }
   const int stops = rows.u_count * rows.v_count;
   summary.without_line = pass.has_lines != 0 ? stops - summary.lines : 0;

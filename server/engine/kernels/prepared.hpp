@@ -69,8 +69,6 @@ struct Splats {
   alignas(64) float half_depth[brick_stops];  // of the silhouette along the view, world units
 };
 
-constexpr int window_side = 8;
-
 // Rows and columns of the tile's blocks that each stop's line and splat may touch, both ends
 // included; none if last < first.
 struct Footing {
@@ -82,12 +80,17 @@ struct Footing {
   // in `low`, columns count from line_column.
   std::uint64_t windowed;  // bit l set: stop l's line does
   alignas(64) std::int32_t line_column[brick_stops];
+  alignas(64) std::int32_t line_column_last[brick_stops];
   alignas(64) std::uint32_t window_low[brick_stops];
   alignas(64) std::uint32_t window_high[brick_stops];
+  // A splat's box of blocks, and the blocks of it that its outline meets, as lines have them.
   alignas(64) std::int32_t row_first[brick_stops];
   alignas(64) std::int32_t row_last[brick_stops];
   alignas(64) std::int32_t column_first[brick_stops];
   alignas(64) std::int32_t column_last[brick_stops];
+  std::uint64_t splat_windowed;
+  alignas(64) std::uint32_t splat_low[brick_stops];
+  alignas(64) std::uint32_t splat_high[brick_stops];
 };
 
 struct Prepared {

@@ -1,5 +1,5 @@
 // Part of the kernel body: Highway's vectors, as wide as the target has them. One lane is either a
-// stop of a brick's row or a pixel of a block.
+// stop of a brick or a pixel of a block.
 #pragma once
 
 #include <hwy/highway.h>
@@ -21,13 +21,16 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using StopTag = hn::CappedTag<float, brick_side>;
+// Two rows of a brick, one after the other: what is prepared together.
+constexpr int pair_stops = 2 * brick_side;
+
+using StopTag = hn::CappedTag<float, pair_stops>;
 using PixelTag = hn::CappedTag<float, block_pixels>;
 using Stop = hn::Vec<StopTag>;    // lanes of stops
 using Pixel = hn::Vec<PixelTag>;  // lanes of pixels
 constexpr int stop_lanes = static_cast<int>(hn::MaxLanes(StopTag()));
 constexpr int pixel_lanes = static_cast<int>(hn::MaxLanes(PixelTag()));
-static_assert(brick_side % stop_lanes == 0 && block_pixels % pixel_lanes == 0);
+static_assert(pair_stops % stop_lanes == 0 && block_pixels % pixel_lanes == 0);
 
 template <class V>
 using TagOf = hn::DFromV<V>;
@@ -88,6 +91,13 @@ KERNEL_INLINE std::uint32_t bits_of(MaskOf<V> mask) {
   return bits;
 }
 
+template <class V>
+KERNEL_INLINE MaskOf<V> mask_of(std::uint32_t bits) {
+  const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(bits),
+                                 static_cast<std::uint8_t>(bits >> 8U)};
+  return hn::LoadMaskBits(TagOf<V>(), bytes);
+}
+
 // Masked samples are NaN, told by their bits: arithmetic is compiled as if there were none.
 template <class V>
 KERNEL_INLINE MaskOf<V> is_masked(V v) {
@@ -106,6 +116,18 @@ KERNEL_INLINE V divisor(V v) {
 template <class V>
 KERNEL_INLINE V inverse_of(V v) {
   return hn::Div(all<V>(1.0F), v);
+}
+
+// 1 / sqrt(v) of positive, normal numbers, to 3e-7: the processor's guess and one step of Newton's.
+template <class V>
+KERNEL_INLINE V inverse_root(V v) {
+#if HWY_TARGET == HWY_SCALAR
+  return inverse_of(hn::Sqrt(v));
+#else
+  const V guess = hn::ApproximateReciprocalSqrt(v);
+  const V half = all<V>(0.5F) * v * guess;
+  return guess * hn::NegMulAdd(half, guess, all<V>(1.5F));
+#endif
 }
 
 // Three components of one quantity.

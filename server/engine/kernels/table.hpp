@@ -54,6 +54,10 @@ struct Table {
   // The length of each pixel's ray whose forward component is 1, in blocks as the tile's are.
   void (*fill_rays)(const Camera& camera, const Tile& tile, float* rays);
 
+  // A row of the tile's pixels as linear premultiplied RGBA, 4 floats each, up to a multiple of
+  // block_side pixels.
+  void (*copy_row)(const Tile& tile, int y, float* rgba);
+
   // How many of the tile's blocks are still open.
   int (*count_open)(const Tile& tile);
 
