@@ -59,23 +59,13 @@ void name_fields(const scene::Scene& scene, const protocol::View& completed,
   }
 }
 
-// " level=1,1,0": how often each axis was halved; nothing where none was.
-void name_level(const std::array<int, 3>& level, engine::WorkReport& work) {
-  if (level == std::array{0, 0, 0}) return;
-  work.variant += " level=";
-  for (std::size_t a = 0; a < 3; ++a) {
-    if (a > 0) work.variant += ',';
-    work.variant += std::to_string(level.at(a));
-  }
-}
-
 Result<engine::WorkReport> render_reference(const scene::Scene& scene, ThreadPool& pool,
                                             const CancelToken& cancel, engine::Image& picture) {
   auto truth = engine::reference::render(scene, pool, cancel);
   if (!truth) return truth.error();
   picture = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};
   engine::WorkReport work;
-  work.variant = "reference double";
+  work.variant.reference = true;
   return work;
 }
 
@@ -103,7 +93,7 @@ Result<engine::WorkReport> render_scene(const scene::Scene& scene, ThreadPool& p
   };
   auto work = jpeg ? engine::render(scene, pool, cancel, workspace.space, to_planes)
                    : engine::render(scene, pool, cancel, workspace.space);
-  if (work) name_level(scene.level, *work);
+  if (work) work->variant.level = scene.level;
   return work;
 }
 

@@ -36,6 +36,20 @@ Scene plain_scene() {
   return scene;
 }
 
+// Leaning eastward with height.
+void lean(scene::Lattice& lattice) {
+  auto places = std::make_shared<std::vector<std::array<float, 3>>>();
+  for (const double z : lattice.positions[2]) {
+    for (const double y : lattice.positions[1]) {
+      for (const double x : lattice.positions[0]) {
+        places->push_back(
+            {static_cast<float>(x + 0.4 * z), static_cast<float>(y), static_cast<float>(z)});
+      }
+    }
+  }
+  lattice.places = places;
+}
+
 class Reuse : public testing::Test {
  protected:
   // Draws with what earlier frames left, and by itself.
@@ -53,6 +67,7 @@ class Reuse : public testing::Test {
     EXPECT_EQ(work->skipped_bound, alone.work.skipped_bound) << what;
     EXPECT_EQ(work->pixel_updates, alone.work.pixel_updates) << what;
     EXPECT_EQ(work->tiles, alone.work.tiles) << what;
+    EXPECT_EQ(text_of(work->variant), text_of(alone.work.variant)) << what;
   }
 
   ThreadPool pool_{2};
@@ -103,7 +118,45 @@ TEST_F(Reuse, EveryChangeOfASceneShowsAtOnce) {
        }},
       {"no lines", [](Scene& s) { s.vector.reset(); }},
       {"no medium", [](Scene& s) { s.scalars.clear(); }},
+      {"nothing",
+       [](Scene& s) {
+         s.vector.reset();
+         s.scalars.clear();
+       }},
       {"slabs", [](Scene& s) { s.method = scene::Method::slab; }},
+      {"bent", [](Scene& s) { lean(s.lattice); }},
+      {"bent slabs",
+       [](Scene& s) {
+         lean(s.lattice);
+         s.method = scene::Method::slab;
+       }},
+      {"orthographic",
+       [](Scene& s) {
+         s.camera = look({0, 0, 0}, {0.3, 1, -0.5}, 3, 90, 70, false, 1);
+       }},
+      {"one more medium, of another stride and table",
+       [](Scene& s) {
+         s.scalars.push_back(s.scalars[0]);
+         s.scalars[1].stride = 2;
+         s.scalars[1].color = ramp_color(0, 2, {1, 0.4F, 0.1F}, {0.2F, 0.5F, 1});
+       }},
+      {"one more medium, of more steps",
+       [](Scene& s) {
+         s.scalars.push_back(s.scalars[0]);
+         s.scalars[1].extinction = {{0, 0}, {0.5, 1}, {1, 0}, {2, 4}};
+       }},
+      {"horizontal lines", [](Scene& s) { s.vector->field = make_volume(s.lattice, 2, wave); }},
+      {"lines coloured by a field",
+       [](Scene& s) {
+         s.vector->color_by = scene::LineColor::scalar;
+         s.vector->color_field = s.scalars[0].field;
+         s.vector->color = ramp_color(-1, 1, {1, 0.4F, 0.1F}, {0.2F, 0.5F, 1});
+       }},
+      {"moving lines",
+       [](Scene& s) {
+         s.vector->moving = true;
+         s.vector->motion_cycles = 0.3;
+       }},
       {"cells",
        [](Scene& s) {
          for (double& w : s.lattice.spacing[0]) w *= 1.5;
