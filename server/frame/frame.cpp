@@ -125,15 +125,15 @@ Result<void> draw(const protocol::View& view, data::Dataset& dataset, const Enco
                          "`windsplat render`");
   }
   const Clock::time_point start = Clock::now();
-  Result<protocol::View> completed = scene::complete_view(view, dataset);
+  Result<scene::Completed> completed = scene::complete_and_place(view, dataset);
   if (!completed) return completed.error();
 
   // Defaults come from the whole picture, so that every level frames the volume alike; radii follow
   // the height that is drawn.
-  protocol::View leveled = *completed;
-  leveled.image.width = std::max(1, leveled.image.width >> encoding.level);
-  leveled.image.height = std::max(1, leveled.image.height >> encoding.level);
-  const Result<scene::Scene> scene = scene::build_scene(leveled, dataset);
+  protocol::ImageView& image = completed->view.image;
+  image.width = std::max(1, view.image.width >> encoding.level);
+  image.height = std::max(1, view.image.height >> encoding.level);
+  const Result<scene::Scene> scene = scene::build_scene(*completed, dataset);
   if (!scene) return scene.error();
   workspace.encoding = encoding;
   workspace.background = scene->background;
@@ -145,8 +145,9 @@ Result<void> draw(const protocol::View& view, data::Dataset& dataset, const Enco
   drawn.width = scene->camera.width;
   drawn.height = scene->camera.height;
   drawn.work = std::move(*work);
-  name_fields(*scene, *completed, drawn.work);
-  drawn.view = std::move(*completed);
+  name_fields(*scene, completed->view, drawn.work);
+  drawn.view = std::move(completed->view);
+  drawn.view.image = view.image;
   drawn.render_us = microseconds(start, Clock::now());
   return {};
 }
