@@ -247,18 +247,14 @@ void add_medium(const Scene& scene, PassPlan& pass) {
   pass.kernel.has_medium = 1;
 }
 
-// How far any cell of a curved lattice reaches along each axis of the world, summed over its edges:
-// no edge is longer than the way between a sample's two neighbours, times the stride.
-void bend_pass(const Scene& scene, PassPlan& pass) {
-  const auto& places = *scene.lattice.places;
-  const auto& dims = scene.lattice.dims;
-  kernels::Pass& to = pass.kernel;
+void measure_ways(const Lattice& lattice, SampleWays& ways) {
+  const auto& places = *lattice.places;
+  const auto& dims = lattice.dims;
   WINDSPLAT_CHECK(places.size() == static_cast<std::size_t>(dims[0]) * dims[1] * dims[2]);
-  to.places = places.front().data();
-  std::array<float, 3> widest{};
+  if (ways.places.lock() == lattice.places && ways.dims == dims) return;
+  std::size_t step = 1;
   for (int a = 0; a < 3; ++a) {
     std::array<float, 3> way{};
-    const std::size_t step = to.step[a];
     const std::size_t row = step * dims[a];
     for (std::size_t i = 0; i + step < places.size(); ++i) {
       if (i % row >= row - step) continue;
@@ -266,9 +262,24 @@ void bend_pass(const Scene& scene, PassPlan& pass) {
         way[c] = std::max(way[c], std::abs(places[i + step][c] - places[i][c]));
       }
     }
+    ways.longest[a] = way;
+    step = row;
+  }
+  ways.places = lattice.places;
+  ways.dims = dims;
+}
+
+// How far any cell of a curved lattice reaches along each axis of the world, summed over its edges:
+// no edge is longer than the way between a sample's two neighbours, times the stride.
+void bend_pass(const Scene& scene, const SampleWays& ways, PassPlan& pass) {
+  kernels::Pass& to = pass.kernel;
+  to.places = scene.lattice.places->front().data();
+  std::array<float, 3> widest{};
+  for (int a = 0; a < 3; ++a) {
     // A cell squeezed to nothing is opened again by its unbent width.
     for (int c = 0; c < 3; ++c) {
-      widest[c] += dims[a] > 1 ? way[c] * static_cast<float>(pass.stride) : to.cell_max[a];
+      widest[c] += scene.lattice.dims[a] > 1 ? ways.longest[a][c] * static_cast<float>(pass.stride)
+                                             : to.cell_max[a];
     }
   }
   const float least = 0.002F * std::max({widest[0], widest[1], widest[2]});
@@ -311,7 +322,7 @@ void plan_slabs(const Scene& scene, RenderPlan& plan) {
   }
 }
 
-void finish_pass(const Scene& scene, int major, PassPlan& pass) {
+void finish_pass(const Scene& scene, int major, const SampleWays& ways, PassPlan& pass) {
   const auto& dims = scene.lattice.dims;
   kernels::Pass& to = pass.kernel;
   to.major = major;
@@ -336,7 +347,7 @@ void finish_pass(const Scene& scene, int major, PassPlan& pass) {
     to.dims[a] = dims[a];
   }
   to.compositing = static_cast<int>(scene.compositing);
-  if (scene.lattice.places) bend_pass(scene, pass);
+  if (scene.lattice.places) bend_pass(scene, ways, pass);
   if (pass.vector != nullptr) add_lines(scene, pass);
   add_medium(scene, pass);
 }
@@ -453,7 +464,8 @@ void make_plan(const Scene& scene, RenderPlan& plan) {
   choose_passes(scene, plan.passes);
   const int major = major_axis(scene.camera, scene.lattice);
   plan.eye_sample = eye_stop(scene.camera, major, scene.lattice.positions[major]);
-  for (PassPlan& pass : plan.passes) finish_pass(scene, major, pass);
+  if (plan.curved) measure_ways(scene.lattice, plan.ways);
+  for (PassPlan& pass : plan.passes) finish_pass(scene, major, plan.ways, pass);
   plan.slab_depth = 1;
   if (plan.slabs || plan.curved) plan_slabs(scene, plan);
   plan.tile_pixels = tile_pixels(scene.camera.width, scene.camera.height);

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "server/engine/kernels/frame_data.hpp"
@@ -65,6 +66,15 @@ struct PassPlan {
   kernels::Pass kernel{};  // points into the arrays above
 };
 
+// How far a curved lattice's samples lie apart; to look at all of them takes as long as to draw
+// some.
+struct SampleWays {
+  std::weak_ptr<const std::vector<std::array<float, 3>>> places;  // whose they are
+  std::array<int, 3> dims{};
+  // [a][c]: the longest way from a sample to the next one along axis a, in the world's direction c.
+  std::array<std::array<float, 3>, 3> longest{};
+};
+
 struct RenderPlan {
   const scene::Camera* view = nullptr;
   kernels::Camera camera{};
@@ -78,6 +88,7 @@ struct RenderPlan {
   float stop_transmittance = 0;
   int tile_pixels = 0;  // along a tile's side, at most kernels::tile_side
   Variant variant;      // without its target and level
+  SampleWays ways;      // of the curved lattice that was planned last
 
   RenderPlan() = default;
   RenderPlan(const RenderPlan&) = delete;  // passes point into themselves
@@ -88,7 +99,7 @@ struct RenderPlan {
 };
 
 // Replaces all that the plan says by this scene, which must outlive its use; of what it was before
-// only storage is kept.
+// only storage is kept, and what is known of a curved lattice that is still there.
 void make_plan(const scene::Scene& scene, RenderPlan& plan);
 
 }  // namespace windsplat::engine
