@@ -44,6 +44,7 @@ struct ImageView {
 struct SliceView {
   GridAxis axis = GridAxis::z;
   int index = 0;  // grid samples
+  bool operator==(const SliceView&) const = default;
 };
 
 struct GeometryView {
@@ -52,6 +53,7 @@ struct GeometryView {
   GeometryMapping mapping = GeometryMapping::flat;
   std::optional<std::string> height_field;  // empty: the vertical coordinate places the samples
   std::optional<SliceView> slice;           // empty: the whole grid
+  bool operator==(const GeometryView&) const = default;
 };
 
 // A field chosen by name, by the dataset's default (key absent), or none at all (null).

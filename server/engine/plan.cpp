@@ -60,33 +60,55 @@ kernels::Camera make_camera(const Scene& scene) {
   return to;
 }
 
+void clear(AxisArrays& axis) {
+  axis.position.clear();
+  axis.camera.clear();
+  axis.from_eye.clear();
+  axis.world.clear();
+  axis.cell.clear();
+  axis.inverse_cell.clear();
+  axis.sample.clear();
+  axis.group.clear();
+  axis.visit.clear();
+  axis.bricks.clear();
+}
+
+void add_stop(const Scene& scene, int a, const Stop& stop, AxisArrays& axis) {
+  const Camera& camera = scene.camera;
+  axis.sample.push_back(stop.sample);
+  axis.group.push_back(stop.group);
+  const double position = scene.lattice.positions[a][stop.sample];
+  const double from_eye = position - camera.eye[a];
+  axis.position.push_back(position);
+  axis.camera.push_back(from_eye * camera.right[a]);
+  axis.camera.push_back(from_eye * -camera.up[a]);
+  axis.camera.push_back(from_eye * camera.forward[a]);
+  axis.from_eye.push_back(static_cast<float>(from_eye));
+  axis.world.push_back(static_cast<float>(position));
+  axis.cell.push_back(static_cast<float>(stop.cell));
+  axis.inverse_cell.push_back(1.0F / axis.cell.back());
+}
+
 // A slice is one stop of its axis, whatever the stride.
-std::vector<Stop> stops_along(const Scene& scene, int a, int stride) {
+void add_stops(const Scene& scene, int a, int stride, AxisArrays& axis) {
   const auto& spacing = scene.lattice.spacing[a];
-  if (!scene.slice || scene.slice->axis != a) return kernel_stops(spacing, stride);
-  WINDSPLAT_CHECK(scene.slice->sample >= 0 && scene.slice->sample < scene.lattice.dims[a]);
-  return {{scene.slice->sample, 1, spacing[scene.slice->sample]}};
+  if (scene.slice && scene.slice->axis == a) {
+    const int sample = scene.slice->sample;
+    WINDSPLAT_CHECK(sample >= 0 && sample < scene.lattice.dims[a]);
+    add_stop(scene, a, {sample, 1, spacing[sample]}, axis);
+    return;
+  }
+  const int samples = static_cast<int>(spacing.size());
+  for (int first = 0; first < samples; first += stride) {
+    add_stop(scene, a, kernel_stop(spacing, stride, first), axis);
+  }
 }
 
 void place_axis(const Scene& scene, int a, int stride, AxisArrays& axis) {
-  const Camera& camera = scene.camera;
-  const auto& positions = scene.lattice.positions[a];
-  for (const auto& [sample, group, cell] : stops_along(scene, a, stride)) {
-    axis.sample.push_back(sample);
-    axis.group.push_back(group);
-    const double position = positions[sample];
-    const double from_eye = position - camera.eye[a];
-    axis.position.push_back(position);
-    axis.camera.push_back(from_eye * camera.right[a]);
-    axis.camera.push_back(from_eye * -camera.up[a]);
-    axis.camera.push_back(from_eye * camera.forward[a]);
-    axis.from_eye.push_back(static_cast<float>(from_eye));
-    axis.world.push_back(static_cast<float>(position));
-    axis.cell.push_back(static_cast<float>(cell));
-    axis.inverse_cell.push_back(1.0F / axis.cell.back());
-  }
+  clear(axis);
+  add_stops(scene, a, stride, axis);
   const int count = static_cast<int>(axis.sample.size());
-  axis.visit = visit_order(count, eye_stop(camera, a, axis.position));
+  visit_order(count, eye_stop(scene.camera, a, axis.position), axis.visit);
   for (int first = 0; first < count;) {
     const int brick = axis.visit[first] / kernels::brick_side;
     int last = first;
@@ -97,19 +119,19 @@ void place_axis(const Scene& scene, int a, int stride, AxisArrays& axis) {
 }
 
 // As kernels::ColorTable wants it.
-std::vector<float> flatten(const scene::ColorTable& table) {
-  std::vector<float> rgb;
-  rgb.reserve(kernels::color_floats * (table.entries.size() + 1));
-  const auto add = [&](const std::array<float, 3>& entry) {
-    rgb.insert(rgb.end(), {entry[0], entry[1], entry[2], 0.0F});
-  };
-  for (const auto& entry : table.entries) add(entry);
-  add(table.entries.back());
-  return rgb;
+void flatten(const scene::ColorTable& table, std::vector<float>& rgb) {
+  const std::size_t entries = table.entries.size();
+  WINDSPLAT_CHECK(entries > 0);
+  rgb.resize(kernels::color_floats * (entries + 1));
+  float* to = rgb.data();
+  for (std::size_t n = 0; n <= entries; ++n, to += kernels::color_floats) {
+    const std::array<float, 3>& entry = table.entries[std::min(n, entries - 1)];
+    std::copy(entry.begin(), entry.end(), to);
+    to[3] = 0;
+  }
 }
 
 kernels::ColorTable make_table(const scene::ColorTable& table, const std::vector<float>& rgb) {
-  WINDSPLAT_CHECK(!table.entries.empty());
   kernels::ColorTable to{};
   to.rgb = rgb.data();
   to.entries = static_cast<int>(table.entries.size());
@@ -125,11 +147,9 @@ void check_volume(const data::Volume& volume, const Lattice& lattice) {
                   volume.samples() * static_cast<std::size_t>(volume.components));
 }
 
-std::vector<float> to_floats(const std::vector<double>& from) {
-  std::vector<float> to;
-  to.reserve(from.size());
+void to_floats(const std::vector<double>& from, std::vector<float>& to) {
+  to.clear();
   for (const double v : from) to.push_back(bounded(v));
-  return to;
 }
 
 // Jitter, box and ink: what a line looks like.
@@ -174,8 +194,8 @@ void add_lines(const Scene& scene, PassPlan& pass) {
     to.velocity[c] = c < from.field->components ? from.field->component(c) : nullptr;
     to.scale[c] = bounded(from.scale[c]);
   }
-  pass.rate_x = to_floats(from.rate_x);
-  pass.rate_z = to_floats(from.rate_z);
+  to_floats(from.rate_x, pass.rate_x);
+  to_floats(from.rate_z, pass.rate_z);
   to.rate_x = pass.rate_x.empty() ? nullptr : pass.rate_x.data();
   to.rate_y = pass.rate_x.empty() ? 1.0F : bounded(from.rate_y);
   to.rate_z = pass.rate_z.empty() ? nullptr : pass.rate_z.data();
@@ -185,22 +205,26 @@ void add_lines(const Scene& scene, PassPlan& pass) {
     check_volume(*from.color_field, scene.lattice);
     to.color_values = from.color_field->values.data();
   }
-  pass.line_rgb = flatten(from.color);
+  flatten(from.color, pass.line_rgb);
   to.color = make_table(from.color, pass.line_rgb);
   pass.kernel.has_lines = 1;
 }
 
 void add_medium(const Scene& scene, PassPlan& pass) {
+  pass.layers.resize(pass.scalars.size());
+  if (pass.scalars.empty()) return;
   kernels::Medium& to = pass.kernel.medium;
   WINDSPLAT_CHECK(pass.scalars.size() <= kernels::medium_layers_max);
   to.layers = static_cast<int>(pass.scalars.size());
   to.min_optical_depth = std::numeric_limits<float>::max();
-  pass.layers.resize(pass.scalars.size());
   for (std::size_t k = 0; k < pass.scalars.size(); ++k) {
     const scene::ScalarLayer& from = *pass.scalars[k];
     check_volume(*from.field, scene.lattice);
     WINDSPLAT_CHECK(!from.extinction.empty());
     LayerArrays& arrays = pass.layers[k];
+    arrays.x.clear();
+    arrays.y.clear();
+    arrays.slope.clear();
     for (std::size_t p = 0; p < from.extinction.size(); ++p) {
       const double x = from.extinction[p][0];
       const double y = std::min(from.extinction[p][1], extinction_max);
@@ -213,7 +237,7 @@ void add_medium(const Scene& scene, PassPlan& pass) {
       arrays.y.push_back(bounded(y));
       arrays.slope.push_back(bounded(slope));
     }
-    arrays.rgb = flatten(from.color);
+    flatten(from.color, arrays.rgb);
     to.layer[k].values = from.field->values.data();
     to.layer[k].extinction = {static_cast<int>(arrays.x.size()), arrays.x.data(), arrays.y.data(),
                               arrays.slope.data()};
@@ -223,18 +247,14 @@ void add_medium(const Scene& scene, PassPlan& pass) {
   pass.kernel.has_medium = 1;
 }
 
-// How far any cell of a curved lattice reaches along each axis of the world, summed over its edges:
-// no edge is longer than the way between a sample's two neighbours, times the stride.
-void bend_pass(const Scene& scene, PassPlan& pass) {
-  const auto& places = *scene.lattice.places;
-  const auto& dims = scene.lattice.dims;
-  kernels::Pass& to = pass.kernel;
+void measure_ways(const Lattice& lattice, SampleWays& ways) {
+  const auto& places = *lattice.places;
+  const auto& dims = lattice.dims;
   WINDSPLAT_CHECK(places.size() == static_cast<std::size_t>(dims[0]) * dims[1] * dims[2]);
-  to.places = places.front().data();
-  std::array<float, 3> widest{};
+  if (ways.places.lock() == lattice.places && ways.dims == dims) return;
+  std::size_t step = 1;
   for (int a = 0; a < 3; ++a) {
     std::array<float, 3> way{};
-    const std::size_t step = to.step[a];
     const std::size_t row = step * dims[a];
     for (std::size_t i = 0; i + step < places.size(); ++i) {
       if (i % row >= row - step) continue;
@@ -242,9 +262,24 @@ void bend_pass(const Scene& scene, PassPlan& pass) {
         way[c] = std::max(way[c], std::abs(places[i + step][c] - places[i][c]));
       }
     }
+    ways.longest[a] = way;
+    step = row;
+  }
+  ways.places = lattice.places;
+  ways.dims = dims;
+}
+
+// How far any cell of a curved lattice reaches along each axis of the world, summed over its edges:
+// no edge is longer than the way between a sample's two neighbours, times the stride.
+void bend_pass(const Scene& scene, const SampleWays& ways, PassPlan& pass) {
+  kernels::Pass& to = pass.kernel;
+  to.places = scene.lattice.places->front().data();
+  std::array<float, 3> widest{};
+  for (int a = 0; a < 3; ++a) {
     // A cell squeezed to nothing is opened again by its unbent width.
     for (int c = 0; c < 3; ++c) {
-      widest[c] += dims[a] > 1 ? way[c] * static_cast<float>(pass.stride) : to.cell_max[a];
+      widest[c] += scene.lattice.dims[a] > 1 ? ways.longest[a][c] * static_cast<float>(pass.stride)
+                                             : to.cell_max[a];
     }
   }
   const float least = 0.002F * std::max({widest[0], widest[1], widest[2]});
@@ -267,7 +302,6 @@ double cell_along_view(const Scene& scene) {
 // cells are, there are at most slabs_max across the volume.
 void plan_slabs(const Scene& scene, RenderPlan& plan) {
   constexpr double slabs_max = 16384;
-  plan.slabs = scene.method == scene::Method::slab;
   for (PassPlan& pass : plan.passes) pass.kernel.by_depth = 1;
   int stride = 0;
   for (const PassPlan& pass : plan.passes) {
@@ -288,7 +322,7 @@ void plan_slabs(const Scene& scene, RenderPlan& plan) {
   }
 }
 
-void finish_pass(const Scene& scene, int major, PassPlan& pass) {
+void finish_pass(const Scene& scene, int major, const SampleWays& ways, PassPlan& pass) {
   const auto& dims = scene.lattice.dims;
   kernels::Pass& to = pass.kernel;
   to.major = major;
@@ -313,9 +347,9 @@ void finish_pass(const Scene& scene, int major, PassPlan& pass) {
     to.dims[a] = dims[a];
   }
   to.compositing = static_cast<int>(scene.compositing);
-  if (scene.lattice.places) bend_pass(scene, pass);
+  if (scene.lattice.places) bend_pass(scene, ways, pass);
   if (pass.vector != nullptr) add_lines(scene, pass);
-  if (!pass.scalars.empty()) add_medium(scene, pass);
+  add_medium(scene, pass);
 }
 
 // A kernel is made ready once for every tile that it may touch: the fewer of those, the larger
@@ -326,19 +360,46 @@ int tile_pixels(int width, int height) {
   return pixels >= 200'000 ? 96 : 64;
 }
 
-std::string describe(const Scene& scene, const RenderPlan& plan) {
-  std::string variant;
-  const bool vector = scene.vector.has_value();
-  if (vector) variant = "vector";
-  if (!scene.scalars.empty()) variant += vector ? "+scalar" : "scalar";
-  if (variant.empty()) return "empty";
-  variant += scene.camera.perspective ? " perspective" : " orthographic";
-  if (vector && scene.vector->head_desaturation > 0) variant += " heads";
-  if (vector && scene.vector->moving) variant += " moving";
-  if (plan.slabs) variant += " slabs";
-  if (plan.curved) variant += " curved";
-  if (plan.passes.size() > 1) variant += " passes=" + std::to_string(plan.passes.size());
+Variant variant_of(const Scene& scene, const RenderPlan& plan) {
+  Variant variant;
+  variant.vector = scene.vector.has_value();
+  variant.scalar = !scene.scalars.empty();
+  variant.perspective = scene.camera.perspective;
+  variant.heads = variant.vector && scene.vector->head_desaturation > 0;
+  variant.moving = variant.vector && scene.vector->moving;
+  variant.slabs = plan.slabs;
+  variant.curved = plan.curved;
+  variant.passes = static_cast<int>(plan.passes.size());
   return variant;
+}
+
+// Whose layers are those of the scene's that have its stride; nothing else is said of it yet.
+void begin_pass(int stride, PassPlan& pass) {
+  pass.stride = stride;
+  pass.vector = nullptr;
+  pass.scalars.clear();
+  pass.line_rgb.clear();
+  pass.rate_x.clear();
+  pass.rate_z.clear();
+  pass.kernel = kernels::Pass{};
+}
+
+// One pass a stride, the lines' first.
+void choose_passes(const Scene& scene, std::vector<PassPlan>& passes) {
+  std::size_t used = 0;
+  const auto with_stride = [&](int stride) -> PassPlan& {
+    for (std::size_t n = 0; n < used; ++n) {
+      if (passes[n].stride == stride) return passes[n];
+    }
+    if (used == passes.size()) passes.emplace_back();
+    begin_pass(stride, passes[used]);
+    return passes[used++];
+  };
+  if (scene.vector) with_stride(scene.vector->stride).vector = &*scene.vector;
+  for (const scene::ScalarLayer& scalar : scene.scalars) {
+    with_stride(scalar.stride).scalars.push_back(&scalar);
+  }
+  passes.resize(used);
 }
 
 }  // namespace
@@ -359,15 +420,10 @@ int major_axis(const Camera& camera, const Lattice& lattice) {
   return major;
 }
 
-std::vector<Stop> kernel_stops(const std::vector<double>& spacing, int stride) {
-  const int dim = static_cast<int>(spacing.size());
-  std::vector<Stop> stops;
-  for (int first = 0; first < dim; first += stride) {
-    const int last = std::min(first + stride, dim) - 1;
-    const double cell = std::accumulate(spacing.begin() + first, spacing.begin() + last + 1, 0.0);
-    stops.push_back({first + (last - first) / 2, last - first + 1, cell});
-  }
-  return stops;
+Stop kernel_stop(const std::vector<double>& spacing, int stride, int first) {
+  const int last = std::min(first + stride, static_cast<int>(spacing.size())) - 1;
+  const double cell = std::accumulate(spacing.begin() + first, spacing.begin() + last + 1, 0.0);
+  return {first + (last - first) / 2, last - first + 1, cell};
 }
 
 int eye_stop(const Camera& camera, int axis, const std::vector<double>& positions) {
@@ -380,8 +436,8 @@ int eye_stop(const Camera& camera, int axis, const std::vector<double>& position
   return stop;
 }
 
-std::vector<int> visit_order(int stops, int eye) {
-  std::vector<int> order;
+void visit_order(int stops, int eye, std::vector<int>& order) {
+  order.clear();
   const auto visit_brick = [&](int brick) {
     const int first = brick * kernels::brick_side;
     const int last = std::min(first + kernels::brick_side, stops) - 1;
@@ -393,38 +449,27 @@ std::vector<int> visit_order(int stops, int eye) {
   const int own = eye / kernels::brick_side;
   for (int brick = own; brick < bricks; ++brick) visit_brick(brick);
   for (int brick = own - 1; brick >= 0; --brick) visit_brick(brick);
-  return order;
 }
 
-RenderPlan make_plan(const Scene& scene) {
+void make_plan(const Scene& scene, RenderPlan& plan) {
   WINDSPLAT_CHECK(scene.camera.width > 0 && scene.camera.height > 0);
   WINDSPLAT_CHECK(scene.camera.half_height > 0);
-  RenderPlan plan;
   plan.view = &scene.camera;
   plan.camera = make_camera(scene);
   plan.compositing = static_cast<int>(scene.compositing);
   plan.curved = scene.lattice.places != nullptr;
+  plan.slabs = scene.method == scene::Method::slab;
   plan.stop_transmittance = static_cast<float>(scene.stop_transmittance);
-  if (scene.vector) {
-    plan.passes.emplace_back();
-    plan.passes.back().stride = scene.vector->stride;
-    plan.passes.back().vector = &*scene.vector;
-  }
-  for (const scene::ScalarLayer& scalar : scene.scalars) {
-    const auto same = std::find_if(plan.passes.begin(), plan.passes.end(),
-                                   [&](const auto& pass) { return pass.stride == scalar.stride; });
-    PassPlan& pass = same == plan.passes.end() ? plan.passes.emplace_back() : *same;
-    pass.stride = scalar.stride;
-    pass.scalars.push_back(&scalar);
-  }
   plan.perspective_medium = scene.camera.perspective && !scene.scalars.empty();
+  choose_passes(scene, plan.passes);
   const int major = major_axis(scene.camera, scene.lattice);
   plan.eye_sample = eye_stop(scene.camera, major, scene.lattice.positions[major]);
-  for (PassPlan& pass : plan.passes) finish_pass(scene, major, pass);
-  if (scene.method == scene::Method::slab || plan.curved) plan_slabs(scene, plan);
+  if (plan.curved) measure_ways(scene.lattice, plan.ways);
+  for (PassPlan& pass : plan.passes) finish_pass(scene, major, plan.ways, pass);
+  plan.slab_depth = 1;
+  if (plan.slabs || plan.curved) plan_slabs(scene, plan);
   plan.tile_pixels = tile_pixels(scene.camera.width, scene.camera.height);
-  plan.variant = describe(scene, plan);
-  return plan;
+  plan.variant = variant_of(scene, plan);
 }
 
 }  // namespace windsplat::engine

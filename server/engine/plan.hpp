@@ -1,13 +1,14 @@
 // Scene -> RenderPlan: everything that the kernels need, as plain data. What the scene lacks is
-// neither computed nor allocated.
+// neither computed nor allocated; nor is what a plan made before has room for.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <string>
+#include <memory>
 #include <vector>
 
 #include "server/engine/kernels/frame_data.hpp"
+#include "server/engine/work.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::engine {
@@ -16,22 +17,22 @@ namespace windsplat::engine {
 // along, |forward_a| / mean spacing_a largest; the first of equals.
 int major_axis(const scene::Camera& camera, const scene::Lattice& lattice);
 
-// Where kernels stop along one axis: each stop stands for `stride` samples, the last one for those
-// that are left, and has the middle one's place (the lower of two).
+// One of an axis' kernel stops: it stands for `stride` samples from `first` on, the last one for
+// those that are left, and has the middle one's place (the lower of two).
 struct Stop {
   int sample = 0;
   int group = 1;    // samples
   double cell = 0;  // world units: what it stands for, from one end to the other
 };
-std::vector<Stop> kernel_stops(const std::vector<double>& spacing, int stride);
+Stop kernel_stop(const std::vector<double>& spacing, int stride, int first);
 
 // The stop whose cell (bounded midway between stops) holds the eye; in orthographic views the end
 // of the axis that the view comes from. From it, outward is front to back.
 int eye_stop(const scene::Camera& camera, int axis, const std::vector<double>& positions);
 
 // Stops in visibility order: bricks of brick_side consecutive stops outward from the eye's, and
-// inside each brick stops outward from the eye's.
-std::vector<int> visit_order(int stops, int eye);
+// inside each brick stops outward from the eye's. Replaces what `order` held.
+void visit_order(int stops, int eye, std::vector<int>& order);
 
 // Backing store of one kernels::Axis.
 struct AxisArrays {
@@ -65,6 +66,15 @@ struct PassPlan {
   kernels::Pass kernel{};  // points into the arrays above
 };
 
+// How far a curved lattice's samples lie apart; to look at all of them takes as long as to draw
+// some.
+struct SampleWays {
+  std::weak_ptr<const std::vector<std::array<float, 3>>> places;  // whose they are
+  std::array<int, 3> dims{};
+  // [a][c]: the longest way from a sample to the next one along axis a, in the world's direction c.
+  std::array<std::array<float, 3>, 3> longest{};
+};
+
 struct RenderPlan {
   const scene::Camera* view = nullptr;
   kernels::Camera camera{};
@@ -77,7 +87,8 @@ struct RenderPlan {
   double slab_depth = 1;            // of a slab along the view, world units
   float stop_transmittance = 0;
   int tile_pixels = 0;  // along a tile's side, at most kernels::tile_side
-  std::string variant;
+  Variant variant;      // without its target and level
+  SampleWays ways;      // of the curved lattice that was planned last
 
   RenderPlan() = default;
   RenderPlan(const RenderPlan&) = delete;  // passes point into themselves
@@ -87,7 +98,8 @@ struct RenderPlan {
   ~RenderPlan() = default;
 };
 
-// The scene must outlive the plan.
-RenderPlan make_plan(const scene::Scene& scene);
+// Replaces all that the plan says by this scene, which must outlive its use; of what it was before
+// only storage is kept, and what is known of a curved lattice that is still there.
+void make_plan(const scene::Scene& scene, RenderPlan& plan);
 
 }  // namespace windsplat::engine

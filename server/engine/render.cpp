@@ -14,6 +14,7 @@ namespace windsplat::engine {
 
 struct RenderSpace::Parts {
   Image image;
+  RenderPlan plan;  // of the frame drawn last, whose scene may be gone
   BinSpace bins;
   TileSpace tiles;
 };
@@ -50,10 +51,12 @@ Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const Can
                           RenderSpace& space, TileSink sink) {
   const auto table = kernels::chosen_table();
   if (!table) return table.error();
-  const RenderPlan plan = make_plan(scene);
-  WorkReport work;
-  work.variant = plan.variant + " " + (*table)->name;
   RenderSpace::Parts& parts = *space.parts_;
+  const RenderPlan& plan = parts.plan;
+  make_plan(scene, parts.plan);
+  WorkReport work;
+  work.variant = plan.variant;
+  work.variant.target = (*table)->name;
   if (!plan.passes.empty() && !cancel.cancelled()) {
     const Bins& bins = make_bins(plan, **table, pool, cancel, parts.bins, work);
     if (!cancel.cancelled()) {

@@ -1,11 +1,31 @@
 // The work report of a frame: what was drawn, what was skipped, and why.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 namespace windsplat::engine {
+
+// What the plan chose; plain facts, because a frame that is drawn over and over should not allocate
+// to say them.
+struct Variant {
+  bool reference = false;  // all that is said of the reference
+  bool vector = false;
+  bool scalar = false;
+  bool perspective = false;
+  bool heads = false;
+  bool moving = false;
+  bool slabs = false;
+  bool curved = false;
+  int passes = 0;
+  const char* target = "";            // of the kernels; a literal
+  std::array<int, 3> level{0, 0, 0};  // how often each axis was halved; filled by who knows
+};
+
+// In words, for example "vector+scalar perspective avx2 level=1,1,0".
+std::string text_of(const Variant& variant);
 
 struct WorkReport {
   std::int64_t samples = 0;  // kernel stops of the scene
@@ -24,7 +44,7 @@ struct WorkReport {
   double stop_bound = 0;     // largest change of a pixel by tiles that ended early, at most
   std::vector<std::string> fields;  // filled by who knows their names
   std::int64_t bytes = 0;           // of the fields touched
-  std::string variant;              // what the plan chose, for example "vector+scalar perspective"
+  Variant variant;
 };
 
 }  // namespace windsplat::engine

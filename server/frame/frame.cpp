@@ -59,23 +59,13 @@ void name_fields(const scene::Scene& scene, const protocol::View& completed,
   }
 }
 
-// " level=1,1,0": how often each axis was halved; nothing where none was.
-void name_level(const std::array<int, 3>& level, engine::WorkReport& work) {
-  if (level == std::array{0, 0, 0}) return;
-  work.variant += " level=";
-  for (std::size_t a = 0; a < 3; ++a) {
-    if (a > 0) work.variant += ',';
-    work.variant += std::to_string(level.at(a));
-  }
-}
-
 Result<engine::WorkReport> render_reference(const scene::Scene& scene, ThreadPool& pool,
                                             const CancelToken& cancel, engine::Image& picture) {
   auto truth = engine::reference::render(scene, pool, cancel);
   if (!truth) return truth.error();
   picture = {truth->width, truth->height, {truth->rgba.begin(), truth->rgba.end()}};
   engine::WorkReport work;
-  work.variant = "reference double";
+  work.variant.reference = true;
   return work;
 }
 
@@ -103,7 +93,7 @@ Result<engine::WorkReport> render_scene(const scene::Scene& scene, ThreadPool& p
   };
   auto work = jpeg ? engine::render(scene, pool, cancel, workspace.space, to_planes)
                    : engine::render(scene, pool, cancel, workspace.space);
-  if (work) name_level(scene.level, *work);
+  if (work) work->variant.level = scene.level;
   return work;
 }
 
@@ -135,15 +125,15 @@ Result<void> draw(const protocol::View& view, data::Dataset& dataset, const Enco
                          "`windsplat render`");
   }
   const Clock::time_point start = Clock::now();
-  Result<protocol::View> completed = scene::complete_view(view, dataset);
+  Result<scene::Completed> completed = scene::complete_and_place(view, dataset);
   if (!completed) return completed.error();
 
   // Defaults come from the whole picture, so that every level frames the volume alike; radii follow
   // the height that is drawn.
-  protocol::View leveled = *completed;
-  leveled.image.width = std::max(1, leveled.image.width >> encoding.level);
-  leveled.image.height = std::max(1, leveled.image.height >> encoding.level);
-  const Result<scene::Scene> scene = scene::build_scene(leveled, dataset);
+  protocol::ImageView& image = completed->view.image;
+  image.width = std::max(1, view.image.width >> encoding.level);
+  image.height = std::max(1, view.image.height >> encoding.level);
+  const Result<scene::Scene> scene = scene::build_scene(*completed, dataset);
   if (!scene) return scene.error();
   workspace.encoding = encoding;
   workspace.background = scene->background;
@@ -155,8 +145,9 @@ Result<void> draw(const protocol::View& view, data::Dataset& dataset, const Enco
   drawn.width = scene->camera.width;
   drawn.height = scene->camera.height;
   drawn.work = std::move(*work);
-  name_fields(*scene, *completed, drawn.work);
-  drawn.view = std::move(*completed);
+  name_fields(*scene, completed->view, drawn.work);
+  drawn.view = std::move(completed->view);
+  drawn.view.image = view.image;
   drawn.render_us = microseconds(start, Clock::now());
   return {};
 }

@@ -66,7 +66,7 @@ protocol::FrameInfo frame_info(const Frame& frame, const protocol::View& view) {
   info.stop_bound = work.stop_bound;
   info.fields = work.fields;
   info.bytes = work.bytes;
-  info.variant = work.variant;
+  info.variant = engine::text_of(work.variant);
   return info;
 }
 

@@ -119,7 +119,7 @@ struct Fields {
 };
 
 // How much of the detail a view asks for its picture can show.
-std::array<int, 3> level_of(const View& view, const Scene& full) {
+std::array<int, 3> level_of(const View& view, const Scene& scene, const Lattice& full) {
   const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
   const bool strided = (lines && view.vector.stride > 1) ||
                        std::any_of(view.scalars->begin(), view.scalars->end(),
@@ -129,7 +129,7 @@ std::array<int, 3> level_of(const View& view, const Scene& full) {
       view.method.name == protocol::MethodName::reference) {
     return {0, 0, 0};
   }
-  return choose_level(full.camera, full.lattice, full.slice,
+  return choose_level(scene.camera, full, scene.slice,
                       lines ? halved_with_lines_below_px : halved_below_px);
 }
 
@@ -187,7 +187,7 @@ Result<ScalarLayer> make_scalar_layer(const protocol::ScalarView& from, const Fi
   return layer;
 }
 
-// The scene, whose lattice has every sample so far, at a level: its layers and what they need.
+// The scene, so far without lattice and layers, at a level.
 Result<Scene> at_level(Scene scene, const std::array<int, 3>& level, const View& view,
                        const Placed& placed, data::Dataset& dataset) {
   scene.level = level;
@@ -213,20 +213,15 @@ Result<Scene> at_level(Scene scene, const std::array<int, 3>& level, const View&
 
 }  // namespace
 
-Result<Scene> build_scene(const View& completed, data::Dataset& dataset) {
-  // Checks the view against this dataset; a complete one passes through and loads nothing.
-  auto checked = complete_view(completed, dataset);
-  if (!checked) return checked.error();
-  const View& view = *checked;
+Result<Scene> build_scene(const Completed& completed, data::Dataset& dataset) {
+  const View& view = completed.view;
+  const Placed& placed = *completed.placed;
   Scene scene;
-  const auto placed = place_dataset(view.geometry, dataset);
-  if (!placed) return placed.error();
-  scene.lattice = (*placed)->lattice;
   scene.slice = slice_of(view.geometry);
-  auto camera = resolve_camera(view, scene.lattice);
+  auto camera = resolve_camera(view, placed.lattice);
   if (!camera) return camera.error();
   scene.camera = *camera;
-  const auto depths = view_depths(scene.camera, scene.lattice);
+  const auto depths = view_depths(scene.camera, placed.lattice);
   const double depth = depths[1] - depths[0];
   scene.depth_cue = {view.depth_cue.strength, depths[0] + view.depth_cue.near * depth,
                      depths[0] + view.depth_cue.far * depth};
@@ -235,12 +230,19 @@ Result<Scene> build_scene(const View& completed, data::Dataset& dataset) {
   scene.slab_thickness = view.method.slab_thickness;
   scene.stop_transmittance = view.method.stop_transmittance;
   scene.background = parse_color(view.image.background).value();
-  const auto level = level_of(view, scene);
-  auto built = at_level(scene, level, view, **placed, dataset);
+  const auto level = level_of(view, scene, placed.lattice);
+  auto built = at_level(scene, level, view, placed, dataset);
   const bool reduced = level != std::array{0, 0, 0};
   if (built || !reduced || built.error().kind != ErrorKind::out_of_memory) return built;
   // Where volumes fit but not their levels beside them, every sample is drawn, as the frame tells.
-  return at_level(std::move(scene), {0, 0, 0}, view, **placed, dataset);
+  return at_level(std::move(scene), {0, 0, 0}, view, placed, dataset);
+}
+
+Result<Scene> build_scene(const View& completed, data::Dataset& dataset) {
+  // A complete one passes through and loads nothing.
+  const auto checked = complete_and_place(completed, dataset);
+  if (!checked) return checked.error();
+  return build_scene(*checked, dataset);
 }
 
 }  // namespace windsplat::scene

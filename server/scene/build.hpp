@@ -13,15 +13,30 @@
 
 namespace windsplat::scene {
 
+// A dataset's grid as placed (heights are its vertical axis) and where its samples stand.
+struct Placed {
+  data::Grid grid;
+  Lattice lattice;
+};
+
 // Every default of the view filled in for this dataset, nothing loaded but what ranges need.
 // Errors: invalid with a pointer (no such field, step, colour map; up parallel to the view; eye on
 // the target).
 Result<protocol::View> complete_view(const protocol::View& view, data::Dataset& dataset);
 
+// The same, and where the dataset's samples stand for it.
+struct Completed {
+  protocol::View view;
+  std::shared_ptr<const Placed> placed;
+};
+Result<Completed> complete_and_place(const protocol::View& view, data::Dataset& dataset);
+
 // The view a viewer starts with: complete_view of {"dataset": id}.
 Result<protocol::View> default_view(data::Dataset& dataset);
 
-// A completed view made ready for the engine. Loads only the fields that the view shows.
+// A completed view made ready for the engine. Loads only the fields that the view shows. A view by
+// itself is checked against the dataset once more.
+Result<Scene> build_scene(const Completed& completed, data::Dataset& dataset);
 Result<Scene> build_scene(const protocol::View& completed, data::Dataset& dataset);
 
 // The values of geometry.heightField.
@@ -37,12 +52,8 @@ struct Heights {
 Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryView& geometry,
                               const Heights* heights = nullptr);
 
-// The same for a dataset, and its grid as placed: heights are its vertical axis. Loads the height
-// field if there is one; a bent lattice is remembered by the dataset.
-struct Placed {
-  data::Grid grid;
-  Lattice lattice;
-};
+// The same for a dataset. Loads the height field if there is one; a bent lattice is remembered by
+// the dataset.
 Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView& geometry,
                                                     data::Dataset& dataset);
 

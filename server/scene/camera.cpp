@@ -5,7 +5,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
-#include <vector>
 
 #include "server/scene/build.hpp"
 
@@ -35,25 +34,25 @@ std::array<glm::dvec3, 8> corners(const Lattice& lattice) {
   return points;
 }
 
-// What must be in the picture: the box's corners, of a bent lattice samples all over it.
-std::vector<glm::dvec3> outline(const Lattice& lattice) {
+// Calls visit(point) with what must be in the picture: the box's corners, of a bent lattice samples
+// all over it.
+template <class Visit>
+void each_outline_point(const Lattice& lattice, const Visit& visit) {
   if (!lattice.places) {
-    const auto points = corners(lattice);
-    return {points.begin(), points.end()};
+    for (const glm::dvec3& corner : corners(lattice)) visit(corner);
+    return;
   }
   const auto& places = *lattice.places;
   const std::size_t layer =
       static_cast<std::size_t>(lattice.dims[0]) * static_cast<std::size_t>(lattice.dims[1]);
-  std::vector<glm::dvec3> points;
   // Bottom and top level alone: what lies between them is seldom farther out.
   for (const std::size_t first : {std::size_t{0}, places.size() - layer}) {
     const std::size_t step = std::max<std::size_t>(1, layer / outline_samples);
     for (std::size_t n = 0; n < layer; n += step) {
       const std::array<float, 3>& p = places[first + n];
-      points.emplace_back(p[0], p[1], p[2]);
+      visit(glm::dvec3(p[0], p[1], p[2]));
     }
   }
-  return points;
 }
 
 // Half a cell: how far beyond its samples a bent lattice reaches.
@@ -95,7 +94,7 @@ Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dv
   const double diagonal = glm::length(lattice.box_max - lattice.box_min);
   Framing framing{0, 0};
   const double reach = outline_reach(lattice);
-  for (const glm::dvec3& corner : outline(lattice)) {
+  each_outline_point(lattice, [&](const glm::dvec3& corner) {
     const glm::dvec3 p = corner - target;
     const double x = std::abs(glm::dot(p, frame.right)) + reach;
     const double y = std::abs(glm::dot(p, frame.up)) + reach;
@@ -104,7 +103,7 @@ Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dv
     const double needed = std::max({x / slope_x, y / slope_y, 0.01 * diagonal}) - depth;
     framing.distance = std::max(framing.distance, needed);
     framing.height = std::max({framing.height, 2.0 * margin * y, 2.0 * margin * x / aspect});
-  }
+  });
   framing.distance = std::min(framing.distance, distance_max);
   framing.height = std::min(framing.height, distance_max);
   return framing;
@@ -165,12 +164,12 @@ std::array<double, 2> view_depths(const Camera& camera, const Lattice& lattice) 
   double farthest = 0;
   bool first = true;
   const double reach = outline_reach(lattice);
-  for (const glm::dvec3& corner : outline(lattice)) {
+  each_outline_point(lattice, [&](const glm::dvec3& corner) {
     const double depth = glm::dot(corner - camera.eye, camera.forward);
     nearest = first ? depth - reach : std::min(nearest, depth - reach);
     farthest = first ? depth + reach : std::max(farthest, depth + reach);
     first = false;
-  }
+  });
   if (camera.perspective) nearest = std::max(nearest, camera.near);
   return {nearest, std::max(farthest, nearest + 1e-6)};
 }

@@ -18,13 +18,14 @@ struct Stops {
   const char* name;
   const char* kind;
   std::vector<std::uint32_t> codes;  // 0xrrggbb, evenly spaced
+  std::vector<Rgb> lab{};            // the same in OKLab
 };
 
 // viridis, magma, inferno, plasma (S. van der Walt, N. Smith) and cividis (Nunez, Anderton,
 // Renslow) are in the public domain (CC0), here by their values at every tenth or ninth. The others
 // are windsplat's own.
-const std::vector<Stops>& tables() {
-  static const std::vector<Stops> all = {
+std::vector<Stops> coded() {
+  return {
       {"viridis",
        "sequential",
        {0x440154, 0x482475, 0x414487, 0x355f8d, 0x2a788e, 0x21918c, 0x22a884, 0x44bf70, 0x7ad151,
@@ -59,7 +60,6 @@ const std::vector<Stops>& tables() {
       // North, east, south, west and north again.
       {"compass", "cyclic", {0x4a7fe8, 0xe0559f, 0xe3b23c, 0x35b07e, 0x4a7fe8}},
   };
-  return all;
 }
 
 double decode(double srgb) {
@@ -97,6 +97,19 @@ Rgb linear_from_oklab(const Rgb& lab) {
           -0.0041960863 * l3 - 0.7034186147 * m3 + 1.7076147010 * s3};
 }
 
+const std::vector<Stops>& tables() {
+  static const std::vector<Stops> all = [] {
+    std::vector<Stops> list = coded();
+    for (Stops& stops : list) {
+      for (const std::uint32_t code : stops.codes) {
+        stops.lab.push_back(oklab_from_linear(linear_from_code(code)));
+      }
+    }
+    return list;
+  }();
+  return all;
+}
+
 const Stops* find_stops(std::string_view name) {
   for (const Stops& stops : tables()) {
     if (name == stops.name) return &stops;
@@ -104,15 +117,14 @@ const Stops* find_stops(std::string_view name) {
   return nullptr;
 }
 
-std::vector<Rgb> interpolate(std::string_view name, int count) {
+// Linear entries of a known map, each as `as_entry` makes it.
+template <class Entry>
+auto interpolate(std::string_view name, int count, const Entry& as_entry) {
   const Stops* stops = find_stops(name);
   WINDSPLAT_CHECK(stops != nullptr && count >= 1);
-  std::vector<Rgb> lab;
-  lab.reserve(stops->codes.size());
-  for (const std::uint32_t code : stops->codes) {
-    lab.push_back(oklab_from_linear(linear_from_code(code)));
-  }
-  std::vector<Rgb> entries(static_cast<std::size_t>(count));
+  const std::vector<Rgb>& lab = stops->lab;
+  std::vector<decltype(as_entry(Rgb{}))> entries;
+  entries.reserve(static_cast<std::size_t>(count));
   for (int n = 0; n < count; ++n) {
     const double place =
         count == 1 ? 0.0
@@ -123,9 +135,9 @@ std::vector<Rgb> interpolate(std::string_view name, int count) {
     for (std::size_t a = 0; a < 3; ++a) {
       mixed[a] = lab[below][a] + t * (lab[below + 1][a] - lab[below][a]);
     }
-    Rgb& entry = entries[static_cast<std::size_t>(n)];
-    entry = linear_from_oklab(mixed);
-    for (double& channel : entry) channel = std::clamp(channel, 0.0, 1.0);
+    Rgb linear = linear_from_oklab(mixed);
+    for (double& channel : linear) channel = std::clamp(channel, 0.0, 1.0);
+    entries.push_back(as_entry(linear));
   }
   return entries;
 }
@@ -151,23 +163,19 @@ const std::vector<ColorMap>& color_maps() {
 bool has_color_map(std::string_view name) { return find_stops(name) != nullptr; }
 
 std::vector<std::array<float, 3>> color_map_linear(std::string_view name, int count) {
-  std::vector<std::array<float, 3>> out;
-  for (const Rgb& c : interpolate(name, count)) {
-    out.push_back({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])});
-  }
-  return out;
+  return interpolate(name, count, [](const Rgb& c) -> std::array<float, 3> {
+    return {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
+  });
 }
 
 std::vector<std::array<unsigned char, 3>> color_map_srgb(std::string_view name, int count) {
-  std::vector<std::array<unsigned char, 3>> out;
-  for (const Rgb& c : interpolate(name, count)) {
+  return interpolate(name, count, [](const Rgb& c) {
     std::array<unsigned char, 3> code{};
     for (std::size_t a = 0; a < 3; ++a) {
       code[a] = static_cast<unsigned char>(std::lround(255.0 * encode(c[a])));
     }
-    out.push_back(code);
-  }
-  return out;
+    return code;
+  });
 }
 
 std::optional<std::array<float, 3>> parse_color(std::string_view text) {

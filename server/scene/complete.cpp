@@ -211,7 +211,7 @@ Result<void> complete_scalars(View& view, const Lattice& lattice, const std::opt
 
 }  // namespace
 
-Result<View> complete_view(const View& view, data::Dataset& dataset) {
+Result<Completed> complete_and_place(const View& view, data::Dataset& dataset) {
   const data::DatasetInfo& info = dataset.info();
   View full = view;
   if (full.dataset.empty()) full.dataset = info.id;
@@ -225,7 +225,7 @@ Result<View> complete_view(const View& view, data::Dataset& dataset) {
     return invalid("/depthCue/near", "is not less than far");
   }
   if (auto ok = check_geometry(full.geometry, info); !ok) return ok.error();
-  const auto placed = place_dataset(full.geometry, dataset);
+  auto placed = place_dataset(full.geometry, dataset);
   if (!placed) return placed.error();
   const Lattice* const lattice = &(*placed)->lattice;
   const std::optional<Slice> slice = slice_of(full.geometry);
@@ -244,7 +244,13 @@ Result<View> complete_view(const View& view, data::Dataset& dataset) {
     vector.color.range = *range;
   }
   if (auto ok = complete_scalars(full, *lattice, slice, dataset); !ok) return ok.error();
-  return full;
+  return Completed{std::move(full), std::move(*placed)};
+}
+
+Result<View> complete_view(const View& view, data::Dataset& dataset) {
+  auto completed = complete_and_place(view, dataset);
+  if (!completed) return completed.error();
+  return std::move(completed->view);
 }
 
 Result<View> default_view(data::Dataset& dataset) {

@@ -12,23 +12,26 @@ namespace windsplat::scene {
 
 namespace {
 
-// First and past-the-end sample of every group of 2^halvings.
-std::vector<std::array<std::size_t, 2>> groups(std::size_t samples, int halvings) {
+// Calls visit(first, end) with the first and the past-the-end sample of every group of 2^halvings.
+template <class Visit>
+void each_group(std::size_t samples, int halvings, const Visit& visit) {
   const std::size_t size = std::size_t{1} << static_cast<unsigned>(halvings);
-  std::vector<std::array<std::size_t, 2>> out;
   for (std::size_t first = 0; first < samples; first += size) {
-    out.push_back({first, std::min(first + size, samples)});
+    visit(first, std::min(first + size, samples));
   }
-  return out;
+}
+
+double width_of(const std::vector<double>& spacing, std::size_t first, std::size_t end) {
+  double width = 0;
+  for (std::size_t i = first; i < end; ++i) width += spacing[i];
+  return width;
 }
 
 double widest_cell(const std::vector<double>& spacing, int halvings) {
   double widest = 0;
-  for (const auto& [first, end] : groups(spacing.size(), halvings)) {
-    double width = 0;
-    for (std::size_t i = first; i < end; ++i) width += spacing[i];
-    widest = std::max(widest, width);
-  }
+  each_group(spacing.size(), halvings, [&](std::size_t first, std::size_t end) {
+    widest = std::max(widest, width_of(spacing, first, end));
+  });
   return widest;
 }
 
@@ -66,31 +69,28 @@ data::Coarsening coarsening_of(const Lattice& lattice, const std::array<int, 3>&
 
 std::vector<double> coarsen_along(const std::vector<double>& values,
                                   const std::vector<double>& widths, int halvings) {
+  if (halvings == 0) return values;
   std::vector<double> out;
-  for (const auto& [first, end] : groups(values.size(), halvings)) {
+  out.reserve(values.size() / 2 + 1);
+  each_group(values.size(), halvings, [&](std::size_t first, std::size_t end) {
     double sum = 0;
-    double width = 0;
-    for (std::size_t i = first; i < end; ++i) {
-      sum += widths[i] * values[i];
-      width += widths[i];
-    }
-    out.push_back(end - first == 1 ? values[first] : sum / width);
-  }
+    for (std::size_t i = first; i < end; ++i) sum += widths[i] * values[i];
+    out.push_back(end - first == 1 ? values[first] : sum / width_of(widths, first, end));
+  });
   return out;
 }
 
 Lattice coarsen_lattice(const Lattice& lattice, const std::array<int, 3>& level) {
   Lattice out = lattice;
   for (std::size_t a = 0; a < 3; ++a) {
+    if (level[a] == 0) continue;
     const auto& spacing = lattice.spacing[a];
     out.positions[a] = coarsen_along(lattice.positions[a], spacing, level[a]);
     out.dims[a] = data::halved(lattice.dims[a], level[a]);
     out.spacing[a].clear();
-    for (const auto& [first, end] : groups(spacing.size(), level[a])) {
-      double width = 0;
-      for (std::size_t i = first; i < end; ++i) width += spacing[i];
-      out.spacing[a].push_back(width);
-    }
+    each_group(spacing.size(), level[a], [&](std::size_t first, std::size_t end) {
+      out.spacing[a].push_back(width_of(spacing, first, end));
+    });
   }
   return out;
 }

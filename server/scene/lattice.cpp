@@ -168,6 +168,8 @@ Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryV
     }
     const int index = static_cast<int>(a);
     lattice.dims[a] = static_cast<int>(axis.positions.size());
+    lattice.positions[a].reserve(axis.positions.size());
+    lattice.spacing[a].reserve(axis.positions.size());
     for (std::size_t i = 0; i < axis.positions.size(); ++i) {
       lattice.positions[a].push_back((axis.positions[i] - centre) * scale);
       lattice.spacing[a].push_back((axis.edges[i + 1] - axis.edges[i]) * scale);

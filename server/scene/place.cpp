@@ -1,8 +1,11 @@
 // A view's geometry and a dataset -> what is wrong with it, or where its samples stand.
+#include <any>
 #include <array>
+#include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 
-#include "protocol/codec.hpp"
 #include "server/scene/bend.hpp"
 #include "server/scene/build.hpp"
 
@@ -10,7 +13,13 @@ namespace windsplat::scene {
 
 namespace {
 
-using PlacedPtr = std::shared_ptr<const Placed>;
+// What a dataset keeps: a placement and what it follows from besides the dataset.
+struct Kept {
+  protocol::GeometryView geometry;  // without a slice, which moves nothing
+  std::shared_ptr<const Placed> placed;
+};
+using KeptPtr = std::shared_ptr<const Kept>;
+constexpr const char* kept_key = "placement";
 
 Error invalid(std::string pointer, std::string detail) {
   return make_error_at(ErrorKind::invalid, std::move(pointer), std::move(detail));
@@ -21,14 +30,6 @@ std::string quoted(const std::string& text) {
   out += printable(text);
   out += '"';
   return out;
-}
-
-// All that a placement follows from besides the dataset.
-std::string key_of(const protocol::GeometryView& geometry) {
-  protocol::View view;
-  view.geometry = geometry;
-  view.geometry.slice.reset();
-  return protocol::encode_view(view);
 }
 
 }  // namespace
@@ -77,10 +78,12 @@ Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView
   const data::DatasetInfo& info = dataset.info();
   const bool bent =
       geometry.mapping != protocol::GeometryMapping::flat || geometry.height_field.has_value();
-  const std::string key = bent ? key_of(geometry) : std::string();
+  protocol::GeometryView unsliced = geometry;
+  unsliced.slice.reset();
   if (bent) {
-    const std::any kept = dataset.kept(key);
-    if (const auto* placed = std::any_cast<PlacedPtr>(&kept)) return *placed;
+    const std::any any = dataset.kept(kept_key);
+    const auto* kept = std::any_cast<KeptPtr>(&any);
+    if (kept != nullptr && (*kept)->geometry == unsliced) return (*kept)->placed;
   }
   auto placed = std::make_shared<Placed>();
   placed->grid = info.grid;
@@ -99,8 +102,8 @@ Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView
   auto lattice = place_lattice(info.grid, geometry, heights ? &*heights : nullptr);
   if (!lattice) return lattice.error();
   placed->lattice = std::move(*lattice);
-  PlacedPtr out = std::move(placed);
-  if (bent) dataset.keep(key, out);
+  std::shared_ptr<const Placed> out = std::move(placed);
+  if (bent) dataset.keep(kept_key, KeptPtr(std::make_shared<Kept>(Kept{unsliced, out})));
   return out;
 }
 

@@ -90,8 +90,8 @@ void jitter(benchmark::State& state, const Table& table) {
 
 // A scene made ready up to its tiles.
 struct Ready {
-  Ready(const Workload& workload, const Table& table)
-      : scene(bench::scene_of(workload)), plan(engine::make_plan(scene)), pool(1) {
+  Ready(const Workload& workload, const Table& table) : scene(bench::scene_of(workload)), pool(1) {
+    engine::make_plan(scene, plan);
     bins = &engine::make_bins(plan, table, pool, CancelToken(), bin_space, work);
   }
   scene::Scene scene;

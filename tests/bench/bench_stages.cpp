@@ -58,6 +58,7 @@ constexpr std::array<const char*, 7> stages = {"view",         "scene",         
 struct Kept {
   frame::Workspace whole;
   engine::RenderSpace engine;
+  engine::RenderPlan plan;
   engine::BinSpace bins;
   engine::TileSpace tiles;
   image::YccPicture planes;
@@ -81,7 +82,8 @@ void staged_frame(const protocol::View& asked, const Workload& workload, ThreadP
   lap();
   const scene::Scene scene = value_or_give_up(scene::build_scene(view, dataset));
   lap();
-  const engine::RenderPlan plan = engine::make_plan(scene);
+  engine::make_plan(scene, kept.plan);
+  const engine::RenderPlan& plan = kept.plan;
   lap();
   const engine::Bins& bins = engine::make_bins(plan, table, pool, cancel, kept.bins, work);
   lap();

@@ -142,7 +142,8 @@ engine::Rendered render_with(const Table& table, const scene::Scene& scene) {
   ThreadPool pool(1);
   const CancelToken cancel;
   engine::Rendered out;
-  const engine::RenderPlan plan = engine::make_plan(scene);
+  engine::RenderPlan plan;
+  engine::make_plan(scene, plan);
   engine::BinSpace bin_space;
   engine::TileSpace tile_space;
   const engine::Bins& bins = engine::make_bins(plan, table, pool, cancel, bin_space, out.work);
@@ -190,7 +191,7 @@ TEST(Targets, VariantNamesTheOneInUse) {
   const auto table = engine::kernels::chosen_table();
   ASSERT_TRUE(table);
   const engine::Rendered rendered = render(busy_scene(8, 8, true));
-  EXPECT_NE(rendered.work.variant.find((*table)->name), std::string::npos);
+  EXPECT_NE(engine::text_of(rendered.work.variant).find((*table)->name), std::string::npos);
 }
 
 }  // namespace

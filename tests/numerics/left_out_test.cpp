@@ -34,8 +34,8 @@ Scene wind_and_cloud(Method method) {
   return scene;
 }
 
-bool names(const std::string& variant, const std::string& word) {
-  return variant.find(word) != std::string::npos;
+bool names(const engine::Variant& variant, const std::string& word) {
+  return engine::text_of(variant).find(word) != std::string::npos;
 }
 
 class EitherMethod : public testing::TestWithParam<Method> {};
@@ -46,7 +46,8 @@ TEST_P(EitherMethod, WithoutAScalarNothingOfAMediumIsPlannedOrComputed) {
   EXPECT_GT(both.exponentials, 0);
   EXPECT_TRUE(names(both.variant, "scalar"));
   scene.scalars.clear();
-  const engine::RenderPlan plan = engine::make_plan(scene);
+  engine::RenderPlan plan;
+  engine::make_plan(scene, plan);
   ASSERT_EQ(plan.passes.size(), 1U);
   EXPECT_EQ(plan.passes[0].kernel.has_medium, 0);
   EXPECT_EQ(plan.passes[0].kernel.medium.layers, 0);
@@ -62,7 +63,7 @@ TEST_P(EitherMethod, WithoutAScalarNothingOfAMediumIsPlannedOrComputed) {
     EXPECT_GT(work.pixel_updates, 0);
     EXPECT_LT(work.pixel_updates, both.pixel_updates);
     EXPECT_TRUE(names(work.variant, "vector"));
-    EXPECT_FALSE(names(work.variant, "scalar")) << work.variant;
+    EXPECT_FALSE(names(work.variant, "scalar")) << engine::text_of(work.variant);
   }
 }
 
@@ -70,7 +71,8 @@ TEST_P(EitherMethod, WithoutAVectorNothingOfALineIsPlannedOrComputed) {
   Scene scene = wind_and_cloud(GetParam());
   const engine::WorkReport both = render(scene).work;
   scene.vector.reset();
-  const engine::RenderPlan plan = engine::make_plan(scene);
+  engine::RenderPlan plan;
+  engine::make_plan(scene, plan);
   ASSERT_EQ(plan.passes.size(), 1U);
   EXPECT_EQ(plan.passes[0].kernel.has_lines, 0);
   for (const float* component : plan.passes[0].kernel.line.velocity) EXPECT_EQ(component, nullptr);
@@ -79,7 +81,7 @@ TEST_P(EitherMethod, WithoutAVectorNothingOfALineIsPlannedOrComputed) {
   const engine::WorkReport work = render(scene).work;
   EXPECT_EQ(work.skipped_vector, 0);
   EXPECT_LE(work.pixel_updates, both.pixel_updates);
-  EXPECT_FALSE(names(work.variant, "vector")) << work.variant;
+  EXPECT_FALSE(names(work.variant, "vector")) << engine::text_of(work.variant);
   // One exponential an update and no more: those inside lines are gone.
   EXPECT_GT(work.exponentials, 0);
   EXPECT_LT(work.exponentials, both.exponentials);
@@ -224,7 +226,8 @@ TEST(LeftOut, WeakLinesAndThinMediaChangeThePictureByNoMoreThanTheirBound) {
     EXPECT_EQ(full.work.skipped_bound, 0) << "nothing is left out: " << seed;
     const Change change = between(less.image, full.image);
     const double bound = less.work.skipped_bound;
-    EXPECT_LE(change.mean, bound + float_noise) << "seed " << seed << ' ' << less.work.variant;
+    EXPECT_LE(change.mean, bound + float_noise)
+        << "seed " << seed << ' ' << engine::text_of(less.work.variant);
     if (change.mean > 1e-4) ++changed;
     if (change.mean > 1e-4 && change.mean > 0.1 * bound) ++tight;
   }

@@ -36,6 +36,20 @@ Scene plain_scene() {
   return scene;
 }
 
+// Leaning eastward with height.
+void lean(scene::Lattice& lattice, double slope) {
+  auto places = std::make_shared<std::vector<std::array<float, 3>>>();
+  for (const double z : lattice.positions[2]) {
+    for (const double y : lattice.positions[1]) {
+      for (const double x : lattice.positions[0]) {
+        places->push_back(
+            {static_cast<float>(x + slope * z), static_cast<float>(y), static_cast<float>(z)});
+      }
+    }
+  }
+  lattice.places = places;
+}
+
 class Reuse : public testing::Test {
  protected:
   // Draws with what earlier frames left, and by itself.
@@ -53,6 +67,21 @@ class Reuse : public testing::Test {
     EXPECT_EQ(work->skipped_bound, alone.work.skipped_bound) << what;
     EXPECT_EQ(work->pixel_updates, alone.work.pixel_updates) << what;
     EXPECT_EQ(work->tiles, alone.work.tiles) << what;
+    EXPECT_EQ(text_of(work->variant), text_of(alone.work.variant)) << what;
+  }
+
+  using Change = std::pair<std::string, std::function<void(Scene&)>>;
+
+  // A plain scene before each, so that what a change brought has to go again.
+  void expect_to_show(const std::vector<Change>& changes) {
+    const Scene first = plain_scene();
+    for (const auto& [what, change] : changes) {
+      expect_same(first, "before " + what);
+      Scene changed = first;
+      change(changed);
+      expect_same(changed, what);
+      expect_same(changed, what + " again");
+    }
   }
 
   ThreadPool pool_{2};
@@ -61,8 +90,7 @@ class Reuse : public testing::Test {
 };
 
 TEST_F(Reuse, EveryChangeOfASceneShowsAtOnce) {
-  using Change = std::pair<std::string, std::function<void(Scene&)>>;
-  const std::vector<Change> changes = {
+  expect_to_show({
       {"the same", [](Scene&) {}},
       {"camera",
        [](Scene& s) {
@@ -121,15 +149,51 @@ TEST_F(Reuse, EveryChangeOfASceneShowsAtOnce) {
            return wave(c + 1, x, y, z);
          });
        }},
-  };
-  const Scene first = plain_scene();
-  for (const auto& [what, change] : changes) {
-    expect_same(first, "before " + what);
-    Scene changed = first;
-    change(changed);
-    expect_same(changed, what);
-    expect_same(changed, what + " again");
-  }
+  });
+}
+
+// What a plan of another kind says must not stay.
+TEST_F(Reuse, EveryOtherKindOfSceneShowsAtOnce) {
+  expect_to_show({
+      {"nothing",
+       [](Scene& s) {
+         s.vector.reset();
+         s.scalars.clear();
+       }},
+      {"bent", [](Scene& s) { lean(s.lattice, 0.2); }},
+      {"bent slabs",
+       [](Scene& s) {
+         lean(s.lattice, 3);
+         s.method = scene::Method::slab;
+       }},
+      {"orthographic",
+       [](Scene& s) {
+         s.camera = look({0, 0, 0}, {0.3, 1, -0.5}, 3, 90, 70, false, 1);
+       }},
+      {"one more medium, of another stride and table",
+       [](Scene& s) {
+         s.scalars.push_back(s.scalars[0]);
+         s.scalars[1].stride = 2;
+         s.scalars[1].color = ramp_color(0, 2, {1, 0.4F, 0.1F}, {0.2F, 0.5F, 1});
+       }},
+      {"one more medium, of more steps",
+       [](Scene& s) {
+         s.scalars.push_back(s.scalars[0]);
+         s.scalars[1].extinction = {{0, 0}, {0.5, 1}, {1, 0}, {2, 4}};
+       }},
+      {"horizontal lines", [](Scene& s) { s.vector->field = make_volume(s.lattice, 2, wave); }},
+      {"lines coloured by a field",
+       [](Scene& s) {
+         s.vector->color_by = scene::LineColor::scalar;
+         s.vector->color_field = s.scalars[0].field;
+         s.vector->color = ramp_color(-1, 1, {1, 0.4F, 0.1F}, {0.2F, 0.5F, 1});
+       }},
+      {"moving lines",
+       [](Scene& s) {
+         s.vector->moving = true;
+         s.vector->motion_cycles = 0.3;
+       }},
+  });
 }
 
 // A step that replaces another often takes its very place in memory.
