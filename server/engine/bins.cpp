@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "server/engine/flush_denormals.hpp"
+#include "server/engine/projector.hpp"
 
 namespace windsplat::engine {
 
@@ -15,18 +16,6 @@ namespace {
 
 using kernels::Brick;
 using kernels::Pass;
-
-// A rectangle of the picture in pixels; empty when first > last.
-struct Rectangle {
-  double x0 = 0, x1 = -1, y0 = 0, y1 = -1;
-  [[nodiscard]] bool empty() const { return x0 > x1 || y0 > y1; }
-};
-
-// A brick's stops as a box of the world.
-struct Box {
-  std::array<double, 3> low{};
-  std::array<double, 3> high{};
-};
 
 // The first stop of the brick that holds a stop.
 int brick_start(int stop) { return stop / kernels::brick_side * kernels::brick_side; }
@@ -84,90 +73,6 @@ std::array<double, 3> kernel_reach(const Pass& pass, double line_reach, bool spl
   }
   return reach;
 }
-
-// One axis of the screen: which part of [0, size] pixels a box may cover, widened by margin. Corner
-// coordinates are (across, forward); with any corner behind `near` the planes through the eye and
-// the screen's two edges decide.
-struct Span {
-  double low = 0, high = -1;
-  bool behind = false;
-};
-
-struct Corners {
-  std::array<std::array<double, 3>, 8> at;  // right, down, forward
-};
-
-Span screen_span(const Corners& corners, int across, const kernels::Camera& camera, double half,
-                 double margin) {
-  const double scale = 1.0 / static_cast<double>(camera.pixel);
-  const bool perspective = camera.perspective != 0;
-  bool behind = false;
-  double low = 1e300;
-  double high = -1e300;
-  for (const auto& corner : corners.at) {
-    behind = behind || (perspective && corner[2] < camera.near);
-    const double z = perspective ? std::max<double>(corner[2], camera.near) : 1.0;
-    low = std::min(low, corner[across] / z);
-    high = std::max(high, corner[across] / z);
-  }
-  if (!behind) return {half + low * scale - margin, half + high * scale + margin, false};
-  // Outside one edge's plane with every corner: not seen at all; otherwise possibly everywhere.
-  const double edge = (half + margin) * camera.pixel;
-  bool left = true;
-  bool right = true;
-  for (const auto& corner : corners.at) {
-    left = left && corner[across] < -edge * corner[2];
-    right = right && corner[across] > edge * corner[2];
-  }
-  if (left || right) return {};
-  return {-margin, 2 * half + margin, true};
-}
-
-// Where kernels may be seen, and how far from the eye.
-struct Projected {
-  Rectangle seen;
-  double depth_first = 0, depth_last = 0;  // view depths of the kernels' reach
-  bool whole = false;                      // no part of it lies outside the picture
-};
-
-class Projector {
- public:
-  explicit Projector(const RenderPlan& plan) : camera_(plan.camera), view_(*plan.view) {}
-
-  Projected operator()(const PassPlan& plan, const Box& box,
-                       const std::array<double, 3>& reach) const {
-    Corners corners;
-    double nearest = 1e300;
-    double farthest = -1e300;
-    for (unsigned c = 0; c < 8; ++c) {
-      std::array<double, 3> sum{};
-      for (int a = 0; a < 3; ++a) {
-        const bool top = ((c >> static_cast<unsigned>(a)) & 1U) != 0;
-        const double at = (top ? box.high[a] + reach[a] : box.low[a] - reach[a]) - view_.eye[a];
-        sum[0] += at * view_.right[a];
-        sum[1] -= at * view_.up[a];
-        sum[2] += at * view_.forward[a];
-      }
-      corners.at[c] = sum;
-      nearest = std::min(nearest, sum[2]);
-      farthest = std::max(farthest, sum[2]);
-    }
-    if (camera_.perspective != 0 && farthest < camera_.near) return {};
-    const double margin = 1.0 + (plan.kernel.has_lines != 0 ? plan.kernel.line.r2 : 0.0);
-    const Span x = screen_span(corners, 0, camera_, camera_.half_width_px, margin);
-    const Span y = screen_span(corners, 1, camera_, camera_.half_height_px, margin);
-    if (x.low > x.high || y.low > y.high) return {};
-    const Rectangle r{std::max(x.low, 0.0), std::min<double>(x.high, camera_.width),
-                      std::max(y.low, 0.0), std::min<double>(y.high, camera_.height)};
-    const bool whole = !x.behind && !y.behind && x.low >= 0 && x.high <= camera_.width &&
-                       y.low >= 0 && y.high <= camera_.height;
-    return {r, nearest, farthest, whole};
-  }
-
- private:
-  const kernels::Camera& camera_;
-  const scene::Camera& view_;
-};
 
 // Pixels a world unit at a view depth, or the nearest that is drawn.
 double scale_at(const kernels::Camera& camera, double depth) {
@@ -269,7 +174,8 @@ class Binner {
   void begin_pass(const PassPlan& pass, PassBins& to);
   void order_slabs();
   void add_brick(const PassPlan& pass, PassBins& shared, const Brick& brick, SlabBricks& out);
-  KeptSummary& summary_of(const PassPlan& pass, PassBins& shared, const Brick& brick);
+  void read_summary(const PassPlan& pass, const PassBins& shared, const Brick& brick,
+                    KeptSummary& kept);
   [[nodiscard]] std::size_t rows_of(std::size_t p) const {
     if (plan_.passes[p].kernel.places != nullptr) return 0;
     const PassSummaries& kept = *space_.passes[p].kept;
@@ -353,17 +259,37 @@ void Binner::look_at_row(std::size_t row, BrickCounts& counts) {
   }
 }
 
-// Read in the lattice's own order, so that sums do not depend on where the first reader stood.
-KeptSummary& Binner::summary_of(const PassPlan& pass, PassBins& shared, const Brick& brick) {
+// A brick as it stands in the lattice.
+Brick in_lattice(const PassPlan& pass, const Brick& brick) {
   const Pass& kernel = pass.kernel;
   Brick own = brick;
   own.slab = pass.axis[kernel.major].visit[brick.slab];
   own.u_first = brick_start(pass.axis[kernel.u].visit[brick.u_first]);
   own.v_first = brick_start(pass.axis[kernel.v].visit[brick.v_first]);
-  KeptSummary& kept = shared.kept->bricks[shared.kept->brick(
-      own.slab, own.v_first / kernels::brick_side, own.u_first / kernels::brick_side)];
-  if (!kept.known()) kept = summarise(table_, shared.pass, own);
-  return kept;
+  return own;
+}
+
+KeptSummary& summary_at(const PassPlan& pass, PassBins& shared, const Brick& brick) {
+  const Brick own = in_lattice(pass, brick);
+  return shared.kept->bricks[shared.kept->brick(own.slab, own.v_first / kernels::brick_side,
+                                                own.u_first / kernels::brick_side)];
+}
+
+// Half the longest line of a brick, world units; negative if it has none.
+double line_reach(const Pass& pass, const PassBins& shared, const KeptSummary& kept) {
+  if (kept.lines == 0) return -1;
+  const double part = std::min(1.0F, kept.magnitude_max * pass.line.inverse_full_magnitude);
+  return shared.longest * part * 1.00001;
+}
+
+std::array<double, 3> reach_of(const Pass& pass, const PassBins& shared, const KeptSummary& kept) {
+  return kernel_reach(pass, line_reach(pass, shared, kept), kept.splats > 0);
+}
+
+// Read in the lattice's own order, so that sums do not depend on where the first reader stood.
+void Binner::read_summary(const PassPlan& pass, const PassBins& shared, const Brick& brick,
+                          KeptSummary& kept) {
+  kept = summarise(table_, shared.pass, in_lattice(pass, brick));
 }
 
 void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from, SlabBricks& out) {
@@ -371,33 +297,39 @@ void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from
   const std::int64_t stops = static_cast<std::int64_t>(brick.u_count) * brick.v_count;
   const Box box = stops_box(pass, brick);
   out.counts.samples += stops;
-  // First by the longest line that the style allows: what is outside is not even read.
-  const Projected most = project_(pass, box, shared.reach);
-  if (most.seen.empty()) {
-    out.counts.culled += stops;
-    return;
+  // First by the longest line that the style allows: what is outside is not even read. A brick that
+  // is known is in sight if what it holds is.
+  KeptSummary& kept = summary_at(pass, shared, brick);
+  const bool known = kept.known() && !kept.left_out_any() && kept.holds_any();
+  Projected found;
+  if (known) found = project_(pass, box, reach_of(pass.kernel, shared, kept));
+  if (!known || found.seen.empty()) {
+    const Projected most = project_(pass, box, shared.reach);
+    if (most.seen.empty()) {
+      out.counts.culled += stops;
+      return;
+    }
+    if (!kept.known()) read_summary(pass, shared, brick, kept);
+    if (kept.left_out_any()) {
+      const double scale = scale_at(plan_.camera, most.depth_first);
+      const double cover = kept.thin_medium > 0 ? splat_cover(pass.kernel, brick, scale) : 0;
+      out.counts.left_out += left_out(plan_, pass, kept, cover, scale);
+    }
+    if (!known && kept.holds_any())
+      found = project_(pass, box, reach_of(pass.kernel, shared, kept));
   }
-  const KeptSummary& summary = summary_of(pass, shared, brick);
-  if (pass.kernel.has_lines != 0) out.counts.without_line += stops - summary.lines;
-  if (pass.kernel.has_medium != 0) out.counts.without_splat += stops - summary.splats;
-  out.counts.without_both += summary.without_both;
-  if (summary.weak_lines > 0 || summary.thin_medium > 0) {
-    const double scale = scale_at(plan_.camera, most.depth_first);
-    const double cover = summary.thin_medium > 0 ? splat_cover(pass.kernel, brick, scale) : 0;
-    out.counts.left_out += left_out(plan_, pass, summary, cover, scale);
-  }
-  if (summary.lines == 0 && summary.splats == 0) return;
-  const double part =
-      std::min(1.0F, summary.magnitude_max * pass.kernel.line.inverse_full_magnitude);
-  const double reach = summary.lines > 0 ? shared.longest * part * 1.00001 : -1;
-  brick.line_reach = static_cast<float>(std::max(reach, 0.0));
-  const Projected found = project_(pass, box, kernel_reach(pass.kernel, reach, summary.splats > 0));
-  if (found.seen.empty()) return;
+  if (pass.kernel.has_lines != 0) out.counts.without_line += stops - kept.lines;
+  if (pass.kernel.has_medium != 0) out.counts.without_splat += stops - kept.splats;
+  out.counts.without_both += kept.without_both;
+  if (!kept.holds_any() || found.seen.empty()) return;
+  brick.lines = kept.lines;
+  brick.splats = kept.splats;
+  brick.line_reach = static_cast<float>(std::max(line_reach(pass.kernel, shared, kept), 0.0));
   set_blocks(found.seen, plan_.camera, brick);
   brick.depth_first = static_cast<float>(found.depth_first - plan_.camera.depth_origin);
   brick.depth_last = static_cast<float>(found.depth_last - plan_.camera.depth_origin);
   out.bricks.push_back(brick);
-  out.kernels.push_back(summary.lines + summary.splats);
+  out.kernels.push_back(kept.lines + kept.splats);
 }
 
 void Binner::add_slab(const SlabKey& key, SlabBricks& out) {

@@ -23,10 +23,11 @@ struct KeptSummary {
 
   static constexpr std::uint8_t unknown = 255;
   [[nodiscard]] bool known() const { return weak_lines != unknown; }
+  [[nodiscard]] bool holds_any() const { return lines > 0 || splats > 0; }
+  // Something that a tolerance has to answer for.
+  [[nodiscard]] bool left_out_any() const { return weak_lines > 0 || thin_medium > 0; }
   // Whether it neither draws nor leaves out anything that a tolerance would have to answer for.
-  [[nodiscard]] bool blank() const {
-    return known() && lines == 0 && splats == 0 && weak_lines == 0 && thin_medium <= 0;
-  }
+  [[nodiscard]] bool blank() const { return known() && !holds_any() && !left_out_any(); }
 };
 
 // The summaries of one pass, by the places of bricks in the lattice, whatever the order of visit.

@@ -362,12 +362,12 @@ void prefetch_brick(const Pass& pass, const Brick& brick) {
   const std::int64_t first = slab + pass.step[pass.u] * u.sample[lowest(u.visit + brick.u_first)];
   for (int j = 0; j < brick.v_count; ++j) {
     const std::int64_t at = first + pass.step[pass.v] * v.sample[v.visit[brick.v_first + j]];
-    if (pass.has_lines != 0) {
+    if (brick.lines != 0) {
       for (const float* values : pass.line.velocity) {
         if (values != nullptr) prefetch_row(values + at, brick.u_count);
       }
     }
-    for (int k = 0; k < pass.medium.layers; ++k) {
+    for (int k = 0; brick.splats != 0 && k < pass.medium.layers; ++k) {
       prefetch_row(pass.medium.layer[k].values + at, brick.u_count);
     }
   }

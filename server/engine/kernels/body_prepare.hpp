@@ -187,9 +187,9 @@ void prepare_on(const Camera& camera, const Pass& pass, const Brick& brick, Tile
 template <bool Perspective>
 void prepare_projected(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
                        Prepared& out) {
-  if (pass.has_lines != 0 && pass.has_medium != 0) {
+  if (brick.lines != 0 && brick.splats != 0) {
     prepare_on<true, true, Perspective>(camera, pass, brick, tile, out);
-  } else if (pass.has_lines != 0) {
+  } else if (brick.lines != 0) {
     prepare_on<true, false, Perspective>(camera, pass, brick, tile, out);
   } else {
     prepare_on<false, true, Perspective>(camera, pass, brick, tile, out);

@@ -222,8 +222,8 @@ void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, con
     }
     const float line = smaller(brick.line_reach, box) + shift;
     if (pass.places != nullptr) square *= 3.0F;
-    const float splat = pass.has_medium != 0 ? footprint_t * square_root(square) : 0.0F;
-    reach[c] = larger(pass.has_lines != 0 ? line : 0.0F, splat) * 1.00001F;
+    const float splat = brick.splats != 0 ? footprint_t * square_root(square) : 0.0F;
+    reach[c] = larger(brick.lines != 0 ? line : 0.0F, splat) * 1.00001F;
   }
 }
 

@@ -66,22 +66,39 @@ struct Oval {
   Stop half_chord2, narrowing, lean, half_width, shear;
 };
 
+// xx dx^2 + xy dx dy + yy dy^2, and det = xx yy - xy^2 / 4, told apart so that it never cancels.
+struct Form {
+  Stop xx, xy, yy, det;
+};
+
+// |dx a + dy b|^2 scale.
+KERNEL_INLINE Form form_of(const Three<Stop>& a, const Three<Stop>& b, Stop scale) {
+  const Three<Stop> normal = cross3(a, b);
+  return {dot3(a, a) * scale, all<Stop>(2.0F) * dot3(a, b) * scale, dot3(b, b) * scale,
+          dot3(normal, normal) * scale * scale};
+}
+
+KERNEL_INLINE void store_form(const Form& form, int l, Splats& s) {
+  store(form.xx, s.xx + l);
+  store(form.xy, s.xy + l);
+  store(form.yy, s.yy + l);
+}
+
 // t^2, and room for rounding.
 constexpr float oval_limit = 1.002F * footprint_t * footprint_t;
 
-// xx dx^2 + xy dx dy + yy dy^2 <= limit; det = xx yy - xy^2 / 4, told apart so that it never
-// cancels.
-KERNEL_INLINE Oval oval_of(Stop xx, Stop xy, Stop yy, Stop det, Stop limit) {
+// Where the form is at most `limit`.
+KERNEL_INLINE Oval oval_of(const Form& form, Stop limit) {
   Oval o;
   const Stop least = all<Stop>(1e-36F);
-  const Stop inverse = inverse_of(hn::Max(xx, least));
-  const Stop half = all<Stop>(-0.5F) * xy;
+  const Stop inverse = inverse_of(hn::Max(form.xx, least));
+  const Stop half = all<Stop>(-0.5F) * form.xy;
   o.half_chord2 = limit * inverse;
-  o.narrowing = det * inverse * inverse;
+  o.narrowing = form.det * inverse * inverse;
   o.lean = half * inverse;
-  o.half_width = hn::Sqrt(yy * limit * inverse_of(hn::Max(det, least)));
-  o.shear = half * inverse_of(hn::Max(yy, least));
-  o.known = hn::And(hn::Gt(hn::Min(xx, yy), least), hn::Gt(det, least));
+  o.half_width = hn::Sqrt(form.yy * limit * inverse_of(hn::Max(form.det, least)));
+  o.shear = half * inverse_of(hn::Max(form.yy, least));
+  o.known = hn::And(hn::Gt(hn::Min(form.xx, form.yy), least), hn::Gt(form.det, least));
   return o;
 }
 
@@ -91,31 +108,67 @@ struct Outline {
   Oval oval;
 };
 
+// |d|^2 about a point of the picture, see Splats.
+struct RaySquares {
+  Stop d0, dx, dy, dxx, dxy, dyy, least;
+
+  // At most so far from the point.
+  KERNEL_INLINE Stop most(Stop w, Stop h) const {
+    const Stop bent = hn::MulAdd(dxx, w * w, hn::MulAdd(hn::Abs(dxy), w * h, dyy * h * h));
+    return hn::Max(d0 + hn::MulAdd(hn::Abs(dx), w, hn::MulAdd(hn::Abs(dy), h, bent)), least);
+  }
+};
+
+KERNEL_INLINE void store_squares(const RaySquares& r, int l, Splats& s) {
+  store(r.d0, s.d0 + l);
+  store(r.dx, s.dx + l);
+  store(r.dy, s.dy + l);
+  store(r.dxx, s.dxx + l);
+  store(r.dxy, s.dxy + l);
+  store(r.dyy, s.dyy + l);
+  store(r.least, s.d2_least + l);
+}
+
+// The outline of splats whose projected centres are (px, py). The ellipse is where the form is at
+// most t^2 times the largest |d|^2 of the box.
+KERNEL_INLINE Outline perspective_outline(const Camera& camera, const Stops& stops, int l,
+                                          const Facing& f, const Form& form, const RaySquares& rays,
+                                          Stop px, Stop py, MaskOf<Stop> inside) {
+  const Stop z = load<Stop>(stops.z + l);
+  const auto span = [&](const float* at, Stop s11, Stop s13, float half) {
+    const Extent e = silhouette(load<Stop>(at + l), z, s11, s13, f.s33);
+    const Stop scale = all<Stop>(camera.inverse_pixel);
+    return Extent{hn::MulAdd(e.low, scale, all<Stop>(half)),
+                  hn::MulAdd(e.high, scale, all<Stop>(half))};
+  };
+  const Extent across = span(stops.x, f.s11, f.s13, camera.half_width_px);
+  const Extent along = span(stops.y, f.s22, f.s23, camera.half_height_px);
+  const Stop w = hn::Max(px - across.low, across.high - px);
+  const Stop h = hn::Max(py - along.low, along.high - py);
+  Oval oval = oval_of(form, all<Stop>(oval_limit) * rays.most(w, h));
+  oval.x = px;
+  oval.y = py;
+  const auto bounded = hn::Lt(hn::Max(w, h), all<Stop>(1e4F));
+  oval.known = hn::And(oval.known, hn::And(inside, bounded));
+  return {across, along, oval};
+}
+
 template <bool Curved>
 KERNEL_INLINE Outline perspective_splats(const Camera& camera, const Stops& stops,
                                          const CellLanes<Curved>& cells, int l, Stop rho,
                                          Splats& s) {
   const Facing f = face<Curved>(camera, cells);
-  const Stop x = load<Stop>(stops.x + l);
-  const Stop y = load<Stop>(stops.y + l);
   const Stop z = load<Stop>(stops.z + l);
   const Stop two = all<Stop>(2.0F);
   const Three<Stop> o = cells.to_grid(cells.from_eye);
-  const Three<Stop> ox = cross3(o, f.right);
-  const Three<Stop> oy = cross3(o, f.down);
-  const Stop xx = dot3(ox, ox);
-  const Stop xy = two * dot3(ox, oy);
-  const Stop yy = dot3(oy, oy);
-  store(xx, s.xx + l);
-  store(xy, s.xy + l);
-  store(yy, s.yy + l);
+  const Form form = form_of(cross3(o, f.right), cross3(o, f.down), all<Stop>(1.0F));
+  store_form(form, l, s);
   const Stop half_width = all<Stop>(camera.half_width_px);
   const Stop half_height = all<Stop>(camera.half_height_px);
   const Stop inverse_z = inverse_of(z);
-  const Stop per_pixel = all<Stop>(camera.inverse_pixel);
-  const Stop scale = per_pixel * inverse_z;
-  const Stop px = hn::MulAdd(x, scale, half_width);
-  const Stop py = hn::MulAdd(y, scale, half_height);
+  const Stop scale = all<Stop>(camera.inverse_pixel) * inverse_z;
+  const Stop px = hn::MulAdd(load<Stop>(stops.x + l), scale, half_width);
+  const Stop py = hn::MulAdd(load<Stop>(stops.y + l), scale, half_height);
   // The nearest point of the picture; its ray, forward component 1, in cells.
   const Stop ex = clamped(px, hn::Zero(StopTag()), two * half_width);
   const Stop ey = clamped(py, hn::Zero(StopTag()), two * half_height);
@@ -130,49 +183,24 @@ KERNEL_INLINE Outline perspective_splats(const Camera& camera, const Stops& stop
   const Three<Stop> d = {ray(o.x, forward.x, f.right.x, f.down.x),
                          ray(o.y, forward.y, f.right.y, f.down.y),
                          ray(o.z, forward.z, f.right.z, f.down.z)};
-  const Stop d0 = dot3(d, d);
-  const Stop dx = two * dot3(d, f.right);
-  const Stop dy = two * dot3(d, f.down);
+  const RaySquares rays = {dot3(d, d),
+                           two * dot3(d, f.right),
+                           two * dot3(d, f.down),
+                           dot3(f.right, f.right),
+                           two * dot3(f.right, f.down),
+                           dot3(f.down, f.down),
+                           inverse_of(cells.edges2())};
+  store_squares(rays, l, s);
   store(px, s.x + l);
   store(py, s.y + l);
   store(ex, s.ex + l);
   store(ey, s.ey + l);
-  store(d0, s.d0 + l);
-  store(dx, s.dx + l);
-  store(dy, s.dy + l);
-  const Stop dxx = dot3(f.right, f.right);
-  const Stop dxy = two * dot3(f.right, f.down);
-  const Stop dyy = dot3(f.down, f.down);
-  const Stop d2_least = inverse_of(cells.edges2());
-  store(dxx, s.dxx + l);
-  store(dxy, s.dxy + l);
-  store(dyy, s.dyy + l);
-  store(hn::IfThenElse(inside, hn::Zero(StopTag()), dot3(o, d) - z * d0), s.b0 + l);
-  store(dot3(o, f.right) - z * dx, s.bx + l);
-  store(dot3(o, f.down) - z * dy, s.by + l);
-  store(d2_least, s.d2_least + l);
+  store(hn::IfThenElse(inside, hn::Zero(StopTag()), dot3(o, d) - z * rays.d0), s.b0 + l);
+  store(dot3(o, f.right) - z * rays.dx, s.bx + l);
+  store(dot3(o, f.down) - z * rays.dy, s.by + l);
   store(hn::Sqrt(f.s33), s.half_depth + l);
   store(rho * all<Stop>(1.0F / footprint_integral), s.strength + l);
-  const Extent across = silhouette(x, z, f.s11, f.s13, f.s33);
-  const Extent along = silhouette(y, z, f.s22, f.s23, f.s33);
-  Outline out = {{hn::MulAdd(across.low, per_pixel, half_width),
-                  hn::MulAdd(across.high, per_pixel, half_width)},
-                 {hn::MulAdd(along.low, per_pixel, half_height),
-                  hn::MulAdd(along.high, per_pixel, half_height)},
-                 {}};
-  // |d|^2 within the box is no more than this.
-  const Stop w = hn::Max(px - out.x.low, out.x.high - px);
-  const Stop h = hn::Max(py - out.y.low, out.y.high - py);
-  const Stop bent = hn::MulAdd(dxx, w * w, hn::MulAdd(hn::Abs(dxy), w * h, dyy * h * h));
-  const Stop most =
-      hn::Max(d0 + hn::MulAdd(hn::Abs(dx), w, hn::MulAdd(hn::Abs(dy), h, bent)), d2_least);
-  const Three<Stop> normal = cross3(ox, oy);
-  out.oval = oval_of(xx, xy, yy, dot3(normal, normal), all<Stop>(oval_limit) * most);
-  out.oval.x = px;
-  out.oval.y = py;
-  const auto bounded = hn::Lt(hn::Max(w, h), all<Stop>(1e4F));
-  out.oval.known = hn::And(out.oval.known, hn::And(inside, bounded));
-  return out;
+  return perspective_outline(camera, stops, l, f, form, rays, px, py, inside);
 }
 
 template <bool Curved>
@@ -183,14 +211,8 @@ KERNEL_INLINE Outline orthographic_splats(const Camera& camera, const Stops& sto
   const Three<Stop> forward = cells.to_grid(camera.forward);
   const Stop length2 = dot3(forward, forward);
   const Stop inverse2 = inverse_of(length2);
-  const Three<Stop> ox = cross3(f.right, forward);
-  const Three<Stop> oy = cross3(f.down, forward);
-  const Stop xx = dot3(ox, ox) * inverse2;
-  const Stop xy = all<Stop>(2.0F) * dot3(ox, oy) * inverse2;
-  const Stop yy = dot3(oy, oy) * inverse2;
-  store(xx, s.xx + l);
-  store(xy, s.xy + l);
-  store(yy, s.yy + l);
+  const Form form = form_of(cross3(f.right, forward), cross3(f.down, forward), inverse2);
+  store_form(form, l, s);
   store(length2, s.d0 + l);
   store(hn::Neg(dot3(f.right, forward)) * inverse2, s.bx + l);
   store(hn::Neg(dot3(f.down, forward)) * inverse2, s.by + l);
@@ -203,12 +225,10 @@ KERNEL_INLINE Outline orthographic_splats(const Camera& camera, const Stops& sto
   store(y, s.y + l);
   const Stop wide = hn::Sqrt(f.s11) * scale;
   const Stop tall = hn::Sqrt(f.s22) * scale;
-  const Three<Stop> normal = cross3(ox, oy);
-  Outline out = {{x - wide, x + wide}, {y - tall, y + tall}, {}};
-  out.oval = oval_of(xx, xy, yy, dot3(normal, normal) * inverse2 * inverse2, all<Stop>(oval_limit));
-  out.oval.x = x;
-  out.oval.y = y;
-  return out;
+  Oval oval = oval_of(form, all<Stop>(oval_limit));
+  oval.x = x;
+  oval.y = y;
+  return {{x - wide, x + wide}, {y - tall, y + tall}, oval};
 }
 
 // A row's splats from lane i on, made ready.

@@ -132,6 +132,7 @@ struct Brick {
   std::int32_t u_first, u_count;
   std::int32_t v_first, v_count;
   std::int32_t pass;
+  std::int32_t lines, splats;     // stops that have one; of neither kind more than the pass has
   float line_reach;               // half the longest line here, world units
   float depth_first, depth_last;  // of its kernels from the camera's depth origin, world units
   std::int16_t block_x, block_y;  // blocks of the picture that it may touch, both ends included
