@@ -129,11 +129,15 @@ KERNEL_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyl
   const Stop scale = all<Stop>(camera.inverse_pixel);
   const Stop k0 = Perspective ? scale / z0 : scale;
   const Stop inverse_z1 = Perspective ? inverse_of(z1) : one;
-  const Stop k1 = Perspective ? scale * inverse_z1 : scale;
-  const Stop x0 = hn::MulAdd(s.low, vx, px) * k0;
-  const Stop y0 = hn::MulAdd(s.low, vy, py) * k0;
-  const Stop ux = hn::MulSub(hn::MulAdd(s.high, vx, px), k1, x0);
-  const Stop uy = hn::MulSub(hn::MulAdd(s.high, vy, py), k1, y0);
+  const Stop ax = hn::MulAdd(s.low, vx, px);
+  const Stop ay = hn::MulAdd(s.low, vy, py);
+  const Stop x0 = ax * k0;
+  const Stop y0 = ay * k0;
+  // b / z1 - a / z0 with b = a + l v and z1 = z0 + l v_z is l (v z0 - a v_z) / (z0 z1): what is left
+  // of a line seen end-on has the digits that it has in the world, not those of two pixels.
+  const Stop part = (s.high - s.low) * k0;
+  const Stop ux = Perspective ? hn::MulSub(vx, z0, ax * vz) * (part * inverse_z1) : vx * part;
+  const Stop uy = Perspective ? hn::MulSub(vy, z0, ay * vz) * (part * inverse_z1) : vy * part;
   const float least = 1e-6F * line.r2;
   const Stop u2 = hn::MulAdd(ux, ux, uy * uy);
   const Stop inverse_u2 = inverse_of(hn::Max(u2, all<Stop>(least * least)));
