@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <limits>
 
 #include "tests/numerics/naive_renderer.hpp"
@@ -192,6 +193,30 @@ INSTANTIATE_TEST_SUITE_P(
                     Rows{{9, 12, 16}, 4, {0.1, 0.2, 1}}, Rows{{41, 12, 9}, 4, {0.1, 1, 0.3}},
                     Rows{{14, 13, 12}, 7, {0.1, 0.2, -1}}, Rows{{14, 13, 22}, 8, {0.2, 1, 0.1}},
                     Rows{{15, 9, 22}, 9, {0.1, 0.2, 1}}));
+
+// Lines that point almost at the eye: hundredths of a pixel long, grey at the one end. Which end a
+// pixel is nearer to must not hang on the last digits of its place in the picture.
+TEST(EndOn, LinesKeepTheirColours) {
+  Scene scene;
+  scene.lattice = even_lattice({24, 18, 6}, {0.1, 0.1, 0.1});
+  const glm::dvec3 eye{0.3, -3, 0.4};
+  scene.camera = look({0, 0, 0}, -eye, glm::length(eye), 360, 280, true, 0.45);
+  scene.vector = plain_lines(
+      make_volume(scene.lattice, 3,
+                  [&](int c, double x, double y, double z) {
+                    const double aside = 0.004 * std::sin(40 * x + 31 * z);
+                    const glm::dvec3 wind = eye - glm::dvec3{x, y, z} + glm::dvec3{aside, 0, aside};
+                    return static_cast<float>(wind[c] / 3);
+                  }),
+      {0.9F, 0.4F, 0.1F});
+  scene.vector->length = 0.08;
+  scene.vector->head_desaturation = 0.9;
+  scene.vector->jitter_center = scene.vector->jitter_stride = 0.5;
+  scene.stop_transmittance = 0;
+  const Difference d = compare(render(scene, 2).image, naive::render<double>(scene));
+  EXPECT_LE(d.linear, 1.0 / 255);
+  EXPECT_GT(d.brightest, 0.3);
+}
 
 // Forward Euler doubles what differs wherever tau passes 1: compared below that.
 TEST(Euler, EqualsTheNaiveRendererWhereItIsStable) {
