@@ -127,8 +127,9 @@ void engine_frame(const protocol::View& view, const Workload& workload, ThreadPo
                   Kept& kept, Series& series) {
   const scene::Scene scene =
       value_or_give_up(scene::build_scene(view, bench::dataset_of(workload.sample)));
+  const CancelToken cancel;
   const bench::Allocations before = bench::allocations();
-  value_or_give_up(engine::render(scene, pool, CancelToken(), kept.engine));
+  value_or_give_up(engine::render(scene, pool, cancel, kept.engine));
   benchmark::DoNotOptimize(kept.engine.image().rgba.data());
   const bench::Allocations after = bench::allocations();
   series.add("engine allocations", static_cast<double>(after.count - before.count));
