@@ -356,7 +356,7 @@ void finish_pass(const Scene& scene, int major, const SampleWays& ways, PassPlan
 // tiles are. Small pictures take small ones, so that there are enough for all threads.
 int tile_pixels(int width, int height) {
   const std::int64_t pixels = std::int64_t{width} * height;
-  if (pixels >= 600'000) return kernels::tile_side;
+  if (pixels >= 300'000) return kernels::tile_side;
   return pixels >= 200'000 ? 96 : 64;
 }
 
