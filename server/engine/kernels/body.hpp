@@ -2,9 +2,9 @@
 // WINDSPLAT_KERNEL_TABLE. Everything here has internal linkage, so no function built for one
 // instruction set can stand in for another's.
 //
-// A brick goes through three steps, the first two row by row with a lane a stop: its stops are
-// projected and culled, what is left is made ready as lines and splats, and these are composited in
-// visibility order, block by block with a lane a pixel.
+// A brick goes through three steps, the first two by pairs of rows with a lane a stop: its stops
+// are projected and culled, what is left is made ready as lines and splats, and these are
+// composited in visibility order, block by block with a lane a pixel.
 #include <cstddef>
 #include <cstdint>
 
