@@ -67,9 +67,10 @@ std::vector<float> scene(Size size) {
 
 void tell(benchmark::State& state, Size size) {
   const double pixels = static_cast<double>(state.iterations()) * size.width * size.height;
-  state.counters["Mpixel/s"] = benchmark::Counter(pixels * 1e-6, benchmark::Counter::kIsRate);
-  state.counters["ns/pixel"] =
-      benchmark::Counter(pixels * 1e-9, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  // Printed with their units: 169M/s, 5.9ns.
+  state.counters["pixels"] = benchmark::Counter(pixels, benchmark::Counter::kIsRate);
+  state.counters["a pixel"] =
+      benchmark::Counter(pixels, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
 // A tile's pixels are near when they are converted; here every tile is read from the same place.

@@ -209,6 +209,11 @@ def main():
     configs = VTK_CONFIGS + (SLOW_CONFIGS if options.slow else [])
     names = ", ".join(config[0] for config in configs)
     configs = [config for config in configs if options.only in config[0]]
+    missing = [name for name in ("windsplat", "tests/bench_path")
+               if not (pathlib.Path(options.build) / name).exists()]
+    if missing:
+        parser.error(f"{options.build} has no {' and no '.join(missing)}: "
+                     "./scripts/build release windsplat bench_path")
     if not configs:
         parser.error(f"no VTK configuration has '{options.only}' in its name; there are: {names}")
     try:
