@@ -187,6 +187,24 @@ TEST(Targets, AgreeAtAwkwardSizes) {
   }
 }
 
+// Whole numbers, so that lengths are whole and as long as the tolerance says.
+TEST(Targets, DrawLinesThatAreJustAsStrongAsTheTolerance) {
+  for (const Table* table : usable_tables()) {
+    int drawn = 0;
+    for (int part = 1; part <= 100; ++part) {
+      scene::Scene scene = busy_scene(8, 8, true);
+      scene.scalars.clear();
+      scene.vector->field = make_volume(scene.lattice, 3, [&](int c, double, double, double) {
+        return static_cast<float>((c == 0 ? 2 : c == 1 ? 3 : 6) * part);
+      });
+      scene.vector->min_magnitude = 7 * part;
+      const engine::WorkReport work = render_with(*table, scene).work;
+      drawn += work.skipped_vector == 0 ? 1 : 0;
+    }
+    EXPECT_EQ(drawn, 100) << table->name;
+  }
+}
+
 TEST(Targets, VariantNamesTheOneInUse) {
   const auto table = engine::kernels::chosen_table();
   ASSERT_TRUE(table);
