@@ -187,6 +187,42 @@ TEST(Targets, AgreeAtAwkwardSizes) {
   }
 }
 
+// Whole numbers, so that lengths are whole and as long as the tolerance says.
+TEST(Targets, DrawLinesThatAreJustAsStrongAsTheTolerance) {
+  for (const Table* table : usable_tables()) {
+    int drawn = 0;
+    for (int part = 1; part <= 100; ++part) {
+      scene::Scene scene = busy_scene(8, 8, true);
+      scene.scalars.clear();
+      scene.vector->field = make_volume(scene.lattice, 3, [&](int c, double, double, double) {
+        return static_cast<float>((c == 0 ? 2 : c == 1 ? 3 : 6) * part);
+      });
+      scene.vector->min_magnitude = 7 * part;
+      const engine::WorkReport work = render_with(*table, scene).work;
+      drawn += work.skipped_vector == 0 ? 1 : 0;
+    }
+    EXPECT_EQ(drawn, 100) << table->name;
+  }
+}
+
+// Squares of such vectors overflow or vanish.
+TEST(Targets, MeasureVectorsOfAnySize) {
+  for (const Table* table : usable_tables()) {
+    for (const double size : {1e-35, 1e-20, 1.0, 1e20, 1e35}) {
+      scene::Scene scene = busy_scene(8, 8, true);
+      scene.scalars.clear();
+      scene.vector->field = make_volume(scene.lattice, 3, [&](int c, double, double, double) {
+        return static_cast<float>((c == 0 ? 2 : c == 1 ? 3 : 6) * size);
+      });
+      scene.vector->min_magnitude = 6.99 * size;
+      EXPECT_EQ(render_with(*table, scene).work.skipped_vector, 0) << table->name << " " << size;
+      scene.vector->min_magnitude = 7.01 * size;
+      const engine::WorkReport work = render_with(*table, scene).work;
+      EXPECT_EQ(work.skipped_vector, work.samples - work.culled) << table->name << " " << size;
+    }
+  }
+}
+
 TEST(Targets, VariantNamesTheOneInUse) {
   const auto table = engine::kernels::chosen_table();
   ASSERT_TRUE(table);

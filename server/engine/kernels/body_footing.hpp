@@ -182,8 +182,6 @@ KERNEL_INLINE std::uint32_t find_splat_blocks(const Outline& outline, const Tile
   const auto within = hn::Set(StopIntegers(), window_side);
   const StopInteger tall = down.last - down.first;
   const auto small = hn::And(hn::Lt(tall, within), hn::Lt(across.last - across.first, within));
-  const std::uint64_t windowed = bits_of<Stop>(hn::RebindMask(StopTag(), small));
-  f.splat_windowed |= windowed << static_cast<unsigned>(l);
   const StopInteger rows = hn::IfThenElseZero(small, tall);
   find_splat_columns(outline, across, down, tile, l, most_of(rows, touching), f);
   return touching;

@@ -157,7 +157,7 @@ void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, T
                    Prepared& out) {
   BrickMaker<Lines, Medium, Perspective, Curved> maker(camera, pass, tile, out);
   Stops& stops = out.stops;
-  stops.lines = stops.splats = out.footing.windowed = out.footing.splat_windowed = 0;
+  stops.lines = stops.splats = out.footing.windowed = 0;
   out.pass = &pass;
   out.near = camera.near;
   open_rows(pass, brick, maker.rows);

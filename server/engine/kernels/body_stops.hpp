@@ -28,7 +28,10 @@ KERNEL_INLINE Norm norm_of(const Three<Stop>& v) {
   if (HWY_LIKELY(hn::AllTrue(StopTag(), hn::Or(moderate, nothing)))) {
     const Stop square = dot3(v, v);
     const Stop inverse = inverse_root(hn::Max(square, all<Stop>(1e-30F)));
-    return {square * inverse, inverse};
+    // Another step for the length: a vector as long as a tolerance is not to fall below it.
+    const Stop length = square * inverse;
+    const Stop rest = hn::NegMulAdd(length, length, square);
+    return {hn::MulAdd(rest, all<Stop>(0.5F) * inverse, length), inverse};
   }
   const Stop least = all<Stop>(magnitude_least);
   const Stop scale = inverse_of(hn::Max(top, least));

@@ -83,12 +83,12 @@ struct Footing {
   alignas(64) std::int32_t line_column_last[brick_stops];
   alignas(64) std::uint32_t window_low[brick_stops];
   alignas(64) std::uint32_t window_high[brick_stops];
-  // A splat's box of blocks, and the blocks of it that its outline meets, as lines have them.
+  // A splat's box of blocks, and the blocks of it that its outline meets as a window, as lines have
+  // them: of a box that is no larger than one.
   alignas(64) std::int32_t row_first[brick_stops];
   alignas(64) std::int32_t row_last[brick_stops];
   alignas(64) std::int32_t column_first[brick_stops];
   alignas(64) std::int32_t column_last[brick_stops];
-  std::uint64_t splat_windowed;
   alignas(64) std::uint32_t splat_low[brick_stops];
   alignas(64) std::uint32_t splat_high[brick_stops];
 };
