@@ -194,6 +194,22 @@ INSTANTIATE_TEST_SUITE_P(
                     Rows{{14, 13, 12}, 7, {0.1, 0.2, -1}}, Rows{{14, 13, 22}, 8, {0.2, 1, 0.1}},
                     Rows{{15, 9, 22}, 9, {0.1, 0.2, 1}}));
 
+// From inside a medium, through a narrow picture: most of the cells that fill it have their middles
+// elsewhere, and some the eye is in.
+TEST(Inside, CellsWhoseMiddlesAreElsewhereFillThePicture) {
+  for (std::uint32_t seed = 1; seed <= 24; ++seed) {
+    Scene scene = SceneMaker(seed).make(What::scalars, true, true);
+    scene.slice.reset();
+    scene.scalars[0].stride = 1 + static_cast<int>(seed % 4);
+    const double angle = 0.7 * seed;
+    const glm::dvec3 forward{std::cos(angle), std::sin(angle), 0.3 * std::sin(3 * angle)};
+    scene.camera = look({0.05, -0.04, 0.03}, forward, 0, 140, 90, true, 0.12);
+    scene.camera.near = 0.01;
+    const Difference d = compare(render(scene, 2).image, naive::render<double>(scene));
+    EXPECT_LE(d.linear, 5e-4) << seed;
+  }
+}
+
 // Lines that point almost at the eye: hundredths of a pixel long, grey at the one end. Which end a
 // pixel is nearer to must not hang on the last digits of its place in the picture.
 TEST(EndOn, LinesKeepTheirColours) {

@@ -7,13 +7,19 @@
 namespace windsplat::engine::kernels {
 namespace {
 
+// What lies right of the widest tile begins at a block that no word has a bit for.
+KERNEL_INLINE UnsignedOf<Stop> shift_of(StopInteger first) {
+  const auto most = hn::Set(StopIntegers(), tile_blocks - 1);
+  return hn::BitCast(hn::RebindToUnsigned<StopTag>(), hn::Min(first, most));
+}
+
 // The bits from first to last; none if last < first.
 KERNEL_INLINE UnsignedOf<Stop> range_masks(const Ranges& range) {
   const hn::RebindToUnsigned<StopTag> tag;
   const auto one = hn::Set(tag, 1U);
   const auto above =
       hn::Shl(one + one, hn::BitCast(tag, hn::Max(range.last, hn::Zero(StopIntegers()))));
-  const auto below = hn::Shl(one, hn::BitCast(tag, range.first));
+  const auto below = hn::Shl(one, shift_of(range.first));
   const auto bits = hn::AndNot(below - one, above - one);
   const auto none = hn::Gt(range.first, range.last);
   return hn::IfThenZeroElse(hn::RebindMask(tag, none), bits);
@@ -89,7 +95,7 @@ KERNEL_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, co
   const Stop first = from_integer<Stop>(s.rows.first);
   const StopInteger tall = s.rows.last - s.rows.first;
   const hn::RebindToUnsigned<StopTag> masks;
-  const auto column = hn::BitCast(masks, s.columns.first);
+  const auto column = shift_of(s.columns.first);
   auto low = hn::Zero(masks);
   auto high = hn::Zero(masks);
   for (int k = 0; k <= most; ++k) {
@@ -142,7 +148,7 @@ KERNEL_INLINE void find_splat_columns(const Outline& outline, const Ranges& acro
                                       all<Stop>(0.5F + static_cast<float>(tile.y))) -
                            outline.oval.y;
   const StopInteger tall = down.last - down.first;
-  const auto column = hn::BitCast(masks, across.first);
+  const auto column = shift_of(across.first);
   const auto box = range_masks(across);
   auto low = hn::Zero(masks);
   auto high = hn::Zero(masks);
