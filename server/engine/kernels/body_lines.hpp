@@ -133,8 +133,8 @@ KERNEL_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyl
   const Stop ay = hn::MulAdd(s.low, vy, py);
   const Stop x0 = ax * k0;
   const Stop y0 = ay * k0;
-  // b / z1 - a / z0 with b = a + l v and z1 = z0 + l v_z is l (v z0 - a v_z) / (z0 z1): what is left
-  // of a line seen end-on has the digits that it has in the world, not those of two pixels.
+  // b / z1 - a / z0 with b = a + l v and z1 = z0 + l v_z is l (v z0 - a v_z) / (z0 z1): what is
+  // left of a line seen end-on has the digits that it has in the world, not those of two pixels.
   const Stop part = (s.high - s.low) * k0;
   const Stop ux = Perspective ? hn::MulSub(vx, z0, ax * vz) * (part * inverse_z1) : vx * part;
   const Stop uy = Perspective ? hn::MulSub(vy, z0, ay * vz) * (part * inverse_z1) : vy * part;
