@@ -166,14 +166,16 @@ KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixe
   const Pixel dx = px - s.x;
   const Pixel dy = py - s.y;
   // The quadratic form is never negative; its rounded sum may be.
-  const Pixel top =
-      hn::Max(hn::MulAdd(s.xx, dx * dx, hn::MulAdd(s.xy, dx * dy, s.yy * (dy * dy))), zero);
+  const Pixel slope = hn::MulAdd(s.xx, dx, s.xy * dy);
+  const Pixel top = hn::Max(hn::MulAdd(slope, dx, s.yy * dy * dy), zero);
   if constexpr (Perspective) {
     const Pixel ex = Start == From::eye_inside ? dx : px - s.ex;
     const Pixel ey = Start == From::eye_inside ? dy : py - s.ey;
-    const Pixel bent = hn::MulAdd(s.dxx, ex * ex, hn::MulAdd(s.dxy, ex * ey, s.dyy * (ey * ey)));
+    const Pixel across = hn::MulAdd(s.dxx, ex, s.dxy * ey);
+    const Pixel along = s.dyy * ey;
+    const Pixel bent = hn::MulAdd(across, ex, along * ey);
     const Pixel length2 =
-        hn::Max(s.d0 + hn::MulAdd(s.dx, ex, hn::MulAdd(s.dy, ey, bent)), s.d2_least);
+        hn::Max(hn::MulAdd(s.dx + across, ex, hn::MulAdd(s.dy + along, ey, s.d0)), s.d2_least);
     const Pixel inverse = inverse_root(length2);
     const Pixel inverse2 = inverse * inverse;
     const Pixel r2 = top * inverse2;
@@ -214,9 +216,10 @@ KERNEL_INLINE void add_product(float* channel, Pixel a, Pixel b) {
 struct Light {
   Pixel most = hn::Zero(PixelTag());
 
-  KERNEL_INLINE void see(Pixel transmittance) {
-    const Pixel here = hn::Abs(transmittance);
-    most = pixel_lanes == block_pixels ? here : hn::Max(most, here);
+  KERNEL_INLINE void see(Pixel transmittance) { see_positive(hn::Abs(transmittance)); }
+  // What no rule but forward Euler's makes negative.
+  KERNEL_INLINE void see_positive(Pixel transmittance) {
+    most = pixel_lanes == block_pixels ? transmittance : hn::Max(most, transmittance);
   }
   KERNEL_INLINE bool above(float stop) const {
     return !hn::AllFalse(PixelTag(), hn::Gt(most, all<Pixel>(stop)));
@@ -240,6 +243,15 @@ template <int Compositing>
 KERNEL_INLINE Pixel bounded_light(Pixel transmittance) {
   if (Compositing != compositing_cd_euler) return transmittance;
   return clamped(transmittance, -1e12F, 1e12F);
+}
+
+template <int Compositing>
+KERNEL_INLINE void see_light(Pixel transmittance, Light& light) {
+  if (Compositing == compositing_cd_euler) {
+    light.see(transmittance);
+  } else {
+    light.see_positive(transmittance);
+  }
 }
 
 // What is left of a line's light in front of which the part `place` of the medium lies.
@@ -350,7 +362,7 @@ KERNEL_INLINE Light splat_block(const SplatLanes& s, float x, float y,
     for (int c = 0; c < 3; ++c) add_product(to.rgb[c] + l, a, s.color[c]);
     const Pixel left = bounded_light<Compositing>(t * medium.transmitted);
     store(left, to.transmittance + l);
-    light.see(left);
+    see_light<Compositing>(left, light);
   }
   return light;
 }
@@ -408,7 +420,7 @@ KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_ri
     }
     left = bounded_light<Compositing>(left);
     store(left, to.transmittance + l);
-    light.see(left);
+    see_light<Compositing>(left, light);
   }
   return light;
 }

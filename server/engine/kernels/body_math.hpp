@@ -22,16 +22,15 @@ struct Attenuation {
   V transmitted;  // exp(-tau)
 };
 
-// expm1(-t) for |t| <= ln2 / 2 (2.5e-8 relative).
+// -expm1(-t) for |t| <= ln2 / 2 (2.5e-8 relative).
 template <class V>
-KERNEL_INLINE V short_expm1(V minus_t) {
-  const V r = minus_t;
+KERNEL_INLINE V short_absorbed(V t) {
   V p = all<V>(1.3926550429e-3F);
-  p = hn::MulAdd(p, r, all<V>(8.3634724672e-3F));
-  p = hn::MulAdd(p, r, all<V>(4.1666552403e-2F));
-  p = hn::MulAdd(p, r, all<V>(1.6666575217e-1F));
-  p = hn::MulAdd(p, r, all<V>(0.5F));
-  return hn::MulAdd(r, r * p, r);
+  p = hn::NegMulAdd(p, t, all<V>(8.3634724672e-3F));
+  p = hn::NegMulAdd(p, t, all<V>(4.1666552403e-2F));
+  p = hn::NegMulAdd(p, t, all<V>(1.6666575217e-1F));
+  p = hn::NegMulAdd(p, t, all<V>(0.5F));
+  return hn::NegMulAdd(t, t * p, t);
 }
 
 // tau = n ln2 + r, |r| <= ln2 / 2. With n = 0 nothing is subtracted from 1, so tau = 1e-30 absorbs
@@ -42,19 +41,19 @@ KERNEL_INLINE Attenuation<V> attenuation(V tau) {
   const V one = all<V>(1.0F);
   constexpr float thin = 0.3465F;
   if (HWY_LIKELY(hn::AllTrue(TagOf<V>(), hn::Le(tau, all<V>(thin))))) {
-    const V expm1_t = short_expm1(hn::Neg(tau));
-    return {hn::Neg(expm1_t), one + expm1_t};
+    const V absorbed = short_absorbed(tau);
+    return {absorbed, one - absorbed};
   }
   const V t = clamped(tau, 0.0F, 88.0F);  // there 2^-n is 0
   // Never negative: truncation rounds to the nearest.
   const auto n = truncated(hn::MulAdd(t, all<V>(1.44269504F), all<V>(0.5F)));
   const V whole = from_integer<V>(n);
   const V r =
-      hn::MulSub(whole, all<V>(-2.12194440e-4F), hn::NegMulAdd(whole, all<V>(0.693359375F), t));
-  const V expm1_r = short_expm1(r);
+      hn::MulAdd(whole, all<V>(2.12194440e-4F), hn::NegMulAdd(whole, all<V>(0.693359375F), t));
+  const V short_part = short_absorbed(r);
   const hn::RebindToSigned<TagOf<V>> integers;
   const V scale = hn::BitCast(TagOf<V>(), hn::ShiftLeft<23>(hn::Sub(hn::Set(integers, 127), n)));
-  return {hn::NegMulAdd(scale, expm1_r, one - scale), hn::MulAdd(scale, expm1_r, scale)};
+  return {hn::MulAdd(scale, short_part, one - scale), hn::NegMulAdd(scale, short_part, scale)};
 }
 
 // The splat's footprint (Max 1991) in strides, normalised by its integral over the plane.
