@@ -417,10 +417,13 @@ void copy_row(const Tile& tile, int y, float* rgba) {
   const hn::CappedTag<float, block_side> tag;
   constexpr int lanes = static_cast<int>(hn::MaxLanes(tag));
   const auto one = hn::Set(tag, 1.0F);
-  const float* block = block_at(tile, y / block_side, 0) + y % block_side * block_side;
+  const std::ptrdiff_t row = std::ptrdiff_t{block_side} * (y % block_side);
+  const float* block = block_at(tile, y / block_side, 0) + row;
   for (int column = 0; column < blocks_of(tile.width); ++column, block += block_floats) {
     for (int i = 0; i < block_side; i += lanes, rgba += std::ptrdiff_t{4} * lanes) {
-      const auto channel = [&](int c) { return hn::LoadU(tag, block + c * block_pixels + i); };
+      const auto channel = [&](std::ptrdiff_t c) {
+        return hn::LoadU(tag, block + c * block_pixels + i);
+      };
       hn::StoreInterleaved4(channel(1), channel(2), channel(3), one - channel(0), tag, rgba);
     }
   }
