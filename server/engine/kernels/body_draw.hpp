@@ -83,12 +83,17 @@ constexpr WindowOffsets window_offsets() {
 
 constexpr WindowOffsets offsets_in_window = window_offsets();
 
+// The two halves of a window's blocks, as Footing has them.
+inline std::uint64_t joined(std::uint32_t high, std::uint32_t low) {
+  return static_cast<std::uint64_t>(high) << 32U | low;
+}
+
 // Composites one line into its blocks; how many.
 template <Depth Along, int Style>
 KERNEL_INLINE int draw_windowed(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
   const int row = f.line_first[l];
   const int column = f.line_column[l];
-  std::uint64_t left = static_cast<std::uint64_t>(f.window_high[l]) << 32U | f.window_low[l];
+  std::uint64_t left = joined(f.window_high[l], f.window_low[l]);
   if (tile.any_closed != 0) left &= open_window(tile, row, column);
   const int blocks = __builtin_popcountll(left);
   const BlockPixels from_line = {all<Pixel>(left_of(tile, column)) - lanes.x,
@@ -189,10 +194,6 @@ inline bool within_window(const Box& box) {
   return box.row_last - box.row < window_side && box.column_last - box.column < window_side;
 }
 
-inline std::uint64_t joined(std::uint32_t high, std::uint32_t low) {
-  return static_cast<std::uint64_t>(high) << 32U | low;
-}
-
 // A window's blocks as another window's, whose corner is not right of or below its own and which
 // holds them all.
 inline std::uint64_t moved(std::uint64_t blocks, const Box& from, const Window& to) {
@@ -214,7 +215,6 @@ inline std::uint64_t in_window(const Box& box, const Window& window, const RowOf
 }
 
 // A kernel that has a splat, and perhaps a line.
-template <bool Perspective>
 struct KernelDrawing {
   const Compositor& with;
   Tile& tile;
@@ -247,12 +247,12 @@ template <bool Perspective>
 void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
   const Footing& f = p.footing;
   const bool lined = has(p.stops.lines, l);
-  KernelDrawing<Perspective> kernel = {
+  KernelDrawing kernel = {
       with, tile, splat_at<Perspective>(p, l), {}, static_cast<int>(from_of<Perspective>(p, l))};
   if (lined) kernel.ribbon = ribbon_at(p.pass->line, p.ribbons, l);
   const Box splat = splat_box(f, l);
-  const Box line = line_box(f, l);
-  const Box box = lined ? united(splat, line) : splat;
+  const Box line = lined ? line_box(f, l) : splat;
+  const Box box = united(splat, line);
   if (within_window(box)) {
     const Window window = {box.row, box.column, 0};
     const std::uint64_t lines =
