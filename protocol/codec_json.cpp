@@ -156,6 +156,16 @@ Json canonical_number(double value) {
   return value;
 }
 
+Json number_or_null(const std::optional<double>& value) {
+  return value ? canonical_number(*value) : Json(nullptr);
+}
+
+Json numbers_json(const std::vector<double>& values) {
+  Json out = Json::array();
+  for (const double value : values) out.push_back(canonical_number(value));
+  return out;
+}
+
 void make_numbers_canonical(Json& value) {
   if (value.is_number()) {
     value = canonical_number(value.get<double>());

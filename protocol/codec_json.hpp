@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -12,12 +11,12 @@
 #include <utility>
 #include <vector>
 
+#include "protocol/codec_tree.hpp"
+#include "protocol/limits.hpp"
 #include "protocol/view.hpp"
 #include "server/base/error.hpp"
 
 namespace windsplat::protocol {
-
-using Json = nlohmann::json;  // objects are sorted by key, which is what makes text canonical
 
 // Errors: too_large (over message_bytes_max), malformed (syntax, UTF-8, NUL, byte order mark,
 // nesting, duplicate keys), invalid (a number that no double holds).
@@ -28,6 +27,8 @@ std::string dump(const Json& value);
 
 // The canonical form of a number: an integer where it is whole and exact, no minus zero.
 Json canonical_number(double value);
+Json number_or_null(const std::optional<double>& value);
+Json numbers_json(const std::vector<double>& values);
 // Canonical numbers throughout a tree.
 void make_numbers_canonical(Json& value);
 
@@ -84,7 +85,7 @@ class ObjectReader {
   void number(const char* key, double& out, NumberRange range);
   void number(const char* key, std::optional<double>& out, NumberRange range);
   void text(const char* key, std::string& out, std::size_t chars_min,
-            Presence presence = Presence::optional);
+            Presence presence = Presence::optional, std::size_t chars_max = limits::name_chars_max);
   void text(const char* key, std::optional<std::string>& out, std::size_t chars_min);
   void color(const char* key, std::string& out);
 
@@ -130,9 +131,10 @@ class ObjectReader {
   [[nodiscard]] const std::string& pointer() const { return pointer_; }
   Faults& faults() { return faults_; }
 
-  void finish();  // refuses keys that nobody asked for
+  void finish();  // refuses keys that nobody asked for, and says which are known
 
  private:
+  [[nodiscard]] std::string known_keys() const;
   template <class E, std::size_t N>
   static std::array<std::string_view, N> texts(const std::array<Name<E>, N>& names) {
     std::array<std::string_view, N> out;
@@ -151,7 +153,8 @@ class ObjectReader {
   std::optional<std::size_t> read_name(const Json& value, const std::string& pointer,
                                        std::span<const std::string_view> names);
   std::optional<std::string> read_text(const Json& value, const std::string& pointer,
-                                       std::size_t chars_min);
+                                       std::size_t chars_min,
+                                       std::size_t chars_max = limits::name_chars_max);
 
   const Json* value_ = nullptr;  // null when there is no object to read
   std::string pointer_;

@@ -87,13 +87,8 @@ StillMessage read_still(ObjectReader& reader) {
 
 PlayMessage read_play(ObjectReader& reader) {
   PlayMessage message;
-  const std::size_t before = reader.faults().count();
   reader.integer("from", message.from, step_range, Presence::required);
   reader.integer("to", message.to, step_range, Presence::required);
-  if (reader.faults().count() == before && message.from > message.to) {
-    reader.faults().add(reader.at("from"), "must be at most to: " + std::to_string(message.from) +
-                                               " is more than " + std::to_string(message.to));
-  }
   reader.number("fps", message.fps, {limits::fps_min, limits::fps_max});
   reader.boolean("loop", message.loop);
   reader.boolean("drop", message.drop);
@@ -182,7 +177,10 @@ Json to_json(const StatsMessage& message) {
               {"frames", message.frames},
               {"dropped", message.dropped},
               {"cancelled", message.cancelled},
-              {"bytes", message.bytes}};
+              {"bytes", message.bytes},
+              {"playFps", message.play_fps ? canonical_number(*message.play_fps) : Json(nullptr)},
+              {"stepsDropped", message.steps_dropped},
+              {"stepsNotReady", message.steps_not_ready}};
 }
 
 Json to_json(const ErrorMessage& message) {
@@ -222,7 +220,22 @@ MessageTag message_tag(std::string_view json) {
   return tag;
 }
 
+// With keys in the order of all other messages.
+std::string opened_with(const std::string& dataset, std::uint32_t id) {
+  std::string text = R"({"dataset":)";
+  text.reserve(dataset.size() + 64);
+  text += dataset;
+  text += R"(,"id":)";
+  text += std::to_string(id);
+  text += R"(,"type":"opened"})";
+  return text;
+}
+
 std::string encode(const ServerMessage& message) {
+  const auto* const opened = std::get_if<OpenedMessage>(&message);
+  if (opened != nullptr && opened->dataset.encoded != nullptr) {
+    return opened_with(*opened->dataset.encoded, opened->id);
+  }
   return dump(std::visit([](const auto& body) { return to_json(body); }, message));
 }
 

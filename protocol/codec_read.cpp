@@ -101,10 +101,10 @@ void ObjectReader::number(const char* key, std::optional<double>& out, NumberRan
   }
 }
 
-void ObjectReader::text(const char* key, std::string& out, std::size_t chars_min,
-                        Presence presence) {
+void ObjectReader::text(const char* key, std::string& out, std::size_t chars_min, Presence presence,
+                        std::size_t chars_max) {
   if (const Json* value = child(key, presence)) {
-    if (auto read = read_text(*value, at(key), chars_min)) out = std::move(*read);
+    if (auto read = read_text(*value, at(key), chars_min, chars_max)) out = std::move(*read);
   }
 }
 
@@ -164,16 +164,16 @@ std::optional<std::size_t> ObjectReader::read_name(const Json& value, const std:
 }
 
 std::optional<std::string> ObjectReader::read_text(const Json& value, const std::string& pointer,
-                                                   std::size_t chars_min) {
+                                                   std::size_t chars_min, std::size_t chars_max) {
   if (!value.is_string()) {
     faults_.add(pointer, "must be a string, not " + described(value));
     return std::nullopt;
   }
   const auto& text = value.get_ref<const std::string&>();
   const std::size_t chars = count_chars(text);
-  if (chars < chars_min || chars > limits::name_chars_max) {
+  if (chars < chars_min || chars > chars_max) {
     faults_.add(pointer, "must have " + std::to_string(chars_min) + " to " +
-                             std::to_string(limits::name_chars_max) + " characters, not " +
+                             std::to_string(chars_max) + " characters, not " +
                              std::to_string(chars));
     return std::nullopt;
   }
@@ -184,12 +184,21 @@ std::optional<std::string> ObjectReader::read_text(const Json& value, const std:
   return text;
 }
 
+std::string ObjectReader::known_keys() const {
+  std::string list;
+  for (auto key = asked_.begin(); key != asked_.end(); ++key) {
+    if (std::find(asked_.begin(), key, *key) != key) continue;
+    list.append(list.empty() ? "" : ", ").append(*key);
+  }
+  return list;
+}
+
 void ObjectReader::finish() {
   if (value_ == nullptr) return;
   for (const auto& member : value_->items()) {
     const std::string& key = member.key();
     if (std::find(asked_.begin(), asked_.end(), key) == asked_.end()) {
-      faults_.add(join_pointer(pointer_, key), "is not known here");
+      faults_.add(join_pointer(pointer_, key), "is not known here; what is: " + known_keys());
     }
   }
 }

@@ -10,19 +10,9 @@ namespace windsplat::protocol {
 
 namespace {
 
-Json numbers_json(const std::vector<double>& values) {
-  Json out = Json::array();
-  for (const double value : values) out.push_back(canonical_number(value));
-  return out;
-}
-
 Json vec3_json(const Vec3& value) {
   return Json::array(
       {canonical_number(value[0]), canonical_number(value[1]), canonical_number(value[2])});
-}
-
-Json number_or_null(const std::optional<double>& value) {
-  return value ? canonical_number(*value) : Json(nullptr);
 }
 
 Json field_json(const FieldDescription& field) {
@@ -30,16 +20,18 @@ Json field_json(const FieldDescription& field) {
   if (field.range) {
     range = Json::array({canonical_number((*field.range)[0]), canonical_number((*field.range)[1])});
   }
-  return Json{{"name", field.name},
-              {"kind", field.kind},
-              {"components", field.components},
-              {"units", field.units},
-              {"standardName", field.standard_name},
-              {"longName", field.long_name},
-              {"range", std::move(range)},
-              {"masked", field.masked ? Json(*field.masked) : Json(nullptr)},
-              {"rangeOf", field.range_of.empty() ? Json(nullptr) : Json(field.range_of)},
-              {"dtype", field.dtype}};
+  Json out{{"name", field.name},
+           {"kind", field.kind},
+           {"components", field.components},
+           {"units", field.units},
+           {"standardName", field.standard_name},
+           {"longName", field.long_name},
+           {"range", std::move(range)},
+           {"masked", field.masked ? Json(*field.masked) : Json(nullptr)},
+           {"rangeOf", field.range_of.empty() ? Json(nullptr) : Json(field.range_of)},
+           {"dtype", field.dtype}};
+  if (field.storage_error > 0) out["storageError"] = canonical_number(field.storage_error);
+  return out;
 }
 
 Json fields_json(const std::vector<FieldDescription>& fields) {
@@ -70,6 +62,8 @@ const char* status_title(int status) {
       return "Bad Request";
     case 404:
       return "Not Found";
+    case 409:
+      return "Conflict";
     case 413:
       return "Content Too Large";
     case 422:
@@ -98,6 +92,8 @@ int status_of(ErrorKind kind) {
       return 404;
     case ErrorKind::too_large:
       return 413;
+    case ErrorKind::not_resident:
+      return 409;
     case ErrorKind::busy:
       return 429;
     case ErrorKind::draining:
@@ -160,6 +156,8 @@ Json limits_json() {
               {"depthCueMax", canonical_number(limits::depth_cue_max)},
               {"budgetMsMin", canonical_number(limits::budget_ms_min)},
               {"budgetMsMax", canonical_number(limits::budget_ms_max)},
+              {"maxErrorMin", canonical_number(limits::max_error_min)},
+              {"maxErrorMax", canonical_number(limits::max_error_max)},
               {"stepMax", limits::step_max},
               {"seedMax", limits::seed_max},
               {"nameCharsMax", limits::name_chars_max},
@@ -169,6 +167,15 @@ Json limits_json() {
               {"stillScaleMax", canonical_number(limits::still_scale_max)},
               {"decodeMsMax", canonical_number(limits::decode_ms_max)},
               {"problemErrorsMax", limits::problem_errors_max},
+              {"pathCharsMax", limits::path_chars_max},
+              {"histogramBinsMax", limits::histogram_bins_max},
+              {"histogramClipMax", canonical_number(limits::histogram_clip_max)},
+              {"coordinateMax", canonical_number(limits::coordinate_max)},
+              {"seriesStepsMax", limits::series_steps_max},
+              {"jobsMax", limits::jobs_max},
+              {"jobsRunningMax", limits::jobs_running_max},
+              {"viewsMax", limits::views_max},
+              {"viewsBytesMax", limits::views_bytes_max},
               {"framesInFlightMax", limits::frames_in_flight_max},
               {"sessionsMaxDefault", limits::sessions_max_default}};
 }
@@ -216,8 +223,9 @@ Json dataset_summary_json(const DatasetDescription& dataset) {
               {"title", dataset.title},
               {"state", dataset.state},
               {"fields", fields_json(dataset.fields)},
-              {"steps", dataset.steps.size()},
-              {"residentBytes", dataset.resident_bytes}};
+              {"steps", std::max(dataset.step_count, dataset.steps.size())},
+              {"residentBytes", dataset.resident_bytes},
+              {"notes", dataset.notes}};
 }
 
 Json dataset_json(const DatasetDescription& dataset) {

@@ -17,6 +17,48 @@ Json point_json(const StudyPoint& point) {
               {"pareto", point.pareto}, {"stable", point.stable}};
 }
 
+Json calibration_json(const StudyCalibration& calibration) {
+  Json agreement = Json::array();
+  for (const StudyAgreement& one : calibration.agreement) {
+    agreement.push_back(Json{{"of", one.of},
+                             {"count", one.count},
+                             {"withinTwo", one.within_two},
+                             {"median", one.median},
+                             {"bounded", one.bounded}});
+  }
+  Json aims = Json::array();
+  for (const StudyAim& one : calibration.aims) {
+    aims.push_back(Json{{"maxError", one.max_error},
+                        {"frames", one.frames},
+                        {"promised", one.promised},
+                        {"promisedKept", one.promised_kept},
+                        {"possible", one.possible},
+                        {"possibleKept", one.possible_kept}});
+  }
+  Json checks = Json::array();
+  for (const StudyCheck& one : calibration.checks) {
+    checks.push_back(Json{{"look", one.look}, {"apart", one.apart}, {"estimate", one.estimate}});
+  }
+  Json points = Json::array();
+  for (const StudyCompared& one : calibration.points) {
+    points.push_back(Json{{"look", one.look},
+                          {"view", one.view},
+                          {"method", one.method},
+                          {"halfLevel", one.half_level},
+                          {"coarser", one.coarser},
+                          {"thinner", one.thinner},
+                          {"error", one.error},
+                          {"estimate", one.estimate},
+                          {"spread", one.spread},
+                          {"prior", one.prior}});
+  }
+  return Json{{"width", calibration.width},        {"height", calibration.height},
+              {"surveyed", calibration.surveyed},  {"heldOut", calibration.held_out},
+              {"seconds", calibration.seconds},    {"looks", calibration.looks},
+              {"agreement", std::move(agreement)}, {"aims", std::move(aims)},
+              {"checks", std::move(checks)},       {"points", std::move(points)}};
+}
+
 Json scene_json(const StudyScene& scene) {
   Json points = Json::array();
   for (const StudyPoint& point : scene.points) points.push_back(point_json(point));
@@ -37,21 +79,23 @@ Json scene_json(const StudyScene& scene) {
                         {"bytes", encoding.bytes}});
   }
   const StudyReference& reference = scene.reference;
-  return Json{{"name", scene.name},
-              {"view", view_to_json(scene.view)},
-              {"reference",
-               {{"kind", reference.kind},
-                {"estimate", reference.estimate},
-                {"seconds", reference.seconds},
-                {"tolerance", reference.tolerance},
-                {"width", reference.width},
-                {"height", reference.height},
-                {"pieces", reference.pieces},
-                {"evaluations", reference.evaluations}}},
-              {"points", std::move(points)},
-              {"curves", std::move(curves)},
-              {"reconstructionRipple", scene.reconstruction_ripple},
-              {"jpeg", std::move(jpeg)}};
+  Json json{{"name", scene.name},
+            {"view", view_to_json(scene.view)},
+            {"reference",
+             {{"kind", reference.kind},
+              {"estimate", reference.estimate},
+              {"seconds", reference.seconds},
+              {"tolerance", reference.tolerance},
+              {"width", reference.width},
+              {"height", reference.height},
+              {"pieces", reference.pieces},
+              {"evaluations", reference.evaluations}}},
+            {"points", std::move(points)},
+            {"curves", std::move(curves)},
+            {"reconstructionRipple", scene.reconstruction_ripple},
+            {"jpeg", std::move(jpeg)}};
+  if (scene.calibration) json["calibration"] = calibration_json(*scene.calibration);
+  return json;
 }
 
 Json stability_json(const StudyStability& one) {

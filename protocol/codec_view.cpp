@@ -313,18 +313,13 @@ QualityView read_quality(const Json& json, const std::string& pointer, Faults& f
   QualityView quality;
   ObjectReader reader(json, pointer, faults);
   reader.number("budgetMs", quality.budget_ms, {limits::budget_ms_min, limits::budget_ms_max});
-  if (const Json* bound = reader.child("maxError"); bound != nullptr && !bound->is_null()) {
-    faults.add(reader.at("maxError"), "must be null, not " + described(*bound));
-  }
+  reader.number("maxError", quality.max_error, {limits::max_error_min, limits::max_error_max});
+  reader.boolean("lossless", quality.lossless);
   reader.finish();
   return quality;
 }
 
 // --- writing ------------------------------------------------------------------------------------
-
-Json number_or_null(const std::optional<double>& value) {
-  return value ? canonical_number(*value) : Json(nullptr);
-}
 
 template <std::size_t N>
 Json numbers_to_json(const std::array<double, N>& values) {
@@ -436,34 +431,36 @@ Json view_to_json(const View& view) {
     scalars = Json::array();
     for (const ScalarView& scalar : *view.scalars) scalars.push_back(scalar_to_json(scalar));
   }
-  return Json{
-      {"dataset", view.dataset},
-      {"step", view.step},
-      {"camera",
-       {{"projection", name_of(view.camera.projection, projection_names)},
-        {"eye", numbers_or_null(view.camera.eye)},
-        {"target", numbers_or_null(view.camera.target)},
-        {"up", numbers_to_json(view.camera.up)},
-        {"fovY", canonical_number(view.camera.fov_y)},
-        {"height", number_or_null(view.camera.height)}}},
-      {"image",
-       {{"width", view.image.width},
-        {"height", view.image.height},
-        {"background", view.image.background}}},
-      {"geometry", geometry_to_json(view.geometry)},
-      {"vector", vector_to_json(view.vector)},
-      {"scalars", std::move(scalars)},
-      {"depthCue",
-       {{"strength", canonical_number(view.depth_cue.strength)},
-        {"near", canonical_number(view.depth_cue.near)},
-        {"far", canonical_number(view.depth_cue.far)}}},
-      {"method",
-       {{"name", name_of(view.method.name, method_names)},
-        {"compositing", name_of(view.method.compositing, compositing_names)},
-        {"slabThickness", canonical_number(view.method.slab_thickness)},
-        {"stopTransmittance", canonical_number(view.method.stop_transmittance)},
-        {"detail", name_of(view.method.detail, detail_names)}}},
-      {"quality", {{"budgetMs", number_or_null(view.quality.budget_ms)}, {"maxError", nullptr}}}};
+  return Json{{"dataset", view.dataset},
+              {"step", view.step},
+              {"camera",
+               {{"projection", name_of(view.camera.projection, projection_names)},
+                {"eye", numbers_or_null(view.camera.eye)},
+                {"target", numbers_or_null(view.camera.target)},
+                {"up", numbers_to_json(view.camera.up)},
+                {"fovY", canonical_number(view.camera.fov_y)},
+                {"height", number_or_null(view.camera.height)}}},
+              {"image",
+               {{"width", view.image.width},
+                {"height", view.image.height},
+                {"background", view.image.background}}},
+              {"geometry", geometry_to_json(view.geometry)},
+              {"vector", vector_to_json(view.vector)},
+              {"scalars", std::move(scalars)},
+              {"depthCue",
+               {{"strength", canonical_number(view.depth_cue.strength)},
+                {"near", canonical_number(view.depth_cue.near)},
+                {"far", canonical_number(view.depth_cue.far)}}},
+              {"method",
+               {{"name", name_of(view.method.name, method_names)},
+                {"compositing", name_of(view.method.compositing, compositing_names)},
+                {"slabThickness", canonical_number(view.method.slab_thickness)},
+                {"stopTransmittance", canonical_number(view.method.stop_transmittance)},
+                {"detail", name_of(view.method.detail, detail_names)}}},
+              {"quality",
+               {{"budgetMs", number_or_null(view.quality.budget_ms)},
+                {"maxError", number_or_null(view.quality.max_error)},
+                {"lossless", view.quality.lossless}}}};
 }
 
 std::string encode_view(const View& view) { return dump(view_to_json(view)); }

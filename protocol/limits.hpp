@@ -43,6 +43,8 @@ inline constexpr double optical_depth_max = 1e3;
 inline constexpr double depth_cue_max = 10;  // depths of the volume
 inline constexpr double budget_ms_min = 1;
 inline constexpr double budget_ms_max = 10000;
+inline constexpr double max_error_min = 1e-6;  // linear RMSE
+inline constexpr double max_error_max = 1;
 inline constexpr std::int64_t step_max = 2147483647;
 inline constexpr std::int64_t seed_max = 4294967295;
 inline constexpr std::size_t name_chars_max = 256;  // code points of a dataset, field or map name
@@ -53,6 +55,16 @@ inline constexpr double fps_max = 120;
 inline constexpr double still_scale_max = 4;
 inline constexpr double decode_ms_max = 1e9;
 inline constexpr std::size_t problem_errors_max = 16;  // values at fault that one answer names
+
+inline constexpr std::size_t path_chars_max = 4096;  // code points of a path below the data root
+inline constexpr int histogram_bins_max = 4096;
+inline constexpr double histogram_clip_max = 0.49;  // share of the values, at either end
+inline constexpr double coordinate_max = 1e30;      // of a probe, in the axes' own units
+inline constexpr int series_steps_max = 100000;
+inline constexpr int jobs_max = 64;  // known at a time, finished ones among them
+inline constexpr int jobs_running_max = 2;
+inline constexpr int views_max = 10000;           // kept by a server
+inline constexpr int views_bytes_max = 16777216;  // of all of them as JSON
 
 inline constexpr int frames_in_flight_max = 2;  // unacknowledged, a session
 inline constexpr int sessions_max_default = 64;

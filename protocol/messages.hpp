@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -35,7 +36,7 @@ struct StillMessage {
   double scale = 1;            // 1..4
 };
 struct PlayMessage {
-  int from = 0;
+  int from = 0;  // greater than `to`: backward
   int to = 0;
   double fps = 10;
   bool loop = true;
@@ -63,7 +64,8 @@ struct FieldDescription {
   std::string long_name;
   std::optional<Range> range;  // absent until the step was loaded; of a vector: its magnitude
   std::optional<std::int64_t> masked;
-  std::string range_of;  // "step" | "all"; empty, told as null, while range is absent
+  std::string range_of;      // "step" | "all"; empty, told as null, while range is absent
+  double storage_error = 0;  // in units; 0: nothing of it is packed
   std::string dtype;
 };
 struct AxisDescription {
@@ -91,11 +93,16 @@ struct DatasetDescription {
   std::vector<std::string> mappings;  // of /geometry/mapping, those that its grid can be bent to
   std::vector<FieldDescription> fields;
   std::vector<std::pair<std::string, std::string>> left_out;  // variable, reason
+  std::vector<std::string> notes;  // what was done to the data, what is wrong
   std::vector<StepDescription> steps;
+  std::size_t step_count = 0;  // also where `steps` was left out
   std::string time_units;
   std::uint64_t resident_bytes = 0;
   std::uint64_t bytes_when_resident = 0;  // every field at every step
   View default_view;  // told only when it names its dataset: while nothing is read it does not
+  // The long form as JSON where it was made before, by a thread that had the time for it: then it
+  // is what is sent, and steps and axes may be left out.
+  std::shared_ptr<const std::string> encoded;
 };
 struct FrameInfo {
   std::string method = "kernel";
@@ -168,6 +175,9 @@ struct StatsMessage {
   std::uint64_t dropped = 0;
   std::uint64_t cancelled = 0;
   std::uint64_t bytes = 0;
+  std::optional<double> play_fps;  // of the steps shown
+  std::uint64_t steps_dropped = 0;
+  std::uint64_t steps_not_ready = 0;
 };
 struct ErrorMessage {
   std::optional<std::uint32_t> id;   // of the message at fault, where it had one

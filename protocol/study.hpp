@@ -1,7 +1,9 @@
 // A study's report as typed values -> study.json. Numbers that are not finite become null.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -43,6 +45,48 @@ struct StudyReference {
   std::int64_t pieces = 0, evaluations = 0;
 };
 
+// Of errors told and true ones: shares within a factor of 2, and within the bound promised.
+struct StudyAgreement {
+  std::string of;
+  std::size_t count = 0;
+  double within_two = 0, median = 0, bounded = 0;
+};
+
+// Frames by what was chosen for an error.
+struct StudyAim {
+  double max_error = 0;
+  std::size_t frames = 0;
+  std::size_t promised = 0, promised_kept = 0;  // forecast to keep it, and did
+  std::size_t possible = 0, possible_kept = 0;  // some setting keeps it, and the chosen one did
+};
+
+// One setting at one view that was held out.
+struct StudyCompared {
+  std::string look;
+  std::size_t view = 0;
+  std::string method;
+  int half_level = 0, coarser = 0, thinner = 1;
+  double error = 0;  // true
+  double estimate = 0, spread = 0, prior = 0;
+};
+
+// The extrapolated truth against the integral.
+struct StudyCheck {
+  std::string look;
+  double apart = 0, estimate = 0;
+};
+
+struct StudyCalibration {
+  int width = 0, height = 0;
+  int surveyed = 0, held_out = 0;  // views of each look
+  double seconds = 0;
+  std::vector<std::string> looks;
+  std::vector<StudyAgreement> agreement;
+  std::vector<StudyAim> aims;
+  std::vector<StudyCheck> checks;
+  std::vector<StudyCompared> points;
+};
+
 struct StudyScene {
   std::string name;
   View view;
@@ -51,6 +95,7 @@ struct StudyScene {
   std::vector<StudyCurve> curves;
   double reconstruction_ripple = 0;  // null: bent lattice or slice
   std::vector<StudyEncoding> jpeg;
+  std::optional<StudyCalibration> calibration;
 };
 
 struct StudyStability {

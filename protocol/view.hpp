@@ -131,8 +131,11 @@ struct MethodView {
   Detail detail = Detail::automatic;  // automatic: coarser where cells are below a pixel
 };
 
+// What the server may choose by itself: resolution, method and slabs of a frame that is not pure.
 struct QualityView {
-  std::optional<double> budget_ms;  // a stream keeps moving frames within it by their resolution
+  std::optional<double> budget_ms;  // milliseconds of drawing and encoding
+  std::optional<double> max_error;  // linear RMSE
+  bool lossless = false;            // final frames of a stream as PNG
 };
 
 struct View {

@@ -3,7 +3,7 @@ set(bench_dir ${CMAKE_CURRENT_LIST_DIR}/bench)
 # What the engine is measured against is built plainly: for the baseline instruction set, with what
 # -O2 vectorises (g++ 12: loops where that costs nothing), without what -O3 adds.
 set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/numerics/naive_renderer.cpp
-  PROPERTIES COMPILE_OPTIONS -O2)
+  PROPERTIES COMPILE_OPTIONS -O2 SKIP_PRECOMPILE_HEADERS ON)
 
 # Times under a sanitizer tell nothing.
 if(WINDSPLAT_SANITIZE)
@@ -26,6 +26,8 @@ windsplat_bench(bench_path)
 windsplat_bench(bench_left_out)
 windsplat_bench(bench_pool)
 windsplat_bench(bench_picture)
+windsplat_bench(bench_load)
+target_link_libraries(bench_load PRIVATE PkgConfig::NETCDF)
 
 # windsplat_smoke(<name> <command...>)
 function(windsplat_smoke name)
@@ -35,7 +37,7 @@ function(windsplat_smoke name)
 endfunction()
 
 # Sanitizers need memory of their own.
-set(memory_limit --max-mb=80)
+set(memory_limit --max-mb=100)
 if(WINDSPLAT_SANITIZE)
   set(memory_limit --size=64x48 --dims=32x16x8)
 endif()
@@ -48,9 +50,20 @@ file(WRITE ${PROJECT_BINARY_DIR}/bench_views.jsonl "{\"image\":{\"width\":32,\"h
 windsplat_smoke(path bench_path tornado bench_views.jsonl bench_view.png)
 windsplat_smoke(memory python3 ${bench_dir}/memory.py --program=$<TARGET_FILE:windsplat>
   --frames=4 --sessions=2 ${memory_limit})
+windsplat_smoke(load bench_load --program=$<TARGET_FILE:windsplat> --dims=32x16x8 --rounds=1)
+windsplat_smoke(playback python3 ${bench_dir}/playback.py --program=$<TARGET_FILE:windsplat>
+  --dims=32x16x8 --steps=6 --size=64x48 --memory-limit=512M)
+windsplat_smoke(budgets python3 ${bench_dir}/budgets.py --program=$<TARGET_FILE:windsplat>
+  --dataset=climate:32x16x6 --size=160x120 --frames=10 --rest=1 --budgets=16,66 --max-errors=0.05)
+windsplat_smoke(links python3 ${bench_dir}/links.py --program=$<TARGET_FILE:windsplat> --smoke)
+windsplat_smoke(viewers python3 ${bench_dir}/viewers.py --program=$<TARGET_FILE:windsplat> --smoke)
 # Where there is no VTK it only says so.
 windsplat_smoke(peers python3 ${bench_dir}/peers/compare.py --build=${PROJECT_BINARY_DIR}
   --frames=1 --sizes=64x48 --dims=32x16x8 --slow)
 windsplat_smoke(peers_only python3 ${bench_dir}/peers/compare.py --only=nothing-matches)
 set_tests_properties(bench.peers_only PROPERTIES
   PASS_REGULAR_EXPRESSION "no VTK configuration has 'nothing-matches'")
+windsplat_smoke(soak python3 ${bench_dir}/soak.py --program=$<TARGET_FILE:windsplat> --smoke)
+windsplat_smoke(overload python3 ${bench_dir}/load.py --program=$<TARGET_FILE:windsplat> --smoke)
+windsplat_smoke(soak_tls python3 ${bench_dir}/soak.py --program=$<TARGET_FILE:windsplat> --smoke
+  --tls)

@@ -11,3 +11,66 @@ windsplat_tidy_test(includes python3 tests/tidy/check_includes.py)
 windsplat_tidy_test(style python3 tests/tidy/check_style.py)
 windsplat_tidy_test(self_test python3 tests/tidy/self_test.py)
 windsplat_tidy_test(format scripts/format --check)
+
+# Real files against independent readers, and spoiled ones against a daemon.
+function(windsplat_program_test name)
+  add_test(NAME files.${name} COMMAND ${ARGN} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+  set_tests_properties(files.${name} PROPERTIES LABELS integration TIMEOUT 300
+    ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+endfunction()
+
+# Debian's own, which finds Debian's modules.
+find_program(SYSTEM_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
+windsplat_program_test(real ${SYSTEM_PYTHON} tests/integration/real_files.py
+  --program=$<TARGET_FILE:windsplat>)
+windsplat_program_test(spoiled python3 tests/fuzz/mutate_files.py --program=$<TARGET_FILE:windsplat>
+  --count=300)
+if(NOT WINDSPLAT_SANITIZE)
+  windsplat_program_test(sbom python3 tests/integration/sbom.py --program=$<TARGET_FILE:windsplat>)
+  windsplat_program_test(hardening python3 tests/tidy/check_hardening.py $<TARGET_FILE:windsplat>)
+endif()
+
+# Cases at the edges of HTTP and WebSocket against a daemon. Sanitizers keep what is freed, so that
+# memory tells nothing there, and look for leaks, which strace keeps them from.
+set(edge_options)
+set(attack_options)
+if(WINDSPLAT_SANITIZE)
+  set(edge_options --growth-kib=0)
+  set(attack_options --strace=no)
+endif()
+function(windsplat_edge_test name script)
+  add_test(NAME edge.${name} COMMAND python3 tests/edge/${script}.py
+    --program=$<TARGET_FILE:windsplat> ${edge_options} ${ARGN}
+    WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+  set_tests_properties(edge.${name} PROPERTIES LABELS integration TIMEOUT 300
+    ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+endfunction()
+
+windsplat_edge_test(rfc6455 rfc6455)
+windsplat_edge_test(http11 http11)
+windsplat_edge_test(boundaries boundaries)
+foreach(attack chunked_trailer external_files url_paths)
+  windsplat_edge_test(attack_${attack} attacks --attack=${attack} ${attack_options})
+endforeach()
+
+# Every fault in short; calls of the system that fail, by a library that is preloaded. It stands in
+# for the allocator, which sanitizers bring of their own.
+function(windsplat_fault_test name script)
+  add_test(NAME faults.${name} COMMAND python3 tests/faults/${script} ${ARGN}
+    --program=$<TARGET_FILE:windsplat> --quick WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+  set_tests_properties(faults.${name} PROPERTIES LABELS integration TIMEOUT 600 RUN_SERIAL ON
+    ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+endfunction()
+
+set(fault_slack 4)
+if(WINDSPLAT_SANITIZE)
+  set(fault_slack 20)
+else()
+  add_library(faults_shim SHARED ${CMAKE_CURRENT_LIST_DIR}/faults/shim.cpp)
+  target_link_libraries(faults_shim PRIVATE ${CMAKE_DL_LIBS})
+  target_compile_options(faults_shim PRIVATE -O1 -fno-builtin)
+  windsplat_fault_test(inject inject.py --shim=$<TARGET_FILE:faults_shim>)
+endif()
+# Times that are asserted may be so much longer: tests share the machine, and sanitizers are slow.
+windsplat_fault_test(table faults.py --slack=${fault_slack})
+windsplat_fault_test(signals signals.py --slack=${fault_slack})

@@ -50,6 +50,20 @@ def stiffness(rows):
         print("| %s | " % ("%g" % tau).replace("e+", "e") + " | ".join(cells) + " |")
 
 
+def calibrations(scenes):
+    print("| sample | errors told | compared | within a factor of 2 | median, told over true | "
+          "within the bound |")
+    print("|---|---|---|---|---|---|")
+    for scene in scenes:
+        for row in scene["calibration"]["agreement"]:
+            bound = "%.1f %%" % (100 * row["bounded"])
+            if row["of"] in ("measured", "jpeg"):
+                bound = ""
+            print("| %s | %s | %d | %.1f %% | %.2f | %s |" % (
+                scene["name"], row["of"], row["count"], 100 * row["withinTwo"], row["median"],
+                bound))
+
+
 def main():
     with open(sys.argv[1], encoding="utf-8") as file:
         study = json.load(file)
@@ -60,6 +74,10 @@ def main():
             methods(scene)
     print()
     stiffness(study["stability"])
+    calibrated = [scene for scene in study["scenes"] if "calibration" in scene]
+    if calibrated:
+        print()
+        calibrations(calibrated)
 
 
 main()

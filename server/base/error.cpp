@@ -89,4 +89,11 @@ std::string printable(std::string_view text, std::size_t bytes_max) {
   return out;
 }
 
+std::string in_quotes(std::string_view name) {
+  std::string out(1, '\'');
+  out += printable(name);
+  out += '\'';
+  return out;
+}
+
 }  // namespace windsplat

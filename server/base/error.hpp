@@ -19,6 +19,7 @@ enum class ErrorKind {
   not_found,      // 404, exit 1
   bad_data,       // 422 from a loader, exit 3: the file is not what it should be
   too_large,      // 413, exit 2: more pixels, bytes or work than the limit
+  not_resident,   // 409, exit 1: the data are not in memory yet
   busy,           // 429, exit 1
   draining,       // 503, exit 1
   out_of_memory,  // 507, exit 1: over the memory limit
@@ -36,6 +37,7 @@ struct Error {
   ErrorKind kind = ErrorKind::internal;
   std::string message;         // one sentence that names the place and the limit
   std::vector<FieldError> at;  // empty unless a value of a document is at fault
+  int retry_after_s = 0;       // of busy, where it is known; 0: soon
 };
 
 // Asking a failed Result for its value is a bug in the caller.
@@ -58,5 +60,8 @@ Error make_error_at(ErrorKind kind, std::string pointer, std::string detail);
 // U+2029, bidirectional controls) and bytes that are not UTF-8 become \xNN; what is cut ends with
 // "...".
 std::string printable(std::string_view text, std::size_t bytes_max = 200);
+
+// The same between single quotes: a name from a file or a user, fit for a message.
+std::string in_quotes(std::string_view name);
 
 }  // namespace windsplat

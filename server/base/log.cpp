@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <exception>
 #include <memory>
 #include <mutex>
 
@@ -133,7 +134,9 @@ std::string json_line(std::string_view time, Level level, std::string_view messa
   return line + '}';
 }
 
-void write(Level level, std::string_view message, Fields fields) {
+namespace {
+
+void write_line(Level level, std::string_view message, Fields fields) {
   Sink& shared = sink();
   std::shared_ptr<spdlog::logger> logger;
   Format format = Format::text;
@@ -146,6 +149,18 @@ void write(Level level, std::string_view message, Fields fields) {
   const std::string line = format == Format::json ? json_line(now_utc(), level, message, fields)
                                                   : text_line(message, fields);
   logger->log(spdlog_level(level), spdlog::string_view_t(line));
+}
+
+}  // namespace
+
+void write(Level level, std::string_view message, Fields fields) {
+  try {
+    write_line(level, message, fields);
+  } catch (const std::exception&) {
+    // No memory for the line: who logs because something failed must not fail by that.
+    constexpr std::string_view lost = "a line of the log is lost: no memory\n";
+    (void)std::fwrite(lost.data(), 1, lost.size(), stderr);
+  }
 }
 
 }  // namespace windsplat::log

@@ -22,11 +22,12 @@ Error file_error(const char* what, const fs::path& path, int fault) {
   message += printable(path.native());
   message += "': ";
   message += std::generic_category().message(fault);
-  return make_error(ErrorKind::internal, std::move(message));
+  const bool full = fault == ENOSPC || fault == EDQUOT;
+  return make_error(full ? ErrorKind::out_of_memory : ErrorKind::internal, std::move(message));
 }
 
 // 0, or the errno of what failed.
-int write_and_close(int file, std::string_view bytes) {
+int write_and_close(int file, std::string_view bytes, Sync sync = Sync::later) {
   int fault = 0;
   for (std::size_t done = 0; done < bytes.size() && fault == 0;) {
     const ssize_t wrote = ::write(file, bytes.data() + done, bytes.size() - done);
@@ -36,6 +37,7 @@ int write_and_close(int file, std::string_view bytes) {
       fault = errno;
     }
   }
+  if (fault == 0 && sync == Sync::now && ::fsync(file) != 0) fault = errno;
   if (::close(file) != 0 && fault == 0) fault = errno;
   return fault;
 }
@@ -62,7 +64,7 @@ int create(const fs::path& path) {
 
 }  // namespace
 
-Result<void> write_whole_file(const fs::path& path, std::string_view bytes) {
+Result<void> write_whole_file(const fs::path& path, std::string_view bytes, Sync sync) {
   std::error_code ignored;
   const fs::file_status status = fs::status(path, ignored);
   const bool replaces = fs::is_regular_file(status);
@@ -75,11 +77,23 @@ Result<void> write_whole_file(const fs::path& path, std::string_view bytes) {
   const int file = create(part);
   if (file < 0) return file_error("cannot create", path, errno);
   if (replaces) fs::permissions(part, status.permissions(), ignored);
-  int fault = write_and_close(file, bytes);
+  int fault = write_and_close(file, bytes, sync);
   if (fault == 0 && ::rename(part.c_str(), target.c_str()) != 0) fault = errno;
-  if (fault == 0) return {};
-  fs::remove(part, ignored);
-  return file_error("cannot write", path, fault);
+  if (fault != 0) {
+    fs::remove(part, ignored);
+    return file_error("cannot write", path, fault);
+  }
+  if (sync == Sync::later) return {};
+  return sync_folder(target.has_parent_path() ? target.parent_path() : fs::path("."));
+}
+
+Result<void> sync_folder(const fs::path& folder) {
+  const int handle = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (handle < 0) return file_error("cannot open", folder, errno);
+  const int fault = ::fsync(handle) == 0 ? 0 : errno;
+  ::close(handle);
+  if (fault != 0) return file_error("cannot write", folder, fault);
+  return {};
 }
 
 }  // namespace windsplat

@@ -1,6 +1,7 @@
 // Bytes -> a file that is there whole or not at all.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string_view>
 
@@ -11,7 +12,12 @@ namespace windsplat {
 // A regular file is written beside its place and renamed into it, so that a reader sees the old
 // file or the new one, and a failure leaves the old one alone; of a symbolic link, the file that it
 // leads to. What is no regular file (a device, a pipe) is written to as it is and never removed.
-// Errors: internal.
-Result<void> write_whole_file(const std::filesystem::path& path, std::string_view bytes);
+// Errors: internal; out_of_memory where the disk is full.
+enum class Sync : std::uint8_t { later, now };  // now: it outlasts the machine's going down
+Result<void> write_whole_file(const std::filesystem::path& path, std::string_view bytes,
+                              Sync sync = Sync::later);
+
+// The names in a folder as they are now: what was made, renamed or removed stays so.
+Result<void> sync_folder(const std::filesystem::path& folder);
 
 }  // namespace windsplat

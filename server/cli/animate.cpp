@@ -28,7 +28,7 @@ using Clock = std::chrono::steady_clock;
 constexpr int per_step_max = 1000;
 constexpr std::size_t digits_max = 9;
 
-struct Arguments {
+struct AnimateArguments {
   ViewArguments view;
   std::string steps;
   std::string output;
@@ -163,7 +163,7 @@ bool draws_lines(const protocol::View& view, const data::DatasetInfo& info) {
   return info.first(data::FieldKind::vector) != nullptr;
 }
 
-Result<Plan> plan_of(const Arguments& arguments, const data::DatasetInfo& info,
+Result<Plan> plan_of(const AnimateArguments& arguments, const data::DatasetInfo& info,
                      const protocol::View& view) {
   const int step_count = static_cast<int>(info.steps.size());
   Plan plan;
@@ -207,7 +207,7 @@ Error interrupted(int done, int total) {
                                               " of " + std::to_string(total) + " frames");
 }
 
-Result<void> animate(const Arguments& arguments, const CancelToken& cancel) {
+Result<void> animate(const AnimateArguments& arguments, const CancelToken& cancel) {
   const auto document = assemble_view(arguments.view);
   if (!document) return document.error();
   const auto dataset = open_dataset(arguments.view.dataset);
@@ -242,7 +242,7 @@ Result<void> animate(const Arguments& arguments, const CancelToken& cancel) {
 
 void add_animate(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand("animate", "Draw a picture a time step");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<AnimateArguments>();
   add_view_options(*command, arguments->view);
   command
       ->add_option("--steps", arguments->steps, "First and last step, and a stride; default: all")

@@ -5,8 +5,10 @@
 #include <exception>
 #include <iostream>
 #include <new>
+#include <string_view>
 
 #include "server/cli/command.hpp"
+#include "server/data/loader/loader.hpp"
 
 namespace windsplat::cli {
 namespace {
@@ -43,6 +45,8 @@ int run(int argc, const char* const* argv) {
   // A reader that goes away is an error of write, not the end of the process.
   std::signal(SIGPIPE, SIG_IGN);
   try {
+    if (argc == 2 && std::string_view(argv[1]) == "load") return load();
+    data::loader::set_program("/proc/self/exe");
     CLI::App app(description, "windsplat");
     app.set_version_flag("--version", "windsplat " WINDSPLAT_VERSION);
     app.require_subcommand(1);

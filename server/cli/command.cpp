@@ -49,6 +49,7 @@ int exit_code(ErrorKind kind) {
     case ErrorKind::bad_data:
       return exit_bad_data;
     case ErrorKind::not_found:
+    case ErrorKind::not_resident:
     case ErrorKind::busy:
     case ErrorKind::draining:
     case ErrorKind::out_of_memory:

@@ -32,6 +32,9 @@ void add_synth(CLI::App& app, Action& chosen);
 void add_healthcheck(CLI::App& app, Action& chosen);
 void add_study(CLI::App& app, Action& chosen);
 
+// `load`, which is not for people: how the program reads files apart. Returns the exit code.
+int load();
+
 // --threads N, or WINDSPLAT_THREADS; 0, the default, means one a hardware thread.
 void add_threads_option(CLI::App& command, unsigned& threads);
 

@@ -1,8 +1,10 @@
 // windsplat healthcheck: asks a running daemon whether it is ready.
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "server/cli/command.hpp"
+#include "server/cli/settings_file.hpp"
 #include "server/net/server.hpp"
 
 namespace windsplat::cli {
@@ -11,10 +13,16 @@ namespace {
 constexpr int timeout_s = 5;
 constexpr int http_ok = 200;
 
-int healthcheck(std::string url) {
+int healthcheck(std::string url, const std::string& ca_file) {
+  std::string ca;
+  if (!ca_file.empty()) {
+    auto text = read_settings_file(ca_file, net::pem_bytes_max);
+    if (!text) return answer(text.error());
+    ca = std::move(*text);
+  }
   if (url.empty() || url.back() != '/') url += '/';
   url += "readyz";
-  const auto status = net::http_status(url, timeout_s);
+  const auto status = net::http_status(url, timeout_s, ca);
   if (!status) return answer(status.error());
   if (*status == http_ok) return exit_ok;
   complain(printable(url) + " answers " + std::to_string(*status));
@@ -31,7 +39,14 @@ void add_healthcheck(CLI::App& app, Action& chosen) {
       ->envname("WINDSPLAT_URL")
       ->type_name("URL")
       ->capture_default_str();
-  command->callback([&chosen, url] { chosen = [url] { return healthcheck(*url); }; });
+  const auto ca = std::make_shared<std::string>();
+  command
+      ->add_option("--ca", *ca,
+                   "Of https: trust these certificates (PEM), the daemon's own or its issuer's, in "
+                   "place of the system's")
+      ->envname("WINDSPLAT_CA")
+      ->type_name("FILE");
+  command->callback([&chosen, url, ca] { chosen = [url, ca] { return healthcheck(*url, *ca); }; });
 }
 
 }  // namespace windsplat::cli

@@ -5,23 +5,23 @@
 #include "protocol/codec.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/inspect_text.hpp"
+#include "server/cli/open_store.hpp"
 #include "server/data/store.hpp"
 #include "server/scene/describe.hpp"
 
 namespace windsplat::cli {
 namespace {
 
-constexpr std::uint64_t resident_bytes_max = 8ULL << 30;
 // Ranges are over the whole series where reading it takes moments, else over the first step.
 constexpr std::uint64_t whole_series_bytes_max = 1ULL << 30;
 
-struct Arguments {
+struct InspectArguments {
   std::string dataset;
   bool json = false;
 };
 
-Result<void> inspect(const Arguments& arguments) {
-  data::Store store(resident_bytes_max);
+Result<void> inspect(const InspectArguments& arguments) {
+  data::Store store(store_options(command_bytes_max));
   const auto dataset = store.add(arguments.dataset);
   if (!dataset) return dataset.error();
   auto description = scene::describe(**dataset, scene::RangesOf::none);
@@ -39,7 +39,7 @@ Result<void> inspect(const Arguments& arguments) {
 void add_inspect(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand(
       "inspect", "Say what is in a file: axes, fields, ranges, steps, what is left out and why");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<InspectArguments>();
   command->add_option("file", arguments->dataset, "A file, or a sample's name")
       ->required()
       ->type_name("FILE");

@@ -111,7 +111,7 @@ std::string fields_text(const protocol::DatasetDescription& dataset) {
   std::vector<Row> rows;
   bool whole = false;
   for (const protocol::FieldDescription& field : dataset.fields) {
-    whole = field.range_of == "all";
+    whole = whole || field.range_of == "all";
     std::string kind = field.kind;
     if (field.kind == "vector") {
       kind += " (";
@@ -121,7 +121,7 @@ std::string fields_text(const protocol::DatasetDescription& dataset) {
       }
       kind += ')';
     }
-    std::string range = "no value";
+    std::string range = field.masked ? "no value" : "made when shown";
     if (field.range) {
       range = field.kind == "vector" ? "|v| " : "";
       range.append(number((*field.range)[0])).append(" .. ").append(number((*field.range)[1]));
@@ -169,6 +169,14 @@ std::string inspect_text(const protocol::DatasetDescription& dataset) {
       rows.push_back({word(variable), printable(reason)});
     }
     out += "\nleft out\n" + table(rows);
+  }
+  if (!dataset.notes.empty()) {
+    out += "\nnotes\n";
+    for (const std::string& note : dataset.notes) {
+      out += "  ";
+      out += printable(note);
+      out += '\n';
+    }
   }
   return out;
 }

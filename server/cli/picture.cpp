@@ -7,14 +7,9 @@
 
 #include "protocol/limits.hpp"
 #include "server/cli/command.hpp"
+#include "server/cli/open_store.hpp"
 
 namespace windsplat::cli {
-namespace {
-
-constexpr std::uint64_t resident_bytes_max = 8ULL << 30;
-
-}  // namespace
-
 void add_view_options(CLI::App& command, ViewArguments& arguments) {
   command.add_option("dataset", arguments.dataset, "A sample's name or a file")
       ->required()
@@ -85,7 +80,7 @@ frame::Encoding file_encoding(frame::Format format, int quality) {
 
 Result<std::shared_ptr<data::Dataset>> open_dataset(const std::string& sample_or_path) {
   // The store keeps nothing that its datasets need after it.
-  return data::Store(resident_bytes_max).add(sample_or_path);
+  return data::Store(store_options(command_bytes_max)).add(sample_or_path);
 }
 
 }  // namespace windsplat::cli

@@ -15,7 +15,7 @@
 namespace windsplat::cli {
 namespace {
 
-struct Arguments {
+struct RenderArguments {
   ViewArguments view;
   std::string output;
   std::string report;  // empty: none
@@ -31,7 +31,7 @@ Result<void> write_report(const std::string& path, const frame::Frame& picture) 
   return write_output(path, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
-Result<void> render(const Arguments& arguments) {
+Result<void> render(const RenderArguments& arguments) {
   const bool to_stdout = arguments.output == "-";
   if (to_stdout && arguments.report == "-") {
     return make_error(ErrorKind::invalid, "--report -: the picture goes to stdout already");
@@ -63,7 +63,7 @@ Result<void> render(const Arguments& arguments) {
 
 void add_render(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand("render", "Draw one picture");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<RenderArguments>();
   add_view_options(*command, arguments->view);
   command->add_option("--step", arguments->view.step, "Time step, from 0")->type_name("N");
   command->add_option("-o", arguments->output, "out.png, .jpg or .npy; - writes a PNG to stdout")

@@ -1,110 +1,143 @@
-// windsplat serve: datasets opened in order, then the daemon until SIGTERM or SIGINT.
+// windsplat serve: datasets opened in order, then the daemon until SIGTERM or SIGINT; SIGHUP has it
+// read its configuration, token and certificate again.
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
+#include <array>
+#include <chrono>
+#include <exception>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
-#include "protocol/limits.hpp"
 #include "server/base/log.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/cli/command.hpp"
-#include "server/cli/listen_address.hpp"
+#include "server/cli/config_file.hpp"
+#include "server/cli/open_store.hpp"
+#include "server/cli/serve_settings.hpp"
 #include "server/cli/signals.hpp"
 #include "server/data/store.hpp"
 #include "server/net/server.hpp"
+#include "server/views/saved_views.hpp"
 
 namespace windsplat::cli {
 namespace {
 
-constexpr int sessions_max = 100000;
-constexpr int idle_timeout_s_max = 7 * 24 * 3600;
+// What a running daemon takes over; the rest waits for the next start.
+constexpr std::array<std::string_view, 8> live_options{"token-file",   "tls-cert",   "tls-key",
+                                                       "allow-origin", "allow-host", "allow-remote",
+                                                       "log-format",   "log-level"};
 
-struct Arguments {
-  std::vector<std::string> datasets;
-  std::string listen = "127.0.0.1:8080";
-  bool allow_remote = false;
-  std::string base_path = "/";
-  std::string memory_limit = "8G";
-  unsigned threads = 0;
-  int sessions = protocol::limits::sessions_max_default;
-  std::vector<std::string> origins;
-  int idle_timeout_s = 300;
-  std::string log_format = "text";
-};
+// At the end of the daemon. A disk may never answer.
+constexpr std::chrono::seconds reload_patience{1};
 
-// The watching thread needs the server, which does not exist until the datasets are open.
-class Drain {
+void configure_log(const ServeArguments& arguments) {
+  log::configure(arguments.log_format == "json" ? log::Format::json : log::Format::text,
+                 log::parse_level(arguments.log_level).value_or(log::Level::info));
+}
+
+// The signals' side of the daemon. The watching thread needs the server, which does not exist until
+// the datasets are open.
+class Control {
  public:
-  void arm(net::Server* server) {
-    const std::lock_guard lock(mutex_);
-    server_ = server;
+  explicit Control(const CLI::App& given) : given_(given) {}
+
+  // What was wanted before there was a server to change is done now.
+  void arm(net::Server& server, std::unique_ptr<ServeSettings> started) {
+    started_ = std::move(started);
+    tls_ = started_->options.tls;
+    while (true) {
+      {
+        const std::lock_guard lock(mutex_);
+        if (!reload_wanted_) {
+          server_ = &server;
+          return;
+        }
+        reload_wanted_ = false;
+      }
+      reload_now([&server](net::Access access) { server.change(std::move(access)); });
+    }
   }
-  // Before there is anything to drain the program just ends.
-  void operator()() {
+  void disarm() {
+    const std::lock_guard lock(mutex_);
+    server_ = nullptr;
+  }
+
+  // Before there is anything to drain the program just ends. It waits for no reload.
+  void drain() {
     const std::lock_guard lock(mutex_);
     if (server_ == nullptr) _exit(exit_ok);
-    log::info("draining");
     server_->drain();
+    log::info("draining");
+  }
+
+  // By one thread. Before there is anything to change it is done when there is.
+  void reload() {
+    {
+      const std::lock_guard lock(mutex_);
+      reload_wanted_ = server_ == nullptr;
+      if (reload_wanted_) return;
+    }
+    reload_now([this](net::Access access) {
+      const std::lock_guard lock(mutex_);
+      if (server_ != nullptr) server_->change(std::move(access));
+    });
   }
 
  private:
-  std::mutex mutex_;
-  net::Server* server_ = nullptr;
-};
-
-Result<void> configure_log(const std::string& format) {
-  log::Level level = log::Level::info;
-  if (const char* name = std::getenv("WINDSPLAT_LOG_LEVEL"); name != nullptr && *name != '\0') {
-    const auto parsed = log::parse_level(name);
-    if (!parsed) {
-      return make_error(ErrorKind::malformed,
-                        "WINDSPLAT_LOG_LEVEL is debug, info, warn, error or "
-                        "off, not '" +
-                            printable(name) + "'");
+  // All of it or nothing, also where memory or threads are short.
+  void reload_now(const std::function<void(net::Access)>& change) {
+    try {
+      take_over(change);
+    } catch (const std::exception& fault) {
+      log::error("the configuration stays as it was", {{"fault", fault.what()}});
     }
-    level = *parsed;
   }
-  log::configure(format == "json" ? log::Format::json : log::Format::text, level);
-  return {};
-}
 
-// Letters that need no escape in a URL, in segments between single slashes.
-bool is_base_path(const std::string& path) {
-  if (path.empty() || path.front() != '/' || path.find("//") != std::string::npos) return false;
-  return std::all_of(path.begin(), path.end(), [](unsigned char c) {
-    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-    return letter || c == '/' || c == '-' || c == '_' || c == '.' || c == '~';
-  });
-}
+  // Reads for as long as a disk takes: the lock is `change`'s business.
+  void take_over(const std::function<void(net::Access)>& change) {
+    const auto fresh = read_settings(given_);
+    if (!fresh) return refuse(fresh.error());
+    const ServeSettings& settings = **fresh;
+    // The address stays what it is, so the rule is asked of that one, too.
+    const auto exposed = check_exposure(settings.arguments, started_->options.local_hosts_only);
+    if (!exposed) return refuse(exposed.error());
+    for (const std::string& name : changed_options(started_->command, settings.command)) {
+      if (std::find(live_options.begin(), live_options.end(), name) == live_options.end()) {
+        log::warn("an option has changed that needs a restart", {{"option", name}});
+      }
+    }
+    const net::ServerOptions& options = settings.options;
+    auto tls = tls_;
+    if ((tls != nullptr) != (options.tls != nullptr)) {
+      log::warn("whether TLS is spoken needs a restart", {{"option", "tls-cert"}});
+    } else {
+      tls = options.tls;
+    }
+    warn_of(settings);
+    change(
+        {options.allow_origins, options.token, tls, options.known_hosts_only, options.allow_hosts});
+    tls_ = std::move(tls);
+    configure_log(settings.arguments);
+    log::info("read the configuration again");
+  }
 
-Result<net::ServerOptions> server_options(const Arguments& arguments) {
-  const auto listen = parse_listen_address(arguments.listen);
-  if (!listen) return listen.error();
-  if (!listen->loopback && !arguments.allow_remote) {
-    return make_error(
-        ErrorKind::invalid,
-        "--listen '" + printable(arguments.listen) +
-            "' can be reached from other machines, and nobody who reaches it is asked "
-            "who they are; say --allow-remote if that is wanted");
+  static void refuse(const Error& error) {
+    log::error("the configuration stays as it was", {{"fault", error.message}});
   }
-  if (!is_base_path(arguments.base_path)) {
-    return make_error(ErrorKind::malformed, "--base-path '" + printable(arguments.base_path) +
-                                                "' is not of the form /windsplat/");
-  }
-  net::ServerOptions options;
-  options.address = listen->address;
-  options.port = listen->port;
-  options.local_hosts_only = listen->loopback;
-  options.base_path = arguments.base_path;
-  options.sessions_max = arguments.sessions;
-  options.idle_timeout_s = arguments.idle_timeout_s;
-  options.allow_origins = arguments.origins;
-  return options;
-}
+
+  const CLI::App& given_;
+  std::unique_ptr<ServeSettings> started_;
+  std::shared_ptr<net::TlsContext> tls_;  // the newest
+  std::mutex mutex_;                      // of the rest, held for moments
+  net::Server* server_ = nullptr;
+  bool reload_wanted_ = false;
+};
 
 // All or none: a daemon that serves half of what it was asked to is harder to notice than none.
 Result<void> open_datasets(const std::vector<std::string>& named, data::Store& store) {
@@ -121,66 +154,40 @@ Result<void> open_datasets(const std::vector<std::string>& named, data::Store& s
   return {};
 }
 
-int serve(const Arguments& arguments) {
-  if (const auto ok = configure_log(arguments.log_format); !ok) return answer(ok.error());
-  const auto options = server_options(arguments);
-  if (!options) return answer(options.error());
-  const auto memory_bytes = parse_bytes(arguments.memory_limit);
-  if (!memory_bytes) {
-    complain("--memory-limit '" + printable(arguments.memory_limit) +
-             "' is not a number of bytes such as 512M or 8G");
-    return exit_usage;
-  }
+int serve(const CLI::App& given) {
+  const auto control = std::make_shared<Control>(given);
+  SignalWatch signals([control] { control->drain(); }, [control] { control->reload(); });
+  auto settings = read_settings(given);
+  if (!settings) return answer(settings.error());
+  const ServeArguments arguments = (*settings)->arguments;
+  configure_log(arguments);
+  net::ServerOptions options = (*settings)->options;
+  warn_of(**settings);
 
-  const auto drain = std::make_shared<Drain>();
-  const SignalWatch signals([drain] { (*drain)(); });
-  const auto store = std::make_shared<data::Store>(*memory_bytes);
+  const auto store = std::make_shared<data::Store>(store_options(
+      parse_bytes(arguments.memory_limit).value_or(0),
+      arguments.storage == "packed16" ? data::Storage::packed16 : data::Storage::float32));
   if (const auto ok = open_datasets(arguments.datasets, *store); !ok) return answer(ok.error());
-  net::Server server(*options, store, std::make_shared<ThreadPool>(arguments.threads));
+  auto views = views::SavedViews::open({arguments.state_dir});
+  if (!views) return answer(views.error());
+  options.views = std::move(*views);
+  net::Server server(std::move(options), store, std::make_shared<ThreadPool>(arguments.threads));
   if (const auto ok = server.listen(); !ok) return answer(ok.error());
-  drain->arm(&server);
+  const std::string url = server.url();
+  control->arm(server, std::move(*settings));
   int code = exit_ok;
-  if (const auto ok = write_stdout(server.url() + "\n"); !ok) {
+  if (const auto ok = write_stdout(url + "\n"); !ok) {
     code = answer(ok.error());
   } else {
     server.run();
     log::info("drained");
   }
-  drain->arm(nullptr);  // from here on a signal ends the program
+  control->disarm();  // from here on a signal ends the program
+  if (!signals.settle(reload_patience)) {
+    log::warn("a configuration that is still read is waited for no longer");
+    _exit(code);
+  }
   return code;
-}
-
-void add_network_options(CLI::App& command, Arguments& arguments) {
-  command.add_option("--listen", arguments.listen, "Where; port 0: any free one")
-      ->envname("WINDSPLAT_LISTEN")
-      ->type_name("HOST:PORT")
-      ->capture_default_str();
-  command
-      .add_flag("--allow-remote", arguments.allow_remote,
-                "Allow an address that other machines reach (needed in a container). Nobody is "
-                "asked who they are: put a proxy in front that does")
-      ->envname("WINDSPLAT_ALLOW_REMOTE");
-  command.add_option("--base-path", arguments.base_path, "Below which path of a proxy's it stands")
-      ->envname("WINDSPLAT_BASE_PATH")
-      ->type_name("PATH")
-      ->capture_default_str();
-  command
-      .add_option("--allow-origin", arguments.origins,
-                  "A further web origin whose pages may connect; may be repeated")
-      ->envname("WINDSPLAT_ALLOW_ORIGIN")
-      ->allow_extra_args(false)
-      ->delimiter(',')
-      ->type_name("ORIGIN");
-  command.add_option("--max-sessions", arguments.sessions, "Viewers at a time")
-      ->envname("WINDSPLAT_MAX_SESSIONS")
-      ->check(CLI::Range(1, sessions_max))
-      ->type_name("N")
-      ->capture_default_str();
-  command.add_option("--idle-timeout", arguments.idle_timeout_s, "Close a silent session after")
-      ->envname("WINDSPLAT_IDLE_TIMEOUT")
-      ->check(CLI::Range(1, idle_timeout_s_max))
-      ->type_name("SECONDS")
-      ->capture_default_str();
 }
 
 }  // namespace
@@ -188,25 +195,10 @@ void add_network_options(CLI::App& command, Arguments& arguments) {
 void add_serve(CLI::App& app, Action& chosen) {
   CLI::App* command =
       app.add_subcommand("serve", "Serve datasets to browsers; prints the URL to open");
-  const auto arguments = std::make_shared<Arguments>();
-  command
-      ->add_option("datasets", arguments->datasets,
-                   "Samples' names or files; none: all built-in samples")
-      ->type_name("DATASET");
-  add_network_options(*command, *arguments);
-  command
-      ->add_option("--memory-limit", arguments->memory_limit,
-                   "Bytes of data to keep resident, with K, M, G as powers of 1024")
-      ->envname("WINDSPLAT_MEMORY_LIMIT")
-      ->type_name("BYTES")
-      ->capture_default_str();
-  add_threads_option(*command, arguments->threads);
-  command->add_option("--log-format", arguments->log_format, "Of the log on stderr")
-      ->envname("WINDSPLAT_LOG_FORMAT")
-      ->check(CLI::IsMember({"text", "json"}))
-      ->capture_default_str();
-  command->footer("Environment: WINDSPLAT_LOG_LEVEL is debug, info, warn, error or off.");
-  command->callback([&chosen, arguments] { chosen = [arguments] { return serve(*arguments); }; });
+  const auto arguments = std::make_shared<ServeArguments>();
+  add_serve_options(*command, *arguments);
+  command->callback(
+      [&chosen, arguments, command] { chosen = [arguments, command] { return serve(*command); }; });
 }
 
 }  // namespace windsplat::cli

@@ -10,13 +10,27 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdint>
+#include <exception>
+#include <new>
 #include <system_error>
 #include <utility>
+
+#include "server/base/log.hpp"
 
 namespace windsplat::cli {
 namespace {
 
-void watch(int signal_fd, int stop_fd, const std::function<void()>& on_first) {
+// Where memory is short there may be none for the words either.
+void complain_of(const std::exception& fault) noexcept {
+  try {
+    log::error("what a signal asked for was not done", {{"fault", fault.what()}});
+  } catch (const std::bad_alloc&) {
+    log::error("what a signal asked for was not done", {});
+  }
+}
+
+void watch(int signal_fd, int stop_fd, const std::function<void()>& on_first,
+           const std::function<void()>& on_hangup) {
   bool seen = false;
   std::array<pollfd, 2> events{{{signal_fd, POLLIN, 0}, {stop_fd, POLLIN, 0}}};
   while (true) {
@@ -27,19 +41,67 @@ void watch(int signal_fd, int stop_fd, const std::function<void()>& on_first) {
     if ((events[1].revents & POLLIN) != 0) return;
     signalfd_siginfo info{};
     if (read(signal_fd, &info, sizeof info) != sizeof info) continue;
+    if (info.ssi_signo == SIGHUP) {
+      on_hangup();
+      continue;
+    }
     if (seen) _exit(1);
     seen = true;
-    on_first();
+    try {
+      on_first();
+    } catch (const std::exception& fault) {
+      complain_of(fault);
+    }
   }
 }
 
 }  // namespace
 
-SignalWatch::SignalWatch(std::function<void()> on_first) {
+Errand::Errand(std::function<void()> call)
+    : thread_([this, call = std::move(call)] { run(call); }) {}
+
+Errand::~Errand() {
+  end(std::chrono::milliseconds(0));
+  thread_.join();
+}
+
+void Errand::want() {
+  const std::lock_guard lock(mutex_);
+  wanted_ = true;
+  changed_.notify_all();
+}
+
+bool Errand::end(std::chrono::milliseconds patience) {
+  std::unique_lock lock(mutex_);
+  ending_ = true;
+  changed_.notify_all();
+  return changed_.wait_for(lock, patience, [this] { return ended_; });
+}
+
+void Errand::run(const std::function<void()>& call) {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return wanted_ || ending_; });
+    if (ending_) break;
+    wanted_ = false;
+    lock.unlock();
+    try {
+      call();
+    } catch (const std::exception& fault) {
+      complain_of(fault);
+    }
+    lock.lock();
+  }
+  ended_ = true;
+  changed_.notify_all();
+}
+
+SignalWatch::SignalWatch(std::function<void()> on_first, std::function<void()> on_hangup) {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
+  if (on_hangup) sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal_fd_ = signalfd(-1, &signals, SFD_CLOEXEC);
   stop_fd_ = eventfd(0, EFD_CLOEXEC);
@@ -49,8 +111,14 @@ SignalWatch::SignalWatch(std::function<void()> on_first) {
     close(stop_fd_);
     throw std::system_error(fault, std::generic_category(), "cannot wait for signals");
   }
-  watcher_ = std::thread(
-      [this, on_first = std::move(on_first)] { watch(signal_fd_, stop_fd_, on_first); });
+  if (on_hangup) hangup_.emplace(std::move(on_hangup));
+  watcher_ = std::thread([this, on_first = std::move(on_first)] {
+    watch(signal_fd_, stop_fd_, on_first, [this] { hangup_->want(); });
+  });
+}
+
+bool SignalWatch::settle(std::chrono::milliseconds patience) {
+  return !hangup_ || hangup_->end(patience);
 }
 
 SignalWatch::~SignalWatch() {

@@ -17,6 +17,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/cli/command.hpp"
+#include "server/cli/open_store.hpp"
 #include "server/cli/signals.hpp"
 #include "server/data/store.hpp"
 #include "server/engine/reference/reference.hpp"
@@ -25,13 +26,12 @@
 namespace windsplat::cli {
 namespace {
 
-constexpr std::uint64_t resident_bytes_max = 8ULL << 30;
 constexpr int bar_width = 28;
 // Of the integral: a hundredth of the least error that a picture of floats in few layers has.
 constexpr double truth_tolerance = 1e-7;
 constexpr double quick_tolerance = 1e-6;
 
-struct Arguments {
+struct StudyArguments {
   std::string dataset;
   bool standard = false;
   std::vector<std::string> scenes;
@@ -39,6 +39,7 @@ struct Arguments {
   std::string size;
   bool quick = false;
   bool no_reference = false;
+  bool no_calibration = false;
   unsigned threads = 0;
   std::string output;
 };
@@ -81,7 +82,7 @@ class Reporter {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-Result<study::Subject> given_subject(const Arguments& arguments, data::Store& store) {
+Result<study::Subject> given_subject(const StudyArguments& arguments, data::Store& store) {
   std::string text = "{}";
   if (!arguments.view_file.empty()) {
     auto file = read_text_file(arguments.view_file, protocol::limits::message_bytes_max);
@@ -107,7 +108,8 @@ Result<study::Subject> given_subject(const Arguments& arguments, data::Store& st
   return study::make_subject(view.dataset, *dataset, view, size);
 }
 
-Result<std::vector<study::Subject>> subjects_of(const Arguments& arguments, data::Store& store) {
+Result<std::vector<study::Subject>> subjects_of(const StudyArguments& arguments,
+                                                data::Store& store) {
   std::vector<study::Subject> subjects;
   if (!arguments.dataset.empty()) {
     if (arguments.standard || !arguments.scenes.empty()) {
@@ -147,13 +149,20 @@ std::string summary(const study::Report& report, const std::string& folder) {
   text += ", " + std::to_string(report.skipped) + " skipped (measured before), in ";
   text += study::format_number("%.1f", report.seconds) + " s: ";
   text += printable(folder) + "/index.html\n";
+  for (const study::SceneReport& scene : report.scenes) {
+    if (!scene.calibration) continue;
+    const study::Agreement of = study::agreement(*scene.calibration);
+    text += printable(scene.name) + ": errors told are within a factor of 2 of the true ones for ";
+    text += study::format_number("%.1f", 100 * of.within_two) + " % of ";
+    text += std::to_string(of.count) + " pictures of views not seen before\n";
+  }
   return text;
 }
 
-int study_command(const Arguments& arguments) {
+int study_command(const StudyArguments& arguments) {
   const CancelToken cancel;
   const SignalWatch watch([&cancel] { cancel.cancel(); });
-  data::Store store(resident_bytes_max);
+  data::Store store(store_options(command_bytes_max));
   const auto subjects = subjects_of(arguments, store);
   if (!subjects) return answer(subjects.error());
   ThreadPool pool(arguments.threads);
@@ -161,6 +170,7 @@ int study_command(const Arguments& arguments) {
   options.folder = arguments.output;
   options.quick = arguments.quick;
   options.tolerance = arguments.quick ? quick_tolerance : truth_tolerance;
+  options.calibrate = !arguments.no_calibration;
   if (!arguments.no_reference) options.truth = integral(options.tolerance, pool, cancel);
   Reporter reporter(isatty(STDERR_FILENO) == 1);
   const auto report =
@@ -183,7 +193,7 @@ int study_command(const Arguments& arguments) {
 void add_study(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand(
       "study", "Measure error against run time of every method; writes a report into a folder");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<StudyArguments>();
   command->add_option("dataset", arguments->dataset, "A sample's name or a file")
       ->type_name("DATASET");
   command->add_flag("--standard", arguments->standard, "The standard scenes (without a DATASET)");
@@ -196,6 +206,8 @@ void add_study(CLI::App& app, Action& chosen) {
   command->add_flag("--quick", arguments->quick, "Small pictures and few points");
   command->add_flag("--no-reference", arguments->no_reference,
                     "Take no integral: extrapolate the truth from method slab");
+  command->add_flag("--no-calibration", arguments->no_calibration,
+                    "Do not compare the errors that frames are told with true ones");
   command->add_option("-o", arguments->output, "The report's folder; what it holds is not redone")
       ->required()
       ->type_name("DIR");

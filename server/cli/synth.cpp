@@ -9,14 +9,14 @@
 namespace windsplat::cli {
 namespace {
 
-struct Arguments {
+struct SynthArguments {
   std::string sample;
   std::string dims;  // "XxYxZ", empty: the sample's own
   int steps = 0;     // 0: the sample's own
   std::string output;
 };
 
-Result<void> synth(const Arguments& arguments) {
+Result<void> synth(const SynthArguments& arguments) {
   std::array<int, 3> dims{};
   if (!arguments.dims.empty()) {
     const auto extent = parse_extent(arguments.dims, 3);
@@ -41,7 +41,7 @@ Result<void> synth(const Arguments& arguments) {
 
 void add_synth(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand("synth", "Write a built-in sample as a CF netCDF file");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<SynthArguments>();
   command->add_option("sample", arguments->sample, "Which sample")
       ->required()
       ->check(CLI::IsMember(data::sample_names()));

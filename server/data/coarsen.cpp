@@ -60,7 +60,7 @@ class Coarsener {
       coarse_.dims[a] = halved(fine.dims[a], halvings_[a]);
     }
     coarse_.components = fine.components;
-    coarse_.values.resize(coarse_.samples() * static_cast<std::size_t>(fine.components));
+    coarse_.values = Samples(coarse_.samples() * static_cast<std::size_t>(fine.components));
     sum_.resize(static_cast<std::size_t>(fine.dims[0]));
     weight_.resize(sum_.size());
   }

@@ -5,14 +5,20 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/base/error.hpp"
+#include "server/data/files/stamp.hpp"
+#include "server/data/samples.hpp"
 
 namespace windsplat::data {
+
+class Files;
 
 enum class AxisKind { longitude, latitude, pressure, height, depth, level, cartesian };
 
@@ -51,7 +57,8 @@ struct FieldInfo {
   std::vector<std::string> component_units;  // one a component; they may differ (m/s, Pa/s)
   std::string standard_name;
   std::string long_name;
-  std::string dtype;  // of the file: "float32", "int16 packed", ...
+  std::string dtype;     // of the file: "float32", "int16 packed", ...
+  bool derived = false;  // made of other fields when it is asked for, not in the file
 };
 
 // A variable of the file that is not shown, and why.
@@ -71,7 +78,7 @@ struct TimeStep {
 struct Volume {
   std::array<int, 3> dims{};
   int components = 1;  // 1 scalar, 2 a horizontal vector whose third component is zero, 3
-  std::vector<float> values;
+  Samples values;
   std::array<float, 2> range{0, 0};  // of the values, or of a vector's magnitude; unmasked only
   std::int64_t masked = 0;
 
@@ -88,18 +95,27 @@ struct Volume {
 // Counts masked samples, makes a vector's mask common to its components, sets range. Readers and
 // samples call it last. Infinite values are masked too.
 void finish_volume(Volume& volume);
+// The two halves of it. Makes what is not finite NaN in all components; `values` as in Volume.
+void mask_volume(float* values, std::size_t samples, int components);
+// Sets range and masked. False if values are infinite, or NaN in some components only.
+[[nodiscard]] bool measure_volume(Volume& volume);
+
+// |V| of a sample in double, where the square of no float overflows; clamped to what a float can
+// say.
+float magnitude(const float* const* components, int count, std::size_t sample);
 
 // Everything about a dataset that is known without loading a field.
 struct DatasetInfo {
   std::string id;
   std::string title;
   std::string source;  // "built-in sample" or the file's name without its folder
-  std::string format;  // "sample", "netCDF classic", "netCDF-4"
+  std::string format;  // "sample", "netCDF classic", "netCDF-4", "VTK image data", ...
   std::string digest;  // changes whenever the data may have changed
   Grid grid;
   std::vector<FieldInfo> fields;
   std::vector<LeftOut> left_out;
-  std::vector<TimeStep> steps;  // at least one
+  std::vector<std::string> notes;  // what was done to the data: "resampled from 4096 cells ..."
+  std::vector<TimeStep> steps;     // at least one
   std::string time_units;
   std::string time_calendar;  // CF; empty means standard
 
@@ -107,14 +123,44 @@ struct DatasetInfo {
   [[nodiscard]] const FieldInfo* first(FieldKind kind) const;          // null if there is none
 };
 
+// How much of a read is done, from 0 to 1.
+using Progress = std::function<void(double done)>;
+
 // Where a dataset's numbers come from: one implementation a format. Called under the store's lock
-// for that dataset, so it need not be thread-safe itself.
+// for that dataset, so it need not be thread-safe itself, but for cancel().
 class Source {
  public:
   virtual ~Source() = default;
   [[nodiscard]] virtual const DatasetInfo& info() const = 0;
   // field indexes info().fields; 0 <= step < info().steps.size().
   virtual Result<Volume> read(std::size_t field, std::size_t step) = 0;
+  // From any thread: a read in work ends soon, with cancelled, where the source can do that.
+  virtual void cancel() {}
+  // Gives back what is kept for the next read: nothing is read for a while.
+  virtual void release() {}
+  // Files that were opened for it besides those that its location names, as they were then.
+  [[nodiscard]] virtual std::vector<Companion> companions() const { return {}; }
+  // From now on called during reads, on the thread that reads.
+  virtual void on_progress(Progress progress) { progress_ = std::move(progress); }
+
+ protected:
+  void tell_progress(double done) const {
+    if (progress_) progress_(done);
+  }
+
+ private:
+  Progress progress_;
+};
+
+// A source that reads files. It fills memory of the caller's, so that a process apart can read into
+// memory that is shared.
+class FileSource : public Source {
+ public:
+  // All components of a field at a step, as whole arrays one after another, into `out`, which holds
+  // zeros. Masked samples become NaN; what is infinite counts as masked too (finish_volume).
+  virtual Result<void> fill(std::size_t field, std::size_t step, float* out) = 0;
+  // fill(), then finish_volume().
+  Result<Volume> read(std::size_t field, std::size_t step) override;
 };
 
 // Built-in samples, made on the spot and deterministic. name: tornado, climate or efield.
@@ -131,7 +177,10 @@ struct SizedSample {
 };
 std::optional<SizedSample> sized_sample(const std::string& text);
 
-// Opens a local file by its content, whatever its name. Errors: not_found, bad_data.
+// Opens a dataset by the content of its files, whatever their names, in this process.
+// Errors: not_found, bad_data, out_of_memory.
+Result<std::unique_ptr<FileSource>> open_dataset(const std::shared_ptr<Files>& files);
+// The same of a path or pattern (see locate()).
 Result<std::unique_ptr<Source>> open_file(const std::string& path);
 
 // Writes every field and step of a source as CF netCDF-4 that open_file reads back.

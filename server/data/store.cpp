@@ -1,315 +1,121 @@
-// The resident store. One budget of bytes for all datasets of a store: a load reserves its bytes
-// first, evicting the least recently used volumes that nobody holds; every volume is loaded once.
+// The registry: what was named -> one dataset each, opened anew when its files change.
 #include "server/data/store.hpp"
 
 #include <algorithm>
-#include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <exception>
-#include <filesystem>
-#include <list>
 #include <map>
 #include <mutex>
 #include <new>
-#include <optional>
-#include <tuple>
+#include <set>
+#include <thread>
 #include <utility>
 
 #include "server/base/log.hpp"
-#include "server/data/digest.hpp"
+#include "server/data/ahead.hpp"
 
 namespace windsplat::data {
 
 namespace {
 
-// Which volume: the dataset by its number in the budget, field, step, and the digest of how it was
-// coarsened (empty: as it was loaded).
-using Key = std::tuple<std::uint64_t, std::size_t, std::size_t, std::string>;
-using VolumePtr = std::shared_ptr<const Volume>;
+using DatasetPtr = std::shared_ptr<Dataset>;
 
-std::string megabytes(std::uint64_t bytes) {
-  const std::uint64_t tenths = (bytes * 10 + (1U << 19)) >> 20;
-  return std::to_string(tenths / 10) + '.' + std::to_string(tenths % 10) + " MiB";
+// Files whose times are asked for at a look; of a longer series the newest.
+constexpr std::size_t files_watched_max = 64;
+
+Result<std::unique_ptr<Source>> open_here(const Location& location) {
+  auto source = open_dataset(direct_files(location));
+  if (!source) return source.error();
+  return std::unique_ptr<Source>(std::move(*source));
+}
+
+// The state of all files of a dataset that are looked at.
+FileStamp stamp_of_all(const Location& location, const std::vector<Companion>& companions) {
+  std::vector<std::string> paths;
+  if (location.kind == Location::Kind::folder) {
+    for (const char* part : {"", "/.zmetadata", "/.zattrs", "/.zgroup"}) {
+      paths.push_back(location.folder + part);
+    }
+  }
+  const std::size_t count = location.members.size();
+  for (std::size_t i = count - std::min(count, files_watched_max); i < count; ++i) {
+    paths.push_back(location.members[i].path);
+  }
+  for (const Companion& companion : companions) paths.push_back(companion.path);
+  FileStamp out;
+  out.text = std::to_string(count);
+  for (const std::string& path : paths) {
+    const FileStamp one = stamp_of(path);
+    out.text += ';' + one.text;
+    out.changed_s = std::max(out.changed_s, one.changed_s);
+  }
+  return out;
+}
+
+// As they were when the dataset was opened: members as `before`, companions as the source met them.
+std::string stamp_as_opened(FileStamp before, const std::vector<Companion>& companions) {
+  for (const Companion& companion : companions) before.text += ';' + companion.stamp.text;
+  return std::move(before.text);
+}
+
+// A series whose folder has changed may have other members by now. False: nothing was looked at.
+bool match_again(std::optional<Location>& location, std::string& listed) {
+  if (location->kind != Location::Kind::series) return false;
+  std::string now = stamp_of(location->folder).text;
+  if (now == listed) return false;
+  if (auto again = locate_again(*location)) location = std::move(*again);
+  listed = std::move(now);
+  return true;
+}
+
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+// Same text, same files.
+std::string key_of(const Location& location) {
+  std::string key =
+      std::to_string(static_cast<int>(location.kind)) + location.folder + '#' + location.inside;
+  for (const Location::Member& member : location.members) {
+    key += '\n';
+    key += member.path;
+  }
+  return key;
 }
 
 }  // namespace
 
-// The shared budget and the cache it pays for. Thread-safe.
-class Budget {
- public:
-  explicit Budget(std::uint64_t bytes_max) : bytes_max_(bytes_max) {}
-
-  std::uint64_t next_owner() { return owners_.fetch_add(1); }
-
-  // The volume of `key`, from the cache or from `load`, which at most one caller runs at a time
-  // for a key; the others wait and get the same answer. A failure is not remembered.
-  template <class Load>
-  Result<VolumePtr> get(const Key& key, std::uint64_t bytes, const Load& load) {
-    std::unique_lock lock(mutex_);
-    if (const auto there = wait_for(key, lock)) {
-      return *there;
-    }
-    if (!make_room(bytes)) {
-      return no_room(bytes);
-    }
-    const auto entry = std::make_shared<Entry>();
-    entry->bytes = bytes;
-    entries_.emplace(key, entry);
-    used_ += bytes;
-
-    lock.unlock();
-    Result<VolumePtr> answer = load();
-    lock.lock();
-
-    if (answer.has_value()) {
-      recent_.push_front(key);
-      entry->place = recent_.begin();
-      entry->listed = true;
-    } else {
-      used_ -= bytes;
-      entries_.erase(key);
-    }
-    entry->answer.emplace(answer);
-    arrived_.notify_all();
-    return answer;
+struct Store::State {
+  explicit State(StoreOptions given)
+      : options(std::move(given)),
+        budget(std::make_shared<Budget>(options.bytes_max)),
+        ahead(budget) {
+    if (!options.open) options.open = open_here;
   }
 
-  // The same for a volume that is there or on its way; none if nobody has asked for it.
-  std::optional<Result<VolumePtr>> find(const Key& key) {
-    std::unique_lock lock(mutex_);
-    return wait_for(key, lock);
-  }
-
-  [[nodiscard]] std::uint64_t bytes_of(std::uint64_t owner) const {
-    const std::lock_guard lock(mutex_);
-    std::uint64_t bytes = 0;
-    for (const auto& [key, entry] : entries_) {
-      bytes += std::get<0>(key) == owner && entry->listed ? entry->bytes : 0;
-    }
-    return bytes;
-  }
-
-  void forget(std::uint64_t owner) {
-    const std::lock_guard lock(mutex_);
-    for (auto at = recent_.begin(); at != recent_.end();) {
-      const auto next = std::next(at);
-      if (std::get<0>(*at) == owner) {
-        drop(at);
-      }
-      at = next;
-    }
-  }
-
- private:
   struct Entry {
-    std::uint64_t bytes = 0;
-    std::optional<Result<VolumePtr>> answer;  // none while it is being loaded
-    std::list<Key>::iterator place;           // in recent_, if listed
-    bool listed = false;
+    DatasetPtr dataset;
+    std::string key;  // of its files, or the sample's name
+    std::optional<Location> location;
+    std::vector<Companion> companions;
+    std::string listed;   // of a series: the folder's stamp when the pattern was matched last
+    std::string stamp;    // of the files as they were opened
+    std::string refused;  // stamp with which they could not be opened anew
+    std::string problem;
   };
 
-  std::optional<Result<VolumePtr>> wait_for(const Key& key, std::unique_lock<std::mutex>& lock) {
-    const auto found = entries_.find(key);
-    if (found == entries_.end()) {
-      return std::nullopt;
-    }
-    const std::shared_ptr<Entry> entry = found->second;
-    arrived_.wait(lock, [&] { return entry->answer.has_value(); });
-    if (entry->answer->has_value()) {
-      touch(*entry);
-    }
-    return entry->answer;
+  // All under the mutex.
+  [[nodiscard]] const Entry* find(const std::string& id) const {
+    const auto at = std::find_if(entries.begin(), entries.end(), [&](const Entry& entry) {
+      return entry.dataset->info().id == id;
+    });
+    return at == entries.end() ? nullptr : &*at;
   }
-
-  void touch(Entry& entry) {
-    if (entry.listed) {
-      recent_.splice(recent_.begin(), recent_, entry.place);
-    }
-  }
-
-  void drop(std::list<Key>::iterator listed) {
-    const auto at = entries_.find(*listed);
-    used_ -= at->second->bytes;
-    at->second->listed = false;
-    entries_.erase(at);
-    recent_.erase(listed);
-  }
-
-  // Nobody outside can gain a reference while the lock is held, so a count of one stays one.
-  static bool is_held(const Entry& entry) { return entry.answer->value().use_count() > 1; }
-
-  bool make_room(std::uint64_t bytes) {
-    if (bytes > bytes_max_) {
-      return false;
-    }
-    // Only evict if that will do: a request that fails must not empty the cache for others.
-    std::uint64_t evictable = 0;
-    for (const Key& key : recent_) {
-      const Entry& entry = *entries_.at(key);
-      evictable += is_held(entry) ? 0 : entry.bytes;
-    }
-    if (used_ - evictable > bytes_max_ - bytes) {
-      return false;
-    }
-    for (auto at = recent_.end(); at != recent_.begin() && used_ > bytes_max_ - bytes;) {
-      --at;
-      if (!is_held(*entries_.at(*at))) {
-        drop(at++);
-      }
-    }
-    return used_ <= bytes_max_ - bytes;
-  }
-
-  [[nodiscard]] Error no_room(std::uint64_t bytes) const {
-    return make_error(ErrorKind::out_of_memory,
-                      "the field needs " + megabytes(bytes) + "; the memory limit is " +
-                          megabytes(bytes_max_) + ", of which " + megabytes(used_) + " are in use");
-  }
-
-  const std::uint64_t bytes_max_;
-  std::atomic<std::uint64_t> owners_{0};
-  mutable std::mutex mutex_;
-  std::condition_variable arrived_;
-  std::map<Key, std::shared_ptr<Entry>> entries_;
-  std::list<Key> recent_;   // loaded ones, the most recently used first
-  std::uint64_t used_ = 0;  // loaded and reserved
-};
-
-struct Dataset::State {
-  std::unique_ptr<Source> source;
-  DatasetInfo info;
-  std::shared_ptr<Budget> budget;
-  std::uint64_t owner = 0;
-  std::mutex source_mutex;
-  std::mutex kept_mutex;
-  std::string kept_key;
-  std::any kept_value;
-  std::atomic<std::uint64_t> loads{0};
-  std::atomic<std::uint64_t> averages{0};
-
-  // Checked: where a field and a step are. Errors: not_found.
-  Result<std::size_t> find(const std::string& field, std::size_t step) const {
-    const FieldInfo* found = info.find(field);
-    if (found == nullptr) {
-      return make_error(ErrorKind::not_found, "dataset '" + printable(info.id) +
-                                                  "' has no field '" + printable(field) + "'");
-    }
-    if (step >= info.steps.size()) {
-      return make_error(ErrorKind::not_found, "dataset '" + printable(info.id) + "' has no step " +
-                                                  std::to_string(step) + "; its last is " +
-                                                  std::to_string(info.steps.size() - 1));
-    }
-    return static_cast<std::size_t>(found - info.fields.data());
-  }
-
-  Result<VolumePtr> load(std::size_t field, std::size_t step) {
-    const std::lock_guard lock(source_mutex);
-    loads.fetch_add(1);
-    return guarded(field, [&] { return source->read(field, step); });
-  }
-
-  // Runs what makes a volume; what it throws becomes an error.
-  template <class Make>
-  Result<VolumePtr> guarded(std::size_t field, const Make& make) const {
-    try {
-      Result<Volume> volume = make();
-      if (!volume) {
-        return volume.error();
-      }
-      return std::make_shared<const Volume>(std::move(*volume));
-    } catch (const std::bad_alloc&) {
-      return make_error(ErrorKind::out_of_memory,
-                        "the machine has no memory left for '" + info.fields[field].name + "'");
-    } catch (const std::exception& fault) {
-      // What a fault of ours says is for the log: it may name places in the source.
-      log::error("loading failed", {{"field", info.fields[field].name}, {"fault", fault.what()}});
-      return make_error(ErrorKind::internal, "loading '" + info.fields[field].name + "' failed");
-    }
-  }
-};
-
-Dataset::Dataset(std::unique_ptr<Source> source, std::string id, std::uint64_t bytes_max)
-    : Dataset(std::move(source), std::move(id), std::make_shared<Budget>(bytes_max)) {}
-
-Dataset::Dataset(std::unique_ptr<Source> source, std::string id, std::shared_ptr<Budget> budget)
-    : state_(std::make_unique<State>()) {
-  state_->source = std::move(source);
-  state_->info = state_->source->info();
-  state_->info.id = std::move(id);
-  state_->budget = std::move(budget);
-  state_->owner = state_->budget->next_owner();
-}
-
-Dataset::~Dataset() { state_->budget->forget(state_->owner); }
-
-const DatasetInfo& Dataset::info() const { return state_->info; }
-
-Result<std::shared_ptr<const Volume>> Dataset::volume(const std::string& field, std::size_t step) {
-  const Result<std::size_t> index = state_->find(field, step);
-  if (!index) {
-    return index.error();
-  }
-  const DatasetInfo& info = state_->info;
-  const std::uint64_t bytes =
-      info.grid.samples() * info.fields[*index].components.size() * sizeof(float);
-  return state_->budget->get({state_->owner, *index, step, ""}, bytes,
-                             [&] { return state_->load(*index, step); });
-}
-
-Result<std::shared_ptr<const Volume>> Dataset::level(const std::string& field, std::size_t step,
-                                                     const Coarsening& how) {
-  if (how.halvings == std::array{0, 0, 0}) {
-    return volume(field, step);
-  }
-  const Result<std::size_t> index = state_->find(field, step);
-  if (!index) {
-    return index.error();
-  }
-  const DatasetInfo& info = state_->info;
-  std::uint64_t bytes = info.fields[*index].components.size() * sizeof(float);
-  for (std::size_t a = 0; a < 3; ++a) {
-    bytes *= static_cast<std::uint64_t>(halved(info.grid.dims()[a], how.halvings[a]));
-  }
-  const Key key{state_->owner, *index, step, digest_of(key_of(how))};
-  if (const auto there = state_->budget->find(key)) {
-    return *there;
-  }
-  // Held first, so that it is never evicted for a level that could not then be made of it.
-  const auto fine = volume(field, step);
-  if (!fine) {
-    return fine.error();
-  }
-  return state_->budget->get(key, bytes, [&] {
-    state_->averages.fetch_add(1);
-    return state_->guarded(*index, [&]() -> Result<Volume> { return coarsen(**fine, how); });
-  });
-}
-
-std::any Dataset::kept(const std::string& key) const {
-  const std::lock_guard lock(state_->kept_mutex);
-  return state_->kept_key == key ? state_->kept_value : std::any();
-}
-
-void Dataset::keep(std::string key, std::any value) {
-  const std::lock_guard lock(state_->kept_mutex);
-  state_->kept_key = std::move(key);
-  state_->kept_value = std::move(value);
-}
-
-std::uint64_t Dataset::resident_bytes() const { return state_->budget->bytes_of(state_->owner); }
-
-std::uint64_t Dataset::loads() const { return state_->loads.load(); }
-
-std::uint64_t Dataset::averages() const { return state_->averages.load(); }
-
-struct Store::State {
-  explicit State(std::uint64_t bytes_max) : budget(std::make_shared<Budget>(bytes_max)) {}
-
-  // Both under the mutex.
-  [[nodiscard]] std::shared_ptr<Dataset> find(const std::string& id) const {
-    const auto at = std::find_if(datasets.begin(), datasets.end(),
-                                 [&](const auto& dataset) { return dataset->info().id == id; });
-    return at == datasets.end() ? nullptr : *at;
+  [[nodiscard]] DatasetPtr known(const std::string& key) const {
+    const auto at = std::find_if(entries.begin(), entries.end(),
+                                 [&](const Entry& entry) { return entry.key == key; });
+    return at == entries.end() ? nullptr : at->dataset;
   }
   [[nodiscard]] std::string unique_id(const std::string& wanted) const {
     std::string id = wanted;
@@ -319,48 +125,246 @@ struct Store::State {
     return id;
   }
 
+  // Not under the mutex. Asks for no memory: a daemon ends where there is none.
+  [[nodiscard]] DatasetPtr one_that_reads() const {
+    const std::lock_guard lock(mutex);
+    const auto at = std::find_if(entries.begin(), entries.end(),
+                                 [](const Entry& entry) { return reads(*entry.dataset); });
+    return at == entries.end() ? nullptr : at->dataset;
+  }
+  static bool reads(const Dataset& dataset) {
+    try {
+      return dataset.loading().has_value();
+    } catch (const std::bad_alloc&) {
+      return true;  // there is a name, for which there is no memory
+    }
+  }
+
+  // The dataset of `key`, opened by at most one caller at a time.
+  template <class Open>
+  Result<Added> add(const std::string& key, const std::string& wanted_id,
+                    std::optional<Location> location, const Open& open) {
+    std::unique_lock lock(mutex);
+    opened.wait(lock, [&] { return opening.count(key) == 0; });
+    if (auto there = known(key)) return Added{std::move(there), false};
+    opening.insert(key);
+    lock.unlock();
+    auto made = open_entry(key, std::move(location), open);
+    lock.lock();
+    opening.erase(key);
+    opened.notify_all();
+    if (!made) return made.error();
+    Entry& entry = made->entry;
+    entry.dataset = std::make_shared<Dataset>(std::move(made->source), unique_id(wanted_id), budget,
+                                              options.storage);
+    if (auto charged = entry.dataset->charge_info(); !charged) {
+      lock.unlock();  // its loader ends with it
+      return charged.error();
+    }
+    if (ended) entry.dataset->end();
+    entries.push_back(std::move(entry));
+    return Added{entries.back().dataset, true};
+  }
+
+  struct Opened {
+    Entry entry;  // without a dataset
+    std::unique_ptr<Source> source;
+  };
+  // Throws nothing: others wait for the key.
+  template <class Open>
+  static Result<Opened> open_entry(const std::string& key, std::optional<Location> location,
+                                   const Open& open) {
+    try {
+      Opened out;
+      out.entry.key = key;
+      // Before they are read: what changes meanwhile is noticed later.
+      FileStamp before;
+      if (location) {
+        before = stamp_of_all(*location, {});
+        out.entry.listed = stamp_of(location->folder).text;
+      }
+      auto source = open();
+      if (!source) return source.error();
+      out.source = std::move(*source);
+      out.entry.companions = out.source->companions();
+      out.entry.location = std::move(location);
+      out.entry.stamp = stamp_as_opened(std::move(before), out.entry.companions);
+      return out;
+    } catch (const std::bad_alloc&) {
+      return make_error(ErrorKind::out_of_memory, "the machine has no memory left to open it");
+    } catch (const std::exception& fault) {
+      log::error("opening failed", {{"fault", fault.what()}});
+      return make_error(ErrorKind::internal, "opening it failed");
+    }
+  }
+
+  // Puts `entry` in place of the one with the dataset `old`, if that is still there; what was there
+  // is given back, to end outside of the lock.
+  Entry put(Entry entry, const DatasetPtr& old) {
+    const std::lock_guard lock(mutex);
+    const auto at = std::find_if(entries.begin(), entries.end(),
+                                 [&](const Entry& known) { return known.dataset == old; });
+    if (ended) entry.dataset->end();
+    if (at != entries.end()) std::swap(*at, entry);
+    return entry;
+  }
+
+  StoreOptions options;
   std::shared_ptr<Budget> budget;
   mutable std::mutex mutex;
-  std::vector<std::shared_ptr<Dataset>> datasets;
+  std::condition_variable opened;
+  std::set<std::string> opening;  // keys
+  std::vector<Entry> entries;
+  bool ended = false;
+  Ahead ahead;  // last: its thread uses datasets
 };
 
-Store::Store(std::uint64_t bytes_max) : state_(std::make_unique<State>(bytes_max)) {}
+Store::Store(StoreOptions options) : state_(std::make_unique<State>(std::move(options))) {}
+Store::Store(std::uint64_t bytes_max) : Store(StoreOptions{bytes_max, Storage::float32, {}}) {}
 Store::~Store() = default;
 
-Result<std::shared_ptr<Dataset>> Store::add(const std::string& sample_or_path) {
-  const auto sample = sized_sample(sample_or_path);
-  auto source = sample ? open_sample(sample->name, sample->dims) : open_file(sample_or_path);
-  if (!source) {
-    Error error = source.error();
-    if (error.kind == ErrorKind::not_found && sample_or_path.find('/') == std::string::npos) {
-      error.message += "; the built-in samples are";
-      for (const std::string& name : sample_names()) {
-        error.message += ' ' + name;
-      }
+Result<DatasetPtr> Store::add(const std::string& sample_or_path) {
+  if (const auto sample = sized_sample(sample_or_path)) {
+    auto added = state_->add("sample:" + sample_or_path, printable(sample_or_path), std::nullopt,
+                             [&] { return open_sample(sample->name, sample->dims); });
+    if (!added) return added.error();
+    return std::move(added->dataset);
+  }
+  auto location = locate(sample_or_path);
+  if (location) return add(*location);
+  Error error = location.error();
+  if (error.kind == ErrorKind::not_found && sample_or_path.find('/') == std::string::npos) {
+    error.message += "; the built-in samples are";
+    for (const std::string& name : sample_names()) {
+      error.message += ' ' + name;
     }
-    return error;
   }
-  const std::string wanted =
-      sample ? sample_or_path : std::filesystem::path(sample_or_path).stem().native();
-  const std::lock_guard lock(state_->mutex);
-  auto dataset = std::make_shared<Dataset>(std::move(*source), state_->unique_id(printable(wanted)),
-                                           state_->budget);
-  state_->datasets.push_back(dataset);
-  return dataset;
+  return error;
 }
 
-Result<std::shared_ptr<Dataset>> Store::find(const std::string& id) const {
+Result<DatasetPtr> Store::add(const Location& location) {
+  auto added = add_or_find(location);
+  if (!added) return added.error();
+  return std::move(added->dataset);
+}
+
+Result<Store::Added> Store::add_or_find(const Location& location) {
+  // Many files opened one after another leave few loaders behind.
+  constexpr double hardly_idle_s = 0.5;
+  release_idle(hardly_idle_s);
+  return state_->add(key_of(location), printable(location.stem), location,
+                     [&] { return state_->options.open(location); });
+}
+
+Result<void> Store::remove(const std::string& id) {
+  DatasetPtr gone;
+  {
+    const std::lock_guard lock(state_->mutex);
+    const State::Entry* found = state_->find(id);
+    if (found == nullptr) {
+      return make_error(ErrorKind::not_found, "there is no dataset " + in_quotes(id));
+    }
+    gone = found->dataset;
+    state_->entries.erase(state_->entries.begin() + (found - state_->entries.data()));
+  }
+  state_->ahead.forget(gone->info());
+  gone->evict();
+  return {};
+}
+
+Result<DatasetPtr> Store::find(const std::string& id) const {
   const std::lock_guard lock(state_->mutex);
-  auto found = state_->find(id);
+  const State::Entry* found = state_->find(id);
   if (found == nullptr) {
-    return make_error(ErrorKind::not_found, "there is no dataset '" + printable(id) + "'");
+    return make_error(ErrorKind::not_found, "there is no dataset " + in_quotes(id));
   }
-  return found;
+  return found->dataset;
 }
 
-std::vector<std::shared_ptr<Dataset>> Store::all() const {
+std::vector<DatasetPtr> Store::all() const {
   const std::lock_guard lock(state_->mutex);
-  return state_->datasets;
+  std::vector<DatasetPtr> out;
+  for (const State::Entry& entry : state_->entries) out.push_back(entry.dataset);
+  return out;
+}
+
+void Store::wish(std::uint64_t owner, std::vector<Wish> wishes) {
+  state_->ahead.wish(owner, std::move(wishes));
+}
+
+std::vector<std::string> Store::look_for_changes(double rest_s) {
+  std::vector<State::Entry> looked_at;
+  {
+    const std::lock_guard lock(state_->mutex);
+    looked_at = state_->entries;
+  }
+  std::vector<std::string> changed;
+  for (State::Entry& entry : looked_at) {
+    if (!entry.location) continue;
+    const DatasetPtr old = entry.dataset;
+    const bool matched = match_again(entry.location, entry.listed);
+    const FileStamp now = stamp_of_all(*entry.location, entry.companions);
+    const bool same = now.text == entry.stamp || now.text == entry.refused;
+    if (same || now_s() - now.changed_s < rest_s) {  // or still being written
+      if (matched && same) state_->put(std::move(entry), old);
+      continue;
+    }
+    const std::string id = old->info().id;
+    auto opened = State::open_entry(key_of(*entry.location), entry.location,
+                                    [&] { return state_->options.open(*entry.location); });
+    if (opened) {
+      entry = std::move(opened->entry);
+      entry.dataset = std::make_shared<Dataset>(std::move(opened->source), id, state_->budget,
+                                                state_->options.storage);
+      (void)entry.dataset->charge_info();  // it was there before: kept, though not counted
+      changed.push_back(id);
+      log::info("opened anew: its files have changed", {{"dataset", id}});
+    } else {
+      entry.refused = now.text;
+      entry.problem = "its files have changed and cannot be opened anew: " + opened.error().message;
+      log::warn("a dataset's files have changed and cannot be opened anew",
+                {{"dataset", id}, {"error", opened.error().message}});
+    }
+    state_->put(std::move(entry), old);
+    if (opened) state_->ahead.forget(old->info());
+  }
+  return changed;
+}
+
+void Store::end() {
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->ended = true;
+    for (const State::Entry& entry : state_->entries) entry.dataset->end();
+  }
+  while (const DatasetPtr dataset = state_->one_that_reads()) {
+    dataset->end();
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
+void Store::release_idle(double idle_s) {
+  for (const DatasetPtr& dataset : all()) dataset->release_idle(idle_s);
+}
+
+std::string Store::problem(const std::string& id) const {
+  const std::lock_guard lock(state_->mutex);
+  const State::Entry* found = state_->find(id);
+  return found == nullptr ? "" : found->problem;
+}
+
+BudgetCounts Store::counts() const { return state_->budget->counts(); }
+
+std::uint64_t Store::room() const { return state_->budget->room(); }
+
+Result<std::shared_ptr<const void>> Store::reserve(std::uint64_t bytes) {
+  const std::shared_ptr<Budget> budget = state_->budget;
+  const std::uint64_t owner = budget->next_owner();
+  auto held = budget->get({owner, 0, 0, "work"}, bytes, Urgency::demand,
+                          [] { return Result<Resident>(std::make_shared<const char>()); });
+  if (!held) return held.error();
+  const auto give_back = [budget, owner, kept = *held](const void*) { budget->forget(owner); };
+  return std::shared_ptr<const void>(held->get(), give_back);
 }
 
 }  // namespace windsplat::data

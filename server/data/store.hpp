@@ -3,31 +3,42 @@
 #pragma once
 
 #include <any>
+#include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "server/base/error.hpp"
+#include "server/data/budget.hpp"
 #include "server/data/coarsen.hpp"
 #include "server/data/dataset.hpp"
+#include "server/data/files/files.hpp"
 
 namespace windsplat::data {
 
-class Budget;  // the bytes that datasets share, with the volumes they pay for
+// How volumes stay in memory.
+enum class Storage {
+  float32,
+  packed16,  // 16 bits a value beside the few that are being drawn (packed.hpp)
+};
 
-// One opened dataset. Thread-safe.
+// One opened dataset. A handle: copies are the same dataset. Thread-safe.
 class Dataset {
  public:
   Dataset(std::unique_ptr<Source> source, std::string id, std::uint64_t bytes_max);
   // Shares the budget of a store's other datasets.
-  Dataset(std::unique_ptr<Source> source, std::string id, std::shared_ptr<Budget> budget);
-  ~Dataset();
+  Dataset(std::unique_ptr<Source> source, std::string id, std::shared_ptr<Budget> budget,
+          Storage storage = Storage::float32);
 
   [[nodiscard]] const DatasetInfo& info() const;
+  // The same as long as it is held; tells datasets of one id apart.
+  [[nodiscard]] std::shared_ptr<const DatasetInfo> shared_info() const;
 
   // The field at the step; loads it if it is not resident. What a caller holds stays valid.
-  // Errors: not_found (no such field or step), bad_data, out_of_memory.
+  // Errors: not_found (no such field or step), bad_data, out_of_memory, cancelled (evicted while it
+  // was read).
   Result<std::shared_ptr<const Volume>> volume(const std::string& field, std::size_t step);
 
   // The field at the step, coarser: averaged once on first need, shared and counted in the memory
@@ -37,32 +48,146 @@ class Dataset {
   Result<std::shared_ptr<const Volume>> level(const std::string& field, std::size_t step,
                                               const Coarsening& how);
 
+  // A handle that never loads, averages or waits: what is not there is the error not_resident.
+  [[nodiscard]] Dataset resident_only() const;
+  // A handle for what is not needed yet: it gives way to loads that somebody waits for, and evicts
+  // nothing that is wished for.
+  [[nodiscard]] Dataset ahead() const;
+  // Under which keys level() keeps its answer and what that is made of; none: no such field or
+  // step.
+  [[nodiscard]] std::vector<ResidentKey> keys_of(const std::string& field, std::size_t step,
+                                                 const Coarsening& how) const;
+
   // What a caller derived from this dataset and would be slow to derive again: one value, replaced
   // by the next. Empty unless it was kept under this key.
   [[nodiscard]] std::any kept(const std::string& key) const;
   void keep(std::string key, std::any value);
 
+  // A few numbers that follow from the data and whatever `key` names: made at most once while they
+  // are remembered, which the last 256 keys are, so that what they were made of need not stay
+  // resident. A failure is not remembered.
+  Result<std::vector<double>> remembered(const std::string& key,
+                                         const std::function<Result<std::vector<double>>()>& make);
+
+  // Drops what nobody holds, ends a load in work.
+  void evict();
+
+  // From now on nothing is read: who asks gets cancelled. Ends a load in work, unless it is just
+  // beginning: loading() tells.
+  void end();
+
+  // Lets the source give back what it keeps between reads if none was for so long.
+  void release_idle(double idle_s);
+
+  // Range and masked count of a field at a step that was ever loaded; none: it was not.
+  struct Seen {
+    std::array<float, 2> range{};
+    std::int64_t masked = 0;
+  };
+  [[nodiscard]] std::optional<Seen> seen(const std::string& field, std::size_t step) const;
+
+  struct Counts {
+    std::uint64_t loads = 0;     // volumes read from the source
+    std::uint64_t ahead = 0;     // of these before somebody asked
+    std::uint64_t averages = 0;  // levels averaged
+    std::uint64_t unpacked = 0;  // volumes had from their packed form
+    std::uint64_t failures = 0;  // reads that failed
+  };
+  [[nodiscard]] Counts counts() const;
   [[nodiscard]] std::uint64_t resident_bytes() const;
-  [[nodiscard]] std::uint64_t loads() const;     // how many volumes were ever read from the source
-  [[nodiscard]] std::uint64_t averages() const;  // how many levels were ever averaged
+  [[nodiscard]] std::uint64_t loads() const { return counts().loads; }
+  [[nodiscard]] std::uint64_t averages() const { return counts().averages; }
+
+  // The read in work, for whoever waits for it.
+  struct Loading {
+    std::string field;
+    std::size_t step = 0;
+    double done = 0;  // 0 to 1
+  };
+  [[nodiscard]] std::optional<Loading> loading() const;
+
+  // Counts what is known of the dataset, steps and places, in the memory limit too, where that is
+  // more than a megabyte. Errors: out_of_memory.
+  Result<void> charge_info();
+
+  [[nodiscard]] Storage storage() const;
+  // The most that a resident value of a field may err by being packed, in the units of its worst
+  // component; 0 for float32.
+  [[nodiscard]] float storage_error(const std::string& field) const;
 
  private:
+  enum class Manner { demand, resident_only, ahead };
   struct State;
-  std::unique_ptr<State> state_;
+  Dataset(std::shared_ptr<State> state, Manner manner)
+      : state_(std::move(state)), manner_(manner) {}
+
+  std::shared_ptr<State> state_;
+  Manner manner_ = Manner::demand;
+};
+
+// Something that may be wanted soon.
+struct Wish {
+  Dataset dataset;
+  std::string field;
+  std::size_t step = 0;
+  Coarsening how;
+};
+
+struct StoreOptions {
+  std::uint64_t bytes_max = 0;
+  Storage storage = Storage::float32;
+  // Opens what is no sample; the default reads files in this process.
+  std::function<Result<std::unique_ptr<Source>>(const Location&)> open;
 };
 
 // All datasets of a process. Thread-safe.
 class Store {
  public:
+  explicit Store(StoreOptions options);
   explicit Store(std::uint64_t bytes_max);
   ~Store();
+  Store(const Store&) = delete;
+  Store& operator=(const Store&) = delete;
 
   // Opens and registers; the id is the sample's name or the file's name without its extension,
   // made unique by -2, -3. A sample is named by its bare name or with a size of its own (see
-  // sized_sample), a file by its path.
+  // sized_sample), files by a path or pattern (see locate). The same files are one dataset however
+  // often and by however many callers they are added; so are samples of one name and size.
   Result<std::shared_ptr<Dataset>> add(const std::string& sample_or_path);
+  Result<std::shared_ptr<Dataset>> add(const Location& location);
+  // The same; and whether it was this call that opened it.
+  struct Added {
+    std::shared_ptr<Dataset> dataset;
+    bool is_new = false;
+  };
+  Result<Added> add_or_find(const Location& location);
+  // Forgets a dataset; who holds it keeps it. Errors: not_found.
+  Result<void> remove(const std::string& id);
   [[nodiscard]] Result<std::shared_ptr<Dataset>> find(const std::string& id) const;
   [[nodiscard]] std::vector<std::shared_ptr<Dataset>> all() const;  // in the order they were added
+
+  // What `owner` will want, the soonest first, in place of what it wished before: loaded by a
+  // thread of the store's own as far as memory goes, and not evicted for what is less urgent.
+  // Empty: no more. Owners take turns.
+  void wish(std::uint64_t owner, std::vector<Wish> wishes);
+
+  // Looks once whether files of a dataset changed since they were opened, and opens those anew that
+  // did and have rested for `rest_s`: under the same id, what was resident of the old goes. One
+  // that cannot be opened stays as it was (problem()). Returns the ids that were opened anew.
+  std::vector<std::string> look_for_changes(double rest_s = 1);
+  // Ends every dataset, those to come too; returns when none is being read. What is resident stays.
+  void end();
+  // Ends what sources keep for their next read, of those that read nothing for so long.
+  void release_idle(double idle_s = 10);
+  // Why the files of a dataset, which changed, could not be opened anew; empty: nothing is wrong.
+  [[nodiscard]] std::string problem(const std::string& id) const;
+
+  [[nodiscard]] BudgetCounts counts() const;
+  // So many bytes of work count in the limit for as long as the answer is held. Errors:
+  // out_of_memory.
+  Result<std::shared_ptr<const void>> reserve(std::uint64_t bytes);
+  // How many could be had now.
+  [[nodiscard]] std::uint64_t room() const;
 
  private:
   struct State;

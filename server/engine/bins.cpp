@@ -379,7 +379,9 @@ void each_tile(const Bins& bins, const TileRange& range, const Visit& visit) {
   }
 }
 
-void list_by_tile(const RenderPlan& plan, BinSpace& space) {
+// Worthless if cancelled.
+void list_by_tile(const RenderPlan& plan, const CancelToken& cancel, BinSpace& space) {
+  constexpr std::size_t bricks_between_looks = 1024;
   Bins& bins = space.bins;
   const std::size_t tiles = static_cast<std::size_t>(bins.tiles_x) * bins.tiles_y;
   bins.first.assign(tiles + 1, 0);
@@ -390,6 +392,7 @@ void list_by_tile(const RenderPlan& plan, BinSpace& space) {
   bins.entries.resize(bins.first[tiles]);
   space.next.assign(bins.first.begin(), bins.first.end() - 1);
   for (std::size_t b = 0; b < bins.bricks.size(); ++b) {
+    if (b % bricks_between_looks == 0 && cancel.cancelled()) return;
     each_tile(bins, tiles_of(plan, bins.bricks[b]), [&](std::size_t tile) {
       bins.entries[space.next[tile]++] = static_cast<std::uint32_t>(b);
     });
@@ -457,7 +460,7 @@ const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, Threa
   if (cancel.cancelled()) return bins;
   BrickCounts sum;
   for (const BrickCounts& row : space.rows) sum += row;
-  for (std::size_t i = 0; i < slabs; ++i) {
+  for (std::size_t i = 0; i < slabs && !cancel.cancelled(); ++i) {
     const SlabBricks& slab = space.found[i];
     bins.bricks.insert(bins.bricks.end(), slab.bricks.begin(), slab.bricks.end());
     add_load(plan, bins, slab);
@@ -472,7 +475,7 @@ const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, Threa
   work.skipped_bound =
       std::min(1.0, sum.left_out / (static_cast<double>(plan.camera.width) * plan.camera.height));
   if (plan.slabs || plan.curved) sort_by_depth(space);
-  list_by_tile(plan, space);
+  if (!cancel.cancelled()) list_by_tile(plan, cancel, space);
   return bins;
 }
 

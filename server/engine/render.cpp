@@ -37,12 +37,19 @@ void TileCopier::operator()(const TilePixels& tile) const {
 
 namespace {
 
-void clear_image(const scene::Camera& camera, Image& image) {
+// A large picture takes its pages from the system here, which may take longer than some pictures.
+void clear_image(const scene::Camera& camera, const CancelToken& cancel, Image& image) {
+  constexpr std::size_t floats_between_looks = std::size_t{1} << 21;
+
   const std::size_t floats = 4 * static_cast<std::size_t>(camera.width) * camera.height;
   give_back(image.rgba, floats, 4 * kept_pixels);
   image.width = camera.width;
   image.height = camera.height;
-  image.rgba.assign(floats, 0.0F);
+  image.rgba.clear();
+  image.rgba.reserve(floats);
+  while (image.rgba.size() < floats && !cancel.cancelled()) {
+    image.rgba.resize(std::min(floats, image.rgba.size() + floats_between_looks));
+  }
 }
 
 }  // namespace
@@ -69,7 +76,7 @@ Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const Can
 
 Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel,
                           RenderSpace& space) {
-  clear_image(scene.camera, space.image());
+  clear_image(scene.camera, cancel, space.image());
   return render(scene, pool, cancel, space, sink_into(space.image()));
 }
 

@@ -6,23 +6,28 @@
 #include <span>
 #include <vector>
 
+#include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 
 namespace windsplat::image {
 
 using Bytes = std::vector<std::uint8_t>;
 
-// 8-bit sRGB, 3 bytes a pixel, of the image over a linear background.
+// 8-bit sRGB, 3 bytes a pixel, of the image over a linear background. Of what is cancelled not all.
 Bytes tone_map(std::span<const float> rgba, int width, int height,
-               const std::array<float, 3>& background);
+               const std::array<float, 3>& background, const CancelToken& cancel = {});
 
 enum class Subsampling { s444, s420 };
 
 // quality 1..100. In one piece, from rounded codes.
 Result<Bytes> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height, int quality,
                           Subsampling subsampling);
-Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int height);
+// Errors: cancelled, noticed within a few rows.
+Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int height,
+                         const CancelToken& cancel = {});
 // NPY 1.0, '<f4', shape (height, width, 4).
-Result<Bytes> encode_npy(std::span<const float> rgba, int width, int height);
+// Errors: cancelled.
+Result<Bytes> encode_npy(std::span<const float> rgba, int width, int height,
+                         const CancelToken& cancel = {});
 
 }  // namespace windsplat::image

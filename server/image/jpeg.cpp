@@ -20,14 +20,14 @@ namespace {
 constexpr int edge_max = 65500;  // pixels, of the library
 constexpr std::int64_t strips_max = 16;
 
-struct Destroy {
+struct DestroyCompressor {
   void operator()(void* compressor) const { tjDestroy(compressor); }
 };
-struct Free {
+struct FreeJpeg {
   void operator()(unsigned char* bytes) const { tjFree(bytes); }
 };
 
-using Compressor = std::unique_ptr<std::remove_pointer_t<tjhandle>, Destroy>;
+using Compressor = std::unique_ptr<std::remove_pointer_t<tjhandle>, DestroyCompressor>;
 
 // The settled picture (4:4:4) takes the accurate transform, the moving one the fast.
 int transform_of(Subsampling subsampling) {
@@ -144,7 +144,7 @@ JpegEncoder::JpegEncoder() : state_(std::make_unique<State>()) {}
 JpegEncoder::~JpegEncoder() = default;
 
 Result<void> JpegEncoder::encode(const YccPicture& picture, int quality, ThreadPool& pool,
-                                 Bytes& bytes) {
+                                 Bytes& bytes, const CancelToken& cancel) {
   if (auto fits = check(picture.width(), picture.height(), quality); !fits) return fits;
   const Cut cut = cut_of(picture);
   State& state = *state_;
@@ -159,7 +159,7 @@ Result<void> JpegEncoder::encode(const YccPicture& picture, int quality, ThreadP
   state.make_room(cut, picture.mcu_side());
   state.failed.assign(pool.size(), 0);
   pool.run(count, [&](std::size_t index, unsigned worker) {
-    if (state.failed[worker] != 0) return;
+    if (state.failed[worker] != 0 || cancel.cancelled()) return;
     if (!state.compress(picture, cut, quality, static_cast<int>(index),
                         state.compressors[worker])) {
       state.failed[worker] = 1;
@@ -168,6 +168,7 @@ Result<void> JpegEncoder::encode(const YccPicture& picture, int quality, ThreadP
   for (std::size_t worker = 0; worker < state.failed.size(); ++worker) {
     if (state.failed[worker] != 0) return fault_of(state.compressors[worker]);
   }
+  if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "nobody waits for the JPEG");
   state.pieces.clear();
   for (std::size_t s = 0; s < count; ++s) {
     state.pieces.emplace_back(state.strips[s].jpeg.get(), state.strips[s].size);
@@ -190,7 +191,7 @@ Result<Bytes> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int heig
   const int failed =
       tjCompress2(compressor.get(), rgb.data(), width, 0, height, TJPF_RGB, &jpeg, &jpeg_bytes,
                   library_name(subsampling), quality, transform_of(subsampling));
-  const std::unique_ptr<unsigned char, Free> owner(jpeg);
+  const std::unique_ptr<unsigned char, FreeJpeg> owner(jpeg);
   if (failed != 0) return fault_of(compressor);
   return Bytes(jpeg, jpeg + jpeg_bytes);
 }

@@ -10,14 +10,15 @@
 namespace windsplat::image {
 namespace {
 
-struct Destroy {
+struct DestroyDecompressor {
   void operator()(void* decompressor) const { tjDestroy(decompressor); }
 };
 
 }  // namespace
 
 Result<Bytes> decode_jpeg(std::span<const std::uint8_t> jpeg, int width, int height) {
-  const std::unique_ptr<std::remove_pointer_t<tjhandle>, Destroy> decompressor(tjInitDecompress());
+  const std::unique_ptr<std::remove_pointer_t<tjhandle>, DestroyDecompressor> decompressor(
+      tjInitDecompress());
   if (!decompressor) {
     return make_error(ErrorKind::internal, std::string("JPEG: ") + tjGetErrorStr2(nullptr));
   }

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/image/ycc.hpp"
@@ -19,8 +20,9 @@ class JpegEncoder {
 
   // `bytes` is overwritten; its storage is used again. Strips follow from the picture's size alone,
   // so that any number of threads gives the same bytes. quality 1..100. Errors: too_large, invalid,
-  // internal.
-  Result<void> encode(const YccPicture& picture, int quality, ThreadPool& pool, Bytes& bytes);
+  // internal; cancelled, noticed between strips.
+  Result<void> encode(const YccPicture& picture, int quality, ThreadPool& pool, Bytes& bytes,
+                      const CancelToken& cancel = {});
 
  private:
   struct State;

@@ -15,7 +15,7 @@ constexpr int compression_level = 1;          // zlib's
 constexpr std::uint8_t color_type_rgb = 2;    // PNG 11.2.2
 constexpr std::uint8_t rendering_intent = 1;  // relative colorimetric
 
-struct Free {
+struct FreePng {
   void operator()(spng_ctx* context) const { spng_ctx_free(context); }
   void operator()(void* bytes) const { std::free(bytes); }
 };
@@ -47,7 +47,8 @@ int configure(spng_ctx* context, int width, int height) {
 
 }  // namespace
 
-Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int height) {
+Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int height,
+                         const CancelToken& cancel) {
   if (width < 1 || height < 1) {
     return make_error(ErrorKind::invalid, "a PNG has at least one pixel a side, not " +
                                               std::to_string(width) + " x " +
@@ -56,16 +57,23 @@ Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int heigh
   WINDSPLAT_CHECK(rgb.size() ==
                   3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
 
-  const std::unique_ptr<spng_ctx, Free> context(spng_ctx_new(SPNG_CTX_ENCODER));
+  const std::unique_ptr<spng_ctx, FreePng> context(spng_ctx_new(SPNG_CTX_ENCODER));
   if (!context) return png_error(SPNG_EMEM);
   if (const int code = configure(context.get(), width, height)) return png_error(code);
-  if (const int code = spng_encode_image(context.get(), rgb.data(), rgb.size(), SPNG_FMT_PNG,
-                                         SPNG_ENCODE_FINALIZE)) {
+  if (const int code = spng_encode_image(context.get(), nullptr, 0, SPNG_FMT_PNG,
+                                         SPNG_ENCODE_PROGRESSIVE | SPNG_ENCODE_FINALIZE)) {
     return png_error(code);
+  }
+  const std::size_t row_bytes = 3 * static_cast<std::size_t>(width);
+  for (int row = 0; row < height; ++row) {
+    if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "nobody waits for the PNG");
+    const std::uint8_t* const at = rgb.data() + static_cast<std::size_t>(row) * row_bytes;
+    const int code = spng_encode_row(context.get(), at, row_bytes);
+    if (code != 0 && code != SPNG_EOI) return png_error(code);
   }
   std::size_t png_bytes = 0;
   int code = 0;
-  const std::unique_ptr<void, Free> png(spng_get_png_buffer(context.get(), &png_bytes, &code));
+  const std::unique_ptr<void, FreePng> png(spng_get_png_buffer(context.get(), &png_bytes, &code));
   if (!png) return png_error(code);
   const auto* begin = static_cast<const std::uint8_t*>(png.get());
   return Bytes(begin, begin + png_bytes);

@@ -58,6 +58,8 @@ const CodeTable& code_table() {
   return table;
 }
 
+constexpr std::size_t pixels_between_looks = 1U << 18;  // a millisecond or two
+
 }  // namespace
 
 double srgb_from_linear(double linear) {
@@ -72,7 +74,7 @@ void srgb_codes(const float* linear, std::uint8_t* codes, std::size_t count) {
 }
 
 Bytes tone_map(std::span<const float> rgba, int width, int height,
-               const std::array<float, 3>& background) {
+               const std::array<float, 3>& background, const CancelToken& cancel) {
   WINDSPLAT_CHECK(width >= 0 && height >= 0);
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   WINDSPLAT_CHECK(rgba.size() == 4 * pixels);
@@ -81,6 +83,7 @@ Bytes tone_map(std::span<const float> rgba, int width, int height,
   const float* in = rgba.data();
   std::uint8_t* out = rgb.data();
   for (std::size_t i = 0; i < pixels; ++i, in += 4, out += 3) {
+    if (i % pixels_between_looks == 0 && cancel.cancelled()) break;
     const float transmittance = 1.0F - in[3];
     out[0] = table(in[0] + transmittance * background[0]);
     out[1] = table(in[1] + transmittance * background[1]);

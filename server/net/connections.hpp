@@ -1,13 +1,15 @@
 // Every connection that lives, so that a drain reaches them all. Used by the io thread alone.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
-#include <vector>
 
 namespace windsplat::net {
 
@@ -16,46 +18,81 @@ class Connection {
   virtual ~Connection() = default;
   virtual void drain() = 0;  // end as soon as what is being answered is answered
   virtual void abort() = 0;  // end now
+  // A dataset's files have changed, and it was opened anew.
+  virtual void on_changed(const std::string& /*dataset*/) {}
+  // Another token is asked for from now on.
+  virtual void on_new_token() {}
+
+  // What a newcomer may take its place from; times of its present state, none where it is in
+  // another or has given its place up.
+  using Since = std::optional<std::chrono::steady_clock::time_point>;
+  virtual Since idle_since() const { return {}; }         // waits for a request's first byte
+  virtual Since unasked_since() const { return {}; }      // of the reserve, without a whole request
+  virtual Since handshaking_since() const { return {}; }  // of TLS
 };
 
 class Connections {
  public:
-  // Told whenever the last one has gone.
+  // Told whenever the last one that is waited for has gone.
   void on_empty(std::function<void()> call) { empty_ = std::move(call); }
 
   std::uint64_t next_id() { return ++ids_; }
-  void add(std::uint64_t id, std::weak_ptr<Connection> connection, bool stream) {
-    live_[id] = {std::move(connection), stream};
+  // `late`: it came while the others are waited for, and is not.
+  void add(std::uint64_t id, std::weak_ptr<Connection> connection, bool stream, bool late = false) {
+    live_[id] = {std::move(connection), stream, late};
     streams_ += stream ? 1U : 0U;
+    waited_for_ += late ? 0U : 1U;
   }
   void remove(std::uint64_t id) {
     const auto found = live_.find(id);
     if (found == live_.end()) return;
     streams_ -= found->second.stream ? 1U : 0U;
+    const bool late = found->second.late;
+    waited_for_ -= late ? 0U : 1U;
     live_.erase(found);
-    if (live_.empty() && empty_) empty_();
+    if (!late && waited_for_ == 0 && empty_) empty_();
   }
 
-  [[nodiscard]] std::size_t size() const { return live_.size(); }
+  [[nodiscard]] std::size_t size() const { return waited_for_; }
   [[nodiscard]] std::size_t streams() const { return streams_; }
 
-  // A copy: a connection may go while the others are told.
-  [[nodiscard]] std::vector<std::shared_ptr<Connection>> all() const {
-    std::vector<std::shared_ptr<Connection>> out;
-    for (const auto& [id, entry] : live_) {
-      if (auto connection = entry.connection.lock()) out.push_back(std::move(connection));
+  // Calls for each of them, any of which may go while it is told. Needs no memory.
+  template <class Call>
+  void each(const Call& call) const {
+    for (auto at = live_.begin(); at != live_.end();) {
+      const std::uint64_t id = at->first;
+      if (const auto connection = at->second.connection.lock()) call(*connection);
+      at = live_.upper_bound(id);
     }
-    return out;
+  }
+
+  // Where more than `most` are in a state, ends the one that is in it for longest, so that its
+  // place is free at once. False: nothing was ended.
+  bool end_longest(Connection::Since (Connection::*since)() const, std::size_t most = 0) const {
+    std::size_t count = 0;
+    std::shared_ptr<Connection> longest;
+    for (const auto& [id, entry] : live_) {
+      auto connection = entry.connection.lock();
+      const Connection::Since time = connection ? ((*connection).*since)() : std::nullopt;
+      if (!time) continue;
+      ++count;
+      if (!longest || *time < *((*longest).*since)()) longest = std::move(connection);
+    }
+    if (count <= most) return false;
+    longest->abort();
+    return true;
   }
 
  private:
   struct Entry {
     std::weak_ptr<Connection> connection;
     bool stream = false;
+    bool late = false;
   };
 
   std::map<std::uint64_t, Entry> live_;
   std::size_t streams_ = 0;
+  std::size_t waited_for_ = 0;
   std::uint64_t ids_ = 0;
   std::function<void()> empty_;
 };

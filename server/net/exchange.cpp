@@ -14,14 +14,22 @@ std::string_view reason(int status) {
   switch (status) {
     case 200:
       return "OK";
+    case 201:
+      return "Created";
+    case 202:
+      return "Accepted";
     case 204:
       return "No Content";
+    case 303:
+      return "See Other";
     case 304:
       return "Not Modified";
     case 308:
       return "Permanent Redirect";
     case 400:
       return "Bad Request";
+    case 401:
+      return "Unauthorized";
     case 403:
       return "Forbidden";
     case 404:
@@ -34,10 +42,14 @@ std::string_view reason(int status) {
       return "Request Timeout";
     case 411:
       return "Length Required";
+    case 412:
+      return "Precondition Failed";
     case 413:
       return "Content Too Large";
     case 415:
       return "Unsupported Media Type";
+    case 409:
+      return "Conflict";
     case 417:
       return "Expectation Failed";
     case 421:
@@ -163,6 +175,8 @@ std::string response_head(const Response& response, bool keep_alive) {
   add("Connection", keep_alive ? "keep-alive" : "close");
   add("X-Content-Type-Options", "nosniff");
   add("Referrer-Policy", "no-referrer");
+  add("Permissions-Policy", "camera=(), geolocation=(), microphone=(), payment=(), usb=()");
+  if (!has_header(response, "Cache-Control")) add("Cache-Control", "no-store");
   if (!has_header(response, "Content-Security-Policy")) {
     add("Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'");
   }

@@ -28,6 +28,8 @@ struct Request {
   std::string body;
   CancelToken cancel;      // raised when the client has gone
   std::uint64_t peer = 0;  // number of the connection
+  std::string address;     // of its other end, without the port; empty: unknown
+  std::string id;          // in the answer and in the log (request_id.hpp)
 
   // The header's values, in order, joined by ", "; names are compared without case.
   [[nodiscard]] std::string header(std::string_view name) const;

@@ -10,6 +10,6 @@
 namespace windsplat::net {
 
 void start_http_session(boost::asio::ip::tcp::socket socket, Services& services,
-                        Connections& connections);
+                        Connections& connections, Visitor visitor);
 
 }  // namespace windsplat::net

@@ -1,8 +1,14 @@
-// A GET for a health check: connects, asks, reads the status line, all within one deadline.
+// A GET for a health check: connects, speaks TLS where told, asks, reads the status line, all
+// within one deadline.
+#include <openssl/ssl.h>
+
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/read_until.hpp>
+#include <boost/asio/ssl/context.hpp>
+#include <boost/asio/ssl/host_name_verification.hpp>
+#include <boost/asio/ssl/stream.hpp>
 #include <boost/asio/streambuf.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/url/parse.hpp>
@@ -24,30 +30,66 @@ using ErrorCode = boost::system::error_code;
 
 constexpr std::size_t status_line_bytes_max = 1024;
 
+// What is asked, and of whom.
+struct Question {
+  std::string host;
+  std::string port;
+  std::string text;
+  bool secure = false;
+};
+
+// The certificates that a server's is checked against. Errors: invalid.
+Result<void> trust(asio::ssl::context& context, const std::string& ca) {
+  ErrorCode fault;
+  context.set_verify_mode(asio::ssl::verify_peer);
+  SSL_CTX_set_min_proto_version(context.native_handle(), TLS1_2_VERSION);
+  if (ca.empty()) {
+    context.set_default_verify_paths(fault);
+  } else {
+    context.add_certificate_authority(asio::buffer(ca), fault);
+    // One that is trusted by name needs no root behind it.
+    X509_VERIFY_PARAM_set_flags(SSL_CTX_get0_param(context.native_handle()),
+                                X509_V_FLAG_PARTIAL_CHAIN);
+  }
+  if (!fault) return {};
+  return make_error(ErrorKind::invalid,
+                    "the trusted certificates cannot be read: " + printable(fault.message()));
+}
+
 // One exchange after the other; the first fault ends it.
 struct Exchange {
-  Exchange(const std::string& host, const std::string& port, std::string request_text)
-      : request(std::move(request_text)) {
-    resolver.async_resolve(host, port, [this](ErrorCode ec, const Tcp::resolver::results_type& to) {
-      if (!failed(ec)) connect(to);
-    });
+  Exchange(Question asked, asio::ssl::context& context)
+      : question(std::move(asked)), stream(io, context) {
+    resolver.async_resolve(question.host, question.port,
+                           [this](ErrorCode ec, const Tcp::resolver::results_type& to) {
+                             if (!failed(ec)) connect(to);
+                           });
   }
 
   void connect(const Tcp::resolver::results_type& to) {
-    asio::async_connect(socket, to, [this](ErrorCode ec, const Tcp::endpoint&) {
-      if (!failed(ec)) write();
+    asio::async_connect(stream.next_layer(), to, [this](ErrorCode ec, const Tcp::endpoint&) {
+      if (failed(ec)) return;
+      question.secure ? handshake() : ask(stream.next_layer());
     });
   }
 
-  void write() {
-    asio::async_write(socket, asio::buffer(request), [this](ErrorCode ec, std::size_t) {
-      if (!failed(ec)) read();
+  void handshake() {
+    ErrorCode is_name;  // an address is no name that a server could choose by
+    (void)asio::ip::make_address(question.host, is_name);
+    if (is_name) SSL_set_tlsext_host_name(stream.native_handle(), question.host.c_str());
+    stream.set_verify_callback(asio::ssl::host_name_verification(question.host));
+    stream.async_handshake(asio::ssl::stream_base::client, [this](ErrorCode ec) {
+      if (!failed(ec)) ask(stream);
     });
   }
 
-  void read() {
-    asio::async_read_until(socket, answer, "\r\n",
-                           [this](ErrorCode ec, std::size_t) { done = !failed(ec); });
+  template <class Stream>
+  void ask(Stream& over) {
+    asio::async_write(over, asio::buffer(question.text), [this, &over](ErrorCode ec, std::size_t) {
+      if (failed(ec)) return;
+      asio::async_read_until(over, answer, "\r\n",
+                             [this](ErrorCode fault, std::size_t) { done = !failed(fault); });
+    });
   }
 
   bool failed(ErrorCode ec) {
@@ -57,8 +99,8 @@ struct Exchange {
 
   asio::io_context io{1};
   Tcp::resolver resolver{io};
-  Tcp::socket socket{io};
-  std::string request;
+  Question question;
+  asio::ssl::stream<Tcp::socket> stream;
   asio::streambuf answer{status_line_bytes_max};
   ErrorCode fault;
   bool done = false;
@@ -80,19 +122,28 @@ std::optional<int> status_of(asio::streambuf& answer) {
 
 }  // namespace
 
-Result<int> http_status(const std::string& url, int timeout_s) {
+Result<int> http_status(const std::string& url, int timeout_s, const std::string& ca) {
   const auto parts = boost::urls::parse_uri(url);
-  if (!parts || parts->scheme() != "http" || parts->host().empty()) {
-    return make_error(ErrorKind::malformed, "'" + printable(url) + "' is no http:// URL");
+  const bool secure = parts && parts->scheme() == "https";
+  if (!parts || (!secure && parts->scheme() != "http") || parts->host().empty()) {
+    return make_error(ErrorKind::malformed,
+                      "'" + printable(url) + "' is no http:// or https:// URL");
   }
-  const std::string port = parts->has_port() ? std::string(parts->port()) : "80";
+  asio::ssl::context context(asio::ssl::context::tls_client);
+  if (secure) {
+    if (const auto ok = trust(context, ca); !ok) return ok.error();
+  }
   std::string target(parts->encoded_target());
   if (target.empty()) target = "/";
   const std::string where = printable(url);
-  Exchange exchange(parts->host_address(), port,
-                    "GET " + target +
-                        " HTTP/1.1\r\nHost: " + std::string(parts->encoded_host_and_port()) +
-                        "\r\nUser-Agent: windsplat\r\nConnection: close\r\n\r\n");
+  Question question;
+  question.host = parts->host_address();
+  question.port = parts->has_port() ? std::string(parts->port()) : secure ? "443" : "80";
+  question.text = "GET " + target +
+                  " HTTP/1.1\r\nHost: " + std::string(parts->encoded_host_and_port()) +
+                  "\r\nUser-Agent: windsplat\r\nConnection: close\r\n\r\n";
+  question.secure = secure;
+  Exchange exchange(std::move(question), context);
   exchange.io.run_for(std::chrono::seconds(timeout_s));
   if (exchange.fault) {
     return make_error(ErrorKind::internal, where + ": " + exchange.fault.message());

@@ -1,6 +1,10 @@
 // Binds, then accepts one connection after the other.
 #include "server/net/listener.hpp"
 
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
 #include <chrono>
 #include <exception>
 #include <utility>
@@ -18,6 +22,18 @@ constexpr std::chrono::milliseconds retry_delay{100};
 // What the kernel may hold of frames that the peer has not taken; it doubles this.
 constexpr int send_buffer_bytes = 128 * 1024;
 
+// What it may hold that has not even been sent: with more, a frame counts as written long before it
+// has left, and what is sent next comes late.
+constexpr int unsent_bytes = 16 * 1024;
+
+// Best effort: without them frames come later, no more.
+void hasten(Tcp::socket& socket) {
+  ErrorCode ignored;
+  socket.set_option(Tcp::no_delay(true), ignored);
+  (void)setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent_bytes,
+                   sizeof unsent_bytes);
+}
+
 ErrorCode bind(Tcp::acceptor& acceptor, const Tcp::endpoint& endpoint) {
   ErrorCode fault;
   acceptor.open(endpoint.protocol(), fault);
@@ -31,8 +47,8 @@ ErrorCode bind(Tcp::acceptor& acceptor, const Tcp::endpoint& endpoint) {
 
 }  // namespace
 
-Listener::Listener(asio::io_context& io, Accepted accepted)
-    : accepted_(std::move(accepted)), acceptor_(io), retry_(io) {}
+Listener::Listener(asio::io_context& io, Accepted accepted, Failed failed)
+    : accepted_(std::move(accepted)), failed_(std::move(failed)), acceptor_(io), retry_(io) {}
 
 Result<void> Listener::listen(const std::string& address, std::uint16_t port) {
   const std::string where = printable(address) + " port " + std::to_string(port);
@@ -58,7 +74,9 @@ Result<void> Listener::listen(const std::string& address, std::uint16_t port) {
   return {};
 }
 
-void Listener::start() { accept(); }
+void Listener::start() {
+  if (!waiting_ && acceptor_.is_open()) accept();
+}
 
 void Listener::close() {
   ErrorCode ignored;
@@ -68,10 +86,10 @@ void Listener::close() {
 
 void Listener::accept() {
   acceptor_.async_accept([this](ErrorCode fault, Tcp::socket socket) {
+    waiting_ = false;
     if (!acceptor_.is_open()) return;
     if (!fault) {
-      ErrorCode ignored;
-      socket.set_option(Tcp::no_delay(true), ignored);
+      hasten(socket);
       try {
         accepted_(std::move(socket));
       } catch (const std::exception& failure) {
@@ -83,11 +101,16 @@ void Listener::accept() {
     if (fault == asio::error::connection_aborted) return accept();
     // No file descriptor or memory left: others will give theirs back.
     log::warn("cannot accept", {{"fault", fault.message()}});
+    failed_();
+    spare_.turn_away(acceptor_.native_handle());
     retry_.expires_after(retry_delay);
     retry_.async_wait([this](ErrorCode cancelled) {
+      waiting_ = false;
       if (!cancelled) accept();
     });
+    waiting_ = true;
   });
+  waiting_ = true;
 }
 
 }  // namespace windsplat::net

@@ -9,20 +9,25 @@
 #include <string>
 
 #include "server/base/error.hpp"
+#include "server/net/spare_descriptor.hpp"
 
 namespace windsplat::net {
 
 class Listener {
  public:
   using Accepted = std::function<void(boost::asio::ip::tcp::socket)>;
+  using Failed = std::function<void()>;
 
-  Listener(boost::asio::io_context& io, Accepted accepted);
+  // `failed`: the system could not hand over a connection.
+  Listener(boost::asio::io_context& io, Accepted accepted, Failed failed);
 
   // `address` is an IP address or a name of this machine. Errors: internal, naming address and
   // port.
   Result<void> listen(const std::string& address, std::uint16_t port);
   [[nodiscard]] boost::asio::ip::tcp::endpoint endpoint() const { return endpoint_; }
 
+  // Accepts from now on. Called again it goes on where memory failed before the next connection
+  // could be waited for; else it changes nothing.
   void start();
   void close();
 
@@ -30,9 +35,12 @@ class Listener {
   void accept();
 
   Accepted accepted_;
+  Failed failed_;
   boost::asio::ip::tcp::acceptor acceptor_;
   boost::asio::steady_timer retry_;
+  SpareDescriptor spare_;
   boost::asio::ip::tcp::endpoint endpoint_;
+  bool waiting_ = false;  // for a connection, or for the time to try again
 };
 
 }  // namespace windsplat::net

@@ -1,8 +1,11 @@
 // Lists of header values, each with its weight, against what there is to offer.
 #include "server/net/negotiate.hpp"
 
+#include <arpa/inet.h>
+
 #include <algorithm>
 #include <charconv>
+#include <string>
 #include <utility>
 
 #include "server/net/exchange.hpp"
@@ -63,6 +66,11 @@ std::string_view without_suffix(std::string_view text, std::string_view suffix) 
              : text;
 }
 
+std::string_view without_port(std::string_view host) {
+  const bool literal = !host.empty() && host.front() == '[';
+  return host.substr(0, literal ? host.find(':', host.find(']')) : host.rfind(':'));
+}
+
 }  // namespace
 
 std::optional<std::size_t> choose_type(std::string_view accept,
@@ -98,11 +106,18 @@ bool matches_etag(std::string_view if_none_match, std::string_view etag) {
   });
 }
 
+bool allows_change(std::string_view if_match, std::string_view etag) {
+  if (if_match.empty()) return true;
+  const auto names = split_list(if_match, ',');  // compared strongly (RFC 9110, 13.1.1)
+  return std::any_of(names.begin(), names.end(),
+                     [&](std::string_view name) { return name == "*" || name == etag; });
+}
+
 bool origin_allowed(std::string_view origin, std::string_view host,
-                    const std::vector<std::string>& allowed) {
+                    const std::vector<std::string>& allowed, bool tls) {
   for (const auto& [scheme, port] :
        {std::pair<std::string_view, std::string_view>{"http://", ":80"}, {"https://", ":443"}}) {
-    if (origin.substr(0, scheme.size()) != scheme) continue;
+    if (origin.substr(0, scheme.size()) != scheme || (tls && scheme == "http://")) continue;
     // The scheme's own port may be said or not, on either side.
     const std::string_view authority = without_suffix(origin.substr(scheme.size()), port);
     if (!authority.empty() && equal_without_case(authority, without_suffix(host, port)))
@@ -112,17 +127,30 @@ bool origin_allowed(std::string_view origin, std::string_view host,
                      [&](const std::string& other) { return equal_without_case(origin, other); });
 }
 
-bool local_host_allowed(std::string_view host, const std::vector<std::string>& allowed) {
-  const bool literal = !host.empty() && host.front() == '[';
-  const std::size_t colon = literal ? host.find(':', host.find(']')) : host.rfind(':');
-  const std::string_view name = host.substr(0, colon);
+bool names_loopback(std::string_view host) {
+  const std::string_view name = without_port(host);
   if (equal_without_case(name, "localhost") || name == "[::1]") return true;
   constexpr std::string_view digits = "0123456789.";
-  if (name.starts_with("127.") && name.find_first_not_of(digits) == std::string_view::npos) {
-    return true;
-  }
-  return std::any_of(allowed.begin(), allowed.end(),
-                     [&](const std::string& origin) { return origin_allowed(origin, host, {}); });
+  return name.starts_with("127.") && name.find_first_not_of(digits) == std::string_view::npos;
+}
+
+bool is_address(std::string_view host) {
+  const std::string name(without_port(host));
+  in_addr v4{};
+  if (inet_pton(AF_INET, name.c_str(), &v4) == 1) return true;
+  in6_addr v6{};
+  return name.size() > 2 && name.front() == '[' && name.back() == ']' &&
+         inet_pton(AF_INET6, name.substr(1, name.size() - 2).c_str(), &v6) == 1;
+}
+
+bool local_host_allowed(std::string_view host, const std::vector<std::string>& origins,
+                        const std::vector<std::string>& names) {
+  if (names_loopback(host)) return true;
+  const std::string_view name = without_port(host);
+  return std::any_of(origins.begin(), origins.end(),
+                     [&](const std::string& origin) { return origin_allowed(origin, host, {}); }) ||
+         std::any_of(names.begin(), names.end(),
+                     [&](const std::string& other) { return equal_without_case(name, other); });
 }
 
 }  // namespace windsplat::net

@@ -1,22 +1,25 @@
 // Problem -> response; answers that may be tried again later say when.
 #include "server/net/problem.hpp"
 
+#include <algorithm>
+#include <string>
 #include <utility>
 
 #include "protocol/codec.hpp"
+#include "server/net/request_id.hpp"
 
 namespace windsplat::net {
 namespace {
 
-constexpr const char* retry_after_s = "1";
+constexpr const char* problem_type = "application/problem+json";
 
-Response respond(const protocol::Problem& problem) {
+Response respond(const protocol::Problem& problem, int retry_after_s) {
   Response response;
   response.status = problem.status;
-  response.content_type = "application/problem+json";
+  response.content_type = problem_type;
   response.headers = {{"Cache-Control", "no-store"}};
-  if (problem.status == 429 || problem.status == 503) {
-    response.headers.emplace_back("Retry-After", retry_after_s);
+  if (problem.status == 409 || problem.status == 429 || problem.status == 503) {
+    response.headers.emplace_back("Retry-After", std::to_string(std::max(1, retry_after_s)));
   }
   response.body = Body::of(protocol::encode_problem(problem));
   return response;
@@ -24,14 +27,45 @@ Response respond(const protocol::Problem& problem) {
 
 }  // namespace
 
-Response problem_response(const Error& error) { return respond(protocol::problem_from(error)); }
+Response problem_response(const Error& error) {
+  return respond(protocol::problem_from(error), error.retry_after_s);
+}
 
-Response problem_response(int status, std::string title, std::string detail) {
+Error naming(Error error, const std::string& dataset, const std::string& field) {
+  if (error.kind != ErrorKind::out_of_memory) return error;
+  std::string message = "dataset '";
+  message += printable(dataset);
+  message += '\'';
+  if (!field.empty()) {
+    message += ", field '";
+    message += printable(field);
+    message += '\'';
+  }
+  message += ": ";
+  message += error.message;
+  message += " (--memory-limit, less what is kept back for what is not data)";
+  error.message = std::move(message);
+  return error;
+}
+
+Response problem_response(int status, std::string title, std::string detail, int retry_after_s) {
   protocol::Problem problem;
   problem.status = status;
   problem.title = std::move(title);
   problem.detail = std::move(detail);
-  return respond(problem);
+  return respond(problem, retry_after_s);
+}
+
+void name_request(Response& response, const std::string& request_id) {
+  response.headers.emplace_back(request_id_header, request_id);
+  if (response.content_type != problem_type) return;
+  // The id has nothing to escape, and a problem has other members.
+  std::string json = "{\"requestId\":\"";
+  json += request_id;
+  json += "\",";
+  const auto rest = response.body.bytes.subspan(1);
+  json.append(rest.begin(), rest.end());
+  response.body = Body::of(std::move(json));
 }
 
 }  // namespace windsplat::net

@@ -10,7 +10,14 @@ namespace windsplat::net {
 
 Response problem_response(const Error& error);
 
+// Where memory is the reason: the same, naming what was to be loaded. Others as they are.
+Error naming(Error error, const std::string& dataset, const std::string& field = "");
+
 // What has no ErrorKind: refusals of HTTP itself. `title` is the status in words.
-Response problem_response(int status, std::string title, std::string detail);
+// `retry_after_s` goes with 409, 429 and 503; at least 1.
+Response problem_response(int status, std::string title, std::string detail, int retry_after_s = 0);
+
+// The answer names its request: in a header, and in a problem as its member requestId.
+void name_request(Response& response, const std::string& request_id);
 
 }  // namespace windsplat::net

@@ -1,151 +1,164 @@
-// Two rings of owners, one a kind; the renderer's thread takes from them in turn.
+// A thread that takes from the queue, and who may add to it.
 #include "server/net/render_service.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
-#include <deque>
 #include <exception>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <thread>
 #include <utility>
 
-#include "server/base/log.hpp"
+#include "server/net/attempt.hpp"
 
 namespace windsplat::net {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+constexpr int retry_after_s_max = 60;
 
-struct Waiting {
-  RenderService::Job job;
-  Clock::time_point since;
-};
+std::int64_t steady_us() {
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+}
 
-struct Owner {
-  std::uint64_t id = 0;
-  std::deque<Waiting> jobs;
-};
+// Of a request's own time: what may come before it, so that one as long as itself does not.
+constexpr double patient_share = 0.75;
+// While more are refused than this in a second, another is soon there when the renderer is free:
+// one is let in only where what runs is nearly done.
+constexpr double refusals_of_overload = 8;
+constexpr double hurried_share = 0.5;
 
-// Owners with something to do, the next one in front.
-struct Ring {
-  std::deque<Owner> owners;
-  std::size_t waiting = 0;
-
-  void push(Waiting waiting_job) {
-    const std::uint64_t id = waiting_job.job.owner;
-    auto owner = std::find_if(owners.begin(), owners.end(),
-                              [&](const Owner& known) { return known.id == id; });
-    if (owner == owners.end()) owner = owners.insert(owners.end(), Owner{id, {}});
-    owner->jobs.push_back(std::move(waiting_job));
-    ++waiting;
-  }
-
-  // Jobs whose answer somebody still waits for; the others cost next to nothing.
-  [[nodiscard]] std::size_t wanted() const {
-    std::size_t count = 0;
-    for (const Owner& owner : owners) {
-      for (const Waiting& kept : owner.jobs) count += kept.job.cancel.cancelled() ? 0U : 1U;
-    }
-    return count;
-  }
-
-  std::optional<Waiting> pop() {
-    if (owners.empty()) return std::nullopt;
-    Owner owner = std::move(owners.front());
-    owners.pop_front();
-    Waiting next = std::move(owner.jobs.front());
-    owner.jobs.pop_front();
-    if (!owner.jobs.empty()) owners.push_back(std::move(owner));
-    --waiting;
-    return next;
-  }
-};
+Error too_busy(const RenderQueue::Load& waiting) {
+  const double seconds = std::ceil(waiting.cost_ms / 1000);
+  const int after_s = static_cast<int>(std::clamp(seconds, 1.0, double{retry_after_s_max}));
+  std::string detail = std::to_string(waiting.count);
+  detail += " pictures wait to be drawn, and more there may not be; try again in ";
+  detail += std::to_string(after_s);
+  detail += " s";
+  Error error = make_error(ErrorKind::busy, std::move(detail));
+  error.retry_after_s = after_s;
+  return error;
+}
 
 }  // namespace
 
 struct RenderService::State {
-  explicit State(std::size_t requests) : requests_max(requests), thread([this] { work(); }) {}
+  explicit State(Options wanted) : options(std::move(wanted)) {
+    if (!options.now_us) options.now_us = steady_us;
+    thread = std::thread([this] { work(); });
+  }
 
   void work() {
     std::unique_lock lock(mutex);
     while (true) {
-      wake.wait(lock, [this] { return stopping || rings[0].waiting + rings[1].waiting > 0; });
-      std::optional<Waiting> next = take();
+      wake.wait(lock, [this] { return stopping || !queue.empty(); });
+      std::optional<RenderQueue::Next> next = queue.pop(options.now_us());
       if (!next) return;
-      running = next->job.cancel;
       lock.unlock();
-      run(*next);
+      const std::int64_t took_us = run(*next);
       next.reset();  // what the job holds goes before the lock is taken
       lock.lock();
-      running.reset();
+      queue.done(took_us);
     }
   }
 
-  std::optional<Waiting> take() {
-    turn = 1 - turn;
-    auto next = rings[turn].pop();
-    return next ? std::move(next) : rings[1 - turn].pop();
-  }
-
-  static void run(const Waiting& next) {
-    const auto queued = Clock::now() - next.since;
+  // How long it took. No exception leaves it.
+  std::int64_t run(const RenderQueue::Next& next) noexcept {
+    const std::int64_t began_us = options.now_us();
     try {
-      next.job.run(std::chrono::duration_cast<std::chrono::microseconds>(queued).count());
+      next.job.run(began_us - next.since_us);
     } catch (const std::exception& fault) {
-      log::error("a render job failed", {{"fault", fault.what()}});
+      tell_fault("a render job failed", fault);
     }
+    const std::int64_t took_us = options.now_us() - began_us;
+    try {
+      if (options.charge && !next.job.payer.empty()) options.charge(next.job.payer, took_us);
+    } catch (const std::exception& fault) {
+      tell_fault("a render job could not be charged", fault);
+    }
+    return took_us;
   }
 
-  void cancel_all() {
-    const std::lock_guard lock(mutex);
-    for (const Ring& ring : rings) {
-      for (const Owner& owner : ring.owners) {
-        for (const Waiting& waiting : owner.jobs) waiting.job.cancel.cancel();
-      }
+  // Under the mutex.
+  [[nodiscard]] bool has_room(const Job& job, const RenderQueue::Load& waiting) const {
+    if (job.kind != Kind::request || job.admitted) return true;
+    const double rest_ms = queue.rest_ms(options.now_us());
+    if (options.others_ms_max > 0 && overloaded() &&
+        rest_ms > hurried_share * std::max(options.others_ms_max, job.cost_ms)) {
+      return false;
     }
-    if (running) running->cancel();
+    if (waiting.count == 0) return true;
+    if (waiting.count >= options.requests_max ||
+        waiting.cost_ms + job.cost_ms > options.requests_ms_max) {
+      return false;
+    }
+    // Nobody has all the places.
+    const std::size_t own_max = std::max<std::size_t>(options.requests_max / 2, 1);
+    if (!job.payer.empty() && queue.requests_of(job.payer).count >= own_max) return false;
+    if (options.others_ms_max <= 0) return true;
+    const auto others = queue.requests_before(job.payer, options.others_ms_max);
+    return others.count == 0 ||
+           rest_ms + others.cost_ms <= std::max(options.others_ms_max, patient_share * job.cost_ms);
   }
 
-  const std::size_t requests_max;
+  // Refusals of late, each counting for less as time goes by.
+  [[nodiscard]] double pressure_now() const {
+    const double since_s = static_cast<double>(options.now_us() - pressure_at_us) / 1e6;
+    return pressure * std::exp(-std::max(since_s, 0.0));
+  }
+  [[nodiscard]] bool overloaded() const { return pressure_now() > refusals_of_overload; }
+  void refuse() {
+    pressure = pressure_now() + 1;
+    pressure_at_us = options.now_us();
+    if (options.refused) options.refused();
+  }
+
+  Options options;
   std::mutex mutex;
   std::condition_variable wake;
-  std::array<Ring, 2> rings;  // by Kind
-  std::size_t turn = 0;
-  std::optional<CancelToken> running;
+  RenderQueue queue;
+  double pressure = 0;
+  std::int64_t pressure_at_us = 0;
   bool stopping = false;
-  std::thread thread;  // last: it uses all of the above
+  std::thread thread;
 };
 
-RenderService::RenderService(std::size_t requests_max)
-    : state_(std::make_unique<State>(requests_max)) {}
+RenderService::RenderService(Options options)
+    : state_(std::make_unique<State>(std::move(options))) {}
 
-RenderService::~RenderService() {
+RenderService::~RenderService() { end(); }
+
+void RenderService::end() {
   {
     const std::lock_guard lock(state_->mutex);
     state_->stopping = true;
+    state_->queue.cancel_all();
   }
-  state_->cancel_all();
   state_->wake.notify_one();
-  state_->thread.join();
+  if (state_->thread.joinable()) state_->thread.join();
 }
 
 Result<void> RenderService::submit(Job job) {
   {
     const std::lock_guard lock(state_->mutex);
-    Ring& ring = state_->rings[static_cast<std::size_t>(job.kind)];
-    if (job.kind == Kind::request && ring.wanted() >= state_->requests_max) {
-      return make_error(ErrorKind::busy, "more pictures are asked for than can be drawn; try " +
-                                             std::string("again in a moment"));
+    if (state_->stopping) return make_error(ErrorKind::draining, "the server is shutting down");
+    const RenderQueue::Load waiting = state_->queue.requests_waiting();
+    if (!state_->has_room(job, waiting)) {
+      state_->refuse();
+      return too_busy(waiting);
     }
-    ring.push({std::move(job), Clock::now()});
+    state_->queue.push(std::move(job), state_->options.now_us());
   }
   state_->wake.notify_one();
   return {};
 }
 
-void RenderService::cancel_all() { state_->cancel_all(); }
+void RenderService::cancel_all() {
+  const std::lock_guard lock(state_->mutex);
+  state_->queue.cancel_all();
+}
 
 }  // namespace windsplat::net

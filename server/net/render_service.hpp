@@ -1,41 +1,51 @@
-// The one thread that loads and draws. Jobs in from any thread; each runs to its end before the
-// next: a frame has the whole thread pool to itself.
+// The one thread that draws. Jobs in from any thread; each runs to its end before the next: a frame
+// has the whole thread pool to itself. Whose turn it is: render_queue.hpp.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 
-#include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
+#include "server/net/render_queue.hpp"
 
 namespace windsplat::net {
 
 class RenderService {
  public:
-  enum class Kind { stream, request };
+  using Kind = RenderKind;
+  using Job = RenderJob;
 
-  struct Job {
-    Kind kind = Kind::request;
-    std::uint64_t owner = 0;  // session or connection; jobs of one owner run in order
-    CancelToken cancel;       // raised from outside, or by cancel_all()
-    // Runs once, cancelled or not, on the renderer's thread. Must not throw.
-    std::function<void(std::int64_t queue_us)> run;
+  struct Options {
+    // What may wait of kind request, cancelled ones not counted; of one payer half as many.
+    // Streams' jobs are bounded by their sessions, each of which asks for one at a time, background
+    // jobs by their owners.
+    std::size_t requests_max = 16;
+    double requests_ms_max = 30'000;  // by the jobs' own estimates; one alone is always let in
+    std::function<std::int64_t()> now_us = {};  // empty: a steady clock
+    // How long requests of other payers, where some wait, may keep one waiting that takes less
+    // itself; 0: as long as those above allow.
+    double others_ms_max = 0;
+    // Told what each job took that has a payer, on the renderer's thread, and each refusal.
+    std::function<void(const std::string& payer, std::int64_t us)> charge = {};
+    std::function<void()> refused = {};
   };
 
-  // `requests_max`: jobs of kind request that may wait, cancelled ones not counted. Those of
-  // streams are bounded by their sessions, each of which asks for one at a time.
-  explicit RenderService(std::size_t requests_max);
-  ~RenderService();  // cancels everything, runs what waits, joins
+  explicit RenderService(Options options);
+  ~RenderService();  // as end()
   RenderService(const RenderService&) = delete;
   RenderService& operator=(const RenderService&) = delete;
 
-  // Streams and requests take turns, and so do the owners within each kind. Errors: busy.
+  // Errors: busy, with the time after which what waits now will be done, where requests alone are
+  // refused; draining after end().
   Result<void> submit(Job job);
 
   // Raises the token of every job that waits or runs.
   void cancel_all();
+  // Cancels everything, runs what waits, joins; refuses whatever comes after.
+  void end();
 
  private:
   struct State;

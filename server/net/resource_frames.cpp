@@ -1,17 +1,20 @@
 // Pictures: a query or a posted view -> a job of the renderer -> encoded bytes with their report.
 #include <array>
-#include <exception>
-#include <new>
+#include <functional>
 #include <utility>
 
 #include "protocol/codec.hpp"
 #include "protocol/limits.hpp"
-#include "server/base/log.hpp"
 #include "server/frame/frame_info.hpp"
+#include "server/frame/measure.hpp"
+#include "server/net/attempt.hpp"
+#include "server/net/drawing.hpp"
 #include "server/net/negotiate.hpp"
 #include "server/net/problem.hpp"
 #include "server/net/resources.hpp"
 #include "server/net/target.hpp"
+#include "server/net/told_error.hpp"
+#include "server/quality/pick.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
 
@@ -36,6 +39,7 @@ struct Picture {
   std::string preset;  // empty: none
   std::optional<Orbit> orbit;
   std::string if_none_match;
+  Cost cost;  // of the view before preset and orbit, which move the camera alone
 };
 
 std::string_view media_type(frame::Format format) {
@@ -110,13 +114,37 @@ Result<protocol::View> resolve(const Picture& picture, data::Dataset& dataset) {
   return scene::complete_view(*view, dataset);
 }
 
+// Within a budget or an error the server may choose, and the picture is not the view's alone.
+bool is_chosen(const protocol::View& view) {
+  return view.quality.budget_ms || view.quality.max_error;
+}
+
+Result<quality::Setting> setting_of(Services& services, const protocol::View& completed,
+                                    data::Dataset& dataset) {
+  if (!is_chosen(completed) || completed.method.name == protocol::MethodName::reference) {
+    return quality::settings[quality::own_setting(completed)];
+  }
+  const auto placed = scene::complete_and_place(completed, dataset);
+  if (!placed) return placed.error();
+  const auto sight = frame::sight_of(*placed);
+  if (!sight) return sight.error();
+  const auto known = services.quality.forecasts(quality::style_of(completed), *sight);
+  const quality::Aim aim{completed.quality.budget_ms, completed.quality.max_error};
+  return quality::settings[quality::pick(completed, known, aim).setting];
+}
+
+frame::Encoding encoding_at(frame::Encoding encoding, const quality::Setting& setting) {
+  encoding.half_level = setting.half_level;
+  encoding.coarser = setting.coarser;
+  return encoding;
+}
+
 Result<Response> draw(Services& services, const Picture& picture, data::Dataset& dataset,
                       std::int64_t queue_us, const CancelToken& cancel) {
   const auto view = resolve(picture, dataset);
   if (!view) return view.error();
   Response response;
-  // Within a budget the server may choose, so the picture is not the view's alone.
-  if (view->quality.budget_ms) {
+  if (is_chosen(*view)) {
     response.headers = {{"Cache-Control", "no-store"}};
   } else {
     const std::string etag = picture_etag(*view, dataset, picture.encoding);
@@ -126,17 +154,28 @@ Result<Response> draw(Services& services, const Picture& picture, data::Dataset&
       return response;
     }
   }
-  auto drawn =
-      frame::produce(*view, dataset, picture.encoding, *services.pool, cancel, services.frames);
+  const auto setting = setting_of(services, *view, dataset);
+  if (!setting) return setting.error();
+  const frame::Encoding encoding = encoding_at(picture.encoding, *setting);
+  auto drawn = frame::produce(quality::at_setting(*view, *setting), dataset, encoding,
+                              *services.pool, cancel, services.frames);
   if (!drawn) return drawn.error();
+  protocol::FrameInfo info = frame::frame_info(*drawn, drawn->view);
+  tell_error(*drawn, seen_in(*drawn, *setting), *setting, encoding, services.quality, info);
+  services.metrics.stage_took(Metrics::Stage::queue, queue_us);
+  services.metrics.stage_took(Metrics::Stage::render, drawn->render_us);
+  services.metrics.stage_took(Metrics::Stage::encode, drawn->encode_us);
+  // What the server chooses is drawn at less work than was reckoned.
+  if (!is_chosen(*view)) {
+    services.costs.learn(view->dataset, view->method.name, picture.cost.kernels,
+                         drawn->render_us + drawn->encode_us);
+  }
   response.content_type = media_type(picture.encoding.format);
   response.headers.emplace_back("Server-Timing",
                                 "queue;dur=" + milliseconds(queue_us) +
                                     ", render;dur=" + milliseconds(drawn->render_us) +
                                     ", encode;dur=" + milliseconds(drawn->encode_us));
-  response.headers.emplace_back(
-      "Windsplat-Frame",
-      ascii_json(protocol::encode_frame_info(frame::frame_info(*drawn, drawn->view))));
+  response.headers.emplace_back("Windsplat-Frame", ascii_json(protocol::encode_frame_info(info)));
   response.headers.emplace_back("Vary", "Accept");
   // A picture is meant for any page's <img>; its pixels stay out of that page's reach.
   response.headers.emplace_back("Cross-Origin-Resource-Policy", "cross-origin");
@@ -144,35 +183,55 @@ Result<Response> draw(Services& services, const Picture& picture, data::Dataset&
   return response;
 }
 
-Response draw_guarded(Services& services, const Picture& picture, data::Dataset& dataset,
-                      std::int64_t queue_us, const CancelToken& cancel) {
-  if (cancel.cancelled()) {
-    return problem_response(make_error(ErrorKind::cancelled, "nobody waits for the answer"));
+void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dataset> dataset,
+                    const Request& request, Reply reply) {
+  if (auto refusal = services.admission.picture(request.address)) {
+    reply(std::move(*refusal));
+    return;
   }
-  try {
-    auto response = draw(services, picture, dataset, queue_us, cancel);
-    return response ? std::move(*response) : problem_response(response.error());
-  } catch (const std::bad_alloc&) {
-    return problem_response(
-        make_error(ErrorKind::out_of_memory, "there is no memory left for this picture"));
-  } catch (const std::exception& fault) {
-    log::error("a picture failed", {{"fault", fault.what()}});
-    return problem_response(make_error(ErrorKind::internal, "the picture could not be drawn"));
+  const double estimate_ms =
+      services.costs.estimate_ms(asked.view.dataset, asked.view.method.name, asked.cost.kernels);
+  if (const auto fits = services.admission.check_estimate(asked.cost, estimate_ms); !fits) {
+    reply(problem_response(fits.error()));
+    return;
   }
-}
-
-void submit(Services& services, Picture picture, std::shared_ptr<data::Dataset> dataset,
-            const Request& request, Reply reply) {
-  picture.if_none_match = request.header("If-None-Match");
-  const auto shared_reply = std::make_shared<Reply>(std::move(reply));
+  asked.if_none_match = request.header("If-None-Match");
+  const auto picture = std::make_shared<const Picture>(std::move(asked));
+  const auto answer = std::make_shared<const Reply>(std::move(reply));
   const CancelToken cancel = request.cancel;
-  const auto queued = services.renderer.submit(
-      {RenderService::Kind::request, request.peer, cancel,
-       [&services, picture = std::move(picture), dataset = std::move(dataset), cancel,
-        shared_reply](std::int64_t queue_us) {
-         (*shared_reply)(draw_guarded(services, picture, *dataset, queue_us, cancel));
-       }});
-  if (!queued) (*shared_reply)(problem_response(queued.error()));
+  // Pictures of one address take turns with those of others, however many connections it has.
+  const std::uint64_t owner =
+      request.address.empty() ? request.peer : std::hash<std::string>{}(request.address);
+  Drawing drawing{
+      RenderService::Kind::request, owner, cancel, std::move(dataset), {}, {}, {}, 0, {}};
+  drawing.draw = [&services, picture, answer, cancel, id = request.id](
+                     data::Dataset& resident, std::int64_t queue_us, bool after_load) {
+    auto response = attempt<Response>(
+        "a picture", cancel, [&] { return draw(services, *picture, resident, queue_us, cancel); },
+        id);
+    if (!after_load && !response && response.error().kind == ErrorKind::not_resident) return false;
+    (*answer)(response ? std::move(*response) : problem_response(response.error()));
+    return true;
+  };
+  drawing.load = [&services, picture, cancel, id = request.id](data::Dataset& loading) {
+    return attempt<std::shared_ptr<const void>>(
+        "loading a picture's fields", cancel,
+        [&]() -> Result<std::shared_ptr<const void>> {
+          const auto view = resolve(*picture, loading);
+          if (!view) return view.error();
+          const auto setting = setting_of(services, *view, loading);
+          if (!setting) return setting.error();
+          return frame::load(quality::at_setting(*view, *setting), loading,
+                             encoding_at(picture->encoding, *setting));
+        },
+        id);
+  };
+  drawing.payer = request.address;
+  drawing.cost_ms = estimate_ms;
+  drawing.fail = [answer](const Error& error) { (*answer)(problem_response(error)); };
+  if (const auto queued = submit(services, std::move(drawing)); !queued) {
+    (*answer)(problem_response(queued.error()));
+  }
 }
 
 // --- GET /v1/datasets/{id}/frame.* --------------------------------------------------------------
@@ -223,10 +282,6 @@ Result<Picture> read_query(const Request& request, frame::Format format) {
 
 // --- POST /v1/frames ----------------------------------------------------------------------------
 
-bool is_json(std::string_view content_type) {
-  return equal_without_case(split_list(content_type, ';')[0], "application/json");
-}
-
 Result<Picture> read_view(const Request& request, frame::Format format) {
   const auto document = protocol::ViewDocument::parse(request.body);
   if (!document) return document.error();
@@ -262,11 +317,13 @@ void get_frame(Services& services, const std::string& id, frame::Format format,
     return;
   }
   picture->view.dataset = id;
-  if (const auto drawable = services.catalogue.check(picture->view); !drawable) {
-    reply(problem_response(drawable.error()));
+  auto checked = check_picture(services, picture->view);
+  if (!checked) {
+    reply(problem_response(checked.error()));
     return;
   }
-  submit(services, std::move(*picture), std::move(*dataset), request, std::move(reply));
+  picture->cost = std::move(checked->cost);
+  submit_picture(services, std::move(*picture), std::move(*dataset), request, std::move(reply));
 }
 
 void post_frame(Services& services, const Request& request, Reply reply) {
@@ -288,17 +345,18 @@ void post_frame(Services& services, const Request& request, Reply reply) {
     reply(problem_response(picture.error()));
     return;
   }
-  const auto drawable = services.catalogue.check(picture->view);
-  if (!drawable) {
-    reply(problem_response(drawable.error()));
+  auto checked = check_picture(services, picture->view);
+  if (!checked) {
+    reply(problem_response(checked.error()));
     return;
   }
+  picture->cost = std::move(checked->cost);
   auto dataset = services.catalogue.find(picture->view.dataset);
   if (!dataset) {
     reply(problem_response(dataset.error()));
     return;
   }
-  submit(services, std::move(*picture), std::move(*dataset), request, std::move(reply));
+  submit_picture(services, std::move(*picture), std::move(*dataset), request, std::move(reply));
 }
 
 }  // namespace windsplat::net

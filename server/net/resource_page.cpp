@@ -62,6 +62,16 @@ std::string inflated(std::span<const std::uint8_t> gzip) {
   return out;
 }
 
+// Made once for each file: of a binary there are a few hundred kilobytes.
+Body inflated_once(const WebAsset& asset) {
+  static std::mutex mutex;
+  static std::map<std::string, Body, std::less<>> made;
+  const std::lock_guard lock(mutex);
+  const auto known = made.find(asset.path);
+  if (known != made.end()) return known->second;
+  return made.emplace(asset.path, Body::of(inflated(asset.gzip))).first->second;
+}
+
 const WebAsset* find_asset(const std::string& path) {
   for (const WebAsset& asset : web_assets()) {
     if (asset.path == path) return &asset;
@@ -96,7 +106,7 @@ Response get_page(const Request& request, const std::string& path) {
     response.headers.emplace_back("Content-Encoding", "gzip");
     response.body = {nullptr, asset->gzip};
   } else {
-    response.body = Body::of(inflated(asset->gzip));
+    response.body = inflated_once(*asset);
   }
   return response;
 }

@@ -1,12 +1,12 @@
 // The service itself: what it is, whether it lives, and what it offers by name.
 #include "server/net/resources.hpp"
 
-#include <exception>
+#include <memory>
 #include <utility>
 
 #include "protocol/codec.hpp"
-#include "server/base/log.hpp"
 #include "server/data/digest.hpp"
+#include "server/net/attempt.hpp"
 #include "server/net/negotiate.hpp"
 #include "server/net/problem.hpp"
 #include "server/net/view_schema.hpp"
@@ -27,21 +27,6 @@ Response health(int status, const char* state) {
   return response;
 }
 
-// Always an answer: a fault of ours becomes a 500, its words go to the log.
-Response describe_guarded(Services& services, const std::string& id, const CancelToken& cancel) {
-  if (cancel.cancelled()) {
-    return problem_response(make_error(ErrorKind::cancelled, "nobody waits for the answer"));
-  }
-  try {
-    const auto description = services.catalogue.describe(id);
-    return description ? json_response(protocol::encode_dataset(*description))
-                       : problem_response(description.error());
-  } catch (const std::exception& fault) {
-    log::error("a description failed", {{"dataset", id}, {"fault", fault.what()}});
-    return problem_response(make_error(ErrorKind::internal, "the dataset cannot be described"));
-  }
-}
-
 }  // namespace
 
 Response json_response(std::string json) {
@@ -50,6 +35,27 @@ Response json_response(std::string json) {
   response.headers = {{"Cache-Control", "no-store"}};
   response.body = Body::of(std::move(json));
   return response;
+}
+
+bool is_json(std::string_view content_type) {
+  return equal_without_case(split_list(content_type, ';')[0], "application/json");
+}
+
+bool is_merge_patch(std::string_view content_type) {
+  return equal_without_case(split_list(content_type, ';')[0], "application/merge-patch+json");
+}
+
+void run_later(LoadService& service, const Request& request, Reply reply, const char* what,
+               const data::Dataset* of, std::function<Response()> make) {
+  const auto answer = std::make_shared<const Reply>(std::move(reply));
+  const CancelToken cancel = request.cancel;
+  const auto run = [what, make = std::move(make), cancel, answer, id = request.id] {
+    auto response = attempt<Response>(what, cancel, make, id);
+    (*answer)(response ? std::move(*response) : problem_response(response.error()));
+  };
+  const auto queued = service.submit(
+      {cancel, run, false, of == nullptr ? nullptr : of->shared_info(), request.address});
+  if (!queued) (*answer)(problem_response(queued.error()));
 }
 
 std::string etag_of(std::string_view text) {
@@ -78,6 +84,14 @@ Response get_readyz(const Services& services) {
   return services.draining ? health(503, "draining") : health(200, "ready");
 }
 
+Response get_metrics(const Services& services) {
+  Response response;
+  response.content_type = "text/plain; version=0.0.4; charset=utf-8";
+  response.headers = {{"Cache-Control", "no-store"}};
+  response.body = Body::of(services.metrics.text(services.catalogue.counts()));
+  return response;
+}
+
 Response get_service(const Services& services) {
   protocol::ServiceDescription service;
   service.version = WINDSPLAT_VERSION;
@@ -85,12 +99,17 @@ Response get_service(const Services& services) {
   service.links = {{"page", base},
                    {"datasets", base + "v1/datasets"},
                    {"frames", base + "v1/frames"},
+                   {"references", base + "v1/references"},
+                   {"forecasts", base + "v1/forecasts"},
+                   {"views", base + "v1/views"},
+                   {"jobs", base + "v1/jobs"},
                    {"colormaps", base + "v1/colormaps"},
                    {"presets", base + "v1/presets"},
                    {"stream", base + "v1/stream"},
                    {"viewSchema", base + "view.schema.json"},
                    {"livez", base + "livez"},
-                   {"readyz", base + "readyz"}};
+                   {"readyz", base + "readyz"},
+                   {"metrics", base + "metrics"}};
   return json_response(protocol::encode_service(service));
 }
 
@@ -115,18 +134,17 @@ Response get_datasets(const Services& services) {
 }
 
 void get_dataset(Services& services, const std::string& id, const Request& request, Reply reply) {
-  if (const auto dataset = services.catalogue.find(id); !dataset) {
+  const auto dataset = services.catalogue.find(id);
+  if (!dataset) {
     reply(problem_response(make_error(ErrorKind::not_found, dataset.error().message)));
     return;
   }
-  const auto shared_reply = std::make_shared<Reply>(std::move(reply));
-  const CancelToken cancel = request.cancel;
-  const auto queued =
-      services.renderer.submit({RenderService::Kind::request, request.peer, cancel,
-                                [&services, id, cancel, shared_reply](std::int64_t /*queue_us*/) {
-                                  (*shared_reply)(describe_guarded(services, id, cancel));
-                                }});
-  if (!queued) (*shared_reply)(problem_response(queued.error()));
+  run_later(services.loads, request, std::move(reply), "a description", dataset->get(),
+            [&services, id]() -> Response {
+              const auto description = services.catalogue.describe(id);
+              return description ? json_response(protocol::encode_dataset(*description))
+                                 : problem_response(description.error());
+            });
 }
 
 }  // namespace windsplat::net

@@ -11,12 +11,7 @@
 #include <boost/beast/http/message.hpp>
 #include <chrono>
 #include <cstddef>
-#include <exception>
 #include <limits>
-#include <memory>
-#include <utility>
-
-#include "server/base/log.hpp"
 
 namespace windsplat::net {
 
@@ -50,19 +45,6 @@ using UpgradeRequest = beast::http::request<beast::http::empty_body>;
 // Time for a peer to take `bytes`: a fixed part and 64 KiB/s.
 inline std::chrono::milliseconds write_deadline(std::size_t bytes, int fixed_s) {
   return std::chrono::seconds(fixed_s) + std::chrono::milliseconds(bytes / 64);
-}
-
-// A completion handler of a session: keeps it alive, and ends it alone when something throws.
-template <class Session, class Body>
-auto guarded(std::shared_ptr<Session> session, Body body) {
-  return [session = std::move(session), body = std::move(body)](auto&&... results) mutable {
-    try {
-      body(std::forward<decltype(results)>(results)...);
-    } catch (const std::exception& fault) {
-      log::error("a connection failed", {{"fault", fault.what()}});
-      session->abort();
-    }
-  };
 }
 
 }  // namespace windsplat::net

@@ -20,14 +20,27 @@ std::vector<std::string> segments_of(std::string_view path) {
   return segments;
 }
 
-// "http://host/path" is as good as "/path" (RFC 9112, 3.2.2).
-std::string_view origin_form(std::string_view target) {
+// "http://host/path" is as good as "/path" where the host is the one that was asked for, as
+// clients must send it (RFC 9112, 3.2.2); nothing where it is another.
+std::optional<std::string> origin_form(std::string_view target, std::string_view host) {
   for (const std::string_view scheme : {"http://", "https://"}) {
-    if (target.substr(0, scheme.size()) != scheme) continue;
-    const std::size_t slash = target.find('/', scheme.size());
-    return slash == std::string_view::npos ? std::string_view("/") : target.substr(slash);
+    if (!equal_without_case(target.substr(0, scheme.size()), scheme)) continue;
+    const std::string_view rest = target.substr(scheme.size());
+    const std::size_t end = std::min(rest.find_first_of("/?#"), rest.size());
+    if (!equal_without_case(rest.substr(0, end), host)) return std::nullopt;
+    const std::string_view path = rest.substr(end);
+    return path.starts_with('/') ? std::string(path) : '/' + std::string(path);
   }
-  return target;
+  return std::string(target);
+}
+
+// Whole text or nothing.
+std::optional<double> parse_number(std::string_view text) {
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const auto [stop, fault] = std::from_chars(text.data(), end, value);
+  if (fault != std::errc() || stop != end || !std::isfinite(value)) return std::nullopt;
+  return value;
 }
 
 }  // namespace
@@ -44,7 +57,12 @@ Result<void> parse_target(std::string_view target, std::string_view base_path, R
     request.below_base = false;
     return {};
   }
-  const auto url = boost::urls::parse_origin_form(origin_form(target));
+  const auto origin = origin_form(target, request.header("Host"));
+  if (!origin) {
+    return make_error(ErrorKind::malformed, "the request target '" + printable(target) +
+                                                "' names another host than the Host");
+  }
+  const auto url = boost::urls::parse_origin_form(*origin);
   if (!url) {
     return make_error(ErrorKind::malformed,
                       "the request target '" + printable(target) + "' is no path");
@@ -54,6 +72,7 @@ Result<void> parse_target(std::string_view target, std::string_view base_path, R
   if (request.ends_in_slash) request.path.pop_back();
   if (url->has_query()) {
     for (const auto& parameter : url->params()) {
+      if (parameter.key.empty() && !parameter.has_value) continue;  // "?" alone, or "&&"
       request.query.emplace_back(parameter.key, parameter.value);
     }
   }
@@ -82,6 +101,13 @@ const std::string* QueryReader::find(std::string_view key) {
   return value;
 }
 
+void QueryReader::fail_range(std::string_view key, double min, double max, std::string_view text) {
+  std::array<char, 100> limits{};
+  std::snprintf(limits.data(), limits.size(), "' must be %g to %g, not ", min, max);
+  fail(ErrorKind::invalid,
+       "the query's '" + std::string(key) + limits.data() + printable(text, 40));
+}
+
 std::optional<std::string> QueryReader::text(std::string_view key) {
   const std::string* value = find(key);
   return value == nullptr ? std::nullopt : std::optional(*value);
@@ -90,19 +116,14 @@ std::optional<std::string> QueryReader::text(std::string_view key) {
 std::optional<double> QueryReader::number(std::string_view key, double min, double max) {
   const std::string* text = find(key);
   if (text == nullptr) return std::nullopt;
-  double value = 0;
-  const char* end = text->data() + text->size();
-  const auto [stop, fault] = std::from_chars(text->data(), end, value);
-  if (fault != std::errc() || stop != end || !std::isfinite(value)) {
+  const auto value = parse_number(*text);
+  if (!value) {
     fail(ErrorKind::malformed,
          "the query's '" + std::string(key) + "' is not a number: " + printable(*text, 40));
     return std::nullopt;
   }
-  if (value < min || value > max) {
-    std::array<char, 100> limits{};
-    std::snprintf(limits.data(), limits.size(), "' must be %g to %g, not ", min, max);
-    fail(ErrorKind::invalid,
-         "the query's '" + std::string(key) + limits.data() + printable(*text, 40));
+  if (*value < min || *value > max) {
+    fail_range(key, min, max, *text);
     return std::nullopt;
   }
   return value;
@@ -134,12 +155,54 @@ std::optional<int> QueryReader::integer(std::string_view key, int min, int max) 
   return std::nullopt;
 }
 
+std::optional<bool> QueryReader::boolean(std::string_view key) {
+  const std::string* text = find(key);
+  if (text == nullptr) return std::nullopt;
+  if (*text == "true" || *text == "1") return true;
+  if (*text == "false" || *text == "0") return false;
+  fail(ErrorKind::malformed,
+       "the query's '" + std::string(key) + "' is true or false, not " + printable(*text, 40));
+  return std::nullopt;
+}
+
+std::optional<std::array<double, 2>> QueryReader::pair(std::string_view key, double min,
+                                                       double max) {
+  const std::string* text = find(key);
+  if (text == nullptr) return std::nullopt;
+  const std::vector<std::string_view> parts = split_list(*text, ',');
+  std::array<double, 2> out{};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const auto value = parts.size() == 2 ? parse_number(parts[i]) : std::nullopt;
+    if (!value) {
+      fail(ErrorKind::malformed, "the query's '" + std::string(key) +
+                                     "' is two numbers with a comma, not " + printable(*text, 80));
+      return std::nullopt;
+    }
+    if (*value < min || *value > max) {
+      fail_range(key, min, max, parts[i]);
+      return std::nullopt;
+    }
+    out[i] = *value;
+  }
+  return out;
+}
+
+std::string QueryReader::known() const {
+  if (asked_.empty()) return "nothing may be asked";
+  std::string list = "what may be asked: ";
+  for (std::size_t i = 0; i < asked_.size(); ++i) {
+    if (i > 0) list += ", ";
+    list += asked_[i];
+  }
+  return list;
+}
+
 Result<void> QueryReader::finish() const {
   if (fault_) return *fault_;
   for (const auto& [name, value] : query_) {
     if (std::find(asked_.begin(), asked_.end(), name) == asked_.end()) {
       return make_error(ErrorKind::malformed,
-                        "the query's '" + printable(name, 40) + "' is unknown here");
+                        "the query's '" + printable(name, 40) + "' is unknown here; " + known());
     }
   }
   return {};

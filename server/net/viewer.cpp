@@ -1,91 +1,214 @@
 // Effects of a session -> render jobs; what they bring -> the session's own words.
 #include "server/net/viewer.hpp"
 
-#include <exception>
-#include <new>
+#include <mutex>
+#include <optional>
+#include <set>
 #include <utility>
 
 #include "protocol/codec.hpp"
-#include "server/base/log.hpp"
 #include "server/frame/frame_info.hpp"
+#include "server/frame/measure.hpp"
+#include "server/net/attempt.hpp"
+#include "server/net/drawing.hpp"
+#include "server/net/survey_job.hpp"
+#include "server/net/told_error.hpp"
+#include "server/scene/build.hpp"
 
 namespace windsplat::net {
 namespace {
 
-frame::Encoding frame_encoding(const session::Encoding& wanted) {
+frame::Encoding frame_encoding(const session::Encoding& wanted, const quality::Setting& setting) {
   frame::Encoding encoding;
   const bool png = wanted.codec == protocol::Codec::png;
   encoding.format = png ? frame::Format::png : frame::Format::jpeg;
   encoding.quality = wanted.quality;
   encoding.subsampling = wanted.full_chroma ? image::Subsampling::s444 : image::Subsampling::s420;
-  encoding.level = wanted.level;
+  encoding.half_level = setting.half_level;
+  encoding.coarser = setting.coarser;
+  encoding.measure = wanted.measure;
   return encoding;
 }
 
-Error nobody_waits() { return make_error(ErrorKind::cancelled, "nobody waits for the answer"); }
-
-// What the next frame of the same data need not do again.
-std::uint64_t preparations(const data::Dataset& dataset) {
-  return dataset.loads() + dataset.averages();
-}
-
 Result<session::Drawn> draw(Services& services, const session::StartRender& wanted,
-                            std::int64_t queue_us, const CancelToken& cancel) {
-  const auto dataset = services.catalogue.find(wanted.view.dataset);
-  if (!dataset) return dataset.error();
-  const std::uint64_t before = preparations(**dataset);
-  auto drawn = frame::produce(wanted.view, **dataset, frame_encoding(wanted.encoding),
+                            data::Dataset& dataset, std::int64_t queue_us,
+                            const CancelToken& cancel) {
+  const frame::Encoding encoding = frame_encoding(wanted.encoding, wanted.setting);
+  auto drawn = frame::produce(quality::at_setting(wanted.view, wanted.setting), dataset, encoding,
                               *services.pool, cancel, services.frames);
   if (!drawn) return drawn.error();
   session::Drawn out;
   out.info = frame::frame_info(*drawn, drawn->view);
+  Seen seen = seen_in(*drawn, wanted.setting);
+  tell_error(*drawn, seen, wanted.setting, encoding, services.quality, out.info);
+  out.style = std::move(seen.style);
+  out.sight = seen.sight;
   out.view_json = protocol::encode_view(drawn->view);
   out.payload = std::make_shared<const std::vector<std::uint8_t>>(std::move(drawn->bytes));
   out.queue_us = queue_us;
   out.render_us = drawn->render_us;
+  out.measure_us = drawn->measure_us;
   out.encode_us = drawn->encode_us;
-  // Nobody else loads while the renderer's thread is here.
-  out.loaded = preparations(**dataset) != before;
+  services.metrics.stage_took(Metrics::Stage::queue, out.queue_us);
+  services.metrics.stage_took(Metrics::Stage::render, out.render_us);
+  services.metrics.stage_took(Metrics::Stage::encode, out.encode_us);
   return out;
 }
 
-// No exception leaves the renderer's thread.
-template <class T, class Make>
-Result<T> attempt(const CancelToken& cancel, const Make& make) {
-  if (cancel.cancelled()) return nobody_waits();
-  try {
-    return make();
-  } catch (const std::bad_alloc&) {
-    return make_error(ErrorKind::out_of_memory, "there is no memory left for this");
-  } catch (const std::exception& fault) {
-    log::error("a render job failed", {{"fault", fault.what()}});
-    return make_error(ErrorKind::internal, "the server failed at this");
+// Made into text here, and what may be long left out: the io thread has others to serve.
+Result<protocol::DatasetDescription> encoded(Result<protocol::DatasetDescription> description) {
+  if (!description) return description;
+  description->encoded =
+      std::make_shared<const std::string>(protocol::encode_dataset(*description));
+  description->steps = {};
+  description->axes = {};
+  return description;
+}
+
+constexpr int describing_max = 4;  // of a session at a time
+
+Result<std::vector<data::Wish>> wishes_of(const data::Dataset& dataset,
+                                          const session::Prefetch& wanted) {
+  data::Dataset ahead = dataset.ahead();
+  const auto completed = frame::complete_at(quality::at_setting(wanted.view, wanted.setting), ahead,
+                                            frame_encoding({}, wanted.setting));
+  if (!completed) return completed.error();
+  const auto shown = scene::shown_by(*completed);
+  if (!shown) return shown.error();
+  std::vector<data::Wish> wishes;
+  for (const int step : wanted.steps) {
+    for (const std::string& field : shown->fields) {
+      wishes.push_back({dataset, field, static_cast<std::size_t>(step), shown->coarsening});
+    }
   }
+  return wishes;
 }
 
 }  // namespace
 
+// What is wished for next. A dataset has one job waiting at most, however often a viewer changes
+// its mind; the job works out what is wished for when its turn has come.
+struct Viewer::Wishes {
+  struct Newest {
+    data::Dataset dataset;
+    session::Prefetch effect;
+  };
+  std::mutex mutex;  // held while a wish is said, so that none is said after it was taken back
+  std::optional<Newest> newest;           // until it is worked out
+  const data::DatasetInfo* of = nullptr;  // which dataset the newest was about; told apart only
+  std::uint64_t epoch = 0;                // counts wishes taken back and datasets left
+  std::set<const data::DatasetInfo*> queued;
+};
+
+Viewer::Viewer(Services& services, std::uint64_t owner, std::string payer)
+    : services_(services),
+      owner_(owner),
+      payer_(std::move(payer)),
+      wishes_(std::make_shared<Wishes>()) {}
+
 void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
+  survey_.cancel();  // the view rests no more
   const CancelToken cancel;
   running_.emplace(effect.ticket, cancel);
-  // Jobs of streams are never refused.
-  (void)services_.renderer.submit(
-      {RenderService::Kind::stream, owner_, cancel,
-       [&services = services_, effect, cancel, reply = std::move(reply)](std::int64_t queue_us) {
-         reply(effect.ticket, attempt<session::Drawn>(cancel, [&] {
-                 return draw(services, effect, queue_us, cancel);
-               }));
-       }});
+  auto dataset = services_.catalogue.find(effect.view.dataset);
+  if (!dataset) return reply(effect.ticket, dataset.error());
+  // A still may be larger than the view that was checked when it came.
+  if (const auto fits = check_view(services_, effect.view); !fits) {
+    return reply(effect.ticket, fits.error());
+  }
+  const auto shared = std::make_shared<const DrawnReply>(std::move(reply));
+  Drawing drawing{
+      RenderService::Kind::stream, owner_, cancel, std::move(*dataset), {}, {}, {}, 0, payer_};
+  drawing.draw = [&services = services_, effect, cancel, shared](
+                     data::Dataset& resident, std::int64_t queue_us, bool after_load) {
+    auto drawn = attempt<session::Drawn>(
+        "a frame", cancel, [&] { return draw(services, effect, resident, queue_us, cancel); });
+    if (!after_load && !drawn && drawn.error().kind == ErrorKind::not_resident) return false;
+    if (drawn) drawn->loaded = after_load;
+    (*shared)(effect.ticket, std::move(drawn));
+    return true;
+  };
+  drawing.load = [effect, cancel](data::Dataset& loading) {
+    return attempt<std::shared_ptr<const void>>("loading a frame's fields", cancel, [&] {
+      return frame::load(quality::at_setting(effect.view, effect.setting), loading,
+                         frame_encoding(effect.encoding, effect.setting));
+    });
+  };
+  drawing.fail = [ticket = effect.ticket, shared](const Error& error) { (*shared)(ticket, error); };
+  // Jobs of streams are refused at the server's end alone.
+  if (const auto queued = submit(services_, std::move(drawing)); !queued) {
+    (*shared)(effect.ticket, queued.error());
+  }
 }
 
 void Viewer::start(const session::Describe& effect, DescribedReply reply) {
-  (void)services_.renderer.submit(
-      {RenderService::Kind::stream, owner_, gone_,
-       [&services = services_, effect, cancel = gone_,
-        reply = std::move(reply)](std::int64_t /*queue_us*/) {
-         reply(effect.id, attempt<protocol::DatasetDescription>(
-                              cancel, [&] { return services.catalogue.describe(effect.dataset); }));
-       }});
+  const auto shared = std::make_shared<const DescribedReply>(std::move(reply));
+  if (describing_.use_count() > describing_max) {
+    const auto busy = make_error(ErrorKind::busy, "earlier datasets are not opened yet");
+    return (*shared)(effect.id, busy);
+  }
+  const auto dataset = services_.catalogue.find(effect.dataset);
+  const auto queued = services_.loads.submit(
+      {gone_,
+       [&services = services_, effect, cancel = gone_, shared, one = describing_] {
+         (*shared)(effect.id, attempt<protocol::DatasetDescription>("a description", cancel, [&] {
+                     return encoded(services.catalogue.describe(effect.dataset));
+                   }));
+       },
+       true, dataset ? (*dataset)->shared_info() : nullptr});
+  if (!queued) (*shared)(effect.id, queued.error());
+}
+
+void Viewer::start(const session::Prefetch& effect) {
+  const auto found = services_.catalogue.find(effect.view.dataset);
+  if (effect.steps.empty() || !found) {
+    wish_no_more();
+    return;
+  }
+  const auto of = (*found)->shared_info();
+  {
+    const std::lock_guard lock(wishes_->mutex);
+    if (wishes_->of != of.get()) ++wishes_->epoch;
+    wishes_->of = of.get();
+    wishes_->newest.emplace(Wishes::Newest{**found, effect});
+    if (!wishes_->queued.insert(of.get()).second) return;
+  }
+  // To know which fields at which detail, the view has to be completed: not here.
+  const auto run = [&services = services_, owner = owner_, wishes = wishes_, key = of.get()] {
+    work_out(services, owner, *wishes, key);
+  };
+  (void)services_.loads.submit({gone_, run, true, of});
+}
+
+void Viewer::work_out(Services& services, std::uint64_t owner, Wishes& wishes,
+                      const data::DatasetInfo* of) {
+  std::optional<Wishes::Newest> newest;
+  std::uint64_t epoch = 0;
+  {
+    const std::lock_guard lock(wishes.mutex);
+    wishes.queued.erase(of);
+    if (!wishes.newest || wishes.of != of) return;
+    newest = std::exchange(wishes.newest, std::nullopt);
+    epoch = wishes.epoch;
+  }
+  auto found = attempt<std::vector<data::Wish>>(
+      "what comes next", {}, [&] { return wishes_of(newest->dataset, newest->effect); });
+  const std::lock_guard lock(wishes.mutex);
+  if (found && wishes.epoch == epoch) services.catalogue.wish(owner, std::move(*found));
+}
+
+void Viewer::wish_no_more() {
+  const std::lock_guard lock(wishes_->mutex);
+  wishes_->newest.reset();
+  wishes_->of = nullptr;
+  ++wishes_->epoch;
+  services_.catalogue.wish(owner_, {});
+}
+
+void Viewer::start(const session::Survey& effect) {
+  survey_.cancel();
+  survey_ = CancelToken();
+  submit_survey(services_, owner_, effect.view, survey_);
 }
 
 void Viewer::cancel(std::uint64_t ticket) {
@@ -94,6 +217,8 @@ void Viewer::cancel(std::uint64_t ticket) {
 
 void Viewer::cancel_all() {
   gone_.cancel();
+  survey_.cancel();
+  wish_no_more();
   for (const auto& [ticket, token] : running_) token.cancel();
 }
 

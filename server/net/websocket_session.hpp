@@ -2,14 +2,25 @@
 // frame is under way at a time.
 #pragma once
 
+#include <string>
+
 #include "server/net/connections.hpp"
 #include "server/net/router.hpp"
-#include "server/net/stream.hpp"
+#include "server/net/wire.hpp"
 
 namespace windsplat::net {
 
-// `request` is an upgrade whose origin was checked.
-void start_websocket_session(TcpStream stream, UpgradeRequest request, Services& services,
-                             Connections& connections);
+// Whose session it is: the address that it is charged to, and its places among connections and
+// sessions.
+struct Guest {
+  std::string address;
+  Ticket connection;
+  Ticket session;
+};
+
+// `request` is an upgrade that was let in (auth.hpp); `request_id` names it in the answer and the
+// log.
+void start_websocket_session(Wire wire, UpgradeRequest request, std::string request_id,
+                             Services& services, Connections& connections, Guest guest);
 
 }  // namespace windsplat::net

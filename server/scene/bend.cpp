@@ -6,10 +6,10 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 #include "server/base/check.hpp"
+#include "server/scene/angles.hpp"
 
 namespace windsplat::scene {
 
@@ -18,7 +18,6 @@ namespace {
 using data::AxisKind;
 using protocol::GeometryMapping;
 
-constexpr double degree = std::numbers::pi / 180.0;
 constexpr double shell_share = 0.15;  // of the inner radius
 
 Error no_heights(const std::string& detail) {
@@ -231,7 +230,8 @@ Shell shell_of(const Lattice& straight, const data::Grid& even, double vertical_
   for (std::size_t a = 0; a < 2; ++a) {
     const std::vector<double>& at = even.axes[a].coordinates;
     if (at.size() < 2) continue;
-    const double step = (at.back() - at.front()) / static_cast<double>(at.size() - 1) * degree;
+    const double step =
+        (at.back() - at.front()) / static_cast<double>(at.size() - 1) * radians_per_degree;
     shell.inner = std::max(shell.inner, 1.0 - step);
   }
   return shell;
@@ -246,8 +246,8 @@ Places on_sphere(const Lattice& straight, const data::Columns& columns,
   std::vector<glm::dvec3> up;
   up.reserve(columns.longitude.size());
   for (std::size_t c = 0; c < columns.longitude.size(); ++c) {
-    const double longitude = columns.longitude[c] * degree;
-    const double latitude = columns.latitude[c] * degree;
+    const double longitude = columns.longitude[c] * radians_per_degree;
+    const double latitude = columns.latitude[c] * radians_per_degree;
     up.emplace_back(std::cos(latitude) * std::sin(longitude),
                     -std::cos(latitude) * std::cos(longitude), std::sin(latitude));
   }

@@ -2,6 +2,7 @@
 #include "server/scene/build.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "server/scene/camera.hpp"
@@ -118,8 +119,8 @@ struct Fields {
   }
 };
 
-// How much of the detail a view asks for its picture can show.
-std::array<int, 3> level_of(const View& view, const Scene& scene, const Lattice& full) {
+// Cells that cover less than this are averaged; 0: none are.
+double averaged_below_px(const View& view) {
   const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
   const bool strided = (lines && view.vector.stride > 1) ||
                        std::any_of(view.scalars->begin(), view.scalars->end(),
@@ -127,10 +128,18 @@ std::array<int, 3> level_of(const View& view, const Scene& scene, const Lattice&
   // A stride counts samples of the data, and the truth is that of all of them.
   if (view.method.detail == protocol::Detail::full || strided ||
       view.method.name == protocol::MethodName::reference) {
-    return {0, 0, 0};
+    return 0;
   }
-  return choose_level(scene.camera, full, scene.slice,
-                      lines ? halved_with_lines_below_px : halved_below_px);
+  return lines ? halved_with_lines_below_px : halved_below_px;
+}
+
+// How much of the detail a view asks for its picture can show.
+std::array<int, 3> level_of(const Completed& completed, const Scene& scene) {
+  const double below_px = averaged_below_px(completed.view);
+  if (below_px == 0) return {0, 0, 0};
+  const Lattice& full = completed.placed->lattice;
+  const auto level = choose_level(scene.camera, full, scene.slice, below_px);
+  return coarser_level(full, scene.slice, level, completed.coarser);
 }
 
 Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
@@ -170,6 +179,10 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
   return layer;
 }
 
+bool shows_lines(const View& view) {
+  return view.vector.field.kind == protocol::FieldChoice::Kind::named && view.vector.opacity > 0;
+}
+
 bool absorbs(const protocol::ScalarView& scalar) {
   return std::any_of(scalar.extinction->begin(), scalar.extinction->end(),
                      [](const auto& point) { return point[1] > 0; });
@@ -195,8 +208,7 @@ Result<Scene> at_level(Scene scene, const std::array<int, 3>& level, const View&
                       coarsening_of(placed.lattice, level)};
   const double pixels = pixels_per_unit(scene.camera, placed.lattice);
   scene.lattice = coarsen_lattice(placed.lattice, level);
-  const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
-  if (lines && view.vector.opacity > 0) {
+  if (shows_lines(view)) {
     auto layer = make_vector_layer(view, placed, fields);
     if (!layer) return layer.error();
     merge_lines(placed.lattice, level, pixels, *layer);
@@ -230,12 +242,42 @@ Result<Scene> build_scene(const Completed& completed, data::Dataset& dataset) {
   scene.slab_thickness = view.method.slab_thickness;
   scene.stop_transmittance = view.method.stop_transmittance;
   scene.background = parse_color(view.image.background).value();
-  const auto level = level_of(view, scene, placed.lattice);
+  const auto level = level_of(completed, scene);
   auto built = at_level(scene, level, view, placed, dataset);
   const bool reduced = level != std::array{0, 0, 0};
   if (built || !reduced || built.error().kind != ErrorKind::out_of_memory) return built;
   // Where volumes fit but not their levels beside them, every sample is drawn, as the frame tells.
   return at_level(std::move(scene), {0, 0, 0}, view, placed, dataset);
+}
+
+Result<double> detail_shown(const Completed& completed) {
+  const double below_px = averaged_below_px(completed.view);
+  if (below_px == 0) return 0;
+  const Lattice& lattice = completed.placed->lattice;
+  const auto camera = resolve_camera(completed.view, lattice);
+  if (!camera) return camera.error();
+  return finest_cell_px(*camera, lattice, slice_of(completed.view.geometry)) / below_px;
+}
+
+Result<Shown> shown_by(const Completed& completed) {
+  const View& view = completed.view;
+  Scene scene;
+  scene.slice = slice_of(view.geometry);
+  auto camera = resolve_camera(view, completed.placed->lattice);
+  if (!camera) return camera.error();
+  scene.camera = *camera;
+  Shown shown;
+  shown.coarsening = coarsening_of(completed.placed->lattice, level_of(completed, scene));
+  if (shows_lines(view)) {
+    shown.fields.push_back(view.vector.field.name);
+    if (view.vector.color.by == protocol::ColorBy::scalar) {
+      shown.fields.push_back(view.vector.color.field.value());
+    }
+  }
+  for (const protocol::ScalarView& scalar : *view.scalars) {
+    if (absorbs(scalar)) shown.fields.push_back(scalar.field);
+  }
+  return shown;
 }
 
 Result<Scene> build_scene(const View& completed, data::Dataset& dataset) {

@@ -28,6 +28,9 @@ Result<protocol::View> complete_view(const protocol::View& view, data::Dataset& 
 struct Completed {
   protocol::View view;
   std::shared_ptr<const Placed> placed;
+  // How often more than the picture asks for the data is halved, where the view leaves that open
+  // (detail.hpp, coarser_level).
+  int coarser = 0;
 };
 Result<Completed> complete_and_place(const protocol::View& view, data::Dataset& dataset);
 
@@ -38,6 +41,18 @@ Result<protocol::View> default_view(data::Dataset& dataset);
 // itself is checked against the dataset once more.
 Result<Scene> build_scene(const Completed& completed, data::Dataset& dataset);
 Result<Scene> build_scene(const protocol::View& completed, data::Dataset& dataset);
+
+// How many times larger the finest cells are in the picture than those that are averaged: below 1
+// not every sample is drawn. 0 where every sample always is.
+Result<double> detail_shown(const Completed& completed);
+
+// What a completed view shows of its dataset at any step, without loading it: the names of fields,
+// and how coarse.
+struct Shown {
+  std::vector<std::string> fields;
+  data::Coarsening coarsening;
+};
+Result<Shown> shown_by(const Completed& completed);
 
 // The values of geometry.heightField.
 struct Heights {

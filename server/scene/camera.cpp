@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <numbers>
 
+#include "server/scene/angles.hpp"
 #include "server/scene/build.hpp"
 
 namespace windsplat::scene {
 
 namespace {
 
-constexpr double degree = std::numbers::pi / 180.0;
 constexpr double margin = 1.04;         // the picture is this much wider than the box
 constexpr double distance_max = 5e5;    // world units: well inside what a view may say
 constexpr double parallel_sine = 1e-6;  // smallest angle between up and the view, as its sine
@@ -76,8 +75,8 @@ double near_plane(const Lattice& lattice) {
 }  // namespace
 
 OrbitFrame orbit_frame(double azimuth, double elevation) {
-  const double a = azimuth * degree;
-  const double e = std::clamp(elevation, -90.0, 90.0) * degree;
+  const double a = azimuth * radians_per_degree;
+  const double e = std::clamp(elevation, -90.0, 90.0) * radians_per_degree;
   OrbitFrame frame{};
   const glm::dvec3 north(-std::sin(a), std::cos(a), 0);  // horizontal part of forward
   frame.right = {std::cos(a), std::sin(a), 0};
@@ -89,7 +88,7 @@ OrbitFrame orbit_frame(double azimuth, double elevation) {
 Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dvec3& target,
                   double fov_y, const protocol::ImageView& image) {
   const double aspect = static_cast<double>(image.width) / image.height;
-  const double slope_y = std::tan(0.5 * fov_y * degree) / margin;
+  const double slope_y = std::tan(0.5 * fov_y * radians_per_degree) / margin;
   const double slope_x = slope_y * aspect;
   const double diagonal = glm::length(lattice.box_max - lattice.box_min);
   Framing framing{0, 0};
@@ -112,7 +111,7 @@ Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dv
 double front_azimuth(const Lattice& lattice) {
   const glm::dvec3 centre = 0.5 * (lattice.box_min + lattice.box_max);
   if (std::hypot(centre.x, centre.y) < aside_min) return default_azimuth;
-  return std::atan2(centre.x, -centre.y) / degree;
+  return std::atan2(centre.x, -centre.y) / radians_per_degree;
 }
 
 void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double elevation,
@@ -151,8 +150,8 @@ Result<Camera> resolve_camera(const protocol::View& completed, const Lattice& la
   }
   camera.right = right / sine;
   camera.up = glm::cross(camera.right, camera.forward);
-  camera.half_height =
-      camera.perspective ? std::tan(0.5 * from.fov_y * degree) : 0.5 * from.height.value();
+  camera.half_height = camera.perspective ? std::tan(0.5 * from.fov_y * radians_per_degree)
+                                          : 0.5 * from.height.value();
   camera.near = near_plane(lattice);
   camera.width = completed.image.width;
   camera.height = completed.image.height;

@@ -14,38 +14,48 @@ namespace {
 
 using Rgb = std::array<double, 3>;
 
+enum class Spacing { as_published, uniform };
+
 struct Stops {
   const char* name;
   const char* kind;
-  std::vector<std::uint32_t> codes;  // 0xrrggbb, evenly spaced
-  std::vector<Rgb> lab{};            // the same in OKLab
+  std::vector<std::uint32_t> codes;  // 0xrrggbb
+  Spacing spacing = Spacing::uniform;
+  std::vector<Rgb> lab{};    // the same in OKLab
+  std::vector<double> at{};  // where each stands, 0 to 1
 };
 
 // viridis, magma, inferno, plasma (S. van der Walt, N. Smith) and cividis (Nunez, Anderton,
 // Renslow) are in the public domain (CC0), here by their values at every tenth or ninth. The others
-// are windsplat's own.
+// are windsplat's own; their stops are spaced by how far apart they look, so that equal differences
+// of values are equal differences of colour (the compass apart, whose quarters are the bearings').
 std::vector<Stops> coded() {
   return {
       {"viridis",
        "sequential",
        {0x440154, 0x482475, 0x414487, 0x355f8d, 0x2a788e, 0x21918c, 0x22a884, 0x44bf70, 0x7ad151,
-        0xbddf26, 0xfde725}},
+        0xbddf26, 0xfde725},
+       Spacing::as_published},
       {"magma",
        "sequential",
        {0x000004, 0x140e36, 0x3b0f70, 0x641a80, 0x8c2981, 0xb73779, 0xde4968, 0xf7705c, 0xfe9f6d,
-        0xfecf92, 0xfcfdbf}},
+        0xfecf92, 0xfcfdbf},
+       Spacing::as_published},
       {"inferno",
        "sequential",
        {0x000004, 0x160b39, 0x420a68, 0x6a176e, 0x932667, 0xbc3754, 0xdd513a, 0xf37819, 0xfca50a,
-        0xf6d746, 0xfcffa4}},
+        0xf6d746, 0xfcffa4},
+       Spacing::as_published},
       {"plasma",
        "sequential",
        {0x0d0887, 0x41049d, 0x6a00a8, 0x8f0da4, 0xb12a90, 0xcc4778, 0xe16462, 0xf2844b, 0xfca636,
-        0xfcce25, 0xf0f921}},
+        0xfcce25, 0xf0f921},
+       Spacing::as_published},
       {"cividis",
        "sequential",
        {0x00224e, 0x123570, 0x3b496c, 0x575d6d, 0x707173, 0x8a8678, 0xa59c74, 0xc3b369, 0xe1cc55,
-        0xfee838}},
+        0xfee838},
+       Spacing::as_published},
       {"grays", "sequential", {0x000000, 0xffffff}},
       {"clouds", "sequential", {0x8593a6, 0xb4bfcc, 0xdde3ea, 0xffffff}},
       {"ice", "sequential", {0x03071e, 0x12305c, 0x1d63a0, 0x3f9bcd, 0x8fd0e6, 0xeafcff}},
@@ -58,7 +68,10 @@ std::vector<Stops> coded() {
        "diverging",
        {0x0b6e6e, 0x4ba39b, 0xa3d1c8, 0xf1efe9, 0xeab9bf, 0xd0748c, 0x9a2f5c}},
       // North, east, south, west and north again.
-      {"compass", "cyclic", {0x4a7fe8, 0xe0559f, 0xe3b23c, 0x35b07e, 0x4a7fe8}},
+      {"compass",
+       "cyclic",
+       {0x4a7fe8, 0xe0559f, 0xe3b23c, 0x35b07e, 0x4a7fe8},
+       Spacing::as_published},
   };
 }
 
@@ -97,6 +110,31 @@ Rgb linear_from_oklab(const Rgb& lab) {
           -0.0041960863 * l3 - 0.7034186147 * m3 + 1.7076147010 * s3};
 }
 
+double distance(const Rgb& a, const Rgb& b) {
+  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+}
+
+// Evenly, or by the way through OKLab; of a diverging map its middle stays in the middle.
+std::vector<double> places(const Stops& stops) {
+  const std::size_t last = stops.lab.size() - 1;
+  std::vector<double> at(last + 1);
+  for (std::size_t n = 0; n <= last; ++n) {
+    at[n] = static_cast<double>(n) / static_cast<double>(last);
+  }
+  if (stops.spacing == Spacing::as_published) return at;
+  const std::size_t part = stops.kind == std::string_view("diverging") ? last / 2 : last;
+  for (std::size_t from = 0; from < last; from += part) {
+    std::vector<double> way(part + 1, 0.0);
+    for (std::size_t n = 1; n <= part; ++n) {
+      way[n] = way[n - 1] + distance(stops.lab[from + n - 1], stops.lab[from + n]);
+    }
+    const double begin = at[from];
+    const double length = at[from + part] - begin;
+    for (std::size_t n = 1; n < part; ++n) at[from + n] = begin + length * way[n] / way[part];
+  }
+  return at;
+}
+
 const std::vector<Stops>& tables() {
   static const std::vector<Stops> all = [] {
     std::vector<Stops> list = coded();
@@ -104,6 +142,7 @@ const std::vector<Stops>& tables() {
       for (const std::uint32_t code : stops.codes) {
         stops.lab.push_back(oklab_from_linear(linear_from_code(code)));
       }
+      stops.at = places(stops);
     }
     return list;
   }();
@@ -123,14 +162,14 @@ auto interpolate(std::string_view name, int count, const Entry& as_entry) {
   const Stops* stops = find_stops(name);
   WINDSPLAT_CHECK(stops != nullptr && count >= 1);
   const std::vector<Rgb>& lab = stops->lab;
+  const std::vector<double>& at = stops->at;
   std::vector<decltype(as_entry(Rgb{}))> entries;
   entries.reserve(static_cast<std::size_t>(count));
   for (int n = 0; n < count; ++n) {
-    const double place =
-        count == 1 ? 0.0
-                   : static_cast<double>(n) * static_cast<double>(lab.size() - 1) / (count - 1);
-    const auto below = std::min(static_cast<std::size_t>(place), lab.size() - 2);
-    const double t = place - static_cast<double>(below);
+    const double place = count == 1 ? 0.0 : static_cast<double>(n) / (count - 1);
+    const auto above = std::upper_bound(at.begin() + 1, at.end() - 1, place);
+    const auto below = static_cast<std::size_t>(above - at.begin()) - 1;
+    const double t = (place - at[below]) / (at[below + 1] - at[below]);
     Rgb mixed{};
     for (std::size_t a = 0; a < 3; ++a) {
       mixed[a] = lab[below][a] + t * (lab[below + 1][a] - lab[below][a]);

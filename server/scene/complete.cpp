@@ -5,10 +5,12 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "server/data/digest.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"
 #include "server/scene/defaults.hpp"
+#include "server/scene/refusal.hpp"
 
 namespace windsplat::scene {
 
@@ -19,33 +21,22 @@ using protocol::FieldChoice;
 using protocol::Range;
 using protocol::View;
 
-Error invalid(std::string pointer, std::string detail) {
-  return make_error_at(ErrorKind::invalid, std::move(pointer), std::move(detail));
-}
-
-std::string quoted(const std::string& text) {
-  std::string out(1, '"');
-  out += printable(text);
-  out += '"';
-  return out;
-}
-
 Result<void> check_map(const std::string& name, const std::string& pointer) {
   if (!has_color_map(name)) {
-    return invalid(pointer, "no colour map is called " + quoted(name));
+    return invalid_at(pointer, "no colour map is called " + in_double_quotes(name));
   }
   return {};
 }
 
 Result<void> check_color(const std::string& text, const std::string& pointer) {
   if (!parse_color(text)) {
-    return invalid(pointer, quoted(text) + " is not of the form #rrggbb");
+    return invalid_at(pointer, in_double_quotes(text) + " is not of the form #rrggbb");
   }
   return {};
 }
 
 Result<void> check_color_range(const std::optional<Range>& range, const std::string& pointer) {
-  if (range && (*range)[0] == (*range)[1]) return invalid(pointer, "its two ends are equal");
+  if (range && (*range)[0] == (*range)[1]) return invalid_at(pointer, "its two ends are equal");
   return {};
 }
 
@@ -70,34 +61,74 @@ Result<void> check_color_field(const protocol::VectorColorView& color,
     auto field = find_field(info, *color.field, data::FieldKind::scalar, pointer);
     if (!field) return field.error();
   } else if (color.by == ColorBy::scalar) {
-    return invalid(pointer, "is needed for colour by scalar: the name of a scalar field");
+    return invalid_at(pointer, "is needed for colour by scalar: the name of a scalar field");
   }
   return {};
+}
+
+// Numbers that follow from a field at the first step and from `arguments`: made once, so that later
+// steps do not need the first one resident.
+template <class Make>
+Result<std::vector<double>> from_first_step(data::Dataset& dataset, const char* what,
+                                            const std::string& field,
+                                            const std::vector<double>& arguments,
+                                            const Make& make) {
+  std::string key = what;
+  key += '/' + field + '/';
+  key += data::digest_of(
+      {reinterpret_cast<const char*>(arguments.data()), arguments.size() * sizeof(double)});
+  return dataset.remembered(key, [&]() -> Result<std::vector<double>> {
+    auto volume = dataset.volume(field, 0);
+    if (!volume) return volume.error();
+    return make(**volume);
+  });
+}
+
+std::vector<double> numbers_of(const Range& range) { return {range.begin(), range.end()}; }
+
+// What placement and slice say, for a key.
+std::vector<double> numbers_of(const Lattice& lattice, const std::optional<Slice>& slice) {
+  std::vector<double> out{slice ? slice->axis + 1.0 : 0.0,
+                          slice ? static_cast<double>(slice->sample) : 0.0};
+  for (int a = 0; a < 3; ++a) {
+    out.push_back(lattice.box_min[a]);
+    out.push_back(lattice.box_max[a]);
+  }
+  out.insert(out.end(), lattice.positions[2].begin(), lattice.positions[2].end());
+  return out;
 }
 
 Result<void> complete_magnitudes(View& view, const Lattice& lattice,
                                  const std::optional<Slice>& slice, data::Dataset& dataset) {
   protocol::VectorView& vector = view.vector;
-  std::shared_ptr<const data::Volume> volume;
-  const bool wanted = !vector.magnitude_range || !vector.min_magnitude;
-  if (wanted && vector.field.kind == FieldChoice::Kind::named) {
-    auto loaded = dataset.volume(vector.field.name, 0);
-    if (!loaded) return loaded.error();
-    volume = std::move(*loaded);
+  const bool named = vector.field.kind == FieldChoice::Kind::named;
+  const std::string& field = vector.field.name;
+  if (!vector.magnitude_range && named) {
+    const auto range = from_first_step(
+        dataset, "magnitudes", field, {},
+        [](const data::Volume& volume) { return numbers_of(default_magnitude_range(volume)); });
+    if (!range) return range.error();
+    vector.magnitude_range = Range{(*range)[0], (*range)[1]};
   }
-  if (!vector.magnitude_range) {
-    vector.magnitude_range = volume ? default_magnitude_range(*volume) : Range{0, 1};
-  }
+  if (!vector.magnitude_range) vector.magnitude_range = Range{0, 1};
   const Range& range = *vector.magnitude_range;
-  if (!(range[0] < range[1])) return invalid("/vector/magnitudeRange", "does not ascend");
-  if (!vector.min_magnitude) {
+  if (!(range[0] < range[1])) return invalid_at("/vector/magnitudeRange", "does not ascend");
+  if (!vector.min_magnitude && named) {
     // Of the lines as they are by default: a view that changes one of their keys changes that
     // alone.
     protocol::VectorView plain;
     plain.length = default_length(lattice, plain.stride, slice);
     plain.magnitude_range = vector.magnitude_range;
-    vector.min_magnitude = volume ? default_min_magnitude(plain, *volume, lattice, slice) : 0.0;
+    std::vector<double> arguments = numbers_of(lattice, slice);
+    arguments.insert(arguments.end(), {range[0], range[1], *plain.length});
+    const auto least = from_first_step(
+        dataset, "least magnitude", field, arguments, [&](const data::Volume& volume) {
+          return std::vector{default_min_magnitude(plain, volume, lattice, slice)};
+        });
+    if (!least) return least.error();
+    vector.min_magnitude = least->front();
   }
+  if (!vector.min_magnitude) vector.min_magnitude = 0.0;
   return {};
 }
 
@@ -105,8 +136,16 @@ Result<void> check_vector(const protocol::VectorView& vector) {
   if (auto ok = check_map(vector.color.map, "/vector/color/map"); !ok) return ok;
   if (auto ok = check_color(vector.color.constant, "/vector/color/constant"); !ok) return ok;
   if (auto ok = check_color_range(vector.color.range, "/vector/color/range"); !ok) return ok;
-  if (vector.r1 > vector.r2) return invalid("/vector/r1", "is greater than r2");
+  if (vector.r1 > vector.r2) return invalid_at("/vector/r1", "is greater than r2");
   return {};
+}
+
+Result<Range> first_scalar_range(const data::FieldInfo& field, data::Dataset& dataset) {
+  const auto range = from_first_step(
+      dataset, "range", field.name, {},
+      [&](const data::Volume& volume) { return numbers_of(default_scalar_range(field, volume)); });
+  if (!range) return range.error();
+  return Range{(*range)[0], (*range)[1]};
 }
 
 // What the colour's value spans.
@@ -117,9 +156,14 @@ Result<Range> default_color_range(const View& view, const Lattice& lattice,
   switch (*vector.color.by) {
     case ColorBy::world_z: {
       if (!lines) return height_range(lattice);
-      auto volume = dataset.volume(vector.field.name, 0);
-      if (!volume) return volume.error();
-      return default_height_range(vector, **volume, lattice);
+      std::vector<double> arguments = numbers_of(lattice, std::nullopt);
+      arguments.push_back(*vector.min_magnitude);
+      const auto range = from_first_step(
+          dataset, "heights", vector.field.name, arguments, [&](const data::Volume& volume) {
+            return numbers_of(default_height_range(vector, volume, lattice));
+          });
+      if (!range) return range.error();
+      return Range{(*range)[0], (*range)[1]};
     }
     case ColorBy::screen_z:
       return Range{depths[0], depths[1]};
@@ -129,10 +173,7 @@ Result<Range> default_color_range(const View& view, const Lattice& lattice,
       return Range{0, 360};
     case ColorBy::scalar: {
       if (!lines) break;
-      const std::string& name = vector.color.field.value();
-      auto volume = dataset.volume(name, 0);
-      if (!volume) return volume.error();
-      return default_scalar_range(*dataset.info().find(name), **volume);
+      return first_scalar_range(*dataset.info().find(vector.color.field.value()), dataset);
     }
     case ColorBy::rise:
     case ColorBy::constant:
@@ -163,9 +204,9 @@ Result<void> check_extinction(const protocol::ScalarView& scalar, const std::str
   for (std::size_t n = 0; n < scalar.extinction->size(); ++n) {
     const auto& point = (*scalar.extinction)[n];
     const std::string at = pointer + "/extinction/" + std::to_string(n);
-    if (!std::isfinite(point[0]) || !(point[1] >= 0)) return invalid(at, "is not an extinction");
+    if (!std::isfinite(point[0]) || !(point[1] >= 0)) return invalid_at(at, "is not an extinction");
     if (n > 0 && point[0] < (*scalar.extinction)[n - 1][0]) {
-      return invalid(at, "its value is less than the one before it");
+      return invalid_at(at, "its value is less than the one before it");
     }
   }
   return {};
@@ -183,11 +224,10 @@ Result<void> complete_scalar(protocol::ScalarView& scalar, const std::string& po
   if (auto ok = check_color_range(scalar.color.range, pointer + "/color/range"); !ok) return ok;
   if (auto ok = check_extinction(scalar, pointer); !ok) return ok;
   if (scalar.color.range && scalar.extinction) return {};
-  auto volume = dataset.volume(scalar.field, 0);
-  if (!volume) return volume.error();
-  const Range range = default_scalar_range(field, **volume);
-  if (!scalar.color.range) scalar.color.range = range;
-  if (!scalar.extinction) scalar.extinction = default_extinction(field, range, lattice, slice);
+  const auto range = first_scalar_range(field, dataset);
+  if (!range) return range.error();
+  if (!scalar.color.range) scalar.color.range = *range;
+  if (!scalar.extinction) scalar.extinction = default_extinction(field, *range, lattice, slice);
   return {};
 }
 
@@ -216,13 +256,13 @@ Result<Completed> complete_and_place(const View& view, data::Dataset& dataset) {
   View full = view;
   if (full.dataset.empty()) full.dataset = info.id;
   if (full.step < 0 || static_cast<std::size_t>(full.step) >= info.steps.size()) {
-    return invalid("/step", "dataset " + quoted(info.id) + " has steps 0 to " +
-                                std::to_string(info.steps.size() - 1));
+    return invalid_at("/step", "dataset " + in_double_quotes(info.id) + " has steps 0 to " +
+                                   std::to_string(info.steps.size() - 1));
   }
   if (auto ok = check_color(full.image.background, "/image/background"); !ok) return ok.error();
   if (auto ok = check_vector(full.vector); !ok) return ok.error();
   if (full.depth_cue.near >= full.depth_cue.far) {
-    return invalid("/depthCue/near", "is not less than far");
+    return invalid_at("/depthCue/near", "is not less than far");
   }
   if (auto ok = check_geometry(full.geometry, info); !ok) return ok.error();
   auto placed = place_dataset(full.geometry, dataset);

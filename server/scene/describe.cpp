@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/data/measure.hpp"
 #include "server/scene/bend.hpp"
 #include "server/scene/build.hpp"
 
@@ -63,24 +64,49 @@ protocol::FieldDescription describe_field(const data::FieldInfo& field) {
 // is unmasked.
 Result<void> add_range(data::Dataset& dataset, std::size_t steps,
                        protocol::FieldDescription& field) {
-  std::int64_t masked = 0;
+  data::FieldRange over;
   for (std::size_t step = 0; step < steps; ++step) {
-    auto volume = dataset.volume(field.name, step);
+    const auto volume = dataset.volume(field.name, step);
     if (!volume) return volume.error();
-    const data::Volume& v = **volume;
-    masked += v.masked;
-    if (v.masked >= static_cast<std::int64_t>(v.samples())) continue;
-    const auto low = static_cast<double>(v.range[0]);
-    const auto high = static_cast<double>(v.range[1]);
-    field.range = field.range ? protocol::Range{std::min((*field.range)[0], low),
-                                                std::max((*field.range)[1], high)}
-                              : protocol::Range{low, high};
+    over.add(**volume);
   }
-  field.masked = masked;
+  field.range = over.range;
+  field.masked = over.masked;
   return {};
 }
 
 }  // namespace
+
+void add_seen_ranges(const data::Dataset& dataset, protocol::DatasetDescription& description) {
+  const auto samples = static_cast<std::int64_t>(dataset.info().grid.samples());
+  for (protocol::FieldDescription& field : description.fields) {
+    field.storage_error = static_cast<double>(dataset.storage_error(field.name));
+    const auto seen = dataset.seen(field.name, 0);
+    if (!seen || !field.range_of.empty()) continue;
+    field.range_of = "step";
+    field.masked = seen->masked;
+    if (seen->masked < samples) {
+      field.range =
+          protocol::Range{static_cast<double>(seen->range[0]), static_cast<double>(seen->range[1])};
+    }
+  }
+}
+
+protocol::DatasetDescription describe_briefly(const data::Dataset& dataset) {
+  const data::DatasetInfo& info = dataset.info();
+  protocol::DatasetDescription out;
+  out.id = info.id;
+  out.title = info.title;
+  out.source = info.source;
+  out.format = info.format;
+  out.state = "ready";
+  out.step_count = info.steps.size();
+  out.time_units = info.time_units;
+  out.notes = info.notes;
+  for (const data::FieldInfo& field : info.fields) out.fields.push_back(describe_field(field));
+  out.resident_bytes = dataset.resident_bytes();
+  return out;
+}
 
 Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf ranges) {
   const data::DatasetInfo& info = dataset.info();
@@ -90,6 +116,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
   out.source = info.source;
   out.format = info.format;
   out.state = "ready";
+  out.step_count = info.steps.size();
   out.dims = info.grid.dims();
   auto lattice = place_lattice(info.grid, protocol::GeometryView{});
   if (!lattice) return lattice.error();
@@ -106,7 +133,9 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
   std::uint64_t components = 0;
   for (const data::FieldInfo& field : info.fields) {
     protocol::FieldDescription description = describe_field(field);
-    if (ranges != RangesOf::none) {
+    // What is made of other fields is made when it is looked at.
+    const bool all = ranges == RangesOf::first_step || ranges == RangesOf::all_steps;
+    if (all && !field.derived) {
       description.range_of = ranges == RangesOf::all_steps ? "all" : "step";
       if (auto ok = add_range(dataset, steps, description); !ok) return ok.error();
     }
@@ -114,6 +143,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
     out.fields.push_back(std::move(description));
   }
   for (const data::LeftOut& left : info.left_out) out.left_out.emplace_back(left.name, left.reason);
+  out.notes = info.notes;
   for (const data::TimeStep& step : info.steps) out.steps.push_back({step.value, step.text});
   out.time_units = info.time_units;
   out.resident_bytes = dataset.resident_bytes();
@@ -123,6 +153,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
     auto view = default_view(dataset);
     if (!view) return view.error();
     out.default_view = std::move(*view);
+    if (ranges == RangesOf::seen) add_seen_ranges(dataset, out);
   }
   return out;
 }

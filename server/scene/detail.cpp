@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "server/scene/build.hpp"
@@ -54,6 +55,37 @@ std::array<int, 3> choose_level(const Camera& camera, const Lattice& lattice,
            widest_cell(spacing, level[a]) * scale < below_px) {
       ++level[a];
     }
+  }
+  return level;
+}
+
+double finest_cell_px(const Camera& camera, const Lattice& lattice,
+                      const std::optional<Slice>& slice) {
+  if (lattice.places) return 0;
+  double finest = std::numeric_limits<double>::infinity();
+  for (std::size_t a = 0; a < 3; ++a) {
+    const bool stays =
+        (slice && slice->axis == static_cast<int>(a)) || data::halved(lattice.dims[a], 1) < 2;
+    if (!stays) finest = std::min(finest, widest_cell(lattice.spacing[a], 0));
+  }
+  return std::isfinite(finest) ? finest * pixels_per_unit(camera, lattice) : 0;
+}
+
+std::array<int, 3> coarser_level(const Lattice& lattice, const std::optional<Slice>& slice,
+                                 std::array<int, 3> level, int times) {
+  constexpr double as_fine = 1.5;
+  if (lattice.places) return level;
+  for (int n = 0; n < times; ++n) {
+    std::array<double, 3> widest{};
+    double finest = std::numeric_limits<double>::infinity();
+    for (std::size_t a = 0; a < 3; ++a) {
+      const bool stays = (slice && slice->axis == static_cast<int>(a)) ||
+                         data::halved(lattice.dims[a], level[a] + 1) < 2;
+      widest[a] = stays ? std::numeric_limits<double>::infinity()
+                        : widest_cell(lattice.spacing[a], level[a]);
+      finest = std::min(finest, widest[a]);
+    }
+    for (std::size_t a = 0; a < 3; ++a) level[a] += widest[a] < as_fine * finest ? 1 : 0;
   }
   return level;
 }

@@ -29,6 +29,15 @@ std::array<int, 3> choose_level(const Camera& camera, const Lattice& lattice,
                                 const std::optional<Slice>& slice,
                                 double below_px = halved_below_px);
 
+// Pixels that the widest cell covers along the axis that is halved first; 0 where none ever is.
+double finest_cell_px(const Camera& camera, const Lattice& lattice,
+                      const std::optional<Slice>& slice);
+
+// A level `times` coarser than `level`: each time the axes of the finest cells are halved, and
+// those whose cells are less than 1.5 times as wide.
+std::array<int, 3> coarser_level(const Lattice& lattice, const std::optional<Slice>& slice,
+                                 std::array<int, 3> level, int times);
+
 // How to average the lattice's volumes for that level.
 data::Coarsening coarsening_of(const Lattice& lattice, const std::array<int, 3>& level);
 

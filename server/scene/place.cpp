@@ -8,6 +8,7 @@
 
 #include "server/scene/bend.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/refusal.hpp"
 
 namespace windsplat::scene {
 
@@ -21,29 +22,19 @@ struct Kept {
 using KeptPtr = std::shared_ptr<const Kept>;
 constexpr const char* kept_key = "placement";
 
-Error invalid(std::string pointer, std::string detail) {
-  return make_error_at(ErrorKind::invalid, std::move(pointer), std::move(detail));
-}
-
-std::string quoted(const std::string& text) {
-  std::string out(1, '"');
-  out += printable(text);
-  out += '"';
-  return out;
-}
-
 }  // namespace
 
 Result<const data::FieldInfo*> find_field(const data::DatasetInfo& info, const std::string& name,
                                           data::FieldKind kind, const std::string& pointer) {
   const data::FieldInfo* field = info.find(name);
   if (field == nullptr) {
-    return invalid(pointer, "dataset " + quoted(info.id) + " has no field " + quoted(name));
+    return invalid_at(pointer, "dataset " + in_double_quotes(info.id) + " has no field " +
+                                   in_double_quotes(name));
   }
   if (field->kind != kind) {
     const bool scalar = field->kind == data::FieldKind::scalar;
-    return invalid(pointer, "field " + quoted(field->name) + " is a " +
-                                (scalar ? "scalar, not a vector" : "vector, not a scalar"));
+    return invalid_at(pointer, "field " + in_double_quotes(field->name) + " is a " +
+                                   (scalar ? "scalar, not a vector" : "vector, not a scalar"));
   }
   return field;
 }
@@ -65,9 +56,9 @@ Result<void> check_geometry(const protocol::GeometryView& geometry, const data::
     const int last = info.grid.dims().at(axis) - 1;
     if (slice->sample < 0 || slice->sample > last) {
       constexpr std::array<const char*, 3> names = {"x", "y", "z"};
-      return invalid("/geometry/slice/index", "dataset " + quoted(info.id) + " has layers 0 to " +
-                                                  std::to_string(last) + " across " +
-                                                  names.at(axis));
+      return invalid_at("/geometry/slice/index", "dataset " + in_double_quotes(info.id) +
+                                                     " has layers 0 to " + std::to_string(last) +
+                                                     " across " + names.at(axis));
     }
   }
   return {};

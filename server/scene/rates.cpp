@@ -7,7 +7,7 @@
 #include <optional>
 #include <string_view>
 
-#include "server/data/units.hpp"
+#include "server/data/cf/units.hpp"
 
 namespace windsplat::scene {
 

@@ -1,5 +1,6 @@
 // Pacing of a session: which frame to draw next, and when.
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 #include <utility>
@@ -12,9 +13,12 @@ namespace windsplat::session {
 namespace {
 
 constexpr double budget_ms_default = 33;
-constexpr int moving_quality = 75;
+constexpr double budget_ms_least = 8;
 constexpr int final_quality = 92;
 constexpr int still_quality = 95;
+constexpr std::size_t chosen_bytes = 600;  // of the message, about, less its view
+constexpr Micros tell_reading_after = 300'000;
+constexpr Micros tell_reading_every = 250'000;
 
 std::uint32_t clamped_us(std::int64_t us) {
   constexpr std::int64_t most = std::numeric_limits<std::uint32_t>::max();
@@ -33,12 +37,40 @@ std::string without_camera(protocol::View view) {
   return protocol::encode_view(view);
 }
 
+// Which data the view asks for, but for its step.
+std::string fields_of(const protocol::View& view) {
+  std::string names = view.dataset;
+  const auto add = [&](const std::string& name) {
+    names += '\n';
+    names += name;
+  };
+  add(std::to_string(static_cast<int>(view.vector.field.kind)) + view.vector.field.name);
+  add(view.vector.color.field.value_or(""));
+  if (!view.scalars) add("default");
+  for (const auto& scalar : view.scalars.value_or(std::vector<protocol::ScalarView>{})) {
+    add(scalar.field);
+  }
+  return names;
+}
+
 // Whether nothing but the background shows. The reference does not tell.
 bool is_blank(const protocol::FrameInfo& info) {
   return info.method != "reference" && info.tiles == 0;
 }
 
 }  // namespace
+
+// Both null: a stream keeps to a budget all the same.
+quality::Aim Session::aim() const {
+  quality::Aim aim{view_.quality.budget_ms, view_.quality.max_error};
+  if (aim.budget_ms || aim.max_error) return aim;
+  // Where others wait for the renderer too, everyone's frames are made shorter, so that they come
+  // oftener: with n viewers of one kind by the root of n.
+  const double waited = 1e-3 * queue_us_;
+  aim.budget_ms = std::max(budget_ms_least,
+                           budget_ms_default * budget_ms_default / (budget_ms_default + waited));
+  return aim;
+}
 
 Micros Session::budget() const {
   return static_cast<Micros>(1000 * view_.quality.budget_ms.value_or(budget_ms_default));
@@ -57,7 +89,11 @@ bool Session::wants_final() const {
 
 void Session::advance_step(Micros now) {
   if (!player_.running() || hidden_ || !openings_.empty()) return;
-  const int step = player_.step_at(now, shown());
+  const auto [step, passed] = player_.advance(now, step_shown());
+  if (passed > 0) {
+    const bool left_out = started_version_ < step_version_;
+    stats_.steps_dropped += static_cast<std::uint64_t>(passed - 1 + (left_out ? 1 : 0));
+  }
   if (step == view_.step) return;
   std::string patch = "{\"step\":" + std::to_string(step) + '}';
   if (auto next = document_.patched(patch)) {
@@ -65,39 +101,144 @@ void Session::advance_step(Micros now) {
   }
 }
 
+bool Session::wants_moving() const { return !shown() && !hidden_ && !view_.dataset.empty(); }
+
+std::optional<Micros> Session::start_at() const {
+  if (!can_start()) return std::nullopt;
+  if (!stills_.empty() || wants_moving()) return link_.may_start_at();
+  if (!wants_final()) return std::nullopt;
+  return std::max(link_.may_start_at(), changed_at_ + rest());
+}
+
+Micros Session::rest() const {
+  const Micros most = std::max(options_.quiet_us, options_.quiet_most_us);
+  return std::clamp(link_.transfer(final_bytes_) / 2, options_.quiet_us, most);
+}
+
 void Session::start_next(Micros now) {
-  if (!can_start()) return;
-  const bool moving = !shown() && !hidden_ && !view_.dataset.empty();
-  const bool quiet = now - changed_at_ >= options_.quiet_us;
+  const auto at = start_at();
+  if (!at || now < *at) return;
+  const bool moving = wants_moving();
+  const bool quiet = now - changed_at_ >= rest();
   if (!stills_.empty() && (!moving || still_turn_)) {
-    start_still();
+    start_still(now);
   } else if (moving) {
-    const int width = view_.image.width;
-    const int height = view_.image.height;
-    const bool cheap = final_cost(width, height, now) <= budget();
+    const bool cheap = final_cost(forecasts(), now) <= budget();
     // A viewer that has stopped while its credit was out need not see a lesser frame first.
     if (quiet && cheap && !player_.running()) {
-      start_final();
+      start_final(now);
     } else {
       start_moving(now);
     }
-  } else if (wants_final() && quiet) {
-    start_final();
+  } else {
+    start_refining(now);
   }
 }
 
-// What a final frame is expected to take: by slab, what the last one of its kind took, or at first
-// several times what a moving frame does.
-Micros Session::final_cost(int width, int height, Micros now) const {
-  const Micros moving = levels_.expected(0, width, height, now);
-  if (view_.method.name == protocol::MethodName::kernel) return moving;
-  constexpr Micros dearer = 4;
-  return std::max(moving, last_final_cost_.value_or(dearer * moving));
+std::vector<int> Session::wanted_steps() const {
+  constexpr int ahead_max = 16;
+  if (closed_ || hidden_ || !openings_.empty() || view_.dataset.empty()) return {};
+  if (player_.running()) return player_.upcoming(ahead_max);
+  const bool rests = shown() && drawn_final_;
+  const bool same = wished_.view.dataset == view_.dataset && wished_.view.step == view_.step &&
+                    wished_fields_ == fields_of(view_);
+  if (!rests) return same && wished_for_rest_ ? wished_.steps : std::vector<int>{};
+  const auto count = surroundings_.check(view_);
+  std::vector<int> steps;
+  if (count && view_.step + 1 < *count) steps.push_back(view_.step + 1);
+  if (count && view_.step > 0) steps.push_back(view_.step - 1);
+  return steps;
 }
 
-Session::Render Session::render_of(Purpose purpose) const {
+void Session::wish() {
+  std::vector<int> steps = wanted_steps();
+  std::string fields = fields_of(view_);
+  const bool none = steps.empty() && wished_.steps.empty();
+  wished_for_rest_ = !player_.running();
+  // While steps run they are drawn as the last one was.
+  const quality::Setting setting = player_.running() && !steps.empty()
+                                       ? moving_setting_
+                                       : quality::settings[quality::own_setting(view_)];
+  const bool same = steps == wished_.steps && fields == wished_fields_;
+  if (none || (same && (steps.empty() || setting == wished_.setting))) return;
+  wished_ = {steps.empty() ? protocol::View{} : view_, std::move(steps), setting};
+  wished_fields_ = std::move(fields);
+  effects_.emplace_back(wished_);
+}
+
+// Of a description 0, of a frame its ticket.
+std::optional<std::uint64_t> Session::waited_for() const {
+  if (closed_ || !surroundings_.what_is_read || hidden_) return std::nullopt;
+  if (!openings_.empty()) return 0;
+  return render_ && !render_->unwanted ? std::optional(render_->ticket) : std::nullopt;
+}
+
+void Session::tell_reading(Micros now) {
+  const auto what = waited_for();
+  if (!what) return wait_.reset();
+  if (!wait_ || wait_->what != *what) wait_ = Wait{*what, now + tell_reading_after};
+  if (now < wait_->tell_at) return;
+  wait_->tell_at = now + tell_reading_every;
+  if (const auto reading = surroundings_.what_is_read(view_.dataset)) {
+    effects_.emplace_back(SendText{protocol::ProgressMessage{
+        std::nullopt, "loading " + reading->field, reading->done, std::nullopt}});
+  }
+}
+
+// What a final frame is expected to take, the finer run that it is measured by among it, which is
+// by slabs whatever the frame is drawn by.
+Micros Session::final_cost(const quality::Forecasts& known, Micros now) const {
+  const bool slab = view_.method.name == protocol::MethodName::slab;
+  const double factor = final_factor_.value_or(slab ? 2.6 : 6.4);
+  const Micros own = chooser_.expected(quality::own_setting(view_), known, now);
+  return static_cast<Micros>(factor * static_cast<double>(own));
+}
+
+// A view's style is known once it was completed, which drawing does: until then its kind alone is.
+quality::Forecasts Session::forecasts() const {
+  quality::Style style = quality::style_of(view_);
+  if (style.key == drawn_style_) {
+    style = style_;
+  } else {
+    style.key.clear();
+  }
+  const quality::Sight sight = quality::sight_of(view_, sight_);
+  if (surroundings_.forecasts) return surroundings_.forecasts(style, sight);
+  quality::Forecasts out;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i] = quality::prior(style.kind, quality::settings[i], sight);
+  }
+  return out;
+}
+
+// What frames cost is learnt from those that are drawn as they are; what was read for them is not
+// theirs.
+void Session::learn(const Render& render, const Drawn& drawn, Micros now) {
+  if (drawn.info.method == "reference" || render.purpose == Purpose::still) return;
+  if (render.dataset != view_.dataset) return;
+  if (!drawn.style.key.empty() && render.version == version_) {
+    drawn_style_ = quality::style_of(view_).key;
+    style_ = drawn.style;
+    sight_ = drawn.sight;
+  }
+  if (drawn.loaded) return;
+  if (render.purpose == Purpose::moving) {
+    constexpr double newest = 0.2;
+    queue_us_ += newest * (static_cast<double>(drawn.queue_us) - queue_us_);
+  }
+  if (render.purpose == Purpose::final) {
+    const auto cost = static_cast<double>(drawn.render_us + drawn.measure_us + drawn.encode_us);
+    const auto own = chooser_.expected(quality::own_setting(view_), forecasts(), now);
+    final_factor_ = cost / std::max(static_cast<double>(own), 1.0);
+  } else if (const auto setting = quality::index_of(render.setting)) {
+    chooser_.learn(*setting, drawn.render_us + drawn.encode_us, forecasts(), now);
+  }
+}
+
+Session::Render Session::render_of(Purpose purpose, Micros now) const {
   Render render;
   render.purpose = purpose;
+  render.begun = now;
   render.version = version_;
   render.rev = rev_;
   render.t = t_;
@@ -105,29 +246,94 @@ Session::Render Session::render_of(Purpose purpose) const {
 }
 
 void Session::start_moving(Micros now) {
-  Render render = render_of(Purpose::moving);
-  render.encoding.quality = moving_quality;
-  render.encoding.level = levels_.choose(view_.image.width, view_.image.height, budget(), now);
-  // While the view changes, more pixels are worth more than slabs: see docs/study.
-  protocol::View view = view_;
-  if (view.method.name == protocol::MethodName::slab) {
-    view.method.name = protocol::MethodName::kernel;
+  Render render = render_of(Purpose::moving, now);
+  const int width = view_.image.width;
+  const int height = view_.image.height;
+  const int least = jpeg_.least_level(width, height, link_, budget());
+  const double pixels_most = least > 0 ? static_cast<double>(width) * height / std::pow(4.0, least)
+                                       : std::numeric_limits<double>::infinity();
+  if (view_.method.name != protocol::MethodName::reference) {
+    render.setting =
+        quality::settings[chooser_.choose(view_, forecasts(), aim(), pixels_most, now)];
+    moving_setting_ = render.setting;
   }
-  start(render, view);
-}
-
-void Session::start_final() {
-  Render render = render_of(Purpose::final);
-  render.encoding.quality = final_quality;
-  render.encoding.full_chroma = true;
+  render.encoding.quality =
+      jpeg_.choose(quality::pixels_at(view_, render.setting), link_, budget());
   start(render, view_);
 }
 
-void Session::start_still() {
+// Towards the final frame: first what errs half as much as what is shown and takes a fraction of
+// its time.
+void Session::start_refining(Micros now) {
+  constexpr Micros long_in_coming = 200'000;
+  constexpr double better = 0.5;
+  const quality::Forecasts known = forecasts();
+  const bool guessed = !final_factor_ && !known[quality::own_setting(view_)].timed;
+  const Micros cost = final_cost(known, now);
+  if (!guessed && cost > long_in_coming && view_.method.name != protocol::MethodName::reference) {
+    constexpr int usual = JpegRate::quality_usual;
+    const auto next = chooser_.least_error(view_, known, cost / 4, now);
+    const auto on_link = [&](const quality::Setting& setting) {
+      return link_.transfer(jpeg_.predicted_bytes(quality::pixels_at(view_, setting), usual));
+    };
+    if (next && known[*next].error < better * shown_error_ &&
+        on_link(quality::settings[*next]) < cost / 2) {
+      Render render = render_of(Purpose::refining, now);
+      render.encoding.quality = usual;
+      render.setting = quality::settings[*next];
+      start(render, view_);
+      return;
+    }
+  }
+  start_final(now);
+}
+
+// The view as it stands; by thinner slabs where it would err more than is asked for.
+quality::Setting Session::final_setting() const {
+  quality::Setting setting = quality::settings[quality::own_setting(view_)];
+  if (thinner_ == 0) return setting;
+  const int halvings = setting.method == protocol::MethodName::slab ? thinner_ : thinner_ - 1;
+  setting.method = protocol::MethodName::slab;
+  setting.thinner = 1 << halvings;
+  return setting;
+}
+
+void Session::start_final(Micros now) {
+  Render render = render_of(Purpose::final, now);
+  const bool lossless = view_.quality.lossless;
+  render.encoding.codec = lossless ? protocol::Codec::png : protocol::Codec::jpeg;
+  render.encoding.quality = lossless ? 100 : final_quality;
+  render.encoding.full_chroma = true;
+  render.encoding.measure = true;
+  if (view_.method.name != protocol::MethodName::reference) render.setting = final_setting();
+  start(render, view_);
+}
+
+// Whether a final frame is not yet what maxError asks for, and thinner slabs are to be had.
+bool Session::errs_too_much(const Render& render, const Drawn& drawn) {
+  constexpr int halvings_max = 4;
+  const auto& most = view_.quality.max_error;
+  if (render.purpose != Purpose::final || render.version != version_ || !most) return false;
+  if (!drawn.info.error_value || *drawn.info.error_value <= *most) return false;
+  if (drawn.info.method == "reference" || thinner_ >= halvings_max) return false;
+  // What slabs do not cause, averages of the data say, thinner ones do not mend.
+  constexpr double mended = 0.67;
+  if (thinner_ > 0 && *drawn.info.error_value > mended * thicker_error_) return false;
+  thicker_error_ = *drawn.info.error_value;
+  ++thinner_;
+  if (view_.method.slab_thickness / final_setting().thinner >=
+      protocol::limits::slab_thickness_min) {
+    return true;
+  }
+  --thinner_;
+  return false;
+}
+
+void Session::start_still(Micros now) {
   const Still still = std::move(stills_.front());
   stills_.pop_front();
   still_turn_ = false;
-  Render render = render_of(Purpose::still);
+  Render render = render_of(Purpose::still, now);
   render.rev = still.rev;
   render.t = still.t;
   render.still_id = still.message.id;
@@ -135,15 +341,19 @@ void Session::start_still() {
   render.encoding.codec = png ? protocol::Codec::png : protocol::Codec::jpeg;
   render.encoding.quality = png ? 100 : still_quality;
   render.encoding.full_chroma = true;
+  render.setting = quality::settings[quality::own_setting(still.view)];
   start(render, still.view);
 }
 
 void Session::start(Render render, const protocol::View& view) {
   render.ticket = ++tickets_;
   render.step = view.step;
-  render.width = view.image.width;
-  render.height = view.image.height;
-  effects_.emplace_back(StartRender{render.ticket, view, render.encoding});
+  render.dataset = view.dataset;
+  if (render.purpose != Purpose::still) {
+    render.played = player_.running() && started_version_ < step_version_;
+    started_version_ = render.version;
+  }
+  effects_.emplace_back(StartRender{render.ticket, view, render.setting, render.encoding});
   render_ = render;
 }
 
@@ -170,6 +380,7 @@ void Session::withhold(const Render& render) {
   settle(render.version);
   drawn_version_ = render.version;
   drawn_final_ = false;
+  shown_error_ = 0;  // nothing but the final frame can tell more
 }
 
 bool Session::looks_standing(const Render& render, const Drawn& drawn) const {
@@ -177,61 +388,107 @@ bool Session::looks_standing(const Render& render, const Drawn& drawn) const {
          is_blank(drawn.info) && standing_->without_camera == without_camera(view_);
 }
 
-void Session::send_frame(const Render& render, Drawn drawn) {
+// How fast steps run, told anew about once a second, and which of them came late for want of data.
+void Session::count_played(const Render& render, bool loaded, Micros now) {
+  constexpr Micros window_us = 1'000'000;
+  if (!player_.running()) {
+    stats_.play_fps.reset();
+    pace_.reset();
+    return;
+  }
+  if (!render.played) return;
+  if (loaded) ++stats_.steps_not_ready;
+  if (!pace_) {
+    pace_ = Pace{now, 0};
+    return;
+  }
+  ++pace_->steps;
+  const Micros passed = now - pace_->since;
+  if (passed < window_us) return;
+  stats_.play_fps = 1e6 * pace_->steps / static_cast<double>(passed);
+  pace_ = Pace{now, 0};
+  effects_.emplace_back(SendText{stats_});
+}
+
+void Session::send_frame(const Render& render, Drawn drawn, Micros now) {
   const bool still = render.purpose == Purpose::still;
+  const bool final = render.purpose == Purpose::final && !errs_too_much(render, drawn);
+  const bool moves = render.purpose == Purpose::moving;
+  const Tier tier = still ? Tier::still : final ? Tier::final : moves ? Tier::moving : Tier::rest;
   const bool blank = is_blank(drawn.info);
   ++sent_seq_;
   writing_ = true;
   ++stats_.frames;
-  stats_.bytes += protocol::frame_header_bytes + drawn.payload->size();
+  const std::size_t frame_bytes = protocol::frame_header_bytes + drawn.payload->size();
+  stats_.bytes += frame_bytes;
+  const std::size_t text_bytes = chosen_bytes + drawn.view_json.size();
+  link_.sent({sent_seq_, text_bytes + frame_bytes, render.begun, moves}, now);
+  if (render.purpose == Purpose::final) {
+    final_bytes_ = static_cast<double>(text_bytes + frame_bytes);
+  }
+  if (moves) {
+    const double pixels = static_cast<double>(drawn.info.width) * drawn.info.height;
+    jpeg_.learn(pixels, render.encoding.quality, frame_bytes, text_bytes);
+  }
 
   protocol::FrameHeader header;
   header.seq = sent_seq_;
   header.rev = render.rev;
   header.step = static_cast<std::uint32_t>(render.step);
-  header.flags = render.purpose == Purpose::moving ? 0 : protocol::flag_final;
+  header.flags = final || still ? protocol::flag_final : 0;
+  if (drawn.info.error_kind == "measured") header.flags |= protocol::flag_error_measured;
+  if (drawn.info.error_kind == "estimated") header.flags |= protocol::flag_error_estimated;
   header.width = static_cast<std::uint16_t>(drawn.info.width);
   header.height = static_cast<std::uint16_t>(drawn.info.height);
   header.codec = render.encoding.codec;
   header.quality = static_cast<std::uint8_t>(render.encoding.quality);
   header.method = method_code(drawn.info.method);
-  header.level = static_cast<std::uint8_t>(render.encoding.level);
-  header.error = std::numeric_limits<float>::quiet_NaN();
-  header.jpeg_error = std::numeric_limits<float>::quiet_NaN();
+  header.level = quality::wire_level(render.setting.half_level);
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  header.error = static_cast<float>(drawn.info.error_value.value_or(unknown));
+  header.jpeg_error = static_cast<float>(drawn.info.jpeg_error.value_or(unknown));
+  // What errs nobody knows how much is not refined twice.
+  const double otherwise = render.purpose == Purpose::refining ? 0 : 1;
+  if (!still) shown_error_ = drawn.info.error_value.value_or(otherwise);
   header.queue_us = clamped_us(drawn.queue_us);
   header.render_us = clamped_us(drawn.render_us);
   header.encode_us = clamped_us(drawn.encode_us);
   header.payload_bytes = static_cast<std::uint32_t>(drawn.payload->size());
   header.t = render.t;
 
+  effects_.emplace_back(Ping{sent_seq_});
   if (still) {
     effects_.emplace_back(SendText{protocol::ProgressMessage{render.still_id, "still", 1, 0.0}});
   }
   effects_.emplace_back(SendText{
       protocol::ChosenMessage{sent_seq_, std::move(drawn.info), std::move(drawn.view_json)}});
-  effects_.emplace_back(SendFrame{header, std::move(drawn.payload)});
+  effects_.emplace_back(SendFrame{header, std::move(drawn.payload), tier});
   if (still) return;
+  count_played(render, drawn.loaded, now);
   if (!stills_.empty()) still_turn_ = true;
   settle(render.version);
   answered(render.version);
   drawn_version_ = render.version;
-  drawn_final_ = render.purpose == Purpose::final;
+  drawn_final_ = final;
   standing_.reset();
   // A final frame is of the present view: any change would have ended it.
   if (drawn_final_) {
     standing_ = {sent_seq_, render.rev, protocol::encode_view(view_),
                  blank ? without_camera(view_) : std::string()};
   }
-  if (drawn_final_) effects_.emplace_back(SendText{stats_});
+  if (!drawn_final_) return;
+  effects_.emplace_back(SendText{stats_});
+  if (!player_.running() && stills_.empty()) effects_.emplace_back(Survey{view_});
 }
 
 std::optional<Micros> Session::wake_at() const {
   if (closed_) return std::nullopt;
   Micros wake = heard_at_ + options_.idle_timeout_us;
   if (player_.running() && !hidden_ && openings_.empty()) {
-    wake = std::min(wake, player_.next_at(shown()).value_or(wake));
+    wake = std::min(wake, player_.next_at(step_shown()).value_or(wake));
   }
-  if (can_start() && wants_final()) wake = std::min(wake, changed_at_ + options_.quiet_us);
+  if (wait_) wake = std::min(wake, wait_->tell_at);
+  wake = std::min(wake, start_at().value_or(wake));
   return wake;
 }
 

@@ -3,45 +3,79 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 namespace windsplat::session {
 
+bool Player::contains(int step) const {
+  const auto [low, high] = std::minmax(message_.from, message_.to);
+  return step >= low && step <= high;
+}
+
+std::int64_t Player::count() const {
+  return std::abs(std::int64_t{message_.to} - message_.from) + 1;
+}
+
+std::int64_t Player::place(int step) const { return std::abs(std::int64_t{step} - message_.from); }
+
+int Player::step_of(std::int64_t place) const {
+  const int direction = message_.from <= message_.to ? 1 : -1;
+  return message_.from + direction * static_cast<int>(place);
+}
+
 void Player::start(const protocol::PlayMessage& message, int step, Micros now) {
+  const Micros before = due_ - period_us_;  // when the present step came
   message_ = message;
   period_us_ = std::max<Micros>(1, std::llround(1e6 / message.fps));
-  const bool inside = step >= message.from && step <= message.to;
-  const bool at_end = step == message.to && !message.loop;
-  step_ = inside && !at_end ? step : message.from;
-  due_ = now + period_us_;
+  step_ = contains(step) ? step : message.from;
+  if (running_) {
+    // Not in the past: what was late until now is not caught up with.
+    due_ = std::max(now, before + period_us_);
+  } else {
+    if (ended()) step_ = message.from;
+    due_ = now + period_us_;
+  }
   running_ = true;
 }
 
 void Player::move_to(int step, Micros now) {
   if (!running_) return;
-  step_ = std::clamp(step, message_.from, message_.to);
+  const auto [low, high] = std::minmax(message_.from, message_.to);
+  step_ = std::clamp(step, low, high);
   due_ = now + period_us_;
 }
 
-int Player::step_at(Micros now, bool shown) {
-  if (!running_ || now < due_ || (!message_.drop && !shown)) return step_;
-  const Micros passed = message_.drop ? 1 + (now - due_) / period_us_ : 1;
-  // Without drop a late step does not make the following ones hurry.
-  due_ = message_.drop ? due_ + passed * period_us_ : std::max(due_ + period_us_, now);
-  const Micros place = step_ - message_.from + passed;
-  if (place < count()) {
-    step_ = message_.from + static_cast<int>(place);
-  } else if (message_.loop) {
-    step_ = message_.from + static_cast<int>(place % count());
-  } else {
-    step_ = message_.to;
+Player::Advance Player::advance(Micros now, bool shown) {
+  if (!running_) return {step_, 0};
+  if (ended() || count() == 1) {  // nothing follows
+    running_ = false;
+    return {step_, 0};
   }
-  if (!message_.loop && step_ == message_.to) running_ = false;
-  return step_;
+  if (now < due_ || (!message_.drop && !shown)) return {step_, 0};
+  const std::int64_t late = message_.drop ? (now - due_) / period_us_ : 0;
+  // Without drop a late step does not make the following ones hurry.
+  due_ = message_.drop ? due_ + (1 + late) * period_us_ : std::max(due_ + period_us_, now);
+  const std::int64_t here = place(step_);
+  const std::int64_t there = here + 1 + late;
+  const std::int64_t end = message_.loop ? there : std::min(there, count() - 1);
+  step_ = step_of(end % count());
+  if (ended()) running_ = false;
+  return {step_, end - here};
 }
 
 std::optional<Micros> Player::next_at(bool shown) const {
   if (!running_ || (!message_.drop && !shown)) return std::nullopt;
   return due_;
+}
+
+std::vector<int> Player::upcoming(int most) const {
+  std::vector<int> steps;
+  const std::int64_t here = place(step_);
+  for (std::int64_t ahead = 1; ahead < count() && ahead <= most; ++ahead) {
+    if (!message_.loop && here + ahead >= count()) break;
+    steps.push_back(step_of((here + ahead) % count()));
+  }
+  return steps;
 }
 
 }  // namespace windsplat::session

@@ -65,8 +65,8 @@ Result<void> size_still(const protocol::StillMessage& message, protocol::View& v
 
 }  // namespace
 
-Session::Session(Options options, Check check, Micros now)
-    : options_(options), check_(std::move(check)), heard_at_(now), changed_at_(now) {}
+Session::Session(Options options, Surroundings surroundings, Micros now)
+    : options_(options), surroundings_(std::move(surroundings)), heard_at_(now), changed_at_(now) {}
 
 // --- inputs -------------------------------------------------------------------------------------
 
@@ -94,10 +94,35 @@ Effects Session::on_drain(Micros now) {
   return finish(now);
 }
 
+Effects Session::on_changed(const std::string& dataset, Micros now) {
+  if (closed_ || view_.dataset != dataset) return {};
+  standing_.reset();
+  show(document_, now);
+  wished_ = {};
+  protocol::View bare;
+  bare.dataset = dataset;
+  const auto steps = surroundings_.check(bare);
+  if (steps && view_.step >= *steps) {
+    std::string patch = "{\"step\":" + std::to_string(*steps - 1) + '}';
+    if (auto next = document_.patched(patch)) {
+      change(std::move(*next), std::nullopt, std::move(patch), now);
+    }
+  }
+  // A viewer that was told what the dataset holds is told anew.
+  const bool is_asked = std::any_of(openings_.begin(), openings_.end(),
+                                    [&](const Opening& known) { return known.id == opened_id_; });
+  if (opened_id_ && !is_asked && openings_.size() < openings_max) {
+    openings_.push_back({*opened_id_, 0});
+    effects_.emplace_back(Describe{*opened_id_, dataset});
+  }
+  return finish(now);
+}
+
 Effects Session::on_time(Micros now) { return finish(now); }
 
 Effects Session::on_written(Micros now) {
   writing_ = false;
+  link_.written(now);
   return finish(now);
 }
 
@@ -129,21 +154,13 @@ Effects Session::on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros n
     }
     return finish(now);
   }
-  // What moving frames cost is learnt from frames drawn as they are.
-  const bool comparable = drawn->info.method == "kernel";
-  if (!drawn->loaded && comparable && render.purpose != Purpose::still) {
-    levels_.learn(render.encoding.level, render.width, render.height,
-                  drawn->render_us + drawn->encode_us, now);
-  }
-  if (!comparable && render.purpose == Purpose::final) {
-    last_final_cost_ = drawn->render_us + drawn->encode_us;
-  }
+  learn(render, *drawn, now);
   if (render.unwanted) {
     ++stats_.dropped;
   } else if (looks_standing(render, *drawn)) {
     render.purpose == Purpose::final ? stand() : withhold(render);
   } else {
-    send_frame(render, std::move(*drawn));
+    send_frame(render, std::move(*drawn), now);
   }
   return finish(now);
 }
@@ -158,7 +175,7 @@ void Session::follow(const protocol::OpenMessage& message, Micros now) {
   }
   protocol::View bare;
   bare.dataset = message.dataset;
-  if (const auto known = check_(bare); !known) {
+  if (const auto known = surroundings_.check(bare); !known) {
     refuse(known.error(), message.id, std::nullopt);
     return;
   }
@@ -176,6 +193,7 @@ void Session::follow(const protocol::OpenMessage& message, Micros now) {
     opening.version = version_;
   }
   openings_.push_back(opening);
+  opened_id_ = message.id;
   effects_.emplace_back(
       SendText{protocol::ProgressMessage{message.id, "loading", 0, std::nullopt}});
   effects_.emplace_back(Describe{message.id, message.dataset});
@@ -190,7 +208,7 @@ void Session::follow(const protocol::PatchMessage& message, Micros now) {
   const protocol::View view = next->view();
   // A client may say how large its canvas is before it names a dataset.
   if (!view.dataset.empty()) {
-    if (const auto drawable = check_(view); !drawable) {
+    if (const auto drawable = surroundings_.check(view); !drawable) {
       refuse(drawable.error(), std::nullopt, message.rev);
       return;
     }
@@ -225,21 +243,23 @@ void Session::follow(const protocol::PlayMessage& message, Micros now) {
     refuse(make_error(ErrorKind::not_found, "no dataset is open"), std::nullopt, std::nullopt);
     return;
   }
-  const auto steps = check_(view_);
+  const auto steps = surroundings_.check(view_);
   if (!steps) {
     refuse(steps.error(), std::nullopt, std::nullopt);
-  } else if (message.to >= *steps) {
-    refuse(make_error_at(ErrorKind::invalid, "/to",
+  } else if (std::max(message.from, message.to) >= *steps) {
+    const char* const key = message.to >= *steps ? "/to" : "/from";
+    refuse(make_error_at(ErrorKind::invalid, key,
                          "must be at most " + std::to_string(*steps - 1) + ", the last step"),
            std::nullopt, std::nullopt);
   } else {
+    if (!player_.running()) pace_.reset();
     player_.start(message, view_.step, now);
   }
 }
 
 void Session::follow(const protocol::PauseMessage& /*message*/, Micros /*now*/) { player_.stop(); }
 
-void Session::follow(const protocol::AckMessage& message, Micros /*now*/) {
+void Session::follow(const protocol::AckMessage& message, Micros now) {
   if (message.seq > sent_seq_) {
     refuse(make_error_at(ErrorKind::invalid, "/seq",
                          "is a frame never sent; the newest is " + std::to_string(sent_seq_)),
@@ -247,9 +267,12 @@ void Session::follow(const protocol::AckMessage& message, Micros /*now*/) {
     return;
   }
   acked_seq_ = std::max(acked_seq_, message.seq);
+  link_.acked(message.seq, message.decode_ms, now);
 }
 
-void Session::follow(const protocol::VisibilityMessage& message, Micros /*now*/) {
+void Session::follow(const protocol::VisibilityMessage& message, Micros now) {
+  // Nobody saw the steps that would have run meanwhile.
+  if (hidden_ && !message.hidden) player_.move_to(view_.step, now);
   hidden_ = message.hidden;
   if (hidden_) abandon_render();
 }
@@ -271,11 +294,22 @@ void Session::change(protocol::ViewDocument next, std::optional<std::uint32_t> r
 }
 
 void Session::show(protocol::ViewDocument next, Micros now) {
+  const int step = view_.step;
+  const std::string dataset = view_.dataset;
   document_ = std::move(next);
   view_ = document_.view();
+  if (view_.dataset != dataset) {
+    chooser_ = Chooser();
+    final_factor_.reset();
+    drawn_style_.clear();
+  }
   ++version_;
+  if (view_.step != step) step_version_ = version_;
   changed_at_ = now;
-  if (render_ && render_->purpose == Purpose::final) abandon_render();
+  thinner_ = 0;
+  const bool at_rest =
+      render_ && (render_->purpose == Purpose::final || render_->purpose == Purpose::refining);
+  if (at_rest) abandon_render();
 }
 
 void Session::settle_oldest() {
@@ -348,8 +382,9 @@ void Session::refuse(const Error& error, std::optional<std::uint32_t> id,
 void Session::close(int code, std::string reason) {
   abandon_render();
   if (render_ && !render_->unwanted) effects_.emplace_back(CancelRender{render_->ticket});
-  effects_.emplace_back(Close{code, std::move(reason)});
   closed_ = true;
+  wish();
+  effects_.emplace_back(Close{code, std::move(reason)});
 }
 
 void Session::abandon_render() {
@@ -366,6 +401,8 @@ Effects Session::finish(Micros now) {
     advance_step(now);
     stand_if_same();
     start_next(now);
+    wish();
+    tell_reading(now);
   }
   return std::exchange(effects_, {});
 }

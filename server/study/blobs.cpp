@@ -89,17 +89,19 @@ class Blobs final : public data::Source {
     data::Volume volume;
     volume.dims = info_.grid.dims();
     volume.components = static_cast<int>(info_.fields[index].components.size());
+    std::vector<float> samples;
     for (int c = 0; c < volume.components; ++c) {
       for (const double z : info_.grid.axes[2].coordinates) {
         for (const double y : info_.grid.axes[1].coordinates) {
           for (const double x : info_.grid.axes[0].coordinates) {
             const double value =
                 index == 0 ? density(x, y, z) : flow(x, y, z)[static_cast<std::size_t>(c)];
-            volume.values.push_back(static_cast<float>(value));
+            samples.push_back(static_cast<float>(value));
           }
         }
       }
     }
+    volume.values = std::move(samples);
     data::finish_volume(volume);
     return volume;
   }

@@ -3,33 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "server/base/check.hpp"
 #include "server/study/srgb.hpp"
 
 namespace windsplat::study {
-
-Difference difference(std::span<const float> rgba, std::span<const double> truth) {
-  WINDSPLAT_CHECK(rgba.size() == truth.size() && !rgba.empty());
-  double squares = 0;
-  double largest = 0;
-  bool known = true;
-  for (std::size_t i = 0; i < rgba.size(); ++i) {
-    const double apart = std::abs(static_cast<double>(rgba[i]) - truth[i]);
-    known = known && !std::isnan(apart);
-    squares += apart * apart;
-    largest = std::max(largest, apart);
-  }
-  if (!known) {
-    constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-    return {unknown, unknown, unknown};
-  }
-  const double rmse = std::sqrt(squares / static_cast<double>(rgba.size()));
-  return {rmse, largest, psnr_of(rmse)};
-}
-
-double psnr_of(double rmse) { return -20 * std::log10(rmse); }
 
 bool within_unit(std::span<const float> rgba, double slack) {
   return std::all_of(rgba.begin(), rgba.end(),

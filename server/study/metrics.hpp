@@ -7,19 +7,6 @@
 
 namespace windsplat::study {
 
-// Over the four channels of linear premultiplied RGBA. Not-a-number when a value of either is.
-struct Difference {
-  double rmse = 0;
-  double max = 0;
-  double psnr = 0;  // dB against a peak of 1; infinite when nothing differs
-};
-
-// Both row 0 on top, 4 values a pixel, of one size.
-Difference difference(std::span<const float> rgba, std::span<const double> truth);
-
-// PSNR in dB against a peak of 1.
-double psnr_of(double rmse);
-
 // Whether every value is finite and within [0, 1], but for `slack`.
 bool within_unit(std::span<const float> rgba, double slack);
 

@@ -158,7 +158,7 @@ Result<std::string> section(const SceneReport& scene) {
   text += escaped(protocol::encode_view(scene.view)) + "</pre></details>\n";
   const auto shown = pictures(scene);
   if (!shown) return shown.error();
-  return text + *shown;
+  return text + *shown + calibration_section(scene);
 }
 
 std::string optical_depth(double tau) {

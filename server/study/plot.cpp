@@ -2,11 +2,11 @@
 // printed and stand in any page.
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <limits>
 #include <vector>
 
 #include "server/study/report.hpp"
+#include "server/study/svg.hpp"
 
 namespace windsplat::study {
 
@@ -21,73 +21,6 @@ constexpr double top = 40;
 constexpr double bottom = 460;
 constexpr double legend_left = 640;
 constexpr double legend_step = 17;
-
-struct LogAxis {
-  double low = 1;  // of the values
-  double high = 10;
-  double from = 0;  // pixels
-  double to = 1;
-
-  [[nodiscard]] double at(double value) const {
-    const double share = std::log(value / low) / std::log(high / low);
-    return from + std::clamp(share, 0.0, 1.0) * (to - from);
-  }
-};
-
-bool drawable(double v) { return std::isfinite(v) && v > 0; }
-
-std::string number(double v) { return format_number("%.1f", v); }
-
-std::string joined(std::initializer_list<std::string_view> parts) {
-  std::string text;
-  for (const std::string_view part : parts) text += part;
-  return text;
-}
-
-std::string attribute(const char* name, double value) {
-  std::string text(1, ' ');
-  text += name;
-  text += "=\"";
-  text += number(value);
-  text += '"';
-  return text;
-}
-
-std::string line(double x1, double y1, double x2, double y2, const std::string& style) {
-  std::string text = "<line" + attribute("x1", x1);
-  text += attribute("y1", y1) + attribute("x2", x2) + attribute("y2", y2);
-  text += " style=\"" + style + "\"/>\n";
-  return text;
-}
-
-std::string label(double x, double y, const std::string& words, const std::string& extra = "") {
-  std::string text = "<text" + attribute("x", x);
-  text += attribute("y", y) + extra + ">" + escaped(words) + "</text>\n";
-  return text;
-}
-
-// Values of 1, 2 and 5 times powers of ten within the axis; few decades get all three.
-std::vector<double> ticks(const LogAxis& axis) {
-  const double decades = std::log10(axis.high / axis.low);
-  std::vector<double> out;
-  const int last = static_cast<int>(std::floor(std::log10(axis.high)));
-  for (int power = static_cast<int>(std::floor(std::log10(axis.low))); power <= last; ++power) {
-    for (const double factor : {1.0, 2.0, 5.0}) {
-      if (factor > 1 && decades > 2.5) break;
-      const double value = factor * std::pow(10, power);
-      if (value >= axis.low * 0.999 && value <= axis.high * 1.001) out.push_back(value);
-    }
-  }
-  return out;
-}
-
-// Room around the values, at least half a decade.
-LogAxis make_axis(double low, double high, double from, double to) {
-  if (!(low <= high)) low = high = 1;
-  const double spread = std::max(std::log10(high / low), 0.5);
-  const double margin = std::pow(10, 0.06 * spread + 0.5 * (spread - std::log10(high / low)));
-  return {low / margin, high * margin, from, to};
-}
 
 const char* dash_of(Knob knob) {
   switch (knob) {
@@ -130,11 +63,7 @@ class Plot {
   }
 
   std::string svg() {
-    text_ = joined({"<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 ", number(width), " ",
-                    number(height)});
-    text_ += "\" font-family=\"sans-serif\" font-size=\"12\" role=\"img\">\n";
-    text_ += "<title>" + escaped(scene_.name) + ": error against run time</title>\n";
-    text_ += "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n";
+    text_ = svg_head(width, height, scene_.name + ": error against run time");
     frame();
     ripple();
     for (const Curve& curve : scene_.curves) draw(curve);
@@ -155,19 +84,7 @@ class Plot {
   }
 
   void frame() {
-    for (const double tick : ticks(x_)) {
-      text_ += line(x_.at(tick), top, x_.at(tick), bottom, "stroke:#e4e4e8");
-      text_ += label(x_.at(tick), bottom + 17, format_number("%g", tick),
-                     " text-anchor=\"middle\" fill=\"#555555\"");
-    }
-    for (const double tick : ticks(y_)) {
-      text_ += line(left, y_.at(tick), right, y_.at(tick), "stroke:#e4e4e8");
-      text_ += label(left - 7, y_.at(tick) + 4, format_number("%.0e", tick),
-                     " text-anchor=\"end\" fill=\"#555555\"");
-    }
-    text_ += "<rect" + attribute("x", left) + attribute("y", top) +
-             attribute("width", right - left) + attribute("height", bottom - top) +
-             " fill=\"none\" stroke=\"#777777\"/>\n";
+    text_ += axes(x_, y_, "%.0e");
     text_ += label(left, top - 14, scene_.name, " font-size=\"16\" font-weight=\"bold\"");
     text_ += label((left + right) / 2, bottom + 40, "run time, ms (median, least to most)",
                    " text-anchor=\"middle\"");

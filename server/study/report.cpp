@@ -25,6 +25,53 @@ bool has_knob(const SceneReport& scene, const Setting& setting, Knob knob) {
   return true;
 }
 
+protocol::StudyAgreement document_of(const Agreement& of, std::string name) {
+  return {std::move(name), of.count, of.within_two, of.median, of.bounded};
+}
+
+protocol::StudyCalibration document_of(const Calibration& calibration) {
+  protocol::StudyCalibration out;
+  out.width = calibration.plan.width;
+  out.height = calibration.plan.height;
+  out.surveyed = calibration.plan.surveyed;
+  out.held_out = calibration.plan.held_out;
+  out.seconds = calibration.seconds;
+  out.looks = calibration.looks;
+  const auto add = [&](const Agreement& of, std::string name) {
+    if (of.count > 0) out.agreement.push_back(document_of(of, std::move(name)));
+  };
+  add(agreement(calibration), "estimated");
+  for (const SettingClass kind : setting_classes) {
+    add(agreement(calibration,
+                  [kind](const Compared& one) {
+                    return class_of(quality::settings[one.setting]) == kind;
+                  }),
+        name_of(kind));
+  }
+  for (std::size_t look = 0; look < calibration.looks.size(); ++look) {
+    add(agreement(calibration, [look](const Compared& one) { return one.look == look; }),
+        calibration.looks[look]);
+  }
+  add(agreement_of_priors(calibration), "prior");
+  add(agreement_of_measured(calibration), "measured");
+  add(agreement_of_encodings(calibration), "jpeg");
+  for (const Aimed& aimed : calibration.aimed) {
+    out.aims.push_back({aimed.max_error, aimed.frames, aimed.promised, aimed.promised_kept,
+                        aimed.possible, aimed.possible_kept});
+  }
+  for (const TruthCheck& check : calibration.checks) {
+    out.checks.push_back({calibration.looks[check.look], check.apart, check.estimate});
+  }
+  for (const Compared& one : calibration.compared) {
+    const quality::Setting& setting = quality::settings[one.setting];
+    const bool slab = setting.method == protocol::MethodName::slab;
+    out.points.push_back({calibration.looks[one.look], one.view, slab ? "slab" : "kernel",
+                          setting.half_level, setting.coarser, setting.thinner, one.error,
+                          one.forecast.error, one.forecast.spread, one.prior.error});
+  }
+  return out;
+}
+
 protocol::StudyScene document_of(const SceneReport& scene) {
   protocol::StudyScene out;
   out.name = scene.name;
@@ -65,6 +112,7 @@ protocol::StudyScene document_of(const SceneReport& scene) {
   for (const Encoded& e : scene.encoded) {
     out.jpeg.push_back({e.quality, e.rmse, e.psnr, e.flip, e.bytes});
   }
+  if (scene.calibration) out.calibration = document_of(*scene.calibration);
   return out;
 }
 
@@ -133,10 +181,15 @@ Result<void> write_report(const Report& report, const std::filesystem::path& fol
   const auto page = report_page(report);
   if (!page) return page.error();
   for (const SceneReport& scene : report.scenes) {
-    std::string name = "plot-";
+    std::string name;
     for (const char c : scene.name) name += c == '/' || c == '\0' ? '_' : c;
     name += ".svg";
-    if (auto done = write_whole_file(folder / name, plot_svg(scene)); !done) return done;
+    if (auto done = write_whole_file(folder / ("plot-" + name), plot_svg(scene)); !done) {
+      return done;
+    }
+    if (!scene.calibration) continue;
+    const auto path = folder / ("calibration-" + name);
+    if (auto done = write_whole_file(path, calibration_svg(scene)); !done) return done;
   }
   if (auto done = write_whole_file(folder / "study.csv", report_csv(report)); !done) return done;
   if (auto done = write_whole_file(folder / "study.json", report_json(report)); !done) return done;

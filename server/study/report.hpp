@@ -18,10 +18,15 @@ std::string report_csv(const Report& report);  // one line a point
 // in the legend.
 std::string plot_svg(const SceneReport& scene);
 
+// Errors told against true ones, both logarithmic, with the band of a factor of 2; and that with
+// its tables for the page. Empty where nothing was calibrated.
+std::string calibration_svg(const SceneReport& scene);
+std::string calibration_section(const SceneReport& scene);
+
 // One page that needs nothing else: plots, tables, and the pictures beside their differences.
 Result<std::string> report_page(const Report& report);
 
-// study.json, study.csv, plot-NAME.svg and index.html. Errors: internal.
+// study.json, study.csv, plot-NAME.svg, calibration-NAME.svg and index.html. Errors: internal.
 Result<void> write_report(const Report& report, const std::filesystem::path& folder);
 
 // "#rrggbb" of a method and compositing, the same in every plot.

@@ -80,7 +80,7 @@ Result<double> reconstruction_ripple(const Subject& subject, ThreadPool& pool,
   const double rho = 1 / depth;
   auto volume = std::make_shared<data::Volume>();
   volume->dims = lattice.dims;
-  volume->values.assign(volume->samples(), 1.0F);
+  volume->values = std::vector<float>(volume->samples(), 1.0F);
   data::finish_volume(*volume);
   scene::ScalarLayer layer;
   layer.field = std::move(volume);

@@ -83,7 +83,9 @@ Result<Subject> blob_subject(const std::string& name, bool quick) {
     if (const auto set = set_medium(name, *dataset, view); !set) return set.error();
   }
   const int side = quick ? 64 : 128;
-  return make_subject(name, std::move(dataset), view, {side, side});
+  auto subject = make_subject(name, std::move(dataset), view, {side, side});
+  if (subject) subject->calibrated = false;  // made for the methods, not for viewers
+  return subject;
 }
 
 }  // namespace

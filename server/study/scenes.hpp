@@ -15,6 +15,7 @@ struct Subject {
   std::string name;
   protocol::View view;  // complete; its image is the size of the study's pictures
   std::shared_ptr<data::Dataset> dataset;
+  bool calibrated = true;  // whether a study asks if errors told of it are true
 };
 
 struct PictureSize {

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double footprint_integral = 1.4476982547;  // C of ARCHITECTURE.md, "The medium"
 constexpr int pixels = 9;                            // of the row, from the line's tail to its head
-constexpr double width = 2e-4;                       // of the row, in cells: g = 1 over all of it
+constexpr double row_width = 2e-4;                   // of the row, in cells: g = 1 over all of it
 constexpr double line_opacity = 0.6;
 constexpr std::array<float, 3> medium_color{0.8F, 0.3F, 0.1F};
 constexpr std::array<float, 3> line_color{0.1F, 0.9F, 0.7F};
@@ -26,7 +26,9 @@ std::shared_ptr<const data::Volume> make_volume(int layers, const std::vector<fl
   auto volume = std::make_shared<data::Volume>();
   volume->dims = {1, layers, 1};
   volume->components = static_cast<int>(sample.size());
-  for (const float v : sample) volume->values.insert(volume->values.end(), layers, v);
+  std::vector<float> samples;
+  for (const float v : sample) samples.insert(samples.end(), layers, v);
+  volume->values = std::move(samples);
   data::finish_volume(*volume);
   return volume;
 }
@@ -53,11 +55,11 @@ scene::Scene make_scene(int layers, double tau, scene::Compositing compositing, 
   scene.camera.eye = {0, -layers - 1.0, 0};
   scene.camera.width = pixels;
   scene.camera.height = 1;
-  scene.camera.half_height = 0.5 * width / pixels;
+  scene.camera.half_height = 0.5 * row_width / pixels;
 
   scene::VectorLayer lines;
-  lines.field = make_volume(layers, {static_cast<float>(width), 1.0F, 0.0F});
-  lines.length = std::hypot(width, 1.0);
+  lines.field = make_volume(layers, {static_cast<float>(row_width), 1.0F, 0.0F});
+  lines.length = std::hypot(row_width, 1.0);
   lines.magnitude_range = {0, lines.length};
   lines.span = 2;
   lines.r1 = 0.6;

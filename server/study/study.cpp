@@ -1,5 +1,5 @@
-// For each subject: its truth, every point of its sweep, its reconstruction ripple, its encodings
-// and its pictures. What the folder holds is not measured again.
+// For each subject: its truth, every point of its sweep, its reconstruction ripple, its encodings,
+// its pictures and its calibration. What the folder holds is not measured again.
 #include "server/study/study.hpp"
 
 #include <algorithm>
@@ -19,8 +19,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double truth_weight = 12;    // points that take as long as one truth
-constexpr double pictures_weight = 2;  // and as the rest of a scene
+constexpr double truth_weight = 12;       // points that take as long as one truth
+constexpr double pictures_weight = 2;     // and as the rest of a scene
+constexpr double calibration_weight = 3;  // and as one view of a calibration
 constexpr int amplification = 10;
 
 double seconds_since(Clock::time_point start) {
@@ -81,7 +82,17 @@ class Study {
       }
       if (options_.truth && !std::filesystem::exists(truth_path(subject))) left_ += truth_weight;
       left_ += pictures_weight;
+      if (is_calibrated(subject)) left_ += calibration_weight * views_of(subject);
     }
+  }
+
+  bool is_calibrated(const Subject& subject) const {
+    return options_.calibrate && subject.calibrated;
+  }
+
+  int views_of(const Subject& subject) const {
+    const CalibrationPlan plan = calibration_plan(subject, options_.quick);
+    return static_cast<int>(looks_of(subject).size()) * (plan.surveyed + plan.held_out);
   }
 
   void tell(const Subject& subject, const std::string& doing) const {
@@ -179,6 +190,15 @@ class Study {
     return {};
   }
 
+  Result<Calibration> calibrate_scene(const Subject& subject) {
+    tell(subject, "calibration");
+    return calibrate(subject, calibration_plan(subject, options_.quick), options_.truth, pool_,
+                     cancel_, [&](int) {
+                       done_ += calibration_weight;
+                       tell(subject, "calibration");
+                     });
+  }
+
   Result<void> study_scene(const Subject& subject) {
     SceneReport scene;
     scene.name = subject.name;
@@ -201,6 +221,11 @@ class Study {
     scene.encoded = std::move(*encoded);
     if (const auto drawn = draw_pictures(subject, *truth, scene); !drawn) return drawn.error();
     done_ += pictures_weight;
+    if (is_calibrated(subject)) {
+      auto calibration = calibrate_scene(subject);
+      if (!calibration) return calibration.error();
+      scene.calibration = std::move(*calibration);
+    }
     tell(subject, "done");
     report_.scenes.push_back(std::move(scene));
     return {};

@@ -3,11 +3,13 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
+#include "server/study/calibration.hpp"
 #include "server/study/machine.hpp"
 #include "server/study/scenes.hpp"
 #include "server/study/stability.hpp"
@@ -39,6 +41,7 @@ struct SceneReport {
   double reconstruction_ripple = 0;  // 0: there is no medium; not a number: bent lattice or slice
   std::vector<Encoded> encoded;
   std::vector<Shown> pictures;
+  std::optional<Calibration> calibration;  // of subjects that are to be calibrated
 };
 
 struct Report {
@@ -63,6 +66,7 @@ struct Options {
   bool quick = false;
   Truth truth;           // empty: extrapolated from slabs
   double tolerance = 0;  // that `truth` is integrated to
+  bool calibrate = true;
 };
 
 using Listener = std::function<void(const Progress&)>;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/base/check.hpp"
+#include "server/frame/difference.hpp"
 #include "server/image/decode.hpp"
 #include "server/image/encode.hpp"
 #include "server/study/metrics.hpp"
@@ -123,7 +124,7 @@ Result<Measurement> measure(const Subject& subject, const Setting& setting, cons
       resample(image.rgba, image.width, image.height, truth.width, truth.height);
 
   Measurement out;
-  const Difference apart = difference(rgba, truth.rgba);
+  const frame::Difference apart = frame::difference_of(rgba, truth.rgba);
   out.rmse = apart.rmse;
   out.max = apart.max;
   out.psnr = apart.psnr;
@@ -187,7 +188,7 @@ Result<std::vector<Encoded>> measure_encoding(const Subject& subject, ThreadPool
     Encoded encoded;
     encoded.quality = quality;
     encoded.rmse = linear_rmse(rgb, *decoded);
-    encoded.psnr = psnr_of(encoded.rmse);
+    encoded.psnr = frame::psnr_of(encoded.rmse);
     encoded.flip = mean_flip(rgb, *decoded, width, height);
     encoded.bytes = jpeg->size();
     all.push_back(encoded);

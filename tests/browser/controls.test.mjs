@@ -264,6 +264,8 @@ test("colour tells a direction by the compass, and a scalar by its name", () =>
     assert.equal(await isShown(page, "share of rise", "input"), false);
     assert.equal(await isShown(page, "map"), false, "one colour needs no map");
     await linkSays(page, "vector", "color", "by", "constant");
+    await control(page, "colour", "input").fill("#ff8000");
+    assert.equal(await lastPatch(page, "vector", "color", "constant"), "#ff8000");
   }));
 
 // --- the flow: only its patches, which go out whatever the server draws ----------------------

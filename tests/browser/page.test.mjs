@@ -15,6 +15,8 @@ import {
   shot,
   somePicture,
   state,
+  watchFrames,
+  watchPatches,
 } from "./support.mjs";
 
 let browser;
@@ -55,11 +57,11 @@ async function withPage(run, path = "", options = {}) {
 }
 
 // A daemon of the test's own and a page on it; both are gone when the test is over, pass or fail.
-async function ownPage(t, { basePath = "/", datasets = [] } = {}) {
+async function ownPage(t, { basePath = "/", datasets = [], ...options } = {}) {
   const own = new Daemon(await freePort(), basePath);
   t.after(() => own.kill());
   await own.start(...datasets);
-  const page = await openPage(browser, own.url);
+  const page = await openPage(browser, own.url, options);
   t.after(() => page.context().close());
   return { own, page };
 }
@@ -286,11 +288,16 @@ test("a link with a value out of range names it and shows the rest by default", 
   }, '#!{"dataset":"climate","vector":{"length":-5}}'));
 
 test("a killed server: the picture stays, dimmed, and comes back by itself", async (t) => {
-  const { own, page } = await ownPage(t);
+  const { own, page } = await ownPage(t, { initScript: [watchFrames, watchPatches] });
   await finalPicture(page);
+  await control(page, "map").selectOption("plasma");
+  await page.locator("#time-next").click();
   await drag(page, 70, -20);
   await finalPicture(page);
   const before = await pixels(page);
+  const lastFrame = () => page.evaluate(() => window.frameHeaders.at(-1));
+  const frameBefore = await lastFrame();
+  assert.equal(frameBefore.step, 1);
   await own.kill("SIGKILL");
   await page.waitForFunction(
     () =>
@@ -298,6 +305,7 @@ test("a killed server: the picture stays, dimmed, and comes back by itself", asy
       /lost/.test(document.querySelector("#status").textContent),
   );
   assert.equal((await pixels(page)).hash, before.hash, "the last picture stays");
+  await page.evaluate(() => (window.patches.length = 0));
   assert.match(
     await page.locator("#picture").evaluate((e) => getComputedStyle(e).filter),
     /brightness/,
@@ -309,6 +317,16 @@ test("a killed server: the picture stays, dimmed, and comes back by itself", asy
   });
   await finalPicture(page);
   assert.equal((await pixels(page)).hash, before.hash, "the same view as before");
+  const frame = await lastFrame();
+  const told = ({ final, step, width, height, codec, quality, method, level, chosen }) => ({
+    ...{ final, step, width, height, codec, quality, method, level },
+    view: chosen.view,
+  });
+  assert.deepEqual(told(frame), told(frameBefore));
+  assert.equal(frame.final, true);
+  const patches = await page.evaluate(() => window.patches.map(({ patch }) => patch));
+  assert.equal(patches.length, 1, "the whole view in one patch");
+  assert.equal(patches[0].vector.color.map, "plasma");
   // The browser itself reports the connections that failed; nothing else may be there.
   const others = page.faults.filter((text) => !/WebSocket|ERR_CONNECTION_REFUSED/.test(text));
   assert.deepEqual(others, []);

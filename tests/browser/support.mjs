@@ -50,7 +50,8 @@ export class Daemon {
     }
     const until = Date.now() + 30_000 * patience;
     while (Date.now() < until && child.exitCode === null) {
-      const answer = await fetch(this.url).catch(() => null);
+      // Where a token is asked for, too.
+      const answer = await fetch(`${this.url}readyz`).catch(() => null);
       if (answer?.ok) return this;
       await sleep(50);
     }
@@ -80,14 +81,15 @@ export const launch = () =>
   });
 
 // A page whose console errors, exceptions and violations of the content policy are collected.
-// options: playwright's for a context, and `initScript`, a function to run in the page first.
-export async function openPage(browser, url, { initScript, ...options } = {}) {
+// options: playwright's for a context; `initScript`, a function or several to run in the page
+// first; `prepare`, what to do with the page before it goes anywhere.
+export async function openPage(browser, url, { initScript, prepare, ...options } = {}) {
   const context = await browser.newContext({
     viewport: { width: 1440, height: 900 },
     colorScheme: "dark",
     ...options,
   });
-  if (initScript !== undefined) await context.addInitScript(initScript);
+  for (const script of [initScript ?? []].flat()) await context.addInitScript(script);
   const page = await context.newPage();
   page.setDefaultTimeout(15_000 * patience);
   page.faults = [];
@@ -95,6 +97,7 @@ export async function openPage(browser, url, { initScript, ...options } = {}) {
     if (message.type() === "error") page.faults.push(message.text());
   });
   page.on("pageerror", (error) => page.faults.push(String(error)));
+  await prepare?.(page);
   await page.goto(url, { waitUntil: "load" });
   return page;
 }
@@ -114,8 +117,8 @@ export async function finalPicture(page) {
   );
   await page.waitForFunction(
     () => {
-      const { rev, wanted, final } = document.querySelector("#picture").dataset;
-      return final === "true" && rev === wanted;
+      const { rev, wanted, state } = document.querySelector("#picture").dataset;
+      return state === "final" && rev === wanted;
     },
     null,
     { polling: 20 },
@@ -194,6 +197,62 @@ export const watchPatches = () => {
   };
 };
 
+// The same for what comes in: the frames' headers, and what `chosen` says of each.
+export const watchFrames = () => {
+  const chosen = new Map();
+  window.frameHeaders = [];
+  const codecs = { 1: "jpeg", 2: "png" };
+  const methods = { 1: "kernel", 2: "slab", 3: "reference" };
+  const Native = window.WebSocket;
+  window.WebSocket = class extends Native {
+    constructor(...args) {
+      super(...args);
+      this.addEventListener("message", ({ data }) => {
+        if (typeof data === "string") {
+          const message = JSON.parse(data);
+          if (message.type === "chosen") chosen.set(message.seq, message);
+          return;
+        }
+        const header = new DataView(data);
+        const u32 = (at) => header.getUint32(at, true);
+        window.frameHeaders.push({
+          seq: u32(8),
+          rev: u32(12),
+          step: u32(16),
+          final: (u32(20) & 1) !== 0,
+          measured: (u32(20) & 2) !== 0,
+          estimated: (u32(20) & 4) !== 0,
+          width: header.getUint16(24, true),
+          height: header.getUint16(26, true),
+          codec: codecs[header.getUint8(28)],
+          quality: header.getUint8(29),
+          method: methods[header.getUint8(30)],
+          level: header.getUint8(31),
+          error: header.getFloat32(32, true),
+          jpegError: header.getFloat32(36, true),
+          chosen: chosen.get(u32(8)),
+        });
+      });
+    }
+  };
+};
+
+// The headers of the frames that came while `act` ran and until the view rests again.
+export async function framesOf(page, act) {
+  await finalPicture(page);
+  await page.evaluate(() => (window.frameHeaders.length = 0));
+  await act();
+  await finalPicture(page);
+  return page.evaluate(() => window.frameHeaders);
+}
+
+// Of those the ones that came while the view moved: a slow final frame is preceded by frames that
+// refine a view which was shown before.
+export const movingOf = (frames) =>
+  frames.filter(
+    ({ final, rev }, n) => !final && frames.findIndex((frame) => frame.rev === rev) === n,
+  );
+
 // Opens folders of the panel.
 export async function unfold(page, ...titles) {
   for (const title of titles) {
@@ -216,7 +275,7 @@ export async function choose(page, label, text) {
 
 // Into the number box of a control.
 export async function type(page, label, value) {
-  const input = control(page, label, "input");
+  const input = control(page, label, 'input:not([type="range"])');
   await input.fill(String(value));
   await input.press("Enter");
 }

@@ -127,6 +127,9 @@ class Process {
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   }
 
+  // -1 once it has ended.
+  [[nodiscard]] pid_t id() const { return pid_; }
+
   [[nodiscard]] std::string messages() const { return read_file(folder_.file("stderr")); }
 
  private:
@@ -171,6 +174,17 @@ inline Outcome run(const Words& arguments, const Words& environment = {}) {
   outcome.code = process.wait();
   outcome.err = process.messages();
   return outcome;
+}
+
+// The port of a daemon's URL line.
+inline std::uint16_t port_of(Process& daemon) {
+  const std::string url = daemon.read_until('\n');
+  const auto colon = url.rfind(':');
+  if (colon == std::string::npos) {
+    ADD_FAILURE() << daemon.messages();
+    return 0;
+  }
+  return static_cast<std::uint16_t>(std::stoi(url.substr(colon + 1)));
 }
 
 // A small series of a built-in sample, written by the program itself.

@@ -47,6 +47,20 @@ TEST(CliStudy, AFileWithAViewIsStudiedAsTheViewSays) {
   EXPECT_EQ(scene.at("reference").at("kind"), "extrapolated");
   EXPECT_EQ(scene.at("reference").at("width"), 48);
   EXPECT_EQ(scene.at("points").at(0).at("knobs").at("span"), 3);
+  EXPECT_EQ(scene.at("calibration").at("width"), 96);
+  EXPECT_TRUE(std::filesystem::exists(out + "/calibration-tornado-small.svg"));
+  EXPECT_THAT(done.out, HasSubstr("within a factor of 2"));
+}
+
+TEST(CliStudy, IsNotCalibratedWhereThatIsNotWanted) {
+  const Folder folder;
+  const std::string data = synth(folder, "tornado", "12x12x12");
+  const std::string out = folder.file("report");
+  const Outcome done = run({"study", data, "--size", "48x36", "--quick", "--no-reference",
+                            "--no-calibration", "-o", out});
+  ASSERT_EQ(done.code, 0) << done.err;
+  EXPECT_FALSE(
+      Json::parse(read_file(out + "/study.json")).at("scenes").at(0).contains("calibration"));
 }
 
 TEST(CliStudy, AnInterruptLeavesAFolderToGoOnFrom) {

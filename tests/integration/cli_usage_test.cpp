@@ -99,10 +99,22 @@ TEST(CliUsage, MessagesHoldNoControlCharactersOfTheArguments) {
 }
 
 // A flag that would do nothing must not be taken.
-TEST(CliUsage, FlagsOfLaterReleasesAreRefused) {
-  for (const char* flag : {"--config", "--token-file", "--tls-cert", "--tls-key", "--data-root"}) {
-    EXPECT_EQ(run({"serve", flag, "x"}).code, 2) << flag;
+TEST(CliUsage, ADataRootThatIsNotThereIsRefused) {
+  const Outcome outcome = run({"serve", "--data-root", "x"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--data-root 'x'"));
+}
+
+TEST(CliUsage, AStateFolderThatCannotBeIsRefused) {
+  for (const Words& environment : {Words{}, Words{"WINDSPLAT_STATE_DIR=/dev/null/state"}}) {
+    Words words{"serve", "--listen", "127.0.0.1:0", "tornado"};
+    if (environment.empty()) words.insert(words.end(), {"--state-dir", "/dev/null/state"});
+    const Outcome outcome = run(words, environment);
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_THAT(outcome.err, HasSubstr("/dev/null/state"));
   }
+  EXPECT_THAT(run({"serve", "--help"}).out, HasSubstr("WINDSPLAT_STATE_DIR"));
 }
 
 TEST(CliUsage, TheEnvironmentGivesOptionsAndTheCommandLineWins) {

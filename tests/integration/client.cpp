@@ -2,7 +2,10 @@
 #include "client.hpp"
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <netinet/in.h>
+#include <openssl/ssl.h>
+#include <openssl/x509.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -11,6 +14,7 @@
 #include <array>
 #include <cctype>
 #include <chrono>
+#include <csignal>
 #include <nlohmann/json.hpp>
 
 namespace net_test {
@@ -63,7 +67,20 @@ std::string type_of(const std::string& text) {
 
 }  // namespace
 
-Socket::Socket(std::uint16_t port, int receive_buffer_bytes) {
+struct Socket::Tls {
+  Tls() : context(SSL_CTX_new(TLS_client_method())), ssl(SSL_new(context)) {}
+  ~Tls() {
+    SSL_free(ssl);
+    SSL_CTX_free(context);
+  }
+  Tls(const Tls&) = delete;
+  Tls& operator=(const Tls&) = delete;
+
+  SSL_CTX* context;
+  SSL* ssl;
+};
+
+Socket::Socket(Place place, int receive_buffer_bytes) {
   handle_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (receive_buffer_bytes > 0) {
     ::setsockopt(handle_, SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes,
@@ -71,21 +88,47 @@ Socket::Socket(std::uint16_t port, int receive_buffer_bytes) {
   }
   sockaddr_in address{};
   address.sin_family = AF_INET;
-  address.sin_port = htons(port);
+  address.sin_port = htons(place.port);
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   if (::connect(handle_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     ::close(handle_);
     handle_ = -1;
   }
+  if (handle_ < 0 || !place.tls) return;
+  std::signal(SIGPIPE, SIG_IGN);  // OpenSSL writes without MSG_NOSIGNAL
+  ::fcntl(handle_, F_SETFL, ::fcntl(handle_, F_GETFL) | O_NONBLOCK);
+  tls_ = std::make_unique<Tls>();
+  constexpr std::array<unsigned char, 12> protocols{2,   'h', '2', 8,   'h', 't',
+                                                    't', 'p', '/', '1', '.', '1'};
+  SSL_set_alpn_protos(tls_->ssl, protocols.data(), protocols.size());
+  SSL_set_fd(tls_->ssl, handle_);
+  int result = 0;
+  do {
+    result = SSL_connect(tls_->ssl);
+  } while (result != 1 && wait_for(result, patience_ms));
+  shaken_ = result == 1;
 }
 
 Socket::~Socket() {
   if (handle_ >= 0) ::close(handle_);
 }
 
+// Until what OpenSSL waits for has come; false if that is nothing, or does not come.
+bool Socket::wait_for(int ssl_result, int timeout_ms) {
+  const int wanted = SSL_get_error(tls_->ssl, ssl_result);
+  if (wanted != SSL_ERROR_WANT_READ && wanted != SSL_ERROR_WANT_WRITE) return false;
+  pollfd ready{handle_, static_cast<short>(wanted == SSL_ERROR_WANT_READ ? POLLIN : POLLOUT), 0};
+  return ::poll(&ready, 1, timeout_ms) > 0;
+}
+
 bool Socket::send(std::string_view bytes) {
   if (handle_ < 0) return false;
   const auto end = in_ms(patience_ms);
+  while (!bytes.empty() && tls_) {
+    const int sent = SSL_write(tls_->ssl, bytes.data(), static_cast<int>(bytes.size()));
+    if (sent <= 0 && !wait_for(sent, left_ms(end))) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(std::max(0, sent)));
+  }
   while (!bytes.empty()) {
     pollfd ready{handle_, POLLOUT, 0};
     if (::poll(&ready, 1, left_ms(end)) <= 0) return false;
@@ -98,12 +141,46 @@ bool Socket::send(std::string_view bytes) {
 
 std::string Socket::receive(int timeout_ms) {
   if (handle_ < 0) return {};
+  std::string bytes(65536, '\0');
+  if (tls_) {
+    const auto end = in_ms(timeout_ms);
+    int got = 0;
+    do {
+      got = SSL_read(tls_->ssl, bytes.data(), static_cast<int>(bytes.size()));
+    } while (got <= 0 && wait_for(got, left_ms(end)));
+    bytes.resize(static_cast<std::size_t>(std::max(0, got)));
+    return bytes;
+  }
   pollfd ready{handle_, POLLIN, 0};
   if (::poll(&ready, 1, timeout_ms) <= 0) return {};
-  std::string bytes(65536, '\0');
   const auto got = ::recv(handle_, bytes.data(), bytes.size(), 0);
   bytes.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
   return bytes;
+}
+
+std::string Socket::peer_name() const {
+  X509* const peer = SSL_get1_peer_certificate(tls_->ssl);
+  if (peer == nullptr) return "";
+  std::array<char, 100> name{};
+  X509_NAME_get_text_by_NID(X509_get_subject_name(peer), NID_commonName, name.data(), name.size());
+  X509_free(peer);
+  return name.data();
+}
+
+std::string Socket::version() const { return SSL_get_version(tls_->ssl); }
+
+std::string Socket::protocol() const {
+  const unsigned char* name = nullptr;
+  unsigned int size = 0;
+  SSL_get0_alpn_selected(tls_->ssl, &name, &size);
+  return {reinterpret_cast<const char*>(name), size};
+}
+
+void Socket::say_goodbye() { SSL_shutdown(tls_->ssl); }
+
+bool Socket::change_key() {
+  return SSL_key_update(tls_->ssl, SSL_KEY_UPDATE_REQUESTED) == 1 &&
+         SSL_do_handshake(tls_->ssl) == 1;
 }
 
 bool Socket::closed_by_peer(int timeout_ms) {
@@ -141,41 +218,41 @@ Answer read_answer(Socket& socket, bool head) {
   return answer;
 }
 
-Answer request(std::uint16_t port, const std::string& method, const std::string& target,
+Answer request(Place place, const std::string& method, const std::string& target,
                const Headers& headers, const std::string& body) {
   std::string text = method + ' ' + target +
-                     " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
+                     " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(place.port) +
                      "\r\nConnection: close\r\n";
   add_headers(headers, text);
   if (!body.empty() || method == "POST") {
     text += "Content-Length: " + std::to_string(body.size()) + "\r\n";
   }
-  Socket socket(port);
+  Socket socket(place);
   socket.send(text + "\r\n" + body);
   return read_answer(socket, method == "HEAD");
 }
 
-Answer get(std::uint16_t port, const std::string& target, const Headers& headers) {
-  return request(port, "GET", target, headers);
+Answer get(Place place, const std::string& target, const Headers& headers) {
+  return request(place, "GET", target, headers);
 }
 
-Answer post_view(std::uint16_t port, const std::string& json, const Headers& headers) {
+Answer post_view(Place place, const std::string& json, const Headers& headers) {
   Headers all{{"Content-Type", "application/json"}};
   all.insert(all.end(), headers.begin(), headers.end());
-  return request(port, "POST", "/v1/frames", all, json);
+  return request(place, "POST", "/v1/frames", all, json);
 }
 
-Answer raw(std::uint16_t port, std::string_view bytes) {
-  Socket socket(port);
+Answer raw(Place place, std::string_view bytes) {
+  Socket socket(place);
   socket.send(bytes);
   return read_answer(socket);
 }
 
-StreamClient::StreamClient(std::uint16_t port, const Headers& headers, const std::string& target,
+StreamClient::StreamClient(Place place, const Headers& headers, const std::string& target,
                            int receive_buffer_bytes)
-    : socket(port, receive_buffer_bytes) {
+    : socket(place, receive_buffer_bytes) {
   std::string text =
-      "GET " + target + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
+      "GET " + target + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(place.port) +
       "\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
       "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
   add_headers(headers, text);

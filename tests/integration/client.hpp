@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,10 +17,18 @@ using Headers = std::vector<std::pair<std::string, std::string>>;
 
 inline constexpr int patience_ms = 60'000;  // a test that waits longer has failed
 
-// A TCP connection to this machine.
+// A port of this machine, and whether TLS is spoken there.
+struct Place {
+  Place(std::uint16_t number, bool with_tls = false)  // NOLINT: a port's number is a place
+      : port(number), tls(with_tls) {}
+  std::uint16_t port;
+  bool tls;
+};
+
+// A TCP connection to this machine, in TLS or not. No certificate is checked: peer_name() tells it.
 class Socket {
  public:
-  explicit Socket(std::uint16_t port, int receive_buffer_bytes = 0);
+  explicit Socket(Place place, int receive_buffer_bytes = 0);
   ~Socket();
   Socket(const Socket&) = delete;
   Socket& operator=(const Socket&) = delete;
@@ -32,8 +41,22 @@ class Socket {
   bool closed_by_peer(int timeout_ms = patience_ms);
   void half_close() const;
 
+  // Of TLS: whether the handshake came to its end, the common name of the peer's certificate, and
+  // what was agreed on ("TLSv1.3", "http/1.1").
+  [[nodiscard]] bool shaken() const { return shaken_; }
+  [[nodiscard]] std::string peer_name() const;
+  [[nodiscard]] std::string version() const;
+  [[nodiscard]] std::string protocol() const;
+  void say_goodbye();  // close_notify
+  bool change_key();   // of TLS 1.3: a record that holds nothing for HTTP
+
  private:
+  struct Tls;
+  bool wait_for(int ssl_result, int timeout_ms);
+
   int handle_ = -1;
+  bool shaken_ = false;
+  std::unique_ptr<Tls> tls_;
 };
 
 struct Answer {
@@ -48,12 +71,12 @@ struct Answer {
 Answer read_answer(Socket& socket, bool head = false);
 
 // One request on a connection of its own.
-Answer request(std::uint16_t port, const std::string& method, const std::string& target,
+Answer request(Place place, const std::string& method, const std::string& target,
                const Headers& headers = {}, const std::string& body = "");
-Answer get(std::uint16_t port, const std::string& target, const Headers& headers = {});
-Answer post_view(std::uint16_t port, const std::string& json, const Headers& headers = {});
+Answer get(Place place, const std::string& target, const Headers& headers = {});
+Answer post_view(Place place, const std::string& json, const Headers& headers = {});
 // Bytes as they are.
-Answer raw(std::uint16_t port, std::string_view bytes);
+Answer raw(Place place, std::string_view bytes);
 
 enum class Opcode : std::uint8_t { more = 0, text = 1, binary = 2, close = 8, ping = 9, pong = 10 };
 
@@ -66,7 +89,7 @@ struct Message {
 // A WebSocket. Answers pings by itself; acknowledges nothing.
 class StreamClient {
  public:
-  explicit StreamClient(std::uint16_t port, const Headers& headers = {},
+  explicit StreamClient(Place place, const Headers& headers = {},
                         const std::string& target = "/v1/stream", int receive_buffer_bytes = 0);
 
   [[nodiscard]] const Answer& handshake() const { return handshake_; }

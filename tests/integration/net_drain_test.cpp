@@ -1,10 +1,28 @@
 // The orderly end: readiness goes first, streams are told, what is being drawn is answered.
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <thread>
+#include <vector>
+
 #include "net_server.hpp"
+#include "protocol/frame_header.hpp"
 
 namespace net_test {
 namespace {
+
+// Takes frames and gives their credit back until the view is at rest, so that what is asked for
+// next is begun.
+bool until_final(StreamClient& client) {
+  while (const auto bytes = client.next_frame()) {
+    const auto header = windsplat::protocol::parse_frame_header(
+        {reinterpret_cast<const std::uint8_t*>(bytes->data()), bytes->size()});
+    if (!header) return false;
+    client.say(Json{{"type", "ack"}, {"seq", header->seq}, {"decodeMs", 1}}.dump());
+    if ((header->flags & windsplat::protocol::flag_final) != 0) return true;
+  }
+  return false;
+}
 
 TEST(Drain, an_idle_server_ends) {
   TestServer server;
@@ -32,6 +50,48 @@ TEST(Drain, streams_are_closed_with_1001) {
   EXPECT_EQ(idle.close_code(), 1001);
   EXPECT_EQ(busy.close_code(), 1001);
   server.stop();
+}
+
+TEST(Drain, is_not_put_off_by_clients_that_ask_again_and_again) {
+  TestServer server;
+  std::vector<std::thread> clients;
+  clients.reserve(6);
+  for (int n = 0; n < 6; ++n) {
+    clients.emplace_back([port = server.port()] {
+      while (get(port, "/v1/datasets/small/frame.jpg?width=16&height=16").status != 0) {
+      }
+    });
+  }
+  ASSERT_EQ(get(server.port(), "/livez").status, 200);
+  const auto begin = std::chrono::steady_clock::now();
+  server.stop();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5))
+      << "connections are ended after 8 s; nothing here takes long";
+  for (std::thread& client : clients) client.join();
+}
+
+// Whatever is under way when the time is up: nothing that ends later touches what has gone.
+TEST(Drain, connections_that_outlast_it_are_ended) {
+  windsplat::net::ServerOptions options;
+  options.drain_cancel_after = std::chrono::milliseconds(0);
+  options.drain_abort_after = std::chrono::milliseconds(0);
+  TestServer server(options);
+  StreamClient idle(server.port());
+  ASSERT_TRUE(idle.next_text("hello"));
+  StreamClient busy(server.port());
+  busy.say(R"({"type":"patch","rev":1,"patch":{"dataset":"small",
+              "image":{"width":2000,"height":2000}}})");
+  ASSERT_TRUE(busy.next_text("hello"));
+  Socket drawing(server.port());
+  drawing.send(
+      "GET /v1/datasets/small/frame.png?width=2000&height=2000 HTTP/1.1\r\n"
+      "Host: x\r\n\r\n");
+  Socket silent(server.port());
+  server.stop();
+  EXPECT_TRUE(idle.socket.closed_by_peer());
+  EXPECT_TRUE(busy.socket.closed_by_peer());
+  EXPECT_TRUE(silent.closed_by_peer());
+  EXPECT_TRUE(drawing.closed_by_peer());
 }
 
 TEST(Drain, a_picture_that_is_being_drawn_is_answered_and_readiness_is_gone_meanwhile) {
@@ -63,11 +123,11 @@ TEST(Drain, a_peer_that_never_reads_does_not_hold_it_up) {
   StreamClient deaf(server.port(), {}, "/v1/stream", 4096);
   deaf.say(R"({"type":"patch","rev":1,"patch":{"dataset":"small",
               "image":{"width":32,"height":32}}})");
-  ASSERT_TRUE(deaf.next_frame());
+  ASSERT_TRUE(until_final(deaf));
   deaf.say(R"({"type":"still","id":1,"width":3000,"height":3000,"format":"png"})");
   const auto progress = [&deaf] { return Json::parse(deaf.texts.back()); };
-  while (deaf.next_text("progress") && progress()["done"] != 1) {
-  }
+  do ASSERT_TRUE(deaf.next_text("progress"));
+  while (progress()["done"] != 1);
   server.stop();
   while (deaf.next(1000)) {
   }

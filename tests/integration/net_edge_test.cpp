@@ -155,6 +155,17 @@ TEST_F(Edge, a_connection_carries_many_requests_even_sent_at_once) {
   EXPECT_EQ(read_answer(socket).status, 200);
 }
 
+TEST_F(Edge, a_refusal_after_a_head_has_its_body) {
+  Socket socket(port());
+  socket.send("HEAD /livez HTTP/1.1\r\nHost: x\r\n\r\n");
+  EXPECT_EQ(read_answer(socket, true).status, 200);
+  socket.send("no request\r\n\r\n");
+  const Answer answer = read_answer(socket);
+  EXPECT_EQ(answer.status, 400);
+  EXPECT_EQ(answer.header("content-length"), std::to_string(answer.body.size()));
+  EXPECT_FALSE(answer.body.empty());
+}
+
 TEST_F(Edge, http_1_0_is_answered_and_closed) {
   Socket socket(port());
   socket.send("GET /livez HTTP/1.0\r\nHost: x\r\n\r\n");

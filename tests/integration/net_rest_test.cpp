@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 
 #include <chrono>
+#include <set>
+#include <string>
 #include <thread>
 
 #include "net_server.hpp"
@@ -29,8 +31,6 @@ class Rest : public testing::Test {
   TestServer server_;
 };
 
-Json json_of(const Answer& answer) { return Json::parse(answer.body, nullptr, false); }
-
 void expect_problem(const Answer& answer, int status, const std::string& pointer = "") {
   EXPECT_EQ(answer.status, status) << answer.body;
   EXPECT_EQ(answer.header("content-type"), "application/problem+json");
@@ -54,7 +54,9 @@ TEST_F(Rest, service_tells_version_links_and_limits_and_every_link_leads_somewhe
   ASSERT_GE(service["links"].size(), 5U);
   for (const auto& [name, link] : service["links"].items()) {
     const int status = get(port(), link.get<std::string>()).status;
-    const int expected = name == "frames" ? 405 : name == "stream" ? 426 : 200;
+    const bool posted =
+        std::set<std::string>{"frames", "forecasts", "references", "views"}.count(name) != 0;
+    const int expected = posted ? 405 : name == "stream" ? 426 : 200;
     EXPECT_EQ(status, expected) << name << ' ' << link;
   }
 }
@@ -73,10 +75,15 @@ TEST_F(Rest, datasets_are_listed_without_being_read_and_described_after_reading)
   EXPECT_EQ(dataset["dims"], Json({{"x", 32}, {"y", 16}, {"z", 6}}));
   EXPECT_EQ(dataset["steps"]["count"], small_steps);
   EXPECT_EQ(dataset["defaultView"]["dataset"], "small");
-  for (const Json& field : dataset["fields"]) EXPECT_TRUE(field["range"].is_array()) << field;
-  EXPECT_EQ(server_.loads(), dataset["fields"].size()) << "each field once";
+  // The default view shows two of the fields: others are neither loaded nor are their ranges known.
+  for (const Json& field : dataset["fields"]) {
+    const bool shown = field["name"] == "wind" || field["name"] == "cloud";
+    EXPECT_EQ(field["range"].is_array(), shown) << field;
+  }
+  EXPECT_GT(dataset["fields"].size(), 2U);
+  EXPECT_EQ(server_.loads(), 2U) << "each once";
   get(port(), "/v1/datasets/small");
-  EXPECT_EQ(server_.loads(), dataset["fields"].size());
+  EXPECT_EQ(server_.loads(), 2U);
   expect_problem(get(port(), "/v1/datasets/nowhere"), 404);
 }
 
@@ -207,6 +214,29 @@ TEST_F(Rest, a_budgeted_picture_is_not_to_be_kept) {
   EXPECT_EQ(answer.header("etag"), "");
 }
 
+// Every picture says what it is thought to err, and one that is asked for by its error or its time
+// is drawn by what does.
+TEST_F(Rest, a_picture_says_its_error_and_keeps_what_is_asked_of_it) {
+  const auto frame_of = [&](const std::string& quality) {
+    const Answer answer =
+        post_view(port(), R"({"dataset":"small","image":{"width":320,"height":240},"quality":)" +
+                              quality + "}");
+    EXPECT_EQ(answer.status, 200);
+    return Json::parse(answer.header("windsplat-frame"));
+  };
+  const Json pure = frame_of("{}");
+  EXPECT_EQ(pure["error"]["kind"], "estimated");
+  EXPECT_GT(pure["error"]["value"], 0);
+  EXPECT_GT(pure["jpegError"], 0);
+  EXPECT_EQ(pure["width"], 320);
+  const Json exact = frame_of(R"({"maxError":0.01})");
+  EXPECT_EQ(exact["method"], "slab");
+  EXPECT_LE(exact["error"]["value"], 0.01);
+  const Json quick = frame_of(R"({"budgetMs":1})");
+  EXPECT_LT(quick["width"], 320);
+  EXPECT_GT(quick["error"]["value"], exact["error"]["value"]);
+}
+
 // --- bad input ----------------------------------------------------------------------------------
 
 TEST_F(Rest, bad_views_are_refused_with_the_pointer) {
@@ -276,7 +306,7 @@ TEST_F(Rest, bad_queries_are_refused) {
 TEST_F(Rest, methods_that_do_nothing_are_told_which_do) {
   const Answer deleted = request(port(), "DELETE", "/v1/datasets");
   expect_problem(deleted, 405);
-  EXPECT_EQ(deleted.header("allow"), "GET, HEAD, OPTIONS");
+  EXPECT_EQ(deleted.header("allow"), "GET, HEAD, POST, OPTIONS");
   const Answer got = get(port(), "/v1/frames");
   expect_problem(got, 405);
   EXPECT_EQ(got.header("allow"), "POST, OPTIONS");
@@ -301,6 +331,8 @@ TEST_F(Rest, head_is_get_without_the_body) {
 }
 
 TEST_F(Rest, beyond_what_can_wait_comes_429_at_once) {
+  // Resident, so that nothing is let in only to find that it has to be loaded first.
+  ASSERT_EQ(get(port(), "/v1/datasets/small/frame.jpg?width=16&height=16").status, 200);
   // More pictures than may wait, asked for before the first is done.
   const std::string slow =
       "GET /v1/datasets/small/frame.png?width=4096&height=4096 HTTP/1.1\r\nHost: x\r\n\r\n";

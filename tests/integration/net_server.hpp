@@ -21,6 +21,8 @@ namespace net_test {
 
 using Json = nlohmann::json;
 
+inline Json json_of(const Answer& answer) { return Json::parse(answer.body, nullptr, false); }
+
 inline constexpr int small_steps = 3;
 
 // A file that lives as long as the tests.
@@ -49,9 +51,13 @@ inline const std::string& small_file() {
 
 class TestServer {
  public:
-  explicit TestServer(windsplat::net::ServerOptions options = {}) {
+  // `open`: how files are opened, other than in this process.
+  explicit TestServer(windsplat::net::ServerOptions options = {},
+                      decltype(windsplat::data::StoreOptions::open) open = {},
+                      std::uint64_t bytes_max = std::uint64_t{1} << 30) {
     options.port = 0;
-    store_ = std::make_shared<windsplat::data::Store>(std::uint64_t{1} << 30);
+    store_ = std::make_shared<windsplat::data::Store>(windsplat::data::StoreOptions{
+        bytes_max, windsplat::data::Storage::float32, std::move(open)});
     const auto added = store_->add(small_file());
     EXPECT_TRUE(added) << (added ? "" : added.error().message);
     server_ = std::make_unique<windsplat::net::Server>(std::move(options), store_,

@@ -15,7 +15,7 @@ using namespace windsplat;  // NOLINT(google-build-using-namespace)
 // Whether data was prepared for the frame, which the next of its kind need not do again.
 bool prepared(net::Viewer& viewer, std::uint64_t ticket, const protocol::View& view) {
   std::promise<bool> told;
-  viewer.start(session::StartRender{ticket, view, {}},
+  viewer.start(session::StartRender{ticket, view, {}, {}},
                [&](std::uint64_t /*ticket*/, Result<session::Drawn> drawn) {
                  EXPECT_TRUE(drawn) << (drawn ? "" : drawn.error().message);
                  told.set_value(drawn && drawn->loaded);
@@ -29,7 +29,7 @@ TEST(Viewer, AFrameThatWaitedForAveragesSaysSoAsOneThatWaitedForFields) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add(small_file()).value();
   net::Services services({}, store, std::make_shared<ThreadPool>(2));
-  net::Viewer viewer(services, 1);
+  net::Viewer viewer(services, 1, "192.0.2.1");
   protocol::View view;
   view.dataset = "small";
   view.image.width = 16;

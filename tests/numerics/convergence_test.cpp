@@ -287,11 +287,6 @@ scene::Scene one_kernel(double rho, double slope_y) {
   return scene;
 }
 
-double footprint(double r) {
-  if (r < 0.48) return 1 - r * r / (0.48 * 1.37);
-  return r < 1.37 ? (1.37 - r) * (1.37 - r) / (1.37 * 0.89) : 0;
-}
-
 void expect_cells(Compositing compositing, double rho) {
   for (const double slope_y : {0.0, 4.0, -9.0}) {
     scene::Scene scene = one_kernel(rho, slope_y);

@@ -15,12 +15,7 @@
 namespace windsplat::test {
 namespace {
 
-constexpr double footprint_integral = 1.4476982547;
 constexpr float infinity = std::numeric_limits<float>::infinity();
-
-std::shared_ptr<const data::Volume> uniform(const scene::Lattice& lattice, float value) {
-  return make_volume(lattice, 1, [=](int, double, double, double) { return value; });
-}
 
 // A line across the middle of a splat, tilted so that at the right it leaves its cell's back; red
 // medium, blue line.

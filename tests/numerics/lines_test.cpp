@@ -8,8 +8,6 @@
 namespace windsplat::test {
 namespace {
 
-constexpr double footprint_integral = 1.4476982547;
-
 std::shared_ptr<const data::Volume> wind(const scene::Lattice& lattice, float u, float v, float w) {
   return make_volume(lattice, 3,
                      [=](int c, double, double, double) { return c == 0 ? u : (c == 1 ? v : w); });

@@ -9,20 +9,6 @@
 namespace windsplat::test {
 namespace {
 
-constexpr double footprint_integral = 1.4476982547;
-constexpr double pi = 3.14159265358979323846;
-
-double footprint(double r) {
-  const double s = 0.48;
-  const double t = 1.37;
-  if (r < s) return 1 - r * r / (s * t);
-  return r < t ? (t - r) * (t - r) / (t * (t - s)) : 0;
-}
-
-std::shared_ptr<const data::Volume> uniform(const scene::Lattice& lattice, float value) {
-  return make_volume(lattice, 1, [=](int, double, double, double) { return value; });
-}
-
 scene::Scene one_splat(double rho, const std::array<double, 3>& spacing, const glm::dvec3& forward,
                        bool perspective) {
   scene::Scene scene;

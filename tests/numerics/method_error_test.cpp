@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "server/engine/reference/reference.hpp"
-#include "server/study/metrics.hpp"
+#include "server/frame/difference.hpp"
 #include "server/study/scenes.hpp"
 #include "server/study/types.hpp"
 #include "tests/numerics/scenes.hpp"
@@ -18,8 +18,6 @@ namespace {
 using scene::Compositing;
 using scene::Method;
 using scene::Scene;
-
-constexpr double footprint_integral = 1.4476982547;
 
 // A standard scene of the study at a stride; nothing is left out behind what is dark.
 Scene standard_scene(const char* name, int stride) {
@@ -37,11 +35,11 @@ std::vector<double> integral(const Scene& scene) {
   return std::move(picture->rgba);
 }
 
-study::Difference error_of(Scene scene, Method method, double thickness,
+frame::Difference error_of(Scene scene, Method method, double thickness,
                            const std::vector<double>& truth) {
   scene.method = method;
   scene.slab_thickness = thickness;
-  return study::difference(render(scene, 2).image.rgba, truth);
+  return frame::difference_of(render(scene, 2).image.rgba, truth);
 }
 
 TEST(MethodError, SlabsOfOneCellErrAFifthOfKernelsAtMostAtEqualStride) {

@@ -25,15 +25,8 @@ using reference::Samples;
 using reference::Sheet;
 using Rgb = std::array<double, 3>;
 
-constexpr double footprint_integral = 1.4476982547;
 constexpr double s = 0.48;
 constexpr double t = 1.37;
-constexpr double pi = 3.14159265358979323846;
-
-double footprint(double r) {
-  if (r < s) return 1 - r * r / (s * t);
-  return r < t ? (t - r) * (t - r) / (t * (t - s)) : 0;
-}
 
 // Simpson's rule on nodes that crowd towards both ends: independent of what it tests.
 double simpson(const std::function<double(double)>& f, double from, double to) {
@@ -72,11 +65,11 @@ reference::Picture truth(const scene::Scene& scene, double tolerance = 1e-10,
   return std::move(*picture);
 }
 
-const double* pixel(const reference::Picture& picture, int x, int y) {
+const double* reference_pixel(const reference::Picture& picture, int x, int y) {
   return picture.rgba.data() + 4 * (static_cast<std::size_t>(y) * picture.width + x);
 }
 
-std::shared_ptr<const data::Volume> uniform(const scene::Lattice& lattice, double value) {
+std::shared_ptr<const data::Volume> constant_scalar(const scene::Lattice& lattice, double value) {
   return make_volume(lattice, 1,
                      [=](int, double, double, double) { return static_cast<float>(value); });
 }
@@ -266,7 +259,7 @@ TEST(Reference, OneSplatIsItsFootprintInAnisotropicCells) {
   scene.lattice = even_lattice({1, 1, 1}, {0.4, 0.7, 0.25});
   const glm::dvec3 cell{0.4, 0.7, 0.25};
   for (const double rho : {1e-30, 0.02, 3.0, 400.0}) {
-    scene.scalars = {medium(uniform(scene.lattice, rho), {1.0F, 0.5F, 0.25F})};
+    scene.scalars = {medium(constant_scalar(scene.lattice, rho), {1.0F, 0.5F, 0.25F})};
     const auto value = static_cast<double>(static_cast<float>(rho));
     for (const bool perspective : {false, true}) {
       scene.camera =
@@ -277,9 +270,9 @@ TEST(Reference, OneSplatIsItsFootprintInAnisotropicCells) {
           const Cut cut = cut_splat(scene.camera, {0, 0, 0}, cell, x, y);
           const double tau = value * footprint(cut.r) / (footprint_integral * cut.cells);
           const double alpha = -std::expm1(-tau);
-          ASSERT_NEAR(pixel(picture, x, y)[3], alpha, std::min(1e-9, 0.05 * value))
+          ASSERT_NEAR(reference_pixel(picture, x, y)[3], alpha, std::min(1e-9, 0.05 * value))
               << x << " " << y;
-          ASSERT_NEAR(pixel(picture, x, y)[1], 0.5 * alpha, std::min(1e-9, 0.05 * value));
+          ASSERT_NEAR(reference_pixel(picture, x, y)[1], 0.5 * alpha, std::min(1e-9, 0.05 * value));
         }
       }
     }
@@ -304,9 +297,9 @@ TEST(Reference, SplatsApartAreCompositedByOver) {
       const double second = -std::expm1(-(side > 0 ? 2 : 1) * g * 3 / footprint_integral);
       const double red_part = side > 0 ? first : second * (1 - first);
       const double blue_part = side > 0 ? second * (1 - first) : first;
-      EXPECT_NEAR(pixel(picture, x, 10)[0], red_part, 1e-9) << x;
-      EXPECT_NEAR(pixel(picture, x, 10)[2], 0.5 * red_part + blue_part, 1e-9) << x;
-      EXPECT_NEAR(pixel(picture, x, 10)[3], red_part + blue_part, 1e-9) << x;
+      EXPECT_NEAR(reference_pixel(picture, x, 10)[0], red_part, 1e-9) << x;
+      EXPECT_NEAR(reference_pixel(picture, x, 10)[2], 0.5 * red_part + blue_part, 1e-9) << x;
+      EXPECT_NEAR(reference_pixel(picture, x, 10)[3], red_part + blue_part, 1e-9) << x;
     }
   }
 }
@@ -328,7 +321,7 @@ TEST(Reference, ALineInASplatSeesTheSplatsPartBeforeIt) {
       scene.vector->r1 = 2;
       scene.vector->r2 = 3;
       scene.vector->opacity = 0.75;
-      scene.scalars = {medium(uniform(scene.lattice, rho), {0.9F, 0.1F, 0.3F})};
+      scene.scalars = {medium(constant_scalar(scene.lattice, rho), {0.9F, 0.1F, 0.3F})};
       const reference::Picture picture = truth(scene);
       const double per_x = static_cast<double>(slope) / 10;  // the line's depth per width
       const double m = std::hypot(1.0, per_x);
@@ -341,12 +334,12 @@ TEST(Reference, ALineInASplatSeesTheSplatsPartBeforeIt) {
         const double tf = value * partial_footprint(r, world * per_x / 2) * 2 / footprint_integral;
         const double a = 0.75;
         const double alpha = -std::expm1(-tau) + a * std::exp(-tau);
-        ASSERT_NEAR(pixel(picture, x, 1)[3], alpha, 1e-9);
+        ASSERT_NEAR(reference_pixel(picture, x, 1)[3], alpha, 1e-9);
         for (int c = 0; c < 3; ++c) {
           const auto line = static_cast<double>(scene.vector->color.entries[0][c]);
           const auto cloud = static_cast<double>(scene.scalars[0].color.entries[0][c]);
-          ASSERT_NEAR(pixel(picture, x, 1)[c], cloud * alpha + a * std::exp(-tf) * (line - cloud),
-                      1e-8)
+          ASSERT_NEAR(reference_pixel(picture, x, 1)[c],
+                      cloud * alpha + a * std::exp(-tf) * (line - cloud), 1e-8)
               << rho << " " << slope << " " << x;
         }
       }
@@ -357,7 +350,7 @@ TEST(Reference, ALineInASplatSeesTheSplatsPartBeforeIt) {
 TEST(Reference, RaysBeginAtTheNearPlane) {
   scene::Scene scene;
   scene.lattice = even_lattice({1, 1, 1}, {1, 1, 1});
-  scene.scalars = {medium(uniform(scene.lattice, 2), {1.0F, 1.0F, 1.0F})};
+  scene.scalars = {medium(constant_scalar(scene.lattice, 2), {1.0F, 1.0F, 1.0F})};
   scene.camera = look({0, 0, 0}, {0, 1, 0}, 0.5, 1, 1, true, 0.1);
   for (const double near : {1e-3, 0.2, 0.45}) {
     scene.camera.near = near;  // the splat's middle is 0.5 away
@@ -371,7 +364,7 @@ TEST(Reference, RaysBeginAtTheNearPlane) {
 TEST(Reference, AUniformLatticeAbsorbsWithinTheFootprintsRipple) {
   scene::Scene scene;
   scene.lattice = even_lattice({24, 24, 9}, {1, 1, 1});
-  scene.scalars = {medium(uniform(scene.lattice, 0.1), {1.0F, 1.0F, 1.0F})};
+  scene.scalars = {medium(constant_scalar(scene.lattice, 0.1), {1.0F, 1.0F, 1.0F})};
   for (const auto& [forward, ripple] :
        {std::pair{glm::dvec3(0, 0, -1), 0.0075}, {glm::dvec3(0.31, 0.17, -1), 0.01}}) {
     scene.camera = look({0, 0, 0}, forward, 100, 24, 24, false, 2);
@@ -429,23 +422,6 @@ TEST(Reference, EqualsTheNaiveRendererWhereThatIsExact) {
       EXPECT_GT(brightest, 0.1);
     }
   }
-}
-
-scene::Scene cloudy_scene(int side, int size) {
-  scene::Scene scene;
-  const double cell = 2.0 / side;
-  scene.lattice = even_lattice({side, side, side}, {cell, cell, cell});
-  const auto wave = [](int c, double x, double y, double z) {
-    return static_cast<float>(1 + std::sin(5 * x + c) + std::cos(4 * y - c) * std::sin(3 * z + 1));
-  };
-  scene.camera = look({0, 0, 0}, {0.3, 1, -0.5}, 4, size, size, true, 0.4);
-  scene.vector = plain_lines(make_volume(scene.lattice, 3, wave), {0.9F, 0.5F, 0.1F});
-  scene.vector->length = 0.2;
-  scene.vector->head_desaturation = 0.5;
-  scene.vector->jitter_center = 0.5;
-  scene.scalars = {medium(make_volume(scene.lattice, 1, wave), {0.5F, 0.6F, 0.9F})};
-  scene.scalars[0].color = ramp_color(0, 3, {0.9F, 0.2F, 0.1F}, {0.2F, 0.5F, 1.0F});
-  return scene;
 }
 
 // A lattice that is bent by nothing but a turn, seen by an eye that turns with it.

@@ -216,7 +216,7 @@ TEST_F(Reuse, AFieldWithoutAnOwnerIsReadAnew) {
   scene.vector.reset();
   scene.scalars[0].field = {std::shared_ptr<void>(), &place};
   expect_same(scene, "before");
-  for (float& value : place.values) value = 0.5F - value;
+  for (std::size_t n = 0; n < place.values.size(); ++n) place.values[n] = 0.5F - place.values[n];
   expect_same(scene, "after");
 }
 

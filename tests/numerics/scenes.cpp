@@ -1,10 +1,18 @@
 // Scenes made by hand for the numerical tests.
 #include "tests/numerics/scenes.hpp"
 
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
 namespace windsplat::test {
+
+double footprint(double r) {
+  const double s = 0.48;
+  const double t = 1.37;
+  if (r < s) return 1 - r * r / (s * t);
+  return r < t ? (t - r) * (t - r) / (t * (t - s)) : 0;
+}
 
 scene::Lattice make_lattice(const std::array<std::vector<double>, 3>& spacing) {
   scene::Lattice lattice;
@@ -36,14 +44,20 @@ std::shared_ptr<const data::Volume> make_volume(
   auto volume = std::make_shared<data::Volume>();
   volume->dims = lattice.dims;
   volume->components = components;
+  std::vector<float> samples;
   for (int c = 0; c < components; ++c) {
     for (const double z : lattice.positions[2]) {
       for (const double y : lattice.positions[1]) {
-        for (const double x : lattice.positions[0]) volume->values.push_back(value(c, x, y, z));
+        for (const double x : lattice.positions[0]) samples.push_back(value(c, x, y, z));
       }
     }
   }
+  volume->values = std::move(samples);
   return volume;
+}
+
+std::shared_ptr<const data::Volume> uniform(const scene::Lattice& lattice, float value) {
+  return make_volume(lattice, 1, [=](int, double, double, double) { return value; });
 }
 
 scene::Camera look(const glm::dvec3& target, const glm::dvec3& forward, double distance, int width,
@@ -101,6 +115,23 @@ scene::VectorLayer plain_lines(std::shared_ptr<const data::Volume> field,
   layer.jitter_stride = 0;
   layer.span = 1e6;
   return layer;
+}
+
+scene::Scene cloudy_scene(int side, int size) {
+  scene::Scene scene;
+  const double cell = 2.0 / side;
+  scene.lattice = even_lattice({side, side, side}, {cell, cell, cell});
+  const auto wave = [](int c, double x, double y, double z) {
+    return static_cast<float>(1 + std::sin(5 * x + c) + std::cos(4 * y - c) * std::sin(3 * z + 1));
+  };
+  scene.camera = look({0, 0, 0}, {0.3, 1, -0.5}, 4, size, size, true, 0.4);
+  scene.vector = plain_lines(make_volume(scene.lattice, 3, wave), {0.9F, 0.5F, 0.1F});
+  scene.vector->length = 0.2;
+  scene.vector->head_desaturation = 0.5;
+  scene.vector->jitter_center = 0.5;
+  scene.scalars = {medium(make_volume(scene.lattice, 1, wave), {0.5F, 0.6F, 0.9F})};
+  scene.scalars[0].color = ramp_color(0, 3, {0.9F, 0.2F, 0.1F}, {0.2F, 0.5F, 1.0F});
+  return scene;
 }
 
 engine::Rendered render(const scene::Scene& scene, unsigned threads) {

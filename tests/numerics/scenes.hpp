@@ -12,6 +12,12 @@
 
 namespace windsplat::test {
 
+inline constexpr double pi = 3.14159265358979323846;
+
+// The footprint g(r) of a splat by its formula, r in cells, and its integral over the plane.
+double footprint(double r);
+inline constexpr double footprint_integral = 1.4476982547;
+
 // Samples with the given spacings, centred on the origin.
 scene::Lattice make_lattice(const std::array<std::vector<double>, 3>& spacing);
 scene::Lattice even_lattice(std::array<int, 3> dims, std::array<double, 3> spacing);
@@ -20,6 +26,9 @@ scene::Lattice even_lattice(std::array<int, 3> dims, std::array<double, 3> spaci
 std::shared_ptr<const data::Volume> make_volume(
     const scene::Lattice& lattice, int components,
     const std::function<float(int, double, double, double)>& value);
+
+// A scalar of one value.
+std::shared_ptr<const data::Volume> uniform(const scene::Lattice& lattice, float value);
 
 // Looks along `forward` at `target` from `distance` away; any up that is not along the view.
 scene::Camera look(const glm::dvec3& target, const glm::dvec3& forward, double distance, int width,
@@ -35,6 +44,10 @@ scene::ScalarLayer medium(std::shared_ptr<const data::Volume> field, std::array<
 
 // Lines of one colour: no jitter, no dimming, no heads.
 scene::VectorLayer plain_lines(std::shared_ptr<const data::Volume> field, std::array<float, 3> rgb);
+
+// Lines of all kinds in a coloured medium, side^3 samples from -1 to 1, in perspective from
+// outside; a picture of size x size.
+scene::Scene cloudy_scene(int side, int size);
 
 engine::Rendered render(const scene::Scene& scene, unsigned threads = 1);
 

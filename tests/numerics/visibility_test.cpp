@@ -17,7 +17,7 @@ scene::Scene two_splats(const scene::Lattice& lattice, std::array<int, 3> red,
   const auto volume = [&](std::array<int, 3> at) {
     auto values = std::make_shared<data::Volume>();
     values->dims = lattice.dims;
-    values->values.assign(values->samples(), 0.0F);
+    values->values = std::vector<float>(values->samples(), 0.0F);
     values
         ->values[static_cast<std::size_t>(at[0]) +
                  static_cast<std::size_t>(lattice.dims[0]) *

@@ -27,12 +27,6 @@ Message read(const std::string& json) {
   return std::get<Message>(*message);
 }
 
-void expect_shape(const std::string& shape, const std::string& json) {
-  EXPECT_THAT(schema_complaints("messages.schema.json", "#/$defs/" + shape, Json::parse(json)),
-              IsEmpty())
-      << json;
-}
-
 FieldDescription wind_field() {
   FieldDescription field;
   field.name = "wind";
@@ -62,6 +56,7 @@ DatasetDescription climate() {
   dataset.mappings = {"flat", "sphere"};
   dataset.fields = {wind_field()};
   dataset.left_out = {{"ps", "two-dimensional"}};
+  dataset.notes = {"winds were turned from the grid's axes to east and north"};
   dataset.steps = {{0, "2001-01-01T00:00:00Z"}, {1.5, "2001-01-01T01:30:00Z"}};
   dataset.time_units = "hours since 2001-01-01";
   dataset.resident_bytes = 48;
@@ -172,7 +167,8 @@ TEST(ServerMessages, FitTheSchemaAndSayTheirType) {
       {"progress", ProgressMessage{7, "load", 1, 0.5}},
       {"chosen", ChosenMessage{1, frame_info(), encode_view(View{})}},
       {"unchanged", UnchangedMessage{5, 9}},
-      {"stats", StatsMessage{1, 2, 3, 4'000'000'000'000}},
+      {"stats", StatsMessage{1, 2, 3, 4'000'000'000'000, std::nullopt, 0, 0}},
+      {"stats", StatsMessage{1, 2, 3, 4, 23.5, 6, 7}},
       {"error", ErrorMessage{1, 2, problem_from(make_error(ErrorKind::busy, "try later"))}}};
   for (const auto& [type, message] : messages) {
     const std::string json = encode(message);
@@ -195,9 +191,10 @@ TEST(ServerMessages, CarryTheirValues) {
                                       "etaMs":120.5})"));
   EXPECT_EQ(Json::parse(encode(UnchangedMessage{5, 9})),
             Json::parse(R"({"type":"unchanged","rev":5,"seq":9})"));
-  const Json stats = Json::parse(encode(StatsMessage{1, 2, 3, 4'000'000'000'000}));
+  const Json stats = Json::parse(encode(StatsMessage{1, 2, 3, 4'000'000'000'000, 23.5, 6, 7}));
   EXPECT_EQ(stats, Json::parse(R"({"type":"stats","frames":1,"dropped":2,"cancelled":3,
-                                   "bytes":4000000000000})"));
+                                   "bytes":4000000000000,"playFps":23.5,"stepsDropped":6,
+                                   "stepsNotReady":7})"));
 }
 
 TEST(ServerMessages, ChosenIsTheFrameInfoWithSeqAndView) {

@@ -186,6 +186,8 @@ TEST(Schema, LimitsOfTheViewAreThoseOfTheLimitsFile) {
             limits::extinction_max);
   EXPECT_EQ(at("/properties/quality/properties/budgetMs/minimum"), limits::budget_ms_min);
   EXPECT_EQ(at("/properties/quality/properties/budgetMs/maximum"), limits::budget_ms_max);
+  EXPECT_EQ(at("/properties/quality/properties/maxError/minimum"), limits::max_error_min);
+  EXPECT_EQ(at("/properties/quality/properties/maxError/maximum"), limits::max_error_max);
   EXPECT_THAT(schema["description"].get<std::string>(),
               HasSubstr(std::to_string(limits::image_pixels_max)));
 }

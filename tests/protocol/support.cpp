@@ -1,5 +1,6 @@
 #include "support.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -228,5 +229,11 @@ std::string under(const std::string& pointer, const std::string& key) {
 }
 
 int status_of(const Error& error) { return problem_from(error).status; }
+
+void expect_shape(const std::string& shape, const std::string& json) {
+  EXPECT_THAT(schema_complaints("messages.schema.json", "#/$defs/" + shape, Json::parse(json)),
+              ::testing::IsEmpty())
+      << json;
+}
 
 }  // namespace windsplat::protocol::testing

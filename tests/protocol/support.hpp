@@ -33,6 +33,9 @@ std::vector<Vector> read_vectors(const std::string& folder);  // "valid" or "inv
 std::vector<std::string> schema_complaints(const std::string& file, const std::string& pointer,
                                            const Json& document);
 
+// The test fails unless `json` is of that shape of messages.schema.json.
+void expect_shape(const std::string& shape, const std::string& json);
+
 // pointer + "/" + key.
 std::string under(const std::string& pointer, const std::string& key);
 

@@ -40,7 +40,8 @@ TEST(ViewDocument, GivesWhatWasSaidAndDefaultsForTheRest) {
       "scalars": [{"field": "cloud", "color": {"map": "grays", "range": [0, 1]},
                    "extinction": [[0, 0], [0.5, 0], [0.5, 4]], "stride": 2}],
       "depthCue": {"strength": 0, "near": -1, "far": 2},
-      "method": {"stopTransmittance": 0.002}, "quality": {"budgetMs": 33}})")
+      "method": {"stopTransmittance": 0.002}, 
+      "quality": {"budgetMs": 33, "maxError": 0.004, "lossless": true}})")
                         .view();
   EXPECT_EQ(view.dataset, "gcm");
   EXPECT_EQ(view.step, 12);
@@ -84,6 +85,8 @@ TEST(ViewDocument, GivesWhatWasSaidAndDefaultsForTheRest) {
   EXPECT_EQ(view.depth_cue.far, 2);
   EXPECT_EQ(view.method.stop_transmittance, 0.002);
   EXPECT_EQ(view.quality.budget_ms, 33);
+  EXPECT_EQ(view.quality.max_error, 0.004);
+  EXPECT_TRUE(view.quality.lossless);
 }
 
 TEST(ViewDocument, TellsNoLinesFromTheDatasetsLines) {

@@ -15,24 +15,31 @@ MAY_INCLUDE = {
     "server/scene": ["server/base", "protocol", "server/data"],
     "server/engine": ["server/base", "server/scene/scene.hpp"],
     "server/image": ["server/base"],
+    "server/quality": ["server/base", "protocol"],
     "server/frame": ["server/base", "protocol", "server/data", "server/scene", "server/engine",
-                     "server/image"],
+                     "server/image", "server/quality"],
     "server/study": ["server/base", "protocol", "server/data", "server/scene", "server/engine",
-                     "server/image", "server/frame"],
-    "server/session": ["server/base", "protocol", "server/scene"],
+                     "server/image", "server/quality", "server/frame"],
+    "server/session": ["server/base", "protocol", "server/scene", "server/quality"],
+    "server/views": ["server/base", "protocol"],
     "server/net": ["server/base", "protocol", "server/data", "server/scene", "server/engine",
-                   "server/image", "server/frame", "server/session"],
+                   "server/image", "server/quality", "server/frame", "server/session",
+                   "server/views"],
     "server/cli": ["server", "protocol"],
     "server/main.cpp": ["server", "protocol"],
 }
 
 # outside header -> the files that may name it, or include a header of ours that does
 CONFINED = [
-    ("nlohmann/", r"nlohmann/", r"protocol/codec\w*\.[ch]pp|tests/.*"),
+    ("nlohmann/", r"nlohmann/",
+     r"protocol/codec\w*\.[ch]pp|server/data/(zarr/json|raw/document)\.cpp|tests/.*"),
+    ("ecCodes", r"eccodes\.h", r"server/data/grib/.*|tests/.*"),
+    ("a compressor", r"(blosc|lz4|zlib|zstd)\.h", r"server/data/.*|tests/.*"),
     ("netCDF", r"netcdf(_\w+)?\.h", r"server/data/.*|tests/.*"),
     ("an image library", r"(turbojpeg|jpeglib|spng|png)\.h", r"server/image/.*|tests/.*"),
     ("Highway", r"hwy/", r"server/engine/kernels/.*|server/image/ycc_rows\.cpp|tests/.*"),
     ("Beast or Asio", r"boost/(beast|asio)[/.]", r"server/net/.*|tests/.*"),
+    ("Prometheus", r"prometheus/", r"server/net/metrics\.cpp|tests/.*"),
     ("CLI11", r"CLI/", r"server/cli/.*|server/main\.cpp"),
 ]
 

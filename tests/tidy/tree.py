@@ -1,8 +1,9 @@
-"""The files of the project as the tidy tests see them: everything but what was built or fetched."""
+"""The files of the project as the tidy tests see them: everything but what was built, fetched or
+found by a fuzzer."""
 import os
 import pathlib
 
-NOT_OURS = {".git", "build", "node_modules", "dist", "__pycache__", ".test-build"}
+NOT_OURS = {".git", "build", "node_modules", "dist", "__pycache__", ".test-build", "corpus"}
 
 
 def files(root):

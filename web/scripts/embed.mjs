@@ -6,7 +6,6 @@ import { createHash } from "node:crypto";
 import { mkdirSync, readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { dirname, extname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
-import { gzipSync } from "node:zlib";
 import { installModules } from "./install.mjs";
 
 const scripts = dirname(fileURLToPath(import.meta.url));
@@ -17,12 +16,12 @@ const contentTypes = {
   ".svg": "image/svg+xml",
 };
 
-// No name, no time in the header (gzip -9n): the same page gives the same bytes.
 function pack(dist, outdir) {
   return readdirSync(dist)
+    .filter((name) => !name.endsWith(".gz"))
     .sort()
     .map((name, index) => {
-      const gzip = gzipSync(readFileSync(join(dist, name)), { level: 9 });
+      const gzip = readFileSync(join(dist, `${name}.gz`));
       const path = join(outdir, `asset_${index}.gz`);
       writeFileSync(path, gzip);
       return {

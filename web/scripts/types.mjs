@@ -32,32 +32,74 @@ async function writeIfChanged(path, text) {
   await rename(temporary, path);
 }
 
-// What the panels say about a key: pointer without array indices -> description and range.
-function collectHelp(node, pointer, help) {
+// The numbers that a key may have: pointer without array indices -> least and greatest.
+function collectRanges(node, pointer, ranges) {
   for (const [key, child] of Object.entries(node.properties ?? {})) {
     const at = `${pointer}/${key}`;
-    if (child.type !== "object") {
-      help[at] = { text: child.description, min: child.minimum, max: child.maximum };
-    }
-    collectHelp(child, at, help);
-    if (child.items && !Array.isArray(child.items)) collectHelp(child.items, at, help);
+    const { minimum, maximum } = child;
+    if (minimum !== undefined && maximum !== undefined) ranges[at] = [minimum, maximum];
+    collectRanges(child, at, ranges);
+    if (child.items && !Array.isArray(child.items)) collectRanges(child.items, at, ranges);
   }
-  return help;
+  return ranges;
 }
 
-async function generateHelp(outDir) {
+async function generateRanges(outDir) {
   const schema = JSON.parse(await readFile(join(protocol, "view.schema.json"), "utf8"));
-  const help = collectHelp(schema, "", {});
+  const ranges = JSON.stringify(collectRanges(schema, "", {}), null, 1);
   const text = `// Made from protocol/view.schema.json by web/scripts/types.mjs.
-export interface KeyHelp { text: string; min?: number; max?: number }
-export const viewHelp: Readonly<Record<string, KeyHelp>> = ${JSON.stringify(help, null, 1)};
+export const viewRanges: Readonly<Record<string, readonly [number, number]>> = ${ranges};
 `;
-  await writeIfChanged(join(outDir, "view_help.ts"), text);
+  await writeIfChanged(join(outDir, "view_ranges.ts"), text);
+}
+
+// A value of the shape that the schema tells: of objects the keys that must be there, of lists of
+// any length one entry.
+function sampleOf(schema) {
+  const type = [schema.type ?? "string"].flat()[0]; // enumerations are of texts
+  if (type === "object") {
+    const needed = schema.required ?? [];
+    return Object.fromEntries(needed.map((key) => [key, sampleOf(schema.properties[key])]));
+  }
+  if (type === "array") {
+    const { minItems, maxItems } = schema;
+    return Array(minItems === maxItems ? minItems : 1).fill(sampleOf(schema.items));
+  }
+  return { string: "", boolean: false, number: 0, integer: 0 }[type];
+}
+
+// Key -> sample, of all that no range tells, but for true and false; a key means the same wherever
+// it stands in a view.
+function collectKeys(schema, keys) {
+  for (const [key, child] of Object.entries(schema.properties ?? {})) {
+    const sample = sampleOf(child);
+    if (key in keys && JSON.stringify(keys[key]) !== JSON.stringify(sample)) {
+      throw new Error(`the view's schema has two kinds of "${key}"`);
+    }
+    keys[key] = sample;
+    collectKeys(child, keys);
+    if (child.items) collectKeys(child.items, keys);
+  }
+  return keys;
+}
+
+async function generateKeys(outDir) {
+  const schema = JSON.parse(await readFile(join(protocol, "view.schema.json"), "utf8"));
+  const entries = Object.entries(collectKeys(schema, {}))
+    .filter(([, sample]) => !["0", "{}", "false"].includes(JSON.stringify(sample)))
+    .map(([key, sample]) => [JSON.stringify(sample), key]);
+  entries.sort(); // like by like: fewer bytes
+  const lines = entries.map(([sample, key]) => `  ${key}: ${sample},\n`).join("");
+  const text = `// Made from protocol/view.schema.json by web/scripts/types.mjs.
+export const viewKeys: Readonly<Record<string, unknown>> = {\n${lines}};
+`;
+  await writeIfChanged(join(outDir, "view_keys.ts"), text);
 }
 
 export async function generateTypes(outDir = join(web, "generated")) {
   await mkdir(outDir, { recursive: true });
-  await generateHelp(outDir);
+  await generateRanges(outDir);
+  await generateKeys(outDir);
   for (const name of schemas) {
     const path = join(protocol, `${name}.schema.json`);
     const schema = toOlderDraft(JSON.parse(await readFile(path, "utf8")));

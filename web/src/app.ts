@@ -1,16 +1,11 @@
 // The page's one mind: what the user does -> view document -> patches out; messages and frames in
 // -> picture, legend, panels, time bar and words. Parts do not know each other, only this does.
-import {
-  anglesOf,
-  distanceOf,
-  frameBox,
-  scaledBox,
-  withProjection,
-  type Angles,
-  type Box,
-  type Camera,
-  type Vec3,
-} from "./camera";
+import { Address } from "./address";
+import { Answers } from "./answers";
+import { Api } from "./api";
+import { anglesOf, distanceOf, rollOf } from "./camera";
+import { CameraControl } from "./camera_control";
+import type { Cards } from "./cards";
 import { ColorMaps } from "./color_maps";
 import {
   Connection,
@@ -19,27 +14,31 @@ import {
   type ConnectionState,
   type SocketLike,
 } from "./connection";
-import { debounced } from "./dom";
+import type { DatasetList } from "./dataset_list";
 import { Flow } from "./flow";
+import { scaleText, type FrameState } from "./frame_words";
+import { loadHelpTexts } from "./help_texts";
 import type { Gizmo } from "./gizmo";
+import type { HoverView } from "./hover_view";
 import type { Hud } from "./hud";
 import type { Legend } from "./legend";
 import { legendEntries } from "./legend_entries";
-import { hashOfView, viewOfHash } from "./link";
+import { Opening } from "./opening";
 import type { Panels } from "./panels";
+import { Playback } from "./playback";
 import {
-  type ChosenMessage,
   type Dataset,
-  type DatasetSummary,
   type ErrorMessage,
   type HelloMessage,
   type ServerMessage,
-  type UnchangedMessage,
   type View,
 } from "./protocol";
+import type { Probe } from "./probe";
 import { problemText, type Status } from "./status";
 import type { TimeBar } from "./time_bar";
-import { ViewState, withDefaults, type Outgoing, type Patch } from "./view_state";
+import { Undoing } from "./undoing";
+import { ViewModel } from "./view_model";
+import type { Outgoing, Patch } from "./view_state";
 import type { DrawnFrame, Viewport } from "./viewport";
 
 export interface AppParts {
@@ -51,42 +50,39 @@ export interface AppParts {
   timeBar: TimeBar;
   status: Status;
   picker: HTMLSelectElement;
+  probe: Probe;
+  hover: HoverView;
+  list: DatasetList;
+  cards: Pick<Cards, "show">;
   facts: HTMLElement; // dims and steps of the dataset
 }
 
-const firstChoice = "climate"; // of the samples, the one that shows most
-const chosenKept = 8; // `chosen` messages whose frames may still come
-const hashDelayMs = 400;
 const presenceMs = 60_000;
-const globe: Box = { min: [-1, -1, -1], max: [1, 1, 1] }; // of a grid that is bent to a sphere
-
-const round = (v: number): number => Number(v.toFixed(6));
-const roundAll = (v: Vec3): Vec3 => [round(v[0]), round(v[1]), round(v[2])];
 
 export class App {
   readonly maps = new ColorMaps();
-  private readonly state = new ViewState();
+  readonly api: Api;
+  readonly cameras: CameraControl;
+  readonly playback: Playback;
+  readonly undoing: Undoing;
+  private readonly model = new ViewModel();
+  private readonly answers = new Answers(this.model.state);
   private readonly connection: Connection;
-  private parts!: AppParts;
-  private datasets: DatasetSummary[] = [];
-  private open: Dataset | null = null; // what is shown
-  private openId = 0;
-  private opening = false; // `opened` has not come yet
-  private readonly chosen = new Map<number, ChosenMessage>();
-  private drawn: ChosenMessage | null = null;
-  private shownSeq = 0; // of the frame on the canvas
-  private unchanged: UnchangedMessage | null = null; // its frame is not shown yet
-  private playing = false;
-  private refusedRev = 0; // of the newest patch that was refused
-  private restored = new Set<number>(); // revs of the view that took a refused one's place
-  private answeredT = 0; // t of the newest patch that a frame has answered
   private readonly flowing: Flow;
-  private readonly saveHash = debounced(() => this.writeHash(), hashDelayMs);
+  private parts!: AppParts;
+  private opening!: Opening;
+  private address!: Address;
 
   constructor(
     clock: Clock,
     private readonly baseUri: string,
   ) {
+    this.api = new Api(baseUri, (url, init) => fetch(url, init));
+    this.cameras = new CameraControl(this.model, {
+      change: (patch) => this.change(patch),
+      size: () => this.parts.viewport.size(),
+      ready: () => this.connection.ready,
+    });
     this.connection = new Connection(
       streamUrl(baseUri),
       // A socket's handlers may ask for less than what the browser hands them.
@@ -102,6 +98,25 @@ export class App {
         },
       },
     );
+    this.undoing = new Undoing({
+      document: () => this.model.state.document,
+      busy: () => this.model.open === null || this.opening.waiting,
+      show: (view) => {
+        if (view.step !== this.model.state.document.step) this.playback.pause();
+        this.restore(view);
+      },
+      edited: () => this.address.edited(),
+      say: (text) => this.parts.status.note(text),
+    });
+    this.playback = new Playback({
+      send: (message) => this.connection.send(message),
+      settings: () => this.parts.timeBar,
+      seek: (step) => this.seek(step),
+      changed: () => {
+        this.showTime();
+        this.address.save();
+      },
+    });
     this.flowing = new Flow({
       now: () => performance.now(),
       setTimeout: clock.setTimeout,
@@ -110,12 +125,12 @@ export class App {
       wanted: () => this.linesMove(),
       time: () => this.view().vector?.motion?.time ?? 0,
       send: (time) => {
-        const outgoing = this.state.change({ vector: { motion: { time } } });
+        const outgoing = this.model.state.change({ vector: { motion: { time } } });
         this.send(outgoing);
         return outgoing.rev;
       },
       ended: () => {
-        this.saveHash();
+        this.address.save();
         this.refresh();
       },
     });
@@ -123,124 +138,105 @@ export class App {
 
   start(parts: AppParts): void {
     this.parts = parts;
-    parts.picker.addEventListener("change", () => this.openDataset(parts.picker.value));
-    const linked = viewOfHash(window.location.hash);
-    if (linked === null && window.location.hash.length > 1) this.sayBadLink();
-    this.state.change(this.firstView(linked ?? {}) as Patch);
+    this.address = new Address(
+      {
+        document: () => this.model.state.document,
+        runs: () => this.playback.running || this.flowing.running,
+        restore: (view) => this.undoing.edit(() => this.restore(view)),
+      },
+      parts.status,
+      this.baseUri,
+    );
+    this.opening = this.makeOpening(parts);
+    parts.picker.addEventListener("change", () => this.open(parts.picker.value));
     this.loadMaps();
-    this.connection.start();
+    this.address.first((view) => {
+      this.model.state.change(this.firstView(view ?? {}) as Patch);
+      this.connection.start();
+    });
     window.addEventListener("online", () => this.connection.retryNow());
-    window.addEventListener("hashchange", () => this.restoreHash());
     document.addEventListener("visibilitychange", () => this.tellVisibility());
     window.setInterval(() => {
       if (!document.hidden) this.tellVisibility();
     }, presenceMs);
   }
 
+  private makeOpening({ status, list, cards }: AppParts): Opening {
+    return new Opening(
+      {
+        say: (message) => void this.connection.send(message),
+        send: (outgoing) => outgoing.forEach((one) => this.send(one)),
+        firstView: (said) => this.firstView(said),
+        halt: () => {
+          this.playback.halt();
+          this.flowing.stop();
+        },
+        describe: (dataset) => this.describe(dataset),
+        opened: (anew, changed) => this.onOpened(anew, changed),
+        refresh: () => this.refresh(),
+        mark: () => this.showMark(),
+        empty: () => cards.show(),
+      },
+      this.model,
+      status,
+      list,
+    );
+  }
+
   // --- what the user does --------------------------------------------------------------
 
-  // The view with every default that is known: what the newest frame was drawn with, under what
-  // the user has said since.
+  // The view with every default that is known.
   view(): View {
-    const said = this.state.document;
-    const drawn = this.drawn?.view.dataset === said.dataset ? this.drawn?.view : undefined;
-    const open = this.open?.id === said.dataset ? this.open?.defaultView : undefined;
-    return withDefaults(drawn ?? open ?? {}, said) as View;
+    return this.model.view();
+  }
+
+  // As the user said it.
+  said(): View {
+    return this.model.state.document;
+  }
+
+  // The view is of the dataset that is open.
+  isOpen(): boolean {
+    return this.model.open !== null && this.model.open.id === this.said().dataset;
   }
 
   dataset(): Dataset {
-    if (this.open === null) throw new Error("no dataset is open");
-    return this.open;
+    return this.model.dataset();
   }
 
   change(patch: Patch): void {
     this.connection.wake();
-    this.send(this.state.change(patch));
+    this.undoing.edit(() => this.send(this.model.state.change(patch)));
     this.refresh();
   }
 
-  camera(): Camera | null {
-    const camera = this.view().camera;
-    if (this.open === null || !camera?.eye || !camera.target) return null;
-    return {
-      projection: camera.projection ?? "perspective",
-      eye: camera.eye,
-      target: camera.target,
-      up: camera.up ?? [0, 0, 1],
-      fovY: camera.fovY ?? 35,
-      height: camera.height ?? 2,
-    };
+  open(id: string): void {
+    this.undoing.edit(() => this.opening.choose(id));
   }
 
-  setCamera(camera: Camera): void {
-    const { eye, target, up, projection } = camera;
-    const patch: Patch = {
-      eye: roundAll(eye),
-      target: roundAll(target),
-      up: roundAll(up),
-      height: round(camera.height),
-    };
-    if (projection !== this.view().camera?.projection) patch.projection = projection;
-    this.change({ camera: patch });
+  // The view that was drawn last, instead of one that takes its time.
+  cancelLoading(): void {
+    const before = this.model.state.settled;
+    if (!this.opening.cancel(before)) this.replace(before);
   }
 
-  // The server frames the whole box anew, whatever the window's shape.
-  resetCamera(): void {
-    this.change({ camera: { eye: null, target: null, up: null, height: null } });
-  }
-
-  lookFrom(angles: Angles): void {
-    const camera = this.camera();
-    if (camera === null) return;
-    const world = this.dataset().world as Box;
-    const { mapping, scale } = this.view().geometry ?? {};
-    const box = mapping === "sphere" ? globe : scaledBox(world, scale ?? [1, 1, 1]);
-    const [width, height] = this.parts.viewport.size();
-    this.setCamera(frameBox(camera, box, angles, width / height));
-  }
-
-  toggleProjection(): void {
-    const camera = this.camera();
-    if (camera === null) return;
-    const other = camera.projection === "perspective" ? "orthographic" : "perspective";
-    this.setCamera(withProjection(camera, other));
+  connectNow(): void {
+    this.connection.retryNow();
   }
 
   resetAll(): void {
-    this.replace(this.firstView({ dataset: this.dataset().id }));
+    this.undoing.edit(() => this.replace(this.firstView({ dataset: this.dataset().id })));
   }
 
   resize(width: number, height: number): void {
-    const image = this.state.document.image;
+    const image = this.model.state.document.image;
     if (image?.width === width && image.height === height) return;
     this.change({ image: { width, height } });
   }
 
   seek(step: number): void {
-    if (this.playing) this.pause();
-    if (step !== this.view().step) this.change({ step });
-  }
-
-  play(): void {
-    const { timeBar } = this.parts;
-    const to = timeBar.steps - 1;
-    if (to < 1) return;
-    this.playing = this.connection.send({
-      type: "play",
-      from: 0,
-      to,
-      fps: timeBar.fps,
-      loop: timeBar.loop,
-      drop: true,
-    });
-    this.showTime();
-  }
-
-  pause(): void {
-    this.playing = false;
-    this.connection.send({ type: "pause" });
-    this.showTime();
-    this.saveHash();
+    this.playback.pause();
+    if (step >= 0 && step !== this.view().step) this.change({ step });
   }
 
   // Lets the lines flow or halts them where they are.
@@ -250,7 +246,7 @@ export class App {
       this.flowing.start();
     } else {
       this.flowing.stop();
-      this.saveHash();
+      this.address.save();
     }
     this.refresh();
   }
@@ -259,24 +255,21 @@ export class App {
     return this.flowing.running;
   }
 
-  playSettings(): void {
-    if (this.playing) this.play();
+  copyLink(): Promise<void> {
+    return this.address.copy();
   }
 
-  openDataset(id: string): void {
-    if (id === "" || id === this.open?.id) return;
-    this.parts.status.clearError("dataset");
-    this.requestOpen(id, this.state.replace(this.firstView({ dataset: id })));
+  // The view of a saved picture or a kept one; what it does not say of the viewer's wishes stays.
+  openView(view: View): void {
+    const { quality } = this.said();
+    this.undoing.edit(() => this.restore(quality === undefined ? view : { quality, ...view }));
   }
 
-  async copyLink(): Promise<void> {
-    this.writeHash();
-    try {
-      await navigator.clipboard.writeText(window.location.href);
-      this.parts.status.say("link copied");
-    } catch {
-      this.parts.status.say("the address bar holds the link");
-    }
+  // Another view in the place of this one.
+  restore(view: View): void {
+    this.parts.status.clearError();
+    const next = this.firstView(view);
+    if (!this.opening.follow(next)) this.replace({ ...next, dataset: this.model.open?.id });
   }
 
   // --- the server ----------------------------------------------------------------------
@@ -293,79 +286,47 @@ export class App {
 
   private send({ rev, patch }: Outgoing): void {
     this.connection.send({ type: "patch", rev, t: performance.now(), patch });
-    this.saveHash();
+    this.address.save();
   }
 
   private replace(view: View): void {
     this.flowing.stop();
-    for (const outgoing of this.state.replace(view)) this.send(outgoing);
+    for (const outgoing of this.model.state.replace(view)) this.send(outgoing);
     this.refresh();
-  }
-
-  // The view goes first, so that the first picture is already the wanted one; `open` only asks what
-  // the dataset holds.
-  private requestOpen(id: string, outgoing: Outgoing[]): void {
-    this.openId += 1;
-    this.opening = true;
-    this.playing = false;
-    this.flowing.stop();
-    this.parts.status.startLoading(`opening ${id}…`);
-    for (const one of outgoing) this.send(one);
-    this.connection.send({ type: "open", id: this.openId, dataset: id });
-    this.showMark();
   }
 
   private onState(state: ConnectionState): void {
     this.parts.status.connection(state);
-    if (state.name !== "live") this.playing = false;
-    if (this.open !== null) this.showTime();
+    if (state.name !== "live") this.playback.halt();
+    this.showMark();
+    if (this.model.open !== null) this.showTime();
   }
 
-  // A new session: it knows nothing yet, so it is told the dataset and the whole view.
   private onHello(hello: HelloMessage): void {
-    this.datasets = hello.datasets;
-    // A server that came back with other datasets does not have what was shown.
-    if (!this.datasets.some((dataset) => dataset.id === this.open?.id)) this.open = null;
     this.parts.viewport.newSession();
-    this.chosen.clear();
-    this.unchanged = null;
-    this.shownSeq = 0;
-    const wanted = this.state.document.dataset;
-    const id = wanted ?? this.defaultDataset();
-    this.showPicker(id ?? "");
+    this.answers.newSession();
     if (!this.maps.loaded) this.loadMaps();
-    if (id === undefined) {
-      this.parts.status.error("open", "The server has no dataset to show.");
-      return;
-    }
-    if (wanted === undefined) this.state.change({ dataset: id });
-    this.requestOpen(id, [this.state.restate()]);
-    this.tellVisibility();
-  }
-
-  private defaultDataset(): string | undefined {
-    const usable = this.datasets.filter((dataset) => dataset.state !== "failed");
-    return (usable.find((dataset) => dataset.id === firstChoice) ?? usable[0])?.id;
+    if (this.opening.begin(hello.datasets)) this.tellVisibility();
   }
 
   private onMessage(message: ServerMessage): void {
-    const { status } = this.parts;
     switch (message.type) {
       case "opened":
-        if (message.id === this.openId) this.onOpened(message.dataset);
+        this.opening.onOpened(message);
         break;
       case "progress":
-        status.progress(message.phase, message.done, message.etaMs);
+        if (!this.opening.awaits(message.id)) break;
+        this.parts.status.progress(message.phase, message.done, message.etaMs);
         break;
       case "chosen":
-        this.chosen.set(message.seq, message);
-        for (const seq of this.chosen.keys()) {
-          if (this.chosen.size > chosenKept) this.chosen.delete(seq);
-        }
+        this.answers.tell(message);
         break;
       case "unchanged":
-        this.unchanged = message;
+        this.answers.stays(message);
         this.settleUnchanged();
+        break;
+      case "stats":
+        this.parts.hud.steps(message);
         break;
       case "error":
         this.onError(message);
@@ -375,24 +336,16 @@ export class App {
     }
   }
 
-  private onOpened(dataset: Dataset): void {
-    const { panels, picker, status, timeBar, gizmo, facts } = this.parts;
-    const other = this.open?.id !== dataset.id;
-    this.open = dataset;
-    this.opening = false;
-    status.clearError("open");
-    status.loaded();
-    status.say("live");
-    picker.value = dataset.id;
-    timeBar.setDataset(dataset);
-    gizmo.setGeographic(dataset.axes.x.kind === "longitude");
-    const { x, y, z } = dataset.dims;
-    const steps = dataset.steps.count;
-    facts.textContent = `${x} × ${y} × ${z} · ${steps} step${steps === 1 ? "" : "s"}`;
-    facts.title = `${dataset.title} — ${dataset.source} (${dataset.format})`;
-    document.title = `${dataset.title} · windsplat`;
-    this.restoreDataset();
-    if (other) panels.build();
+  private onOpened(anew: boolean, changed: boolean): void {
+    if (changed) {
+      if (this.dataset().steps.count > 1) this.playback.again();
+      else this.playback.pause();
+    }
+    if (anew) {
+      this.parts.panels.build();
+      // Without them the panel is as usable as before: no word of a failure.
+      loadHelpTexts(this.baseUri).catch(() => undefined);
+    }
     this.refresh();
     this.showLegend();
   }
@@ -400,90 +353,50 @@ export class App {
   private onError(message: ErrorMessage): void {
     const { status } = this.parts;
     const text = problemText(message.problem);
-    if (this.opening && message.id === this.openId) {
-      this.openFailed(text);
-    } else if (message.rev !== undefined) {
+    if (this.opening.onError(message, text)) return;
+    if (message.rev !== undefined) {
       status.error("view", text);
-      this.refusedRev = message.rev;
-      // What was refused is taken back, so that controls and link tell what is drawn.
-      this.state.refuse(message.rev);
+      this.answers.refuse(message.rev);
       this.flowing.refused(message.rev);
-      // The defaults themselves were refused: to ask for them again would never end.
-      if (!this.opening && !this.restored.has(message.rev)) this.restoreDataset();
+      this.opening.onRefused(message.rev);
       this.refresh();
     } else {
-      status.error("server", text);
-    }
-  }
-
-  // A whole view was refused (a link with a value of another release, say): its dataset with the
-  // defaults is better than nothing.
-  private restoreDataset(): void {
-    if (this.open !== null && this.state.document.dataset !== this.open.id) {
-      this.parts.status.holdError();
-      const outgoing = this.state.replace(this.firstView({ dataset: this.open.id }));
-      this.restored = new Set(outgoing.map(({ rev }) => rev));
-      for (const one of outgoing) this.send(one);
-      this.refresh();
-    }
-  }
-
-  private openFailed(text: string): void {
-    const { status, picker } = this.parts;
-    this.opening = false;
-    status.loaded();
-    status.error("dataset", text);
-    const failed = picker.value || this.state.document.dataset;
-    const fallback = this.open?.id ?? this.defaultDataset();
-    picker.value = fallback ?? "";
-    if (fallback === undefined || fallback === failed) return;
-    if (this.open !== null) {
-      status.say("live");
-      this.restoreDataset();
-      this.refresh();
-    } else {
-      this.requestOpen(fallback, this.state.replace(this.firstView({ dataset: fallback })));
+      // Of a step that new files lack the next picture is the end.
+      const ofStep = message.problem.errors?.some(({ pointer }) => pointer === "/step");
+      status.error(ofStep ? "view" : "server", text);
     }
   }
 
   onDrawn(frame: DrawnFrame): void {
     const { header } = frame;
-    const { hud, status } = this.parts;
-    this.connection.send({ type: "ack", seq: header.seq, decodeMs: frame.decodeMs });
-    this.shownSeq = header.seq;
-    this.state.settle(header.rev);
+    const { hud, status, viewport } = this.parts;
+    if (!this.opening.waiting) status.loaded(); // what it waited for
+    const chosen = this.answers.drawn(header);
     this.flowing.answered(header.rev);
-    const chosen = this.chosen.get(header.seq) ?? null;
-    this.chosen.delete(header.seq);
-    if (chosen !== null) this.drawn = chosen;
+    if (chosen !== null) this.model.drew(chosen, header.final);
     // Nothing newer was asked for, or time runs by itself: the step is the server's.
-    if (this.playing || header.rev === this.state.rev) this.followStep(header.step);
-    hud.show(frame, chosen);
+    if (this.playback.running || header.rev === this.model.state.rev) this.followStep(header.step);
+    hud.show(frame, chosen, viewport.canvas.width);
     status.clearError("frame");
-    if (header.rev > this.refusedRev) status.clearError("view");
+    if (this.answers.mends(header.rev)) status.clearError("view");
     this.settleUnchanged();
-    // Only the first frame that echoes a patch tells how fast the answer to it was.
-    if (header.t > 0 && header.t !== this.answeredT) status.responded(performance.now() - header.t);
-    this.answeredT = header.t;
+    if (this.answers.isFirst(header)) status.responded(frame.drawnAt - header.t);
     document.documentElement.classList.add("has-picture");
     this.refresh();
     this.showLegend();
   }
 
-  // A patch changed nothing that shows: once its frame is there, that is the answer to it.
   private settleUnchanged(): void {
-    if (this.unchanged === null || this.shownSeq < this.unchanged.seq) return;
+    const rev = this.answers.settleUnchanged();
+    if (rev === null) return;
     const { canvas } = this.parts.viewport;
-    const { rev } = this.unchanged;
-    this.unchanged = null;
-    this.state.settle(rev);
     this.flowing.answered(rev);
     canvas.dataset.rev = String(Math.max(rev, Number(canvas.dataset.rev)));
-    if (rev > this.refusedRev) this.parts.status.clearError("view");
+    if (this.answers.mends(rev)) this.parts.status.clearError("view");
     this.refresh();
   }
 
-  // A frame that is not shown still has to give its credit back.
+  // As soon as it is decoded, whether it is shown or not: another frame may come meanwhile.
   acknowledge(seq: number, decodeMs: number): void {
     this.connection.send({ type: "ack", seq, decodeMs });
   }
@@ -495,18 +408,32 @@ export class App {
 
   // --- showing -------------------------------------------------------------------------
 
+  private describe({ title, source, format, dims, steps, axes }: Dataset): void {
+    const { timeBar, gizmo, facts } = this.parts;
+    timeBar.setDataset(this.dataset());
+    gizmo.setGeographic(axes.x.kind === "longitude");
+    const { count } = steps;
+    const { x, y, z } = dims;
+    facts.textContent = `${x} × ${y} × ${z} · ${count} step${count === 1 ? "" : "s"}`;
+    facts.title = `${title} — ${source} (${format})`;
+    document.title = `${title} · windsplat`;
+  }
+
   private followStep(step: number): void {
-    if (step !== this.state.document.step) this.state.follow(step);
-    const { timeBar } = this.parts;
-    if (!timeBar.loop && step === timeBar.steps - 1) this.playing = false;
+    const before = this.view().step ?? 0;
+    const { state } = this.model;
+    if (step !== state.document.step) state.follow(step);
+    this.playback.shown(step, before);
   }
 
   private refresh(): void {
     this.showMark();
-    if (this.open === null) return;
+    if (this.model.open === null) return;
     this.parts.panels.refresh();
     this.showTime();
-    const camera = this.camera();
+    this.parts.probe.show();
+    this.parts.hover.refresh();
+    const camera = this.model.camera();
     if (camera !== null) {
       this.parts.gizmo.show(camera);
       const { azimuth, elevation } = anglesOf(camera);
@@ -514,44 +441,39 @@ export class App {
       dataset.azimuth = azimuth.toFixed(1);
       dataset.elevation = elevation.toFixed(1);
       dataset.distance = distanceOf(camera).toFixed(4);
+      dataset.roll = rollOf(camera).toFixed(1);
     }
   }
 
-  // final: nothing newer was asked for and the server will not draw this view again.
+  // What is shown is the last word or on the way to it only while nothing newer is asked for.
   private showMark(): void {
-    const { dataset } = this.parts.viewport.canvas;
-    dataset.wanted = String(this.state.rev);
-    const final = dataset.final === "true" && dataset.rev === dataset.wanted && !this.playing;
-    this.parts.hud.mark(final, Number(dataset.level ?? 0));
+    const { canvas } = this.parts.viewport;
+    const { dataset } = canvas;
+    dataset.wanted = String(this.model.state.rev);
+    const rests = dataset.rev === dataset.wanted && !this.playback.running;
+    const state = rests ? (dataset.state as FrameState | undefined) : undefined;
+    const scale = scaleText(Number(dataset.width ?? canvas.width), canvas.width);
+    if (dataset.seq !== undefined && !this.connection.live) {
+      this.parts.hud.mark("offline", "");
+      return;
+    }
+    this.parts.hud.mark(state ?? "moving", scale);
   }
 
   private showLegend(): void {
-    const view = this.drawn?.view;
-    if (this.open === null || view?.dataset !== this.open.id) return;
-    this.parts.legend.show(legendEntries(this.open, view as View));
+    const view = this.model.drawnView();
+    if (view !== null) this.parts.legend.show(legendEntries(this.dataset(), view));
   }
 
   private showTime(): void {
-    this.parts.timeBar.show(this.view().step ?? 0, this.playing);
-  }
-
-  private showPicker(id: string): void {
-    const { picker } = this.parts;
-    picker.replaceChildren(
-      ...this.datasets.map((dataset) => {
-        const option = new Option(dataset.title || dataset.id, dataset.id);
-        option.disabled = dataset.state === "failed";
-        return option;
-      }),
-    );
-    picker.value = id;
+    this.parts.timeBar.show(this.view().step ?? 0, this.playback.direction);
   }
 
   private loadMaps(): void {
     this.maps.load(this.baseUri).then(
       () => {
         this.parts.status.clearError("maps");
-        if (this.open === null) return;
+        if (this.model.open === null) return;
         this.parts.panels.build();
         this.refresh();
         this.showLegend();
@@ -567,31 +489,5 @@ export class App {
       this.flowing.seen();
     }
     this.connection.send({ type: "visibility", hidden: document.hidden });
-  }
-
-  private writeHash(): void {
-    if (this.playing || this.flowing.running) return;
-    const hash = hashOfView(this.state.document);
-    if (window.location.hash !== hash) window.history.replaceState(null, "", hash);
-  }
-
-  private sayBadLink(): void {
-    this.parts.status.error("link", "This link holds no view that can be read.");
-  }
-
-  private restoreHash(): void {
-    const view = viewOfHash(window.location.hash);
-    if (view === null) {
-      this.sayBadLink();
-      return;
-    }
-    this.parts.status.clearError("link");
-    const next = this.firstView(view);
-    const id = view.dataset ?? this.open?.id ?? this.defaultDataset();
-    if (id !== undefined && id !== this.open?.id) {
-      this.requestOpen(id, this.state.replace({ ...next, dataset: id }));
-    } else {
-      this.replace({ ...next, dataset: id });
-    }
   }
 }

@@ -1,6 +1,7 @@
 // Camera maths in world space: x east, y north, z up. Angles in degrees: azimuth 0 has the eye
 // south of the target, positive azimuth moves it eastward; elevation is above the horizon.
 // Pure functions: camera in, camera out.
+import { clamp } from "./values";
 
 export type Vec3 = [number, number, number];
 
@@ -46,8 +47,6 @@ export const cross = (a: Vec3, b: Vec3): Vec3 => [
   a[0] * b[1] - a[1] * b[0],
 ];
 
-const clamp = (x: number, low: number, high: number): number => Math.min(Math.max(x, low), high);
-
 const unit = (a: Vec3): Vec3 => times(a, 1 / length(a));
 
 export function orbitFrame({ azimuth, elevation }: Angles): Frame3 {
@@ -89,9 +88,55 @@ export function lookFrom(camera: Camera, angles: Angles, distance = distanceOf(c
   };
 }
 
+// Turns the picture clockwise, in its plane.
+export function roll(camera: Camera, degrees: number): Camera {
+  if (degrees === 0) return camera;
+  const { right, up } = cameraFrame(camera);
+  const angle = degrees * degree;
+  return { ...camera, up: subtract(times(up, Math.cos(angle)), times(right, Math.sin(angle))) };
+}
+
+// How far the picture is turned clockwise from upright, -180..180. Straight up or down there is no
+// upright: what turns there counts as azimuth.
+export function rollOf(camera: Camera): number {
+  const angles = anglesOf(camera);
+  if (Math.abs(angles.elevation) >= uprightElevation) return 0;
+  const frame = orbitFrame(angles);
+  return Math.atan2(-dot(camera.up, frame.right), dot(camera.up, frame.up)) / degree;
+}
+
+// About the world's vertical axis and up or down, whatever the roll, which stays.
 export function orbit(camera: Camera, dAzimuth: number, dElevation: number): Camera {
   const { azimuth, elevation } = anglesOf(camera);
-  return lookFrom(camera, { azimuth: azimuth + dAzimuth, elevation: elevation + dElevation });
+  const next = { azimuth: azimuth + dAzimuth, elevation: elevation + dElevation };
+  return roll(lookFrom(camera, next), rollOf(camera));
+}
+
+// As if by hand: degrees by which what lies in front goes to the right and down on the screen.
+export function drag(camera: Camera, right: number, down: number): Camera {
+  const angle = rollOf(camera) * degree;
+  const [c, s] = [Math.cos(angle), Math.sin(angle)];
+  // The volume follows: to the right means that the eye goes west.
+  return orbit(camera, -(right * c + down * s), down * c - right * s);
+}
+
+// From one camera to another, at t from 0 to 1: by the shorter way round, evenly in the angles.
+export function between(from: Camera, to: Camera, t: number): Camera {
+  const mix = (a: number, b: number): number => a + (b - a) * t;
+  const mixAngle = (a: number, b: number): number =>
+    a + (((((b - a + 540) % 360) + 360) % 360) - 180) * t;
+  const [a, b] = [anglesOf(from), anglesOf(to)];
+  const target = from.target.map((value, axis) => mix(value, to.target[axis]!)) as Vec3;
+  const angles = {
+    azimuth: mixAngle(a.azimuth, b.azimuth),
+    elevation: mix(a.elevation, b.elevation),
+  };
+  const distance = distanceOf(from) * (distanceOf(to) / distanceOf(from)) ** t;
+  const height = from.height * (to.height / from.height) ** t;
+  return roll(
+    lookFrom({ ...to, target, height }, angles, distance),
+    mixAngle(rollOf(from), rollOf(to)),
+  );
 }
 
 // World units that the picture's height spans at the target.
@@ -122,6 +167,39 @@ export function zoom(camera: Camera, factor: number): Camera {
   };
 }
 
+// Where a point lies on the picture: fractions of its width and height from the upper left corner;
+// null behind the eye.
+export function project(camera: Camera, point: Vec3, aspect: number): [number, number] | null {
+  const frame = cameraFrame(camera);
+  const p = subtract(point, camera.eye);
+  const depth = dot(p, frame.forward);
+  if (depth <= 0) return null;
+  const perspective = camera.projection === "perspective";
+  const height = perspective ? 2 * depth * Math.tan(0.5 * camera.fovY * degree) : camera.height;
+  return [0.5 + dot(p, frame.right) / (height * aspect), 0.5 - dot(p, frame.up) / height];
+}
+
+// The point that shows at this place of the picture and lies in the plane where the world's
+// coordinate `axis` is `value`; null: there is none before the eye.
+export function pointInPlane(
+  camera: Camera,
+  [x, y]: [number, number],
+  aspect: number,
+  axis: 0 | 1 | 2,
+  value: number,
+): Vec3 | null {
+  const frame = cameraFrame(camera);
+  const height = heightAtTarget(camera);
+  const side = times(frame.right, (x - 0.5) * height * aspect);
+  const shift = add(side, times(frame.up, (0.5 - y) * height));
+  const perspective = camera.projection === "perspective";
+  const way = perspective ? add(subtract(camera.target, camera.eye), shift) : frame.forward;
+  const from = perspective ? camera.eye : add(camera.eye, shift);
+  const distance = (value - from[axis]) / way[axis];
+  if (!(distance > 0) || !Number.isFinite(distance)) return null;
+  return add(from, times(way, distance));
+}
+
 // The other projection, with the target's surroundings at the same size.
 export function withProjection(camera: Camera, projection: Camera["projection"]): Camera {
   if (camera.projection === projection) return camera;
@@ -132,7 +210,8 @@ export function withProjection(camera: Camera, projection: Camera["projection"])
     distanceMin,
     distanceMax,
   );
-  return lookFrom({ ...camera, projection }, anglesOf(camera), distance);
+  const moved = lookFrom({ ...camera, projection }, anglesOf(camera), distance);
+  return roll(moved, rollOf(camera));
 }
 
 // Looks at the box's centre from these angles so that all of it is in the picture. Every corner p

@@ -25,6 +25,7 @@ export interface CloseLike {
 export interface SocketLike {
   binaryType: string;
   readyState: number;
+  bufferedAmount: number; // bytes that have not left yet
   send(text: string): void;
   close(code?: number, reason?: string): void;
   onmessage: ((event: MessageLike) => void) | null;
@@ -55,6 +56,7 @@ const helloDeadlineMs = 10_000;
 const delayFirstMs = 625;
 const delayLastMs = 12_500;
 const socketOpen = 1;
+const waitingBytesMax = 2048; // a few patches
 const idleCode = 4410;
 
 // Milliseconds before attempt n (from 0): doubling, spread by a fifth to either side so that the
@@ -69,10 +71,10 @@ const closeReasons: Record<number, string> = {
   1006: "no answer from the server",
   1008: "the server refused this page (origin or token)",
   1009: "a message was too big for the server",
-  1013: "the server is full",
+  1013: "the server is full, all its places are taken",
   4400: "the server did not understand a message",
   4408: "the server did not say hello",
-  4410: "the session was idle",
+  4410: "nobody did anything for long, so the server let this page go",
 };
 
 export function closeReason(code: number, reason: string): string {
@@ -100,6 +102,11 @@ export class Connection {
 
   get live(): boolean {
     return this.greeted;
+  }
+
+  // Whether what is sent now goes out at once. Without a connection nothing waits either.
+  get ready(): boolean {
+    return !this.greeted || (this.socket?.bufferedAmount ?? 0) <= waitingBytesMax;
   }
 
   start(): void {

@@ -119,7 +119,18 @@ export function colorByPatch(dataset: Dataset, view: View, by: string): Patch {
   if (by === "scalar" && !view.vector?.color?.field) {
     color.field = dataset.fields.find((field) => field.kind === "scalar")?.name ?? null;
   }
+  // North is one colour from either side; of what has two ends a cyclic map tells nothing.
+  if (by === "direction") color.map = "compass";
+  else if (view.vector?.color?.map === "compass") color.map = null;
   return { vector: { color } };
+}
+
+// The field whose values the lines' colours tell, of a vector its magnitude; null: of none.
+export function colorField(view: View): string | null {
+  const { field = null, color } = view.vector ?? {};
+  if (field === null) return null;
+  if (color?.by === "magnitude") return field;
+  return color?.by === "scalar" ? (color.field ?? null) : null;
 }
 
 // near and far with at least `gap` between them: the one that moved takes the other along.
@@ -133,6 +144,14 @@ export function depthCuePatch(view: View, end: "near" | "far", value: number): P
   return { depthCue };
 }
 
+export const hasErrorLimit = (view: View): boolean => (view.quality?.maxError ?? null) !== null;
+
+// What moving frames are drawn for.
+export const qualityHint = (view: View): string =>
+  hasErrorLimit(view)
+    ? "Moving frames: the fastest that is expected to keep the error, within the budget."
+    : "Moving frames: the least error that the budget allows.";
+
 // Which controls count under a view; the others are hidden or out of use.
 export function controlStates(view: View) {
   const vector = view.vector ?? {};
@@ -142,6 +161,7 @@ export function controlStates(view: View) {
   return {
     lines,
     ranged: by !== "constant", // colours along a range, by a map
+    counted: colorField(view) !== null,
     constant: by === "constant",
     rise: by === "rise",
     colorField: by === "scalar",
@@ -152,6 +172,7 @@ export function controlStates(view: View) {
     vertical: (view.geometry?.heightField ?? null) === null,
     slice: (view.geometry?.slice ?? null) !== null,
     fovY: view.camera?.projection !== "orthographic",
+    errorLimit: hasErrorLimit(view),
     depthCue: lines && view.depthCue?.strength !== 0,
   };
 }

@@ -19,10 +19,45 @@ export function make<K extends keyof HTMLElementTagNameMap>(
 
 const svgSpace = "http://www.w3.org/2000/svg";
 
-export function makeSvg(tag: string, attributes: Record<string, string | number>): SVGElement {
-  const element = document.createElementNS(svgSpace, tag);
+type Attributes = Record<string, string | number>;
+
+export function setAttributes(element: Element, attributes: Attributes): void {
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
+}
+
+export function makeSvg(tag: string, attributes: Attributes): SVGElement {
+  const element = document.createElementNS(svgSpace, tag);
+  setAttributes(element, attributes);
   return element;
+}
+
+// `anchor`: start, middle or end of the text lies at x.
+export function svgText(x: number, y: number, text: string, anchor: string): SVGElement {
+  const element = makeSvg("text", { x, y, "text-anchor": anchor });
+  element.textContent = text;
+  return element;
+}
+
+export function numberBox(): HTMLInputElement {
+  const box = make("input");
+  box.type = "number";
+  box.step = "any";
+  return box;
+}
+
+// A label round a check box.
+export function checkLabel(box: HTMLInputElement, text: string, title = ""): HTMLLabelElement {
+  const label = make("label", "histogram-check");
+  box.type = "checkbox";
+  label.append(box, text);
+  label.title = title;
+  return label;
+}
+
+// Tells whether the element is in sight, whenever that changes.
+export function whileSeen(element: Element, tell: (seen: boolean) => void): void {
+  // Several changes may come at once, in order.
+  new IntersectionObserver((entries) => tell(entries.at(-1)!.isIntersecting)).observe(element);
 }
 
 // Runs `run` once, `ms` after the last call.

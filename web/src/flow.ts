@@ -1,6 +1,7 @@
 // Lets the lines flow: moves /vector/motion/time on while it runs, at most `flowFps` times a second
 // and never before the frame that the last move asked for has come back. Time, timers and the
 // page's state are handed in.
+import { clamp } from "./values";
 
 export const flowFps = 15;
 const intervalMs = 1000 / flowFps;
@@ -20,7 +21,7 @@ export interface FlowHost {
 
 // The view's time `ms` later: one step a second, so that `rate` is cycles a second.
 export function laterTime(time: number, ms: number): number {
-  const next = time + Math.min(Math.max(ms, 0), gapMsMax) / 1000;
+  const next = time + clamp(ms, 0, gapMsMax) / 1000;
   return next > timeMax ? 0 : Number(next.toFixed(3));
 }
 

@@ -1,14 +1,45 @@
-// The small cross of axes that tells how the volume is turned: east, north and up (or x, y, z).
-import { cameraFrame, dot, type Camera, type Vec3 } from "./camera";
-import { makeSvg } from "./dom";
+// The small cross of axes that tells how the volume is turned. Its six ends are buttons that look
+// from there: east, north and up (or x, y, z), and what is opposite.
+import { cameraFrame, dot, type Angles, type Camera, type Vec3 } from "./camera";
+import { make, makeSvg } from "./dom";
 
-const labelGap = 15; // below it two labels would cover each other
-const radius = 30; // of the longest arm, in the drawing's units
-const axes: { name: string; way: Vec3 }[] = [
-  { name: "x", way: [1, 0, 0] },
-  { name: "y", way: [0, 1, 0] },
-  { name: "z", way: [0, 0, 1] },
+const reach = 36; // of the longest arm, percent of the whole
+
+export interface Look {
+  name: string; // "from the south"
+  key: string;
+  sign: string; // on the gizmo; empty for what is behind
+  way: Vec3 | null; // where its end points to; null: is no end of an axis
+  angles: Angles;
+}
+
+type Named = [string, string, Look["key"], Vec3 | null, number, number];
+
+const geographic: Named[] = [
+  ["from the south", "", "1", [0, -1, 0], 0, 0],
+  ["from the north", "N", "2", [0, 1, 0], 180, 0],
+  ["from the east", "E", "3", [1, 0, 0], 90, 0],
+  ["from the west", "", "4", [-1, 0, 0], -90, 0],
+  ["from above", "Up", "5", [0, 0, 1], 0, 90],
+  ["from below", "", "6", [0, 0, -1], 0, -90],
+  ["isometrically", "", "7", null, 45, Math.atan(Math.SQRT1_2) / (Math.PI / 180)],
 ];
+const plain: [string, string][] = [
+  ["from −y", ""],
+  ["from +y", "y"],
+  ["from +x", "x"],
+  ["from −x", ""],
+  ["from +z", "z"],
+  ["from −z", ""],
+];
+
+export const looks: Look[] = geographic.map(([name, sign, key, way, azimuth, elevation]) => ({
+  name,
+  sign,
+  key,
+  way,
+  angles: { azimuth, elevation },
+}));
 
 export interface GizmoArm {
   axis: string;
@@ -17,53 +48,68 @@ export interface GizmoArm {
   depth: number; // > 0: points away from the eye
 }
 
-export function gizmoArms(camera: Camera): GizmoArm[] {
-  const frame = cameraFrame(camera);
-  return axes
-    .map(({ name, way }) => ({
-      axis: name,
-      x: dot(way, frame.right),
-      y: dot(way, frame.up),
-      depth: dot(way, frame.forward),
-    }))
-    .sort((a, b) => b.depth - a.depth);
+const axisOf = (way: Vec3): string => ["x", "y", "z"][way.findIndex((value) => value !== 0)]!;
+
+function armOf(camera: Camera, way: Vec3): GizmoArm {
+  const { right, up, forward } = cameraFrame(camera);
+  return { axis: axisOf(way), x: dot(way, right), y: dot(way, up), depth: dot(way, forward) };
 }
 
-// How far a label steps aside, so that arms over each other can still be told apart: the farther
-// one to the right, the nearer to the left.
-function aside(arm: GizmoArm, arms: GizmoArm[]): number {
-  const other = arms.find(
-    (one) => one !== arm && radius * Math.hypot(one.x - arm.x, one.y - arm.y) < labelGap,
-  );
-  if (other === undefined) return 0;
-  return arms.indexOf(arm) < arms.indexOf(other) ? 8 : -8;
-}
+// The three axes, the farthest first.
+export const gizmoArms = (camera: Camera): GizmoArm[] =>
+  (
+    [
+      [1, 0, 0],
+      [0, 1, 0],
+      [0, 0, 1],
+    ] as Vec3[]
+  )
+    .map((way) => armOf(camera, way))
+    .sort((a, b) => b.depth - a.depth);
 
 export class Gizmo {
-  constructor(
-    private readonly element: SVGElement,
-    private labels: Record<string, string> = { x: "E", y: "N", z: "Up" },
-  ) {}
+  private readonly lines = makeSvg("svg", { viewBox: "-50 -50 100 100", "aria-hidden": "true" });
+  private readonly ends: { look: Look; button: HTMLButtonElement }[] = [];
 
-  setGeographic(geographic: boolean): void {
-    this.labels = geographic ? { x: "E", y: "N", z: "Up" } : { x: "x", y: "y", z: "z" };
+  constructor(element: HTMLElement, lookFrom: (angles: Angles) => void) {
+    element.append(this.lines);
+    for (const look of looks) {
+      if (look.way === null) continue;
+      const kind = `gizmo-end arm-${axisOf(look.way)}${look.sign === "" ? " opposite" : ""}`;
+      const button = make("button", kind);
+      button.append(make("span"));
+      button.addEventListener("click", () => lookFrom(look.angles));
+      element.append(button);
+      this.ends.push({ look, button });
+    }
+    this.setGeographic(true);
+  }
+
+  setGeographic(on: boolean): void {
+    this.ends.forEach(({ look, button }, n) => {
+      const [name, sign] = on ? [look.name, look.sign] : plain[n]!;
+      button.setAttribute("aria-label", `Look ${name}`);
+      button.title = `Look ${name} (${look.key})`;
+      button.firstElementChild!.textContent = sign;
+    });
   }
 
   show(camera: Camera): void {
-    const parts: SVGElement[] = [];
-    const arms = gizmoArms(camera);
-    for (const arm of arms) {
-      const x = arm.x * radius;
-      const y = -arm.y * radius;
-      const group = makeSvg("g", {
-        class: `arm arm-${arm.axis}${arm.depth > 0.02 ? " away" : ""}`,
-      });
-      group.append(makeSvg("line", { x1: 0, y1: 0, x2: x, y2: y }));
-      const label = makeSvg("text", { x: x * 1.28 + aside(arm, arms), y: y * 1.28 });
-      label.textContent = this.labels[arm.axis]!;
-      group.append(label);
-      parts.push(group);
+    this.lines.replaceChildren(
+      ...gizmoArms(camera).map(({ axis, x, y, depth }) =>
+        makeSvg("line", {
+          class: `arm-${axis}${depth > 0.02 ? " away" : ""}`,
+          x2: x * reach,
+          y2: -y * reach,
+        }),
+      ),
+    );
+    for (const { look, button } of this.ends) {
+      const { x, y, depth } = armOf(camera, look.way!);
+      button.style.left = `${(50 + x * reach).toFixed(2)}%`;
+      button.style.top = `${(50 - y * reach).toFixed(2)}%`;
+      button.style.zIndex = String(Math.round(10 - 9 * depth)); // the nearest lies on top
+      button.classList.toggle("away", depth > 0.02);
     }
-    this.element.replaceChildren(...parts);
   }
 }

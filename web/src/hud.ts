@@ -1,47 +1,59 @@
-// Times and sizes of the frames that are drawn: the table in the picture's corner (key \).
-import type { ChosenMessage, FrameHeader } from "./protocol";
-import type { DrawnFrame } from "./viewport";
+// Times, sizes and errors of the frames that are drawn: the table in the picture's corner (key \).
+// It is read when someone looks at it; nothing in it announces itself.
 import { byId } from "./dom";
-import { formatBytes, formatNumber } from "./ticks";
+import { errorMetric } from "./error_text";
+import {
+  encodingWords,
+  errorWords,
+  FrameRate,
+  methodText,
+  networkMs,
+  paceText,
+  scaleText,
+  stepsText,
+  workLines,
+  type FrameState,
+  type Words,
+} from "./frame_words";
+import {
+  frameHeaderBytes,
+  type ChosenMessage,
+  type FrameHeader,
+  type StatsMessage,
+} from "./protocol";
+import { formatBytes } from "./ticks";
+import type { DrawnFrame } from "./viewport";
 
-const windowMs = 1000;
-
-// Frames drawn in the last second.
-export class FrameRate {
-  private times: number[] = [];
-
-  add(now: number): void {
-    this.times.push(now);
-  }
-
-  value(now: number): number {
-    this.times = this.times.filter((time) => now - time < windowMs);
-    return this.times.length;
-  }
-}
-
-// What the way took besides the server's own work, ms: from the patch's departure to the frame's
-// arrival. Only the first frame that echoes a patch tells it; later ones waited for other reasons.
-export function networkMs(header: FrameHeader, arrivedAt: number, lastT: number): number | null {
-  if (header.t === lastT || header.t <= 0) return null;
-  const serverMs = (header.queueUs + header.renderUs + header.encodeUs) / 1000;
-  return Math.max(0, arrivedAt - header.t - serverMs);
-}
+const rateEveryMs = 1000;
 
 const ms = (value: number): string => (value < 10 ? value.toFixed(1) : value.toFixed(0));
+
+function write(element: HTMLElement, { text, title }: Words, before = ""): void {
+  element.textContent = text === "" ? "" : before + text;
+  if (element.title !== title) element.title = title;
+}
 
 export class Hud {
   private readonly element = byId("hud", HTMLElement);
   private readonly rate = new FrameRate();
   private readonly markElement = byId("mark", HTMLElement);
+  private readonly fps = byId("fps", HTMLElement);
+  private readonly bytes = byId("hud-bytes", HTMLElement);
   private readonly headline = byId("hud-head", HTMLElement);
+  private readonly drawingError = byId("hud-error", HTMLElement);
+  private readonly encodingError = byId("hud-encoding", HTMLElement);
   private readonly times = byId("hud-times", HTMLElement);
   private readonly work = byId("hud-work", HTMLElement);
+  private readonly pace = byId("hud-pace", HTMLElement);
+  private readonly stepCounts = byId("hud-steps", HTMLElement);
   private lastT = -1;
   private network: number | null = null;
+  private latency: number | null = null;
+  private newest: { header: FrameHeader; limit: number | null } | null = null;
 
   constructor() {
-    window.setInterval(() => this.showRate(), windowMs);
+    errorMetric.watch(() => this.showErrors());
+    window.setInterval(() => this.showRate(), rateEveryMs);
   }
 
   toggle(): boolean {
@@ -49,63 +61,63 @@ export class Hud {
     return !this.element.classList.contains("folded");
   }
 
-  // Whether the picture is the last word on what was asked for; else its level, 0 full size.
-  mark(final: boolean, level: number): void {
-    const text = final ? "final" : level === 0 ? "moving" : `moving 1/${2 ** level}`;
+  // Whether the picture is the last word on what was asked for; else how large it was drawn, as
+  // scaleText tells it.
+  mark(state: FrameState | "offline", scale: string): void {
+    const text = state === "final" || scale === "" ? state : `${state} ${scale}`;
     if (this.markElement.textContent === text) return;
     this.markElement.textContent = text;
-    this.markElement.classList.toggle("is-final", final);
+    this.markElement.classList.toggle("is-offline", state === "offline");
+    this.markElement.classList.toggle("is-final", state === "final");
+    this.markElement.classList.toggle("is-refining", state === "refining");
   }
 
-  show(frame: DrawnFrame, chosen: ChosenMessage | null): void {
+  // How steps run, or ran.
+  steps(stats: StatsMessage): void {
+    const { playFps } = stats;
+    this.pace.textContent = playFps === null ? "" : paceText(playFps);
+    this.stepCounts.textContent = stepsText(stats);
+  }
+
+  // fullWidth: of the whole picture, pixels.
+  show(frame: DrawnFrame, chosen: ChosenMessage | null, fullWidth: number): void {
     const { header } = frame;
-    this.rate.add(performance.now());
+    this.rate.add(frame.drawnAt, header.payloadBytes + frameHeaderBytes);
     const network = networkMs(header, frame.arrivedAt, this.lastT);
-    if (network !== null) this.network = network;
+    if (network !== null) {
+      this.network = network;
+      this.latency = frame.drawnAt - header.t;
+    }
     this.lastT = header.t;
-    const kind = header.errorMeasured ? "measured" : header.errorEstimated ? "estimated" : "";
+    const scale = scaleText(header.width, fullWidth);
+    const quality = header.codec === "jpeg" ? ` ${header.quality}` : "";
     this.headline.textContent = [
-      `${formatBytes(header.payloadBytes)} ${header.codec}`,
       chosen === null ? header.method : methodText(chosen),
-      `${header.width}×${header.height}`,
+      `${header.width}×${header.height}${scale === "" ? "" : ` (${scale})`}`,
+      `${header.codec}${quality} ${formatBytes(header.payloadBytes)}`,
       ...(header.cached ? ["cached"] : []),
-      ...(kind === "" ? [] : [`error ${formatNumber(header.error, 2)} ${kind}`]),
     ].join(" · ");
-    const net = this.network === null ? "–" : ms(this.network);
+    this.newest = { header, limit: chosen?.view.quality?.maxError ?? null };
+    this.showErrors();
+    const told = (value: number | null): string => (value === null ? "–" : ms(value));
     this.times.textContent =
       `queue ${ms(header.queueUs / 1e3)} · render ${ms(header.renderUs / 1e3)} · ` +
-      `encode ${ms(header.encodeUs / 1e3)} · net ${net} · decode ${ms(frame.decodeMs)} ms`;
+      `encode ${ms(header.encodeUs / 1e3)} · net ${told(this.network)} · ` +
+      `decode ${ms(frame.decodeMs)} · latency ${told(this.latency)} ms`;
     this.work.textContent = chosen === null ? "" : workLines(chosen.work).join("\n");
     this.showRate();
   }
 
-  private showRate(): void {
-    const rate = this.rate.value(performance.now());
-    byId("fps", HTMLElement).textContent = rate === 0 ? "– fps" : `${rate} fps`;
+  private showErrors(): void {
+    if (this.newest === null) return;
+    const { header, limit } = this.newest;
+    write(this.drawingError, errorWords(header, limit, errorMetric.value));
+    write(this.encodingError, encodingWords(header, errorMetric.value), " · ");
   }
-}
 
-// The method, and what is particular to it.
-export function methodText({ method, compositing, slabThickness }: ChosenMessage): string {
-  const slabs = slabThickness === null ? "" : ` of ${formatNumber(slabThickness, 3)} cells`;
-  return method === "reference" ? method : `${method}${slabs} ${compositing}`;
-}
-
-const many = (n: number): string => {
-  if (n < 1000) return String(n);
-  if (n < 1e6) return `${(n / 1e3).toFixed(1)} k`;
-  return n < 1e9 ? `${(n / 1e6).toFixed(1)} M` : `${(n / 1e9).toFixed(1)} G`;
-};
-
-// What was drawn and what was left out, and what it cost.
-export function workLines(work: ChosenMessage["work"]): [string, string, string] {
-  const drawn = work.samples - work.culled - work.skippedBoth;
-  return [
-    `${many(drawn)} of ${many(work.samples)} samples · culled ${many(work.culled)}` +
-      ` · occluded ${many(work.occluded)}`,
-    `skipped ${many(work.skippedVector)} lines, ${many(work.skippedScalar)} splats,` +
-      ` ${many(work.skippedBoth)} both`,
-    `${many(work.pixelUpdates)} pixel updates · ${many(work.exponentials)} exponentials` +
-      ` · ${work.variant}`,
-  ];
+  private showRate(): void {
+    const { fps, bytes } = this.rate.value(performance.now());
+    this.fps.textContent = fps === 0 ? "– fps" : `${fps} fps`;
+    this.bytes.textContent = fps === 0 ? "" : `${formatBytes(bytes)}/s`;
+  }
 }

@@ -1,6 +1,6 @@
 // Legend entries -> elements over the picture. Rebuilt only when what it says has changed.
 import { make, makeSvg } from "./dom";
-import type { LegendEntry } from "./legend_entries";
+import { curvePlaces, type LegendEntry } from "./legend_entries";
 import type { ColorMaps } from "./color_maps";
 
 const stripHeight = 10; // of the curve's own coordinates
@@ -41,9 +41,16 @@ export class Legend {
       box.append(ticks);
     }
     if (entry.note !== "") box.append(make("div", "legend-note", entry.note));
+    if (entry.leftOut !== "") {
+      box.append(make("div", "legend-note legend-left-out", entry.leftOut));
+    }
     const said = entry.ticks.map((tick) => tick.text).join(", ");
+    const leftOut = entry.leftOut === "" ? "" : `; ${entry.leftOut}`;
     box.setAttribute("role", "img");
-    box.setAttribute("aria-label", `Legend: ${entry.title} ${entry.units}; ticks ${said}`);
+    box.setAttribute(
+      "aria-label",
+      `Legend: ${entry.title} ${entry.units}; ticks ${said}${leftOut}`,
+    );
     return box;
   }
 }
@@ -51,14 +58,12 @@ export class Legend {
 // How opaque the medium is along its strip: the colours show below the curve, what is above it is
 // covered.
 function extinctionCurve(points: [number, number][]): SVGElement {
-  const inside = points.map(([at, share]) => [100 * Math.min(Math.max(at, -1), 2), share] as const);
-  const first = inside[0]!;
-  const last = inside[inside.length - 1]!;
-  const left = Math.min(0, first[0]);
-  const right = Math.max(100, last[0]);
-  const path = [[left, first[1]] as const, ...inside, [right, last[1]] as const]
-    .map(([x, share]) => `${x.toFixed(2)},${(stripHeight * (0.94 - 0.88 * share)).toFixed(2)}`)
+  const at = curvePlaces(points);
+  const path = at
+    .map(([x, y]) => `${(100 * x).toFixed(2)},${(stripHeight * y).toFixed(2)}`)
     .join(" ");
+  const left = 100 * at[0]![0];
+  const right = 100 * at.at(-1)![0];
   const svg = makeSvg("svg", {
     viewBox: `0 0 100 ${stripHeight}`,
     preserveAspectRatio: "none",

@@ -2,6 +2,7 @@
 // Pure: (complete view, dataset) -> entries.
 import type { Dataset, Field, ScalarView, View } from "./protocol";
 import { axisTicks, compassTicks, formatNumber, linearTicks, type LegendTick } from "./ticks";
+import { clamp } from "./values";
 
 export interface LegendEntry {
   kind: "lines" | "medium";
@@ -13,6 +14,7 @@ export interface LegendEntry {
   ticks: LegendTick[];
   extinction: [number, number][]; // (place 0..1, share of the greatest), medium only
   note: string;
+  leftOut: string; // what is not drawn; empty: nothing is left out
 }
 
 const fieldNamed = (dataset: Dataset, name: string): Field | undefined =>
@@ -64,6 +66,15 @@ function heightEntry(dataset: Dataset, view: View, range: [number, number]) {
   return { what: verticalTitles[axis.kind] ?? axis.name, units: unitText(axis.units), ticks };
 }
 
+const speeds = /^([ckm]?m|mi|ft) ?(s⁻¹|h⁻¹|\/ ?s|\/ ?h)$|^knots?$|^kt$/i;
+
+// Vectors too short to be drawn.
+function leftOutText(least: number, units: string): string {
+  if (!(least > 0)) return "";
+  const what = speeds.test(units) ? "slower" : "weaker";
+  return `${what} than ${formatNumber(least)}${units === "" ? "" : ` ${units}`} not drawn`;
+}
+
 function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
   const vector = view.vector;
   if (!vector?.field) return null;
@@ -73,6 +84,8 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
   const range = (color.range ?? [0, 1]) as [number, number];
   const units = unitText(field?.units);
   const top = vector.magnitudeRange?.[1];
+  const longest = top === undefined ? "" : `longest line ${formatNumber(top)} ${units}`.trim();
+  const heads = (vector.headDesaturation ?? 0) > 0 ? "white end ahead" : "";
   const entry: LegendEntry = {
     kind: "lines",
     title: name,
@@ -82,7 +95,8 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
     color: null,
     ticks: linearTicks(range),
     extinction: [],
-    note: top === undefined ? "" : `longest line ${formatNumber(top)} ${units}`.trim(),
+    note: [longest, heads].filter((words) => words !== "").join(", "),
+    leftOut: leftOutText(vector.minMagnitude ?? 0, units),
   };
   switch (color.by) {
     case "worldZ": {
@@ -139,7 +153,21 @@ function mediumEntry(dataset: Dataset, layer: ScalarView): LegendEntry {
       most > 0 ? extinction / most : 0,
     ]),
     note: most > 0 ? `opacity up to ${formatNumber(most, 3)} a world unit` : "clear",
+    leftOut: "",
   };
+}
+
+// The curve of a medium's extinction on its strip: fractions of the strip's width and, from above,
+// of its height.
+export function curvePlaces(points: [number, number][]): [x: number, y: number][] {
+  const inside = points.map(([at, share]) => [clamp(at, -1, 2), share] as const);
+  const first = inside[0]!;
+  const last = inside[inside.length - 1]!;
+  return [
+    [Math.min(0, first[0]), first[1]] as const,
+    ...inside,
+    [Math.max(1, last[0]), last[1]] as const,
+  ].map(([x, share]) => [x, 0.94 - 0.88 * share]);
 }
 
 export function legendEntries(dataset: Dataset, view: View): LegendEntry[] {

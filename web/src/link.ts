@@ -1,6 +1,7 @@
 // View <-> the part of the address after `#`: `#!{...}`, so that a link restores the view.
 // The picture's size belongs to the window and stays out.
 import type { View } from "./protocol";
+import { isView } from "./view_shape";
 
 const start = "#!";
 
@@ -8,8 +9,7 @@ export function viewOfHash(hash: string): View | null {
   if (!hash.startsWith(start)) return null;
   try {
     const view: unknown = JSON.parse(decodeURIComponent(hash.slice(start.length)));
-    if (typeof view !== "object" || view === null || Array.isArray(view)) return null;
-    return withoutSize(view as View);
+    return isView(view) ? withoutSize(view) : null;
   } catch {
     return null;
   }
@@ -24,7 +24,7 @@ export function hashOfView(view: View): string {
   return start + readable;
 }
 
-function withoutSize(view: View): View {
+export function withoutSize(view: View): View {
   const { image, ...rest } = view;
   if (typeof image !== "object" || image === null) return rest;
   const { width: _width, height: _height, ...kept } = image;

@@ -1,6 +1,7 @@
 // The media of a view as the panel handles them: which are on, and the opacity curve by its two
 // handles, density and threshold. Pure.
 import type { ScalarView } from "./protocol";
+import { clamp } from "./values";
 
 export type Curve = [number, number][]; // (value, extinction per world unit), values ascending
 
@@ -22,7 +23,7 @@ export function thresholdOf(curve: Curve): number | null {
 // A ramp from `threshold` up to the range's top.
 export function rampCurve(range: [number, number], threshold: number, density: number): Curve {
   const [low, high] = [Math.min(...range), Math.max(...range)];
-  const knee = Math.min(Math.max(threshold, low), low + 0.999 * (high - low));
+  const knee = clamp(threshold, low, low + 0.999 * (high - low));
   const ramp: Curve = [
     [knee, 0],
     [high, density],

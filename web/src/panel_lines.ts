@@ -1,6 +1,7 @@
 // The panel of the lines: field, length and opacity; their colour, shape, kernels and motion.
 import type GUI from "lil-gui";
-import { colorByPatch, fieldOptions } from "./controls";
+import { colorByPatch, colorField, fieldOptions } from "./controls";
+import type { Range } from "./api";
 import { unitText } from "./legend_entries";
 import { keyAccess, type PanelKit } from "./panel_kit";
 
@@ -104,6 +105,21 @@ function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
     host.change({ vector: { color: { range: null } } }),
   );
   kit.showWhen((states) => states.ranged, map, ...ends, auto);
+  const counted = () => colorField(host.view());
+  const said = host.dataset().defaultView?.vector;
+  const histogram = kit.histogram(folder, {
+    key: "lines",
+    map: () => host.view().vector?.color?.map,
+    defaultRange: () =>
+      said?.color?.by === host.view().vector?.color?.by
+        ? ((said?.color?.range ?? null) as Range | null)
+        : null,
+    title: () => (host.view().vector?.color?.by === "magnitude" ? "|v|" : (counted() ?? "")),
+    field: counted,
+    range: () => (host.view().vector?.color?.range ?? null) as Range | null,
+    choose: (range) => host.change({ vector: { color: { range } } }),
+  });
+  kit.showWhen((states) => states.counted, histogram);
   const weight = kit.number(folder, "share of rise", keyAccess("/vector/color/riseWeight"));
   kit.showWhen((states) => states.rise, weight);
   const constant = kit.color(folder, "colour", keyAccess("/vector/color/constant"));
@@ -192,6 +208,14 @@ function addMagnitudes(folder: GUI, kit: PanelKit, per: string): void {
     },
     limits,
   );
+  kit.histogram(folder, {
+    key: "lengths",
+    defaultRange: () => null,
+    title: () => "|v|",
+    field: () => kit.host.view().vector?.field ?? null,
+    range,
+    choose: (next) => kit.host.change({ vector: { magnitudeRange: next } }),
+  });
 }
 
 function addKernels(parent: GUI, kit: PanelKit): GUI {

@@ -1,5 +1,6 @@
 // The media's panel: up to four scalar fields, each with its switch, field, colours and opacity.
 import type GUI from "lil-gui";
+import type { Range } from "./api";
 import { fieldOptions } from "./controls";
 import { unitText } from "./legend_entries";
 import {
@@ -10,10 +11,12 @@ import {
   rampCurve,
   thresholdOf,
   withDensity,
+  type Curve,
   type Layer,
 } from "./media";
 import { PanelKit, type Access } from "./panel_kit";
 import type { ScalarView } from "./protocol";
+import { isRamp } from "./transfer";
 
 const layersMax = 4;
 
@@ -28,13 +31,16 @@ class MediaPanel {
   private layers: Layer[] = [];
   private shape = ""; // fields and switches that the controls were built for
   private controls: PanelKit;
+  private readonly folded = new Set<string>(); // fields whose curve is not shown
+
+  private readonly forms = new Map<string, Curve>(); // by fields, before density scaled them
 
   constructor(
     private readonly folder: GUI,
     private readonly kit: PanelKit,
     private readonly options: Record<string, string>,
   ) {
-    this.controls = new PanelKit(kit.host);
+    this.controls = new PanelKit(kit.host, kit.modes);
     kit.onRefresh(() => this.refresh());
     this.refresh();
   }
@@ -59,7 +65,7 @@ class MediaPanel {
 
   private build(): void {
     for (const child of [...this.folder.children]) child.destroy();
-    this.controls = new PanelKit(this.kit.host);
+    this.controls = new PanelKit(this.kit.host, this.kit.modes);
     this.layers.forEach((_, index) => this.addLayer(index));
     if (this.layers.length >= layersMax) return;
     const used = new Set(this.layers.map((layer) => layer.view.field));
@@ -76,6 +82,7 @@ class MediaPanel {
     if (layer === undefined) return null;
     layer.view = { ...layer.view, ...change };
     if (layer.on) this.send();
+    else this.controls.refresh();
     return null; // sent already
   }
 
@@ -88,6 +95,7 @@ class MediaPanel {
     this.addField(folder, index);
     this.addOpacity(folder, index, units);
     this.addColors(folder, index, units);
+    this.addCurve(folder, index);
     this.addSampling(folder, index);
     this.controls.action(folder, "Remove", "Take this medium out of the view", () => {
       this.layers.splice(index, 1);
@@ -145,6 +153,41 @@ class MediaPanel {
     );
   }
 
+  private addCurve(parent: GUI, index: number): void {
+    const field = this.viewOf(index).field;
+    const color = () => this.viewOf(index).color;
+    const { defaultView } = this.kit.host.dataset();
+    const known = defaultView?.scalars?.find((medium) => medium.field === field);
+    const folder = this.controls.histogram(parent, {
+      key: `medium ${field}`,
+      folder: "Opacity curve",
+      title: () => field,
+      field: () => field,
+      range: () => (color()?.range ?? null) as Range | null,
+      defaultRange: () => (known?.color?.range ?? null) as Range | null,
+      // A medium without a range gets its default.
+      choose: (range) => this.update(index, { color: { ...color(), range: range ?? undefined } }),
+      map: () => color()?.map ?? undefined,
+      ...(this.viewOf(index).extinction == null
+        ? {} // the server has not told its default yet
+        : {
+            curve: {
+              curve: () => curveOf(this.viewOf(index)),
+              setCurve: (curve) => this.setCurve(index, curve),
+            },
+          }),
+    });
+    if (this.folded.has(field)) folder.close();
+    folder.onOpenClose(() => {
+      if (folder._closed) this.folded.add(field);
+      else this.folded.delete(field);
+    });
+  }
+
+  private setCurve(index: number, curve: Curve): null {
+    return this.update(index, { extinction: curve as ScalarView["extinction"] });
+  }
+
   private addSampling(folder: GUI, index: number): void {
     this.controls.number(
       folder,
@@ -169,43 +212,39 @@ class MediaPanel {
   }
 
   private addOpacity(folder: GUI, index: number, units: string): void {
-    const layer = () => this.viewOf(index);
-    if (layer().extinction == null) return; // the server has not told its default yet
-    const range = (): [number, number] =>
-      (layer().color?.range ?? [curveOf(layer())[0]![0], curveOf(layer()).at(-1)![0]]) as [
-        number,
-        number,
-      ];
+    if (this.viewOf(index).extinction == null) return; // the server has not told its default yet
+    const curve = () => curveOf(this.viewOf(index));
+    const low = () => Math.min(curve()[0]![0], ...(this.viewOf(index).color?.range ?? []));
+    const ends = (): Range => [low(), curve().at(-1)![0]];
     const density: Access<number> = {
       pointer: "/scalars/extinction",
-      get: () => densityOf(curveOf(layer())),
-      set: (value) =>
-        this.update(index, {
-          extinction: withDensity(curveOf(layer()), range(), value) as ScalarView["extinction"],
-        }),
+      get: () => densityOf(curve()),
+      // A curve that was scaled to nothing comes back in its form.
+      set: (value) => {
+        const { field } = this.viewOf(index);
+        const form = densityOf(curve()) > 0 ? curve() : (this.forms.get(field) ?? curve());
+        this.forms.set(field, form);
+        return this.setCurve(index, withDensity(form, ends(), value));
+      },
     };
-    const [low, high] = [Math.min(...range()), Math.max(...range())];
-    const most = densityOf(curveOf(layer()));
+    const most = densityOf(curve());
     this.controls.number(folder, "density", density, {
       min: 0,
       max: most > 0 ? Number((4 * most).toPrecision(2)) : 100,
     });
-    this.controls.number(
+    const clear = this.controls.number(
       folder,
       units === "" ? "clear below" : `clear below (${units})`,
       {
         pointer: "/scalars/extinction",
-        get: () => thresholdOf(curveOf(layer())) ?? low,
-        set: (value) =>
-          this.update(index, {
-            extinction: rampCurve(
-              range(),
-              value,
-              densityOf(curveOf(layer())) || most,
-            ) as ScalarView["extinction"],
-          }),
+        get: () => thresholdOf(curve()) ?? low(),
+        set: (value) => this.setCurve(index, rampCurve(ends(), value, densityOf(curve()) || most)),
       },
-      { min: low, max: high },
+      { min: ends()[0], max: ends()[1] },
     );
+    // A curve of another form has no foot to move.
+    const follow = () => clear.enable(densityOf(curve()) === 0 || isRamp(curve()));
+    this.controls.onRefresh(follow);
+    follow();
   }
 }

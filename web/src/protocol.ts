@@ -1,6 +1,7 @@
 // The wire: bytes of a binary message -> frame header and picture; text -> typed server message.
 // Everything here is pure; what is malformed is a WireError.
 import type { ClientMessage, Dataset, ServerMessage } from "../generated/messages";
+import { isObject } from "./values";
 
 export type {
   ChosenMessage,
@@ -14,6 +15,7 @@ export type {
   Problem,
   ProgressMessage,
   ServerMessage,
+  StatsMessage,
   UnchangedMessage,
 } from "../generated/messages";
 export type { ScalarView, View } from "../generated/view";
@@ -117,9 +119,6 @@ export function parseFrame(message: ArrayBuffer): Frame {
 
 type Json = Record<string, unknown>;
 
-const isObject = (value: unknown): value is Json =>
-  typeof value === "object" && value !== null && !Array.isArray(value);
-
 const isDataset = (value: unknown): value is Dataset =>
   isObject(value) &&
   typeof value.id === "string" &&
@@ -138,7 +137,10 @@ const looksRight: Record<ServerMessage["type"], (message: Json) => boolean> = {
   progress: (m) => typeof m.phase === "string" && typeof m.done === "number",
   chosen: (m) => Number.isInteger(m.seq) && isObject(m.view) && isObject(m.work),
   unchanged: (m) => Number.isInteger(m.rev) && Number.isInteger(m.seq),
-  stats: (m) => typeof m.frames === "number",
+  stats: (m) =>
+    typeof m.stepsDropped === "number" &&
+    typeof m.stepsNotReady === "number" &&
+    (m.playFps === null || typeof m.playFps === "number"),
   error: (m) => isProblem(m.problem),
 };
 

@@ -4,6 +4,7 @@ import type { ConnectionState } from "./connection";
 import type { Problem } from "./protocol";
 import { byId } from "./dom";
 
+const noteMs = 4000;
 const barDelayMs = 200; // what is faster than this needs no bar
 
 export function problemText(problem: Problem): string {
@@ -26,7 +27,12 @@ export class Status {
   private readonly loadingText = byId("loading-text", HTMLElement);
   private alertTopic = "";
   private barTimer: number | undefined;
+  private noteTimer: number | undefined;
+  private noted: string | null = null; // what a note stands in front of
   private countdown: number | undefined;
+  private readonly offline = byId("offline", HTMLElement);
+  private readonly offlineText = byId("offline-text", HTMLElement);
+  private lost = false; // the line tells of the connection, and nothing less may take its place
 
   constructor() {
     byId("alert-close", HTMLButtonElement).addEventListener("click", () => this.clearError());
@@ -34,6 +40,20 @@ export class Status {
 
   // A word for screen readers and the status line.
   say(text: string): void {
+    window.clearTimeout(this.noteTimer);
+    this.noted = null;
+    if (!this.lost) this.tell(text);
+  }
+
+  // The same for a while, of what was done; then what was said before it.
+  note(text: string): void {
+    const before = this.noted ?? this.line.textContent ?? "";
+    this.say(text);
+    this.noted = before;
+    this.noteTimer = window.setTimeout(() => this.say(before), noteMs);
+  }
+
+  private tell(text: string): void {
     if (this.line.textContent !== text) this.line.textContent = text;
   }
 
@@ -41,22 +61,25 @@ export class Status {
     window.clearInterval(this.countdown);
     document.documentElement.dataset.connection = state.name;
     this.light.title = state.name;
+    this.lost = state.name === "waiting" || state.name === "asleep";
+    this.offline.hidden = !this.lost;
+    if (state.name !== "live") this.latency.textContent = "";
     if (state.name === "live") {
-      this.say("live");
+      this.tell("live");
     } else if (state.name === "connecting") {
-      this.latency.textContent = "";
-      this.say(state.attempt === 0 ? "connecting…" : `connecting again (${state.attempt})…`);
+      this.tell(state.attempt === 0 ? "connecting…" : `connecting again (${state.attempt})…`);
     } else if (state.name === "asleep") {
-      this.latency.textContent = "";
-      this.say("resting; move the volume to go on");
+      this.loaded();
+      this.tell("resting; move the volume to go on");
+      this.offlineText.textContent = `Resting: ${state.reason}.`;
     } else if (state.name === "waiting") {
       this.loaded();
       const until = performance.now() + state.delayMs;
       const tell = () => {
         const left = Math.max(0, Math.ceil((until - performance.now()) / 1000));
-        this.latency.textContent = `again in ${left} s`;
+        this.offlineText.textContent = `Offline: ${state.reason}. Again in ${left} s.`;
       };
-      this.say(`connection lost: ${state.reason}`);
+      this.tell(`connection lost: ${state.reason}`);
       tell();
       this.countdown = window.setInterval(tell, 1000);
     }
@@ -93,6 +116,7 @@ export class Status {
   }
 
   progress(phase: string, done: number, etaMs: number | null): void {
+    if (phase.startsWith("loading ")) this.loading.hidden = false; // told of what is slow only
     this.bar.value = done;
     const left = etaMs === null ? "" : `, ${Math.ceil(etaMs / 1000)} s left`;
     this.loadingText.textContent = `${phase}: ${Math.round(100 * done)} %${left}`;

@@ -1,31 +1,42 @@
-// The bar below the picture: time step, play, speed. It shows what it is told and says what the
-// user wants; it holds no step of its own.
+// The bar below the picture: time step, play either way, speed. It shows what it is told and says
+// what the user wants; it holds no step of its own.
 import type { Dataset } from "./protocol";
 import { byId } from "./dom";
 
+export type Direction = 1 | -1; // of time: forward, backward
+
 export interface TimeBarEvents {
   seek(step: number): void;
-  play(): void;
+  scrub(step: number): void; // the slider is being moved
+  scrubbed(): void; // and was let go
+  play(direction: Direction): void;
   pause(): void;
-  settings(): void; // loop or speed changed
+  settings(): void; // loop, speed or dropping changed
 }
 
 export class TimeBar {
   private readonly element = byId("time", HTMLElement);
   private readonly slider = byId("time-slider", HTMLInputElement);
-  private readonly playButton = byId("time-play", HTMLButtonElement);
+  private readonly buttons: [Direction, HTMLButtonElement, string][] = [
+    [1, byId("time-play", HTMLButtonElement), "Play"],
+    [-1, byId("time-reverse", HTMLButtonElement), "Play backward"],
+  ];
   private readonly loopBox = byId("time-loop", HTMLInputElement);
   private readonly speed = byId("time-fps", HTMLSelectElement);
+  private readonly keeping = byId("time-drop", HTMLSelectElement);
   private readonly label = byId("time-label", HTMLElement);
   private readonly stepText = byId("time-step", HTMLElement);
   private count = 0;
   private times: string[] = [];
   private step = 0;
-  private running = false;
+  private running: Direction | 0 = 0;
 
   constructor(private readonly events: TimeBarEvents) {
-    this.slider.addEventListener("input", () => events.seek(Number(this.slider.value)));
-    this.playButton.addEventListener("click", () => this.toggle());
+    this.slider.addEventListener("input", () => events.scrub(Number(this.slider.value)));
+    this.slider.addEventListener("change", () => events.scrubbed());
+    for (const [direction, button] of this.buttons) {
+      button.addEventListener("click", () => this.toggle(direction));
+    }
     const moves: [string, () => number][] = [
       ["time-first", () => 0],
       ["time-previous", () => this.neighbour(-1)],
@@ -37,6 +48,7 @@ export class TimeBar {
     }
     this.loopBox.addEventListener("change", () => events.settings());
     this.speed.addEventListener("change", () => events.settings());
+    this.keeping.addEventListener("change", () => events.settings());
   }
 
   get fps(): number {
@@ -45,6 +57,11 @@ export class TimeBar {
 
   get loop(): boolean {
     return this.loopBox.checked;
+  }
+
+  // Whether steps are left out rather than shown late.
+  get drop(): boolean {
+    return this.keeping.value === "time";
   }
 
   get steps(): number {
@@ -56,10 +73,11 @@ export class TimeBar {
     return (this.step + by + this.count) % this.count;
   }
 
-  toggle(): void {
+  // Plays that way, or stops if it does.
+  toggle(direction: Direction = 1): void {
     if (this.count < 2) return;
-    if (this.running) this.events.pause();
-    else this.events.play();
+    if (this.running === direction) this.events.pause();
+    else this.events.play(direction);
   }
 
   setDataset(dataset: Dataset): void {
@@ -70,7 +88,7 @@ export class TimeBar {
     this.element.inert = this.count < 2;
   }
 
-  show(step: number, running: boolean): void {
+  show(step: number, running: Direction | 0): void {
     this.step = step;
     this.running = running;
     this.slider.value = String(step);
@@ -81,8 +99,10 @@ export class TimeBar {
       "aria-valuetext",
       `step ${step} of ${this.count}${time === "" ? "" : `, ${time}`}`,
     );
-    this.playButton.classList.toggle("running", running);
-    this.playButton.setAttribute("aria-label", running ? "Pause" : "Play");
+    for (const [direction, button, name] of this.buttons) {
+      button.classList.toggle("running", running === direction);
+      button.setAttribute("aria-label", running === direction ? "Pause" : name);
+    }
   }
 }
 

@@ -2,11 +2,9 @@
 // Changes go in as merge patches, become pending until a frame or an error tells their fate, and
 // come out as (rev, patch) to send.
 import type { View } from "./protocol";
+import { isObject } from "./values";
 
 export type Patch = Record<string, unknown>;
-
-const isObject = (value: unknown): value is Patch =>
-  typeof value === "object" && value !== null && !Array.isArray(value);
 
 // RFC 7396, with the wire's exception: null at /vector/field is a value ("no lines").
 export function mergePatch(target: unknown, patch: unknown, pointer = ""): unknown {
@@ -33,6 +31,17 @@ export function withDefaults(defaults: unknown, said: unknown): unknown {
   const filled: Patch = { ...defaults };
   for (const [key, value] of Object.entries(said)) filled[key] = withDefaults(defaults[key], value);
   return filled;
+}
+
+// The same for a view, and for its media too: one that is of the same field in the same place.
+export function completeView(defaults: View, said: View): View {
+  const view = withDefaults(defaults, said) as View;
+  if (!said.scalars || !defaults.scalars) return view;
+  const scalars = said.scalars.map((medium, index) => {
+    const known = defaults.scalars?.[index];
+    return known?.field === medium.field ? (withDefaults(known, medium) as typeof medium) : medium;
+  }) as View["scalars"];
+  return { ...view, scalars };
 }
 
 // The merge patch that turns `old`, or any part of it, into `next`: nulls for what must go, and all
@@ -69,6 +78,11 @@ export class ViewState {
   // The newest view as the user said it. Not to be changed in place.
   get document(): View {
     return this.said;
+  }
+
+  // The newest view that has been answered by a picture.
+  get settled(): View {
+    return this.confirmed;
   }
 
   // Of the newest patch that stands: frames of this rev show what is wanted.

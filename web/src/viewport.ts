@@ -1,17 +1,22 @@
 // Encoded frames -> canvas. Always the newest: a frame that is decoded after a newer one was drawn
-// is not shown. What is shown is also told by data attributes of the canvas (seq, rev, step, level,
-// final), for tests and style sheets alike.
+// is not shown, and one that a newer overtakes before its turn is not decoded, so that however fast
+// frames come no more than three are held. Frames of any size fill the canvas. What is shown is
+// also told by data attributes of the canvas (seq, rev, step, state, level, width, height), for
+// tests and style sheets alike.
+import { frameState } from "./frame_words";
 import type { Frame, FrameHeader } from "./protocol";
+import { clamp } from "./values";
 
 export interface DrawnFrame {
   header: FrameHeader;
   decodeMs: number;
   arrivedAt: number; // performance.now()
+  drawnAt: number; // the same clock
 }
 
 export interface ViewportEvents {
+  decoded(header: FrameHeader, decodeMs: number): void; // since it came, shown or not
   drawn(frame: DrawnFrame): void;
-  stale(header: FrameHeader, decodeMs: number): void; // decoded, not shown
   broken(header: FrameHeader): void; // could not be decoded
   resized(width: number, height: number): void; // pixels to render
 }
@@ -19,6 +24,7 @@ export interface ViewportEvents {
 const pixelsMax = 3.7e6; // a picture of 2560 x 1440; more is not worth its time
 const edgeMax = 4096;
 const densityMax = 2;
+const decodesMax = 2; // at a time; as many as the server sends without an answer
 
 // Pixels to render for an element of this size; never more than it can show.
 export function pictureSize(
@@ -26,7 +32,7 @@ export function pictureSize(
   cssHeight: number,
   density: number,
 ): [number, number] {
-  const wanted = Math.min(Math.max(density, 1), densityMax);
+  const wanted = clamp(density, 1, densityMax);
   const area = Math.max(1, cssWidth * cssHeight);
   const scale = Math.min(
     wanted,
@@ -36,10 +42,32 @@ export function pictureSize(
   return [Math.max(16, Math.round(cssWidth * scale)), Math.max(16, Math.round(cssHeight * scale))];
 }
 
+export interface Size {
+  width: number;
+  height: number;
+}
+
+// Where a picture goes on the canvas: all over it if it is of the same shape, but for what rounding
+// to whole pixels does to a coarse one; otherwise in its own shape in the middle. x, y, width,
+// height.
+export function placeOn(canvas: Size, picture: Size): [number, number, number, number] {
+  const { width, height } = canvas;
+  const expected = (picture.width * height) / width;
+  if (Math.abs(expected - picture.height) <= Math.max(1, 0.03 * picture.height)) {
+    return [0, 0, width, height];
+  }
+  const scale = Math.min(width / picture.width, height / picture.height);
+  const w = picture.width * scale;
+  const h = picture.height * scale;
+  return [(width - w) / 2, (height - h) / 2, w, h];
+}
+
 export class Viewport {
-  private drawnSeq = 0;
+  private drawn: FrameHeader | null = null; // of this session
   private readonly context: CanvasRenderingContext2D;
   private session = 0;
+  private decoding = 0;
+  private waiting: Frame | null = null; // the newest, while as many as may be are decoded
 
   constructor(
     readonly canvas: HTMLCanvasElement,
@@ -50,6 +78,22 @@ export class Viewport {
     this.context = context;
     new ResizeObserver(() => this.report()).observe(canvas);
     window.addEventListener("resize", () => this.report());
+    this.watchDensity();
+  }
+
+  // Another screen or another zoom of the page; the query holds for one density only.
+  private watchDensity(): void {
+    const query = window.matchMedia(`(resolution: ${window.devicePixelRatio}dppx)`);
+    const changed = () => {
+      this.watchDensity();
+      this.report();
+    };
+    query.addEventListener("change", changed, { once: true });
+  }
+
+  // Of the frame on the canvas; null: none of this session.
+  get frame(): FrameHeader | null {
+    return this.drawn;
   }
 
   size(): [number, number] {
@@ -60,10 +104,28 @@ export class Viewport {
   // seq begins anew with each session.
   newSession(): void {
     this.session += 1;
-    this.drawnSeq = 0;
+    this.drawn = null;
+    this.waiting = null;
   }
 
+  // What is overtaken gets no answer of its own: answers count for every frame before them.
   async show(frame: Frame): Promise<void> {
+    if (this.decoding >= decodesMax) {
+      this.waiting = frame;
+      return;
+    }
+    this.decoding += 1;
+    try {
+      await this.decode(frame);
+    } finally {
+      this.decoding -= 1;
+    }
+    const next = this.waiting;
+    this.waiting = null;
+    if (next !== null) await this.show(next);
+  }
+
+  private async decode(frame: Frame): Promise<void> {
     const arrivedAt = performance.now();
     const session = this.session;
     const { header } = frame;
@@ -77,12 +139,13 @@ export class Viewport {
       return;
     }
     const decodeMs = performance.now() - arrivedAt;
-    if (session === this.session && header.seq > this.drawnSeq) {
-      this.drawnSeq = header.seq;
-      this.draw(bitmap, header);
-      this.events.drawn({ header, decodeMs, arrivedAt });
-    } else if (session === this.session) {
-      this.events.stale(header, decodeMs);
+    if (session === this.session) {
+      this.events.decoded(header, decodeMs);
+      if (header.seq > (this.drawn?.seq ?? 0)) {
+        this.draw(bitmap, header);
+        this.drawn = header;
+        this.events.drawn({ header, decodeMs, arrivedAt, drawnAt: performance.now() });
+      }
     }
     bitmap.close();
   }
@@ -91,23 +154,23 @@ export class Viewport {
     const { canvas, context } = this;
     const [width, height] = this.size();
     if (canvas.width !== width || canvas.height !== height) {
-      canvas.width = width;
+      canvas.width = width; // empties the canvas, which is not seen before the picture is on it
       canvas.height = height;
     }
-    // A frame of the size before a resize keeps its shape; rounding of a coarser level does not
-    // count as another shape.
-    const scale = Math.min(width / bitmap.width, height / bitmap.height);
-    const same = Math.abs((bitmap.width * height) / (bitmap.height * width) - 1) < 0.03;
-    const w = same ? width : bitmap.width * scale;
-    const h = same ? height : bitmap.height * scale;
-    if (!same) context.clearRect(0, 0, width, height);
-    context.imageSmoothingQuality = "high";
-    context.drawImage(bitmap, (width - w) / 2, (height - h) / 2, w, h);
+    const place = placeOn(canvas, bitmap);
+    if (place[2] < width || place[3] < height) context.clearRect(0, 0, width, height);
+    context.imageSmoothingEnabled = true;
+    // Without a GPU the better one takes as long as a display frame: only at rest.
+    const state = frameState(header, this.drawn);
+    context.imageSmoothingQuality = state === "moving" ? "low" : "high";
+    context.drawImage(bitmap, ...place);
     canvas.dataset.seq = String(header.seq);
     canvas.dataset.rev = String(header.rev);
     canvas.dataset.step = String(header.step);
+    canvas.dataset.state = state;
     canvas.dataset.level = String(header.level);
-    canvas.dataset.final = String(header.final);
+    canvas.dataset.width = String(header.width);
+    canvas.dataset.height = String(header.height);
   }
 
   private report(): void {

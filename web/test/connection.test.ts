@@ -16,6 +16,7 @@ import type { Frame, HelloMessage, ServerMessage } from "../src/protocol";
 class FakeSocket implements SocketLike {
   binaryType = "blob";
   readyState = 1;
+  bufferedAmount = 0;
   sent: string[] = [];
   closed: { code?: number; reason?: string } | null = null;
   onmessage: ((event: MessageLike) => void) | null = null;
@@ -93,7 +94,9 @@ const vectors = (name: string): Row[] =>
 const hello = JSON.stringify(
   vectors("server_messages").find((row) => row.document.type === "hello")!.document,
 );
-const stats = '{"type": "stats", "frames": 1, "dropped": 0, "cancelled": 0, "bytes": 2}';
+const stats =
+  '{"type": "stats", "frames": 1, "dropped": 0, "cancelled": 0, "bytes": 2, ' +
+  '"playFps": null, "stepsDropped": 0, "stepsNotReady": 0}';
 
 function frameBytes(payload = 3): ArrayBuffer {
   const header = Buffer.from(vectors("frame_headers")[0]!.hex.replaceAll(" ", ""), "hex");

@@ -16,7 +16,7 @@ import {
   slicePatch,
   sliceText,
 } from "../src/controls";
-import { methodText, workLines } from "../src/hud";
+import { methodText, workLines } from "../src/frame_words";
 import { legendEntries, sampleHeights } from "../src/legend_entries";
 import type { ChosenMessage, Dataset, Field, View } from "../src/protocol";
 import { compassTicks } from "../src/ticks";
@@ -86,7 +86,11 @@ test("a slice begins in the middle of an axis that has layers, and tells where i
 
 test("colour by another quantity forgets the range, and a scalar is named", () => {
   assert.deepEqual(colorByPatch(dataset, {}, "direction"), {
-    vector: { color: { by: "direction", range: null } },
+    vector: { color: { by: "direction", range: null, map: "compass" } },
+  });
+  const turned: View = { vector: { color: { map: "compass" } } };
+  assert.deepEqual(colorByPatch(dataset, turned, "magnitude"), {
+    vector: { color: { by: "magnitude", range: null, map: null } },
   });
   assert.deepEqual(colorByPatch(dataset, {}, "scalar"), {
     vector: { color: { by: "scalar", range: null, field: "cloud" } },

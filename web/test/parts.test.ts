@@ -2,7 +2,6 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { FrameRate, networkMs } from "../src/hud";
 import { gesture, MoveQueue } from "../src/input";
 import { legendEntries, sampleHeights, unitText } from "../src/legend_entries";
 import { hashOfView, viewOfHash } from "../src/link";
@@ -17,7 +16,7 @@ import {
   type Layer,
 } from "../src/media";
 import { patchAt, valueAt } from "../src/panel_kit";
-import type { Dataset, FrameHeader, View } from "../src/protocol";
+import type { Dataset, View } from "../src/protocol";
 import { problemText } from "../src/status";
 import { axisTicks, formatBytes, formatNumber, linearTicks, niceTicks } from "../src/ticks";
 import { readableTime } from "../src/time_bar";
@@ -86,6 +85,7 @@ const dataset: Dataset = {
     },
   ],
   leftOut: [],
+  notes: [],
   steps: { count: 1, times: [{ value: 0, text: "" }] },
   timeUnits: "",
   residentBytes: 0,
@@ -203,6 +203,19 @@ test("each way of colouring has its unit; one colour has no range", () => {
   assert.equal(constant!.range, null);
   assert.equal(constant!.color, "#ff0000");
   assert.match(constant!.note, /60 m s⁻¹/);
+});
+
+test("the legend tells what is too slow to be drawn, in the field's unit", () => {
+  const told = (minMagnitude: number | undefined, units = "m s-1") => {
+    const fields = dataset.fields.map((field) => ({ ...field, units }));
+    const view: View = { vector: { field: "wind", minMagnitude }, scalars: [{ field: "cloud" }] };
+    return legendEntries({ ...dataset, fields }, view).map((entry) => entry.leftOut);
+  };
+  assert.deepEqual(told(3), ["slower than 3 m s⁻¹ not drawn", ""]);
+  assert.equal(told(12.5, "km/h")[0], "slower than 12.5 km/h not drawn");
+  assert.equal(told(0.5, "V m-1")[0], "weaker than 0.5 V m⁻¹ not drawn");
+  assert.equal(told(0.25, "1")[0], "weaker than 0.25 not drawn");
+  for (const all of [0, undefined]) assert.deepEqual(told(all), ["", ""]);
 });
 
 test("powers in units are raised, anything else stays", () => {
@@ -368,8 +381,9 @@ test("two fingers have a centre and a spread", () => {
   );
 });
 
-test("however many moves come, one camera a display frame goes out", () => {
-  let camera: Camera = {
+// A camera that counts how often it is told, on a page whose display frames come when asked for.
+class Desk {
+  camera: Camera = {
     projection: "perspective",
     eye: [0, -1, 0],
     target: [0, 0, 0],
@@ -377,25 +391,63 @@ test("however many moves come, one camera a display frame goes out", () => {
     fovY: 35,
     height: 1,
   };
-  const frames: (() => void)[] = [];
-  let told = 0;
-  const queue = new MoveQueue(
+  told = 0;
+  isReady = true;
+  private frames: (() => void)[] = [];
+  readonly queue = new MoveQueue(
     {
-      camera: () => camera,
+      camera: () => this.camera,
       setCamera: (next) => {
-        camera = next;
-        told += 1;
+        this.camera = next;
+        this.told += 1;
       },
+      ready: () => this.isReady,
     },
-    (run) => frames.push(run),
+    (run) => this.frames.push(run),
   );
-  for (let n = 0; n < 50; n++) queue.push((c) => ({ ...c, height: c.height + 1 }));
-  assert.equal(frames.length, 1);
-  frames.pop()!();
-  assert.equal(told, 1);
-  assert.equal(camera.height, 51, "and none of them is lost");
-  queue.push((c) => c);
-  assert.equal(frames.length, 1, "the next display frame is asked for anew");
+
+  grow(times: number): void {
+    for (let n = 0; n < times; n++) this.queue.push((c) => ({ ...c, height: c.height + 1 }));
+  }
+
+  get asked(): number {
+    return this.frames.length;
+  }
+
+  displayFrame(): void {
+    for (const run of this.frames.splice(0)) run();
+  }
+}
+
+test("the first move goes out at once, and what comes until the next display frame as one", () => {
+  const desk = new Desk();
+  desk.grow(50);
+  assert.deepEqual([desk.told, desk.camera.height], [1, 2], "the first does not wait");
+  assert.equal(desk.asked, 1);
+  desk.displayFrame();
+  assert.deepEqual([desk.told, desk.camera.height], [2, 51], "none of the others is lost");
+  desk.grow(1);
+  assert.equal(desk.told, 2, "one patch a display frame");
+  desk.displayFrame();
+  assert.equal(desk.told, 3);
+  desk.displayFrame();
+  assert.deepEqual([desk.told, desk.asked], [3, 0], "at rest no display frames are asked for");
+  desk.grow(1);
+  assert.equal(desk.told, 4, "and the next one is a first one again");
+});
+
+test("while the link holds patches up, moves are gathered and the newest wins", () => {
+  const desk = new Desk();
+  desk.isReady = false;
+  desk.grow(3);
+  for (let n = 0; n < 10; n++) {
+    desk.displayFrame();
+    desk.grow(1);
+  }
+  assert.equal(desk.told, 0);
+  desk.isReady = true;
+  desk.displayFrame();
+  assert.deepEqual([desk.told, desk.camera.height], [1, 14]);
 });
 
 test("the picture is as sharp as the screen up to what is worth it", () => {
@@ -412,20 +464,6 @@ test("the picture is as sharp as the screen up to what is worth it", () => {
     assert.ok(width * height <= 3.71e6 && width <= 4096 && height <= 4096);
     assert.ok(Math.abs(width / height / (w / h) - 1) < 0.02);
   }
-});
-
-test("network time is what the server's own times do not explain, told once a patch", () => {
-  const header = { t: 1000, queueUs: 1000, renderUs: 20_000, encodeUs: 4000 } as FrameHeader;
-  assert.equal(networkMs(header, 1040, 0), 15);
-  assert.equal(networkMs(header, 1040, 1000), null);
-  assert.equal(networkMs(header, 1010, 0), 0, "never negative");
-});
-
-test("the frame rate counts the last second", () => {
-  const rate = new FrameRate();
-  for (let now = 0; now < 2000; now += 100) rate.add(now);
-  assert.equal(rate.value(1950), 10);
-  assert.equal(rate.value(9000), 0);
 });
 
 test("times are readable and unknown ones stay as they are", () => {

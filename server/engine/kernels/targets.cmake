@@ -17,7 +17,9 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   list(APPEND kernel_flags -fno-ipa-pure-const -fno-ipa-modref)
 endif()
 target_sources(windsplat_engine PRIVATE ${kernel_dir}/dispatch.cpp ${kernel_dir}/portable.cpp)
-set_source_files_properties(${kernel_dir}/portable.cpp PROPERTIES COMPILE_OPTIONS "${kernel_flags}")
+set_source_files_properties(${kernel_dir}/portable.cpp PROPERTIES
+  COMPILE_OPTIONS "${kernel_flags}"
+  SKIP_UNITY_BUILD_INCLUSION ON)
 
 set(WINDSPLAT_KERNELS sse4 avx2 avx512 CACHE STRING "Instruction sets besides the portable one")
 set(kernel_processor_sse4 x86-64-v2)
@@ -30,6 +32,7 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     target_sources(windsplat_engine PRIVATE ${kernel_dir}/${name}.cpp)
     set_source_files_properties(${kernel_dir}/${name}.cpp PROPERTIES
       COMPILE_OPTIONS "${kernel_flags};-march=${kernel_processor_${name}}"
-      COMPILE_DEFINITIONS HWY_DISABLE_PCLMUL_AES)
+      COMPILE_DEFINITIONS HWY_DISABLE_PCLMUL_AES
+      SKIP_UNITY_BUILD_INCLUSION ON)
   endforeach()
 endif()

@@ -488,11 +488,29 @@ ScreenBox ribbon_box(const Ribbon& line) {
           std::min(line.y0, line.y1) - line.r2, std::max(line.y0, line.y1) + line.r2};
 }
 
-Kernels list_kernels(const Scene& scene, const View& view) {
+KernelBounds kernel_bounds(const Scene& scene) {
+  KernelBounds bounds;
+  for (const LayerGroup& group : group_layers(scene)) {
+    std::uint64_t stops = 1;
+    for (const auto& axis : group.axis) stops *= axis.size();
+    if (group.lines != nullptr) bounds.ribbons += stops;
+    if (!group.media.empty()) bounds.splats += stops;
+  }
+  return bounds;
+}
+
+Kernels list_kernels(const Scene& scene, const View& view, const CancelToken& cancel) {
   Kernels kernels;
+  list_kernels(scene, view, cancel, kernels);
+  return kernels;
+}
+
+void list_kernels(const Scene& scene, const View& view, const CancelToken& cancel,
+                  Kernels& kernels) {
   for (const LayerGroup& group : group_layers(scene)) {
     for (const AxisStop& z : group.axis[2]) {
       for (const AxisStop& y : group.axis[1]) {
+        if (cancel.cancelled()) return;
         for (const AxisStop& x : group.axis[0]) {
           const Stop stop = make_stop(scene, view, {x, y, z});
           if (!stop.has_cell || (view.perspective && stop.centre[2] < view.near)) continue;
@@ -508,7 +526,6 @@ Kernels list_kernels(const Scene& scene, const View& view) {
       }
     }
   }
-  return kernels;
 }
 
 }  // namespace windsplat::engine::reference

@@ -6,9 +6,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
+#include "server/base/cancel.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::engine::reference {
@@ -159,6 +161,16 @@ struct Kernels {
   std::vector<ScreenBox> splat_boxes;
   std::vector<Ribbon> ribbons;
 };
-Kernels list_kernels(const scene::Scene& scene, const View& view);
+// Cancelled: not all of them.
+Kernels list_kernels(const scene::Scene& scene, const View& view, const CancelToken& cancel = {});
+// The same, added to what there is; no vector grows that has room.
+void list_kernels(const scene::Scene& scene, const View& view, const CancelToken& cancel,
+                  Kernels& kernels);
+// The most kernels that the scene may list, seen from anywhere.
+struct KernelBounds {
+  std::uint64_t splats = 0;
+  std::uint64_t ribbons = 0;
+};
+KernelBounds kernel_bounds(const scene::Scene& scene);
 
 }  // namespace windsplat::engine::reference

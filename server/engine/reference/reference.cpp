@@ -10,60 +10,11 @@
 #include "server/engine/reference/kernels.hpp"
 #include "server/engine/reference/profile.hpp"
 #include "server/engine/reference/ray.hpp"
+#include "server/engine/reference/screen_grid.hpp"
 
 namespace windsplat::engine::reference {
 
 namespace {
-
-// ---- which kernels may cover a pixel ----
-
-constexpr int tile_side = 8;  // pixels
-
-struct PixelRange {
-  int x0 = 0, x1 = -1, y0 = 0, y1 = -1;  // both ends included
-};
-
-// Pixels of [0, size) whose middle may lie within [low, high].
-std::pair<int, int> pixels_between(double low, double high, int size) {
-  const double first = std::clamp(std::floor(low - 0.5), 0.0, static_cast<double>(size));
-  const double last = std::clamp(std::ceil(high - 0.5), -1.0, size - 1.0);
-  return {static_cast<int>(first), static_cast<int>(last)};
-}
-
-// Lists of kernels by tile, each ascending.
-class ScreenGrid {
- public:
-  ScreenGrid(int width, int height)
-      : width_(width),
-        height_(height),
-        columns_((width + tile_side - 1) / tile_side),
-        rows_((height + tile_side - 1) / tile_side) {
-    lists_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
-  }
-
-  void add(const ScreenBox& box, std::uint32_t id) {
-    const auto [x0, x1] = pixels_between(box.x0, box.x1, width_);
-    const auto [y0, y1] = pixels_between(box.y0, box.y1, height_);
-    if (x1 < x0 || y1 < y0) return;
-    for (int ty = y0 / tile_side; ty <= y1 / tile_side; ++ty) {
-      for (int tx = x0 / tile_side; tx <= x1 / tile_side; ++tx) list(tx, ty).push_back(id);
-    }
-  }
-
-  [[nodiscard]] const std::vector<std::uint32_t>& at(int x, int y) const {
-    return lists_[static_cast<std::size_t>(y / tile_side) * static_cast<std::size_t>(columns_) +
-                  static_cast<std::size_t>(x / tile_side)];
-  }
-
- private:
-  std::vector<std::uint32_t>& list(int tx, int ty) {
-    return lists_[static_cast<std::size_t>(ty) * static_cast<std::size_t>(columns_) +
-                  static_cast<std::size_t>(tx)];
-  }
-
-  int width_, height_, columns_, rows_;
-  std::vector<std::vector<std::uint32_t>> lists_;
-};
 
 // ---- the medium along a ray ----
 
@@ -86,6 +37,16 @@ struct Stretch {
 class SplatMedium {
  public:
   explicit SplatMedium(const Profile& profile) : profile_(profile) {}
+
+  // Of `splats` on one ray.
+  static std::uint64_t bytes_for(std::uint64_t splats) {
+    return splats * (2 * sizeof(Stretch) + breaks_each * sizeof(double));
+  }
+  void make_room(std::size_t splats) {
+    stretches_.reserve(splats);
+    active_.reserve(splats);
+    breaks_.reserve(breaks_each * splats);
+  }
 
   void start(const Ray& ray, double nearest) {
     ray_ = ray;
@@ -159,6 +120,8 @@ class SplatMedium {
   }
 
  private:
+  static constexpr std::size_t breaks_each = 4;
+
   void add_break(double depth) { breaks_.push_back(std::max(depth, nearest_)); }
 
   const Profile& profile_;
@@ -184,6 +147,15 @@ struct Frame {
 class Painter {
  public:
   Painter(const Frame& frame, const Profile& profile) : frame_(frame), medium_(profile) {}
+
+  // For a pixel that so many may cover; sorting takes as much again for sheets.
+  static std::uint64_t bytes_for(std::uint64_t splats, std::uint64_t ribbons) {
+    return SplatMedium::bytes_for(splats) + 2 * ribbons * sizeof(Sheet);
+  }
+  void make_room(std::size_t splats, std::size_t ribbons) {
+    medium_.make_room(splats);
+    sheets_.reserve(ribbons);
+  }
 
   Light pixel(int x, int y, RayCount& count) {
     const View& view = frame_.view;
@@ -227,47 +199,139 @@ class Painter {
   std::vector<Sheet> sheets_;
 };
 
+Error unwanted() { return make_error(ErrorKind::cancelled, "the reference was cancelled"); }
+
 }  // namespace
+
+struct Painting::State {
+  State(const scene::Scene& scene, const Options& options)
+      : view(make_view(scene.camera)),
+        splats(scene.camera.width, scene.camera.height),
+        ribbons(scene.camera.width, scene.camera.height),
+        rules(make_rules()),
+        frame{view, kernels, splats, ribbons, rules, options.tolerance} {}
+
+  Result<void> reserve_bytes(std::uint64_t bytes, const Reserve& reserve) {
+    auto held = reserve(bytes);
+    if (!held) return held.error();
+    reserved.push_back(std::move(*held));
+    return {};
+  }
+
+  // Room for all that there may be, so that nothing grows beyond what was counted. Of what is not
+  // used, nothing becomes resident.
+  Result<void> make_room_for_kernels(const scene::Scene& scene, const Reserve& reserve) {
+    const KernelBounds bounds = kernel_bounds(scene);
+    const std::uint64_t bytes =
+        bounds.splats * (sizeof(Splat) + sizeof(ScreenBox)) + bounds.ribbons * sizeof(Ribbon);
+    if (auto held = reserve_bytes(bytes, reserve); !held) return held;
+    kernels.splats.reserve(bounds.splats);
+    kernels.splat_boxes.reserve(bounds.splats);
+    kernels.ribbons.reserve(bounds.ribbons);
+    return {};
+  }
+
+  Result<void> list_by_tiles(unsigned workers, const CancelToken& cancel, const Reserve& reserve) {
+    const auto splat = [this](std::size_t id) { return kernels.splat_boxes[id]; };
+    const auto ribbon = [this](std::size_t id) { return ribbon_box(kernels.ribbons[id]); };
+    const std::size_t splats_all = kernels.splats.size();
+    const std::size_t ribbons_all = kernels.ribbons.size();
+    if (!splats.count(splats_all, splat, cancel) || !ribbons.count(ribbons_all, ribbon, cancel)) {
+      return unwanted();
+    }
+    if (reserve) {
+      const std::uint64_t work = workers * Painter::bytes_for(splats.longest(), ribbons.longest());
+      auto held = reserve_bytes(splats.bytes() + ribbons.bytes() + work, reserve);
+      if (!held) return held;
+    }
+    if (!splats.fill(splats_all, splat, cancel) || !ribbons.fill(ribbons_all, ribbon, cancel)) {
+      return unwanted();
+    }
+    kernels.splat_boxes = std::vector<ScreenBox>();
+    return {};
+  }
+
+  std::vector<std::shared_ptr<const void>> reserved;  // given back last
+  View view;
+  Kernels kernels;
+  ScreenGrid splats, ribbons;
+  Rules rules;
+  Profile profile;
+  Frame frame;
+  std::vector<Painter> painters;
+  std::vector<RayCount> counts;  // by worker
+};
+
+Painting::Painting(std::unique_ptr<State> state) : state_(std::move(state)) {}
+
+Result<std::unique_ptr<Painting>> Painting::begin(const scene::Scene& scene, unsigned workers,
+                                                  const CancelToken& cancel, const Options& options,
+                                                  const Reserve& reserve) {
+  if (cancel.cancelled()) return unwanted();
+  auto state = std::make_unique<State>(scene, options);
+  if (reserve) {
+    if (auto room = state->make_room_for_kernels(scene, reserve); !room) return room.error();
+  }
+  list_kernels(scene, state->view, cancel, state->kernels);
+  if (cancel.cancelled()) return unwanted();
+  if (auto listed = state->list_by_tiles(workers, cancel, reserve); !listed) return listed.error();
+  state->counts.resize(workers);
+  state->painters.reserve(workers);
+  for (unsigned worker = 0; worker < workers; ++worker) {
+    state->painters.emplace_back(state->frame, state->profile);
+    state->painters.back().make_room(state->splats.longest(), state->ribbons.longest());
+  }
+  return std::unique_ptr<Painting>(new Painting(std::move(state)));
+}
+
+Painting::~Painting() = default;
+
+bool Painting::draw(int row, int x0, int x1, unsigned worker, const CancelToken& cancel,
+                    double* to) {
+  Painter& painter = state_->painters[worker];
+  RayCount count;
+  int x = x0;
+  for (; x < x1 && !cancel.cancelled(); ++x, to += 4) {
+    const Light light = painter.pixel(x, row, count);
+    std::copy(light.rgb.begin(), light.rgb.end(), to);
+    to[3] = std::min(light.alpha, 1.0);
+  }
+  state_->counts[worker].pieces += count.pieces;
+  state_->counts[worker].evaluations += count.evaluations;
+  return x == x1;
+}
+
+std::int64_t Painting::pieces() const {
+  std::int64_t sum = 0;
+  for (const RayCount& count : state_->counts) sum += count.pieces;
+  return sum;
+}
+
+std::int64_t Painting::evaluations() const {
+  std::int64_t sum = 0;
+  for (const RayCount& count : state_->counts) sum += count.evaluations;
+  return sum;
+}
 
 Result<Picture> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel,
                        const Options& options, const std::function<void(int)>& progress) {
-  const int width = scene.camera.width;
-  const int height = scene.camera.height;
-  const View view = make_view(scene.camera);
-  const Kernels kernels = list_kernels(scene, view);
-  ScreenGrid splats(width, height);
-  ScreenGrid ribbons(width, height);
-  for (std::size_t i = 0; i < kernels.splats.size(); ++i) {
-    splats.add(kernels.splat_boxes[i], static_cast<std::uint32_t>(i));
-  }
-  for (std::size_t i = 0; i < kernels.ribbons.size(); ++i) {
-    ribbons.add(ribbon_box(kernels.ribbons[i]), static_cast<std::uint32_t>(i));
-  }
-  const Rules rules = make_rules();
-  const Profile profile;
-  const Frame frame{view, kernels, splats, ribbons, rules, options.tolerance};
-  std::vector<Painter> painters(pool.size(), Painter(frame, profile));
+  const auto begun = Painting::begin(scene, pool.size(), cancel, options);
+  if (!begun) return begun.error();
+  Painting& painting = **begun;
   Picture picture;
-  picture.width = width;
-  picture.height = height;
-  picture.rgba.assign(4 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 0.0);
-  std::vector<RayCount> counts(static_cast<std::size_t>(height));
+  picture.width = scene.camera.width;
+  picture.height = scene.camera.height;
+  const std::size_t row_values = 4 * static_cast<std::size_t>(picture.width);
+  picture.rgba.assign(row_values * static_cast<std::size_t>(picture.height), 0.0);
   std::atomic<int> rows_done{0};
-  pool.run(counts.size(), [&](std::size_t row, unsigned worker) {
-    double* to = picture.rgba.data() + 4 * row * static_cast<std::size_t>(width);
-    for (int x = 0; x < width; ++x, to += 4) {
-      if (cancel.cancelled()) return;
-      const Light light = painters[worker].pixel(x, static_cast<int>(row), counts[row]);
-      std::copy(light.rgb.begin(), light.rgb.end(), to);
-      to[3] = std::min(light.alpha, 1.0);
-    }
-    if (progress) progress(++rows_done);
+  pool.run(static_cast<std::size_t>(picture.height), [&](std::size_t row, unsigned worker) {
+    double* const to = picture.rgba.data() + row * row_values;
+    const bool done = painting.draw(static_cast<int>(row), 0, picture.width, worker, cancel, to);
+    if (done && progress) progress(++rows_done);
   });
-  if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "the reference was cancelled");
-  for (const RayCount& count : counts) {
-    picture.pieces += count.pieces;
-    picture.evaluations += count.evaluations;
-  }
+  if (cancel.cancelled()) return unwanted();
+  picture.pieces = painting.pieces();
+  picture.evaluations = painting.evaluations();
   return picture;
 }
 

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "server/base/cancel.hpp"
@@ -34,6 +35,38 @@ struct Picture {
 // progress (may be empty) is called with the rows done so far, from any worker. Errors: cancelled.
 Result<Picture> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel,
                        const Options& options = {}, const std::function<void(int)>& progress = {});
+
+// Counts bytes of work in a limit while the answer is held.
+using Reserve = std::function<Result<std::shared_ptr<const void>>(std::uint64_t bytes)>;
+
+// Such a picture, drawn bit by bit: the same pixels, whatever is drawn first and by whom.
+class Painting {
+ public:
+  // Lists the kernels, of which it keeps what it needs: the scene may go. `workers`: how many may
+  // draw at a time. `reserve` is asked before there is anything, for as many kernels as there may
+  // be, and before the lists of which tiles they cover, for those; empty: nothing is counted.
+  // Errors: cancelled; those of `reserve`.
+  static Result<std::unique_ptr<Painting>> begin(const scene::Scene& scene, unsigned workers,
+                                                 const CancelToken& cancel,
+                                                 const Options& options = {},
+                                                 const Reserve& reserve = {});
+  ~Painting();
+  Painting(const Painting&) = delete;
+  Painting& operator=(const Painting&) = delete;
+
+  // Pixels [x0, x1) of a row into 4 values each, by a worker of which no other call has the number.
+  // False where it was cancelled: not all of them.
+  bool draw(int row, int x0, int x1, unsigned worker, const CancelToken& cancel, double* to);
+  // So far.
+  [[nodiscard]] std::int64_t pieces() const;
+  [[nodiscard]] std::int64_t evaluations() const;
+
+ private:
+  struct State;
+  explicit Painting(std::unique_ptr<State> state);
+
+  std::unique_ptr<State> state_;
+};
 
 // K(r), r in cells: the 3-D kernel whose integral along a line at distance r from its middle is the
 // splat's footprint g(r) (its inverse Abel transform). K >= 0, and 0 from r = 1.37 on.

@@ -69,6 +69,16 @@ TEST_F(WholeFile, IsMadeAndReplacedAndLeavesNothingBesideIt) {
   EXPECT_EQ(entries(), 1);
 }
 
+TEST_F(WholeFile, WhatIsSyncedIsWrittenTheSameWay) {
+  const fs::path path = folder_ / "a.json";
+  ASSERT_TRUE(write_whole_file(path, "first", Sync::now));
+  ASSERT_TRUE(write_whole_file(path, "second", Sync::now));
+  EXPECT_EQ(read(path), "second");
+  EXPECT_EQ(entries(), 1);
+  EXPECT_TRUE(sync_folder(folder_));
+  EXPECT_FALSE(sync_folder(path)) << "is no folder";
+}
+
 TEST_F(WholeFile, AReaderOfTheOldOneKeepsIt) {
   const fs::path path = folder_ / "a.png";
   ASSERT_TRUE(write_whole_file(path, "the old one"));
@@ -116,7 +126,9 @@ TEST_F(WholeFile, WhatIsNoRegularFileIsWrittenToAndStays) {
 
   const fs::path full = folder_ / "full.png";  // every write to /dev/full fails
   fs::create_symlink("/dev/full", full);
-  EXPECT_FALSE(write_whole_file(full, "bytes"));
+  const auto refused = write_whole_file(full, "bytes");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::out_of_memory) << "the disk is full";
   EXPECT_TRUE(fs::is_symlink(full));
 
   const fs::path folder = folder_ / "folder.png";

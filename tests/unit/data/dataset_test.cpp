@@ -85,7 +85,7 @@ TEST(FinishVolume, AllMaskedHasRangeZero) {
 TEST(FinishVolume, RefusesAVolumeOfTheWrongSize) {
   Volume volume;
   volume.dims = {2, 2, 2};
-  volume.values.resize(7);
+  volume.values = Samples(7);
   EXPECT_THROW(finish_volume(volume), std::logic_error);
 }
 

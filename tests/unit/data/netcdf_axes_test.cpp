@@ -110,8 +110,8 @@ TEST_P(AnyOrder, AndAnyDirectionGiveTheSameVolume) {
     expect_placed(info, *first);
     auto second = source->read(0, 1);
     ASSERT_TRUE(second);
-    for (float& value : second->values) {
-      value = -value;
+    for (std::size_t n = 0; n < second->values.size(); ++n) {
+      second->values[n] *= -1;
     }
     expect_placed(info, *second);
   }
@@ -183,7 +183,135 @@ INSTANTIATE_TEST_SUITE_P(
                     VerticalCase{"lev", "1", "atmosphere_sigma_coordinate", "", AxisKind::level,
                                  true},
                     VerticalCase{"lev", "", "model_level_number", "", AxisKind::level, false},
-                    VerticalCase{"isobaric1", "", "", "", AxisKind::pressure, true}));
+                    VerticalCase{"isobaric1", "", "", "", AxisKind::pressure, true},
+                    VerticalCase{"pres", "dbar", "", "", AxisKind::depth, true},
+                    VerticalCase{"pres", "Pa", "sea_water_pressure", "", AxisKind::depth, true},
+                    VerticalCase{"p", "decibar", "sea_water_pressure", "up", AxisKind::depth, true},
+                    VerticalCase{"p", "dbar", "air_pressure", "", AxisKind::pressure, true},
+                    VerticalCase{"sigma", "sigma_level", "", "", AxisKind::level, true},
+                    VerticalCase{"sigma", "sigma_level", "", "up", AxisKind::level, false},
+                    VerticalCase{"lev", "sigma_level", "", "", AxisKind::level, false}));
+
+TEST(NetcdfAxes, ValuesTellTheWayWherePositiveIsSilent) {
+  struct Case {
+    const char* name;
+    const char* units;
+    const char* standard_name;
+    const char* positive;
+    std::vector<double> stored;
+    AxisKind kind;
+    double lowest;
+  };
+  const std::vector<Case> cases{
+      {"depth", "m", "", "", {-5, -100, -500}, AxisKind::height, -500},
+      {"depth", "m", "depth", "", {-500, -100, 0}, AxisKind::height, -500},
+      {"depth", "m", "", "", {0, 100, 500}, AxisKind::depth, 500},
+      {"depth", "m", "", "", {-1, 100, 500}, AxisKind::depth, 500},
+      {"depth", "m", "", "down", {-500, -100, -5}, AxisKind::depth, -5},
+      {"lev", "sigma_level", "", "", {0.1, 0.5, 0.995}, AxisKind::level, 0.995},
+      {"sigma", "1", "", "", {0, -0.5, -1}, AxisKind::level, -1}};
+  for (const Case& c : cases) {
+    const Folder folder;
+    {
+      NetcdfMaker file(folder / "v.nc");
+      const int z = file.axis(c.name, c.stored, c.units, c.standard_name);
+      if (*c.positive != '\0') file.text(file.variable_id(c.name), "positive", c.positive);
+      const int y = file.axis("lat", {0, 1}, "degrees_north");
+      const int x = file.axis("lon", {0, 1}, "degrees_east");
+      file.variable("uo", NC_DOUBLE, {z, y, x}, counting(12));
+      file.variable("vo", NC_DOUBLE, {z, y, x}, counting(12));
+    }
+    auto source = open_good(folder / "v.nc");
+    ASSERT_NE(source, nullptr);
+    const Axis& axis = source->info().grid.axes[2];
+    EXPECT_EQ(axis.kind, c.kind) << c.name << c.stored[0];
+    EXPECT_EQ(axis.coordinates.front(), c.lowest) << c.name << c.stored[0];
+    const auto& notes = source->info().notes;
+    EXPECT_EQ(std::any_of(notes.begin(), notes.end(),
+                          [](const std::string& note) {
+                            return note.find("taken for heights") != std::string::npos;
+                          }),
+              c.kind == AxisKind::height);
+  }
+}
+
+TEST(NetcdfAxes, OceanPressureIsNoAir) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "o.nc");
+    const int z = file.axis("pres", {0, 10, 1000}, "dbar", "sea_water_pressure");
+    const int y = file.axis("lat", {0, 1}, "degrees_north");
+    const int x = file.axis("lon", {0, 1}, "degrees_east");
+    file.variable("t", NC_DOUBLE, {z, y, x}, counting(12));
+  }
+  auto source = open_good(folder / "o.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().fields.size(), 1U);  // no height of the standard atmosphere
+  EXPECT_EQ(source->info().grid.axes[2].coordinates, (std::vector<double>{1000, 10, 0}));
+}
+
+// A second dimension along one axis that is 1 long needs no place, wherever it stands.
+TEST(NetcdfAxes, ASecondTimeOrLevelOfLengthOneIsPassedOver) {
+  for (const int second : {0, 1, 2, 3}) {
+    const Folder folder;
+    {
+      NetcdfMaker file(folder / "s.nc");
+      const int reference = file.axis("reft", {0}, "hours since 2000-01-01");
+      const int t = file.axis("time", {0, 6}, "hours since 2000-01-01", "time");
+      const int height = file.axis("height", {2}, "m", "height");
+      const int z = file.axis("lev", {1000, 500, 200}, "hPa");
+      const int y = file.axis("lat", {0, 10}, "degrees_north");
+      const int x = file.axis("lon", {0, 90}, "degrees_east");
+      std::vector<int> dims{t, z, y, x};
+      if (second < 2) dims.insert(dims.begin() + second, reference);
+      if (second >= 2) dims.insert(dims.begin() + second - 1, height);
+      file.variable("f", NC_FLOAT, dims, counting(24));
+    }
+    auto source = open_good(folder / "s.nc");
+    ASSERT_NE(source, nullptr) << second;
+    EXPECT_EQ(source->info().grid.dims(), (std::array<int, 3>{2, 2, 3}));
+    ASSERT_EQ(source->info().steps.size(), 2U);
+    EXPECT_EQ(source->read(0, 1)->values[4], 16) << second;
+  }
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "u.nc");  // five without a role: the long ones have the places
+    const std::vector<int> dims{file.dimension("a", 1), file.dimension("b", 2),
+                                file.dimension("c", 1), file.dimension("d", 3),
+                                file.dimension("e", 4)};
+    file.variable("f", NC_FLOAT, dims, counting(24));
+  }
+  auto source = open_good(folder / "u.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().grid.dims(), (std::array<int, 3>{4, 3, 2}));
+}
+
+TEST(NetcdfAxes, TimesOutOfOrderAreNoted) {
+  struct Case {
+    std::vector<double> times;
+    std::string note;
+  };
+  for (const Case& c :
+       {Case{{0, 6, 12}, ""}, Case{{12, 0, 6}, "'time' goes back once: "},
+        Case{{0, 6, 6, 6}, "'time' stands still 2 times: "},
+        Case{{0, 0, 6, 1, 0}, "'time' goes back 2 times and stands still once: "}}) {
+    const Folder folder;
+    {
+      NetcdfMaker file(folder / "t.nc");
+      const int t = file.axis("time", c.times, "hours since 2000-01-01");
+      const int y = file.axis("y", {0, 1}, "m");
+      const int x = file.axis("x", {0, 1}, "m");
+      file.variable("f", NC_FLOAT, {t, y, x}, counting(4 * c.times.size()));
+    }
+    auto source = open_good(folder / "t.nc");
+    ASSERT_NE(source, nullptr);
+    EXPECT_EQ(source->info().steps.size(), c.times.size());
+    const auto& notes = source->info().notes;
+    EXPECT_EQ(notes.size(), c.note.empty() ? 0U : 1U);
+    if (notes.empty()) continue;
+    EXPECT_EQ(notes[0].find(c.note), 0U) << notes[0];
+  }
+}
 
 TEST(NetcdfAxes, RecognisesAxesByTheAxisAttributeAgainstTheNames) {
   const Folder folder;

@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "netcdf_maker.hpp"
-#include "server/data/cf_fields.hpp"
+#include "server/data/cf/fields.hpp"
 #include "server/data/dataset.hpp"
 
 namespace windsplat::data::test {
@@ -156,7 +156,9 @@ TEST(NetcdfFields, AVectorsInfoSpeaksForItsComponents) {
   auto source = open_file(folder / "w.nc");
   ASSERT_TRUE(source) << source.error().message;
   const DatasetInfo& info = (*source)->info();
-  ASSERT_EQ(info.fields.size(), 4U);
+  ASSERT_EQ(info.fields.size(), 6U);  // wind, its three components, and what they make
+  EXPECT_EQ(info.fields[4].name, "standard_height");
+  EXPECT_EQ(info.fields[5].name, "wind_m");
   const FieldInfo& wind = info.fields[0];
   EXPECT_EQ(wind.name, "wind");
   EXPECT_EQ(wind.kind, FieldKind::vector);
@@ -210,9 +212,10 @@ TEST(NetcdfFields, TheLargestGridWinsAndEverythingElseIsExplained) {
   auto source = open_file(folder / "many.nc");
   ASSERT_TRUE(source) << source.error().message;
   const DatasetInfo& info = (*source)->info();
-  ASSERT_EQ(info.fields.size(), 2U);
+  ASSERT_EQ(info.fields.size(), 3U);
   EXPECT_EQ(info.fields[0].name, "cloud");
   EXPECT_EQ(info.fields[1].name, "orography");
+  EXPECT_TRUE(info.fields[2].derived);  // standard_height
   std::map<std::string, std::string> reasons;
   for (const LeftOut& left : info.left_out) {
     reasons[left.name] = left.reason;
@@ -225,7 +228,7 @@ TEST(NetcdfFields, TheLargestGridWinsAndEverythingElseIsExplained) {
   EXPECT_EQ(reasons["hyam"], "fewer than two spatial dimensions");
   EXPECT_EQ(reasons["spread"], "its dimension 'member' is neither space nor time");
   EXPECT_EQ(reasons["empty"], "its dimension 'obs' has length 0");
-  EXPECT_EQ(reasons["inner"], "group: only variables outside groups are read");
+  EXPECT_EQ(reasons["/inner"], "group: to see it, name it behind the file's name and '#'");
   EXPECT_EQ(reasons.count("cloud"), 0U);
   // What does not depend on time is the same at each.
   auto first = (*source)->read(1, 0);

@@ -7,8 +7,8 @@
 #include <memory>
 
 #include "netcdf_maker.hpp"
-#include "server/data/classic_header.hpp"
 #include "server/data/dataset.hpp"
+#include "server/data/netcdf/classic_header.hpp"
 
 namespace windsplat::data::test {
 namespace {
@@ -38,7 +38,7 @@ TEST(NetcdfRefusals, WhatIsNoFile) {
   expect_refused(folder / "no/folder.nc", ErrorKind::not_found, "no such file");
   expect_refused("", ErrorKind::not_found, "no file name");
   std::filesystem::create_directory(folder / "dir.nc");
-  expect_refused(folder / "dir.nc", ErrorKind::bad_data, "is a directory");
+  expect_refused(folder / "dir.nc", ErrorKind::bad_data, "is a directory, and not a Zarr store");
   ASSERT_EQ(::mkfifo((folder / "pipe.nc").c_str(), 0600), 0);
   expect_refused(folder / "pipe.nc", ErrorKind::bad_data, "not a regular file");
   expect_refused("/dev/null", ErrorKind::bad_data, "not a regular file");
@@ -54,6 +54,8 @@ TEST(NetcdfRefusals, WhatIsNoNetcdf) {
   expect_refused(folder / "three.nc", ErrorKind::bad_data, "not a netCDF file");
   write_bytes(folder / "cdf4.nc", std::string("CDF\x04 and more", 13));
   expect_refused(folder / "cdf4.nc", ErrorKind::bad_data, "not a netCDF file");
+  write_bytes(folder / "hdf4.nc", std::string("\x0e\x03\x13\x01 and more"));
+  expect_refused(folder / "hdf4.nc", ErrorKind::bad_data, "is HDF4");
   write_bytes(folder / "hdf.nc", "\x89HDF\r\n\x1a\n and nothing of use behind it");
   expect_refused(folder / "hdf.nc", ErrorKind::bad_data, "cut short or damaged");
 }
@@ -65,11 +67,18 @@ TEST(NetcdfRefusals, UrlsAndDirectionsToTheLibrary) {
   expect_refused("[mode=bytes]https://127.0.0.1:9/a.nc", ErrorKind::bad_data, "URL");
   write_good(folder / "a.nc", 0);
   expect_refused((folder / "a.nc") + "#mode=zarr", ErrorKind::not_found, "no such file");
+  // The library never sees a file's name: one that looks like directions to it is a plain file.
   std::filesystem::copy_file(folder / "a.nc", folder / "a.nc#mode=zarr");
-  expect_refused(folder / "a.nc#mode=zarr", ErrorKind::bad_data, "'#'");
-  // A name that stands for such a file is that file.
   std::filesystem::create_symlink(folder / "a.nc#mode=zarr", folder / "innocent.nc");
-  expect_refused(folder / "innocent.nc", ErrorKind::bad_data, "'#'");
+  for (const char* name : {"a.nc#mode=zarr", "innocent.nc"}) {
+    auto source = open_file(folder / name);
+    ASSERT_TRUE(source) << source.error().message;
+    EXPECT_EQ((*source)->info().format, "netCDF classic");
+    auto volume = (*source)->read(0, 1);
+    ASSERT_TRUE(volume) << volume.error().message;
+    EXPECT_EQ(volume->values[0], 61);  // written as 1, 2, 3, ...; a step has 60 samples
+    EXPECT_EQ(volume->values[59], 120);
+  }
 }
 
 TEST(NetcdfRefusals, NothingToShow) {

@@ -92,6 +92,30 @@ TEST(NetcdfValues, ValidRangeIsInStoredNumbers) {
   expect_values(other_side, {-2, 0.3F, kNan});
 }
 
+TEST(NetcdfValues, WhatTheFileCallsValidIsTold) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "v.nc");
+    const int y = file.axis("y", {0, 1}, "m");
+    const int x = file.axis("x", {0, 1}, "m");
+    const auto add = [&](const char* name, nc_type type) {
+      return file.variable(name, type, {y, x}, {5, 6, 7, 8});
+    };
+    add("all", NC_FLOAT);
+    const int packed = add("packed", NC_SHORT);
+    file.number(packed, "scale_factor", NC_DOUBLE, {-0.5});
+    file.number(packed, "add_offset", NC_DOUBLE, {10});
+    file.number(packed, "valid_range", NC_SHORT, {0, 100});
+    file.number(add("low", NC_FLOAT), "valid_min", NC_FLOAT, {0.3});
+    file.number(add("high", NC_FLOAT), "valid_max", NC_FLOAT, {7.5});
+  }
+  auto source = open_file(folder / "v.nc");
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_EQ((*source)->info().notes,
+            (std::vector<std::string>{"masked beyond what the file calls valid: 'packed' (-40 to "
+                                      "10), 'low' (from 0.3), 'high' (up to 7.5)"}));
+}
+
 TEST(NetcdfValues, FillMissingNanAndInfinityAreMasked) {
   const auto describe = [](NetcdfMaker& file, int f) {
     file.number(f, "missing_value", NC_DOUBLE, {-1e10, 1e30});  // wider than a float variable
@@ -128,7 +152,7 @@ TEST(NetcdfValues, DoublesBeyondFloatAreMaskedAndTinyOnesKept) {
   expect_values(read_row(NC_DOUBLE, {1e39, -1e300, 3.4e38, 1e-40, -0.0}, plain),
                 {kNan, kNan, 3.4e38, 1e-40, 0});
   const Volume zero = read_row(NC_FLOAT, {-0.0}, plain);
-  EXPECT_TRUE(std::signbit(zero.values.at(0)));
+  EXPECT_TRUE(std::signbit(zero.values[0]));
 }
 
 TEST(NetcdfValues, EveryNumberType) {
@@ -164,6 +188,20 @@ TEST(NetcdfValues, SignedBytesMarkedUnsigned) {
     file.number(f, "scale_factor", NC_DOUBLE, {2});
   });
   expect_values(volume, {0, 254, 256, kNan});
+}
+
+// Stored -1 is 65535, and limits are stored in the same way.
+TEST(NetcdfValues, SignedShortsMarkedUnsigned) {
+  const std::vector<double> stored{0, 1, 32767, -32768, -3, -2, -1};
+  const auto described = [&](double low, double high) {
+    return read_row(NC_SHORT, stored, [=](NetcdfMaker& file, int f) {
+      file.text(f, "_Unsigned", "true");
+      file.number(f, "_FillValue", NC_SHORT, {-1});
+      file.number(f, "valid_range", NC_SHORT, {low, high});
+    });
+  };
+  expect_values(described(1, -3), {kNan, 1, 32767, 32768, 65533, kNan, kNan});
+  expect_values(described(-32768, -2), {kNan, kNan, kNan, 32768, 65533, 65534, kNan});
 }
 
 TEST(NetcdfValues, EveryFormatHoldsTheSame) {

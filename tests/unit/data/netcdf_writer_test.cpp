@@ -28,9 +28,10 @@ class FakeSource : public Source {
     volume.dims = info_.grid.dims();
     volume.components = static_cast<int>(info_.fields[field].components.size());
     const std::size_t values = volume.samples() * static_cast<std::size_t>(volume.components);
+    volume.values = Samples(values);
     for (std::size_t i = 0; i < values; ++i) {
-      volume.values.push_back(
-          std::sin(static_cast<float>(i + 1) * 12.9898F + static_cast<float>(field * 31 + step)));
+      volume.values[i] =
+          std::sin(static_cast<float>(i + 1) * 12.9898F + static_cast<float>(field * 31 + step));
     }
     volume.values[0] = -0.0F;
     volume.values[1] = std::numeric_limits<float>::denorm_min();

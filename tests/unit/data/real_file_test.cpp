@@ -7,20 +7,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 
 #include "server/data/dataset.hpp"
+#include "test_data.hpp"
 
 namespace windsplat::data {
 namespace {
 
-std::string real_file() {
-  const char* folder = std::getenv("WINDSPLAT_TEST_DATA");
-  return (folder != nullptr ? std::string(folder)
-                            : std::string(WINDSPLAT_SOURCE_DIR) + "/build/test-data") +
-         "/nc4uvt.nc";
-}
+std::string real_file() { return test::test_data("nc4uvt.nc"); }
 
 class RealFile : public testing::Test {
  protected:

@@ -45,7 +45,7 @@ Picture busy_picture(int width, int height) {
   return picture;
 }
 
-Picture decode_jpeg(const Bytes& bytes) {
+Picture decoded_jpeg(const Bytes& bytes) {
   Picture picture;
   tjhandle decoder = tjInitDecompress();
   int colorspace = 0;
@@ -60,7 +60,7 @@ Picture decode_jpeg(const Bytes& bytes) {
   return picture;
 }
 
-Picture decode_png(const Bytes& bytes) {
+Picture decoded_png(const Bytes& bytes) {
   Picture picture;
   spng_ctx* decoder = spng_ctx_new(0);
   spng_ihdr header{};
@@ -89,15 +89,15 @@ double root_mean_square(const Picture& a, const Picture& b) {
   return std::sqrt(sum / static_cast<double>(a.rgb.size()));
 }
 
-const std::vector<std::pair<int, int>> sizes{{1, 1}, {1, 67}, {67, 1}, {17, 9}, {256, 64}};
+const std::vector<std::pair<int, int>> few_sizes{{1, 1}, {1, 67}, {67, 1}, {17, 9}, {256, 64}};
 
 TEST(Jpeg, KeepsSizeSubsamplingAndColours) {
-  for (const auto& [width, height] : sizes) {
+  for (const auto& [width, height] : few_sizes) {
     for (const Subsampling subsampling : {Subsampling::s444, Subsampling::s420}) {
       const Picture picture = smooth_picture(width, height);
       const auto bytes = encode_jpeg(picture.rgb, width, height, 95, subsampling);
       ASSERT_TRUE(bytes) << bytes.error().message;
-      const Picture back = decode_jpeg(*bytes);
+      const Picture back = decoded_jpeg(*bytes);
       EXPECT_EQ(back.width, width);
       EXPECT_EQ(back.height, height);
       EXPECT_EQ(back.subsampling, subsampling == Subsampling::s444 ? TJSAMP_444 : TJSAMP_420);
@@ -111,8 +111,8 @@ TEST(Jpeg, HigherQualityIsNearerAndLarger) {
   const auto coarse = encode_jpeg(picture.rgb, 64, 64, 20, Subsampling::s444);
   const auto fine = encode_jpeg(picture.rgb, 64, 64, 95, Subsampling::s444);
   ASSERT_TRUE(coarse && fine);
-  EXPECT_LT(root_mean_square(picture, decode_jpeg(*fine)),
-            root_mean_square(picture, decode_jpeg(*coarse)));
+  EXPECT_LT(root_mean_square(picture, decoded_jpeg(*fine)),
+            root_mean_square(picture, decoded_jpeg(*coarse)));
   EXPECT_GT(fine->size(), coarse->size());
 }
 
@@ -125,11 +125,11 @@ TEST(Jpeg, RefusesWhatTheFormatCannotHold) {
 }
 
 TEST(Png, IsLossless) {
-  for (const auto& [width, height] : sizes) {
+  for (const auto& [width, height] : few_sizes) {
     for (const Picture& picture : {smooth_picture(width, height), busy_picture(width, height)}) {
       const auto bytes = encode_png(picture.rgb, width, height);
       ASSERT_TRUE(bytes) << bytes.error().message;
-      const Picture back = decode_png(*bytes);
+      const Picture back = decoded_png(*bytes);
       EXPECT_EQ(back.width, width);
       EXPECT_EQ(back.height, height);
       EXPECT_EQ(back.rgb, picture.rgb);

@@ -32,7 +32,7 @@ class Produce : public testing::Test {
   Result<Frame> produce_as(Format format, int level = 0) {
     Encoding encoding;
     encoding.format = format;
-    encoding.level = level;
+    encoding.half_level = 2 * level;
     return produce(view, *dataset, encoding, pool, cancel);
   }
 

@@ -105,7 +105,7 @@ Restarts restarts_of(const Bytes& jpeg) {
   return found;
 }
 
-const std::vector<std::pair<int, int>> sizes{
+const std::vector<std::pair<int, int>> many_sizes{
     {1, 1},     {1, 67},     {67, 1},    {17, 9},     {18, 22},     {334, 398}, {640, 480},
     {641, 479}, {1280, 720}, {9, 20000}, {20000, 17}, {1921, 1081}, {47, 3001}};
 
@@ -113,7 +113,7 @@ TEST(JpegStrips, DecodeToWhatOnePieceDecodesTo) {
   ThreadPool pool(2);
   JpegEncoder encoder;
   Bytes bytes;
-  for (const auto& [width, height] : sizes) {
+  for (const auto& [width, height] : many_sizes) {
     for (const Subsampling subsampling : {Subsampling::s420, Subsampling::s444}) {
       const YccPicture picture = waves(width, height, subsampling);
       const int quality = subsampling == Subsampling::s444 ? 90 : 80;
@@ -134,7 +134,7 @@ TEST(JpegStrips, RestartMarkersSayWhereStripsEnd) {
   JpegEncoder encoder;
   Bytes bytes;
   std::size_t most = 0;
-  for (const auto& [width, height] : sizes) {
+  for (const auto& [width, height] : many_sizes) {
     for (const Subsampling subsampling : {Subsampling::s420, Subsampling::s444}) {
       const YccPicture picture = waves(width, height, subsampling);
       ASSERT_TRUE(encoder.encode(picture, 85, pool, bytes));
@@ -161,7 +161,7 @@ TEST(JpegStrips, AnyNumberOfThreadsGivesTheSameBytes) {
   ThreadPool two(2);
   ThreadPool five(5);
   JpegEncoder used;
-  for (const auto& [width, height] : sizes) {
+  for (const auto& [width, height] : many_sizes) {
     const YccPicture picture = waves(width, height, Subsampling::s420);
     Bytes alone;
     Bytes shared;

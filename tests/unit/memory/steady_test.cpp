@@ -256,6 +256,21 @@ TEST(HugePicture, PlanesAndStripsAreGivenBackByTheNextSmallerOne) {
   }
 }
 
+// What a daemon that has no memory left does as it ends, and destructors of its sessions do.
+TEST(WithoutMemory, WishesAreTakenBackAndAStoreEnds) {
+  data::Store store(std::uint64_t{1} << 30U);
+  const auto dataset = store.add("climate:16x16x8").value();
+  const std::string field = dataset->info().fields.front().name;
+  ASSERT_TRUE(dataset->volume(field, 0)) << "so that no thread has anything to do for a wish";
+  store.wish(1, {{*dataset, field, 0, {}}});
+  const Spent spent = spent_by([&] {
+    store.wish(2, {});
+    store.wish(1, {});
+    store.end();
+  });
+  EXPECT_EQ(spent.blocks, 0);
+}
+
 // The counter counts: a vector as large as a picture would be seen.
 TEST(SteadyStateItself, SeesAVector) {
   const Spent spent = spent_by([] {

@@ -27,14 +27,6 @@ std::unique_ptr<data::Dataset> weather(std::shared_ptr<FakeSource::Reads> reads 
       3, std::move(reads)));
 }
 
-Scene built(const View& view, data::Dataset& dataset) {
-  auto full = complete_view(view, dataset);
-  EXPECT_TRUE(full);
-  auto scene = build_scene(*full, dataset);
-  EXPECT_TRUE(scene);
-  return std::move(*scene);
-}
-
 TEST(BuildScene, LoadsOnlyWhatIsShown) {
   using Reads = FakeSource::Reads;
   auto reads = std::make_shared<Reads>();

@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
+#include <vector>
 
 namespace windsplat::scene {
 namespace {
@@ -48,6 +52,38 @@ TEST(ColorMap, SequentialMapsGrowLighterAndDivergingOnesPeakInTheMiddle) {
       EXPECT_EQ(map.kind, "sequential");
       EXPECT_EQ(lightest, 63U) << map.name;
     }
+  }
+}
+
+// OKLab (B. Ottosson 2020) of linear sRGB, by its definition.
+std::array<double, 3> oklab(const std::array<float, 3>& c) {
+  const double r = static_cast<double>(c[0]);
+  const double g = static_cast<double>(c[1]);
+  const double b = static_cast<double>(c[2]);
+  const double l = std::cbrt(0.4122214708 * r + 0.5363325363 * g + 0.0514459929 * b);
+  const double m = std::cbrt(0.2119034982 * r + 0.6806995451 * g + 0.1073969566 * b);
+  const double s = std::cbrt(0.0883024619 * r + 0.2817188376 * g + 0.6299787005 * b);
+  return {0.2104542553 * l + 0.7936177850 * m - 0.0040720468 * s,
+          1.9779984951 * l - 2.4285922050 * m + 0.4505937099 * s,
+          0.0259040371 * l + 0.7827717662 * m - 0.8086757660 * s};
+}
+
+TEST(ColorMap, EqualDifferencesOfValuesAreEqualDifferencesOfColour) {
+  for (const ColorMap& map : color_maps()) {
+    if (map.kind == "cyclic") continue;  // its quarters are the bearings'
+    const auto entries = color_map_linear(map.name, 257);
+    std::vector<double> steps;
+    for (std::size_t n = 8; n < entries.size(); n += 8) {
+      const auto before = oklab(entries[n - 8]);
+      const auto after = oklab(entries[n]);
+      steps.push_back(std::hypot(after[0] - before[0], after[1] - before[1], after[2] - before[2]));
+    }
+    const auto [least, most] = std::minmax_element(steps.begin(), steps.end());
+    // Those that are published were made even by another measure (CAM02-UCS).
+    const bool published =
+        std::set<std::string>{"viridis", "magma", "inferno", "plasma", "cividis"}.count(map.name) !=
+        0;
+    EXPECT_LT(*most / *least, published ? 1.8 : 1.1) << map.name;
   }
 }
 

@@ -18,7 +18,7 @@ using protocol::ColorBy;
 using protocol::FieldChoice;
 using protocol::View;
 
-std::unique_ptr<data::Dataset> weather(std::shared_ptr<FakeSource::Reads> reads = nullptr) {
+std::unique_ptr<data::Dataset> cloudy_weather(std::shared_ptr<FakeSource::Reads> reads = nullptr) {
   return dataset_of(std::make_unique<FakeSource>(
       atmosphere_grid(),
       std::vector<data::FieldInfo>{scalar_info("temperature", "K"), wind_info(),
@@ -88,7 +88,7 @@ TEST(CompleteView, DefaultsAreFitForTheSchema) {
 }
 
 TEST(CompleteView, KeepsWhatTheUserSaid) {
-  auto dataset = weather();
+  auto dataset = cloudy_weather();
   View view;
   view.vector.length = 0.7;
   view.vector.magnitude_range = protocol::Range{1, 2};
@@ -114,14 +114,14 @@ TEST(CompleteView, KeepsWhatTheUserSaid) {
 }
 
 TEST(CompleteView, RangesComeFromTheFirstStep) {
-  auto dataset = weather();
+  auto dataset = cloudy_weather();
   View later;
   later.step = 2;
   EXPECT_EQ(told(completed(later, *dataset)), told(completed(View{}, *dataset)));
 }
 
 TEST(CompleteView, ShowsCloudsButNoTemperatureBesideAWind) {
-  auto dataset = weather();
+  auto dataset = cloudy_weather();
   const View full = completed(View{}, *dataset);
   ASSERT_EQ(full.scalars->size(), 1U);
   EXPECT_EQ((*full.scalars)[0].field, "cloud");
@@ -190,7 +190,7 @@ TEST(CompleteView, AtmospheresAreColouredByHeightOthersByMagnitude) {
 }
 
 TEST(CompleteView, RefusesByPointer) {
-  auto dataset = weather();
+  auto dataset = cloudy_weather();
   const auto scalar = [](const std::string& field) {
     protocol::ScalarView out;
     out.field = field;
@@ -254,7 +254,7 @@ TEST(CompleteView, RefusesByPointer) {
 }
 
 TEST(CompleteView, StepEdgesInAnOpacityFunctionAreAllowed) {
-  auto dataset = weather();
+  auto dataset = cloudy_weather();
   View view;
   protocol::ScalarView scalar;
   scalar.field = "cloud";

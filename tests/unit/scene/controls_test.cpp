@@ -17,20 +17,12 @@ using protocol::GridAxis;
 using protocol::SliceView;
 using protocol::View;
 
-std::unique_ptr<data::Dataset> weather(std::shared_ptr<FakeSource::Reads> reads = nullptr) {
+std::unique_ptr<data::Dataset> known_weather(std::shared_ptr<FakeSource::Reads> reads = nullptr) {
   return dataset_of(std::make_unique<FakeSource>(
       atmosphere_grid(),
       std::vector<data::FieldInfo>{wind_info(), scalar_info("cloud", "1"),
                                    scalar_info("temperature", "K")},
       3, std::move(reads)));
-}
-
-Scene built(const View& view, data::Dataset& dataset) {
-  auto full = complete_view(view, dataset);
-  EXPECT_TRUE(full) << full.error().message;
-  auto scene = build_scene(*full, dataset);
-  EXPECT_TRUE(scene) << scene.error().message;
-  return std::move(*scene);
 }
 
 std::string pointer_of_refusal(const View& view, data::Dataset& dataset) {
@@ -41,7 +33,7 @@ std::string pointer_of_refusal(const View& view, data::Dataset& dataset) {
 }
 
 TEST(Slice, IsTheLayerThatTheViewNames) {
-  auto dataset = weather();
+  auto dataset = known_weather();
   EXPECT_FALSE(built(View{}, *dataset).slice);
   View view;
   view.geometry.slice = SliceView{GridAxis::y, 2};
@@ -52,7 +44,7 @@ TEST(Slice, IsTheLayerThatTheViewNames) {
 }
 
 TEST(Slice, BeyondTheGridIsRefusedWithItsLimit) {
-  auto dataset = weather();
+  auto dataset = known_weather();
   const std::array<int, 3> layers{4, 3, 3};
   for (const GridAxis axis : {GridAxis::x, GridAxis::y, GridAxis::z}) {
     const int count = layers.at(static_cast<std::size_t>(axis));
@@ -115,7 +107,7 @@ TEST(Slice, CountsItsOwnLinesAlone) {
 }
 
 TEST(Slice, LinesAndMediumAreMeasuredByTheLayer) {
-  auto dataset = weather();
+  auto dataset = known_weather();
   View view;
   const Scene whole = built(view, *dataset);
   view.geometry.slice = SliceView{GridAxis::z, 1};
@@ -129,7 +121,7 @@ TEST(Slice, LinesAndMediumAreMeasuredByTheLayer) {
 }
 
 TEST(ColorByDirection, SpansTheCompass) {
-  auto dataset = weather();
+  auto dataset = known_weather();
   View view;
   view.vector.color.by = ColorBy::direction;
   const Scene scene = built(view, *dataset);
@@ -140,7 +132,7 @@ TEST(ColorByDirection, SpansTheCompass) {
 
 TEST(ColorByScalar, TakesTheFieldAtTheStepAndItsRangeFromTheFirst) {
   auto reads = std::make_shared<FakeSource::Reads>();
-  auto dataset = weather(reads);
+  auto dataset = known_weather(reads);
   View view;
   view.step = 2;
   view.scalars.emplace();
@@ -159,7 +151,7 @@ TEST(ColorByScalar, TakesTheFieldAtTheStepAndItsRangeFromTheFirst) {
 TEST(ColorByScalar, LoadsNothingThatIsNotDrawn) {
   for (const bool lines : {true, false}) {
     auto reads = std::make_shared<FakeSource::Reads>();
-    auto dataset = weather(reads);
+    auto dataset = known_weather(reads);
     View view;
     view.scalars.emplace();
     view.vector.color.field = "temperature";
@@ -171,7 +163,7 @@ TEST(ColorByScalar, LoadsNothingThatIsNotDrawn) {
 }
 
 TEST(ColorByScalar, NeedsAScalarField) {
-  auto dataset = weather();
+  auto dataset = known_weather();
   View view;
   view.vector.color.by = ColorBy::scalar;
   EXPECT_EQ(pointer_of_refusal(view, *dataset), "/vector/color/field");
@@ -184,7 +176,7 @@ TEST(ColorByScalar, NeedsAScalarField) {
 }
 
 TEST(Motion, CyclesAreRateTimesStepAndTime) {
-  auto dataset = weather();
+  auto dataset = known_weather();
   View view;
   view.step = 2;
   view.vector.motion_rate = 1.5;
@@ -197,7 +189,7 @@ TEST(Motion, CyclesAreRateTimesStepAndTime) {
 }
 
 TEST(Methods, AreTheViews) {
-  auto dataset = weather();
+  auto dataset = known_weather();
   View view;
   EXPECT_EQ(built(view, *dataset).method, Method::slab);
   view.method.name = protocol::MethodName::kernel;

@@ -1,6 +1,8 @@
 // A small dataset whose fields are known, and which counts what is read from it.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <functional>
 #include <map>
 #include <memory>
@@ -10,6 +12,7 @@
 
 #include "server/data/dataset.hpp"
 #include "server/data/store.hpp"
+#include "server/scene/build.hpp"
 
 namespace windsplat::scene {
 
@@ -80,16 +83,18 @@ class FakeSource final : public data::Source {
     data::Volume volume;
     volume.dims = info_.grid.dims();
     volume.components = static_cast<int>(info_.fields[field].components.size());
+    std::vector<float> samples;
     for (int c = 0; c < volume.components; ++c) {
       for (std::size_t n = 0; n < volume.samples(); ++n) {
         if (values) {
-          volume.values.push_back(static_cast<float>(values(info_.fields[field].name, n)));
+          samples.push_back(static_cast<float>(values(info_.fields[field].name, n)));
           continue;
         }
         const double ramp = static_cast<double>(n) + 100.0 * c + 1000.0 * static_cast<double>(step);
-        volume.values.push_back(static_cast<float>(constant ? *constant : ramp));
+        samples.push_back(static_cast<float>(constant ? *constant : ramp));
       }
     }
+    volume.values = std::move(samples);
     data::finish_volume(volume);
     return volume;
   }
@@ -110,6 +115,15 @@ inline std::unique_ptr<data::Dataset> sample_dataset(const std::string& name,
                                                      std::array<int, 3> dims = {0, 0, 0}) {
   auto source = data::open_sample(name, dims);
   return std::make_unique<data::Dataset>(std::move(*source), name, std::uint64_t{1} << 32U);
+}
+
+// A view completed and built; the test fails where that does.
+inline Scene built(const protocol::View& view, data::Dataset& dataset) {
+  auto full = complete_view(view, dataset);
+  EXPECT_TRUE(full) << full.error().message;
+  auto scene = build_scene(*full, dataset);
+  EXPECT_TRUE(scene) << scene.error().message;
+  return std::move(*scene);
 }
 
 }  // namespace windsplat::scene

@@ -20,17 +20,33 @@ using windsplat::Result;
 using windsplat::protocol::View;
 using namespace windsplat::session;  // NOLINT(google-build-using-namespace)
 namespace protocol = windsplat::protocol;
+namespace quality = windsplat::quality;
 
 inline constexpr Micros ms = 1000;
 inline constexpr int steps = 10;
 inline constexpr double beyond = 1000;  // an eye so far away sees nothing
 inline constexpr double faint = 500;    // nor this one in a moving frame
 
+inline protocol::PlayMessage play(int from, int to, double fps, bool loop, bool drop) {
+  return {from, to, fps, loop, drop};
+}
+
+inline std::string azimuth(int n) {
+  return R"({"camera":{"eye":[)" + std::to_string(n) + ",-3,1]}}";
+}
+
 class Driver {
  public:
   explicit Driver(Options options = {})
-      : session_(
-            options, [](const View& view) { return check(view); }, now_) {}
+      : session_(options,
+                 {[this](const View& view) { return check(view, step_count); },
+                  [this](const std::string& dataset) {
+                    return dataset == "wind" ? reading : std::nullopt;
+                  },
+                  [this](const quality::Style& style, const quality::Sight& sight) {
+                    return surveyed.value_or(quality::Table(style.kind).forecasts(sight));
+                  }},
+                 now_) {}
 
   // --- inputs -----------------------------------------------------------------------------------
 
@@ -40,6 +56,7 @@ class Driver {
   }
   void ack(std::uint32_t seq) { say(protocol::AckMessage{seq, 0}); }
   void binary() { take(session_.on_binary(now_)); }
+  void changed(const std::string& dataset) { take(session_.on_changed(dataset, now_)); }
   void drain() { take(session_.on_drain(now_)); }
   void refused(const Error& error) { take(session_.on_refused(error, {}, now_)); }
   void described(std::uint32_t id, Result<protocol::DatasetDescription> description) {
@@ -119,35 +136,55 @@ class Driver {
   std::vector<protocol::ServerMessage> texts;
   std::vector<SendFrame> frames;
   std::vector<Describe> describes;
+  std::vector<Prefetch> wishes;
   std::optional<StartRender> render;  // being drawn
   bool cancelled = false;             // it was given up
   int renders = 0;
   std::optional<Close> closed;
   bool write_at_once = true;
+  int step_count = steps;
+  Micros queue = 0;                // that a frame waits for the renderer, as told
+  std::optional<Reading> reading;  // of the dataset "wind"
+  std::vector<Survey> surveys;
+  std::optional<quality::Forecasts> surveyed;  // what is known; empty: the prior
+  bool averaged = false;  // data: what final frames err does not come from their slabs
+  std::optional<double> measured_error;  // of final frames drawn by the view's own slabs
 
  private:
-  static Result<int> check(const View& view) {
+  static Result<int> check(const View& view, int step_count) {
     if (view.dataset != "wind" && view.dataset != "sea") {
       return make_error_at(ErrorKind::not_found, "/dataset", "there is no such dataset");
     }
-    if (view.step >= steps) return make_error_at(ErrorKind::invalid, "/step", "is beyond the last");
-    return steps;
+    if (view.step >= step_count) {
+      return make_error_at(ErrorKind::invalid, "/step", "is beyond the last");
+    }
+    return step_count;
   }
 
-  static Drawn drawn(const StartRender& done, Micros cost, bool loaded) {
+  Drawn drawn(const StartRender& done, Micros cost, bool loaded) const {
     Drawn out;
     out.payload = std::make_shared<const std::vector<std::uint8_t>>(100);
-    const bool kernel = done.view.method.name == protocol::MethodName::kernel;
+    const bool kernel = done.setting.method == protocol::MethodName::kernel;
     out.info.method = kernel ? "kernel" : "slab";
+    out.style.key = "its style";
+    if (done.encoding.measure && measured_error) {
+      const int by = averaged ? 1 : done.setting.thinner * done.setting.thinner;
+      out.info.error_value = *measured_error / by;
+      out.info.error_kind = "measured";
+    } else if (const auto index = quality::index_of(done.setting); index && surveyed) {
+      out.info.error_value = (*surveyed)[*index].error;
+      out.info.error_kind = "estimated";
+    }
     out.info.tiles = 1;
     const bool moving = !done.encoding.full_chroma;
     for (const double height : done.view.camera.eye.value_or(protocol::Vec3{})) {
       if (height >= beyond || (moving && height >= faint)) out.info.tiles = 0;
     }
-    out.info.width = std::max(1, done.view.image.width >> done.encoding.level);
-    out.info.height = std::max(1, done.view.image.height >> done.encoding.level);
+    out.info.width = quality::edge_at(done.view.image.width, done.setting.half_level);
+    out.info.height = quality::edge_at(done.view.image.height, done.setting.half_level);
     out.view_json = "{}";
     out.render_us = cost;
+    out.queue_us = queue;
     out.loaded = loaded;
     return out;
   }
@@ -155,7 +192,13 @@ class Driver {
   void take(Effects effects) {
     for (Effect& effect : effects) {
       ASSERT_FALSE(closed) << "an effect after close";
-      if (auto* text = std::get_if<SendText>(&effect)) texts.push_back(text->message);
+      if (auto* ping = std::get_if<Ping>(&effect)) pinged_ = ping->seq;
+      if (auto* text = std::get_if<SendText>(&effect)) {
+        texts.push_back(text->message);
+        if (const auto* chosen = std::get_if<protocol::ChosenMessage>(&text->message)) {
+          ASSERT_EQ(chosen->seq, pinged_) << "the ping goes before what it measures";
+        }
+      }
       if (auto* describe = std::get_if<Describe>(&effect)) describes.push_back(*describe);
       if (auto* start = std::get_if<StartRender>(&effect)) {
         ASSERT_FALSE(render) << "two renders at a time";
@@ -173,12 +216,15 @@ class Driver {
         frames.push_back(*frame);
         unwritten_ = true;
       }
+      if (auto* wish = std::get_if<Prefetch>(&effect)) wishes.push_back(*wish);
+      if (auto* survey = std::get_if<Survey>(&effect)) surveys.push_back(*survey);
       if (auto* close = std::get_if<Close>(&effect)) closed = *close;
     }
   }
 
   Micros now_ = 1'000'000;
   bool unwritten_ = false;
+  std::uint32_t pinged_ = 0;
   Session session_;
 };
 

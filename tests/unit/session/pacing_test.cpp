@@ -1,4 +1,4 @@
-// Which frames a viewer gets, and when: credit, newest view first, refinement, level of detail.
+// Which frames a viewer gets, and when: credit, newest view first, what changes nothing.
 #include <gmock/gmock.h>
 
 #include "driver.hpp"
@@ -6,10 +6,7 @@
 namespace session_test {
 namespace {
 
-using testing::Each;
 using testing::ElementsAre;
-
-std::string azimuth(int n) { return R"({"camera":{"eye":[)" + std::to_string(n) + ",-3,1]}}"; }
 
 TEST(Pacing, a_patch_alone_brings_a_moving_frame_and_then_the_final_one) {
   Driver driver;
@@ -28,7 +25,7 @@ TEST(Pacing, a_patch_alone_brings_a_moving_frame_and_then_the_final_one) {
   EXPECT_FALSE(driver.render) << "too early: the viewer may go on moving";
   driver.wait(60 * ms);
   ASSERT_TRUE(driver.render);
-  EXPECT_EQ(driver.render->encoding.level, 0);
+  EXPECT_EQ(driver.render->setting.half_level, 0);
   EXPECT_TRUE(driver.render->encoding.full_chroma);
   driver.finish_render();
   ASSERT_EQ(driver.frames.size(), 2U);
@@ -45,17 +42,19 @@ TEST(Pacing, moving_frames_are_drawn_by_kernel_and_final_ones_as_asked) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   ASSERT_TRUE(driver.render);
-  EXPECT_EQ(driver.render->view.method.name, protocol::MethodName::kernel);
+  EXPECT_EQ(driver.render->setting.method, protocol::MethodName::kernel);
   driver.finish_render(500 * ms);
   driver.ack(1);
   driver.wait(200 * ms);
   ASSERT_TRUE(driver.render);
-  EXPECT_EQ(driver.render->view.method.name, protocol::MethodName::slab);
+  EXPECT_EQ(driver.render->setting.method, protocol::MethodName::slab);
 }
 
 TEST(Pacing, slow_final_frames_by_slab_do_not_coarsen_moving_ones) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
+  ASSERT_TRUE(driver.render);
+  const quality::Setting before = driver.render->setting;
   driver.finish_render(10 * ms);
   driver.ack(1);
   driver.wait(200 * ms);
@@ -64,7 +63,8 @@ TEST(Pacing, slow_final_frames_by_slab_do_not_coarsen_moving_ones) {
   driver.ack(2);
   driver.patch(2, azimuth(1));
   ASSERT_TRUE(driver.render);
-  EXPECT_EQ(driver.render->encoding.level, 0);
+  EXPECT_LE(driver.render->setting.half_level, before.half_level);
+  EXPECT_LE(driver.render->setting.coarser, before.coarser);
 }
 
 TEST(Pacing, every_frame_is_announced_by_what_was_chosen_for_it) {
@@ -77,6 +77,36 @@ TEST(Pacing, every_frame_is_announced_by_what_was_chosen_for_it) {
     EXPECT_EQ(chosen[n].seq, driver.frames[n].header.seq);
     EXPECT_EQ(chosen[n].info.width, driver.frames[n].header.width);
   }
+}
+
+TEST(Pacing, a_lossless_view_rests_as_png_and_moves_as_jpeg) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","quality":{"lossless":true}})");
+  driver.settle();
+  ASSERT_EQ(driver.frames.size(), 2U);
+  EXPECT_EQ(driver.frames[0].header.codec, protocol::Codec::jpeg);
+  EXPECT_EQ(driver.frames[1].header.codec, protocol::Codec::png);
+  EXPECT_EQ(driver.frames[1].header.quality, 100);
+  EXPECT_TRUE(Driver::is_final(driver.frames[1]));
+}
+
+TEST(Pacing, a_final_frame_is_of_high_quality_however_slow_the_link) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.finish_render();
+  driver.ack(1);
+  for (std::uint32_t rev = 2; rev < 12; ++rev) {
+    driver.patch(rev, azimuth(static_cast<int>(rev)));
+    driver.finish_render();
+    driver.wait(100 * ms);  // for not even 1 kB
+    driver.ack(rev);
+  }
+  EXPECT_EQ(driver.frames.back().header.quality, 40);
+  EXPECT_GT(driver.frames.back().header.level, 0);
+  driver.settle();
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  EXPECT_GE(driver.frames.back().header.quality, 90);
+  EXPECT_EQ(driver.frames.back().header.level, 0);
 }
 
 TEST(Pacing, no_third_frame_before_an_acknowledgement) {
@@ -207,92 +237,6 @@ TEST(Pacing, a_hidden_client_is_sent_nothing_until_it_is_seen_again) {
   driver.settle();
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
-}
-
-// --- level of detail ----------------------------------------------------------------------------
-
-// Drags for `count` frames whose cost follows the level; the levels drawn.
-std::vector<int> drag(Driver& driver, int count, std::uint32_t& rev,
-                      const std::function<Micros(int level)>& cost) {
-  std::vector<int> levels;
-  for (int n = 0; n < count; ++n) {
-    driver.patch(++rev, azimuth(n));
-    if (!driver.render) continue;
-    const int level = driver.render->encoding.level;
-    levels.push_back(level);
-    driver.finish_render(cost(level));
-    driver.ack(driver.frames.back().header.seq);
-  }
-  return levels;
-}
-
-TEST(Level, is_the_finest_that_keeps_the_budget) {
-  struct Case {
-    const char* budget;
-    Micros full;  // cost of level 0; a level costs a quarter of the next finer one
-    int level;
-  };
-  for (const Case& c :
-       {Case{"null", 20 * ms, 0}, Case{"null", 100 * ms, 1}, Case{"null", 400 * ms, 2},
-        Case{"200", 100 * ms, 0}, Case{"10", 100 * ms, 2}}) {
-    Driver driver;
-    driver.patch(1, R"({"dataset":"wind","quality":{"budgetMs":)" + std::string(c.budget) + "}}");
-    std::uint32_t rev = 1;
-    const auto levels = drag(driver, 40, rev, [&](int level) { return c.full >> (2 * level); });
-    ASSERT_GE(levels.size(), 20U);
-    EXPECT_THAT(std::vector<int>(levels.end() - 10, levels.end()), Each(c.level))
-        << c.budget << " ms, full picture " << c.full / ms << " ms";
-  }
-}
-
-TEST(Level, says_so_in_the_header_and_the_final_frame_is_full) {
-  Driver driver;
-  driver.patch(1, R"({"dataset":"wind","image":{"width":800,"height":600}})");
-  std::uint32_t rev = 1;
-  drag(driver, 10, rev, [](int level) { return 400 * ms >> (2 * level); });
-  const auto moving = driver.frames.back().header;
-  ASSERT_GT(moving.level, 0);
-  EXPECT_EQ(moving.width, 800 >> moving.level);
-  EXPECT_EQ(moving.height, 600 >> moving.level);
-  driver.settle(400 * ms);
-  const auto final = driver.frames.back().header;
-  EXPECT_EQ(final.level, 0);
-  EXPECT_EQ(final.width, 800);
-  EXPECT_EQ(final.height, 600);
-}
-
-TEST(Level, one_slow_load_does_not_coarsen_what_follows) {
-  Driver driver;
-  driver.patch(1, R"({"dataset":"wind"})");
-  std::uint32_t rev = 1;
-  drag(driver, 10, rev, [](int /*level*/) { return 10 * ms; });
-  ASSERT_EQ(driver.frames.back().header.level, 0);
-  driver.patch(++rev, R"({"step":3})");
-  driver.finish_render(900 * ms, true);
-  driver.ack(driver.frames.back().header.seq);
-  driver.patch(++rev, azimuth(99));
-  ASSERT_TRUE(driver.render);
-  EXPECT_EQ(driver.render->encoding.level, 0);
-}
-
-TEST(Level, never_makes_a_picture_too_small_to_tell_anything) {
-  Driver driver;
-  driver.patch(1, R"({"dataset":"wind","image":{"width":300,"height":200}})");
-  std::uint32_t rev = 1;
-  const auto levels = drag(driver, 10, rev, [](int /*level*/) { return 5000 * ms; });
-  EXPECT_THAT(levels, Each(testing::Le(1)));
-  EXPECT_EQ(levels.back(), 1) << "100 pixels high; 50 would be too few";
-}
-
-TEST(Level, comes_back_when_the_scene_has_become_cheap) {
-  Driver driver;
-  driver.patch(1, R"({"dataset":"wind"})");
-  std::uint32_t rev = 1;
-  drag(driver, 20, rev, [](int level) { return 400 * ms >> (2 * level); });
-  ASSERT_EQ(driver.frames.back().header.level, 2);
-  driver.wait(4000 * ms);
-  drag(driver, 200, rev, [](int level) { return 16 * ms >> (2 * level); });
-  EXPECT_EQ(driver.frames.back().header.level, 0);
 }
 
 // --- what changes nothing ------------------------------------------------------------------------

@@ -34,6 +34,76 @@ TEST(Open, describes_the_dataset_and_then_draws_it) {
   EXPECT_EQ(driver.render->view.image.width, 640);
 }
 
+// What is quick is not told; nor is what is read for somebody else's frame while ours is drawn.
+TEST(Open, how_far_reading_has_come_is_told_while_a_frame_waits_for_it) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.reading = Reading{"u", 0.25};
+  driver.wait(250 * ms);
+  EXPECT_TRUE(driver.texts_of<protocol::ProgressMessage>().empty());
+  driver.wait(100 * ms);
+  driver.reading->done = 0.75;
+  driver.wait(250 * ms);
+  driver.reading.reset();
+  driver.wait(1000 * ms);
+  const auto told = driver.texts_of<protocol::ProgressMessage>();
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[0].phase, "loading u");
+  EXPECT_EQ(told[0].done, 0.25);
+  EXPECT_EQ(told[1].done, 0.75);
+  EXPECT_FALSE(told[0].id);
+  driver.settle();
+  driver.texts.clear();
+  driver.reading = Reading{"u", 0.5};
+  driver.wait(2000 * ms);
+  for (int n = 0; n < 20; ++n) {
+    driver.patch(2 + n, R"({"camera":{"eye":[0,0,)" + std::to_string(3 + n) + "]}}");
+    driver.finish_render(100 * ms);
+    driver.ack(driver.frames.back().header.seq);
+  }
+  EXPECT_TRUE(driver.texts_of<protocol::ProgressMessage>().empty());
+}
+
+// --- files that change --------------------------------------------------------------------------
+
+TEST(Changed, the_dataset_is_described_and_drawn_anew) {
+  Driver driver;
+  driver.say(protocol::OpenMessage{5, "wind"});
+  driver.described(5, description("wind"));
+  driver.settle();
+  const int before = driver.renders;
+  driver.describes.clear();
+  driver.texts.clear();
+  driver.changed("sea");
+  EXPECT_TRUE(driver.describes.empty()) << "is not shown";
+  driver.changed("wind");
+  ASSERT_EQ(driver.describes.size(), 1U);
+  EXPECT_EQ(driver.describes[0].id, 5U);
+  driver.changed("wind");
+  EXPECT_EQ(driver.describes.size(), 1U) << "is on its way";
+  driver.described(5, description("wind"));
+  EXPECT_EQ(driver.texts_of<protocol::OpenedMessage>().size(), 1U);
+  driver.settle();
+  EXPECT_GT(driver.renders, before);
+}
+
+TEST(Changed, a_step_that_is_gone_becomes_the_last_and_neighbours_are_wished_for_anew) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","step":8})");
+  driver.settle();
+  driver.step_count = 4;
+  driver.changed("wind");
+  ASSERT_TRUE(driver.render);
+  EXPECT_EQ(driver.render->view.step, 3);
+  driver.settle();
+  EXPECT_TRUE(driver.errors().empty());
+  driver.wishes.clear();
+  driver.changed("wind");
+  driver.settle();
+  ASSERT_FALSE(driver.wishes.empty());
+  EXPECT_THAT(driver.wishes.back().steps, ElementsAre(2));
+}
+
 TEST(Open, an_unknown_dataset_is_an_error_and_the_view_stays) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
@@ -239,7 +309,7 @@ TEST(Still, is_drawn_at_its_size_and_announced_by_its_id) {
   ASSERT_TRUE(driver.render);
   EXPECT_EQ(driver.render->view.image.width, 2000);
   EXPECT_EQ(driver.render->view.image.height, 1000);
-  EXPECT_EQ(driver.render->encoding.level, 0);
+  EXPECT_EQ(driver.render->setting.half_level, 0);
   driver.finish_render(500 * ms);
   const auto header = driver.frames.back().header;
   EXPECT_EQ(header.codec, protocol::Codec::png);
@@ -296,12 +366,8 @@ TEST(Still, too_large_too_many_or_of_nothing_is_an_error) {
 
 // --- steps that run -----------------------------------------------------------------------------
 
-protocol::PlayMessage play(int from, int to, double fps, bool loop, bool drop) {
-  return {from, to, fps, loop, drop};
-}
-
 // Draws each frame in `cost` and acknowledges it, for `duration`.
-void run(Driver& driver, Micros duration, Micros cost) {
+void run_for(Driver& driver, Micros duration, Micros cost) {
   const Micros end = driver.now() + duration;
   while (driver.now() < end) {
     if (driver.render) {
@@ -319,7 +385,7 @@ TEST(Play, shows_every_step_in_time_when_there_is_time) {
   driver.settle();
   driver.frames.clear();
   driver.say(play(0, 3, 10, true, true));
-  run(driver, 850 * ms, 20 * ms);
+  run_for(driver, 850 * ms, 20 * ms);
   EXPECT_THAT(driver.steps_shown(), ElementsAre(1U, 2U, 3U, 0U, 1U, 2U, 3U, 0U));
 }
 
@@ -329,7 +395,7 @@ TEST(Play, with_drop_skips_what_is_late) {
   driver.settle();
   driver.frames.clear();
   driver.say(play(0, 9, 20, false, true));
-  run(driver, 700 * ms, 120 * ms);  // 50 ms a step, 120 ms a frame
+  run_for(driver, 700 * ms, 120 * ms);  // 50 ms a step, 120 ms a frame
   std::vector<std::uint32_t> shown;
   for (const SendFrame& frame : driver.frames) {
     if (!Driver::is_final(frame)) shown.push_back(frame.header.step);
@@ -346,7 +412,7 @@ TEST(Play, without_drop_leaves_none_out_however_long_it_takes) {
   driver.settle();
   driver.frames.clear();
   driver.say(play(0, 5, 20, false, false));
-  run(driver, 900 * ms, 120 * ms);
+  run_for(driver, 900 * ms, 120 * ms);
   driver.settle();
   std::vector<std::uint32_t> moving;
   for (const SendFrame& frame : driver.frames) {
@@ -361,7 +427,7 @@ TEST(Play, pause_stops_at_the_step_reached_and_makes_it_final) {
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
   driver.say(play(0, 9, 10, true, true));
-  run(driver, 350 * ms, 10 * ms);
+  run_for(driver, 350 * ms, 10 * ms);
   driver.say(protocol::PauseMessage{});
   driver.frames.clear();
   driver.settle();
@@ -379,7 +445,7 @@ TEST(Play, goes_on_from_the_step_that_the_user_picks) {
   driver.say(play(0, 9, 10, true, true));
   driver.patch(2, R"({"step":7})");
   driver.frames.clear();
-  run(driver, 250 * ms, 5 * ms);
+  run_for(driver, 250 * ms, 5 * ms);
   EXPECT_THAT(driver.steps_shown(), ElementsAre(7U, 8U, 9U));
 }
 

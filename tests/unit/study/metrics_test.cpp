@@ -7,6 +7,8 @@
 #include <limits>
 #include <random>
 
+#include "server/frame/difference.hpp"
+
 namespace windsplat::study {
 namespace {
 
@@ -35,7 +37,7 @@ Rgb noisy(const Rgb& from, double sigma) {
 TEST(Difference, IsTheRootOfTheMeanSquareTheLargestAndItsDecibels) {
   const std::vector<float> picture{0.5F, 0, 0, 1, 0, 0, 0, 0};
   const std::vector<double> truth{0.25, 0, 0, 1, 0, 0.5, 0, 0};
-  const Difference d = difference(picture, truth);
+  const frame::Difference d = frame::difference_of(picture, truth);
   EXPECT_NEAR(d.rmse, std::sqrt((0.0625 + 0.25) / 8), 1e-15);
   EXPECT_DOUBLE_EQ(d.max, 0.5);
   EXPECT_NEAR(d.psnr, 10 * std::log10(8 / 0.3125), 1e-12);
@@ -44,11 +46,11 @@ TEST(Difference, IsTheRootOfTheMeanSquareTheLargestAndItsDecibels) {
 TEST(Difference, OfEqualPicturesIsNothingAndOfAHoleUnknown) {
   std::vector<float> picture{0.5F, 0, 0, 1};
   const std::vector<double> truth(picture.begin(), picture.end());
-  EXPECT_EQ(difference(picture, truth).rmse, 0);
-  EXPECT_EQ(difference(picture, truth).psnr, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(frame::difference_of(picture, truth).rmse, 0);
+  EXPECT_EQ(frame::difference_of(picture, truth).psnr, std::numeric_limits<double>::infinity());
   picture[1] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_TRUE(std::isnan(difference(picture, truth).rmse));
-  EXPECT_TRUE(std::isnan(difference(picture, truth).max));
+  EXPECT_TRUE(std::isnan(frame::difference_of(picture, truth).rmse));
+  EXPECT_TRUE(std::isnan(frame::difference_of(picture, truth).max));
 }
 
 TEST(WithinUnit, HoldsUpToTheSlackAndForNoHole) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/frame/difference.hpp"
 #include "server/scene/build.hpp"
 #include "server/study/metrics.hpp"
 #include "tests/unit/scene/fake.hpp"
@@ -137,7 +138,7 @@ TEST(Measure, ASmallerPictureIsComparedAtTheTruthsSize) {
   ASSERT_EQ(half.width * 2, own.width);
   const auto larger = resample(half.rgba, half.width, half.height, own.width, own.height);
   EXPECT_NEAR(measure(subject, setting, truth, pool, CancelToken()).value().rmse,
-              difference(larger, truth.rgba).rmse, 1e-12);
+              frame::difference_of(larger, truth.rgba).rmse, 1e-12);
 }
 
 // Overlapping footprints ripple by 1 % peak to peak on axis to 4 % at 45 degrees, of tau = 1: an

@@ -1,0 +1,24 @@
+# What makes a fault in memory end the program instead of serving whoever provoked it. What came of
+# it in the program is looked at by tests/tidy/check_hardening.py.
+include(CheckPIESupported)
+check_pie_supported()
+
+add_compile_options(-fstack-protector-strong -Wformat -Wformat-security)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  add_compile_options(-fstack-clash-protection)
+endif()
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  add_compile_options(-fcf-protection)
+endif()
+if(NOT WINDSPLAT_SANITIZE)
+  # Needs an optimising compiler; the sanitizers look at more.
+  add_compile_options($<$<CONFIG:Release>:-U_FORTIFY_SOURCE>
+    $<$<CONFIG:Release>:-D_FORTIFY_SOURCE=3>)
+endif()
+add_link_options(-Wl,-z,relro -Wl,-z,now -Wl,-z,noexecstack -Wl,-z,separate-code)
+
+# The bounds of the standard library's containers, wherever bytes from outside are met. The engine
+# and the pictures' codes get checked values and no bytes.
+function(windsplat_check_containers target)
+  target_compile_definitions(${target} PRIVATE $<$<CONFIG:Release>:_GLIBCXX_ASSERTIONS>)
+endfunction()

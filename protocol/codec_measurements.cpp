@@ -1,0 +1,158 @@
+// Measurements and jobs -> JSON; the request for a dataset -> its path.
+#include <cmath>
+
+#include "protocol/codec_json.hpp"
+#include "protocol/codec_shapes.hpp"
+#include "protocol/limits.hpp"
+#include "protocol/measurements.hpp"
+#include "server/base/check.hpp"
+
+namespace windsplat::protocol {
+
+namespace {
+
+Json range_json(const std::optional<Range>& range) {
+  if (!range) return nullptr;
+  return Json::array({canonical_number((*range)[0]), canonical_number((*range)[1])});
+}
+
+Json position_json(const PositionDescription& position) {
+  Json out{{"units", Json::object()}, {"index", Json::object()}};
+  constexpr std::array<const char*, 3> keys{"x", "y", "z"};
+  for (std::size_t a = 0; a < 3; ++a) {
+    out[keys[a]] = canonical_number(position.coordinates[a]);
+    out["units"][keys[a]] = position.units[a];
+    out["index"][keys[a]] = position.index[a];
+  }
+  return out;
+}
+
+Json value_json(const ProbedField& field, const ProbedValue& value) {
+  if (!value) return nullptr;
+  WINDSPLAT_CHECK(!value->empty());
+  return field.is_vector ? numbers_json(*value) : canonical_number(value->front());
+}
+
+void add_units(const ProbedField& field, Json& out) {
+  out["units"] = field.units;
+  for (const std::string& units : field.component_units) {
+    if (units != field.component_units.front()) out["componentUnits"] = field.component_units;
+  }
+}
+
+Json result_json(const JobResult& result) {
+  if (const auto* const id = std::get_if<std::string>(&result)) return *id;
+  const auto& reference = std::get<ReferenceDescription>(result);
+  const bool differs = std::isfinite(reference.psnr);
+  return Json{{"id", reference.id},
+              {"picture", reference.picture},
+              {"width", reference.width},
+              {"height", reference.height},
+              {"error",
+               {{"value", canonical_number(reference.rmse)},
+                {"max", canonical_number(reference.max)},
+                {"psnr", differs ? canonical_number(reference.psnr) : Json(nullptr)}}}};
+}
+
+Json point_json(const ForecastPoint& point) {
+  return Json{{"method", point.method},
+              {"slabThickness", number_or_null(point.slab_thickness)},
+              {"width", point.width},
+              {"height", point.height},
+              {"coarser", point.coarser},
+              {"ms", canonical_number(point.ms)},
+              {"timed", point.timed},
+              {"error", canonical_number(point.error)},
+              {"errorLow", canonical_number(point.error_low)},
+              {"errorHigh", canonical_number(point.error_high)},
+              {"kind", point.measured ? "measured" : "estimated"},
+              {"pareto", point.pareto}};
+}
+
+Json job_json(const JobDescription& job) {
+  return Json{{"id", job.id},
+              {"kind", job.kind},
+              {"state", job.state},
+              {"progress", canonical_number(job.progress)},
+              {"etaMs", job.eta_ms ? canonical_number(*job.eta_ms) : Json(nullptr)},
+              {"result", job.result ? result_json(*job.result) : Json(nullptr)},
+              {"problem", job.problem ? problem_json(*job.problem) : Json(nullptr)}};
+}
+
+}  // namespace
+
+std::string encode_histogram(const HistogramDescription& histogram) {
+  Json out{{"range", range_json(histogram.range)},
+           {"counts", histogram.counts},
+           {"below", histogram.below},
+           {"above", histogram.above},
+           {"masked", histogram.masked},
+           {"log", histogram.log}};
+  if (!histogram.edges.empty()) out["edges"] = numbers_json(histogram.edges);
+  return dump(out);
+}
+
+std::string encode_probe(const ProbeDescription& probe) {
+  WINDSPLAT_CHECK(probe.fields.size() == probe.values.size());
+  Json values = Json::object();
+  for (std::size_t i = 0; i < probe.fields.size(); ++i) {
+    const ProbedField& field = probe.fields[i];
+    Json entry{{"value", value_json(field, probe.values[i])}};
+    add_units(field, entry);
+    values[field.name] = std::move(entry);
+  }
+  return dump(Json{{"position", position_json(probe.position)},
+                   {"step", probe.step},
+                   {"values", std::move(values)}});
+}
+
+std::string encode_series(const SeriesDescription& series) {
+  Json times = Json::array();
+  for (const StepDescription& time : series.times) {
+    times.push_back(Json{{"value", canonical_number(time.value)}, {"text", time.text}});
+  }
+  Json values = Json::array();
+  for (const ProbedValue& value : series.values) {
+    values.push_back(value_json(series.field, value));
+  }
+  Json out{{"position", position_json(series.position)},
+           {"times", std::move(times)},
+           {"values", std::move(values)}};
+  add_units(series.field, out);
+  return dump(out);
+}
+
+std::string encode_range(const RangeDescription& range) {
+  return dump(Json{
+      {"range", range_json(range.range)}, {"masked", range.masked}, {"rangeOf", range.range_of}});
+}
+
+std::string encode_forecast(const ForecastDescription& forecast) {
+  Json points = Json::array();
+  for (const ForecastPoint& point : forecast.points) points.push_back(point_json(point));
+  return dump(Json{{"view", {{"width", forecast.width}, {"height", forecast.height}}},
+                   {"points", std::move(points)},
+                   {"chosen", forecast.chosen ? Json(*forecast.chosen) : Json(nullptr)}});
+}
+
+std::string encode_job(const JobDescription& job) { return dump(job_json(job)); }
+
+std::string encode_jobs(const std::vector<JobDescription>& jobs) {
+  Json list = Json::array();
+  for (const JobDescription& job : jobs) list.push_back(job_json(job));
+  return dump(Json{{"jobs", std::move(list)}});
+}
+
+Result<std::string> parse_dataset_request(std::string_view json) {
+  const auto tree = parse_json(json);
+  if (!tree) return tree.error();
+  Faults faults;
+  ObjectReader reader(*tree, "", faults);
+  std::string path;
+  reader.text("path", path, 1, Presence::required, limits::path_chars_max);
+  reader.finish();
+  if (!faults.empty()) return faults.error();
+  return path;
+}
+
+}  // namespace windsplat::protocol

@@ -1,0 +1,79 @@
+// Flags and environment of what one address, and all of them together, may take.
+#include "server/cli/serve_limits.hpp"
+
+#include <string>
+
+#include "protocol/limits.hpp"
+#include "server/net/address.hpp"
+
+namespace windsplat::cli {
+namespace {
+
+constexpr std::size_t count_max = 1'000'000;
+constexpr double number_max = 1e18;
+
+template <class Number>
+void add(CLI::App& command, const char* flag, const char* environment, Number& value, Number most,
+         const char* help, const char* unit) {
+  command.add_option(flag, value, help)
+      ->envname(environment)
+      ->check(CLI::Range(Number{0}, most))
+      ->type_name(unit)
+      ->capture_default_str()
+      ->group("Limits (0: none)");
+}
+
+std::string fault_of_proxy(const std::string& text) {
+  if (net::Network::parse(text)) return "";
+  return "is an address or a network such as 172.17.0.0/16, not '" + text + "'";
+}
+
+}  // namespace
+
+void add_limit_options(CLI::App& command, net::Limits& limits) {
+  add(command, "--max-connections", "WINDSPLAT_MAX_CONNECTIONS", limits.connections, count_max,
+      "Connections at a time, viewers' among them", "N");
+  add(command, "--max-connections-per-address", "WINDSPLAT_MAX_CONNECTIONS_PER_ADDRESS",
+      limits.connections_per_address, count_max, "Of one address (IPv6: of 64 bits)", "N");
+  add(command, "--max-arrivals", "WINDSPLAT_MAX_ARRIVALS", limits.arrivals, number_max,
+      "New connections a second; one in TLS counts as 5", "N");
+  add(command, "--max-arrivals-per-address", "WINDSPLAT_MAX_ARRIVALS_PER_ADDRESS",
+      limits.arrivals_per_address, number_max, "Of one address", "N");
+  add(command, "--max-sessions-per-address", "WINDSPLAT_MAX_SESSIONS_PER_ADDRESS",
+      limits.sessions_per_address, count_max, "Viewers of one address at a time", "N");
+  add(command, "--max-requests-per-address", "WINDSPLAT_MAX_REQUESTS_PER_ADDRESS",
+      limits.requests_per_address, number_max, "Requests a second of one address", "N");
+  add(command, "--max-messages-per-address", "WINDSPLAT_MAX_MESSAGES_PER_ADDRESS",
+      limits.messages_per_address, number_max, "Messages a second of one address's viewers", "N");
+  add(command, "--max-received-per-address", "WINDSPLAT_MAX_RECEIVED_PER_ADDRESS",
+      limits.received_per_address, number_max, "Bytes of them a second", "BYTES");
+  add(command, "--max-bytes-per-address", "WINDSPLAT_MAX_BYTES_PER_ADDRESS",
+      limits.bytes_per_address, number_max, "Sent to one address a second", "BYTES");
+  add(command, "--max-render-per-address", "WINDSPLAT_MAX_RENDER_PER_ADDRESS",
+      limits.render_s_per_address, number_max, "Time of drawing for one address a minute",
+      "SECONDS");
+  add(command, "--max-failed-logins-per-address", "WINDSPLAT_MAX_FAILED_LOGINS_PER_ADDRESS",
+      limits.failed_logins_per_address, number_max, "Wrong tokens of one address a minute", "N");
+  add(command, "--max-pixels", "WINDSPLAT_MAX_PIXELS", limits.pixels,
+      protocol::limits::image_pixels_max, "Pixels of a picture", "N");
+  add(command, "--max-kernels", "WINDSPLAT_MAX_KERNELS", limits.kernels, number_max,
+      "Work of a picture, in lines and samples and in pixels that they cover, 16 counting as one",
+      "N");
+  add(command, "--max-render", "WINDSPLAT_MAX_RENDER", limits.render_s, number_max,
+      "Time to draw a picture asked for by HTTP, by what those before it took", "SECONDS");
+  add(command, "--max-wait", "WINDSPLAT_MAX_WAIT", limits.wait_ms, number_max,
+      "Refuse a picture asked for by HTTP that those of other addresses keep waiting longer than "
+      "this, and than it takes itself",
+      "MS");
+  command
+      .add_option("--trusted-proxy", limits.trusted_proxies,
+                  "A proxy whose X-Forwarded-For tells the client's address: an address or a "
+                  "network; may be repeated")
+      ->envname("WINDSPLAT_TRUSTED_PROXY")
+      ->allow_extra_args(false)
+      ->delimiter(',')
+      ->check(fault_of_proxy)
+      ->type_name("ADDRESS");
+}
+
+}  // namespace windsplat::cli

@@ -1,0 +1,39 @@
+// The options of `windsplat serve`: how they are named and what they set.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "protocol/limits.hpp"
+#include "server/net/limits.hpp"
+
+namespace windsplat::cli {
+
+struct ServeArguments {
+  std::vector<std::string> datasets;
+  std::string config;
+  std::string listen = "127.0.0.1:8080";
+  bool allow_remote = false;
+  std::string token_file;
+  std::string tls_cert;
+  std::string tls_key;
+  std::string base_path = "/";
+  std::string data_root;
+  std::string state_dir;
+  std::string memory_limit = "8G";
+  std::string storage = "float32";
+  unsigned threads = 0;
+  int sessions = protocol::limits::sessions_max_default;
+  std::vector<std::string> origins;
+  std::vector<std::string> hosts;
+  int idle_timeout_s = 300;
+  std::string log_format = "text";
+  std::string log_level = "info";
+  net::Limits limits;
+};
+
+// `arguments` outlives the command.
+void add_serve_options(CLI::App& command, ServeArguments& arguments);
+
+}  // namespace windsplat::cli

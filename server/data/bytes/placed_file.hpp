@@ -1,0 +1,90 @@
+// Arrays that lie in bytes at even distances: what NRRD, GrADS, OpenDX and raw files with a
+// description come down to. Their readers fill a PlacedFile, cf/source.hpp makes the dataset.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/data/bytes/byte_store.hpp"
+#include "server/data/bytes/scalar.hpp"
+#include "server/data/cf/array_file.hpp"
+
+namespace windsplat::data::bytes {
+
+// The indices of a dimension for which numbers are stored, from the first to behind the last.
+struct Stored {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
+// Where a variable's numbers lie. A store is shared by the variables in it.
+struct Placement {
+  std::shared_ptr<ByteStore> store;
+  std::uint64_t offset = 0;  // of the first number, that of the first stored indices
+  Scalar type = Scalar::float32;
+  bool big_endian = false;
+  std::vector<std::uint64_t> strides;           // bytes from one index to the next, one a dimension
+  std::vector<Stored> present;                  // one a dimension; what is not stored is masked
+  bool negated = false;                         // components of axes that were turned round
+  std::optional<std::array<double, 2>> masked;  // stored numbers from the first to the second
+};
+
+// What a coordinate is called and how it runs.
+struct AxisLabel {
+  std::string units;
+  std::string axis;      // "X", "Y", "Z", "T" or empty: by name and units
+  std::string positive;  // "up", "down" or empty
+  std::string calendar;
+};
+
+class PlacedFile final : public cf::ArrayFile {
+ public:
+  PlacedFile(std::string name, std::string format)
+      : name_(std::move(name)), format_(std::move(format)) {}
+
+  void set_title(std::string title) { contents_.title = std::move(title); }
+  void add_note(std::string note) { contents_.notes.push_back(std::move(note)); }
+  void add_identity(const std::string& identity) { identity_ += identity + '\n'; }
+  int add_dimension(std::string name, std::size_t length);
+  // The coordinates of a dimension, one an index.
+  void add_axis(int dimension, const AxisLabel& label, std::vector<double> coordinates);
+  // A field's numbers; the variable's type is that of the placement. `missing`: as stored.
+  void add_array(FileVariable variable, Placement placement, std::vector<double> missing);
+
+  [[nodiscard]] const FileContents& contents() const override { return contents_; }
+  [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] std::string format() const override { return format_; }
+  [[nodiscard]] std::string identity() const override { return identity_; }
+  [[nodiscard]] cf::Numbers numbers(int variable, const char* attribute) const override;
+  [[nodiscard]] std::string text_of(int variable, const char* attribute) const override;
+  [[nodiscard]] std::vector<std::size_t> chunk(int variable) const override;
+  Result<void> read(int variable, const std::vector<std::size_t>& start,
+                    const std::vector<std::size_t>& count, double* out) const override;
+  Result<void> read(int variable, const std::vector<std::size_t>& start,
+                    const std::vector<std::size_t>& count, float* out) const override;
+
+ private:
+  struct Entry {
+    std::vector<double> values;  // of a coordinate
+    std::optional<Placement> placement;
+    std::vector<double> missing;
+  };
+  template <class T>
+  Result<void> read_any(int variable, const std::vector<std::size_t>& start,
+                        const std::vector<std::size_t>& count, T* out) const;
+  template <class T>
+  Result<void> read_run(const Placement& placement, std::uint64_t offset, std::uint64_t stride,
+                        std::size_t count, T* out) const;
+
+  std::string name_;
+  std::string format_;
+  std::string identity_;
+  FileContents contents_;
+  std::vector<Entry> entries_;  // one a variable
+};
+
+}  // namespace windsplat::data::bytes

@@ -1,0 +1,62 @@
+// Named arrays of numbers with dimensions and attributes: what netCDF, Zarr, GRIB, GrADS, NRRD, ...
+// have in common. A reader of such a format implements this; source.hpp makes a dataset of it.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/cf/contents.hpp"
+
+namespace windsplat::data::cf {
+
+// An index into a file's dimensions or variables as one of a vector; not for -1.
+inline std::size_t at(int index) { return static_cast<std::size_t>(index); }
+
+// The index of the variable of that name, -1 if there is none.
+int variable_named(const FileContents& contents, std::string_view name);
+
+// A numeric attribute, as doubles.
+struct Numbers {
+  std::vector<double> values;  // empty if the attribute is absent or text
+  bool floating = false;       // stored as float or double
+};
+
+class ArrayFile {
+ public:
+  virtual ~ArrayFile() = default;
+
+  [[nodiscard]] virtual const FileContents& contents() const = 0;
+  [[nodiscard]] virtual const std::string& name() const = 0;  // without its folder, for messages
+  // What a user is told that the data come from: where it is not name().
+  [[nodiscard]] virtual std::string origin() const { return name(); }
+  [[nodiscard]] virtual std::string format() const = 0;  // "netCDF-4", "Zarr v2", ...
+  // Differs whenever the numbers may: names, sizes and times of change; not where files lie.
+  [[nodiscard]] virtual std::string identity() const = 0;
+
+  // Attributes that the reader does not put into FileVariable: _FillValue, missing_value,
+  // valid_min, valid_max, valid_range, scale_factor, add_offset, those of a grid mapping.
+  [[nodiscard]] virtual Numbers numbers(int variable, const char* attribute) const = 0;
+  // A text attribute, trimmed; empty if it is absent.
+  [[nodiscard]] virtual std::string text_of(int variable, const char* attribute) const = 0;
+  // How much is best read at once along each dimension; 1 where that does not matter.
+  [[nodiscard]] virtual std::vector<std::size_t> chunk(int variable) const = 0;
+
+  // Reads a block of a numeric variable as stored. start, count: one a dimension, slowest first;
+  // `out` holds the product of the counts, the last dimension fastest. Errors: bad_data, also where
+  // a file changed since it was opened.
+  virtual Result<void> read(int variable, const std::vector<std::size_t>& start,
+                            const std::vector<std::size_t>& count, double* out) const = 0;
+  // The same of a variable of type float32, without a detour.
+  virtual Result<void> read(int variable, const std::vector<std::size_t>& start,
+                            const std::vector<std::size_t>& count, float* out) const = 0;
+  // Frees what the reader keeps of a variable between reads.
+  virtual void forget_chunks(int /*variable*/) const {}
+
+  // A whole variable of few values.
+  [[nodiscard]] Result<std::vector<double>> read_all(int variable) const;
+};
+
+}  // namespace windsplat::data::cf

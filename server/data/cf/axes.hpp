@@ -1,0 +1,69 @@
+// Which dimension of a file is which axis of the world, by CF attributes first and usual names
+// last. Pure: FileContents in, roles and oriented axes out.
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/cf/contents.hpp"
+#include "server/data/dataset.hpp"
+
+namespace windsplat::data::cf {
+
+enum class Role { unknown, x, y, z, time, other };  // other: an ensemble, cell corners, ...
+
+// What is known of a dimension before any variable on it is looked at.
+struct DimensionRole {
+  Role role = Role::unknown;
+  AxisKind kind = AxisKind::cartesian;
+  bool kind_is_sure = false;   // false: only "it is vertical" or the like is known
+  bool positive_down = false;  // larger coordinates lie lower
+  int coordinate = -1;         // the 1-D variable that gives its coordinates; -1: none
+};
+
+// One entry a dimension of the file. Evidence in the order of trust: the `axis` attribute,
+// standard_name, units, `positive`, then the names of coordinate variable and dimension.
+std::vector<DimensionRole> classify_dimensions(const FileContents& contents);
+
+// Whether lower-case units are one of CF's spellings of degrees_east.
+bool is_east(std::string_view units);
+
+// Whether units, in whatever case, are radians.
+bool is_radian(std::string_view units);
+
+// Whether a variable holds longitudes or latitudes, of whatever rank.
+bool is_position(const FileVariable& variable);
+
+// How a variable's dimensions span space and time; -1 where it lacks one.
+struct Layout {
+  std::array<int, 3> space{-1, -1, -1};  // dimension ids of x, y, z
+  int time = -1;
+  std::string problem;  // why the variable cannot be placed; empty if it can
+
+  [[nodiscard]] int rank() const;  // how many spatial dimensions it has
+};
+
+// Dimensions of unknown role take the places that are free, the last one x, then y, then z; an
+// unlimited first one is time. A dimension of another role must have length 1; where two want one
+// place the longer has it, and one of length 1 needs none.
+Layout lay_out(const FileContents& contents, const std::vector<DimensionRole>& roles,
+               const FileVariable& variable);
+
+// An axis whose index grows with the world coordinate, and whether the file's order was turned.
+struct OrientedAxis {
+  Axis axis;
+  bool turned = false;
+  std::string note;  // what was taken for what; empty if there is nothing to say
+};
+
+// which: 0 x, 1 y, 2 z. coordinates: as in the file, angles in degrees; empty: the dimension has
+// none, samples are placed by index. horizontal: the x axis' kind, which tells a height from a
+// plain z. Errors: bad_data if the coordinates are not finite and strictly monotonic.
+Result<OrientedAxis> orient_axis(const FileContents& contents, const DimensionRole& role,
+                                 int dimension, int which, std::vector<double> coordinates,
+                                 AxisKind horizontal);
+
+}  // namespace windsplat::data::cf

@@ -1,0 +1,27 @@
+// Read whole, unpacked one by one; radians become degrees.
+#include "server/data/cf/coordinates.hpp"
+
+#include <numbers>
+
+#include "server/data/cf/axes.hpp"
+#include "server/data/cf/packing.hpp"
+
+namespace windsplat::data::cf {
+
+Result<std::vector<double>> unpacked_values(const ArrayFile& file, int variable) {
+  auto values = file.read_all(variable);
+  if (!values) return values;
+  const Packing packing = packing_of(file, variable);
+  for (double& value : *values) value = unpack_double(packing, value);
+  return values;
+}
+
+Result<std::vector<double>> unpacked_degrees(const ArrayFile& file, int variable) {
+  auto values = unpacked_values(file, variable);
+  if (values && is_radian(file.contents().variables.at(at(variable)).units)) {
+    for (double& value : *values) value *= 180 / std::numbers::pi;
+  }
+  return values;
+}
+
+}  // namespace windsplat::data::cf

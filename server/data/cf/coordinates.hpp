@@ -1,0 +1,17 @@
+// Values of coordinate variables and coefficients: file -> physical numbers in double.
+#pragma once
+
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/cf/array_file.hpp"
+
+namespace windsplat::data::cf {
+
+// All values of a variable of few values, unpacked, NaN where missing. Errors: bad_data.
+Result<std::vector<double>> unpacked_values(const ArrayFile& file, int variable);
+
+// The same of longitudes or latitudes, in degrees whatever angle the file tells them in.
+Result<std::vector<double>> unpacked_degrees(const ArrayFile& file, int variable);
+
+}  // namespace windsplat::data::cf

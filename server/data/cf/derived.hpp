@@ -1,0 +1,54 @@
+// Fields that a file's own variables make together: pressure, heights, vertical motion in metres a
+// second. Known at once, computed when one is asked for.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/cf/array_file.hpp"
+#include "server/data/cf/fields.hpp"
+#include "server/data/cf/read_blocks.hpp"
+#include "server/data/cf/vertical.hpp"
+#include "server/data/dataset.hpp"
+
+namespace windsplat::data::cf {
+
+// What tells the pressure of a sample, in Pa: levels by themselves, or over the surface's.
+struct PressureLevels {
+  std::vector<double> level;  // Pa, from below; empty where `hybrid` tells
+  std::optional<HybridLevels> hybrid;
+};
+
+struct DerivedField {
+  enum class Rule {
+    pressure,         // of every sample, in the surface pressure's units
+    height,           // inputs[0] times scale, in metres
+    standard_height,  // where the standard atmosphere has the sample's pressure
+    rise,             // inputs: u, v, omega: w = -omega R T / (p g) as the third component
+  };
+  Rule rule = Rule::pressure;
+  FieldInfo info;
+  std::vector<int> inputs;  // variables
+  double scale = 1;         // of inputs[0] (height), of omega to Pa/s (rise)
+  int temperature = -1;     // variable; -1: the standard atmosphere's
+  double celsius = 0;       // added to temperatures
+};
+
+// plans: the fields that the file has by itself; variables: those on the grid. Notes say what was
+// taken for what. Errors: bad_data if a file must be looked into and cannot be read.
+Result<std::vector<DerivedField>> find_derived(const ArrayFile& file, const Placement& grid,
+                                               const std::vector<FieldPlan>& plans,
+                                               const std::vector<int>& variables,
+                                               const PressureLevels& pressures,
+                                               std::vector<std::string>& notes);
+
+// The field at a step, all components. Errors: bad_data.
+Result<void> fill_derived(const ArrayFile& file, const Placement& grid,
+                          const PressureLevels& pressures, const DerivedField& field,
+                          std::size_t step, float* out, const Progress& tell);
+
+}  // namespace windsplat::data::cf

@@ -1,0 +1,31 @@
+// Which variables of a file share the one grid that is shown, and why the others are left out.
+// Pure: FileContents and dimension roles in, a choice out.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/cf/axes.hpp"
+#include "server/data/cf/contents.hpp"
+#include "server/data/dataset.hpp"
+
+namespace windsplat::data::cf {
+
+// Limits on what is read: a grid's samples and a volume's bytes.
+inline constexpr std::size_t samples_max = std::size_t{1} << 31;
+inline constexpr std::size_t volume_bytes_max = std::size_t{16} << 30;
+
+struct GridChoice {
+  std::array<int, 3> space{-1, -1, -1};  // dimension ids of x, y, z; -1 where the grid is flat
+  int time = -1;                         // dimension id, -1 if nothing shown changes in time
+  std::vector<int> variables;            // those shown, in the file's order
+  std::vector<LeftOut> left_out;
+};
+
+// Grids with three spatial dimensions come first, then the one that holds the most samples over
+// all its variables. Errors: bad_data if there is none, or if it is beyond samples_max.
+Result<GridChoice> choose_grid(const FileContents& contents,
+                               const std::vector<DimensionRole>& roles);
+
+}  // namespace windsplat::data::cf

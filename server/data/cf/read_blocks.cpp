@@ -1,0 +1,238 @@
+// Blocks are some MiB, and whole chunks where the file has chunks.
+#include "server/data/cf/read_blocks.hpp"
+
+#include <algorithm>
+#include <type_traits>
+#include <vector>
+
+#include "server/data/cf/packing.hpp"
+
+namespace windsplat::data::cf {
+
+namespace {
+
+// Doubles read at a time: 32 MiB where whole chunks are wanted, otherwise 2 MiB.
+constexpr std::size_t chunked_values = std::size_t{4} << 20;
+constexpr std::size_t plain_values = std::size_t{1} << 18;
+// One dimension of a variable on its way into the volume.
+struct Way {
+  std::size_t first = 0;      // index in the file where reading starts
+  std::size_t length = 1;     // how many indices are read
+  std::ptrdiff_t stride = 0;  // floats between neighbours in the volume, negative if turned
+};
+
+// Calls row(offset of the row's first value in the volume, row's values) for all rows of a block
+// (counts, last fastest).
+template <class T, class Row>
+void for_rows(const T* block, const std::vector<std::size_t>& count, const std::vector<Way>& ways,
+              const Row& row) {
+  const std::size_t rank = count.size();
+  std::vector<std::size_t> index(rank, 0);
+  for (;;) {
+    std::ptrdiff_t offset = 0;
+    for (std::size_t d = 0; d + 1 < rank; ++d) {
+      offset += static_cast<std::ptrdiff_t>(index[d]) * ways[d].stride;
+    }
+    row(offset, block);
+    block += count.back();
+    std::size_t d = rank - 1;
+    for (; d > 0; --d) {  // an odometer over all but the last dimension
+      if (++index[d - 1] < count[d - 1]) {
+        break;
+      }
+      index[d - 1] = 0;
+    }
+    if (d == 0) {
+      return;
+    }
+  }
+}
+
+// Unpacks a block into the volume, starting at `out`.
+void scatter(const Packing& packing, const double* block, const std::vector<std::size_t>& count,
+             const std::vector<Way>& ways, float* out) {
+  const std::ptrdiff_t stride = ways.back().stride;
+  for_rows(block, count, ways, [&](std::ptrdiff_t offset, const double* row) {
+    for (std::size_t i = 0; i < count.back(); ++i) {
+      out[offset + static_cast<std::ptrdiff_t>(i) * stride] = unpack(packing, row[i]);
+    }
+  });
+}
+
+void scatter(const FloatMask& mask, float* block, const std::vector<std::size_t>& count,
+             const std::vector<Way>& ways, float* out) {
+  const std::ptrdiff_t stride = ways.back().stride;
+  std::size_t values = 1;
+  for (const std::size_t n : count) values *= n;
+  apply(mask, block, values);
+  for_rows(block, count, ways, [&](std::ptrdiff_t offset, const float* row) {
+    float* to = out + offset;
+    if (stride == 1) {
+      std::copy_n(row, count.back(), to);
+      return;
+    }
+    for (std::size_t i = 0; i < count.back(); ++i) {
+      to[static_cast<std::ptrdiff_t>(i) * stride] = row[i];
+    }
+  });
+}
+
+// Whether a block lies in the volume as it lies in the file.
+bool in_one_piece(const std::vector<std::size_t>& count, const std::vector<Way>& ways) {
+  std::ptrdiff_t values = 1;
+  for (std::size_t d = ways.size(); d-- > 0;) {
+    if (count[d] > 1 && ways[d].stride != values) return false;
+    values *= static_cast<std::ptrdiff_t>(count[d]);
+  }
+  return true;
+}
+
+// How much of each dimension a block spans: whole inner dimensions, some of one, single outer ones.
+std::vector<std::size_t> block_counts(const std::vector<Way>& ways,
+                                      const std::vector<std::size_t>& chunk) {
+  const bool chunked = std::any_of(chunk.begin(), chunk.end(), [](auto n) { return n > 1; });
+  const std::size_t block_values = chunked ? chunked_values : plain_values;
+  std::vector<std::size_t> count(ways.size(), 1);
+  std::size_t values = 1;
+  for (std::size_t d = ways.size(); d-- > 0;) {
+    const std::size_t fit = std::max<std::size_t>(1, block_values / values);
+    count[d] = std::min(ways[d].length, fit);
+    if (count[d] < ways[d].length) {
+      // Whole chunks, so that none is decompressed twice.
+      if (count[d] > chunk[d]) {
+        count[d] -= count[d] % chunk[d];
+      }
+      break;
+    }
+    values *= count[d];
+  }
+  return count;
+}
+
+// How each dimension of a variable is read, and where its index 0 lands in the volume.
+std::vector<Way> ways_of(const ArrayFile& file, const Placement& grid, int variable,
+                         std::size_t step, const Levels& levels, std::ptrdiff_t& origin) {
+  const std::array<std::ptrdiff_t, 3> strides{1, static_cast<std::ptrdiff_t>(grid.length[0]),
+                                              static_cast<std::ptrdiff_t>(grid.layer())};
+  std::vector<Way> ways;
+  origin = 0;
+  for (const int id : file.contents().variables.at(static_cast<std::size_t>(variable)).dims) {
+    Way way;
+    const auto* at = std::find(grid.space.begin(), grid.space.end(), id);
+    if (at != grid.space.end()) {
+      const auto axis = static_cast<std::size_t>(at - grid.space.begin());
+      const bool turned = grid.turned.at(axis);
+      way.length = axis == 2 ? levels.count : grid.length.at(axis);
+      if (axis == 2) {
+        way.first = turned ? grid.length[2] - levels.first - levels.count : levels.first;
+      }
+      way.stride = strides.at(axis);
+      if (turned) {
+        origin += static_cast<std::ptrdiff_t>(way.length - 1) * way.stride;
+        way.stride = -way.stride;
+      }
+    } else if (id == grid.time) {
+      way.first = step;
+    }
+    ways.push_back(way);
+  }
+  return ways;
+}
+
+// The next step may find what this one decompressed, and other levels what these did.
+bool hold_other_parts(const ArrayFile& file, const Placement& grid, int variable,
+                      const Levels& levels, const std::vector<std::size_t>& chunk) {
+  const auto& dims = file.contents().variables.at(static_cast<std::size_t>(variable)).dims;
+  const auto time = std::find(dims.begin(), dims.end(), grid.time);
+  return (time != dims.end() && chunk[static_cast<std::size_t>(time - dims.begin())] > 1) ||
+         levels.first + levels.count < grid.length[2];
+}
+
+// The state of going through a variable block by block.
+struct Walk {
+  std::vector<std::size_t> start;
+  std::vector<std::size_t> count;
+  std::ptrdiff_t corner = 0;  // where the block's first value lands
+  std::size_t values = 1;     // in the block
+};
+
+Walk block_at(const std::vector<Way>& ways, const std::vector<std::size_t>& block,
+              const std::vector<std::size_t>& index, std::ptrdiff_t origin) {
+  Walk walk;
+  walk.corner = origin;
+  for (std::size_t d = 0; d < ways.size(); ++d) {
+    walk.start.push_back(ways[d].first + index[d]);
+    walk.count.push_back(std::min(block[d], ways[d].length - index[d]));
+    walk.corner += static_cast<std::ptrdiff_t>(index[d]) * ways[d].stride;
+    walk.values *= walk.count[d];
+  }
+  return walk;
+}
+
+// To the next block; false behind the last.
+bool advance(const std::vector<Way>& ways, const std::vector<std::size_t>& block,
+             std::vector<std::size_t>& index) {
+  for (std::size_t d = ways.size(); d > 0; --d) {
+    index[d - 1] += block[d - 1];
+    if (index[d - 1] < ways[d - 1].length) return true;
+    index[d - 1] = 0;
+  }
+  return false;
+}
+
+// Block after block of type T: read, then `rule` makes values of what is stored.
+template <class T, class Rule>
+Result<void> read_blocks(const ArrayFile& file, int variable, const std::vector<Way>& ways,
+                         std::ptrdiff_t origin, const Rule& rule, float* out,
+                         const Progress& tell) {
+  const std::vector<std::size_t> block = block_counts(ways, file.chunk(variable));
+  std::size_t all = 1;
+  for (const Way& way : ways) all *= way.length;
+  std::vector<T> buffer;
+  std::size_t done = 0;
+  std::vector<std::size_t> index(ways.size(), 0);  // of the block's corner, from each way's first
+  do {
+    const Walk walk = block_at(ways, block, index, origin);
+    bool in_place = false;
+    if constexpr (std::is_same_v<T, float>) {
+      in_place = in_one_piece(walk.count, ways);
+      if (in_place) {
+        if (auto read = file.read(variable, walk.start, walk.count, out + walk.corner); !read) {
+          return read;
+        }
+        apply(rule, out + walk.corner, walk.values);
+      }
+    }
+    if (!in_place) {
+      buffer.resize(std::max(buffer.size(), walk.values));
+      if (auto read = file.read(variable, walk.start, walk.count, buffer.data()); !read) {
+        return read;
+      }
+      scatter(rule, buffer.data(), walk.count, ways, out + walk.corner);
+    }
+    done += walk.values;
+    tell(static_cast<double>(done) / static_cast<double>(all));
+  } while (advance(ways, block, index));
+  return {};
+}
+
+}  // namespace
+
+Result<void> read_variable(const ArrayFile& file, const Placement& grid, int variable,
+                           std::size_t step, const Levels& levels, float* out,
+                           const Progress& tell) {
+  std::ptrdiff_t origin = 0;
+  const std::vector<Way> ways = ways_of(file, grid, variable, step, levels, origin);
+  const Packing packing = packing_of(file, variable);
+  const auto mask = float_mask(packing);
+  const auto& type = file.contents().variables.at(static_cast<std::size_t>(variable)).type;
+  auto done = type == "float32" && mask
+                  ? read_blocks<float>(file, variable, ways, origin, *mask, out, tell)
+                  : read_blocks<double>(file, variable, ways, origin, packing, out, tell);
+  if (done && !hold_other_parts(file, grid, variable, levels, file.chunk(variable))) {
+    file.forget_chunks(variable);
+  }
+  return done;
+}
+
+}  // namespace windsplat::data::cf

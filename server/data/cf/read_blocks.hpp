@@ -1,0 +1,35 @@
+// One variable at one step -> a volume, x fastest: blocks of the file in its own order, unpacked,
+// scattered and turned.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "server/base/error.hpp"
+#include "server/data/cf/array_file.hpp"
+#include "server/data/dataset.hpp"
+
+namespace windsplat::data::cf {
+
+// Which dimensions of a file are a grid's axes, and how they lie in its volumes.
+struct Placement {
+  std::array<int, 3> space{-1, -1, -1};             // dimension ids of x, y, z; -1: one sample
+  int time = -1;                                    // -1: nothing changes in time
+  std::array<bool, 3> turned{false, false, false};  // the file's order is the other way round
+  std::array<std::size_t, 3> length{1, 1, 1};       // samples along x, y, z
+  [[nodiscard]] std::size_t layer() const { return length[0] * length[1]; }
+};
+
+// Levels of a volume, from below.
+struct Levels {
+  std::size_t first = 0;
+  std::size_t count = 0;
+};
+
+// Unpacked values of those levels of a variable, NaN where masked; `out` holds levels.count layers,
+// of a variable without levels one. `tell` hears of the part that is done. Errors: bad_data.
+Result<void> read_variable(const ArrayFile& file, const Placement& grid, int variable,
+                           std::size_t step, const Levels& levels, float* out,
+                           const Progress& tell);
+
+}  // namespace windsplat::data::cf

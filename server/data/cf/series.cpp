@@ -1,0 +1,513 @@
+// Members are compared with the first one, their times put on one axis, and blocks passed on to the
+// member that has the step.
+#include "server/data/cf/series.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include "server/data/cf/axes.hpp"
+#include "server/data/cf/coordinates.hpp"
+#include "server/data/cf/grid.hpp"
+#include "server/data/cf/packing.hpp"
+#include "server/data/cf/text.hpp"
+#include "server/data/cf/time.hpp"
+#include "server/data/digest.hpp"
+
+namespace windsplat::data::cf {
+
+namespace {
+
+int dimension_named(const FileContents& contents, const std::string& name) {
+  for (std::size_t d = 0; d < contents.dimensions.size(); ++d) {
+    if (contents.dimensions[d].name == name) return static_cast<int>(d);
+  }
+  return -1;
+}
+
+bool same_number(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
+
+bool same_packing(const Packing& a, const Packing& b) {
+  return a.packed == b.packed && same_number(a.scale, b.scale) && same_number(a.offset, b.offset) &&
+         a.wrap == b.wrap && same_number(a.valid_min, b.valid_min) &&
+         same_number(a.valid_max, b.valid_max) && a.valid_is_unpacked == b.valid_is_unpacked &&
+         std::equal(a.missing.begin(), a.missing.end(), b.missing.begin(), b.missing.end(),
+                    same_number);
+}
+
+// Whether coordinates are the same to the rounding of single precision.
+bool same_place(double a, double b) {
+  return same_number(a, b) || std::abs(a - b) <= 1e-6 * std::max(std::abs(a), std::abs(b)) + 1e-9;
+}
+
+constexpr std::size_t compared_max = std::size_t{1} << 24;  // values of a coordinate
+
+// How many values a variable has; compared_max + 1 stands for all that is more.
+std::size_t values_of(const FileContents& contents, int variable) {
+  std::size_t values = 1;
+  for (const int d : contents.variables.at(at(variable)).dims) {
+    const std::size_t length = contents.dimensions.at(at(d)).length;
+    if (length == 0) return 0;
+    values = values > compared_max / length ? compared_max + 1 : values * length;
+  }
+  return values;
+}
+
+std::vector<std::string> dimension_names(const FileContents& contents, int variable) {
+  std::vector<std::string> out;
+  for (const int d : contents.variables.at(at(variable)).dims) {
+    out.push_back(contents.dimensions.at(at(d)).name);
+  }
+  return out;
+}
+
+Error misfit(const ArrayFile& file, const ArrayFile& first, const std::string& what) {
+  return make_error(ErrorKind::bad_data, in_quotes(file.name()) +
+                                             " does not fit into a series with " +
+                                             in_quotes(first.name()) + ": " + what);
+}
+
+// Every value of a block of one step, put where it belongs among those of all steps.
+template <class T>
+void interleave(const std::vector<std::size_t>& count, std::size_t axis, std::size_t step,
+                const std::vector<T>& block, T* out) {
+  std::size_t inner = 1;
+  for (std::size_t d = axis + 1; d < count.size(); ++d) inner *= count[d];
+  for (std::size_t outer = 0; outer * inner < block.size(); ++outer) {
+    std::copy_n(block.data() + outer * inner, inner, out + (outer * count[axis] + step) * inner);
+  }
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SeriesFile>> SeriesFile::open(std::string name, std::size_t members,
+                                                     OpenMember open_member, std::string origin) {
+  std::unique_ptr<SeriesFile> series(new SeriesFile(std::move(name), std::move(open_member)));
+  series->origin_ = std::move(origin);
+  for (std::size_t m = 0; m < members; ++m) {
+    if (auto added = series->add(m); !added) return added.error();
+  }
+  series->sort_steps();
+  if (series->steps_.empty()) {
+    return make_error(ErrorKind::bad_data, in_quotes(series->name_) + ": no file has a time step");
+  }
+  series->finish();
+  return series;
+}
+
+std::string SeriesFile::identity() const {
+  std::string all;
+  for (const Member& member : members_) all += member.identity + '\n';
+  return digest_of(all);
+}
+
+Result<void> SeriesFile::begin() {
+  const FileContents& contents = first_->contents();
+  const std::vector<DimensionRole> roles = classify_dimensions(contents);
+  auto choice = choose_grid(contents, roles);
+  if (!choice) {
+    return make_error(choice.error().kind,
+                      in_quotes(first_->name()) + ": " + choice.error().message);
+  }
+  space_ = choice->space;
+  time_ = choice->time;
+  dropped_.resize(contents.variables.size());
+  as_values_.resize(contents.variables.size());
+  if (time_ >= 0) {
+    time_coordinate_ = roles.at(at(time_)).coordinate;
+    return {};
+  }
+  for (std::size_t v = 0; v < contents.variables.size(); ++v) {
+    const FileVariable& variable = contents.variables[v];
+    if (variable.dims.empty() && variable.numeric &&
+        (variable.standard_name == "time" || variable.name == "time")) {
+      time_coordinate_ = static_cast<int>(v);
+    }
+  }
+  return {};
+}
+
+// Whether all members are taken to have the first one's values.
+bool SeriesFile::is_static(std::size_t in_first) const {
+  const FileVariable& variable = first_->contents().variables[in_first];
+  if (static_cast<int>(in_first) == time_coordinate_) return false;
+  if (time_ >= 0) {
+    return std::find(variable.dims.begin(), variable.dims.end(), time_) == variable.dims.end();
+  }
+  return variable.dims.size() < 2 || !variable.numeric || is_position(variable);
+}
+
+Result<void> SeriesFile::add(std::size_t member) {
+  auto opened = open_member_(member);
+  if (!opened) return opened.error();
+  const bool is_first = member == 0;
+  if (is_first) {
+    first_ = std::move(*opened);
+    if (auto begun = begin(); !begun) return begun;
+  }
+  const ArrayFile& file = is_first ? *first_ : **opened;
+  members_.push_back({file.identity(), {}});
+  if (!is_first) {
+    if (auto fine = check_space(file); !fine) return fine;
+    if (auto fine = check_values(file); !fine) return fine;
+    compare_variables(file, members_.back());
+  }
+  return add_times(member, file);
+}
+
+Result<void> SeriesFile::check_space(const ArrayFile& file) const {
+  for (const int d : space_) {
+    if (d < 0) continue;
+    const FileDimension& own = first_->contents().dimensions.at(at(d));
+    const int other = dimension_named(file.contents(), own.name);
+    if (other < 0) return misfit(file, *first_, "it has no dimension " + in_quotes(own.name));
+    const std::size_t length = file.contents().dimensions.at(at(other)).length;
+    if (length != own.length) {
+      return misfit(file, *first_,
+                    "its dimension " + in_quotes(own.name) + " has length " +
+                        std::to_string(length) + ", not " + std::to_string(own.length));
+    }
+  }
+  return {};
+}
+
+// Coordinates of space, of whatever rank, and what stands beside them along an axis.
+Result<void> SeriesFile::check_values(const ArrayFile& file) const {
+  const FileContents& contents = first_->contents();
+  for (std::size_t v = 0; v < contents.variables.size(); ++v) {
+    const FileVariable& variable = contents.variables[v];
+    const bool places = variable.dims.size() == 1 || is_position(variable);
+    const bool in_space = std::all_of(variable.dims.begin(), variable.dims.end(), [&](int d) {
+      return std::find(space_.begin(), space_.end(), d) != space_.end();
+    });
+    const int other = variable_named(file.contents(), variable.name);
+    if (!variable.numeric || !places || variable.dims.empty() || !in_space || other < 0 ||
+        values_of(contents, static_cast<int>(v)) > compared_max) {
+      continue;
+    }
+    if (!file.contents().variables[at(other)].numeric ||
+        dimension_names(contents, static_cast<int>(v)) != dimension_names(file.contents(), other)) {
+      return misfit(file, *first_, in_quotes(variable.name) + " is another kind of variable");
+    }
+    auto own = unpacked_values(*first_, static_cast<int>(v));
+    auto others = unpacked_values(file, other);
+    if (!own) return own.error();
+    if (!others) return others.error();
+    const auto differ =
+        std::mismatch(own->begin(), own->end(), others->begin(), others->end(), same_place);
+    if (differ.first != own->end() || differ.second != others->end()) {
+      const auto index = differ.first - own->begin();
+      std::string what = "its coordinate " + in_quotes(variable.name) + " differs at index " +
+                         std::to_string(index);
+      if (differ.first != own->end() && differ.second != others->end()) {
+        what += ": " + number_text(*differ.second) + ", not " + number_text(*differ.first);
+      }
+      return misfit(file, *first_, what);
+    }
+  }
+  return {};
+}
+
+void SeriesFile::compare_variables(const ArrayFile& file, Member& member) {
+  const FileContents& own = first_->contents();
+  const FileContents& others = file.contents();
+  std::vector<int> indices;
+  bool same = true;
+  for (std::size_t v = 0; v < own.variables.size(); ++v) {
+    const FileVariable& variable = own.variables[v];
+    const int other = variable_named(others, variable.name);
+    indices.push_back(other);
+    same = same && other == static_cast<int>(v);
+    if (is_static(v) || static_cast<int>(v) == time_coordinate_ || !dropped_[v].empty()) continue;
+    if (other < 0) {
+      dropped_[v] = "only some files have it: " + in_quotes(file.name()) + " does not";
+      continue;
+    }
+    const FileVariable& found = others.variables[at(other)];
+    bool fits = dimension_names(own, static_cast<int>(v)) == dimension_names(others, other) &&
+                variable.numeric == found.numeric;
+    for (std::size_t d = 0; fits && d < variable.dims.size(); ++d) {
+      fits = variable.dims[d] == time_ || own.dimensions[at(variable.dims[d])].length ==
+                                              others.dimensions[at(found.dims[d])].length;
+    }
+    if (!fits || variable.units != found.units) {
+      dropped_[v] = "its " + std::string(fits ? "units" : "dimensions") + " differ in " +
+                    in_quotes(file.name());
+    } else if (variable.numeric) {
+      const bool alike =
+          variable.type == found.type && variable.is_unsigned == found.is_unsigned &&
+          same_packing(packing_of(*first_, static_cast<int>(v)), packing_of(file, other));
+      as_values_[v] = as_values_[v] || !alike;
+    }
+  }
+  for (const FileVariable& variable : others.variables) {
+    const bool told = std::any_of(contents_.left_out.begin(), contents_.left_out.end(),
+                                  [&](const LeftOut& left) { return left.name == variable.name; });
+    if (variable_named(own, variable.name) < 0 && variable.dims.size() > 1 && !told) {
+      contents_.left_out.push_back(
+          {variable.name, "only some files have it: " + in_quotes(first_->name()) + " does not"});
+    }
+  }
+  if (!same) member.variables = std::move(indices);
+}
+
+Result<void> SeriesFile::add_times(std::size_t member, const ArrayFile& file) {
+  const FileContents& own = first_->contents();
+  std::size_t records = 1;
+  if (time_ >= 0) {
+    const int time = dimension_named(file.contents(), own.dimensions[at(time_)].name);
+    if (time < 0) {
+      return misfit(file, *first_,
+                    "it has no dimension " + in_quotes(own.dimensions[at(time_)].name));
+    }
+    records = file.contents().dimensions[at(time)].length;
+  }
+  if (steps_.size() + records > 10'000'000) {
+    return make_error(ErrorKind::bad_data, "there are more than 10000000 time steps");
+  }
+  if (time_coordinate_ < 0) {
+    for (std::size_t r = 0; r < records; ++r) {
+      steps_.push_back({member, r, static_cast<double>(steps_.size())});
+    }
+    return {};
+  }
+  const FileVariable& coordinate = own.variables[at(time_coordinate_)];
+  const int other = variable_named(file.contents(), coordinate.name);
+  if (other < 0) return misfit(file, *first_, "it has no " + in_quotes(coordinate.name));
+  const FileVariable& found = file.contents().variables[at(other)];
+  auto values = found.numeric && values_of(file.contents(), other) == records
+                    ? unpacked_values(file, other)
+                    : std::vector<double>();
+  if (!values) return values.error();
+  const bool complete = std::all_of(values->begin(), values->end(),
+                                    [](double value) { return std::isfinite(value); });
+  if (values->size() != records || !complete) {
+    return misfit(file, *first_, "it does not tell the times of all its steps");
+  }
+  const auto times = convert_times(*values, {found.units, found.calendar},
+                                   {coordinate.units, coordinate.calendar});
+  if (!times) {
+    return misfit(file, *first_,
+                  "its times, in " + in_quotes(found.units) + " (calendar " +
+                      in_quotes(found.calendar) + "), cannot be told in " +
+                      in_quotes(coordinate.units) + " (calendar " + in_quotes(coordinate.calendar) +
+                      ")");
+  }
+  for (std::size_t r = 0; r < records; ++r) steps_.push_back({member, r, (*times)[r]});
+  return {};
+}
+
+void SeriesFile::sort_steps() {
+  std::stable_sort(steps_.begin(), steps_.end(),
+                   [](const Step& a, const Step& b) { return a.time < b.time; });
+  std::vector<Step> kept;
+  std::size_t twice = 0;   // in two files
+  std::size_t within = 0;  // in one
+  for (const Step& step : steps_) {
+    const bool again =
+        !kept.empty() && step.time - kept.back().time <= 1e-12 * std::max(1.0, std::abs(step.time));
+    if (again) {
+      ++(step.member != kept.back().member ? twice : within);
+      kept.back() = step;
+    } else {
+      kept.push_back(step);
+    }
+  }
+  if (twice > 0) {
+    contents_.notes.push_back(std::to_string(twice) + (twice == 1 ? " time lies" : " times lie") +
+                              " in more than one file: the later file's is shown");
+  }
+  if (within > 0) {
+    contents_.notes.push_back(std::to_string(within) + (within == 1 ? " time is" : " times are") +
+                              " told again within one file: the later one is shown");
+  }
+  steps_ = std::move(kept);
+}
+
+// Puts the first member's contents and what was found about the others together.
+void SeriesFile::finish() {
+  const FileContents& own = first_->contents();
+  contents_.title = own.title;
+  contents_.dimensions = own.dimensions;
+  contents_.groups = own.groups;
+  contents_.notes.insert(contents_.notes.begin(), own.notes.begin(), own.notes.end());
+  contents_.left_out.insert(contents_.left_out.begin(), own.left_out.begin(), own.left_out.end());
+  for (std::size_t v = 0; v < own.variables.size(); ++v) {
+    FileVariable variable = own.variables[v];
+    if (!dropped_[v].empty()) {
+      contents_.left_out.push_back({variable.name, dropped_[v]});
+      continue;
+    }
+    const bool is_time = static_cast<int>(v) == time_coordinate_;
+    if (as_values_[v] || is_time) {
+      variable.type = is_time ? "float64" : "float32";
+      variable.packed = false;
+      variable.is_unsigned = false;
+    }
+    Variable way;
+    way.in_first = static_cast<int>(v);
+    way.as_values = as_values_[v] || is_time;
+    const auto time = std::find(variable.dims.begin(), variable.dims.end(), time_);
+    if (time_ >= 0 && time != variable.dims.end()) {
+      way.time_axis = static_cast<int>(time - variable.dims.begin());
+    }
+    contents_.variables.push_back(std::move(variable));
+    variables_.push_back(way);
+  }
+  if (time_ >= 0) {
+    contents_.dimensions[at(time_)].length = steps_.size();
+  } else {
+    add_time_dimension();
+  }
+  contents_.notes.push_back(std::to_string(members_.size()) + " files joined along time");
+}
+
+// Members that are single steps get a dimension that they lack.
+void SeriesFile::add_time_dimension() {
+  FileDimension dimension;
+  dimension.name = time_coordinate_ >= 0 ? first_->contents().variables[at(time_coordinate_)].name
+                                         : std::string("time");
+  for (int n = 1; dimension_named(contents_, dimension.name) >= 0; ++n) {
+    dimension.name = "time_" + std::to_string(n);
+  }
+  dimension.length = steps_.size();
+  dimension.unlimited = true;
+  const auto added = static_cast<int>(contents_.dimensions.size());
+  contents_.dimensions.push_back(std::move(dimension));
+  for (std::size_t v = 0; v < variables_.size(); ++v) {
+    if (is_static(at(variables_[v].in_first))) continue;
+    FileVariable& variable = contents_.variables[v];
+    variable.dims.insert(variable.dims.begin(), added);
+    variables_[v].time_axis = 0;
+    if (variables_[v].in_first == time_coordinate_) variable.axis = "T";
+  }
+}
+
+Numbers SeriesFile::numbers(int variable, const char* attribute) const {
+  const Variable& way = variables_.at(at(variable));
+  return way.as_values ? Numbers() : first_->numbers(way.in_first, attribute);
+}
+
+std::string SeriesFile::text_of(int variable, const char* attribute) const {
+  return first_->text_of(variables_.at(at(variable)).in_first, attribute);
+}
+
+std::vector<std::size_t> SeriesFile::chunk(int variable) const {
+  const Variable& way = variables_.at(at(variable));
+  std::vector<std::size_t> lengths = first_->chunk(way.in_first);
+  if (time_ < 0 && way.time_axis == 0) lengths.insert(lengths.begin(), 1);
+  return lengths;
+}
+
+void SeriesFile::forget_chunks(int variable) const {
+  const Variable& way = variables_.at(at(variable));
+  first_->forget_chunks(way.in_first);
+  for (const Opened& opened : opened_) {
+    const auto& indices = members_[opened.member].variables;
+    opened.file->forget_chunks(indices.empty() ? way.in_first : indices[at(way.in_first)]);
+  }
+}
+
+Result<const ArrayFile*> SeriesFile::member_file(std::size_t member) const {
+  if (member == 0) return first_.get();
+  const auto found = std::find_if(opened_.begin(), opened_.end(),
+                                  [&](const Opened& opened) { return opened.member == member; });
+  if (found != opened_.end()) {
+    opened_.splice(opened_.begin(), opened_, found);
+    return opened_.front().file.get();
+  }
+  if (opened_.size() + 2 > open_max) opened_.pop_back();
+  auto file = open_member_(member);
+  if (!file) return file.error();
+  if ((*file)->identity() != members_[member].identity) {
+    return make_error(ErrorKind::bad_data, in_quotes((*file)->name()) +
+                                               " has changed since it was opened; open it again");
+  }
+  opened_.push_front({member, std::move(*file)});
+  return opened_.front().file.get();
+}
+
+Result<void> SeriesFile::read_block(const Variable& variable, std::size_t step,
+                                    const std::vector<std::size_t>& start,
+                                    const std::vector<std::size_t>& count, double* out) const {
+  const std::size_t member = variable.time_axis < 0 ? 0 : steps_[step].member;
+  const auto file = member_file(member);
+  if (!file) return file.error();
+  const auto& indices = members_[member].variables;
+  const int id = indices.empty() ? variable.in_first : indices[at(variable.in_first)];
+  auto done = (*file)->read(id, start, count, out);
+  if (done && variable.as_values) {
+    const Packing packing = packing_of(**file, id);
+    std::size_t values = 1;
+    for (const std::size_t n : count) values *= n;
+    for (std::size_t i = 0; i < values; ++i) out[i] = unpack_double(packing, out[i]);
+  }
+  return done;
+}
+
+Result<void> SeriesFile::read_block(const Variable& variable, std::size_t step,
+                                    const std::vector<std::size_t>& start,
+                                    const std::vector<std::size_t>& count, float* out) const {
+  if (variable.as_values) {
+    std::size_t values = 1;
+    for (const std::size_t n : count) values *= n;
+    std::vector<double> wide(values);
+    auto done = read_block(variable, step, start, count, wide.data());
+    std::transform(wide.begin(), wide.end(), out, [](double v) { return static_cast<float>(v); });
+    return done;
+  }
+  const std::size_t member = variable.time_axis < 0 ? 0 : steps_[step].member;
+  const auto file = member_file(member);
+  if (!file) return file.error();
+  const auto& indices = members_[member].variables;
+  return (*file)->read(indices.empty() ? variable.in_first : indices[at(variable.in_first)], start,
+                       count, out);
+}
+
+template <class T>
+Result<void> SeriesFile::read_steps(int variable, const std::vector<std::size_t>& start,
+                                    const std::vector<std::size_t>& count, T* out) const {
+  const Variable& way = variables_.at(at(variable));
+  if (way.in_first == time_coordinate_) {
+    for (std::size_t i = 0; i < count[0]; ++i) {
+      out[i] = static_cast<T>(steps_[start[0] + i].time);
+    }
+    return {};
+  }
+  if (way.time_axis < 0) return read_block(way, 0, start, count, out);
+  const std::size_t axis = at(way.time_axis);
+  std::vector<std::size_t> from = start;
+  std::vector<std::size_t> here = count;
+  here[axis] = 1;
+  if (time_ < 0) {  // the dimension that members lack
+    from.erase(from.begin());
+    here.erase(here.begin());
+  }
+  std::size_t values = 1;
+  for (const std::size_t n : here) values *= n;
+  const bool leads = std::all_of(count.begin(), count.begin() + way.time_axis,
+                                 [](std::size_t n) { return n == 1; });
+  std::vector<T> block(leads ? 0 : values);
+  for (std::size_t i = 0; i < count[axis]; ++i) {
+    const std::size_t step = start[axis] + i;
+    if (time_ >= 0) from[axis] = steps_[step].record;
+    T* to = leads ? out + i * values : block.data();
+    if (auto done = read_block(way, step, from, here, to); !done) return done;
+    if (!leads) interleave(count, axis, i, block, out);
+  }
+  return {};
+}
+
+Result<void> SeriesFile::read(int variable, const std::vector<std::size_t>& start,
+                              const std::vector<std::size_t>& count, double* out) const {
+  return read_steps(variable, start, count, out);
+}
+
+Result<void> SeriesFile::read(int variable, const std::vector<std::size_t>& start,
+                              const std::vector<std::size_t>& count, float* out) const {
+  return read_steps(variable, start, count, out);
+}
+
+}  // namespace windsplat::data::cf

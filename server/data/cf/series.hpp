@@ -1,0 +1,108 @@
+// Several files of one kind -> one, joined along time. Members and a way to open them in, an
+// ArrayFile out.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <list>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/cf/array_file.hpp"
+
+namespace windsplat::data::cf {
+
+// Opens a member by its index.
+using OpenMember = std::function<Result<std::unique_ptr<ArrayFile>>(std::size_t member)>;
+
+// All members are looked into once, for their times; after that at most `open_max` are open at a
+// time. Steps are in the order of time, whatever the files' epochs; of two with the same time the
+// later file's counts. Files without a time dimension are one step each.
+class SeriesFile final : public ArrayFile {
+ public:
+  static constexpr std::size_t open_max = 32;
+
+  // `name`: what the series is called; `origin`: how its files are named together. Errors: bad_data
+  // naming the member that does not fit the first one, and what differs.
+  static Result<std::unique_ptr<SeriesFile>> open(std::string name, std::size_t members,
+                                                  OpenMember open_member, std::string origin = "");
+
+  [[nodiscard]] const FileContents& contents() const override { return contents_; }
+  [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] std::string origin() const override { return origin_.empty() ? name_ : origin_; }
+  [[nodiscard]] std::string format() const override { return first_->format(); }
+  [[nodiscard]] std::string identity() const override;
+
+  [[nodiscard]] Numbers numbers(int variable, const char* attribute) const override;
+  [[nodiscard]] std::string text_of(int variable, const char* attribute) const override;
+  [[nodiscard]] std::vector<std::size_t> chunk(int variable) const override;
+  void forget_chunks(int variable) const override;
+
+  Result<void> read(int variable, const std::vector<std::size_t>& start,
+                    const std::vector<std::size_t>& count, double* out) const override;
+  Result<void> read(int variable, const std::vector<std::size_t>& start,
+                    const std::vector<std::size_t>& count, float* out) const override;
+
+ private:
+  struct Member {
+    std::string identity;
+    std::vector<int> variables;  // its own index of each of the first's; empty: the very same
+  };
+  struct Step {
+    std::size_t member = 0;
+    std::size_t record = 0;
+    double time = 0;
+  };
+  // Parallel to contents_.variables.
+  struct Variable {
+    int in_first = -1;       // its index in the first member
+    int time_axis = -1;      // which of its dimensions is time; -1: the first member's, always
+    bool as_values = false;  // members store it in different ways: what is read is unpacked
+  };
+  struct Opened {
+    std::size_t member = 0;
+    std::unique_ptr<ArrayFile> file;
+  };
+
+  SeriesFile(std::string name, OpenMember open_member)
+      : name_(std::move(name)), open_member_(std::move(open_member)) {}
+  Result<void> begin();
+  Result<void> add(std::size_t member);
+  Result<void> add_times(std::size_t member, const ArrayFile& file);
+  Result<void> check_space(const ArrayFile& file) const;
+  Result<void> check_values(const ArrayFile& file) const;
+  void compare_variables(const ArrayFile& file, Member& member);
+  void sort_steps();
+  void finish();
+  void add_time_dimension();
+  [[nodiscard]] bool is_static(std::size_t in_first) const;
+  [[nodiscard]] Result<const ArrayFile*> member_file(std::size_t member) const;
+  Result<void> read_block(const Variable& variable, std::size_t step,
+                          const std::vector<std::size_t>& start,
+                          const std::vector<std::size_t>& count, double* out) const;
+  Result<void> read_block(const Variable& variable, std::size_t step,
+                          const std::vector<std::size_t>& start,
+                          const std::vector<std::size_t>& count, float* out) const;
+  template <class T>
+  Result<void> read_steps(int variable, const std::vector<std::size_t>& start,
+                          const std::vector<std::size_t>& count, T* out) const;
+
+  std::string name_;
+  std::string origin_;
+  OpenMember open_member_;
+  std::unique_ptr<ArrayFile> first_;
+  std::array<int, 3> space_{-1, -1, -1};  // the first member's dimensions
+  int time_ = -1;                         // the same; -1: members are single steps
+  int time_coordinate_ = -1;              // the first member's variable; -1: steps are counted
+  std::vector<std::string> dropped_;      // why each of the first member's variables is left out
+  std::vector<bool> as_values_;           // of the first member's variables
+  std::vector<Member> members_;
+  std::vector<Step> steps_;
+  FileContents contents_;
+  std::vector<Variable> variables_;
+  mutable std::list<Opened> opened_;  // the one used last in front
+};
+
+}  // namespace windsplat::data::cf

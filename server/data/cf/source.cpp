@@ -1,0 +1,504 @@
+// Puts together what the files beside this one find out, and reads one field at one step: blocks of
+// the file in its own order, unpacked and scattered into x-fastest volumes.
+#include "server/data/cf/source.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "server/base/check.hpp"
+#include "server/data/cf/axes.hpp"
+#include "server/data/cf/coordinates.hpp"
+#include "server/data/cf/curvilinear.hpp"
+#include "server/data/cf/derived.hpp"
+#include "server/data/cf/fields.hpp"
+#include "server/data/cf/grid.hpp"
+#include "server/data/cf/packing.hpp"
+#include "server/data/cf/read_blocks.hpp"
+#include "server/data/cf/rotation.hpp"
+#include "server/data/cf/text.hpp"
+#include "server/data/cf/time.hpp"
+#include "server/data/cf/units.hpp"
+#include "server/data/cf/vertical.hpp"
+#include "server/data/digest.hpp"
+
+namespace windsplat::data::cf {
+
+namespace {
+
+constexpr std::size_t axis_max = std::size_t{1} << 24;
+
+class ArraySource final : public FileSource {
+ public:
+  explicit ArraySource(std::unique_ptr<ArrayFile> file) : file_(std::move(file)) {}
+
+  Result<void> prepare() {
+    roles_ = classify_dimensions(file_->contents());
+    auto choice = choose_grid(file_->contents(), roles_);
+    if (!choice) {
+      return named(choice.error());
+    }
+    choice_ = std::move(*choice);
+    info_.left_out = std::move(choice_.left_out);
+    info_.notes = file_->contents().notes;
+    if (auto done = find_axes(); !done) {
+      return named(done.error());
+    }
+    if (auto done = find_steps(); !done) {
+      return named(done.error());
+    }
+    if (auto done = find_pressures(); !done) {
+      return named(done.error());
+    }
+    if (auto done = find_fields(); !done) {
+      return named(done.error());
+    }
+    if (info_.fields.empty()) {
+      return named(make_error(ErrorKind::bad_data, "no field fits into the limit of 16 GiB"));
+    }
+    tell_valid_values();
+    const std::filesystem::path name(file_->name());
+    info_.id = name.stem().native();
+    info_.source = file_->origin();
+    info_.title = file_->contents().title.empty() ? info_.id : file_->contents().title;
+    info_.format = file_->format();
+    info_.digest = digest_of(file_->identity() + '\n' + WINDSPLAT_VERSION);
+    return {};
+  }
+
+  [[nodiscard]] const DatasetInfo& info() const override { return info_; }
+
+  Result<void> fill(std::size_t field, std::size_t step, float* out) override {
+    WINDSPLAT_CHECK(field < plans_.size() && step < info_.steps.size());
+    const Plan& plan = plans_[field];
+    const std::size_t samples = info_.grid.samples();
+    const auto tell = [&](double done) { tell_progress(done); };
+    if (plan.derived >= 0) {
+      const DerivedField& rule = derived_[static_cast<std::size_t>(plan.derived)];
+      if (auto done = fill_derived(*file_, placement_, pressures_, rule, step, out, tell); !done) {
+        return done;
+      }
+    }
+    for (std::size_t c = 0; plan.derived < 0 && c < plan.variables.size(); ++c) {
+      const auto part = [&](double done) {
+        tell((static_cast<double>(c) + done) / static_cast<double>(plan.variables.size()));
+      };
+      if (auto done = read_variable(*file_, placement_, plan.variables[c], step, all_levels(),
+                                    out + c * samples, part);
+          !done) {
+        return done;
+      }
+    }
+    if (plan.rotated) rotate(bearing(), placement_.length[2], out, out + samples);
+    if (plan.follows_rows) follow_axes(out, out + samples);
+    return {};
+  }
+
+ private:
+  // How a field is made.
+  struct Plan {
+    std::vector<int> variables;
+    int derived = -1;           // index into derived_
+    bool rotated = false;       // from east and north to the axes
+    bool follows_rows = false;  // from the file's rows and columns to the axes
+  };
+
+  // Which way the components of what is told along the file's own rows and columns go.
+  struct ToAxes {
+    bool swapped = false;
+    std::array<bool, 2> negated{false, false};  // after the exchange
+    [[nodiscard]] bool any() const { return swapped || negated[0] || negated[1]; }
+  };
+
+  [[nodiscard]] Error named(Error error) const {
+    error.message = in_quotes(file_->name()) + ": " + error.message;
+    return error;
+  }
+
+  [[nodiscard]] const FileDimension& dimension(int id) const {
+    return file_->contents().dimensions.at(static_cast<std::size_t>(id));
+  }
+
+  Result<void> find_axes() {
+    auto bearing = find_bearing(*file_, roles_, choice_);
+    if (!bearing) {
+      return bearing.error();
+    }
+    for (std::size_t which = 0; which < 3; ++which) {
+      if (choice_.space.at(which) < 0) {
+        info_.grid.axes.at(which) = flat_axis(which);
+        continue;
+      }
+      if (auto done = find_axis(which); !done) {
+        return done;
+      }
+      if (which < 2 && bearing->is_curvilinear) {
+        placement_.turned.at(which) = bearing->turned.at(which);
+      }
+    }
+    if (bearing->is_curvilinear) {
+      to_axes_.swapped = bearing->swapped;
+      for (std::size_t a = 0; a < 2; ++a) {
+        to_axes_.negated.at(a) = bearing->turned.at(a) != dimension(choice_.space.at(a)).falls;
+      }
+    }
+    info_.grid.columns = std::move(bearing->columns);
+    placement_.space = choice_.space;
+    placement_.time = choice_.time;
+    for (std::size_t a = 0; a < 3; ++a) {
+      placement_.length.at(a) = info_.grid.axes.at(a).coordinates.size();
+    }
+    follows_other_axes_ = bearing->is_curvilinear;
+    return bearing->is_curvilinear ? Result<void>() : find_projection();
+  }
+
+  // Where axes with coordinates of their own are those of a map.
+  Result<void> find_projection() {
+    const auto& [x, y, z] = info_.grid.axes;
+    const int mapping = grid_mapping_of(*file_, choice_.variables);
+    const std::string projection =
+        mapping < 0 ? std::string() : lower(file_->text_of(mapping, "grid_mapping_name"));
+    const bool about_pole =
+        x.kind == AxisKind::longitude &&
+        (x.standard_name == "grid_longitude" ||
+         (projection == "rotated_latitude_longitude" && x.standard_name.empty()));
+    if (x.kind == AxisKind::longitude && !about_pole) return {};
+    auto columns = find_columns(*file_, placement_);
+    if (!columns) return columns.error();
+    info_.grid.columns = std::move(*columns);
+    if (!info_.grid.columns && about_pole && y.kind == AxisKind::latitude && mapping >= 0) {
+      info_.grid.columns = columns_about_pole(*file_, mapping, info_.grid);
+      if (info_.grid.columns) {
+        info_.notes.push_back("longitudes and latitudes are computed from the rotated pole of " +
+                              in_quotes(variable_name(mapping)));
+      }
+    }
+    constexpr auto along_east = std::to_array<std::string_view>(
+        {"latitude_longitude", "mercator", "lambert_cylindrical_equal_area"});
+    const bool on_map = x.standard_name == "projection_x_coordinate" || !projection.empty();
+    follows_other_axes_ =
+        info_.grid.columns || about_pole || (on_map && !is_one_of(projection, along_east));
+    return {};
+  }
+
+  [[nodiscard]] Levels all_levels() const { return {0, placement_.length[2]}; }
+
+  // The axis of a dimension that the data lack.
+  [[nodiscard]] Axis flat_axis(std::size_t which) const {
+    constexpr std::array<const char*, 3> known_names{"x", "y", "z"};
+    Axis axis;
+    axis.name = known_names.at(which);
+    const bool over_globe = which == 2 && info_.grid.axes[0].kind == AxisKind::longitude;
+    axis.kind = over_globe ? AxisKind::level : AxisKind::cartesian;
+    axis.coordinates = {0};
+    return axis;
+  }
+
+  Result<void> find_axis(std::size_t which) {
+    const int id = choice_.space.at(which);
+    const DimensionRole& role = roles_.at(static_cast<std::size_t>(id));
+    if (dimension(id).length > axis_max) {
+      return make_error(ErrorKind::bad_data, "the dimension " + in_quotes(dimension(id).name) +
+                                                 " is longer than " + std::to_string(axis_max));
+    }
+    std::vector<double> coordinates;
+    if (role.coordinate >= 0) {
+      const FileVariable& variable = file_->contents().variables.at(at(role.coordinate));
+      const bool is_angle = role.kind == AxisKind::longitude || role.kind == AxisKind::latitude;
+      auto read = is_angle ? unpacked_degrees(*file_, role.coordinate)
+                           : unpacked_values(*file_, role.coordinate);
+      if (!read) {
+        return read.error();
+      }
+      coordinates = std::move(*read);
+      if (is_angle && is_radian(variable.units)) {
+        info_.notes.push_back(in_quotes(variable.name) + " is told in radians: shown in degrees");
+      }
+    } else {
+      info_.left_out.push_back(
+          {dimension(id).name, "dimension without a coordinate variable: placed by index"});
+    }
+    auto oriented = orient_axis(file_->contents(), role, id, static_cast<int>(which),
+                                std::move(coordinates), info_.grid.axes[0].kind);
+    if (!oriented) {
+      return oriented.error();
+    }
+    info_.grid.axes.at(which) = std::move(oriented->axis);
+    placement_.turned.at(which) = oriented->turned;
+    if (!oriented->note.empty()) info_.notes.push_back(std::move(oriented->note));
+    return {};
+  }
+
+  Result<void> find_steps() {
+    const auto& variables = file_->contents().variables;
+    int coordinate = -1;
+    std::size_t count = 1;
+    if (choice_.time >= 0) {
+      count = dimension(choice_.time).length;
+      coordinate = roles_.at(static_cast<std::size_t>(choice_.time)).coordinate;
+    } else {
+      for (std::size_t v = 0; v < variables.size(); ++v) {
+        if (variables[v].dims.empty() && variables[v].numeric &&
+            (variables[v].standard_name == "time" || variables[v].name == "time")) {
+          coordinate = static_cast<int>(v);
+        }
+      }
+    }
+    std::vector<double> values;
+    if (coordinate >= 0) {
+      auto read = unpacked_values(*file_, coordinate);
+      if (!read) {
+        return read.error();
+      }
+      values = std::move(*read);
+    }
+    const bool complete = !values.empty() && std::all_of(values.begin(), values.end(),
+                                                         [](double v) { return std::isfinite(v); });
+    if (complete) {
+      const auto& variable = variables[static_cast<std::size_t>(coordinate)];
+      auto decoded = decode_time(values, variable.units, variable.calendar);
+      info_.steps = std::move(decoded.steps);
+      info_.time_units = variable.units;
+      info_.time_calendar = variable.calendar;
+      if (!decoded.reason.empty()) {
+        info_.left_out.push_back({variable.name, "time is shown as a number: " + decoded.reason});
+      }
+      note_disorder(variable.name, values);
+      return {};
+    }
+    if (choice_.time >= 0) {
+      info_.left_out.push_back({dimension(choice_.time).name,
+                                coordinate >= 0 ? "time has missing values: steps are counted"
+                                                : "dimension without a coordinate variable: steps "
+                                                  "are counted"});
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      info_.steps.push_back({static_cast<double>(i), std::to_string(i)});
+    }
+    return {};
+  }
+
+  // A series of files is in order, a file by itself is shown as it is.
+  void note_disorder(const std::string& name, const std::vector<double>& times) {
+    std::size_t falls = 0;
+    std::size_t repeats = 0;
+    for (std::size_t i = 1; i < times.size(); ++i) {
+      falls += times[i] < times[i - 1] ? 1U : 0U;
+      repeats += times[i] == times[i - 1] ? 1U : 0U;
+    }
+    if (falls + repeats == 0) return;
+    std::string note = in_quotes(name);
+    if (falls > 0) note += " goes back " + times_text(falls);
+    if (falls > 0 && repeats > 0) note += " and";
+    if (repeats > 0) note += " stands still " + times_text(repeats);
+    note += ": steps are in the file's own order";
+    info_.notes.push_back(std::move(note));
+  }
+
+  static std::string times_text(std::size_t count) {
+    return count == 1 ? std::string("once") : std::to_string(count) + " times";
+  }
+
+  // Where levels follow the ground the vertical axis becomes that of mean pressures.
+  Result<void> find_pressures() {
+    Axis& axis = info_.grid.axes[2];
+    const int z = choice_.space[2];
+    const int coordinate = z < 0 ? -1 : roles_.at(static_cast<std::size_t>(z)).coordinate;
+    const bool by_pressure = axis.kind == AxisKind::pressure;
+    const auto unit = pascals_in(axis.units);
+    if (!by_pressure) {
+      auto hybrid = find_hybrid(*file_, placement_, coordinate);
+      if (!hybrid) return hybrid.error();
+      if (*hybrid) return place_by_pressure(std::move(**hybrid));
+    }
+    if (by_pressure && unit) {
+      for (const double p : axis.coordinates) pressures_.level.push_back(p * *unit);
+      const int surface = find_surface_pressure(file_->contents(), placement_);
+      if (surface >= 0) {
+        info_.notes.push_back(in_quotes(variable_name(surface)) +
+                              " is the surface pressure: what lies below it is shown as the file "
+                              "has it, unless it is marked as missing");
+      }
+    }
+    return {};
+  }
+
+  Result<void> place_by_pressure(HybridLevels hybrid) {
+    std::vector<float> surface(placement_.layer());
+    if (auto read = read_variable(*file_, placement_, hybrid.surface, 0, all_levels(),
+                                  surface.data(), [](double) {});
+        !read) {
+      return read;
+    }
+    double sum = 0;
+    double count = 0;
+    for (const float p : surface) {
+      if (!std::isfinite(p)) continue;
+      sum += static_cast<double>(p);
+      ++count;
+    }
+    const bool turned = placement_.turned[2];
+    Axis axis = info_.grid.axes[2];
+    const auto mean = [&](std::size_t k) {
+      return hybrid.a[k] / hybrid.unit_pa + hybrid.b[k] * sum / count;
+    };
+    // Levels may be counted from the top without the file saying so.
+    if (count > 0 && mean(0) < mean(axis.coordinates.size() - 1)) {
+      std::reverse(hybrid.a.begin(), hybrid.a.end());
+      std::reverse(hybrid.b.begin(), hybrid.b.end());
+      placement_.turned[2] = !placement_.turned[2];
+    }
+    bool falls = count > 0;
+    for (std::size_t k = 0; k < axis.coordinates.size(); ++k) {
+      axis.coordinates[k] = mean(k);
+      falls = falls && axis.coordinates[k] > 0 &&
+              (k == 0 || axis.coordinates[k] < axis.coordinates[k - 1]);
+    }
+    if (!falls) {
+      placement_.turned[2] = turned;
+      info_.notes.emplace_back(
+          "levels follow the ground, but their mean pressures do not fall from level to level: "
+          "the file's own coordinate is kept");
+      return {};
+    }
+    axis.kind = AxisKind::pressure;
+    axis.standard_name = "air_pressure";
+    axis.units = hybrid.units;
+    info_.grid.axes[2] = std::move(axis);
+    info_.notes.push_back(hybrid.note);
+    for (LeftOut& left : info_.left_out) {
+      if (left.name == variable_name(hybrid.surface)) {
+        left.reason = "surface pressure: tells the pressure of the levels";
+      }
+      for (const int v : hybrid.coefficients) {
+        if (left.name == variable_name(v)) left.reason = "coefficient of the levels' pressure";
+      }
+    }
+    pressures_.hybrid = std::move(hybrid);
+    return {};
+  }
+
+  [[nodiscard]] const std::string& variable_name(int variable) const {
+    return file_->contents().variables.at(static_cast<std::size_t>(variable)).name;
+  }
+
+  Result<void> find_fields() {
+    const int z = choice_.space[2];
+    const bool in_water = z >= 0 && roles_.at(at(z)).kind == AxisKind::depth;
+    auto plans = cf::find_fields(file_->contents(), choice_.variables,
+                                 in_water ? AxisKind::depth : info_.grid.axes[2].kind);
+    auto derived =
+        find_derived(*file_, placement_, plans, choice_.variables, pressures_, info_.notes);
+    if (!derived) return derived.error();
+    derived_ = std::move(*derived);
+    for (FieldPlan& plan : plans) {
+      add_field(std::move(plan.info), {std::move(plan.variables), -1, false, false});
+    }
+    for (std::size_t d = 0; d < derived_.size(); ++d) {
+      add_field(derived_[d].info, {derived_[d].inputs, static_cast<int>(d), false, false});
+    }
+    return {};
+  }
+
+  void tell_valid_values() {
+    constexpr std::size_t told_max = 20;
+    std::string text;
+    std::size_t count = 0;
+    for (const int v : choice_.variables) {
+      const std::string valid = valid_text(packing_of(*file_, v));
+      if (valid.empty() || ++count > told_max) continue;
+      text += text.empty() ? "" : ", ";
+      text += in_quotes(variable_name(v)) + " (" + valid + ')';
+    }
+    if (count == 0) return;
+    if (count > told_max) text += " and " + std::to_string(count - told_max) + " more";
+    info_.notes.push_back("masked beyond what the file calls valid: " + text);
+  }
+
+  void add_field(FieldInfo info, Plan plan) {
+    if (info_.grid.samples() * info.components.size() * sizeof(float) > volume_bytes_max) {
+      info_.left_out.push_back({info.name, "more than 16 GiB a step"});
+      return;
+    }
+    if (info.kind == FieldKind::vector && follows_other_axes_) find_turning(info, plan);
+    info_.fields.push_back(std::move(info));
+    plans_.push_back(std::move(plan));
+  }
+
+  // How a vector comes to the grid's axes, which need not run east and north.
+  void find_turning(const FieldInfo& info, Plan& plan) {
+    const auto& first =
+        file_->contents().variables.at(static_cast<std::size_t>(plan.variables.front()));
+    const bool by_earth = first.standard_name.starts_with("eastward_");
+    const bool by_grid = first.standard_name.starts_with("x_") ||
+                         first.standard_name.starts_with("grid_") ||
+                         first.standard_name.find("_x_") != std::string::npos;
+    std::string note = in_quotes(info.name);
+    if (by_earth && info_.grid.columns) {
+      note +=
+          " is told by east and north: turned into the directions of the grid's rows and columns";
+    } else if (by_earth) {
+      note +=
+          " is told by east and north, but the grid's longitudes and latitudes have gaps or are "
+          "not in the file: it is drawn as if rows ran east";
+    } else if (!by_grid) {
+      note +=
+          " does not say which way its components point: taken to be along the axes as they are "
+          "drawn";
+    }
+    if (by_earth || !by_grid) info_.notes.push_back(std::move(note));
+    plan.rotated = by_earth && info_.grid.columns;
+    // u and v without a word mean east and north, or nearly, more often than indices.
+    plan.follows_rows = by_grid && to_axes_.any();
+    if (!plan.follows_rows) return;
+    note = in_quotes(info.name) + " is told along the file's rows and columns: its components are ";
+    const bool turned = to_axes_.negated[0] || to_axes_.negated[1];
+    note += to_axes_.swapped ? (turned ? "exchanged and turned" : "exchanged") : "turned";
+    note += " with the axes";
+    info_.notes.push_back(std::move(note));
+  }
+
+  void follow_axes(float* x, float* y) const {
+    for (std::size_t n = 0; n < info_.grid.samples(); ++n) {
+      if (to_axes_.swapped) std::swap(x[n], y[n]);
+      if (to_axes_.negated[0]) x[n] = -x[n];
+      if (to_axes_.negated[1]) y[n] = -y[n];
+    }
+  }
+
+  const GridBearing& bearing() {
+    if (!bearing_) bearing_ = bearing_of(*info_.grid.columns, placement_.length[0]);
+    return *bearing_;
+  }
+
+  std::unique_ptr<ArrayFile> file_;
+  std::vector<DimensionRole> roles_;
+  GridChoice choice_;
+  Placement placement_;
+  DatasetInfo info_;
+  PressureLevels pressures_;
+  bool follows_other_axes_ = false;  // rows need not run east
+  ToAxes to_axes_;
+  std::optional<GridBearing> bearing_;
+  std::vector<DerivedField> derived_;
+  std::vector<Plan> plans_;  // parallel to info_.fields
+};
+
+}  // namespace
+
+Result<std::unique_ptr<FileSource>> make_source(std::unique_ptr<ArrayFile> file) {
+  auto source = std::make_unique<ArraySource>(std::move(file));
+  if (auto done = source->prepare(); !done) {
+    return done.error();
+  }
+  return std::unique_ptr<FileSource>(std::move(source));
+}
+
+}  // namespace windsplat::data::cf

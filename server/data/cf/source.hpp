@@ -1,0 +1,15 @@
+// Arrays with the conventions of CF -> a dataset: dimensions' roles -> grid -> fields -> volumes.
+#pragma once
+
+#include <memory>
+
+#include "server/base/error.hpp"
+#include "server/data/cf/array_file.hpp"
+#include "server/data/dataset.hpp"
+
+namespace windsplat::data::cf {
+
+// The dataset of a file's arrays. Errors: bad_data.
+Result<std::unique_ptr<FileSource>> make_source(std::unique_ptr<ArrayFile> file);
+
+}  // namespace windsplat::data::cf

@@ -1,0 +1,59 @@
+// CF time coordinates -> steps with ISO 8601 text. Pure: numbers and attribute text in, steps out.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/data/dataset.hpp"
+
+namespace windsplat::data::cf {
+
+// CF 1.8, section 4.4.1. "standard" is Julian up to 1582-10-04 and Gregorian from 1582-10-15.
+enum class Calendar { standard, proleptic_gregorian, julian, noleap, all_leap, day360 };
+
+// The calendar of a `calendar` attribute; empty text means standard. Nothing if it is unknown.
+std::optional<Calendar> parse_calendar(std::string_view text);
+
+// A day of a calendar. Years count astronomically: the year before 1 is 0.
+struct Date {
+  std::int64_t year = 0;
+  int month = 1;  // 1..12
+  int day = 1;    // 1..31
+
+  bool operator==(const Date&) const = default;
+};
+
+[[nodiscard]] bool is_valid(const Date& date, Calendar calendar);
+
+// Days since the calendar's own day zero, and back; |year| <= 10^7.
+std::int64_t day_number(const Date& date, Calendar calendar);
+Date date_of(std::int64_t day_number, Calendar calendar);
+
+struct DecodedTime {
+  std::vector<TimeStep> steps;
+  std::string reason;  // why the texts are plain numbers; empty if they are dates
+};
+
+// values: one a step, in `units` ("hours since 2001-01-01 00:00"). Texts are rounded to the
+// millisecond. Months and years are those of the calendar, a fraction its share of the month it
+// lies in. Where unit, epoch or calendar is not understood, the texts are the numbers.
+DecodedTime decode_time(const std::vector<double>& values, std::string_view units,
+                        std::string_view calendar);
+
+struct TimeUnits {
+  std::string units;
+  std::string calendar;
+};
+
+// The same moments in other units, to the millisecond. Empty where one of the units is not
+// understood, the calendars have different days, or `to` counts months.
+std::optional<std::vector<double>> convert_times(const std::vector<double>& values,
+                                                 const TimeUnits& from, const TimeUnits& to);
+
+// The shortest decimal text that reads back as the same double.
+std::string number_text(double value);
+
+}  // namespace windsplat::data::cf

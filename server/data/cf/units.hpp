@@ -1,0 +1,14 @@
+// Units of length and pressure as files write them -> SI. Case and surrounding blanks do not
+// matter.
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+namespace windsplat::data {
+
+std::optional<double> metres_in(std::string_view unit);   // empty: not a length
+std::optional<double> pascals_in(std::string_view unit);  // empty: not a pressure
+std::optional<double> pascals_per_second_in(std::string_view unit);
+
+}  // namespace windsplat::data

@@ -1,0 +1,70 @@
+// Which files a dataset may consist of, and the one way to open them. What a user named -> Location
+// -> Files -> InputFile.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/files/input_file.hpp"
+#include "server/data/files/stamp.hpp"
+
+namespace windsplat::data {
+
+// What a user named, links resolved.
+struct Location {
+  enum class Kind {
+    file,    // one file, and beside it what its format says that it refers to
+    series,  // the files that a pattern matches, in natural order (f2 before f10)
+    folder,  // a folder that is one dataset, with all that lies in it
+  };
+  struct Member {
+    std::string name;  // as readers ask for it, and as messages tell it
+    std::string path;  // absolute
+  };
+  Kind kind = Kind::file;
+  std::string folder;           // absolute; of Kind::folder the dataset itself
+  std::vector<Member> members;  // of a file one, of a folder none
+  bool companions = false;      // other files below `folder` may be opened too
+  std::string inside;           // a group within the file or files ("a/b"), for formats with groups
+  std::string stem;             // what a dataset of these is called: no folder, no extension
+  std::string pattern;          // of a series, absolute, or below `root` if that is not empty
+  std::string root;
+};
+
+// A path of a file or folder, or a pattern whose last part has * ? or [...]; of files that hold
+// groups also "path#/group". Whether a file may
+// have companions follows from the ending of its name (those of formats whose header refers to
+// other files). Errors: not_found; bad_data for URLs and what is neither file nor folder.
+Result<Location> locate(const std::string& path_or_pattern);
+
+// The same of a path that a stranger named, below the folder `root`: neither "..", an absolute
+// path, nor a link ever leads out of it, and no link that is absolute is followed. Nothing is read
+// but names. Errors: invalid (refused, or neither file nor folder), not_found; they name the path
+// as it was given, not the root.
+Result<Location> locate_beneath(const std::string& root, const std::string& path_or_pattern);
+
+// What the pattern of a series matches by now. Errors: those of the function that located it.
+Result<Location> locate_again(const Location& series);
+
+class Files {
+ public:
+  virtual ~Files() = default;
+  [[nodiscard]] virtual const Location& location() const = 0;
+  // `name`: a member's, or that of a companion, relative to the folder, parts between '/'; never
+  // above the folder. Errors: not_found, bad_data.
+  virtual Result<std::shared_ptr<const InputFile>> open(const std::string& name) = 0;
+  // What lies in a folder below (empty: the folder itself), sorted; folders end in '/'. Errors:
+  // not_found, bad_data.
+  virtual Result<std::vector<std::string>> list(const std::string& folder) = 0;
+  // Whether there is such a file or folder.
+  virtual bool exists(const std::string& name) = 0;
+  // The companions that were opened so far, the first few hundred of them.
+  [[nodiscard]] virtual std::vector<Companion> companions() const { return {}; }
+};
+
+// Opens what the location allows, by way of openat2 with RESOLVE_BENEATH for companions.
+std::shared_ptr<Files> direct_files(Location location);
+
+}  // namespace windsplat::data

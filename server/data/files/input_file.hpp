@@ -1,0 +1,54 @@
+// One regular file, open for reading, whatever happens to its name.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "server/base/error.hpp"
+
+namespace windsplat::data {
+
+// Thread-safe: reads carry their own offset.
+class InputFile {
+ public:
+  // Takes over an open descriptor; `name` is for messages. Errors: bad_data for what is not a
+  // regular file or is empty.
+  static Result<std::shared_ptr<const InputFile>> adopt(int descriptor, std::string name);
+  ~InputFile();
+  InputFile(const InputFile&) = delete;
+  InputFile& operator=(const InputFile&) = delete;
+
+  [[nodiscard]] const std::string& name() const { return name_; }  // without its folder
+  [[nodiscard]] std::uint64_t size() const { return stamp_.bytes; }
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+  // Exactly `count` bytes. Errors: bad_data if the file ends before or cannot be read.
+  Result<void> read(std::uint64_t offset, void* out, std::size_t count) const;
+  // The first bytes as text, at most `bytes_max`.
+  [[nodiscard]] Result<std::string> head(std::size_t bytes_max) const;
+
+  // Name, size and time of last change, so independent of where the file lies.
+  [[nodiscard]] std::string identity() const;
+  // Errors: bad_data if size or time of change are no longer those at the time of opening.
+  [[nodiscard]] Result<void> check_unchanged() const;
+  // A name by which a library that opens files itself reaches this very file.
+  [[nodiscard]] std::string library_path() const;
+
+  // bad_data: "'name' what".
+  [[nodiscard]] Error fault(const std::string& what) const;
+
+ private:
+  struct Stamp {
+    std::uint64_t bytes = 0;
+    std::int64_t seconds = 0;
+    std::int64_t nanoseconds = 0;
+    bool operator==(const Stamp&) const = default;
+  };
+  InputFile(int descriptor, std::string name) : descriptor_(descriptor), name_(std::move(name)) {}
+
+  int descriptor_;
+  std::string name_;
+  Stamp stamp_;
+};
+
+}  // namespace windsplat::data

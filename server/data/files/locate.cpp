@@ -1,0 +1,187 @@
+// A path or pattern -> Location: links resolved, patterns matched, names put in order.
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <filesystem>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "server/data/files/files.hpp"
+#include "server/data/files/locate_parts.hpp"
+
+namespace windsplat::data {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// Endings of formats whose header names files beside it.
+constexpr auto with_companions = std::to_array<std::string_view>(
+    {".pvd", ".pvti", ".pvtr", ".pvts", ".pvtu", ".ctl", ".json", ".nhdr", ".dx"});
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return text;
+}
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+}  // namespace
+
+bool comes_before(std::string_view a, std::string_view b) {
+  std::size_t i = 0;
+  std::size_t j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (!is_digit(a[i]) || !is_digit(b[j])) {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i;
+      ++j;
+      continue;
+    }
+    const auto run = [](std::string_view text, std::size_t& at) {
+      while (at < text.size() && text[at] == '0') ++at;
+      const std::size_t from = at;
+      while (at < text.size() && is_digit(text[at])) ++at;
+      return text.substr(from, at - from);
+    };
+    const std::string_view left = run(a, i);
+    const std::string_view right = run(b, j);
+    if (left.size() != right.size()) return left.size() < right.size();
+    if (left != right) return left < right;
+  }
+  if (i == a.size() && j == b.size()) return a < b;
+  return i == a.size();
+}
+
+std::string stem_of_pattern(const std::string& pattern) {
+  std::string stem = fs::path(pattern).stem().native();
+  std::string out;
+  for (std::size_t i = 0; i < stem.size(); ++i) {
+    if (stem[i] == '[') {
+      const std::size_t end = stem.find(']', i);
+      i = end == std::string::npos ? stem.size() : end;
+    } else if (stem[i] != '*' && stem[i] != '?') {
+      out += stem[i];
+    }
+  }
+  while (!out.empty() && (out.back() == '_' || out.back() == '-' || out.back() == '.')) {
+    out.pop_back();
+  }
+  return out.empty() ? "series" : out;
+}
+
+bool has_wildcard(std::string_view name) { return name.find_first_of("*?[") != std::string::npos; }
+
+bool may_have_companions(const std::string& name) {
+  const std::string ending = lower(fs::path(name).extension().native());
+  return std::find(with_companions.begin(), with_companions.end(), ending) != with_companions.end();
+}
+
+namespace {
+
+Error not_reached(const std::string& path, const std::error_code& fault) {
+  const bool absent =
+      fault == std::errc::no_such_file_or_directory || fault == std::errc::not_a_directory;
+  return make_error(absent ? ErrorKind::not_found : ErrorKind::bad_data,
+                    in_quotes(path) + ": " + (absent ? "no such file" : fault.message()));
+}
+
+Result<Location> locate_series(const std::string& pattern) {
+  const fs::path whole(pattern);
+  const std::string name = whole.filename().native();
+  const fs::path beside = whole.has_parent_path() ? whole.parent_path() : fs::path(".");
+  std::error_code fault;
+  const fs::path folder = fs::canonical(beside, fault);
+  if (fault) return not_reached(beside.native(), fault);
+  Location out;
+  out.kind = Location::Kind::series;
+  out.folder = folder.native();
+  out.stem = stem_of_pattern(name);
+  out.pattern = (folder / name).native();
+  for (fs::directory_iterator at(folder, fault), end; !fault && at != end; at.increment(fault)) {
+    const std::string found = at->path().filename().native();
+    if (::fnmatch(name.c_str(), found.c_str(), FNM_PERIOD) != 0) continue;
+    std::error_code broken;
+    const fs::path path = fs::canonical(at->path(), broken);
+    if (broken || !fs::is_regular_file(path, broken)) continue;
+    out.members.push_back({found, path.native()});
+    if (out.members.size() > series_members_max) {
+      return make_error(ErrorKind::bad_data, in_quotes(pattern) + " matches more than " +
+                                                 std::to_string(series_members_max) + " files");
+    }
+  }
+  if (fault) return not_reached(folder.native(), fault);
+  if (out.members.empty()) {
+    return make_error(ErrorKind::not_found, in_quotes(pattern) + ": no file matches");
+  }
+  std::sort(out.members.begin(), out.members.end(),
+            [](const auto& a, const auto& b) { return comes_before(a.name, b.name); });
+  return out;
+}
+
+// "path#/group" where no file is called so. Errors as locate().
+Result<Location> locate_inside(const std::string& path, std::size_t mark) {
+  const std::string file = path.substr(0, mark);
+  std::error_code fault;
+  if (file.find("#/") != std::string::npos && !fs::exists(file, fault)) {
+    return not_reached(path, std::make_error_code(std::errc::no_such_file_or_directory));
+  }
+  auto out = locate(file);
+  if (!out) return out;
+  if (out->kind == Location::Kind::folder) {
+    return make_error(ErrorKind::bad_data,
+                      in_quotes(path) + ": a folder has no groups to name behind '#'");
+  }
+  out->inside = path.substr(mark + 2);
+  return out;
+}
+
+}  // namespace
+
+Result<Location> locate(const std::string& path_or_pattern) {
+  const std::string& path = path_or_pattern;
+  if (path.empty() || path.find('\0') != std::string::npos) {
+    return make_error(ErrorKind::not_found, "no file name is given");
+  }
+  if (path.find("://") != std::string::npos) {
+    return make_error(ErrorKind::bad_data,
+                      in_quotes(path) + " is a URL; only local files are opened");
+  }
+  std::error_code fault;
+  const fs::path plain = fs::canonical(path, fault);
+  if (fault) {
+    if (const auto mark = path.rfind("#/"); mark != std::string::npos && mark > 0) {
+      return locate_inside(path, mark);
+    }
+    const bool pattern = has_wildcard(fs::path(path).filename().native());
+    return pattern ? locate_series(path) : Result<Location>(not_reached(path, fault));
+  }
+  Location out;
+  // A folder may be named with a slash at its end.
+  const fs::path named =
+      fs::path(path).has_filename() ? fs::path(path) : fs::path(path).parent_path();
+  out.stem = named.stem().native();
+  if (fs::is_directory(plain, fault)) {
+    out.kind = Location::Kind::folder;
+    out.folder = plain.native();
+    return out;
+  }
+  out.folder = plain.parent_path().native();
+  out.members.push_back({plain.filename().native(), plain.native()});
+  out.companions = may_have_companions(plain.filename().native());
+  return out;
+}
+
+Result<Location> locate_again(const Location& series) {
+  auto out = series.root.empty() ? locate_series(series.pattern)
+                                 : locate_beneath(series.root, series.pattern);
+  if (out) out->inside = series.inside;
+  return out;
+}
+
+}  // namespace windsplat::data

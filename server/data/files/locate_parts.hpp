@@ -1,0 +1,21 @@
+// What the two ways of locating files share: order of names, what a series is called, which
+// formats name files beside them.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace windsplat::data {
+
+inline constexpr std::size_t series_members_max = 100'000;
+
+// Runs of digits compare as numbers: f2 before f10.
+bool comes_before(std::string_view a, std::string_view b);
+// The name without what a pattern leaves open and without its extension: "wrf_*.nc" is "wrf".
+std::string stem_of_pattern(const std::string& pattern);
+bool has_wildcard(std::string_view name);
+// Whether a file of that name is of a format whose header names files beside it.
+bool may_have_companions(const std::string& name);
+
+}  // namespace windsplat::data

@@ -1,0 +1,23 @@
+// GRIB 1 and 2 by way of ecCodes, where windsplat was built with it. InputFile -> arrays.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "server/base/error.hpp"
+#include "server/data/cf/array_file.hpp"
+#include "server/data/files/input_file.hpp"
+
+namespace windsplat::data::grib {
+
+// Whether a file begins with a GRIB message, or with a WMO heading and one.
+bool is_grib(const InputFile& input);
+
+// The folder of tables that ecCodes reads at run time, by names of its own; several are separated
+// by ':'. Empty without ecCodes.
+std::string definitions_folder();
+
+// Errors: bad_data; also where windsplat was built without ecCodes.
+Result<std::unique_ptr<cf::ArrayFile>> open(std::shared_ptr<const InputFile> input);
+
+}  // namespace windsplat::data::grib

@@ -1,0 +1,187 @@
+// The handler runs wherever a library opens a file, maybe with the allocator's lock held: it
+// allocates nothing and takes no lock.
+#include "server/data/loader/by_name.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <ucontext.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <csignal>
+#include <cstdint>
+#include <string_view>
+#include <utility>
+
+#include "server/data/loader/channel.hpp"
+
+namespace windsplat::data::loader {
+
+namespace {
+
+constexpr std::string_view own_files = "/proc/self/fd/";
+
+struct Asking {
+  int socket = -1;
+  std::vector<std::string> folders;  // each ends in '/'
+};
+
+// A signal handler has no other way to know.
+Asking& asking() {
+  static Asking all;
+  return all;
+}
+
+bool is_regular(int descriptor) {
+  struct stat status {};
+  return ::syscall(SYS_fstat, descriptor, &status) == 0 && S_ISREG(status.st_mode);
+}
+
+// The number of "/proc/self/fd/N"; -1 if it is no such path or no regular file.
+int own_file(std::string_view path) {
+  if (!path.starts_with(own_files)) return -1;
+  int number = -1;
+  const char* end = path.data() + path.size();
+  const auto [stop, fault] = std::from_chars(path.data() + own_files.size(), end, number);
+  return fault == std::errc() && stop == end && number >= 0 && is_regular(number) ? number : -1;
+}
+
+bool is_libraries(std::string_view path) {
+  if (asking().socket < 0) return false;
+  for (const std::string& folder : asking().folders) {
+    if (path.starts_with(folder)) return true;
+  }
+  return false;
+}
+
+// A descriptor, or a negative errno.
+long ask_for(std::string_view path) {
+  const int socket = asking().socket;
+  if (send_message(socket, Kind::ask_library, path.data(), path.size(), -1, {}) != Fate::done) {
+    return -EIO;
+  }
+  Descriptor came;
+  Frame frame;
+  if (receive_bytes(socket, reinterpret_cast<char*>(&frame), sizeof frame, &came, {}) !=
+          Fate::done ||
+      frame.bytes != 0) {
+    ::_exit(1);  // the daemon and we no longer understand each other
+  }
+  return came ? came.give() : -ENOENT;
+}
+
+// A descriptor of one's own for the file of that name, or a negative errno.
+long open_named(const char* name, int flags) {
+  if (name == nullptr) return -EFAULT;
+  const std::string_view path(name);
+  const bool writes = (flags & O_ACCMODE) != O_RDONLY || (flags & (O_CREAT | O_TRUNC)) != 0;
+  if (writes || (flags & O_DIRECTORY) != 0) return -EACCES;
+  if (const int number = own_file(path); number >= 0) {
+    const int copy = ::fcntl(number, F_DUPFD_CLOEXEC, 0);
+    if (copy < 0) return -errno;
+    // It shares its position with the one it is copied from, which InputFile does not use.
+    ::lseek(copy, 0, SEEK_SET);
+    return copy;
+  }
+  return is_libraries(path) ? ask_for(path) : -EACCES;
+}
+
+long look_at(const char* name, struct stat* out) {
+  const long opened = open_named(name, O_RDONLY);
+  if (opened < 0) return opened;
+  const Descriptor file(static_cast<int>(opened));
+  return ::syscall(SYS_fstat, file.number(), out) == 0 ? 0 : -errno;
+}
+
+long may_read(const char* name, int mode) {
+  if ((mode & (W_OK | X_OK)) != 0) return -EACCES;
+  const long opened = open_named(name, O_RDONLY);
+  if (opened < 0) return opened;
+  const Descriptor closes(static_cast<int>(opened));
+  return 0;
+}
+
+using Arguments = std::array<std::uint64_t, 4>;
+
+const char* name_at(const Arguments& given, std::size_t i) {
+  return reinterpret_cast<const char*>(given.at(i));  // NOLINT: a call's arguments are numbers
+}
+
+long answer(int call, const Arguments& given) {
+  const auto number = [&](std::size_t i) { return static_cast<int>(given.at(i)); };
+  const auto status_at = [&](std::size_t i) {
+    return reinterpret_cast<struct stat*>(given.at(i));  // NOLINT: as above
+  };
+  switch (call) {
+    case SYS_openat:
+      return open_named(name_at(given, 1), number(2));
+    case SYS_newfstatat:
+      if (const char* name = name_at(given, 1);
+          (number(3) & AT_EMPTY_PATH) != 0 && (name == nullptr || *name == '\0')) {
+        return ::syscall(SYS_fstat, number(0), status_at(2)) == 0 ? 0 : -errno;
+      }
+      return look_at(name_at(given, 1), status_at(2));
+    case SYS_faccessat:
+    case SYS_faccessat2:
+      return may_read(name_at(given, 1), number(2));
+#ifdef __x86_64__
+    case SYS_open:
+      return open_named(name_at(given, 0), number(1));
+    case SYS_stat:
+    case SYS_lstat:
+      return look_at(name_at(given, 0), status_at(1));
+    case SYS_access:
+      return may_read(name_at(given, 0), number(1));
+#endif
+    default:
+      return -EACCES;
+  }
+}
+
+void on_call(int /*signal*/, siginfo_t* about, void* context) {
+  const int kept = errno;
+  auto& machine = static_cast<ucontext_t*>(context)->uc_mcontext;
+#if defined(__x86_64__)
+  const auto value = [&](int which) { return static_cast<std::uint64_t>(machine.gregs[which]); };
+  const Arguments given{value(REG_RDI), value(REG_RSI), value(REG_RDX), value(REG_R10)};
+  machine.gregs[REG_RAX] = answer(about->si_syscall, given);
+#elif defined(__aarch64__)
+  const Arguments given{machine.regs[0], machine.regs[1], machine.regs[2], machine.regs[3]};
+  machine.regs[0] = static_cast<std::uint64_t>(answer(about->si_syscall, given));
+#else
+#error "loaders know how this machine passes arguments of system calls: not yet"
+#endif
+  errno = kept;
+}
+
+}  // namespace
+
+const std::vector<int>& calls_by_name() {
+  static const std::vector<int> all{SYS_openat,     SYS_openat2,    SYS_newfstatat, SYS_faccessat,
+                                    SYS_faccessat2, SYS_readlinkat, SYS_statx,
+#ifdef __x86_64__
+                                    SYS_open,       SYS_stat,       SYS_lstat,      SYS_access,
+                                    SYS_readlink
+#endif
+  };
+  return all;
+}
+
+Result<void> answer_calls_by_name(int socket, std::vector<std::string> library_folders) {
+  for (std::string& folder : library_folders) folder += '/';
+  asking() = {socket, std::move(library_folders)};
+  struct sigaction action {};
+  action.sa_sigaction = &on_call;
+  action.sa_flags = SA_SIGINFO;
+  sigfillset(&action.sa_mask);
+  sigdelset(&action.sa_mask, SIGIO);
+  if (::sigaction(SIGSYS, &action, nullptr) != 0) {
+    return make_error(ErrorKind::internal, "no handler for system calls");
+  }
+  return {};
+}
+
+}  // namespace windsplat::data::loader

@@ -1,0 +1,77 @@
+// Messages between the daemon and a loader over a stream socket: a frame of 16 bytes, a payload,
+// and at most one descriptor, which goes to the loader only.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "server/data/files/descriptor.hpp"
+
+namespace windsplat::data::loader {
+
+enum class Kind : std::uint32_t {
+  // daemon -> loader: what to do
+  open = 1,  // settings and location -> opened or failed
+  read,      // field, step; with the memory to fill -> filled or failed
+  // daemon -> loader: answers to what it asks meanwhile
+  descriptor,  // with a descriptor
+  names,
+  yes,
+  no,  // with an error, or empty
+  // loader -> daemon: questions
+  ask_open,
+  ask_list,
+  ask_exists,
+  ask_library,
+  // loader -> daemon: news and answers
+  progress,
+  opened,
+  filled,
+  failed,
+};
+
+using Clock = std::chrono::steady_clock;
+using Deadline = std::optional<Clock::time_point>;  // none: however long it takes
+
+enum class Fate {
+  done,
+  closed,  // by the other side, at whatever point
+  late,
+  broken,  // what came is no message, or longer than it may be
+};
+
+struct Frame {
+  std::uint32_t kind = 0;
+  std::uint32_t zero = 0;
+  std::uint64_t bytes = 0;
+};
+
+// These allocate nothing, so that a signal handler may call them. `descriptor` -1: none goes along.
+Fate send_message(int socket, Kind kind, const char* payload, std::size_t bytes, int descriptor,
+                  const Deadline& deadline);
+// Exactly `bytes`; a descriptor that comes along is closed unless there is a place for it.
+Fate receive_bytes(int socket, char* out, std::size_t bytes, Descriptor* descriptor,
+                   const Deadline& deadline);
+
+struct Message {
+  Kind kind = Kind::failed;
+  std::string payload;
+  Descriptor descriptor;
+};
+
+enum class Descriptors { refused, taken };
+
+// Payloads are taken up as they arrive: what a frame announces is not allocated ahead.
+Fate receive_message(int socket, Message& out, std::size_t bytes_max, Descriptors descriptors,
+                     const Deadline& deadline);
+
+inline Fate send_message(int socket, Kind kind, std::string_view payload, int descriptor,
+                         const Deadline& deadline) {
+  return send_message(socket, kind, payload.data(), payload.size(), descriptor, deadline);
+}
+
+}  // namespace windsplat::data::loader

@@ -1,0 +1,222 @@
+// The loader's side: task -> confined -> opened -> reads, one after another, until the socket
+// closes. What goes wrong with a file is answered; what goes wrong with the daemon ends it.
+#include <fcntl.h>
+#include <malloc.h>
+#include <poll.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <string>
+#include <utility>
+
+#include "server/data/loader/bytes.hpp"
+#include "server/data/loader/channel.hpp"
+#include "server/data/loader/confine.hpp"
+#include "server/data/loader/loader.hpp"
+#include "server/data/loader/messages.hpp"
+#include "server/data/loader/process.hpp"
+#include "server/data/loader/transfer.hpp"
+
+namespace windsplat::data::loader {
+
+namespace {
+
+constexpr int niceness = 5;
+constexpr std::uint64_t files_besides_members = 256;
+constexpr std::chrono::milliseconds progress_every{50};
+constexpr std::size_t answer_bytes_max = std::size_t{1} << 30;
+
+// There is nobody left to tell.
+[[noreturn]] void leave() { ::_exit(1); }
+
+void say(Kind kind, std::string_view payload) {
+  if (send_message(socket_of_loader, kind, payload, -1, {}) != Fate::done) leave();
+}
+
+void hear(Message& out) {
+  if (receive_message(socket_of_loader, out, answer_bytes_max, Descriptors::taken, {}) !=
+      Fate::done) {
+    leave();
+  }
+}
+
+// Files that the daemon opens: questions out, descriptors in.
+class BrokeredFiles final : public Files {
+ public:
+  explicit BrokeredFiles(Location location) : location_(std::move(location)) {}
+  [[nodiscard]] const Location& location() const override { return location_; }
+
+  Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
+    Message answer = ask(Kind::ask_open, name);
+    if (answer.kind != Kind::descriptor) return decode_error(answer.payload);
+    return InputFile::adopt(answer.descriptor.give(), name.substr(name.find_last_of('/') + 1));
+  }
+  Result<std::vector<std::string>> list(const std::string& folder) override {
+    const Message answer = ask(Kind::ask_list, folder);
+    if (answer.kind != Kind::names) return decode_error(answer.payload);
+    return decode_names(answer.payload);
+  }
+  bool exists(const std::string& name) override {
+    return ask(Kind::ask_exists, name).kind == Kind::yes;
+  }
+
+ private:
+  static Message ask(Kind what, const std::string& name) {
+    Message out;
+    if (name.size() > question_bytes_max) {
+      out.kind = Kind::no;
+      out.payload = encode_error(make_error(ErrorKind::bad_data, "a file's name is too long"));
+    } else {
+      say(what, name);
+      hear(out);
+    }
+    return out;
+  }
+
+  Location location_;
+};
+
+// Calls `work`; what it throws is an error too.
+template <class Work>
+auto guarded(const Work& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return make_error(ErrorKind::out_of_memory, "reading it needs more memory than a loader has");
+  } catch (const std::exception& fault) {
+    return make_error(ErrorKind::internal, "reading it failed: " + printable(fault.what()));
+  }
+}
+
+Result<void> fill(FileSource& source, std::size_t field, std::size_t step, const Mapping& memory) {
+  const DatasetInfo& info = source.info();
+  if (field >= info.fields.size() || step >= info.steps.size()) {
+    return make_error(ErrorKind::internal, "there is no such field or step");
+  }
+  const std::size_t components = info.fields[field].components.size();
+  const std::size_t samples = info.grid.samples();
+  if (samples * components > memory.floats()) {
+    return make_error(ErrorKind::internal, "the memory of a volume has another size");
+  }
+  std::fill_n(memory.data(), samples * components, 0.0F);  // of the volume before
+  if (auto done = source.fill(field, step, memory.data()); !done) return done;
+  mask_volume(memory.data(), samples, static_cast<int>(components));
+  return {};
+}
+
+class Loader {
+ public:
+  void open(const std::string& payload) {
+    auto task = decode_task(payload);
+    if (!task) leave();
+    Confinement how;
+    how.memory_bytes = task->memory_bytes;
+    how.files = task->location.members.size() + files_besides_members;
+    how.socket = socket_of_loader;
+    how.library_folders = std::move(task->library_folders);
+    if (auto done = confine(std::move(how)); !done) {
+      say(Kind::failed, encode_error(done.error()));
+      leave();
+    }
+    const auto files = std::make_shared<BrokeredFiles>(std::move(task->location));
+    auto opened = guarded([&] { return open_dataset(files); });
+    if (!opened) {
+      say(Kind::failed, encode_error(opened.error()));
+      return;
+    }
+    source_ = std::move(*opened);
+    source_->on_progress([this](double done) { tell(done); });
+    say(Kind::opened, encode_info(source_->info()));
+  }
+
+  void read(Message& message) {
+    Reader in(message.payload);
+    const auto field = in.number<std::uint64_t>();
+    const auto step = in.number<std::uint64_t>();
+    if (!source_ || !in.complete()) leave();
+    told_ = Clock::now();
+    const auto done = guarded([&]() -> Result<void> {
+      if (message.descriptor) {
+        memory_ = Mapping();
+        auto mapped = Mapping::of(message.descriptor, true);
+        message.descriptor.reset();
+        if (!mapped) return mapped.error();
+        memory_ = std::move(*mapped);
+      }
+      return fill(*source_, static_cast<std::size_t>(field), static_cast<std::size_t>(step),
+                  memory_);
+    });
+    if (memory_.bytes() > Transfer::kept_bytes_max) memory_ = Mapping();
+    say(done ? Kind::filled : Kind::failed, done ? std::string() : encode_error(done.error()));
+  }
+
+ private:
+  void tell(double done) {
+    const auto now = Clock::now();
+    if (now - told_ < progress_every) return;
+    told_ = now;
+    Writer out;
+    out.number(done);
+    say(Kind::progress, out.bytes());
+  }
+
+  std::unique_ptr<FileSource> source_;
+  Mapping memory_;  // for volumes, until another is sent
+  Clock::time_point told_;
+};
+
+// Libraries take and give back buffers of a chunk's size at every read. Given back to the system
+// their pages would be cleared and mapped anew each time, which took a third of the time of a read.
+void keep_freed_memory() {
+  constexpr int mapped_from = 32 << 20;  // the most that glibc allows
+  constexpr int kept = 48 << 20;
+  ::mallopt(M_MMAP_THRESHOLD, mapped_from);
+  ::mallopt(M_TRIM_THRESHOLD, kept);
+}
+
+// Ends this process with the daemon, even while it reads: the daemon's end of the pipe closes, and
+// SIGIO ends who does not handle it. (The signal on a parent's death is no help here: it comes with
+// the end of the thread that started us.)
+bool end_with_daemon() {
+  if (::fcntl(life_of_loader, F_SETOWN, ::getpid()) != 0) return false;
+  const int flags = ::fcntl(life_of_loader, F_GETFL);
+  if (flags < 0 || ::fcntl(life_of_loader, F_SETFL, flags | O_ASYNC | O_NONBLOCK) != 0) {
+    return false;
+  }
+  pollfd event{life_of_loader, POLLIN, 0};
+  return ::poll(&event, 1, 0) == 0;
+}
+
+}  // namespace
+
+int run() {
+  std::signal(SIGIO, SIG_DFL);
+  if (!end_with_daemon()) {
+    std::fputs("windsplat: load is what windsplat starts by itself\n", stderr);
+    return 2;
+  }
+  static_cast<void>(::setpriority(PRIO_PROCESS, 0, niceness));
+  keep_freed_memory();
+  Loader loader;
+  for (;;) {
+    Message message;
+    const Fate fate =
+        receive_message(socket_of_loader, message, answer_bytes_max, Descriptors::taken, {});
+    if (fate == Fate::closed) ::_exit(0);  // without the last acts of libraries and sanitizers
+    if (fate != Fate::done) leave();
+    if (message.kind == Kind::open) {
+      loader.open(message.payload);
+    } else if (message.kind == Kind::read) {
+      loader.read(message);
+    } else {
+      leave();
+    }
+  }
+}
+
+}  // namespace windsplat::data::loader

@@ -1,0 +1,264 @@
+// Structures <-> bytes, field by field; numbers as this machine has them, for both ends run on it.
+#include "server/data/loader/messages.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "server/data/cf/grid.hpp"
+#include "server/data/loader/bytes.hpp"
+
+namespace windsplat::data::loader {
+
+namespace {
+
+constexpr std::size_t text_max = std::size_t{1} << 16;
+constexpr std::size_t things_max = 1'000'000;  // fields, notes, names of a folder
+constexpr std::size_t steps_max = std::size_t{1} << 24;
+constexpr std::size_t axis_max = std::size_t{1} << 24;
+constexpr std::size_t text_bytes_min = sizeof(std::uint64_t);
+
+// Whether text may go on as it is; what may not is spelt out (see printable()).
+std::string text_of(Reader& in) {
+  const std::string text = in.text(text_max);
+  // Four bytes a byte that is spelt out, so that nothing is cut.
+  return printable(text, 4 * text.size() + 1);
+}
+
+std::vector<std::string> texts_of(Reader& in) {
+  std::vector<std::string> out(in.count(things_max, text_bytes_min));
+  for (std::string& text : out) text = text_of(in);
+  return out;
+}
+
+void put_texts(Writer& out, const std::vector<std::string>& texts) {
+  out.count(texts.size());
+  for (const std::string& text : texts) out.text(text);
+}
+
+Axis axis_of(Reader& in, bool vertical) {
+  Axis axis;
+  axis.name = text_of(in);
+  axis.standard_name = text_of(in);
+  axis.units = text_of(in);
+  const auto kind = in.number<std::uint8_t>();
+  if (kind > static_cast<std::uint8_t>(AxisKind::cartesian)) in.fail();
+  axis.kind = static_cast<AxisKind>(in.sound() ? kind : 0);
+  axis.coordinates = in.doubles(axis_max);
+  const std::vector<double>& at = axis.coordinates;
+  if (at.empty()) in.fail();
+  // Only a vertical axis may descend: pressure, depth, levels counted from the top.
+  const bool descends = vertical && at.size() > 1 && at[1] < at[0];
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const bool goes_on = i == 0 || (descends ? at[i] < at[i - 1] : at[i] > at[i - 1]);
+    if (!std::isfinite(at[i]) || !goes_on) in.fail();
+  }
+  return axis;
+}
+
+std::shared_ptr<const Columns> columns_of(Reader& in, std::size_t expected) {
+  Columns columns;
+  columns.longitude = in.doubles(expected);
+  columns.latitude = in.doubles(expected);
+  const auto fits = [expected](const std::vector<double>& values) {
+    return values.size() == expected &&
+           std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  };
+  if (!fits(columns.longitude) || !fits(columns.latitude)) in.fail();
+  return std::make_shared<const Columns>(std::move(columns));
+}
+
+// Counts up to 2^24 each, so that products are checked two by two.
+Grid grid_of(Reader& in) {
+  Grid grid;
+  for (std::size_t a = 0; a < 3; ++a) grid.axes.at(a) = axis_of(in, a == 2);
+  const std::uint64_t layer =
+      std::uint64_t{grid.axes[0].coordinates.size()} * grid.axes[1].coordinates.size();
+  if (layer > cf::samples_max || layer * grid.axes[2].coordinates.size() > cf::samples_max) {
+    in.fail();
+  }
+  const auto curved = in.number<std::uint8_t>();
+  if (curved > 1) in.fail();
+  if (in.sound() && curved == 1) {
+    grid.columns = columns_of(in, static_cast<std::size_t>(layer));
+  }
+  return grid;
+}
+
+FieldInfo field_of(Reader& in, std::uint64_t samples) {
+  FieldInfo field;
+  field.name = text_of(in);
+  const auto kind = in.number<std::uint8_t>();
+  field.kind = kind == 0 ? FieldKind::scalar : FieldKind::vector;
+  field.components = texts_of(in);
+  field.units = text_of(in);
+  field.component_units = texts_of(in);
+  field.standard_name = text_of(in);
+  field.long_name = text_of(in);
+  field.dtype = text_of(in);
+  const auto derived = in.number<std::uint8_t>();
+  field.derived = derived == 1;
+  const std::size_t count = field.components.size();
+  const bool right_count = kind == 0 ? count == 1 : count == 2 || count == 3;
+  if (kind > 1 || derived > 1 || !right_count || field.component_units.size() != count ||
+      field.name.empty() ||
+      samples > cf::volume_bytes_max / sizeof(float) / std::max<std::size_t>(count, 1)) {
+    in.fail();
+  }
+  return field;
+}
+
+void put_axis(Writer& out, const Axis& axis) {
+  out.text(axis.name);
+  out.text(axis.standard_name);
+  out.text(axis.units);
+  out.number(static_cast<std::uint8_t>(axis.kind));
+  out.doubles(axis.coordinates);
+}
+
+void put_field(Writer& out, const FieldInfo& field) {
+  out.text(field.name);
+  out.number(static_cast<std::uint8_t>(field.kind == FieldKind::scalar ? 0 : 1));
+  put_texts(out, field.components);
+  out.text(field.units);
+  put_texts(out, field.component_units);
+  out.text(field.standard_name);
+  out.text(field.long_name);
+  out.text(field.dtype);
+  out.number(static_cast<std::uint8_t>(field.derived ? 1 : 0));
+}
+
+Error nonsense(const char* what) {
+  return make_error(ErrorKind::bad_data, std::string("the loader sent ") + what);
+}
+
+}  // namespace
+
+std::string encode_task(const Task& task) {
+  Writer out;
+  out.number(task.memory_bytes);
+  put_texts(out, task.library_folders);
+  out.number(static_cast<std::uint8_t>(task.location.kind));
+  out.number(static_cast<std::uint8_t>(task.location.companions ? 1 : 0));
+  out.text(task.location.stem);
+  out.text(task.location.inside);
+  out.text(task.location.pattern);
+  out.count(task.location.members.size());
+  for (const Location::Member& member : task.location.members) out.text(member.name);
+  return out.bytes();
+}
+
+Result<Task> decode_task(std::string_view bytes) {
+  Reader in(bytes);
+  Task out;
+  out.memory_bytes = in.number<std::uint64_t>();
+  out.library_folders.resize(in.count(things_max, text_bytes_min));
+  for (std::string& folder : out.library_folders) folder = in.text(text_max);
+  const auto kind = in.number<std::uint8_t>();
+  if (kind > static_cast<std::uint8_t>(Location::Kind::folder)) in.fail();
+  out.location.kind = static_cast<Location::Kind>(kind);
+  out.location.companions = in.number<std::uint8_t>() != 0;
+  out.location.stem = in.text(text_max);
+  out.location.inside = in.text(text_max);
+  out.location.pattern = in.text(text_max);
+  out.location.members.resize(in.count(things_max, text_bytes_min));
+  for (Location::Member& member : out.location.members) member.name = in.text(text_max);
+  if (!in.complete()) return make_error(ErrorKind::internal, "the loader's task is broken");
+  return out;
+}
+
+std::string encode_error(const Error& error) {
+  Writer out;
+  out.number(static_cast<std::uint8_t>(error.kind));
+  out.text(std::string_view(error.message).substr(0, text_max));
+  return out.bytes();
+}
+
+Error decode_error(std::string_view bytes) {
+  Reader in(bytes);
+  const auto number = in.number<std::uint8_t>();
+  std::string message = printable(in.text(text_max), 4000);
+  const auto is = [number](ErrorKind kind) { return number == static_cast<std::uint8_t>(kind); };
+  if (!in.complete() || message.empty()) return nonsense("an error that cannot be read");
+  for (const ErrorKind kind : {ErrorKind::not_found, ErrorKind::out_of_memory, ErrorKind::internal,
+                               ErrorKind::too_large}) {
+    if (is(kind)) return make_error(kind, std::move(message));
+  }
+  return make_error(ErrorKind::bad_data, std::move(message));
+}
+
+std::string encode_info(const DatasetInfo& info) {
+  Writer out;
+  for (const auto* text : {&info.id, &info.title, &info.source, &info.format, &info.digest,
+                           &info.time_units, &info.time_calendar}) {
+    out.text(*text);
+  }
+  for (const Axis& axis : info.grid.axes) put_axis(out, axis);
+  out.number(static_cast<std::uint8_t>(info.grid.columns ? 1 : 0));
+  if (info.grid.columns) {
+    out.doubles(info.grid.columns->longitude);
+    out.doubles(info.grid.columns->latitude);
+  }
+  out.count(info.fields.size());
+  for (const FieldInfo& field : info.fields) put_field(out, field);
+  out.count(info.left_out.size());
+  for (const LeftOut& left : info.left_out) {
+    out.text(left.name);
+    out.text(left.reason);
+  }
+  put_texts(out, info.notes);
+  out.count(info.steps.size());
+  for (const TimeStep& step : info.steps) {
+    out.number(step.value);
+    out.text(step.text);
+  }
+  return out.bytes();
+}
+
+Result<DatasetInfo> decode_info(std::string_view bytes) {
+  Reader in(bytes);
+  DatasetInfo info;
+  for (auto* text : {&info.id, &info.title, &info.source, &info.format, &info.digest,
+                     &info.time_units, &info.time_calendar}) {
+    *text = text_of(in);
+  }
+  info.grid = grid_of(in);
+  const std::uint64_t samples = in.sound() ? info.grid.samples() : 0;
+  info.fields.resize(in.count(things_max, text_bytes_min));
+  for (FieldInfo& field : info.fields) {
+    field = field_of(in, samples);
+    if (!in.sound()) break;
+  }
+  info.left_out.resize(in.count(things_max, 2 * text_bytes_min));
+  for (LeftOut& left : info.left_out) {
+    left.name = text_of(in);
+    left.reason = text_of(in);
+  }
+  info.notes = texts_of(in);
+  info.steps.resize(in.count(steps_max, sizeof(double) + text_bytes_min));
+  for (TimeStep& step : info.steps) {
+    step.value = in.number<double>();
+    step.text = text_of(in);
+    if (!std::isfinite(step.value)) in.fail();
+  }
+  if (!in.complete()) return nonsense("a description that cannot be read");
+  if (info.fields.empty() || info.steps.empty()) return nonsense("a dataset without data");
+  return info;
+}
+
+std::string encode_names(const std::vector<std::string>& names) {
+  Writer out;
+  put_texts(out, names);
+  return out.bytes();
+}
+
+Result<std::vector<std::string>> decode_names(std::string_view bytes) {
+  Reader in(bytes);
+  std::vector<std::string> out(in.count(things_max + 1, text_bytes_min));
+  for (std::string& name : out) name = in.text(text_max);
+  if (!in.complete()) return make_error(ErrorKind::internal, "a folder's list is broken");
+  return out;
+}
+
+}  // namespace windsplat::data::loader

@@ -1,0 +1,42 @@
+// What the payloads of messages say: location and limits to the loader, errors and the dataset's
+// info back. Decoding checks everything that the rest of the program relies on.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/dataset.hpp"
+#include "server/data/files/files.hpp"
+
+namespace windsplat::data::loader {
+
+inline constexpr std::size_t info_bytes_max = std::size_t{1} << 30;
+inline constexpr std::size_t question_bytes_max = std::size_t{1} << 16;
+
+// What a loader is told before it opens anything. Paths stay with the daemon.
+struct Task {
+  std::uint64_t memory_bytes = 0;
+  std::vector<std::string> library_folders;
+  Location location;  // members and pattern without folders
+};
+
+std::string encode_task(const Task& task);
+Result<Task> decode_task(std::string_view bytes);
+
+std::string encode_error(const Error& error);
+// Whatever the bytes: an error of a kind that reading can have, its message fit for a log.
+Error decode_error(std::string_view bytes);
+
+std::string encode_info(const DatasetInfo& info);
+// Errors: bad_data for what is no info, or one that no reader would give: axes that are not finite
+// and strictly monotonic, fields without components, no steps, more than cf's limits. Texts come
+// out printable.
+Result<DatasetInfo> decode_info(std::string_view bytes);
+
+std::string encode_names(const std::vector<std::string>& names);
+Result<std::vector<std::string>> decode_names(std::string_view bytes);
+
+}  // namespace windsplat::data::loader

@@ -1,0 +1,186 @@
+// posix_spawn with a socket and a pipe, and waitpid.
+#include "server/data/loader/process.hpp"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <ctime>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace windsplat::data::loader {
+
+namespace {
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool messages_are_shown = true;  // those of the sanitizer
+#else
+constexpr bool messages_are_shown = false;
+#endif
+
+Error not_started(int reason) {
+  return make_error(ErrorKind::internal,
+                    "a loader cannot be started: " + std::generic_category().message(reason));
+}
+
+// Beyond the numbers that the loader finds them under.
+Descriptor moved_up(Descriptor from) {
+  constexpr int first_free = 16;
+  return Descriptor(::fcntl(from.number(), F_DUPFD_CLOEXEC, first_free));
+}
+
+// What files libraries would look for, they must not find through a user's variables.
+std::vector<std::string> environment_of_loader() {
+  std::vector<std::string> out{"HDF5_USE_FILE_LOCKING=FALSE"};
+  for (const char* name : {"ASAN_OPTIONS", "UBSAN_OPTIONS", "TSAN_OPTIONS", "LSAN_OPTIONS"}) {
+    const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nobody sets any
+    if (value != nullptr) {
+      std::string variable = name;
+      variable += '=';
+      variable += value;
+      out.push_back(std::move(variable));
+    }
+  }
+  return out;
+}
+
+std::vector<char*> pointers(std::vector<std::string>& words) {
+  std::vector<char*> out;
+  out.reserve(words.size() + 1);
+  for (std::string& word : words) out.push_back(word.data());
+  out.push_back(nullptr);
+  return out;
+}
+
+int spawn(const std::string& program, int socket, int life, pid_t& id) {
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
+  if (!messages_are_shown) {
+    posix_spawn_file_actions_addopen(&actions, 2, "/dev/null", O_WRONLY, 0);
+  }
+  posix_spawn_file_actions_adddup2(&actions, socket, socket_of_loader);
+  posix_spawn_file_actions_adddup2(&actions, life, life_of_loader);
+  posix_spawn_file_actions_addclosefrom_np(&actions, life_of_loader + 1);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none;
+  sigset_t all;
+  sigemptyset(&none);
+  sigfillset(&all);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setsigdefault(&attributes, &all);
+  // A group of its own: what a terminal sends to the daemon's is the daemon's to act on.
+  posix_spawnattr_setpgroup(&attributes, 0);
+  posix_spawnattr_setflags(&attributes,
+                           POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  std::vector<std::string> words{"windsplat", "load"};
+  std::vector<std::string> variables = environment_of_loader();
+  const int fault = ::posix_spawn(&id, program.c_str(), &actions, &attributes,
+                                  pointers(words).data(), pointers(variables).data());
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  return fault;
+}
+
+std::string how_it_ended(int status) {
+  if (WIFSIGNALED(status)) return "was ended by signal " + std::to_string(WTERMSIG(status));
+  return "ended with code " + std::to_string(WEXITSTATUS(status));
+}
+
+}  // namespace
+
+Result<void> Process::start(const std::string& program) {
+  end();
+  std::array<int, 2> pair{-1, -1};
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair.data()) != 0) {
+    return not_started(errno);
+  }
+  Descriptor ours(pair[0]);
+  const Descriptor theirs = moved_up(Descriptor(pair[1]));
+  if (::pipe2(pair.data(), O_CLOEXEC) != 0) return not_started(errno);
+  const Descriptor life = moved_up(Descriptor(pair[0]));
+  Descriptor life_held(pair[1]);
+  if (!theirs || !life) return not_started(EMFILE);
+  pid_t id = -1;
+  if (const int fault = spawn(program, theirs.number(), life.number(), id); fault != 0) {
+    return not_started(fault);
+  }
+  const std::lock_guard lock(mutex_);
+  id_ = id;
+  socket_ = std::move(ours);
+  life_ = std::move(life_held);
+  return {};
+}
+
+void Process::kill() {
+  const std::lock_guard lock(mutex_);
+  if (id_ > 0) ::kill(id_, SIGKILL);
+}
+
+std::string Process::end(std::chrono::milliseconds patience) {
+  const pid_t id = this->id();
+  std::string how;
+  if (id > 0) {
+    // Waited for without being reaped, so that its number stays its own until it is forgotten.
+    siginfo_t about{};
+    const auto late = std::chrono::steady_clock::now() + patience;
+    while (::waitid(P_PID, static_cast<id_t>(id), &about, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           about.si_pid == 0 && std::chrono::steady_clock::now() < late) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    if (about.si_pid == 0) kill();
+    while (::waitid(P_PID, static_cast<id_t>(id), &about, WEXITED | WNOWAIT) != 0 &&
+           errno == EINTR) {
+    }
+    const std::lock_guard lock(mutex_);
+    int status = 0;
+    while (::waitpid(id, &status, 0) < 0 && errno == EINTR) {
+    }
+    how = how_it_ended(status);
+    id_ = -1;
+  }
+  socket_.reset();
+  life_.reset();
+  return how;
+}
+
+void Process::allow_cpu(std::chrono::seconds more) {
+  const pid_t id = this->id();
+  clockid_t clock{};
+  timespec used{};
+  if (id < 0 || ::clock_getcpuclockid(id, &clock) != 0 || ::clock_gettime(clock, &used) != 0) {
+    return;
+  }
+  rlimit bound{};
+  if (::prlimit(id, RLIMIT_CPU, nullptr, &bound) != 0) return;
+  bound.rlim_cur = std::min<rlim_t>(
+      static_cast<rlim_t>(used.tv_sec) + static_cast<rlim_t>(more.count()), bound.rlim_max);
+  ::prlimit(id, RLIMIT_CPU, &bound, nullptr);
+}
+
+bool Process::runs() const {
+  const std::lock_guard lock(mutex_);
+  siginfo_t about{};
+  return id_ > 0 &&
+         ::waitid(P_PID, static_cast<id_t>(id_), &about, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+         about.si_pid == 0;
+}
+
+pid_t Process::id() const {
+  const std::lock_guard lock(mutex_);
+  return id_;
+}
+
+}  // namespace windsplat::data::loader

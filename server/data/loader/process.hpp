@@ -1,0 +1,51 @@
+// One loader process: started, talked to, ended. Never outlives its object, nor the daemon.
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <cstdint>
+#include <mutex>
+#include <string>
+
+#include "server/base/error.hpp"
+#include "server/data/files/descriptor.hpp"
+
+namespace windsplat::data::loader {
+
+// What a loader finds under these numbers when it starts.
+inline constexpr int socket_of_loader = 3;
+inline constexpr int life_of_loader = 4;  // a pipe whose other end closes with the daemon
+
+class Process {
+ public:
+  Process() = default;
+  ~Process() { end(); }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  // Runs `program load` with an empty environment and nothing else that is open here. Errors:
+  // internal.
+  Result<void> start(const std::string& program);
+
+  // Kills it, from whichever thread; end() is still to be called. Nothing if there is none.
+  void kill();
+  // Waits a moment for one that is about to end, kills it otherwise; closes what belongs to it. How
+  // it ended: "was ended by signal 11", "ended with code 1"; empty if there was none.
+  std::string end(std::chrono::milliseconds patience = std::chrono::milliseconds(0));
+  // From now on at most that many seconds of processor time.
+  void allow_cpu(std::chrono::seconds more);
+
+  // Started, and not yet seen to have ended by itself.
+  [[nodiscard]] bool runs() const;
+  [[nodiscard]] int socket() const { return socket_.number(); }
+  [[nodiscard]] pid_t id() const;  // -1 if there is none
+
+ private:
+  mutable std::mutex mutex_;  // of id_: a number is signalled only before it is waited for
+  pid_t id_ = -1;
+  Descriptor socket_;
+  Descriptor life_;
+};
+
+}  // namespace windsplat::data::loader

@@ -1,0 +1,331 @@
+// The daemon's side: a call goes out, the loader's questions are answered, its answer is checked.
+// Whatever else happens ends that loader and is an error of the call.
+#include <fcntl.h>
+#include <linux/openat2.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "server/base/check.hpp"
+#include "server/data/digest.hpp"
+#include "server/data/loader/bytes.hpp"
+#include "server/data/loader/channel.hpp"
+#include "server/data/loader/loader.hpp"
+#include "server/data/loader/messages.hpp"
+#include "server/data/loader/process.hpp"
+#include "server/data/loader/transfer.hpp"
+
+namespace windsplat::data::loader {
+
+namespace {
+
+struct Program {
+  std::mutex mutex;
+  std::string path;
+};
+
+Program& program() {
+  static Program the_one;
+  return the_one;
+}
+
+std::string program_path() {
+  const std::lock_guard lock(program().mutex);
+  return program().path;
+}
+
+// A regular file below one of the folders where libraries keep their tables.
+Descriptor open_of_library(const std::vector<std::string>& folders, const std::string& path) {
+  for (const std::string& folder : folders) {
+    if (!path.starts_with(folder + '/') || path.find('\0') != std::string::npos) continue;
+    const Descriptor root(::open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+    open_how how{};
+    how.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
+    how.resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS;
+    const char* below = path.c_str() + path.find_first_not_of('/', folder.size());
+    Descriptor file(
+        static_cast<int>(::syscall(SYS_openat2, root.number(), below, &how, sizeof how)));
+    struct stat status {};
+    if (file && ::fstat(file.number(), &status) == 0 && S_ISREG(status.st_mode)) return file;
+  }
+  return Descriptor();
+}
+
+std::string seconds_text(std::chrono::milliseconds time) {
+  const auto tenths = (time.count() + 50) / 100;
+  return std::to_string(tenths / 10) + '.' + std::to_string(tenths % 10) + " s";
+}
+
+}  // namespace
+
+void set_program(std::string path) {
+  const std::lock_guard lock(program().mutex);
+  program().path = std::move(path);
+}
+
+struct RemoteSource::State {
+  // One call to the loader.
+  struct Call {
+    Kind kind = Kind::open;
+    std::string payload;
+    int descriptor = -1;
+    Kind answer = Kind::opened;
+    std::string doing;  // "opening it", "reading 'u'"
+    std::chrono::milliseconds time{};
+  };
+
+  Location location;
+  Limits limits;
+  DatasetInfo info;
+  std::string digest;  // of the info as it came
+  std::vector<Companion> companions;
+  Progress progress;
+  std::shared_ptr<Files> files;  // while there is a loader
+  Process process;
+  std::optional<Transfer> transfer;  // as the loader has it mapped
+  std::mutex mutex;                  // of the two below
+  bool under_way = false;
+  bool cancelled = false;
+
+  // Starts a loader and has it open the dataset: the info, encoded.
+  Result<std::string> start() {
+    release();
+    const std::string path = program_path();
+    if (path.empty()) return make_error(ErrorKind::internal, "no program is set to load files");
+    if (auto started = process.start(path); !started) return started.error();
+    files = direct_files(location);
+    Task task;
+    task.memory_bytes = limits.memory_bytes;
+    task.library_folders = limits.library_folders;
+    task.location.kind = location.kind;
+    task.location.companions = location.companions;
+    task.location.stem = location.stem;
+    task.location.inside = location.inside;
+    task.location.pattern = location.pattern.substr(location.pattern.find_last_of('/') + 1);
+    for (const Location::Member& member : location.members) {
+      task.location.members.push_back({member.name, {}});
+    }
+    auto answer =
+        call({Kind::open, encode_task(task), -1, Kind::opened, "opening it", limits.open_time});
+    if (!answer) {
+      release();
+      return answer.error();
+    }
+    companions = files->companions();
+    return std::move(answer->payload);
+  }
+
+  [[nodiscard]] bool is_cancelled() {
+    const std::lock_guard lock(mutex);
+    return cancelled;
+  }
+  void begin() {
+    const std::lock_guard lock(mutex);
+    under_way = true;
+    cancelled = false;
+  }
+  // Whether it was cancelled.
+  bool finish() {
+    const std::lock_guard lock(mutex);
+    under_way = false;
+    return cancelled;
+  }
+  void cancel() {
+    const std::lock_guard lock(mutex);
+    if (!under_way) return;
+    cancelled = true;
+    process.kill();
+  }
+
+  // There is a loader that has opened what was opened at first.
+  Result<void> be_ready() {
+    if (process.runs()) return {};
+    auto encoded = start();
+    if (!encoded) return encoded.error();
+    if (digest_of(*encoded) == digest) return {};
+    release();
+    return make_error(ErrorKind::bad_data,
+                      in_quotes(info.source) + " has changed since it was opened; open it again");
+  }
+
+  void release() {
+    process.end();
+    files.reset();
+    transfer.reset();
+  }
+
+  Result<Message> call(const Call& what) {
+    const Deadline deadline = Clock::now() + what.time;
+    process.allow_cpu(std::chrono::ceil<std::chrono::seconds>(what.time));
+    Fate fate = send_message(process.socket(), what.kind, what.payload, what.descriptor, deadline);
+    std::size_t questions = 0;
+    while (fate == Fate::done) {
+      Message heard;
+      const std::size_t bytes_max =
+          what.answer == Kind::opened ? opened_bytes_max() : std::size_t{question_bytes_max};
+      fate = receive_message(process.socket(), heard, bytes_max, Descriptors::refused, deadline);
+      if (fate != Fate::done) break;
+      if (heard.kind == what.answer) return heard;
+      if (heard.kind == Kind::failed) return decode_error(heard.payload);
+      fate = heard.kind == Kind::progress         ? hear_progress(heard.payload)
+             : ++questions > 2 * limits.opens_max ? Fate::broken
+                                                  : answer(heard, deadline);
+    }
+    return ended(fate, what);
+  }
+
+  [[nodiscard]] std::size_t opened_bytes_max() const {
+    return std::min<std::size_t>(info_bytes_max, limits.memory_bytes);
+  }
+
+  Fate hear_progress(const std::string& payload) const {
+    Reader in(payload);
+    const auto done = in.number<double>();
+    if (!in.complete() || !(done >= 0 && done <= 1)) return Fate::broken;
+    if (progress) progress(done);
+    return Fate::done;
+  }
+
+  [[nodiscard]] Fate answer(const Message& question, const Deadline& deadline) const {
+    const auto say = [&](Kind kind, std::string_view payload, int descriptor = -1) {
+      return send_message(process.socket(), kind, payload, descriptor, deadline);
+    };
+    const std::string& name = question.payload;
+    if (name.size() > question_bytes_max) return Fate::broken;
+    if (question.kind == Kind::ask_open) {
+      const auto file = files->open(name);
+      return file ? say(Kind::descriptor, {}, (*file)->descriptor())
+                  : say(Kind::no, encode_error(file.error()));
+    }
+    if (question.kind == Kind::ask_list) {
+      const auto names = files->list(name);
+      return names ? say(Kind::names, encode_names(*names))
+                   : say(Kind::no, encode_error(names.error()));
+    }
+    if (question.kind == Kind::ask_exists) {
+      return say(files->exists(name) ? Kind::yes : Kind::no, {});
+    }
+    if (question.kind == Kind::ask_library) {
+      const Descriptor file = open_of_library(limits.library_folders, name);
+      return file ? say(Kind::descriptor, {}, file.number()) : say(Kind::no, {});
+    }
+    return Fate::broken;
+  }
+
+  // Why there is no answer. The loader is gone after this.
+  Error ended(Fate fate, const Call& what) {
+    constexpr std::chrono::milliseconds patience{500};
+    const std::string how =
+        process.end(fate == Fate::closed ? patience : std::chrono::milliseconds(0));
+    files.reset();
+    transfer.reset();
+    const std::string name =
+        in_quotes(location.members.empty() ? location.stem : location.members.front().name);
+    std::string message = "the loader of ";
+    message += name;
+    message += ' ';
+    if (fate == Fate::late) {
+      message += "was ended after ";
+      message += seconds_text(what.time);
+    } else {
+      message += fate == Fate::closed ? how : "said what it must not and was ended";
+    }
+    message += " while ";
+    message += what.doing;
+    return make_error(ErrorKind::bad_data, std::move(message));
+  }
+
+  Result<Volume> read(std::size_t field, std::size_t step) {
+    if (auto ready = be_ready(); !ready) return ready.error();
+    // A loader that was only just started was none yet that cancel() could end.
+    if (is_cancelled()) return make_error(ErrorKind::cancelled, "reading was cancelled");
+    const FieldInfo& about = info.fields[field];
+    Volume volume;
+    volume.dims = info.grid.dims();
+    volume.components = static_cast<int>(about.components.size());
+    const std::size_t floats = volume.samples() * about.components.size();
+    const bool is_new = !transfer || transfer->floats() < floats;
+    if (is_new) {
+      transfer.reset();
+      auto made = Transfer::make(floats);
+      if (!made) return made.error();
+      transfer = std::move(*made);
+    }
+    Writer request;
+    request.number(static_cast<std::uint64_t>(field));
+    request.number(static_cast<std::uint64_t>(step));
+    const std::uint64_t bytes = floats * sizeof(float);
+    Call what{Kind::read,
+              request.bytes(),
+              is_new ? transfer->descriptor() : -1,
+              Kind::filled,
+              "reading " + in_quotes(about.name),
+              limits.read_time};
+    what.time += std::chrono::milliseconds(bytes * 1000 / limits.read_bytes_per_second);
+    if (auto done = call(what); !done) {
+      // What a loader has written to memory that is not kept goes with the loader.
+      if (transfer && !transfer->is_kept()) release();
+      if (is_new) transfer.reset();  // whether the loader has it mapped is not known
+      return done.error();
+    }
+    volume.values = transfer->take(floats);
+    if (!transfer->is_kept()) {
+      const bool is_over = transfer->close();
+      transfer.reset();
+      if (!is_over) release();
+    }
+    if (!measure_volume(volume)) {
+      release();
+      return make_error(ErrorKind::bad_data, "the loader of " + in_quotes(info.source) +
+                                                 " left numbers unmasked while " + what.doing);
+    }
+    return volume;
+  }
+};
+
+RemoteSource::RemoteSource(std::unique_ptr<State> state) : state_(std::move(state)) {}
+RemoteSource::~RemoteSource() = default;
+
+const DatasetInfo& RemoteSource::info() const { return state_->info; }
+
+Result<Volume> RemoteSource::read(std::size_t field, std::size_t step) {
+  WINDSPLAT_CHECK(field < info().fields.size() && step < info().steps.size());
+  state_->begin();
+  auto out = state_->read(field, step);
+  if (!state_->finish()) return out;
+  state_->release();
+  return make_error(ErrorKind::cancelled, "reading " + in_quotes(info().fields[field].name) +
+                                              " of " + in_quotes(info().source) + " was cancelled");
+}
+
+void RemoteSource::on_progress(Progress progress) { state_->progress = std::move(progress); }
+
+void RemoteSource::cancel() { state_->cancel(); }
+
+std::vector<Companion> RemoteSource::companions() const { return state_->companions; }
+
+void RemoteSource::release() { state_->release(); }
+
+pid_t RemoteSource::process() const { return state_->process.id(); }
+
+Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits) {
+  auto state = std::make_unique<RemoteSource::State>();
+  state->location = std::move(location);
+  state->limits = std::move(limits);
+  auto encoded = state->start();
+  if (!encoded) return encoded.error();
+  auto info = decode_info(*encoded);
+  if (!info) return info.error();
+  state->info = std::move(*info);
+  state->digest = digest_of(*encoded);
+  return std::unique_ptr<RemoteSource>(new RemoteSource(std::move(state)));
+}
+
+}  // namespace windsplat::data::loader

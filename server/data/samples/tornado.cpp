@@ -1,0 +1,155 @@
+// The sample "tornado": after the test function of Crawfis & Max, a swirl about an axis that
+// wanders with height and time, with an updraft; here built so that mass is conserved and the
+// funnel is where moist air must condense.
+//
+// Domain 1500 m x 1500 m x 1500 m, metres, step = 10 s. With the axis at c(z, t), s = r / r_u the
+// distance from it over the updraft's radius, q = r / r_c(z) over the core's radius:
+//   swirl     v_theta = 2 V q / (1 + q^2)            V at the core's edge, counter-clockwise
+//   updraft   w = W(z) exp(-s^2)                     W(z) = W_top (1 - exp(-z / h))
+//   inflow    v_r = -W'(z) r_u^2 / (2 r) (1 - exp(-s^2))          from continuity
+//   tilt      w dc/dz is added to the horizontal wind, so that the air follows the leaning axis
+// Each part is free of divergence: the swirl because v_theta does not depend on the angle, updraft
+// and inflow by construction, the tilt because shifting levels against each other keeps volumes.
+//   vorticity on the axis (untilted) = 4 V / r_c
+//   pressure deficit by cyclostrophic balance, dp/dr = density v_theta^2 / r:
+//     p(inf) - p = density 2 V^2 / (1 + q^2)
+// Air at height z that feels this deficit has cooled as if lifted by deficit / (density g). Where
+// that brings it above the condensation level, which rises outwards as the air gets drier, there is
+// cloud:
+//   cloud = step((z + 2 V^2 / (g (1 + q^2)) - z_base - d s^2) / width), ragged by noise that turns
+//   with the swirl.
+#include <cmath>
+#include <numbers>
+
+#include "server/data/samples/source.hpp"
+
+namespace windsplat::data {
+
+namespace {
+
+constexpr int tornado_version = 1;
+constexpr double extent_m = 1500;
+constexpr double step_s = 10;
+constexpr double gravity = 9.81;         // m/s^2
+constexpr double updraft_top = 45;       // m/s
+constexpr double updraft_scale_m = 450;  // h
+constexpr double updraft_radius_m = 300;
+constexpr double condensation_base_m = 1250;
+constexpr double dry_rise_m = 180;  // d
+
+// What does not depend on x and y.
+struct Level {
+  double height_m;
+  double axis_x, axis_y;    // c(z, t), m
+  double tilt_x, tilt_y;    // dc/dz
+  double core_m;            // r_c
+  double swirl;             // V, m/s
+  double updraft;           // W, m/s
+  double updraft_gradient;  // dW/dz, 1/s
+};
+
+Level level_at(double height_m, double time_s) {
+  const double z = height_m / extent_m;
+  Level level{};
+  level.height_m = height_m;
+  // Two slow turns with height that drift with time, and a walk of the whole funnel.
+  const double phase_x = 5.0 * z + 0.045 * time_s;
+  const double phase_y = 3.6 * z + 0.035 * time_s + 1.0;
+  const double reach = 40.0 + 110.0 * z;
+  const double reach_gradient = 110.0 / extent_m;
+  level.axis_x = 0.5 * extent_m + reach * std::sin(phase_x) + 60.0 * std::cos(0.025 * time_s);
+  level.axis_y = 0.5 * extent_m + reach * std::cos(phase_y) + 60.0 * std::sin(0.025 * time_s);
+  level.tilt_x = reach_gradient * std::sin(phase_x) + reach * std::cos(phase_x) * 5.0 / extent_m;
+  level.tilt_y = reach_gradient * std::cos(phase_y) - reach * std::sin(phase_y) * 3.6 / extent_m;
+  level.core_m = 62.0 + 200.0 * std::pow(z, 1.5);
+  level.swirl = 80.0 - 8.0 * z;
+  const double decay = std::exp(-height_m / updraft_scale_m);
+  level.updraft = updraft_top * (1.0 - decay);
+  level.updraft_gradient = updraft_top / updraft_scale_m * decay;
+  return level;
+}
+
+class Tornado final : public SampleSource {
+ public:
+  explicit Tornado(const SampleSize& size)
+      : SampleSource("tornado", "Tornado test function", size, tornado_version, "s") {
+    info_.grid.axes = sample_box(size.dims, {0, 0, 0}, {extent_m, extent_m, extent_m});
+    info_.fields = {
+        sample_vector("wind", {"u", "v", "w"}, "m s-1", "wind"),
+        sample_scalar("cloud", "1", "", "condensation in the funnel, 0 clear to 1 cloudy"),
+        sample_scalar("vorticity", "s-1", "", "vertical vorticity of the swirl")};
+    for (int i = 0; i < size.steps; ++i) {
+      const int seconds = static_cast<int>(step_s) * i;
+      info_.steps.push_back({static_cast<double>(seconds), std::to_string(seconds) + " s"});
+    }
+  }
+
+ private:
+  void fill(std::size_t field, std::size_t step, Volume& volume) override {
+    const double time_s = info_.steps[step].value;
+    const auto& axes = info_.grid.axes;
+    float* out = volume.values.data();
+    for (const double z : axes[2].coordinates) {
+      const Level level = level_at(z, time_s);
+      for (const double y : axes[1].coordinates) {
+        for (const double x : axes[0].coordinates) {
+          const double dx = x - level.axis_x;
+          const double dy = y - level.axis_y;
+          if (field == 0) {
+            wind(level, dx, dy, volume.samples(), out);
+          } else if (field == 1) {
+            *out = cloud(level, dx, dy, time_s);
+          } else {
+            *out = vorticity(level, dx, dy);
+          }
+          ++out;
+        }
+      }
+    }
+  }
+
+  static void wind(const Level& level, double dx, double dy, std::size_t stride, float* out) {
+    const double r2 = dx * dx + dy * dy;
+    const double core2 = level.core_m * level.core_m;
+    const double spin = 2.0 * level.swirl * level.core_m / (core2 + r2);  // v_theta / r
+    const double s2 = r2 / (updraft_radius_m * updraft_radius_m);
+    const double fall = std::exp(-s2);
+    // (1 - exp(-s^2)) / s^2 tends to 1 on the axis.
+    const double mean_fall = s2 > 1e-12 ? -std::expm1(-s2) / s2 : 1.0;
+    const double draw = -0.5 * level.updraft_gradient * mean_fall;  // v_r / r
+    const double w = level.updraft * fall;
+    out[0] = static_cast<float>(-spin * dy + draw * dx + w * level.tilt_x);
+    out[stride] = static_cast<float>(spin * dx + draw * dy + w * level.tilt_y);
+    out[2 * stride] = static_cast<float>(w);
+  }
+
+  static float cloud(const Level& level, double dx, double dy, double time_s) {
+    const double r2 = dx * dx + dy * dy;
+    const double q2 = r2 / (level.core_m * level.core_m);
+    const double lift_m = 2.0 * level.swirl * level.swirl / (gravity * (1.0 + q2));
+    const double base_m =
+        condensation_base_m + dry_rise_m * r2 / (updraft_radius_m * updraft_radius_m);
+    const double above_m = level.height_m + lift_m - base_m;
+    if (above_m < -260.0) return 0.0F;
+    // The noise lives in (angle, log radius, height) and turns with the air's own rate there,
+    // so that its threads wind up the funnel. Its period is the full turn.
+    const double turns = std::atan2(dy, dx) / (2.0 * std::numbers::pi);
+    const double around = 5.0 * (turns + 1.0 - 0.012 * time_s + level.height_m / 900.0);
+    const double rough =
+        fractal_noise(around, 1.6 * std::log1p(q2), level.height_m / 210.0, 5, 4, 11);
+    return static_cast<float>(smooth_step(-60.0, 260.0, above_m + 170.0 * rough));
+  }
+
+  static float vorticity(const Level& level, double dx, double dy) {
+    const double q2 = (dx * dx + dy * dy) / (level.core_m * level.core_m);
+    return static_cast<float>(4.0 * level.swirl / (level.core_m * (1.0 + q2) * (1.0 + q2)));
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Source> make_tornado(const SampleSize& size) {
+  return std::make_unique<Tornado>(size);
+}
+
+}  // namespace windsplat::data

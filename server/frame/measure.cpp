@@ -1,0 +1,355 @@
+// Pictures drawn twice, and the RMS of what lies between them.
+#include "server/frame/measure.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "server/base/kept.hpp"
+
+namespace windsplat::frame {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t channels = 4;
+
+double samples_of(const scene::Lattice& lattice) {
+  double samples = 1;
+  for (const int n : lattice.dims) samples *= n;
+  return samples;
+}
+
+// Whether thinner slabs of the scene's own rules come to the truth.
+bool is_exact(const scene::Scene& scene) {
+  return scene.compositing == scene::Compositing::analytic &&
+         scene.stop_transmittance <= quality::stop_of_the_truth;
+}
+
+// The view by analytic slabs of its thickness over `thinner`, of every sample where that is to be
+// had. The second: whether it is.
+Result<std::pair<scene::Scene, bool>> finer_scene(const scene::Completed& completed,
+                                                  data::Dataset& dataset, int thinner,
+                                                  double samples_max) {
+  scene::Completed finer = completed;
+  finer.view.method.name = protocol::MethodName::slab;
+  finer.view.method.compositing = protocol::Compositing::analytic;
+  double& stop = finer.view.method.stop_transmittance;
+  stop = std::min(stop, quality::stop_of_the_truth);
+  finer.view.method.slab_thickness /= thinner;
+  finer.coarser = 0;
+  const bool few = samples_of(completed.placed->lattice) <= samples_max;
+  if (few) {
+    scene::Completed full = finer;
+    full.view.method.detail = protocol::Detail::full;
+    auto scene = scene::build_scene(full, dataset);
+    if (scene) return std::pair{std::move(*scene), true};
+    if (scene.error().kind != ErrorKind::not_resident) return scene.error();
+  }
+  auto scene = scene::build_scene(finer, dataset);
+  if (!scene) return scene.error();
+  const bool every = scene->level == std::array<int, 3>{0, 0, 0};
+  return std::pair{std::move(*scene), every};
+}
+
+// Calls value(index in the picture, float) for every value of a part.
+template <class Value>
+void each_value(const engine::TilePixels& tile, int width, const Value& value) {
+  for (int y = 0; y < tile.height; ++y) {
+    const float* from = tile.rgba + static_cast<std::size_t>(y) * tile.stride;
+    std::size_t at =
+        channels * (static_cast<std::size_t>(tile.y + y) * static_cast<std::size_t>(width) +
+                    static_cast<std::size_t>(tile.x));
+    for (std::size_t i = 0; i < channels * static_cast<std::size_t>(tile.width); ++i) {
+      value(at++, from[i]);
+    }
+  }
+}
+
+double rms(const std::vector<float>& values) {
+  double squares = 0;
+  for (const float v : values) squares += static_cast<double>(v) * v;
+  return std::sqrt(squares / static_cast<double>(values.size()));
+}
+
+// RMS of what a picture, brought to the truth's size, is apart from it: bilinear between pixels'
+// centres, as a page shows it.
+double apart(const engine::Image& picture, const std::vector<float>& truth, int width, int height,
+             ThreadPool& pool) {
+  struct Tap {
+    std::size_t low, high;
+    float weight;
+  };
+  const auto taps = [](int from, int to) {
+    std::vector<Tap> out;
+    for (int i = 0; i < to; ++i) {
+      const double at = std::clamp((i + 0.5) * from / to - 0.5, 0.0, from - 1.0);
+      const auto low = static_cast<std::size_t>(at);
+      out.push_back({low, std::min(low + 1, static_cast<std::size_t>(from) - 1),
+                     static_cast<float>(at - static_cast<double>(low))});
+    }
+    return out;
+  };
+  const std::vector<Tap> columns = taps(picture.width, width);
+  const std::vector<Tap> rows = taps(picture.height, height);
+  std::vector<double> squares(rows.size());
+  const std::size_t stride = channels * static_cast<std::size_t>(picture.width);
+  pool.run(rows.size(), [&](std::size_t y, unsigned) {
+    const float* const above = picture.rgba.data() + rows[y].low * stride;
+    const float* const below = picture.rgba.data() + rows[y].high * stride;
+    const float* to = truth.data() + channels * y * static_cast<std::size_t>(width);
+    double sum = 0;
+    for (const Tap& x : columns) {
+      for (std::size_t c = 0; c < channels; ++c) {
+        const auto along = [&](const float* row) {
+          const float low = row[channels * x.low + c];
+          return low + x.weight * (row[channels * x.high + c] - low);
+        };
+        const float top = along(above);
+        const double d = top + rows[y].weight * (along(below) - top) - *to++;
+        sum += d * d;
+      }
+    }
+    squares[y] = sum;
+  });
+  double sum = 0;
+  for (const double row : squares) sum += row;
+  return std::sqrt(sum / static_cast<double>(truth.size()));
+}
+
+// The truth of a view and the errors of the two runs that it comes from.
+struct Truth {
+  std::vector<float> rgba;
+  double squares = 0;  // of all values
+  double error_of_half = 0;
+  double error_of_quarter = 0;
+};
+
+class Survey {
+ public:
+  Survey(const protocol::View& view, data::Dataset& dataset, ThreadPool& pool,
+         const CancelToken& cancel, Workspace& workspace,
+         const std::function<void(const Surveyed&)>& report)
+      : view_(view),
+        dataset_(dataset),
+        pool_(pool),
+        cancel_(cancel),
+        workspace_(workspace),
+        report_(report) {
+    const double pixels = static_cast<double>(view_.image.width) * view_.image.height;
+    const double scale = std::sqrt(static_cast<double>(kept_pixels) / pixels);
+    if (scale < 1) {
+      view_.image.width = std::max(1, static_cast<int>(view_.image.width * scale));
+      view_.image.height = std::max(1, static_cast<int>(view_.image.height * scale));
+    }
+  }
+
+  Result<void> run() {
+    workspace_.space.image() = {};  // a picture that was drawn before
+    if (auto drawn = draw_truth(); !drawn) return drawn.error();
+    for (std::size_t i = 0; i < quality::settings_count; ++i) {
+      const quality::Setting& setting = quality::settings[i];
+      if (!quality::is_allowed(setting, view_)) continue;
+      const bool slab = setting.method == protocol::MethodName::slab;
+      if (slab && setting.thinner > 1 && told_) continue;
+      const auto measured = measure(setting);
+      if (!measured && setting.coarser > 0 && is_absent(measured.error())) continue;
+      if (!measured) return measured.error();
+      report_({i, sight_, *measured});
+    }
+    return {};
+  }
+
+ private:
+  // Averages that there is no room for.
+  static bool is_absent(const Error& error) {
+    return error.kind == ErrorKind::not_resident || error.kind == ErrorKind::out_of_memory;
+  }
+
+  Result<void> draw_truth() {
+    auto completed = complete_at(view_, dataset_, {});
+    if (!completed) return completed.error();
+    const auto sight = sight_of(*completed);
+    if (!sight) return sight.error();
+    sight_ = *sight;
+    const auto own = scene::build_scene(*completed, dataset_);
+    if (!own) return own.error();
+    const std::array<int, 3> own_level = own->level;
+    for (const int thinner : {2, 4}) {
+      const auto finer = finer_scene(*completed, dataset_, thinner, truth_samples_max);
+      if (!finer) return finer.error();
+      const Clock::time_point start = Clock::now();
+      auto drawn = thinner == 2 ? draw_half(finer->first) : draw_quarter(finer->first);
+      if (!drawn) return drawn.error();
+      ms_.push_back(milliseconds_since(start));
+      told_ = finer->first.level == own_level && is_exact(*own);
+    }
+    if (!told_) return {};
+    tell_run({protocol::MethodName::slab, 0, 0, 2}, truth_.error_of_half, ms_[0]);
+    tell_run({protocol::MethodName::slab, 0, 0, 4}, truth_.error_of_quarter, ms_[1]);
+    return {};
+  }
+
+  Result<void> draw_half(const scene::Scene& scene) {
+    const std::size_t values =
+        channels * static_cast<std::size_t>(view_.image.width) * view_.image.height;
+    truth_.rgba.assign(values, 0);
+    const int width = view_.image.width;
+    const auto keep = [&](const engine::TilePixels& tile) {
+      each_value(tile, width, [&](std::size_t at, float value) { truth_.rgba[at] = value; });
+    };
+    const auto work = engine::render(scene, pool_, cancel_, workspace_.space, keep);
+    if (!work) return work.error();
+    return {};
+  }
+
+  // I + (I - I_half) / 3: slabs err by order 2.
+  Result<void> draw_quarter(const scene::Scene& scene) {
+    std::mutex mutex;
+    double squares = 0;
+    const int width = view_.image.width;
+    const auto extrapolate = [&](const engine::TilePixels& tile) {
+      double sum = 0;
+      each_value(tile, width, [&](std::size_t at, float value) {
+        const float d = value - truth_.rgba[at];
+        truth_.rgba[at] = value + d / 3;
+        sum += static_cast<double>(d) * d;
+      });
+      const std::lock_guard lock(mutex);
+      squares += sum;
+    };
+    const auto work = engine::render(scene, pool_, cancel_, workspace_.space, extrapolate);
+    if (!work) return work.error();
+    const double difference = std::sqrt(squares / static_cast<double>(truth_.rgba.size()));
+    for (const float v : truth_.rgba) truth_.squares += static_cast<double>(v) * v;
+    truth_.error_of_half = difference * 4 / 3;
+    truth_.error_of_quarter = difference / 3;
+    return {};
+  }
+
+  void tell_run(const quality::Setting& setting, double error, double ms) {
+    if (!quality::is_allowed(setting, view_)) return;
+    report_({quality::index_of(setting).value(), sight_, {error, ms}});
+  }
+
+  Result<quality::Measured> measure(const quality::Setting& setting) {
+    Encoding encoding;
+    encoding.half_level = setting.half_level;
+    encoding.coarser = setting.coarser;
+    const auto completed = complete_at(quality::at_setting(view_, setting), dataset_, encoding);
+    if (!completed) return completed.error();
+    const auto scene = scene::build_scene(*completed, dataset_);
+    if (!scene) return scene.error();
+    quality::Measured out;
+    const bool full = setting.half_level == 0;
+    double beyond = 0;
+    // The first run fills caches of what depends on no camera.
+    constexpr double quick_ms = 20;  // such runs are repeated, for others disturb them most
+    for (int run = 0; run < 4; ++run) {
+      if (run > 1 && *out.ms > quick_ms) break;
+      const Clock::time_point start = Clock::now();
+      const auto work =
+          full ? compare(*scene, beyond) : engine::render(*scene, pool_, cancel_, workspace_.space);
+      if (!work) return work.error();
+      const double ms = milliseconds_since(start);
+      out.ms = std::min(ms, out.ms.value_or(ms));
+    }
+    if (full) {
+      const double values = static_cast<double>(truth_.rgba.size());
+      out.error = std::sqrt(std::max(0.0, truth_.squares + beyond) / values);
+      return out;
+    }
+    const engine::Image& picture = workspace_.space.image();
+    out.error = apart(picture, truth_.rgba, view_.image.width, view_.image.height, pool_);
+    return out;
+  }
+
+  // Pictures of the truth's size are compared as their tiles come: sum of (v - t)^2 - t^2 over
+  // them, for what never comes is 0.
+  Result<engine::WorkReport> compare(const scene::Scene& scene, double& beyond) {
+    std::mutex mutex;
+    beyond = 0;
+    const int width = view_.image.width;
+    const auto add = [&](const engine::TilePixels& tile) {
+      double sum = 0;
+      each_value(tile, width, [&](std::size_t at, float value) {
+        const double t = truth_.rgba[at];
+        const double d = value - t;
+        sum += d * d - t * t;
+      });
+      const std::lock_guard lock(mutex);
+      beyond += sum;
+    };
+    return engine::render(scene, pool_, cancel_, workspace_.space, add);
+  }
+
+  static double milliseconds_since(Clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+  }
+
+  protocol::View view_;
+  data::Dataset& dataset_;
+  ThreadPool& pool_;
+  const CancelToken& cancel_;
+  Workspace& workspace_;
+  const std::function<void(const Surveyed&)>& report_;
+  quality::Sight sight_;
+  Truth truth_;
+  std::vector<double> ms_;
+  bool told_ = false;  // the truth's two runs are pictures of settings too, and were reported
+};
+
+}  // namespace
+
+Result<quality::Sight> sight_of(const scene::Completed& completed) {
+  quality::Sight sight = quality::sight_of(completed.view);
+  const auto detail = scene::detail_shown(completed);
+  if (!detail) return detail.error();
+  sight.detail = *detail;
+  return sight;
+}
+
+bool is_measured(const scene::Scene& scene, const Encoding& encoding) {
+  const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
+  return encoding.measure && encoding.half_level == 0 && scene.method != scene::Method::reference &&
+         pixels <= static_cast<double>(kept_pixels);
+}
+
+Result<std::optional<double>> measured_error(const scene::Completed& completed,
+                                             const scene::Scene& scene, data::Dataset& dataset,
+                                             ThreadPool& pool, const CancelToken& cancel,
+                                             Workspace& workspace) {
+  // The renderer waits for no file, others no longer than for a few frames more.
+  constexpr double times_as_many = 4;
+  data::Dataset resident = dataset.resident_only();
+  const auto finer =
+      finer_scene(completed, resident, 2,
+                  std::min(truth_samples_max, times_as_many * samples_of(scene.lattice)));
+  if (!finer || !finer->second) return std::optional<double>();
+  // A PNG is coded from the picture afterwards.
+  std::vector<float>& rgba = workspace.space.image().rgba;
+  std::vector<float> copy;
+  if (workspace.encoding.format != Format::jpeg) copy = rgba;
+  std::vector<float>& left = copy.empty() ? rgba : copy;
+  const int width = scene.camera.width;
+  const auto subtract = [&](const engine::TilePixels& tile) {
+    each_value(tile, width, [&](std::size_t at, float value) { left[at] -= value; });
+  };
+  const auto work = engine::render(finer->first, pool, cancel, workspace.space, subtract);
+  if (!work) return work.error();
+  const bool order_two =
+      scene.method == scene::Method::slab && scene.level == finer->first.level && is_exact(scene);
+  return std::optional(rms(left) * (order_two ? 4.0 / 3 : 1.0));
+}
+
+Result<void> survey(const protocol::View& completed, data::Dataset& dataset, ThreadPool& pool,
+                    const CancelToken& cancel, Workspace& workspace,
+                    const std::function<void(const Surveyed&)>& report) {
+  return Survey(completed, dataset, pool, cancel, workspace, report).run();
+}
+
+}  // namespace windsplat::frame

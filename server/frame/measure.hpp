@@ -1,0 +1,56 @@
+// What pictures err: a frame against a finer run of itself, and a survey of every setting.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <optional>
+
+#include "server/frame/frame.hpp"
+#include "server/quality/table.hpp"
+#include "server/scene/build.hpp"
+
+namespace windsplat::frame {
+
+// Truths are drawn from every sample of the data up to this many; of larger data only from what the
+// picture itself is drawn from.
+inline constexpr double truth_samples_max = 32.0 * 1024 * 1024;
+
+// The view at the encoding's size and detail. Errors: those of complete_and_place; invalid for a
+// half level outside 0..31.
+Result<scene::Completed> complete_at(const protocol::View& view, data::Dataset& dataset,
+                                     const Encoding& encoding);
+
+// Where a completed view is seen from. Errors: invalid (its camera).
+Result<quality::Sight> sight_of(const scene::Completed& completed);
+
+// Whether the frame of this scene will be measured: pictures of full size alone, up to kept_pixels.
+bool is_measured(const scene::Scene& scene, const Encoding& encoding);
+
+// Linear RMSE over premultiplied RGBA of the workspace's picture, of which the differences are
+// left. The finer run is by slabs of half the thickness, of every sample. Slabs err by order 2 in
+// their thickness, so by 4/3 of the difference; other pictures by the difference. Empty where the
+// finer run is not to be had: averaged data of which not every sample is resident, or which has
+// more than four times the samples drawn. Reads no file. Errors: those of the engine.
+Result<std::optional<double>> measured_error(const scene::Completed& completed,
+                                             const scene::Scene& scene, data::Dataset& dataset,
+                                             ThreadPool& pool, const CancelToken& cancel,
+                                             Workspace& workspace);
+
+// Draws the view at every setting that is allowed for it and compares each with the truth: slabs of
+// half and a quarter of the view's thickness, extrapolated. Reports each as it is known, the
+// settings in no certain order. Pictures of more than kept_pixels are surveyed smaller; `sight`
+// says how they are. Times are of drawing alone. Errors: cancelled; not_resident; those of scenes.
+struct Surveyed {
+  std::size_t setting = 0;
+  quality::Sight sight;
+  quality::Measured measured;
+};
+inline bool is_worth_a_survey(const protocol::View& view) {  // nobody looks at icons for long
+  return std::min(view.image.width, view.image.height) >= 64;
+}
+Result<void> survey(const protocol::View& completed, data::Dataset& dataset, ThreadPool& pool,
+                    const CancelToken& cancel, Workspace& workspace,
+                    const std::function<void(const Surveyed&)>& report);
+
+}  // namespace windsplat::frame

@@ -1,0 +1,27 @@
+// The name of a request in its answer and in the log: the client's own where it is fit for that.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace windsplat::net {
+
+inline constexpr const char* request_id_header = "X-Request-Id";
+inline constexpr std::size_t request_id_bytes_max = 64;
+
+// 1 to 64 of A-Z a-z 0-9 . _ -
+bool is_request_id(std::string_view text);
+
+// Used by one thread. Ids of one server differ, and those of two hardly ever meet.
+class RequestIds {
+ public:
+  RequestIds();
+  std::string next();  // 16 hexadecimal digits
+
+ private:
+  std::uint64_t state_;
+};
+
+}  // namespace windsplat::net

@@ -1,0 +1,16 @@
+// TLS as OpenSSL has it. For the files of the network alone.
+#pragma once
+
+#include <boost/asio/ssl/context.hpp>
+#include <boost/system/error_code.hpp>
+
+namespace windsplat::net {
+
+struct TlsContext {
+  boost::asio::ssl::context context{boost::asio::ssl::context::tls_server};
+};
+
+// Whether a handshake failed because the peer began with a request in plain HTTP.
+bool is_plain_http(const boost::system::error_code& fault);
+
+}  // namespace windsplat::net

@@ -1,0 +1,68 @@
+// The front of error against time, asked for one point.
+#include "server/quality/pick.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace windsplat::quality {
+namespace {
+
+// Costs scatter: a setting fits where it is expected to take this share of the budget.
+constexpr double headroom = 0.92;
+constexpr double spreads = 1.65;  // of a normal distribution 95 of 100 lie below
+
+struct Candidate {
+  std::size_t setting = 0;
+  double value = std::numeric_limits<double>::infinity();
+  [[nodiscard]] bool found() const { return std::isfinite(value); }
+  void take(std::size_t other, double its_value) {
+    if (its_value < value) *this = {other, its_value};
+  }
+};
+
+}  // namespace
+
+double error_bound(const Forecast& forecast) {
+  return forecast.error * std::exp(spreads * forecast.spread);
+}
+
+double error_low(const Forecast& forecast) {
+  return forecast.error * std::exp(-spreads * forecast.spread);
+}
+
+double pixels_at(const protocol::View& view, const Setting& setting) {
+  return static_cast<double>(edge_at(view.image.width, setting.half_level)) *
+         edge_at(view.image.height, setting.half_level);
+}
+
+Choice pick(const protocol::View& view, const Forecasts& forecasts,
+            const std::array<double, settings_count>& ms, const Aim& aim, double pixels_most) {
+  const double budget =
+      aim.budget_ms ? headroom * *aim.budget_ms : std::numeric_limits<double>::max();
+  const bool any_small = std::any_of(settings.begin(), settings.end(), [&](const auto& setting) {
+    return is_allowed(setting, view) && pixels_at(view, setting) <= pixels_most;
+  });
+  Candidate keeps_both;
+  Candidate least_error;  // of those within the budget
+  Candidate fastest;      // of all
+  for (std::size_t i = 0; i < settings_count; ++i) {
+    const bool large = pixels_at(view, settings[i]) > pixels_most;
+    if (!is_allowed(settings[i], view) || (any_small && large)) continue;
+    fastest.take(i, ms[i]);
+    if (ms[i] > budget) continue;
+    least_error.take(i, forecasts[i].error);
+    if (aim.max_error && error_bound(forecasts[i]) <= *aim.max_error) keeps_both.take(i, ms[i]);
+  }
+  if (keeps_both.found()) return {keeps_both.setting, true};
+  if (least_error.found()) return {least_error.setting, true};
+  return {fastest.setting, false};
+}
+
+Choice pick(const protocol::View& view, const Forecasts& forecasts, const Aim& aim) {
+  std::array<double, settings_count> ms{};
+  for (std::size_t i = 0; i < ms.size(); ++i) ms[i] = forecasts[i].ms;
+  return pick(view, forecasts, ms, aim, std::numeric_limits<double>::infinity());
+}
+
+}  // namespace windsplat::quality

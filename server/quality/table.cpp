@@ -1,0 +1,201 @@
+// Measurements near by -> forecasts, in logarithms.
+#include "server/quality/table.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "server/quality/laws.hpp"
+
+namespace windsplat::quality {
+namespace {
+
+constexpr double ms_least = 1e-3;
+constexpr double near = 0.5;  // a study as near as this would tell nothing new
+constexpr std::size_t nearest_max = 6;
+
+// Linear RMSE of a JPEG of quality 90, the median of the samples (docs/study).
+constexpr double encoding_error_of_lines = 9.5e-3;
+constexpr double encoding_error_of_media = 2.4e-3;
+// What halving the chroma adds to it, whatever the quality.
+constexpr double half_chroma = 0.95;
+
+// Of what quantisation loses at quality 90. Its steps follow libjpeg's rule: 50 / q below 50,
+// 2 - q / 50 above; what they lose saturates, for most of a picture's detail is gone at last.
+double quantised(int quality) {
+  const auto lost = [](double q) {
+    constexpr double saturation = 0.36;
+    const double step = q >= 50 ? 2.02 - q / 50 : 50 / std::max(q, 1.0);
+    return step / (step + saturation);
+  };
+  return lost(quality) / lost(90);
+}
+
+// The logarithm of a measured value over what was expected of it.
+struct Told {
+  const Sight* sight = nullptr;
+  double log_ratio = 0;
+  double apart = 0;  // from the sight that is asked for
+};
+
+struct Kriged {
+  double log_ratio = 0;
+  double variance = 0;  // of what would be measured
+};
+
+double squared(double x) { return x * x; }
+
+// C = style^2 + sight^2 exp(-distance) + noise^2 [the same measurement]; the mean is known to be 0.
+// Solves C w = c by Cholesky's factors, row by row, and the forward half of c along with it.
+Kriged krige(const std::vector<Told>& told, const Scatter& scatter) {
+  const double of_style = squared(scatter.style);
+  const double of_sight = squared(scatter.sight);
+  std::array<std::array<double, nearest_max>, nearest_max> factor{};
+  std::array<double, nearest_max> asked{};
+  std::array<double, nearest_max> known{};
+  Kriged out;
+  out.variance = of_style + of_sight + squared(scatter.noise);
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    asked[i] = of_style + of_sight * std::exp(-told[i].apart);
+    known[i] = told[i].log_ratio;
+    for (std::size_t j = 0; j <= i; ++j) {
+      double c = of_style + of_sight * std::exp(-distance(*told[i].sight, *told[j].sight));
+      if (i == j) c += squared(scatter.noise);
+      for (std::size_t k = 0; k < j; ++k) c -= factor[i][k] * factor[j][k];
+      factor[i][j] = i == j ? std::sqrt(c) : c / factor[j][j];
+    }
+    for (std::size_t k = 0; k < i; ++k) {
+      asked[i] -= factor[i][k] * asked[k];
+      known[i] -= factor[i][k] * known[k];
+    }
+    asked[i] /= factor[i][i];
+    known[i] /= factor[i][i];
+    out.log_ratio += asked[i] * known[i];
+    out.variance -= squared(asked[i]);
+  }
+  return out;
+}
+
+void keep_nearest(std::vector<Told>& told) {
+  if (told.size() <= nearest_max) return;
+  std::stable_sort(told.begin(), told.end(),
+                   [](const Told& a, const Told& b) { return a.apart < b.apart; });
+  told.resize(nearest_max);
+}
+
+// A picture is less to encode the farther away it is seen from.
+double encoded_detail(const Sight& sight) { return 1 / std::sqrt(sight.height); }
+
+}  // namespace
+
+Forecast prior(const Kind& kind, const Setting& setting, const Sight& sight) {
+  const Expected error = expected_error(kind, setting, sight);
+  Forecast out;
+  out.error = error.value;
+  out.spread = std::hypot(error.scatter.style, error.scatter.sight);
+  out.ms = expected_ms(kind, setting, sight).value;
+  return out;
+}
+
+void Table::add(std::size_t setting, const Sight& sight, const Measured& measured) {
+  const auto is_bad = [](const std::optional<double>& value) {
+    return value && !std::isfinite(*value);
+  };
+  if (is_bad(measured.error) || is_bad(measured.ms)) return;
+  const Setting& how = settings[setting];
+  Entry entry{sight, {}, {}, is_averaged(how, sight)};
+  if (measured.error) {
+    const double error = std::max(*measured.error, error_least);
+    entry.log_error = std::log(error / expected_error(kind_, how, sight).value);
+  }
+  if (measured.ms) {
+    entry.log_ms =
+        std::log(std::max(*measured.ms, ms_least) / expected_ms(kind_, how, sight).value);
+  }
+  std::deque<Entry>& entries = entries_[setting];
+  entries.push_back(entry);
+  if (entries.size() <= measurements_max) return;
+  // Times come from surveys alone: they outlast what only tells an error.
+  const auto oldest = std::find_if(entries.begin(), entries.end() - 1,
+                                   [](const Entry& kept) { return !kept.log_ms; });
+  entries.erase(oldest == entries.end() - 1 ? entries.begin() : oldest);
+}
+
+Forecast Table::forecast(std::size_t setting, const Sight& sight) const {
+  const Setting& how = settings[setting];
+  const bool averaged = is_averaged(how, sight);
+  Forecast out = prior(kind_, how, sight);
+  std::vector<Told> errors;
+  std::vector<Told> times;
+  for (const Entry& entry : entries_[setting]) {
+    const double apart = distance(entry.sight, sight);
+    // Averages err by another law than what is drawn of every sample.
+    if (entry.log_error && entry.averaged == averaged) {
+      errors.push_back({&entry.sight, *entry.log_error, apart});
+    }
+    if (entry.log_ms) times.push_back({&entry.sight, *entry.log_ms, apart});
+  }
+  if (!errors.empty()) {
+    out.measured =
+        std::any_of(errors.begin(), errors.end(), [](const Told& t) { return t.apart < near; });
+    keep_nearest(errors);
+    const Kriged kriged = krige(errors, expected_error(kind_, how, sight).scatter);
+    out.error = std::max(error_least, out.error * std::exp(kriged.log_ratio));
+    out.spread = std::sqrt(kriged.variance);
+  }
+  if (!times.empty()) {
+    keep_nearest(times);
+    out.ms *= std::exp(krige(times, expected_ms(kind_, how, sight).scatter).log_ratio);
+    out.timed = true;
+  }
+  return out;
+}
+
+Forecasts Table::forecasts(const Sight& sight) const {
+  Forecasts out;
+  double log_ratio = 0;
+  int timed = 0;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i] = forecast(i, sight);
+    if (!out[i].timed) continue;
+    log_ratio += std::log(out[i].ms / prior(kind_, settings[i], sight).ms);
+    ++timed;
+  }
+  if (timed == 0) return out;
+  for (Forecast& guessed : out) {
+    if (!guessed.timed) guessed.ms *= std::exp(log_ratio / timed);
+  }
+  return out;
+}
+
+bool Table::wants_study(const Sight& sight) const {
+  return !studying_ && std::none_of(studied_.begin(), studied_.end(), [&](const Sight& known) {
+    return distance(known, sight) < near;
+  });
+}
+
+void Table::begin_study(const Sight& sight) {
+  studying_ = true;
+  studied_.push_back(sight);
+  if (studied_.size() > studies_max) studied_.pop_front();
+}
+
+void Table::end_study(bool complete) {
+  studying_ = false;
+  if (!complete && !studied_.empty()) studied_.pop_back();
+}
+
+void Table::add_encoding(int quality, const Sight& sight, double error) {
+  const double known = error / (quantised(quality) * encoded_detail(sight));
+  if (!(known > 0) || !std::isfinite(known)) return;
+  encoding_error_ = encoding_error_ ? std::sqrt(*encoding_error_ * known) : known;
+}
+
+double Table::encoding_error(int quality, bool full_chroma, const Sight& sight) const {
+  const double prior = kind_.lines ? encoding_error_of_lines : encoding_error_of_media;
+  const double at_90 = encoding_error_ ? *encoding_error_ * encoded_detail(sight) : prior;
+  return at_90 * std::hypot(quantised(quality), full_chroma ? 0 : half_chroma);
+}
+
+}  // namespace windsplat::quality

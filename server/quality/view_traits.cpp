@@ -1,0 +1,114 @@
+// Views told apart by style and sight.
+#include "server/quality/view_traits.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "protocol/codec.hpp"
+
+namespace windsplat::quality {
+namespace {
+
+constexpr double radians_per_degree = 0.017453292519943295;
+// Apart by this much, sights are at a distance of 1.
+constexpr double height_scale = 0.5;     // of the logarithm of heights
+constexpr double pixels_scale = 1;       // of the logarithm of pixels
+constexpr double direction_scale = 1.2;  // radians
+
+// Of a line's length of the densest medium; 0 where it is not known.
+double depth_of(const protocol::View& view) {
+  if (!view.scalars || !view.vector.length) return 0;
+  double extinction = 0;
+  for (const protocol::ScalarView& layer : *view.scalars) {
+    double most = 0;
+    if (!layer.extinction) continue;
+    for (const auto& point : *layer.extinction) most = std::max(most, point[1]);
+    extinction += most;
+  }
+  return extinction * *view.vector.length;
+}
+
+}  // namespace
+
+Sight sight_of(const protocol::View& view, const Sight& otherwise) {
+  Sight sight = otherwise;
+  sight.width = view.image.width;
+  sight.pixels_high = view.image.height;
+  sight.detail *= static_cast<double>(sight.pixels_high) / otherwise.pixels_high;
+  if (!view.camera.eye || !view.camera.target) return sight;
+  protocol::Vec3 way{};
+  double length = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    way[a] = (*view.camera.target)[a] - (*view.camera.eye)[a];
+    length = std::hypot(length, way[a]);
+  }
+  if (!(length > 0)) return sight;
+  for (std::size_t a = 0; a < 3; ++a) sight.direction[a] = way[a] / length;
+  sight.height = view.camera.projection == protocol::Projection::orthographic && view.camera.height
+                     ? *view.camera.height
+                     : 2 * length * std::tan(0.5 * radians_per_degree * view.camera.fov_y);
+  sight.detail *= otherwise.height / sight.height;
+  return sight;
+}
+
+namespace {
+
+// As the samples were found to err by each rule at stride 1.
+double error_of_rule(protocol::Compositing compositing) {
+  switch (compositing) {
+    case protocol::Compositing::analytic:
+      return 0;
+    case protocol::Compositing::cd:
+      return 1e-4;
+    case protocol::Compositing::cd_naive:
+      return 5e-4;
+    case protocol::Compositing::simple:
+      return 3e-3;
+    case protocol::Compositing::cd_euler:
+      return 5e-3;
+  }
+  return 0;
+}
+
+// By rays that stop while they still let T through: up to T times what would have shone there.
+double error_of_stop(double transmittance) {
+  constexpr double shine = 0.04;
+  return shine * std::max(0.0, transmittance - stop_of_the_truth);
+}
+
+}  // namespace
+
+Style style_of(const protocol::View& completed) {
+  Style style;
+  style.kind.lines = completed.vector.field.kind != protocol::FieldChoice::Kind::none;
+  style.kind.medium = !completed.scalars || !completed.scalars->empty();
+  style.kind.length = completed.vector.length.value_or(0);
+  style.kind.radius = completed.vector.r2;
+  style.kind.thickness = completed.method.slab_thickness;
+  if (style.kind.medium) {
+    style.kind.rule = error_of_rule(completed.method.compositing);
+    style.kind.stop = error_of_stop(completed.method.stop_transmittance);
+  }
+  if (const double depth = depth_of(completed); depth > 0) style.kind.depth = depth;
+  protocol::View view = completed;
+  view.step = 0;
+  view.camera = {};
+  view.image = {};
+  view.quality = {};
+  view.vector.motion_time = 0;
+  view.method.name = protocol::MethodName::slab;
+  style.key = protocol::encode_view(view);
+  style.dataset = completed.dataset;
+  return style;
+}
+
+double distance(const Sight& a, const Sight& b) {
+  const double height = std::log(a.height / b.height) / height_scale;
+  const double pixels = std::log(static_cast<double>(a.pixels_high) / b.pixels_high) / pixels_scale;
+  double along = 0;
+  for (std::size_t i = 0; i < 3; ++i) along += a.direction[i] * b.direction[i];
+  const double turn = std::acos(std::clamp(along, -1.0, 1.0)) / direction_scale;
+  return std::hypot(height, pixels, turn);
+}
+
+}  // namespace windsplat::quality

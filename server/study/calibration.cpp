@@ -1,0 +1,403 @@
+// Views of a fixed sequence, some surveyed, the others drawn at every setting and compared.
+#include "server/study/calibration.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <random>
+#include <utility>
+
+#include "server/engine/render.hpp"
+#include "server/frame/difference.hpp"
+#include "server/frame/measure.hpp"
+#include "server/image/decode.hpp"
+#include "server/image/jpeg_encoder.hpp"
+#include "server/quality/laws.hpp"
+#include "server/quality/pick.hpp"
+#include "server/scene/build.hpp"
+#include "server/study/metrics.hpp"
+#include "server/study/sweep.hpp"
+
+namespace windsplat::study {
+
+namespace {
+
+constexpr double density_factor = 10;
+constexpr double thick_radius = 4;  // pixels at a height of 720
+constexpr double zoom_least = 0.6;
+constexpr double zoom_most = 4;
+// Places of the sequence: those before the first one are what quality/laws.cpp was fitted to.
+constexpr std::uint64_t first_view = 100'000;
+constexpr std::uint64_t views_of_a_look = 1000;  // at most
+constexpr std::array<double, 7> max_errors{0.1, 0.05, 0.03, 0.02, 0.01, 3e-3, 1e-3};
+constexpr std::array<int, 5> qualities{40, 60, 75, 90, 95};
+constexpr int learnt_quality = 90;
+
+double uniform(std::mt19937_64& random, double low, double high) {
+  const double share = static_cast<double>(random() >> 11U) * 0x1p-53;
+  return low + share * (high - low);
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// Errors of one view by setting; not a number where a setting is not allowed.
+using SettingErrors = std::array<double, quality::settings_count>;
+
+class Calibrator {
+ public:
+  Calibrator(const Subject& subject, const CalibrationPlan& plan, const Truth& truth,
+             ThreadPool& pool, const CancelToken& cancel, const std::function<void(int)>& progress)
+      : subject_(subject), truth_(truth), pool_(pool), cancel_(cancel), progress_(progress) {
+    out_.plan = plan;
+    for (const double error : max_errors) out_.aimed.push_back({error, 0, 0, 0, 0, 0});
+  }
+
+  Result<Calibration> run() {
+    const auto start = std::chrono::steady_clock::now();
+    const std::vector<Look> looks = looks_of(subject_);
+    for (look_ = 0; look_ < looks.size(); ++look_) {
+      out_.looks.push_back(looks[look_].name);
+      if (auto done = calibrate_look(looks[look_].view); !done) return done.error();
+    }
+    out_.seconds = seconds_since(start);
+    return std::move(out_);
+  }
+
+ private:
+  Result<void> calibrate_look(const protocol::View& view) {
+    const quality::Style style = quality::style_of(view);
+    quality::Table table(style.kind);
+    for (int n = 0; n < out_.plan.surveyed + out_.plan.held_out; ++n) {
+      if (cancel_.cancelled()) return make_error(ErrorKind::cancelled, "interrupted");
+      auto seen = seen_from(view, *subject_.dataset,
+                            first_view + views_of_a_look * look_ + static_cast<std::uint64_t>(n));
+      if (!seen) return seen.error();
+      protocol::View held = std::move(*seen);
+      held.image.width = out_.plan.width;
+      held.image.height = out_.plan.height;
+      const auto done =
+          n < out_.plan.surveyed
+              ? survey(held, n == 0, table)
+              : compare(held, static_cast<std::size_t>(n - out_.plan.surveyed), style, table);
+      if (!done) return done.error();
+      if (progress_) progress_(++views_);
+    }
+    return {};
+  }
+
+  Result<void> survey(const protocol::View& view, bool first, quality::Table& table) {
+    auto done = frame::survey(view, *subject_.dataset, pool_, cancel_, workspace_,
+                              [&](const frame::Surveyed& found) {
+                                table.add(found.setting, found.sight, found.measured);
+                              });
+    if (!done || !first) return done;
+    if (auto drawn = draw_measured(view); !drawn) return drawn.error();
+    const auto jpeg = encoded(view, learnt_quality, image::Subsampling::s444);
+    if (!jpeg) return jpeg.error();
+    const auto error = image::encoding_error(workspace_.planes, *jpeg);
+    if (!error) return error.error();
+    table.add_encoding(learnt_quality, quality::sight_of(view), *error);
+    return {};
+  }
+
+  Result<void> compare(const protocol::View& view, std::size_t n, const quality::Style& style,
+                       const quality::Table& table) {
+    Subject seen = subject_;
+    seen.view = view;
+    const auto truth = extrapolate(seen, pool_, cancel_);
+    if (!truth) return truth.error();
+    auto errors = setting_errors(view, truth->picture);
+    if (!errors) return errors.error();
+    const auto completed = frame::complete_at(view, *subject_.dataset, {});
+    if (!completed) return completed.error();
+    const auto seen_at = frame::sight_of(*completed);
+    if (!seen_at) return seen_at.error();
+    const quality::Sight sight = *seen_at;
+    const quality::Forecasts forecasts = table.forecasts(sight);
+    for (std::size_t i = 0; i < errors->size(); ++i) {
+      if (std::isnan((*errors)[i])) continue;
+      out_.compared.push_back({look_, n, i, (*errors)[i], forecasts[i],
+                               quality::prior(style.kind, quality::settings[i], sight)});
+    }
+    aim(view, forecasts, *errors);
+    for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
+      protocol::View own = view;
+      own.method.name = method;
+      if (auto done = draw_measured(own); !done) return done.error();
+      if (!workspace_.drawn.error) continue;
+      const double error =
+          frame::difference_of(workspace_.space.image().rgba, truth->picture.rgba).rmse;
+      out_.measured.push_back(
+          {look_, method == protocol::MethodName::slab, error, *workspace_.drawn.error});
+    }
+    if (auto done = compare_encodings(view, style, table); !done) return done.error();
+    return n == 0 && truth_ ? check_truth(view) : Result<void>();
+  }
+
+  Result<SettingErrors> setting_errors(const protocol::View& view, const Picture& truth) {
+    SettingErrors errors;
+    errors.fill(std::nan(""));
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      const quality::Setting& setting = quality::settings[i];
+      if (!quality::is_allowed(setting, view)) continue;
+      frame::Encoding encoding;
+      encoding.half_level = setting.half_level;
+      encoding.coarser = setting.coarser;
+      const auto completed =
+          frame::complete_at(quality::at_setting(view, setting), *subject_.dataset, encoding);
+      if (!completed) return completed.error();
+      const auto scene = scene::build_scene(*completed, *subject_.dataset);
+      if (!scene) return scene.error();
+      const auto drawn = engine::render(*scene, pool_, cancel_);
+      if (!drawn) return drawn.error();
+      const auto& [width, height, rgba] = drawn->image;
+      errors[i] =
+          frame::difference_of(resample(rgba, width, height, truth.width, truth.height), truth.rgba)
+              .rmse;
+    }
+    return errors;
+  }
+
+  void aim(const protocol::View& view, const quality::Forecasts& forecasts,
+           const SettingErrors& errors) {
+    for (Aimed& aimed : out_.aimed) {
+      protocol::View asked = view;
+      asked.quality.max_error = aimed.max_error;
+      const std::size_t chosen =
+          quality::pick(asked, forecasts, {std::nullopt, aimed.max_error}).setting;
+      const bool kept = errors[chosen] <= aimed.max_error;
+      const bool promised = quality::error_bound(forecasts[chosen]) <= aimed.max_error;
+      const bool possible = std::any_of(errors.begin(), errors.end(),
+                                        [&](double error) { return error <= aimed.max_error; });
+      ++aimed.frames;
+      aimed.promised += promised ? 1 : 0;
+      aimed.promised_kept += promised && kept ? 1 : 0;
+      aimed.possible += possible ? 1 : 0;
+      aimed.possible_kept += possible && kept ? 1 : 0;
+    }
+  }
+
+  // The picture and the error of its own are the workspace's then.
+  Result<void> draw_measured(const protocol::View& view) {
+    frame::Encoding encoding;
+    encoding.format = frame::Format::npy;
+    encoding.measure = true;
+    return frame::draw(view, *subject_.dataset, encoding, pool_, cancel_, workspace_);
+  }
+
+  // Of the workspace's picture; the planes are the workspace's too.
+  Result<image::Bytes> encoded(const protocol::View& view, int quality,
+                               image::Subsampling subsampling) {
+    const auto& [width, height, rgba] = workspace_.space.image();
+    workspace_.planes.reset(view.image.width, view.image.height, subsampling,
+                            workspace_.background);
+    workspace_.planes.put({0, 0, width, height, rgba.data(), std::size_t{4} * width});
+    image::Bytes bytes;
+    auto done = workspace_.jpeg.encode(workspace_.planes, quality, pool_, bytes);
+    if (!done) return done.error();
+    return bytes;
+  }
+
+  Result<void> compare_encodings(const protocol::View& view, const quality::Style& style,
+                                 const quality::Table& table) {
+    const auto& [width, height, rgba] = workspace_.space.image();
+    const auto rgb = displayed(rgba, width, height, workspace_.background);
+    const quality::Table untaught(style.kind);
+    const quality::Sight sight = quality::sight_of(view);
+    for (const auto subsampling : {image::Subsampling::s444, image::Subsampling::s420}) {
+      for (const int quality : qualities) {
+        const auto jpeg = encoded(view, quality, subsampling);
+        if (!jpeg) return jpeg.error();
+        const auto decoded = image::decode_jpeg(*jpeg, width, height);
+        if (!decoded) return decoded.error();
+        const bool full = subsampling == image::Subsampling::s444;
+        out_.encodings.push_back({look_, quality, full, linear_rmse(rgb, *decoded),
+                                  table.encoding_error(quality, full, sight),
+                                  untaught.encoding_error(quality, full, sight)});
+      }
+    }
+    return {};
+  }
+
+  Result<void> check_truth(const protocol::View& view) {
+    Subject seen = subject_;
+    seen.view = view;
+    seen.view.image = subject_.view.image;
+    const auto made = extrapolate(seen, pool_, cancel_);
+    if (!made) return made.error();
+    const auto scene =
+        scene_at(seen, {scene::Method::reference, scene::Compositing::analytic, own_knobs(seen)});
+    if (!scene) return scene.error();
+    const auto integral = truth_(*scene);
+    if (!integral) return integral.error();
+    out_.checks.push_back({look_,
+                           frame::difference_of(to_floats(made->picture), integral->rgba).rmse,
+                           made->estimate});
+    return {};
+  }
+
+  const Subject& subject_;
+  const Truth& truth_;
+  ThreadPool& pool_;
+  const CancelToken& cancel_;
+  const std::function<void(int)>& progress_;
+  frame::Workspace workspace_;
+  Calibration out_;
+  std::size_t look_ = 0;
+  int views_ = 0;
+};
+
+struct Pair {
+  double estimate = 0;
+  double truth = 0;
+  double bound = 0;
+};
+
+Agreement agreement_of(const std::vector<Pair>& pairs) {
+  Agreement out;
+  out.count = pairs.size();
+  if (pairs.empty()) return out;
+  std::vector<double> ratios;
+  std::size_t within = 0;
+  std::size_t bounded = 0;
+  for (const Pair& pair : pairs) {
+    const double truth = std::max(pair.truth, quality::error_least);
+    const double ratio = std::max(pair.estimate, quality::error_least) / truth;
+    ratios.push_back(ratio);
+    within += ratio >= 0.5 && ratio <= 2 ? 1 : 0;
+    bounded += truth <= std::max(pair.bound, quality::error_least) ? 1 : 0;
+  }
+  const auto share = [&](std::size_t n) {
+    return static_cast<double>(n) / static_cast<double>(pairs.size());
+  };
+  out.within_two = share(within);
+  out.bounded = share(bounded);
+  out.median = median(std::move(ratios));
+  return out;
+}
+
+}  // namespace
+
+std::vector<Look> looks_of(const Subject& subject) {
+  const protocol::View& own = subject.view;
+  const bool lines = own.vector.field.kind == protocol::FieldChoice::Kind::named;
+  const bool medium = !own.scalars->empty();
+  std::vector<Look> looks{{"as it is", own}};
+  if (lines && medium) {
+    looks.push_back({"lines alone", own});
+    looks.back().view.scalars->clear();
+    looks.push_back({"medium alone", own});
+    looks.back().view.vector.field = {protocol::FieldChoice::Kind::none, ""};
+  }
+  if (medium) {
+    looks.push_back({"ten times as dense", own});
+    for (protocol::ScalarView& layer : *looks.back().view.scalars) {
+      for (auto& point : *layer.extinction) point[1] = std::min(density_factor * point[1], 1e30);
+    }
+  }
+  if (lines) {
+    looks.push_back({"thick lines", own});
+    protocol::VectorView& vector = looks.back().view.vector;
+    vector.r1 = thick_radius / 2;
+    vector.r2 = thick_radius;
+    *vector.length *= 2;
+  }
+  return looks;
+}
+
+Result<protocol::View> seen_from(const protocol::View& view, data::Dataset& dataset,
+                                 std::uint64_t n) {
+  const auto placed = scene::place_dataset(view.geometry, dataset);
+  if (!placed) return placed.error();
+  std::mt19937_64 random(n);
+  const double azimuth = uniform(random, 0, 360);
+  const double elevation = uniform(random, -20, 80);
+  const double zoom = std::exp(uniform(random, std::log(zoom_least), std::log(zoom_most)));
+  protocol::View out = view;
+  scene::orbit(out, (*placed)->lattice, azimuth, elevation, zoom);
+  return out;
+}
+
+CalibrationPlan calibration_plan(const Subject& subject, bool quick) {
+  CalibrationPlan plan;
+  plan.width = 2 * subject.view.image.width;
+  plan.height = 2 * subject.view.image.height;
+  if (quick) plan.held_out = 2;
+  return plan;
+}
+
+Result<Calibration> calibrate(const Subject& subject, const CalibrationPlan& plan,
+                              const Truth& truth, ThreadPool& pool, const CancelToken& cancel,
+                              const std::function<void(int)>& progress) {
+  return Calibrator(subject, plan, truth, pool, cancel, progress).run();
+}
+
+SettingClass class_of(const quality::Setting& setting) {
+  const bool slab = setting.method == protocol::MethodName::slab;
+  if (setting.coarser > 0) return slab ? SettingClass::slab_coarser : SettingClass::kernel_coarser;
+  if (setting.half_level > 0) {
+    return slab ? SettingClass::slab_smaller : SettingClass::kernel_smaller;
+  }
+  return slab ? SettingClass::slab : SettingClass::kernel;
+}
+
+const char* name_of(SettingClass kind) {
+  switch (kind) {
+    case SettingClass::kernel:
+      return "kernel";
+    case SettingClass::kernel_smaller:
+      return "kernel, fewer pixels";
+    case SettingClass::kernel_coarser:
+      return "kernel, coarser data";
+    case SettingClass::slab:
+      return "slab";
+    case SettingClass::slab_smaller:
+      return "slab, fewer pixels";
+    case SettingClass::slab_coarser:
+      return "slab, coarser data";
+  }
+  return "";
+}
+
+Agreement agreement(const Calibration& calibration,
+                    const std::function<bool(const Compared&)>& counts) {
+  std::vector<Pair> pairs;
+  for (const Compared& one : calibration.compared) {
+    if (!counts(one)) continue;
+    pairs.push_back({one.forecast.error, one.error, quality::error_bound(one.forecast)});
+  }
+  return agreement_of(pairs);
+}
+
+Agreement agreement(const Calibration& calibration) {
+  return agreement(calibration, [](const Compared&) { return true; });
+}
+
+Agreement agreement_of_priors(const Calibration& calibration) {
+  std::vector<Pair> pairs;
+  for (const Compared& one : calibration.compared) {
+    pairs.push_back({one.prior.error, one.error, quality::error_bound(one.prior)});
+  }
+  return agreement_of(pairs);
+}
+
+Agreement agreement_of_measured(const Calibration& calibration) {
+  std::vector<Pair> pairs;
+  for (const MeasuredFrame& one : calibration.measured) {
+    pairs.push_back({one.measured, one.error, one.measured});
+  }
+  return agreement_of(pairs);
+}
+
+Agreement agreement_of_encodings(const Calibration& calibration) {
+  std::vector<Pair> pairs;
+  for (const ComparedEncoding& one : calibration.encodings) {
+    pairs.push_back({one.forecast, one.error, one.forecast});
+  }
+  return agreement_of(pairs);
+}
+
+}  // namespace windsplat::study

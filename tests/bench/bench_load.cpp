@@ -1,0 +1,242 @@
+// How fast a dataset's volumes are read: by the bare library or bare reads, by our reader in this
+// process, and by the loader apart (which also hands them over and has them checked). Files are
+// written and read once before, so that they come from the system's memory; each reads into memory
+// that is new to the process, as what stays resident must. Milliseconds a step of all fields, the
+// least of the rounds, and ratios to the bare read.
+//
+//   bench_load [--program=windsplat] [--dims=320x160x19] [--steps=8] [--rounds=7] [--only=raw]
+//              [--markdown]
+#include <fcntl.h>
+#include <malloc.h>
+#include <netcdf.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/data/dataset.hpp"
+#include "server/data/loader/loader.hpp"
+#include "support.hpp"
+#include "text_table.hpp"
+
+namespace {
+
+using namespace windsplat;
+using Clock = std::chrono::steady_clock;
+
+struct Options {
+  std::string program = "windsplat";
+  std::array<int, 3> dims{320, 160, 19};
+  int steps = 8;
+  int rounds = 7;
+  std::string only;  // the name of one kind of file
+  bool markdown = false;
+};
+
+Options options_of(int argc, char** argv) {
+  Options out;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const auto value = [&](const char* name) {
+      const std::string start = std::string("--") + name + "=";
+      return word.starts_with(start) ? word.substr(start.size()) : std::string();
+    };
+    if (word == "--markdown") out.markdown = true;
+    if (auto v = value("program"); !v.empty()) out.program = v;
+    if (auto v = value("only"); !v.empty()) out.only = v;
+    if (auto v = value("steps"); !v.empty()) out.steps = std::stoi(v);
+    if (auto v = value("rounds"); !v.empty()) out.rounds = std::stoi(v);
+    if (auto v = value("dims"); !v.empty()) {
+      std::sscanf(v.c_str(), "%dx%dx%d", &out.dims[0], &out.dims[1], &out.dims[2]);
+    }
+  }
+  return out;
+}
+
+void check(int status) {
+  if (status != NC_NOERR) bench::give_up(nc_strerror(status));
+}
+
+// The variables u, v, w and cloud as one netCDF file, chunked by step and deflated or not.
+void write_netcdf(const std::string& path, data::Source& source, int format, int deflate) {
+  const auto dims = source.info().grid.dims();
+  const std::size_t steps = source.info().steps.size();
+  int ncid = 0;
+  std::array<int, 4> ids{};
+  check(nc_create(path.c_str(), NC_CLOBBER | format, &ncid));
+  check(nc_def_dim(ncid, "time", steps, &ids[0]));
+  const std::array<const char*, 3> names{"z", "y", "x"};
+  for (std::size_t a = 0; a < 3; ++a) {
+    check(nc_def_dim(ncid, names.at(a), static_cast<std::size_t>(dims.at(2 - a)), &ids.at(a + 1)));
+  }
+  std::vector<int> variables;
+  for (const char* name : {"u", "v", "w", "cloud"}) {
+    variables.emplace_back();
+    check(nc_def_var(ncid, name, NC_FLOAT, 4, ids.data(), &variables.back()));
+    if (deflate > 0) check(nc_def_var_deflate(ncid, variables.back(), 1, 1, deflate));
+  }
+  check(nc_enddef(ncid));
+  for (std::size_t t = 0; t < steps; ++t) {
+    const auto wind = bench::value_or_give_up(source.read(0, t));
+    const auto cloud = bench::value_or_give_up(source.read(1, t));
+    const std::array<std::size_t, 4> start{t, 0, 0, 0};
+    const std::array<std::size_t, 4> count{1, static_cast<std::size_t>(dims[2]),
+                                           static_cast<std::size_t>(dims[1]),
+                                           static_cast<std::size_t>(dims[0])};
+    for (int c = 0; c < 4; ++c) {
+      const float* values = c < 3 ? wind.component(c) : cloud.component(0);
+      check(nc_put_vara_float(ncid, variables.at(static_cast<std::size_t>(c)), start.data(),
+                              count.data(), values));
+    }
+  }
+  check(nc_close(ncid));
+}
+
+void write_raw(const std::string& folder, data::Source& source) {
+  const auto dims = source.info().grid.dims();
+  std::ofstream raw(folder + "/raw.bin", std::ios::binary);
+  for (std::size_t t = 0; t < source.info().steps.size(); ++t) {
+    for (const std::size_t field : {0U, 1U}) {
+      const auto volume = bench::value_or_give_up(source.read(field, t));
+      raw.write(reinterpret_cast<const char*>(volume.component(0)),
+                static_cast<std::streamsize>(volume.bytes()));
+    }
+  }
+  std::ofstream(folder + "/raw.json")
+      << R"({"windsplat": "raw", "file": "raw.bin", "type": "float32", "endian": "little", )"
+      << R"("dims": {"x": )" << dims[0] << R"(, "y": )" << dims[1] << R"(, "z": )" << dims[2]
+      << R"(}, "steps": {"count": )" << source.info().steps.size()
+      << R"(}, "fields": [{"name": "wind", "components": ["u", "v", "w"], "layout": "planar"},
+               {"name": "cloud"}]})";
+}
+
+// Seconds that `work` takes, the least of the rounds after one that is not timed.
+double least_seconds(int rounds, const std::function<void()>& work) {
+  work();
+  double least = 1e30;
+  for (int r = 0; r < rounds; ++r) {
+    const auto start = Clock::now();
+    work();
+    least = std::min(least, std::chrono::duration<double>(Clock::now() - start).count());
+  }
+  return least;
+}
+
+// What was read stays for as long as a round lasts, as in a program that wants to use it.
+using Kept = std::vector<std::unique_ptr<float[]>>;
+
+float* take(Kept& kept, std::size_t floats) {
+  kept.emplace_back(new float[floats]);
+  return kept.back().get();
+}
+
+void read_bare_netcdf(const std::string& path, std::size_t steps, std::size_t samples) {
+  Kept kept;
+  int ncid = 0;
+  check(nc_open(path.c_str(), NC_NOWRITE, &ncid));
+  std::array<int, 4> dims{};
+  std::array<std::size_t, 4> count{1};
+  for (std::size_t t = 0; t < steps; ++t) {
+    for (const char* name : {"u", "v", "w", "cloud"}) {
+      int variable = 0;
+      check(nc_inq_varid(ncid, name, &variable));
+      check(nc_inq_vardimid(ncid, variable, dims.data()));
+      for (std::size_t d = 1; d < 4; ++d) check(nc_inq_dimlen(ncid, dims.at(d), &count.at(d)));
+      const std::array<std::size_t, 4> start{t, 0, 0, 0};
+      check(nc_get_vara_float(ncid, variable, start.data(), count.data(), take(kept, samples)));
+    }
+  }
+  check(nc_close(ncid));
+}
+
+void read_bare(const std::string& path, std::size_t steps, std::size_t samples) {
+  Kept kept;
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const auto bytes = static_cast<ssize_t>(samples * sizeof(float));
+  for (std::size_t i = 0; i < 4 * steps; ++i) {
+    const auto at = static_cast<off_t>(i) * bytes;
+    if (::pread(file, take(kept, samples), static_cast<std::size_t>(bytes), at) != bytes) {
+      bench::give_up("a file is shorter than it was written");
+    }
+  }
+  ::close(file);
+}
+
+void read_all(data::Source& source) {
+  std::vector<data::Volume> kept;
+  for (std::size_t t = 0; t < source.info().steps.size(); ++t) {
+    for (const char* name : {"wind", "cloud"}) {
+      const data::FieldInfo* field = source.info().find(name);
+      if (field == nullptr) bench::give_up("a field is missing");
+      const auto index = static_cast<std::size_t>(field - source.info().fields.data());
+      kept.push_back(bench::value_or_give_up(source.read(index, t)));
+    }
+  }
+}
+
+bench::Row measure(const std::string& name, const std::string& path, const Options& options,
+                   const std::function<void()>& bare) {
+  // First of all: HDF5 would share the chunks that another opening of the file has unpacked.
+  const double plain = least_seconds(options.rounds, bare);
+  const auto here = bench::value_or_give_up(data::open_file(path));
+  const auto apart =
+      bench::value_or_give_up(data::loader::open(bench::value_or_give_up(data::locate(path))));
+  const double ours = least_seconds(options.rounds, [&] { read_all(*here); });
+  const double loader = least_seconds(options.rounds, [&] { read_all(*apart); });
+  const double each = 1000.0 / options.steps;
+  return {name,
+          bench::number("%.2f", each * plain),
+          bench::number("%.2f", each * ours),
+          bench::number("%.2f", ours / plain),
+          bench::number("%.2f", each * loader),
+          bench::number("%.2f", loader / plain)};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ::mallopt(M_MMAP_THRESHOLD, 1 << 20);  // and stays there: memory given back is not given again
+  const Options options = options_of(argc, argv);
+  data::loader::set_program(options.program);
+  const std::string folder =
+      std::filesystem::temp_directory_path() / ("windsplat-load-" + std::to_string(::getpid()));
+  std::filesystem::create_directory(folder);
+  const auto source =
+      bench::value_or_give_up(data::open_sample("climate", options.dims, options.steps));
+  const std::size_t samples = source->info().grid.samples();
+  const auto steps = static_cast<std::size_t>(options.steps);
+
+  bench::Table table{{"file", "bare ms", "reader ms", "ratio", "loader ms", "ratio"}};
+  struct Kind {
+    const char* name;
+    int format;
+    int deflate;
+  };
+  for (const Kind kind :
+       {Kind{"netCDF-4", NC_NETCDF4, 0}, Kind{"netCDF-4, deflated", NC_NETCDF4, 1},
+        Kind{"netCDF CDF-5", NC_64BIT_DATA, 0}}) {
+    if (!options.only.empty() && options.only != kind.name) continue;
+    const std::string path = folder + "/file.nc";
+    write_netcdf(path, *source, kind.format, kind.deflate);
+    table.push_back(
+        measure(kind.name, path, options, [&] { read_bare_netcdf(path, steps, samples); }));
+  }
+  if (options.only.empty() || options.only == "raw") {
+    write_raw(folder, *source);
+    table.push_back(measure("raw", folder + "/raw.json", options,
+                            [&] { read_bare(folder + "/raw.bin", steps, samples); }));
+  }
+  std::filesystem::remove_all(folder);
+  std::printf("%zu samples, 4 components, %d steps: %.1f MB a step\n\n%s", samples, options.steps,
+              16e-6 * static_cast<double>(samples),
+              (options.markdown ? bench::markdown(table) : bench::plain(table, 1)).c_str());
+  return 0;
+}

@@ -1,0 +1,307 @@
+#!/usr/bin/env python3
+"""Many viewers of the same data who all turn the camera: what each gets, how late, how evenly, and
+what they cost. Tables as Markdown on stdout. Linux only (/proc).
+
+Usage: viewers.py [--program=windsplat] [--dataset=climate] [--viewers=16] [--seconds=20]
+       [--size=640x480] [--mixed] [--deaf=20] [--ended=200]
+       [--min-jain=0.95] [--smoke]
+
+A viewer sends the next camera with every frame it receives. --mixed adds one viewer at 1920x1080
+and one that never reads. --deaf: sessions that ask for frames of 2560x1440 and never read, for the
+memory of each. --ended: sessions that come, look and go, for what they leave behind. 0: none.
+Exit 1 where Jain's index of the viewers' frame rates, (sum x)^2 / (n sum x^2), is below --min-jain,
+or a deaf session costs more than two frames and 256 KiB.
+--smoke: small and short; it fails only where nothing works."""
+import argparse
+import json
+import math
+import os
+import pathlib
+import statistics
+import struct
+import sys
+import threading
+import time
+import urllib.request
+
+from stream_client import Daemon, Viewer
+
+MB = 1e6
+KIB = 1024
+BIG, DEAF_VIEW = (1920, 1080), (2560, 1440)
+DISTANCE = 2.4  # of the eye from the middle of the data
+
+
+def camera(angle):
+    return {"eye": [DISTANCE * math.sin(angle), -DISTANCE * math.cos(angle), 1.6]}
+
+
+class Orbit(threading.Thread):
+    """A viewer that turns the camera until told to stop."""
+
+    def __init__(self, port, dataset, size, first_angle):
+        super().__init__(daemon=True)
+        self.viewer = Viewer(port)
+        self.size, self.angle, self.dataset = size, first_angle, dataset
+        self.sent, self.rev = {}, 0
+        self.frames, self.latencies, self.bytes = 0, [], 0
+        self.counting = self.over = False
+        self.fault = None
+
+    def patch(self):
+        self.rev += 1
+        self.angle += math.radians(2)
+        view = {"camera": camera(self.angle)}
+        if self.rev == 1:
+            width, height = self.size
+            view.update(dataset=self.dataset, image={"width": width, "height": height})
+        self.sent[self.rev] = time.monotonic()
+        self.viewer.say({"type": "patch", "rev": self.rev, "t": self.rev, "patch": view})
+
+    def run(self):
+        try:
+            self.patch()
+            while not self.over:
+                self.take(*self.viewer.message())
+        except (OSError, RuntimeError) as fault:
+            self.fault = fault
+
+    def take(self, opcode, payload):
+        if opcode == 1:
+            message = json.loads(payload)
+            if message["type"] == "error":
+                raise RuntimeError(message)
+            return
+        now = time.monotonic()
+        seq, rev = struct.unpack_from("<2I", payload, 8)
+        self.viewer.say({"type": "ack", "seq": seq, "decodeMs": 1})
+        if self.counting:
+            self.frames += 1
+            self.bytes += len(payload)
+            self.latencies.append(1000 * (now - self.sent[rev]))
+        for old in [known for known in self.sent if known < rev]:
+            del self.sent[old]
+        self.patch()
+
+
+def percentile(values, share):
+    """The smallest value that so many are not above."""
+    ordered = sorted(values)
+    return ordered[max(0, math.ceil(share * len(ordered)) - 1)] if ordered else math.nan
+
+
+def jain(rates):
+    squares = sum(rate * rate for rate in rates)
+    return sum(rates) ** 2 / (len(rates) * squares) if squares else 0.0
+
+
+class Deaf:
+    """Asks for pictures, one after the other, and reads nothing; its receive buffer is small."""
+
+    def __init__(self, port, dataset, size):
+        self.viewer = Viewer(port, receive_buffer=4 * KIB)
+        self.rev, self.dataset, self.size = 0, dataset, size
+
+    def ask(self):
+        self.rev += 1
+        width, height = self.size
+        self.viewer.say({"type": "patch", "rev": self.rev, "t": self.rev, "patch": {
+            "dataset": self.dataset, "image": {"width": width, "height": height},
+            "camera": camera(0.1 * self.rev)}})
+
+
+def run(orbits, seconds, besides=None):
+    """Lets them start, then counts for so long; the seconds that it took."""
+    for orbit in orbits:
+        orbit.start()
+    time.sleep(min(2.0, seconds / 4))
+    begun = time.monotonic()
+    for orbit in orbits:
+        orbit.counting = True
+    while time.monotonic() - begun < seconds:
+        time.sleep(0.1)
+        if besides:
+            besides()
+    for orbit in orbits:
+        orbit.counting = False
+    took = time.monotonic() - begun
+    for orbit in orbits:
+        orbit.over = True
+    for orbit in orbits:
+        orbit.join(120)
+        if orbit.fault:
+            sys.exit(f"viewers.py: a viewer failed: {orbit.fault}")
+    return took
+
+
+def row(name, orbit, took):
+    return (f"| {name} | {orbit.size[0]}x{orbit.size[1]} | {orbit.frames / took:.2f} "
+            f"| {statistics.median(orbit.latencies or [math.nan]):.0f} "
+            f"| {percentile(orbit.latencies, 0.99):.0f} "
+            f"| {orbit.bytes / max(1, orbit.frames) / KIB:.0f} |")
+
+
+def measure(daemon, options, size, count, mixed):
+    """Prints the table of one run; Jain's index of the equal viewers."""
+    orbits = [Orbit(daemon.port, options.dataset_id, size, 2 * math.pi * i / count)
+              for i in range(count)]
+    big = [Orbit(daemon.port, options.dataset_id, BIG, 0)] if mixed else []
+    deaf = Deaf(daemon.port, options.dataset_id, BIG) if mixed else None
+    took = run(orbits + big, options.seconds, deaf.ask if deaf else None)
+    held = daemon.memory()["VmRSS"]
+    print("| viewer | view | frames/s | latency, ms: median | p99 | KiB a frame |")
+    print("|---|---|---|---|---|---|")
+    for i, orbit in enumerate(orbits):
+        print(row(i + 1, orbit, took))
+    for orbit in big:
+        print(row("large", orbit, took))
+    rates = [orbit.frames / took for orbit in orbits]
+    together = [latency for orbit in orbits for latency in orbit.latencies]
+    index = jain(rates)
+    print(f"\n{count} viewers{', a large one and one that never reads' if mixed else ''}: "
+          f"{sum(rates):.1f} frames/s together, Jain's index {index:.4f}, latency "
+          f"{statistics.median(together or [math.nan]):.0f} ms median and "
+          f"{percentile(together, 0.99):.0f} ms p99, RSS {held / MB:.1f} MB\n", flush=True)
+    return index
+
+
+def settled(daemon):
+    """Resident bytes once they change no more."""
+    last = 0
+    for _ in range(50):
+        now = daemon.memory()["VmRSS"]
+        if abs(now - last) < 64 * KIB:
+            return now
+        last = now
+        time.sleep(0.3)
+    return last
+
+
+def kernel_bytes():
+    """What sockets of this network namespace hold, peers' receive buffers too."""
+    for line in pathlib.Path("/proc/net/sockstat").read_text().splitlines():
+        words = line.split()
+        if words[0] == "TCP:":
+            return os.sysconf("SC_PAGE_SIZE") * int(words[words.index("mem") + 1])
+    return 0
+
+
+def metric(daemon, name):
+    """The sum of a family's series."""
+    with urllib.request.urlopen(f"http://127.0.0.1:{daemon.port}/metrics", timeout=60) as answer:
+        lines = answer.read().decode().splitlines()
+    return sum(float(line.rsplit(" ", 1)[1]) for line in lines
+               if line.split(" ")[0].split("{")[0] == name)
+
+
+def ask_all(daemon, deaf):
+    """Lets them ask until no more is drawn for them."""
+    for _ in range(3):
+        for one in deaf:
+            one.ask()
+        drawn, since = -1, time.monotonic()
+        while time.monotonic() - since < 2:
+            now = metric(daemon, "windsplat_stage_seconds_count")
+            if now != drawn:
+                drawn, since = now, time.monotonic()
+            time.sleep(0.1)
+
+
+def measure_deaf(daemon, options, size):
+    """The resident bytes of a session that never reads, against two frames and 256 KiB."""
+    reader = Viewer(daemon.port)
+    view = {"dataset": options.dataset_id, "image": {"width": size[0], "height": size[1]},
+            "camera": camera(0.1)}
+    reader.say({"type": "patch", "rev": 1, "t": 1, "patch": view})
+    frame = reader.final_frame(1)
+    reader.socket.close()
+    first = [Deaf(daemon.port, options.dataset_id, size) for _ in range(3)]
+    ask_all(daemon, first)  # the renderer has all it needs after these
+    held_before = metric(daemon, "windsplat_unsent_bytes")
+    before, kernel_before = settled(daemon), kernel_bytes()
+    deaf = [Deaf(daemon.port, options.dataset_id, size) for _ in range(options.deaf)]
+    ask_all(daemon, deaf)
+    held = (metric(daemon, "windsplat_unsent_bytes") - held_before) / options.deaf
+    each = (settled(daemon) - before) / options.deaf
+    kernel = (kernel_bytes() - kernel_before) / options.deaf
+    limit = 2 * frame + 256 * KIB
+    print(f"A session that never reads, {size[0]}x{size[1]}: {each / KIB:.0f} KiB of the daemon's "
+          f"({held / KIB:.0f} KiB of them messages) and {kernel / KIB:.0f} KiB of the kernel's "
+          f"(mean of {options.deaf}); a final frame has {frame / KIB:.0f} KiB, two of them and "
+          f"256 KiB are {limit / KIB:.0f} KiB")
+    for one in first + deaf:
+        one.viewer.socket.close()
+    return each + max(0, kernel) <= limit
+
+
+def measure_ended(daemon, options, size):
+    """What sessions that have ended leave behind, in bytes each."""
+    view = {"dataset": options.dataset_id, "image": {"width": size[0], "height": size[1]}}
+
+    def visit(count):
+        for _ in range(count):
+            viewer = Viewer(daemon.port)
+            viewer.turn(view, 2)
+            viewer.socket.close()
+        return settled(daemon)
+
+    first = visit(max(1, options.ended // 4))
+    left = (visit(options.ended) - first) / options.ended
+    print(f"A session that has ended leaves {left / KIB:.1f} KiB (mean of {options.ended}, "
+          f"after {max(1, options.ended // 4)} others)")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    default = pathlib.Path(__file__).resolve().parents[2] / "build/release/windsplat"
+    parser.add_argument("--program", default=str(default))
+    parser.add_argument("--dataset", default="climate")
+    parser.add_argument("--viewers", type=int, default=16)
+    parser.add_argument("--seconds", type=float, default=20)
+    parser.add_argument("--size", default="640x480")
+    parser.add_argument("--mixed", action="store_true")
+    parser.add_argument("--deaf", type=int, default=20)
+    parser.add_argument("--ended", type=int, default=200)
+    parser.add_argument("--min-jain", type=float, default=0.95)
+    parser.add_argument("--smoke", action="store_true")
+    options = parser.parse_args()
+    deaf_view = DEAF_VIEW
+    if options.smoke:
+        options.dataset, options.size, options.viewers = "climate:32x16x8", "64x48", 3
+        options.seconds, options.min_jain, options.deaf, options.mixed = 0.5, 0, 2, True
+        options.ended = 4
+        deaf_view = (64, 48)
+    size = tuple(map(int, options.size.split("x")))
+    daemon = Daemon(options.program, options.dataset)
+    fine = True
+    try:
+        print(f"{os.cpu_count()} processors, {options.dataset}; started: RSS "
+              f"{daemon.memory()['VmRSS'] / MB:.1f} MB\n")
+        hello = json.loads(Viewer(daemon.port).message()[1])
+        options.dataset_id = hello["datasets"][0]["id"]
+        first = Viewer(daemon.port)
+        first.turn({"dataset": options.dataset_id,
+                    "image": {"width": size[0], "height": size[1]}}, 1)
+        first.socket.close()
+        print(f"One final frame was drawn: RSS {daemon.memory()['VmRSS'] / MB:.1f} MB\n")
+        for count in (1, options.viewers):
+            fine = measure(daemon, options, size, count, False) >= options.min_jain and fine
+        if options.mixed:
+            index = measure(daemon, options, size, options.viewers, True)
+            fine = index >= options.min_jain and fine
+    finally:
+        daemon.stop()
+    if options.deaf or options.ended:
+        daemon = Daemon(options.program, options.dataset)  # whose memory nothing else has moved
+        try:
+            if options.ended:
+                measure_ended(daemon, options, size)
+            if options.deaf:
+                fine = (measure_deaf(daemon, options, deaf_view) or options.smoke) and fine
+        finally:
+            daemon.stop()
+    return 0 if fine else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,222 @@
+// Whether everybody can use the page: axe's rules in both themes and in small windows, the whole
+// page by the keyboard alone, and less motion for those who ask for it.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { after, before, test } from "node:test";
+import { Daemon, finalPicture, freePort, launch, openPage, pixels, state } from "./support.mjs";
+
+const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+
+let browser;
+let daemon;
+
+before(async () => {
+  browser = await launch();
+  daemon = await new Daemon(await freePort()).start();
+});
+
+after(async () => {
+  await browser?.close();
+  await daemon?.kill();
+});
+
+async function withPage(options, run) {
+  const page = await openPage(browser, daemon.url, options);
+  try {
+    await finalPicture(page);
+    await run(page);
+    assert.deepEqual(page.faults, [], "the browser's console is clean");
+  } finally {
+    await page.context().close();
+  }
+}
+
+async function violations(page) {
+  await page.evaluate(axe);
+  // What fades in or out is not yet what is read.
+  await page.evaluate(() =>
+    Promise.allSettled(document.getAnimations().map(({ finished }) => finished)),
+  );
+  const found = await page.evaluate(() =>
+    window.axe.run(document, { resultTypes: ["violations"] }),
+  );
+  assert.ok(found.passes.length > 15, "axe looked at the page");
+  return found.violations.map(({ id, nodes }) => [
+    id,
+    ...nodes.map(({ target, any }) => [...target, ...any.map(({ message }) => message)].join(" ")),
+  ]);
+}
+
+// Every folder of the panel, those within folders too.
+async function unfoldAll(page) {
+  const folded = page.locator('#panel .lil-title[aria-expanded="false"]:visible');
+  while ((await folded.count()) > 0) await folded.first().click();
+}
+
+const windows = [
+  ["dark", { colorScheme: "dark" }],
+  ["light", { colorScheme: "light" }],
+  ["dark phone", { colorScheme: "dark", viewport: { width: 390, height: 844 } }],
+  ["light phone", { colorScheme: "light", viewport: { width: 390, height: 844 } }],
+];
+
+// As a user opens each dialog, with all that comes to be in it.
+const openers = {
+  datasets: async (page) => {
+    await page.keyboard.press("d");
+    await page.waitForFunction(() => {
+      const cards = [...document.querySelectorAll("#cards .card")];
+      return cards.length > 0 && cards.every((card) => card.querySelector("img")?.complete);
+    });
+  },
+  help: async (page) => {
+    await page.keyboard.press("?");
+    await page.locator("#help").waitFor();
+  },
+  save: async (page) => {
+    await page.keyboard.press("s");
+    await page.locator("#keep-name").fill("a view");
+    await page.keyboard.press("Enter");
+    await page.locator("#kept li").waitFor();
+  },
+};
+
+for (const [name, options] of windows) {
+  test(`axe finds nothing: ${name}`, () =>
+    withPage(options, async (page) => {
+      assert.deepEqual(await violations(page), [], "as it opens");
+      if (await page.locator("#panel").isVisible()) {
+        await unfoldAll(page);
+        assert.deepEqual(await violations(page), [], "with the whole panel open");
+      }
+      const dialogs = await page.locator("dialog").evaluateAll((all) => all.map((d) => d.id));
+      assert.deepEqual(dialogs.sort(), Object.keys(openers).sort());
+      for (const [dialog, open] of Object.entries(openers)) {
+        await page.evaluate(() => document.activeElement?.blur());
+        await open(page);
+        assert.deepEqual(await violations(page), [], `with #${dialog} open`);
+        await page.keyboard.press("Escape");
+        await page.locator(`#${dialog}`).waitFor({ state: "hidden" });
+      }
+    }));
+}
+
+test("axe's rules are looked at: a button without a name is found", () =>
+  withPage({}, async (page) => {
+    await page.evaluate(() =>
+      document.querySelector("header").append(document.createElement("button")),
+    );
+    assert.deepEqual(
+      (await violations(page)).map(([id]) => id),
+      ["button-name"],
+    );
+  }));
+
+// What has the focus: its name, and whether one sees that it has it.
+const focused = (page) =>
+  page.evaluate(() => {
+    const element = document.activeElement;
+    if (element === null || element === document.body) return null;
+    const ring = (node) => {
+      const { outlineStyle, outlineWidth, boxShadow } = getComputedStyle(node);
+      return (outlineStyle !== "none" && parseFloat(outlineWidth) > 0) || boxShadow !== "none";
+    };
+    const box = element.getBoundingClientRect();
+    const name = element.getAttribute("aria-label") ?? element.textContent.trim().slice(0, 30);
+    return {
+      what: `${element.tagName}#${element.id} ${name}`,
+      ring: ring(element) || [...element.parentElement.children, element.parentElement].some(ring),
+      seen: box.width > 0 && box.height > 0 && box.bottom > 0 && box.top < innerHeight,
+    };
+  });
+
+test("the tab key reaches every control once around, and one sees where it is", () =>
+  withPage({}, async (page) => {
+    const expected = await page.evaluate(
+      () =>
+        [...document.querySelectorAll("button, select, input, [tabindex='0'], a[href]")].filter(
+          (e) =>
+            e.checkVisibility({ visibilityProperty: true }) &&
+            !e.disabled &&
+            e.tabIndex >= 0 &&
+            e.closest("[inert]") === null,
+        ).length,
+    );
+    assert.ok(expected > 30, `${expected} controls`);
+    const seen = [];
+    await page.evaluate(() => document.activeElement?.blur());
+    for (let n = 0; n < 2 * expected; n++) {
+      await page.keyboard.press("Tab");
+      const now = await focused(page);
+      if (now === null) break; // the browser's own controls come next
+      seen.push(now);
+    }
+    assert.ok(seen.length >= expected, `${seen.length} of ${expected} were reached`);
+    assert.ok(seen.length < 2 * expected, "the way round has an end");
+    assert.deepEqual(
+      seen.filter(({ ring }) => !ring),
+      [],
+      "no focus is hidden",
+    );
+    assert.deepEqual(
+      seen.filter(({ seen: at }) => !at),
+      [],
+      "and each comes into sight",
+    );
+  }));
+
+test("a visit by the keyboard alone: another dataset, a turn, longer lines, the help", () =>
+  withPage({}, async (page) => {
+    const tabTo = async (selector) => {
+      for (let n = 0; n < 200; n++) {
+        if (await page.evaluate((s) => document.activeElement?.matches(s) ?? false, selector))
+          return;
+        await page.keyboard.press("Tab");
+      }
+      assert.fail(`the tab key does not come to ${selector}`);
+    };
+    await tabTo("#dataset");
+    const before = await page.locator("#facts").textContent();
+    const options = await page
+      .locator("#dataset option")
+      .evaluateAll((all) => all.map((o) => o.value));
+    const at = options.indexOf(await page.locator("#dataset").inputValue());
+    await page.keyboard.press(at === 0 ? "ArrowDown" : "ArrowUp");
+    await page.waitForFunction(
+      (text) => document.querySelector("#facts").textContent !== text,
+      before,
+    );
+    await finalPicture(page);
+    const first = await pixels(page);
+    await tabTo("#picture");
+    const { azimuth } = await state(page);
+    await page.keyboard.press("ArrowRight");
+    await finalPicture(page);
+    assert.notEqual((await state(page)).azimuth, azimuth);
+    assert.notEqual((await pixels(page)).hash, first.hash);
+    const turned = await pixels(page);
+    await tabTo("#panel .lil-number input");
+    for (let n = 0; n < 5; n++) await page.keyboard.press("ArrowUp");
+    await finalPicture(page);
+    assert.notEqual((await pixels(page)).hash, turned.hash, "longer lines are seen");
+    await tabTo("#help-button");
+    await page.keyboard.press("Enter");
+    await page.locator("#help").waitFor();
+    await page.keyboard.press("Escape");
+    assert.equal(await page.evaluate(() => document.activeElement.id), "help-button");
+  }));
+
+test("who asks for less motion gets none that nobody asked for", () =>
+  withPage({ reducedMotion: "reduce" }, async (page) => {
+    const moving = await page.evaluate(() =>
+      [...document.querySelectorAll("*")].flatMap((element) => {
+        const { animationName, animationDuration, transitionDuration } = getComputedStyle(element);
+        const long = (text) => text.split(",").some((t) => parseFloat(t) > 0.01);
+        const moves =
+          (animationName !== "none" && long(animationDuration)) || long(transitionDuration);
+        return moves ? [`${element.tagName}#${element.id}.${element.className}`] : [];
+      }),
+    );
+    assert.deepEqual(moving, []);
+  }));

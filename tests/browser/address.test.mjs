@@ -1,0 +1,117 @@
+// The page's address with a link to a kept view, and the cards while their list is refreshed.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { Daemon, drag, finalPicture, freePort, launch, openPage } from "./support.mjs";
+
+let browser;
+let daemon;
+
+before(async () => {
+  browser = await launch();
+  daemon = await new Daemon(await freePort()).start();
+});
+
+after(async () => {
+  await browser?.close();
+  await daemon?.kill();
+});
+
+async function withPage(run, path = "", options = {}) {
+  const page = await openPage(browser, daemon.url + path, {
+    viewport: { width: 900, height: 600 },
+    ...options,
+  });
+  try {
+    await run(page);
+  } finally {
+    await page.context().close();
+  }
+}
+
+// Every address that the page writes.
+const watchAddress = () => {
+  window.addresses = [];
+  const { history } = window;
+  const replace = history.replaceState.bind(history);
+  history.replaceState = (state, title, url) => {
+    window.addresses.push(url);
+    replace(state, title, url);
+  };
+};
+
+// The server never answers, and the deadline is near.
+test("a kept view that never comes: the default, the reason, and the link until a change", () => {
+  const hurry = () => {
+    const timeout = AbortSignal.timeout.bind(AbortSignal);
+    AbortSignal.timeout = (ms) => timeout(ms / 20);
+  };
+  return withPage(
+    async (page) => {
+      await finalPicture(page);
+      assert.match(await page.locator("#alert-text").textContent(), /did not answer in time/);
+      assert.equal(await page.locator("#dataset").inputValue(), "climate");
+      // What the page does by itself (its size, its dataset) has had time to be written here.
+      await page.setViewportSize({ width: 860, height: 580 });
+      await finalPicture(page);
+      await drag(page, 60, 10);
+      await page.waitForFunction(() => window.addresses.length > 0);
+      const addresses = await page.evaluate(() => window.addresses);
+      assert.match(decodeURIComponent(addresses[0]), /"camera"/, "nothing before the user's own");
+    },
+    "#!view=k7",
+    {
+      initScript: [watchAddress, hurry],
+      prepare: (page) => page.route("**/v1/views/k7", () => {}),
+    },
+  );
+});
+
+test("a refreshed list leaves cards, their pictures and the focus as they are", () => {
+  const previews = [];
+  let release;
+  const held = new Promise((resolve) => (release = resolve));
+  return withPage(
+    async (page) => {
+      await finalPicture(page);
+      await page.keyboard.press("d");
+      await page.waitForFunction(() => document.querySelectorAll(".card img").length === 3);
+      await page.keyboard.press("ArrowRight");
+      const focused = () => page.evaluate(() => document.activeElement.textContent);
+      assert.match(await focused(), /^Global/);
+      await page.evaluate(() => {
+        window.oldCards = [...document.querySelectorAll(".card")];
+      });
+      release();
+      await page.locator(".card", { hasText: "One more" }).waitFor();
+      assert.match(await focused(), /^Global/);
+      const same = await page.evaluate(() =>
+        [...document.querySelectorAll(".card")].map((card) => window.oldCards.includes(card)),
+      );
+      assert.deepEqual(same, [true, true, false, true], "the new one is the third");
+      await page.waitForFunction(() => document.querySelectorAll(".card img").length === 4);
+      assert.equal(previews.length, 4, previews.join());
+    },
+    "",
+    {
+      prepare: async (page) => {
+        await page.route(/\/v1\/datasets$/, async (route) => {
+          await held;
+          const { datasets } = await (await route.fetch()).json();
+          const [a, b, c] = datasets.map((one) => ({ ...one, residentBytes: 12345 }));
+          await route.fulfill({
+            json: { datasets: [a, b, { ...c, title: "One more", id: "x" }, c] },
+          });
+        });
+        await page.route(/\/frame\.jpg\?width=320&height=200$/, async (route) => {
+          previews.push(route.request().url());
+          const url = route.request().url().replace("/x/", "/efield/");
+          await route.fulfill({ response: await route.fetch({ url }) });
+        });
+        await page.route(/\/v1\/datasets\/x$/, async (route) => {
+          const url = route.request().url().replace("/x", "/efield");
+          await route.fulfill({ response: await route.fetch({ url }) });
+        });
+      },
+    },
+  );
+});

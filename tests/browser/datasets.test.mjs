@@ -1,0 +1,149 @@
+// Files that cannot be shown, and files that change, in a real browser: what the page says of them.
+import assert from "node:assert/strict";
+import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { gzipSync } from "node:zlib";
+import { Daemon, finalPicture, freePort, launch, openPage, shot, unfold } from "./support.mjs";
+
+let browser;
+let folder;
+
+before(async () => {
+  browser = await launch();
+  folder = mkdtempSync(join(tmpdir(), "windsplat-datasets-"));
+});
+
+after(async () => {
+  await browser?.close();
+  rmSync(folder, { recursive: true, force: true });
+});
+
+// A cube of n x n x n vectors, all files by the same title.
+function writeCube(name, n, damaged = false) {
+  const values = Float32Array.from({ length: 3 * n ** 3 }, (_, i) => 5 + 4 * Math.sin(i / 7));
+  const packed = gzipSync(Buffer.from(values.buffer), { level: 1 });
+  if (damaged) packed.fill(0x55, packed.length / 2);
+  const header = [
+    "NRRD0004",
+    "content: My storm",
+    "type: float",
+    "dimension: 4",
+    `sizes: 3 ${n} ${n} ${n}`,
+    "kinds: vector domain domain domain",
+    "encoding: gzip",
+    "endian: little",
+  ];
+  const path = join(folder, name);
+  writeFileSync(path, Buffer.concat([Buffer.from(`${header.join("\n")}\n\n`), packed]));
+  return path;
+}
+
+// A daemon of the test's own and a page on it, before the page is loaded.
+async function ownPage(t, ...datasets) {
+  const daemon = new Daemon(await freePort());
+  t.after(() => daemon.kill());
+  await daemon.start(...datasets);
+  const page = await openPage(browser, "about:blank", { viewport: { width: 1280, height: 800 } });
+  t.after(() => page.context().close());
+  return { daemon, page };
+}
+
+const texts = (page) => page.locator("#dataset option").allTextContents();
+
+test("why a dataset of the picker cannot be shown stays to be read", async (t) => {
+  const files = [writeCube("ok.nrrd", 12), writeCube("big.nrrd", 130)];
+  files.push(writeCube("torn.nrrd", 12, true));
+  const { daemon, page } = await ownPage(t, "--memory-limit", "40M", ...files);
+  await page.goto(daemon.url);
+  await finalPicture(page);
+  assert.deepEqual(await texts(page), ["My storm (ok)", "My storm (big)", "My storm (torn)"]);
+  for (const [id, why] of [
+    ["big", /memory limit/],
+    ["torn", /torn\.nrrd/],
+  ]) {
+    await page.locator("#dataset").selectOption(id);
+    await page.waitForFunction((one) => {
+      const option = document.querySelector(`#dataset option[value=${one}]`);
+      return option.textContent.endsWith("failed");
+    }, id);
+    await finalPicture(page);
+    await page.waitForTimeout(500); // what the server answers to the view that went back
+    assert.ok(await page.locator("#alert").isVisible(), id);
+    assert.match(await page.locator("#alert-text").textContent(), why);
+    assert.equal(await page.locator("#dataset").inputValue(), "ok");
+  }
+  await shot(page, "unreadable-1280");
+  await page.locator("#alert-close").click();
+  assert.equal(await page.locator("#alert").isVisible(), false);
+  assert.deepEqual(page.faults, []);
+});
+
+test("the page follows files that change: their steps, and that they cannot be read", async (t) => {
+  const { daemon, page } = await ownPage(t, "climate");
+  let opened;
+  let say;
+  await page.routeWebSocket(/\/v1\/stream/, (socket) => {
+    say = (message) => socket.send(JSON.stringify(message));
+    const server = socket.connectToServer();
+    server.onMessage((data) => {
+      if (typeof data === "string" && data.includes('"opened"')) opened = JSON.parse(data);
+      socket.send(data);
+    });
+  });
+  await page.goto(daemon.url);
+  await finalPicture(page);
+  const { id, dataset } = opened;
+  await unfold(page, "Probe");
+  await page.locator("#probe-x").fill("100");
+  await page.locator("#probe-x").press("Enter");
+  const place = await page.locator("#probe-x").inputValue();
+  await page.locator("#picture").focus();
+  await page.keyboard.press("}");
+  await finalPicture(page);
+  const times = dataset.steps.times.slice(0, 3);
+  say({ type: "opened", id, dataset: { ...dataset, steps: { count: 3, times } } });
+  await page.waitForFunction(
+    () => document.querySelector("#time-step").textContent === "step 2 of 3",
+  );
+  await finalPicture(page);
+  assert.equal(await page.locator("#picture").getAttribute("data-step"), "2");
+  assert.equal(await page.locator("#probe-x").inputValue(), place, "the probe stays");
+  const detail = "'climate.nc' is damaged: its header cannot be read";
+  const problem = { type: "about:blank", title: "Unprocessable Content", status: 422, detail };
+  say({ type: "error", id, problem });
+  await page.locator("#alert").waitFor();
+  await page.keyboard.press("{");
+  await finalPicture(page);
+  assert.equal(await page.locator("#alert-text").textContent(), detail);
+  assert.match((await texts(page))[0], / — failed$/);
+  await shot(page, "files-changed-1280");
+  say(opened);
+  await page.locator("#alert").waitFor({ state: "hidden" });
+  assert.deepEqual(page.faults, []);
+});
+
+test("the legend tells what is too slow, and the probe's ends are times", async (t) => {
+  const { daemon, page } = await ownPage(t, "climate");
+  await page.goto(`${daemon.url}#!{"dataset":"climate","vector":{"minMagnitude":3}}`);
+  await finalPicture(page);
+  const told = page.locator(".legend-lines .legend-left-out");
+  assert.equal(await told.textContent(), "slower than 3 m s⁻¹ not drawn");
+  const name = await page.locator(".legend-lines").getAttribute("aria-label");
+  assert.match(name, /slower than 3 m s⁻¹ not drawn$/);
+  await unfold(page, "Probe");
+  await page.getByRole("button", { name: "Over time" }).click();
+  const course = page.locator(".course");
+  await course.waitFor();
+  const words = await course.getAttribute("aria-label");
+  assert.match(words, / between \d{4}-\d\d-\d\d \d\d:\d\dZ and \d{4}-\d\d-\d\d \d\d:\d\dZ$/);
+  assert.doesNotMatch(await course.textContent(), /object/);
+  await finalPicture(page);
+  await course.scrollIntoViewIfNeeded();
+  await shot(page, "left-out-1280");
+  await page.setViewportSize({ width: 390, height: 844 });
+  await finalPicture(page);
+  await shot(page, "left-out-390");
+  assert.deepEqual(page.faults, []);
+});

@@ -1,0 +1,118 @@
+// The daemon's errors in the page: every frame says one, what is asked for is kept, and a lossless
+// final frame is what the daemon has drawn, pixel by pixel.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import {
+  control,
+  Daemon,
+  drag,
+  finalPicture,
+  framesOf,
+  freePort,
+  launch,
+  movingOf,
+  openPage,
+  type,
+  unfold,
+  watchFrames,
+} from "./support.mjs";
+
+let browser;
+let daemon;
+
+before(async () => {
+  browser = await launch();
+  daemon = await new Daemon(await freePort()).start();
+});
+
+after(async () => {
+  await browser?.close();
+  await daemon?.kill();
+});
+
+async function withPage(run) {
+  const page = await openPage(browser, daemon.url, { initScript: watchFrames });
+  try {
+    await finalPicture(page);
+    await unfold(page, "Quality");
+    await run(page);
+    assert.equal(await page.locator("#alert").isVisible(), false, "the server took every view");
+    assert.deepEqual(page.faults, [], "the browser's console is clean");
+  } finally {
+    await page.context().close();
+  }
+}
+
+const lastFrame = (page) => page.evaluate(() => window.frameHeaders.at(-1));
+
+test("moving frames say what they are estimated to err, the final one what was measured", () =>
+  withPage(async (page) => {
+    const frames = await framesOf(page, () => drag(page, 90, 20, 30));
+    const final = frames.at(-1);
+    assert.ok(final.final && final.measured && final.error >= 0, JSON.stringify(final));
+    const moving = frames.filter(({ rev, measured }) => rev < final.rev && !measured);
+    assert.ok(moving.length > 0);
+    for (const { estimated, error, chosen } of moving) {
+      assert.ok(estimated && error > 0, `${error}`);
+      assert.equal(chosen.error.kind, "estimated");
+      assert.ok(Math.abs(chosen.error.value / error - 1) < 1e-5, "`chosen` says the same");
+    }
+    assert.match(await page.locator("#hud-error").textContent(), /^error [\d.e-]+ measured$/);
+    assert.match(await page.locator("#hud-encoding").textContent(), /^ · JPEG [\d.e-]+$/);
+  }));
+
+test("an error that is asked for is kept, by no more pixels than it takes", () =>
+  withPage(async (page) => {
+    await type(page, "moving budget \\(ms\\)", 500);
+    const moving = async () => movingOf(await framesOf(page, () => drag(page, 90, 20, 60)));
+    const best = (await moving()).at(-1);
+    await control(page, "limit the error", "input").check();
+    for (const limit of [0.2, Math.max(0.001, 2 * best.error)]) {
+      await type(page, "max error \\(linear RMSE\\)", limit);
+      const frames = await moving();
+      // The first frames may have been begun for the limit before.
+      const last = frames.at(-1);
+      assert.ok(last.error <= limit, `${last.error} where ${limit} was asked for`);
+      assert.equal(last.chosen.view.quality.maxError, Number(limit.toPrecision(5)));
+      if (limit === 0.2) {
+        assert.ok(
+          last.width < best.width,
+          `${last.width} px would do with fewer than ${best.width}`,
+        );
+        assert.ok(last.error > best.error);
+      }
+    }
+  }));
+
+test("a lossless final frame has the pixels that the daemon draws, a JPEG has not", () =>
+  withPage(async (page) => {
+    // How many pixels differ from a PNG of the same view that was asked for apart.
+    const differing = () =>
+      page.evaluate(async () => {
+        const { view } = window.frameHeaders.at(-1).chosen;
+        const answer = await fetch(new URL("v1/frames", document.baseURI), {
+          method: "POST",
+          headers: { "Content-Type": "application/json", Accept: "image/png" },
+          body: JSON.stringify(view),
+        });
+        const bitmap = await createImageBitmap(await answer.blob());
+        const { width, height } = bitmap;
+        const context = new OffscreenCanvas(width, height).getContext("2d");
+        context.drawImage(bitmap, 0, 0);
+        const words = (ctx) => new Uint32Array(ctx.getImageData(0, 0, width, height).data.buffer);
+        const shown = words(document.querySelector("#picture").getContext("2d"));
+        return words(context).reduce((sum, word, n) => sum + (word === shown[n] ? 0 : 1), 0);
+      });
+    assert.equal((await lastFrame(page)).codec, "jpeg");
+    assert.ok((await differing()) > 1000);
+    await control(page, "lossless final", "input").check();
+    await finalPicture(page);
+    const { codec, final, width } = await lastFrame(page);
+    const full = await page.evaluate(() => document.querySelector("#picture").width);
+    assert.deepEqual([codec, final, width], ["png", true, full]);
+    assert.equal(await page.locator("#hud-encoding").textContent(), " · PNG lossless");
+    assert.equal(await differing(), 0);
+    await drag(page, 60, 0);
+    await finalPicture(page);
+    assert.equal((await lastFrame(page)).codec, "png", "and the next one too");
+  }));

@@ -1,0 +1,582 @@
+// What the dialog "Save" gives out, read by other eyes: pictures by the browser's decoder and the
+// server's own frames, ZIP files by python, videos by a <video>; and how views come back from them.
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import {
+  Daemon,
+  finalPicture,
+  freePort,
+  launch,
+  openPage,
+  patience,
+  pixels,
+  screenshots,
+  shot,
+  state,
+} from "./support.mjs";
+
+let browser;
+let daemon;
+
+before(async () => {
+  browser = await launch();
+  daemon = await new Daemon(await freePort(), "/a/b/").start();
+});
+
+after(async () => {
+  await browser?.close();
+  await daemon?.kill();
+});
+
+const small = { viewport: { width: 900, height: 600 } };
+
+async function withPage(run, path = "", options = {}) {
+  const page = await openPage(browser, daemon.url + path, { ...small, ...options });
+  try {
+    await finalPicture(page);
+    await run(page);
+    assert.deepEqual(page.faults, [], "the browser's console is clean");
+  } finally {
+    await page.context().close();
+  }
+}
+
+const hashOf = (view) => `#!${encodeURIComponent(JSON.stringify(view))}`;
+
+// What the button saves: the file's name and bytes.
+async function saved(page, button) {
+  const [download] = await Promise.all([
+    page.waitForEvent("download", { timeout: 120_000 * patience }),
+    page.locator(button).click(),
+  ]);
+  return { name: download.suggestedFilename(), bytes: await readFile(await download.path()) };
+}
+
+async function savePicture(page, scale, legend = true) {
+  if (!(await page.locator("#save").isVisible())) await page.keyboard.press("s");
+  await page.locator("#save-scale").selectOption(String(scale));
+  await page.locator("#save-legend").setChecked(legend);
+  return saved(page, "#save-picture");
+}
+
+// The pixels of a PNG or JPEG, by the browser.
+const decoded = (page, bytes) =>
+  page.evaluate(async (text) => {
+    const file = new Blob([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))]);
+    const bitmap = await createImageBitmap(file, { colorSpaceConversion: "none" });
+    const { width, height } = bitmap;
+    const context = new OffscreenCanvas(width, height).getContext("2d", { alpha: false });
+    context.drawImage(bitmap, 0, 0);
+    const { data } = context.getImageData(0, 0, width, height);
+    let word = "";
+    for (let n = 0; n < data.length; n += 30_000) {
+      word += String.fromCharCode(...data.subarray(n, n + 30_000));
+    }
+    return { width, height, data: btoa(word) };
+  }, bytes.toString("base64"));
+
+const decode = async (page, bytes) => {
+  const { width, height, data } = await decoded(page, bytes);
+  return { width, height, data: Buffer.from(data, "base64") };
+};
+
+// The box about the pixels that differ; null: none do.
+function difference(a, b) {
+  assert.deepEqual([a.width, a.height], [b.width, b.height]);
+  let box = null;
+  let count = 0;
+  for (let n = 0; n < a.width * a.height; n++) {
+    if (a.data.compare(b.data, 4 * n, 4 * n + 4, 4 * n, 4 * n + 4) === 0) continue;
+    const [x, y] = [n % a.width, Math.floor(n / a.width)];
+    count += 1;
+    box ??= { left: x, right: x, top: y, bottom: y };
+    box.left = Math.min(box.left, x);
+    box.right = Math.max(box.right, x);
+    box.bottom = y;
+  }
+  return box === null ? null : { ...box, count };
+}
+
+// The view in a PNG, found without the page's code.
+function viewIn(bytes) {
+  const text = execFileSync(
+    "python3",
+    [
+      "-c",
+      `
+import struct, sys, zlib
+data, at, found = sys.stdin.buffer.read(), 8, []
+while at < len(data):
+    (length,) = struct.unpack(">I", data[at:at + 4])
+    body = data[at + 4:at + 8 + length]
+    assert struct.unpack(">I", data[at + 8 + length:at + 12 + length])[0] == zlib.crc32(body)
+    if body.startswith(b"iTXtwindsplat-view\\0\\0\\0\\0\\0"):
+        found.append(body[23:])
+    at += 12 + length
+assert len(found) == 1
+sys.stdout.buffer.write(found[0])
+`,
+    ],
+    { input: bytes, encoding: "utf8" },
+  );
+  return JSON.parse(text);
+}
+
+async function drawn(view) {
+  const answer = await fetch(`${daemon.url}v1/frames`, {
+    method: "POST",
+    headers: { "Content-Type": "application/json", Accept: "image/png" },
+    body: JSON.stringify(view),
+  });
+  assert.equal(answer.status, 200);
+  return Buffer.from(await answer.arrayBuffer());
+}
+
+async function drop(page, bytes, name = "picture.png") {
+  const transfer = await page.evaluateHandle(
+    ([text, name]) => {
+      const data = new DataTransfer();
+      data.items.add(new File([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))], name));
+      return data;
+    },
+    [bytes.toString("base64"), name],
+  );
+  await page.dispatchEvent("#picture", "dragover", { dataTransfer: transfer });
+  assert.ok(await page.locator("#drop-hint").isVisible(), "there is a hint while it is above");
+  await page.dispatchEvent("#picture", "drop", { dataTransfer: transfer });
+  assert.equal(await page.locator("#drop-hint").isVisible(), false);
+}
+
+const addressView = (page) =>
+  page.evaluate(() => JSON.parse(decodeURIComponent(location.hash.slice(2))));
+
+const turned = { dataset: "climate", step: 3, camera: { eye: [2, -2, 1], target: [0, 0, 0.1] } };
+
+test("a saved picture is the view's own, n times as large, with its view inside", () =>
+  withPage(async (page) => {
+    const size = await page.locator("#picture").evaluate((c) => [c.clientWidth, c.clientHeight]);
+    for (const scale of [1, 2]) {
+      const { name, bytes } = await savePicture(page, scale, false);
+      assert.equal(name, `climate-3-${scale}x.png`);
+      const picture = await decode(page, bytes);
+      assert.deepEqual([picture.width, picture.height], [scale * size[0], scale * size[1]]);
+      const view = viewIn(bytes);
+      assert.deepEqual(view.camera, turned.camera);
+      assert.deepEqual(
+        { ...view, image: undefined },
+        { ...(await addressView(page)), image: undefined },
+        "the view in the file is the page's",
+      );
+      assert.equal(difference(picture, await decode(page, await drawn(view))), null);
+    }
+    await shot(page, "save-dark");
+  }, hashOf(turned)));
+
+test("the legend is in the picture where the page shows it, at every scale", () =>
+  withPage(async (page) => {
+    const stage = await page.locator("#picture").boundingBox();
+    const legend = await page.locator("#legend").boundingBox();
+    for (const scale of [1, 2]) {
+      const plain = await decode(page, (await savePicture(page, scale, false)).bytes);
+      const { bytes } = await savePicture(page, scale, true);
+      const box = difference(plain, await decode(page, bytes));
+      assert.notEqual(box, null);
+      // Nothing but the legend and the line above it, to a pixel of the page.
+      const inPage = (pixels) => pixels / scale;
+      assert.ok(Math.abs(inPage(box.left) - 10) <= 1, `left ${box.left}`);
+      assert.ok(Math.abs(inPage(box.right + 1) - (legend.x - stage.x + legend.width)) <= 2);
+      assert.ok(Math.abs(inPage(box.bottom + 1) - (stage.height - 10)) <= 1, `${box.bottom}`);
+      const top = legend.y - stage.y;
+      assert.ok(inPage(box.top) > top - 50 && inPage(box.top) < top, `${box.top}`);
+      assert.deepEqual(viewIn(bytes).step, 3);
+      if (scale === 2) await writeFile(join(screenshots, "saved-2x.png"), bytes);
+    }
+  }, hashOf(turned)));
+
+test("a picture dropped on another page brings its view back, pixel for pixel", async () => {
+  let bytes;
+  let before;
+  await withPage(
+    async (page) => {
+      before = await pixels(page);
+      ({ bytes } = await savePicture(page, 2));
+    },
+    hashOf({ ...turned, vector: { field: null } }),
+  );
+  for (const path of ["", hashOf({ dataset: "tornado", vector: { field: "wind", length: 0.2 } })]) {
+    await withPage(async (page) => {
+      assert.notEqual((await pixels(page)).hash, before.hash);
+      await drop(page, bytes);
+      await page.waitForFunction(() => document.querySelector("#picture").dataset.step === "3");
+      await finalPicture(page);
+      assert.equal((await pixels(page)).hash, before.hash);
+      assert.equal(await page.locator("#alert").isVisible(), false);
+    }, path);
+  }
+  await withPage(async (page) => {
+    await page.keyboard.press("s");
+    await page.locator("#picture-file").setInputFiles({
+      name: "a.png",
+      mimeType: "image/png",
+      buffer: bytes,
+    });
+    await page.waitForFunction(() => document.querySelector("#picture").dataset.step === "3");
+    await finalPicture(page);
+    assert.equal(await page.locator("#save").isVisible(), false);
+    assert.equal((await pixels(page)).hash, before.hash);
+  });
+});
+
+test("a file without a view is told in the alert, and the view stays", () =>
+  withPage(async (page) => {
+    const before = await pixels(page);
+    for (const [bytes, words] of [
+      [await drawn({ ...turned, image: { width: 32, height: 32 } }), /holds no view/],
+      [Buffer.from("just a text of some length"), /no PNG/],
+    ]) {
+      await drop(page, bytes);
+      await page.locator("#alert-text").getByText(words).waitFor();
+    }
+    assert.equal((await pixels(page)).hash, before.hash);
+  }));
+
+const pythonZip = `
+import base64, json, sys, zipfile
+z = zipfile.ZipFile(sys.argv[1])
+assert z.testzip() is None
+json.dump([[n, base64.b64encode(z.read(n)).decode()] for n in z.namelist()], sys.stdout)
+`;
+
+async function filesIn(page, bytes) {
+  const folder = await mkdtemp(join(tmpdir(), "windsplat-"));
+  try {
+    await writeFile(`${folder}/a.zip`, bytes);
+    const text = execFileSync("python3", ["-c", pythonZip, `${folder}/a.zip`], {
+      maxBuffer: 1 << 28,
+      encoding: "utf8",
+    });
+    return JSON.parse(text).map(([name, data]) => [name, Buffer.from(data, "base64")]);
+  } finally {
+    await rm(folder, { recursive: true });
+  }
+}
+
+async function setAnimation(page, choices) {
+  await page.keyboard.press("s");
+  await page.locator("#save-scale").selectOption("1");
+  for (const [id, value] of Object.entries(choices)) {
+    const control = page.locator(`#save-${id}`);
+    if (["over", "as"].includes(id)) await control.selectOption(value);
+    else if (id === "legend") await control.setChecked(value);
+    else {
+      await control.fill(String(value));
+      await control.press("Tab");
+    }
+  }
+}
+
+test("an animation over steps is a ZIP of the right frames, at most two asked for at once", () =>
+  withPage(async (page) => {
+    let under = 0;
+    let most = 0;
+    page.on("request", (one) => {
+      if (one.url().endsWith("/v1/frames")) most = Math.max(most, ++under);
+    });
+    page.on("requestfinished", (one) => {
+      if (one.url().endsWith("/v1/frames")) under -= 1;
+    });
+    await setAnimation(page, { from: 1, to: 6, every: 2, legend: false, fps: 5 });
+    assert.match(await page.locator("#save-about").textContent(), /^3 frames of .*, 0\.6 s\./);
+    const { name, bytes } = await saved(page, "#save-animation");
+    assert.equal(name, "climate-steps.zip");
+    assert.ok(most <= 2, `${most} at once`);
+    const files = await filesIn(page, bytes);
+    assert.deepEqual(
+      files.map(([file]) => file),
+      [0, 1, 2].map((n) => `climate-steps-000${n}.png`),
+    );
+    const pictures = [];
+    for (const [n, [, file]] of files.entries()) {
+      const view = viewIn(file);
+      assert.equal(view.step, 1 + 2 * n);
+      pictures.push(await decode(page, file));
+      assert.equal(difference(pictures[n], await decode(page, await drawn(view))), null);
+    }
+    assert.notEqual(difference(pictures[0], pictures[1]), null);
+    assert.notEqual(difference(pictures[1], pictures[2]), null);
+  }));
+
+test("a turn round the volume looks from all sides", () =>
+  withPage(
+    async (page) => {
+      await setAnimation(page, { over: "turn", legend: false, frames: 4 });
+      const files = await filesIn(page, (await saved(page, "#save-animation")).bytes);
+      assert.equal(files.length, 4);
+      const start = viewIn(files[0][1]).camera.eye;
+      const half = viewIn(files[2][1]).camera;
+      assert.ok(Math.abs(half.eye[0] - (2 * half.target[0] - start[0])) < 1e-6);
+      assert.ok(Math.abs(half.eye[1] - (2 * half.target[1] - start[1])) < 1e-6);
+      assert.ok(Math.abs(half.eye[2] - start[2]) < 1e-6);
+      const [a, b] = [await decode(page, files[0][1]), await decode(page, files[2][1])];
+      assert.notEqual(difference(a, b), null);
+    },
+    hashOf({ dataset: "tornado" }),
+  ));
+
+test("a WebM video plays, in the frames' size and for their time", () =>
+  withPage(async (page) => {
+    await setAnimation(page, { as: "webm", to: 5, fps: 4 });
+    const { name, bytes } = await saved(page, "#save-animation");
+    assert.equal(name, "climate-steps.webm");
+    assert.equal(bytes.subarray(0, 4).toString("hex"), "1a45dfa3", "it is EBML");
+    const size = await page.locator("#picture").evaluate((c) => [c.clientWidth, c.clientHeight]);
+    // The page's policy knows no media, so it plays on a page without one.
+    const theatre = await page.context().newPage();
+    const played = await theatre.evaluate(async (text) => {
+      const video = document.createElement("video");
+      document.body.append(video);
+      video.muted = true;
+      const file = new Blob([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))]);
+      video.src = URL.createObjectURL(file);
+      const canvas = new OffscreenCanvas(64, 64).getContext("2d");
+      const seen = new Set();
+      const look = () => {
+        canvas.drawImage(video, 0, 0, 64, 64);
+        seen.add(String(canvas.getImageData(0, 0, 64, 64).data));
+        video.requestVideoFrameCallback(look);
+      };
+      video.requestVideoFrameCallback(look);
+      await video.play();
+      await new Promise((done) => (video.onended = done));
+      return {
+        size: [video.videoWidth, video.videoHeight],
+        time: video.currentTime,
+        seen: seen.size,
+      };
+    }, bytes.toString("base64"));
+    assert.deepEqual(played.size, size);
+    assert.ok(played.time > 1, `${played.time} s of 6 frames, 4 a second`);
+    assert.ok(played.seen >= 4, `${played.seen} pictures of 6 steps`);
+  }));
+
+test("Cancel ends the requests, and nothing is saved", () =>
+  withPage(async (page) => {
+    const asked = [];
+    const failed = [];
+    const ours = (one) => one.url().endsWith("/v1/frames");
+    page.on("requestfailed", (one) => ours(one) && failed.push(one));
+    page.on("download", () => assert.fail("nothing is to be saved"));
+    // The server answers the first frame and lets the others wait.
+    await page.route("**/v1/frames", (route) => {
+      asked.push(route.request());
+      return asked.length === 1 ? route.continue() : undefined;
+    });
+    await setAnimation(page, { from: 0, to: 7 });
+    await page.locator("#save-animation").click();
+    await page
+      .locator("#save-progress")
+      .getByText(/frame 1 of 8, \d+ s left/)
+      .waitFor();
+    assert.ok(Math.abs((await page.locator("#save-bar").evaluate((b) => b.value)) - 1 / 8) < 1e-6);
+    assert.ok(await page.locator("#save-picture").isDisabled());
+    await page.keyboard.press("Escape");
+    await page.locator("#save-said").getByText("Cancelled.").waitFor();
+    assert.ok(await page.locator("#save").isVisible(), "the dialog stays");
+    await page.waitForFunction(() => document.querySelector("#save-job").hidden);
+    assert.equal(asked.length, 3, "no other was asked for");
+    while (failed.length < 2) await page.waitForEvent("requestfailed");
+    assert.ok(await page.locator("#save-picture").isEnabled());
+    await page.locator("#save-close").click();
+    page.faults = page.faults.filter((fault) => !/net::ERR_/.test(fault));
+  }));
+
+test("what the server refuses is told in the dialog in its words", () =>
+  withPage(async (page) => {
+    let tries = 0;
+    await page.route("**/v1/frames", (route) => {
+      tries += 1;
+      const busy = tries === 1;
+      return route.fulfill({
+        status: busy ? 429 : 507,
+        headers: busy ? { "Retry-After": "1" } : {},
+        json: { type: "about:blank", title: "No", status: 507, detail: "needs 9 GB of memory" },
+      });
+    });
+    await page.keyboard.press("s");
+    await page.locator("#save-picture").click();
+    await page.locator("#save-error").getByText("needs 9 GB of memory").waitFor();
+    assert.equal(tries, 2, "busy: asked again; refused: not");
+    page.faults = page.faults.filter((fault) => !/429|507/.test(fault));
+  }));
+
+test("views are kept by name, and come back after a reload", () =>
+  withPage(async (page) => {
+    const before = await pixels(page);
+    await page.keyboard.press("s");
+    await page.locator("#keep-name").fill("from the east");
+    await page.keyboard.press("Enter");
+    const name = page.locator("#kept li input");
+    assert.equal(await name.inputValue(), "from the east");
+    await name.fill("east");
+    await name.press("Tab");
+    await page.locator("#save-close").click();
+    await page.goto(`${daemon.url}?again`);
+    await finalPicture(page);
+    assert.notEqual((await state(page)).step, "3");
+    await page.keyboard.press("s");
+    await page.getByRole("button", { name: "Open east" }).click();
+    await page.waitForFunction(() => document.querySelector("#picture").dataset.step === "3");
+    await finalPicture(page);
+    assert.equal((await pixels(page)).hash, before.hash);
+    await page.keyboard.press("s");
+    await page.getByRole("button", { name: "Delete east" }).click();
+    assert.equal(await page.locator("#kept li").count(), 0);
+  }, hashOf(turned)));
+
+test("a renamed view's row stays, with the focus and the button under the mouse", () =>
+  withPage(async (page) => {
+    await page.keyboard.press("s");
+    for (const name of ["one", "two"]) {
+      await page.locator("#keep-name").fill(name);
+      await page.keyboard.press("Enter");
+      await page.getByRole("button", { name: `Open ${name}` }).waitFor();
+    }
+    const name = page.locator("#kept li input").last();
+    await name.fill("first");
+    await name.press("Tab");
+    const label = () => page.evaluate(() => document.activeElement.ariaLabel);
+    assert.equal(await label(), "Open first");
+    // One press of the mouse leaves the name, which renames, and deletes.
+    await name.fill("other");
+    await page.locator("#kept li button").last().click();
+    assert.equal(await page.locator("#kept li").count(), 1);
+    assert.equal(await page.locator("#kept li input").inputValue(), "two");
+  }));
+
+test("behind an open dialog the page's keys do nothing, wherever the focus is", () =>
+  withPage(async (page) => {
+    await page.keyboard.press("s");
+    await page.evaluate(() => document.activeElement.blur());
+    assert.equal(await page.evaluate(() => document.activeElement === document.body), true);
+    const before = await state(page);
+    await page.keyboard.press("ArrowLeft");
+    await page.keyboard.press("]");
+    await finalPicture(page);
+    const after = await state(page);
+    assert.deepEqual([after.azimuth, after.step], [before.azimuth, before.step]);
+    await page.keyboard.press("Escape");
+    await page.locator("#save").waitFor({ state: "hidden" });
+    await page.keyboard.press("ArrowLeft");
+    await finalPicture(page);
+    assert.notEqual((await state(page)).azimuth, before.azimuth, "and do again once it is closed");
+  }));
+
+test("a link with a view of another shape is told, and the page stays whole", () =>
+  withPage(async (page) => {
+    const before = await pixels(page);
+    for (const view of [
+      { scalars: 5 },
+      { vector: { magnitudeRange: 3 } },
+      { camera: { eye: 5 } },
+    ]) {
+      await page.evaluate((hash) => (location.hash = hash), hashOf(view));
+      await page
+        .locator("#alert-text")
+        .getByText(/no view that can be read/)
+        .waitFor();
+    }
+    assert.equal((await pixels(page)).hash, before.hash);
+  }));
+
+// A view whose link is longer than 2000 characters.
+const long = {
+  ...turned,
+  scalars: [
+    {
+      field: "cloud",
+      extinction: Array.from({ length: 64 }, (_, n) => [
+        Number((0.2 + n / 97).toFixed(15)),
+        Number((40 * Math.sin(n / 61) ** 2).toFixed(15)),
+      ]),
+    },
+  ],
+};
+
+const share = async (page) => {
+  await page.context().grantPermissions(["clipboard-read", "clipboard-write"]);
+  await page.locator("#share-button").click();
+  await page
+    .locator("#status")
+    .getByText(/link copied/)
+    .waitFor();
+  return page.evaluate(() => navigator.clipboard.readText());
+};
+
+test("Share copies the link; a long one becomes a short one that restores the same pixels", () =>
+  withPage(async (page) => {
+    assert.ok((await page.evaluate(() => location.href.length)) > 2000);
+    const before = await pixels(page);
+    const link = await share(page);
+    assert.match(link, /\/a\/b\/#!view=[\w.~-]+$/);
+    assert.ok(link.length < 200, link);
+    await withPage(async (other) => {
+      assert.equal((await pixels(other)).hash, before.hash);
+      // Its own address is whole again, so that it outlives the server.
+      await other.waitForFunction(() => location.hash.startsWith("#!{"));
+      assert.deepEqual((await addressView(other)).scalars, long.scalars);
+    }, link.slice(daemon.url.length));
+  }, hashOf(long)));
+
+test("where the server keeps no views the long link is copied, and that is said", () =>
+  withPage(async (page) => {
+    const problem = { type: "about:blank", title: "No", status: 507, detail: "no room for views" };
+    await page.route("**/v1/views", (route) => route.fulfill({ status: 507, json: problem }));
+    const link = await share(page);
+    assert.deepEqual(JSON.parse(decodeURIComponent(link.split("#!")[1])).scalars, long.scalars);
+    assert.match(await page.locator("#status").textContent(), /long one: no room for views/);
+    page.faults = page.faults.filter((fault) => !/507/.test(fault));
+  }, hashOf(long)));
+
+test("a short link that leads nowhere is told, and the default shown", async () => {
+  const page = await openPage(browser, `${daemon.url}#!view=no-such-view`, small);
+  try {
+    await finalPicture(page);
+    assert.match(await page.locator("#alert-text").textContent(), /^The link's view: /);
+    assert.equal(await page.locator("#dataset").inputValue(), "climate");
+  } finally {
+    await page.context().close();
+  }
+});
+
+test("the dialog fits a phone in either theme, by keyboard alone", async () => {
+  for (const colorScheme of ["dark", "light"]) {
+    await withPage(
+      async (page) => {
+        await page.locator("#save-button").focus();
+        await page.keyboard.press("Enter");
+        const out = await page.evaluate(() => {
+          const box = document.querySelector("#save").getBoundingClientRect();
+          const parts = [...document.querySelectorAll("#save :is(button, input, select, p)")];
+          return [
+            ...(box.left >= 0 && box.right <= innerWidth ? [] : ["dialog"]),
+            ...parts
+              .filter((part) => part.getBoundingClientRect().right > box.right)
+              .map((part) => part.id),
+          ];
+        });
+        assert.deepEqual(out, []);
+        assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 360);
+        await shot(page, `save-360-${colorScheme}`);
+        await page.keyboard.press("Escape");
+        assert.equal(await page.locator("#save").isVisible(), false);
+        assert.equal(await page.evaluate(() => document.activeElement.id), "save-button");
+      },
+      "",
+      { viewport: { width: 360, height: 780 }, colorScheme, hasTouch: true },
+    );
+  }
+});

@@ -1,0 +1,599 @@
+// The page's hands in a real browser: undo, the value under the cursor, axes that are clicked,
+// fingers, wheel, dense screens, keys, and a page that nobody sees.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import {
+  control,
+  Daemon,
+  drag,
+  finalPicture,
+  framesOf,
+  freePort,
+  launch,
+  movingOf,
+  openPage,
+  pictureBox,
+  pixels,
+  shot,
+  state,
+  type,
+  unfold,
+  watchFrames,
+  watchPatches,
+} from "./support.mjs";
+
+let browser;
+let daemon;
+
+before(async () => {
+  browser = await launch();
+  daemon = await new Daemon(await freePort()).start();
+});
+
+after(async () => {
+  await browser?.close();
+  await daemon?.kill();
+});
+
+async function withPage(run, options = {}) {
+  const page = await openPage(browser, daemon.url, {
+    viewport: { width: 1000, height: 600 },
+    initScript: [watchPatches, watchFrames],
+    ...options,
+  });
+  try {
+    await finalPicture(page);
+    await run(page);
+    assert.deepEqual(page.faults, [], "the browser's console is clean");
+  } finally {
+    await page.context().close();
+  }
+}
+
+const patches = (page) => page.evaluate(() => window.patches);
+const cameras = async (page) =>
+  (await patches(page)).map(({ patch }) => patch.camera).filter((camera) => camera?.eye);
+const hashOf = async (page) => {
+  await finalPicture(page);
+  return (await pixels(page)).hash;
+};
+const saysStatus = (page, text) => page.locator("#status").filter({ hasText: text }).waitFor();
+const until = (page, key, value) =>
+  page.waitForFunction(
+    ([k, v]) => document.querySelector("#picture").dataset[k] === v,
+    [key, value],
+  );
+const settled = (page) =>
+  page.waitForFunction(
+    () => {
+      const { elevation, azimuth, roll } = document.querySelector("#picture").dataset;
+      const now = `${elevation} ${azimuth} ${roll}`;
+      const stands = window.lastSeen === now;
+      window.lastSeen = now;
+      return stands;
+    },
+    null,
+    { polling: 400 },
+  );
+
+// --- undo and redo ---------------------------------------------------------------------------
+
+test("undo of a drag restores the very pixels, and redo what it undid", () =>
+  withPage(async (page) => {
+    const undo = page.locator("#undo-button");
+    const redo = page.locator("#redo-button");
+    assert.equal(await undo.getAttribute("aria-disabled"), "true");
+    const first = await hashOf(page);
+    await drag(page, 120, -40);
+    const second = await hashOf(page);
+    await drag(page, -60, 90);
+    const third = await hashOf(page);
+    assert.equal(new Set([first, second, third]).size, 3);
+    await page.keyboard.press("Control+z");
+    await saysStatus(page, "undone: camera");
+    assert.equal(await hashOf(page), second, "each drag is one entry");
+    await undo.click();
+    assert.equal(await hashOf(page), first);
+    assert.equal(await undo.getAttribute("aria-disabled"), "true");
+    await page.keyboard.press("Control+Shift+z");
+    await saysStatus(page, "redone: camera");
+    assert.equal(await hashOf(page), second);
+    await redo.click();
+    assert.equal(await hashOf(page), third);
+    assert.equal(await redo.getAttribute("aria-disabled"), "true");
+  }));
+
+test("a slider's run is one entry, and the panel follows what is undone", () =>
+  withPage(async (page) => {
+    const before = await hashOf(page);
+    const number = control(page, "opacity", "input");
+    const value = await number.inputValue();
+    const slider = await control(page, "opacity", ".lil-slider").boundingBox();
+    const y = slider.y + slider.height / 2;
+    await page.mouse.move(slider.x + 0.7 * slider.width, y);
+    await page.mouse.down();
+    for (let n = 7; n >= 2; n--) await page.mouse.move(slider.x + 0.1 * n * slider.width, y);
+    await page.mouse.up();
+    assert.notEqual(await hashOf(page), before);
+    assert.notEqual(await number.inputValue(), value);
+    await page.keyboard.press("Control+z");
+    await saysStatus(page, "undone: lines");
+    assert.equal(await hashOf(page), before);
+    assert.equal(await number.inputValue(), value);
+    assert.equal(await page.locator("#undo-button").getAttribute("aria-disabled"), "true");
+  }));
+
+test("undo brings the former dataset back as it was seen", () =>
+  withPage(async (page) => {
+    await drag(page, 80, 20);
+    const before = await hashOf(page);
+    await page.locator("#dataset").selectOption("tornado");
+    await page.waitForFunction(() => document.title.startsWith("Tornado"));
+    assert.notEqual(await hashOf(page), before);
+    await page.keyboard.press("Control+z");
+    await page.waitForFunction(() => !document.title.startsWith("Tornado"));
+    assert.equal(await hashOf(page), before);
+  }));
+
+test("steps that were played stay when the camera is undone, and a size is no entry", () =>
+  withPage(async (page) => {
+    const start = await state(page);
+    await drag(page, 80, 20);
+    await page.keyboard.press("Space");
+    await page.waitForFunction(() => Number(document.querySelector("#picture").dataset.step) >= 2);
+    await page.keyboard.press("Space");
+    await finalPicture(page);
+    const { step } = await state(page);
+    await page.setViewportSize({ width: 900, height: 640 });
+    const box = await pictureBox(page);
+    await page.waitForFunction(
+      (width) => document.querySelector("#picture").width === width,
+      Math.round(box.width),
+    );
+    await page.keyboard.press("Control+z");
+    await finalPicture(page);
+    const now = await state(page);
+    assert.deepEqual([now.azimuth, now.step], [start.azimuth, step]);
+    assert.deepEqual(await pictureBox(page), box);
+    assert.equal((await pixels(page)).width, Math.round(box.width));
+  }));
+
+// --- the value under the cursor --------------------------------------------------------------
+
+test("the value under the cursor is the one that the server probes there", () =>
+  withPage(async (page) => {
+    const asked = [];
+    page.on("request", (request) => {
+      if (request.url().includes("/probe?")) asked.push(request.url());
+    });
+    const answered = page.waitForResponse(/\/probe\?/);
+    const hover = page.locator("#hover");
+    const box = await pictureBox(page);
+    await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.55 * box.height);
+    await hover.waitFor();
+    await answered;
+    const [values, place] = (await hover.innerText()).split("\n");
+    const [, east, ew, north, ns, z] = place.match(
+      /^([\d.]+) °([EW]), ([\d.]+) °([NS]) · level ([\d.]+) hPa$/,
+    );
+    const [x, y] = [ew === "E" ? east : -east, ns === "N" ? north : -north];
+    const answer = await fetch(
+      `${daemon.url}v1/datasets/climate/probe?x=${x}&y=${y}&z=${z}&step=0`,
+    ).then((response) => response.json());
+    for (const axis of ["x", "y", "z"]) {
+      const told = Number({ x, y, z }[axis]);
+      assert.ok(Math.abs(answer.position[axis] - told) <= 1e-3 * Math.abs(told), axis);
+    }
+    const size = Math.hypot(...answer.values.wind.value);
+    const [, wind] = values.match(/^wind ([-\d.e]+) m s⁻¹/);
+    assert.ok(Math.abs(Number(wind) - size) < 1e-3 * size, `${wind} is not ${size}`);
+    const [, cloud] = values.match(/cloud ([-\d.e]+)/);
+    assert.ok(Math.abs(Number(cloud) - answer.values.cloud.value) < 1e-3);
+    await shot(page, "hover");
+    // However fast the mouse is, no more than about eight questions a second go out.
+    const before = asked.length;
+    const start = Date.now();
+    for (let n = 0; n < 60; n++) {
+      await page.mouse.move(box.x + (0.4 + 0.004 * n) * box.width, box.y + 0.55 * box.height);
+    }
+    const most = Math.ceil((Date.now() - start) / 125) + 1;
+    assert.ok(asked.length - before <= most, `${asked.length - before} of at most ${most}`);
+    await page.mouse.move(5, 5);
+    await hover.waitFor({ state: "hidden" });
+  }));
+
+test("nothing is asked while the mouse drags, none when it is switched off", () =>
+  withPage(async (page) => {
+    const hover = page.locator("#hover");
+    const box = await pictureBox(page);
+    const at = [box.x + 0.5 * box.width, box.y + 0.55 * box.height];
+    await page.mouse.move(...at);
+    await hover.waitFor();
+    let asked = 0;
+    page.on("request", (request) => (asked += Number(request.url().includes("/probe?"))));
+    await page.mouse.down();
+    await hover.waitFor({ state: "hidden" });
+    await page.mouse.move(at[0] + 60, at[1], { steps: 20 });
+    await finalPicture(page);
+    assert.equal(asked, 0);
+    await page.mouse.up();
+    await hover.waitFor();
+    await page.keyboard.press("Shift+I");
+    await hover.waitFor({ state: "hidden" });
+    await page.mouse.move(at[0] - 30, at[1], { steps: 5 });
+    asked = 0;
+    await page.reload();
+    await finalPicture(page);
+    await page.mouse.move(...at, { steps: 5 });
+    await finalPicture(page);
+    await unfold(page, "Probe");
+    const box2 = page.getByLabel("values under the cursor");
+    assert.equal(await box2.isChecked(), false, "remembered for the session");
+    assert.equal(await hover.isVisible(), false);
+    await box2.check();
+    await page.mouse.move(...at);
+    await hover.waitFor();
+  }));
+
+test("a probe that the server refuses is no alert", () =>
+  withPage(async (page) => {
+    let refused = 0;
+    await page.route(/\/probe\?/, (route) => {
+      refused += 1;
+      return route.fulfill({ status: 200, json: { nothing: true } });
+    });
+    const box = await pictureBox(page);
+    const asked = page.waitForRequest(/\/probe\?/);
+    await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.55 * box.height);
+    await asked;
+    await page.keyboard.press("]");
+    await until(page, "step", "1");
+    await finalPicture(page);
+    assert.ok(refused >= 1);
+    assert.equal(await page.locator("#alert").isVisible(), false);
+    assert.equal(await page.locator("#hover").isVisible(), false);
+  }));
+
+// --- axes and roll ---------------------------------------------------------------------------
+
+test("each end of the axes looks from there, by a turn or at once", async () => {
+  const ways = [
+    ["from the east", "90.0", "0.0"],
+    ["from the north", "180.0", "0.0"],
+    ["from above", "0.0", "90.0"],
+    ["isometrically", "45.0", "35.3"],
+    ["from the west", "-90.0", "0.0"],
+    ["from below", "0.0", "-90.0"],
+    ["from the south", "0.0", "0.0"],
+  ];
+  await withPage(async (page) => {
+    for (const [name, azimuth, elevation] of ways) {
+      const frames = await framesOf(page, async () => {
+        await page.evaluate(() => (window.patches.length = 0));
+        await page.getByRole("button", { name: `Look ${name}` }).click();
+        await until(page, "elevation", elevation);
+        await until(page, "azimuth", azimuth);
+      });
+      assert.ok(frames.length >= 2);
+      assert.ok((await patches(page)).length >= 3, `${name}: a turn, not a jump`);
+    }
+    await page.keyboard.press("Control+z");
+    await until(page, "elevation", "-90.0");
+    for (const end of await page.locator(".gizmo-end").all()) {
+      const { width, height } = await end.boundingBox();
+      assert.ok(Math.min(width, height) >= 24);
+    }
+    await page.getByRole("button", { name: "Look from the east" }).press("Enter");
+    await until(page, "azimuth", "90.0");
+    await page.keyboard.press("7");
+    await until(page, "azimuth", "45.0");
+    await shot(page, "gizmo");
+  });
+  await withPage(
+    async (page) => {
+      await page.getByRole("button", { name: "Look from the east" }).press("Enter");
+      await until(page, "azimuth", "90.0");
+      await finalPicture(page);
+      assert.equal((await cameras(page)).length, 1, "no movement is wanted");
+    },
+    { reducedMotion: "reduce" },
+  );
+});
+
+test("a hand on the picture ends a turn", () =>
+  withPage(async (page) => {
+    await page.locator("#picture").focus();
+    await page.keyboard.press("2");
+    await page.keyboard.press("ArrowLeft");
+    await finalPicture(page);
+    await settled(page);
+    const sent = await cameras(page);
+    const { azimuth } = await state(page);
+    assert.notEqual(azimuth, "180.0");
+    assert.ok(sent.length < 30);
+  }));
+
+test("the picture rolls by keys, turns as before with the roll, and 0 puts it upright", () =>
+  withPage(async (page) => {
+    const start = await state(page);
+    const first = await hashOf(page);
+    for (let n = 0; n < 3; n++) await page.keyboard.press(".");
+    await until(page, "roll", "15.0");
+    assert.notEqual(await hashOf(page), first);
+    for (let n = 0; n < 4; n++) await page.keyboard.press("ArrowRight");
+    await settled(page);
+    const turned = await state(page);
+    assert.equal(turned.roll, "15.0", "a turn keeps the roll");
+    assert.notEqual(turned.azimuth, start.azimuth);
+    for (let n = 0; n < 2; n++) await page.keyboard.press(",");
+    await until(page, "roll", "5.0");
+    await page.keyboard.press("0");
+    await until(page, "roll", "0.0");
+    assert.equal(await hashOf(page), first);
+  }));
+
+// --- fingers and wheel -----------------------------------------------------------------------
+
+const upOf = async (page) => (await cameras(page)).at(-1).up;
+
+test("two fingers that twist roll the camera by their angle", () =>
+  withPage(
+    async (page) => {
+      await page.keyboard.press("1"); // from the south: up is z, right is x
+      await until(page, "elevation", "0.0");
+      const cdp = await page.context().newCDPSession(page);
+      const box = await pictureBox(page);
+      const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+      const touch = async (type, ...degrees) => {
+        for (const angle of degrees) {
+          const [dx, dy] = [60 * Math.cos(angle / 57.29578), 60 * Math.sin(angle / 57.29578)];
+          await cdp.send("Input.dispatchTouchEvent", {
+            type,
+            touchPoints: [
+              { x: x + dx, y: y + dy, id: 0 },
+              { x: x - dx, y: y - dy, id: 1 },
+            ],
+          });
+        }
+      };
+      const { distance } = await state(page);
+      await touch("touchStart", 0);
+      await touch("touchMove", 2, 4);
+      await finalPicture(page);
+      assert.equal((await state(page)).roll, "0.0", "fingers that tremble do not twist");
+      await touch("touchMove", 10, 15, 20, 25, 30);
+      await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+      await finalPicture(page);
+      // Clockwise by 30 degrees: what was 30 degrees to the left is up now.
+      const up = await upOf(page);
+      for (const [n, value] of [-0.5, 0, Math.sqrt(3) / 2].entries()) {
+        assert.ok(Math.abs(up[n] - value) < 0.01, `${up}`);
+      }
+      const turned = await state(page);
+      assert.ok(Math.abs(Number(turned.roll) - 30) < 0.5);
+      assert.ok(Math.abs(Number(turned.distance) / Number(distance) - 1) < 0.01);
+      assert.equal(await page.locator("#hover").isVisible(), false);
+    },
+    { hasTouch: true, viewport: { width: 390, height: 700 }, isMobile: true },
+  ));
+
+test("a burst of the wheel lands at the right zoom by a few patches, and nothing scrolls", () =>
+  withPage(async (page) => {
+    const start = Number((await state(page)).distance);
+    const before = (await cameras(page)).length;
+    const frames = await framesOf(page, () =>
+      page.evaluate(() => {
+        const picture = document.querySelector("#picture");
+        for (let n = 0; n < 200; n++) {
+          const event = new WheelEvent("wheel", { deltaY: 3, bubbles: true, cancelable: true });
+          if (picture.dispatchEvent(event)) throw new Error("the page would scroll");
+        }
+      }),
+    );
+    const { distance } = await state(page);
+    assert.ok(Math.abs(Number(distance) / (start * 1.0015 ** 600) - 1) < 2e-3);
+    assert.ok((await cameras(page)).length - before <= 3);
+    assert.ok(frames.length >= 1);
+    await page.keyboard.press("Control+z");
+    await until(page, "distance", start.toFixed(4));
+    // A trackpad's pinch comes as a wheel with ctrl, which would zoom the page.
+    await page.evaluate(() => {
+      const picture = document.querySelector("#picture");
+      for (let n = 0; n < 10; n++) {
+        const look = { deltaY: -7, ctrlKey: true, bubbles: true, cancelable: true };
+        if (picture.dispatchEvent(new WheelEvent("wheel", look))) throw new Error("zooms the page");
+      }
+    });
+    await finalPicture(page);
+    const pinched = Number((await state(page)).distance);
+    assert.ok(Math.abs(pinched / (start / 1.01 ** 70) - 1) < 2e-3, `${start} to ${pinched}`);
+  }));
+
+// --- dense screens ---------------------------------------------------------------------------
+
+const watchDensities = () => {
+  window.densities = [];
+  const match = window.matchMedia.bind(window);
+  window.matchMedia = (text) => {
+    const query = match(text);
+    if (text.includes("resolution")) window.densities.push(query);
+    return query;
+  };
+};
+
+test("on a dense screen it is sharp at rest, and moves in frames that the budget allows", () =>
+  withPage(
+    async (page) => {
+      const box = await pictureBox(page);
+      const full = [2 * box.width, 2 * box.height].map(Math.round);
+      const before = await patches(page);
+      const frames = await framesOf(page, () => drag(page, 150, 20, 30));
+      const last = frames.at(-1);
+      assert.deepEqual([last.final, last.width, last.height], [true, ...full]);
+      const stats = await pixels(page);
+      assert.deepEqual([stats.width, stats.height], full);
+      // The server draws them smaller, of the picture that is wanted: what it tells of their error
+      // is told against that one.
+      const moving = movingOf(frames);
+      assert.ok(moving.length >= 2);
+      for (const { chosen } of moving) {
+        const { width, height } = chosen.view.image;
+        assert.deepEqual([width, height], full);
+      }
+      const sent = (await patches(page)).slice(before.length);
+      assert.ok(sent.every(({ patch }) => patch.image === undefined));
+      // Another screen.
+      const cdp = await page.context().newCDPSession(page);
+      await cdp.send("Emulation.setDeviceMetricsOverride", {
+        width: 800,
+        height: 600,
+        deviceScaleFactor: 1.5,
+        mobile: false,
+      });
+      // What a browser tells when the window goes to another screen; emulation leaves it out.
+      await page.evaluate(() => window.densities.at(-1).dispatchEvent(new Event("change")));
+      await page.waitForFunction(
+        (width) => document.querySelector("#picture").width === width,
+        Math.round(1.5 * box.width),
+      );
+      await finalPicture(page);
+    },
+    {
+      viewport: { width: 800, height: 600 },
+      deviceScaleFactor: 2,
+      initScript: [watchPatches, watchFrames, watchDensities],
+    },
+  ));
+
+// --- keys ------------------------------------------------------------------------------------
+
+test("keys work right after a control of the panel was used, not while one types", () =>
+  withPage(async (page) => {
+    await control(page, "shown", "input").uncheck();
+    await page.keyboard.press("]");
+    await until(page, "step", "1");
+    await control(page, "shown", "input").check();
+    await control(page, "map").selectOption("plasma");
+    await page.keyboard.press("]");
+    await until(page, "step", "2");
+    await page
+      .locator("#panel .lil-title")
+      .filter({ hasText: /^Lines$/ })
+      .click();
+    await page.keyboard.press("[");
+    await until(page, "step", "1");
+    await page
+      .locator("#panel .lil-title")
+      .filter({ hasText: /^Lines$/ })
+      .click();
+    const box = control(page, "length", "input");
+    const { azimuth } = await state(page);
+    await box.click();
+    await page.keyboard.type("0.1[3]");
+    assert.equal((await state(page)).step, "1");
+    await page.keyboard.press("Enter");
+    await page.keyboard.press("[");
+    await until(page, "step", "0");
+    assert.equal((await state(page)).azimuth, azimuth);
+  }));
+
+test("arrows on a handle of the panel move that, not the volume", () =>
+  withPage(async (page) => {
+    const handle = page.locator('#panel [role="slider"]').first();
+    if (!(await handle.isVisible())) await unfold(page, "Opacity and colours");
+    const { azimuth, elevation } = await state(page);
+    await handle.focus();
+    for (const key of ["ArrowUp", "ArrowLeft"]) await page.keyboard.press(key);
+    await page.waitForFunction(() => window.patches.at(-1).patch.scalars !== undefined);
+    await finalPicture(page);
+    const now = await state(page);
+    assert.deepEqual([now.azimuth, now.elevation], [azimuth, elevation]);
+    await page.keyboard.press("]");
+    await until(page, "step", "1");
+  }));
+
+test("what is typed into a box is one entry", () =>
+  withPage(async (page) => {
+    const box = control(page, "length", "input");
+    const before = await box.inputValue();
+    await box.click();
+    await box.fill("");
+    await page.keyboard.type("0.125");
+    await page.keyboard.press("Enter");
+    await finalPicture(page);
+    assert.equal(await box.inputValue(), "0.125");
+    await page.keyboard.press("Control+z");
+    await finalPicture(page);
+    assert.equal(await box.inputValue(), before);
+  }));
+
+test("e tells errors in dB, and the help lists every key", () =>
+  withPage(async (page) => {
+    const error = page.locator("#hud-error");
+    const [, rmse] = (await error.textContent()).match(/^error ([\d.e-]+) measured$/);
+    await page.keyboard.press("e");
+    const [, decibels] = (await error.textContent()).match(/^PSNR ([\d.]+) dB measured$/);
+    assert.ok(Math.abs(-20 * Math.log10(Number(rmse)) - Number(decibels)) < 0.5);
+    await page.keyboard.press("e");
+    assert.match(await error.textContent(), /^error/);
+    await page.keyboard.press("?");
+    const keys = await page.locator("#help-keys dt").allTextContents();
+    for (const key of ["7", ",", ".", "e", "i", "shift i", "ctrl z", "ctrl y"]) {
+      assert.ok(keys.includes(key), `${key} in ${keys}`);
+    }
+    await shot(page, "help-hands");
+  }));
+
+// --- hidden ----------------------------------------------------------------------------------
+
+test("a page that nobody sees gets no frames, and the newest when someone looks again", () =>
+  withPage(async (page) => {
+    const hide = (hidden) =>
+      page.evaluate((value) => {
+        Object.defineProperty(document, "hidden", { value, configurable: true });
+        document.dispatchEvent(new Event("visibilitychange"));
+      }, hidden);
+    const headers = () => page.evaluate(() => window.frameHeaders.length);
+    const quiet = async () => {
+      // What was on its way comes still; then a second without a frame.
+      let last = -1;
+      for (let n = 0; n < 10 && (await headers()) !== last; n++) {
+        last = await headers();
+        await page.waitForTimeout(300);
+      }
+      const before = await headers();
+      await page.waitForTimeout(1000);
+      assert.equal(await headers(), before, "no frames for nobody");
+    };
+    await page.keyboard.press("Space");
+    await page.waitForFunction(() => Number(document.querySelector("#picture").dataset.step) >= 1);
+    await hide(true);
+    await quiet();
+    const { seq } = await state(page);
+    await hide(false);
+    await page.waitForFunction(
+      (s) => document.querySelector("#picture").dataset.seq > s + 2,
+      Number(seq),
+    );
+    await page.keyboard.press("Space");
+    await finalPicture(page);
+    await hide(true);
+    await page.keyboard.press("ArrowLeft");
+    await quiet();
+    const { rev, wanted } = await state(page);
+    assert.notEqual(rev, wanted);
+    await hide(false);
+    await finalPicture(page);
+  }));
+
+test("nothing is there to undo or redo at first", () =>
+  withPage(async (page) => {
+    await page.keyboard.press("Control+z");
+    await saysStatus(page, "nothing to undo");
+    await page.keyboard.press("Control+y");
+    await saysStatus(page, "nothing to redo");
+    assert.ok((await patches(page)).every(({ patch }) => patch.vector === undefined));
+    await type(page, "length", 0.1);
+    await page.keyboard.press("Control+z");
+    await saysStatus(page, "undone: lines");
+  }));

@@ -1,0 +1,194 @@
+// Error against time in the Quality panel, in a real browser; what the server forecasts is made up
+// here, what budget and limit do to the frames is the daemon's own.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import {
+  control,
+  Daemon,
+  drag,
+  finalPicture,
+  framesOf,
+  freePort,
+  launch,
+  movingOf,
+  openPage,
+  patience,
+  shot,
+  type,
+  unfold,
+  watchFrames,
+  watchPatches,
+} from "./support.mjs";
+
+let browser;
+let daemon;
+
+before(async () => {
+  browser = await launch();
+  daemon = await new Daemon(await freePort()).start();
+});
+
+after(async () => {
+  await browser?.close();
+  await daemon?.kill();
+});
+
+const points = [4, 9, 20, 45, 100, 220].map((ms, n) => ({
+  method: n % 2 === 0 ? "kernel" : "slab",
+  slabThickness: n % 2 === 0 ? null : 2,
+  width: 1136,
+  height: 818,
+  coarser: 0,
+  ms,
+  timed: true,
+  error: 0.2 / ms,
+  errorLow: 0.1 / ms,
+  errorHigh: 0.4 / ms,
+  kind: n === 3 ? "measured" : "estimated",
+  pareto: n !== 2,
+}));
+
+async function withPage(run, { status = 200, json } = {}) {
+  const asked = [];
+  const page = await openPage(browser, daemon.url, {
+    initScript: [watchFrames, watchPatches],
+    prepare: (one) =>
+      one.route(/\/v1\/forecasts$/, (route) => {
+        asked.push(route.request().postDataJSON());
+        return route.fulfill({ status, json: json ?? { view: {}, points, chosen: 2 } });
+      }),
+  });
+  page.asked = asked;
+  try {
+    await finalPicture(page);
+    await run(page);
+    assert.equal(await page.locator("#alert").isVisible(), false, "the server took every view");
+    if (status === 200) assert.deepEqual(page.faults, [], "the browser's console is clean");
+  } finally {
+    await page.context().close();
+  }
+}
+
+const handle = (page, name) => page.getByRole("slider", { name, exact: true }).last();
+const budgetOf = (page) =>
+  page.evaluate(
+    () => window.patches.map(({ patch }) => patch.quality?.budgetMs).findLast((v) => v) ?? null,
+  );
+
+async function open(page) {
+  await unfold(page, "Quality");
+  await page.locator(".forecast").scrollIntoViewIfNeeded();
+  await page.locator(".forecast circle").first().waitFor();
+}
+
+test("the plot is asked for when it is seen and the view rests, and tells each setting", () =>
+  withPage(async (page) => {
+    assert.deepEqual(page.asked, [], "not while nobody looks");
+    await open(page);
+    assert.equal(page.asked.length, 1);
+    assert.equal(page.asked[0].dataset, "climate");
+    assert.equal(page.asked[0].quality.budgetMs, 33);
+    const circles = page.locator(".forecast circle");
+    assert.equal(await circles.count(), points.length);
+    assert.equal(await page.locator(".plot-measured").count(), 1);
+    const told = await circles.nth(3).locator("title").textContent();
+    assert.equal(
+      told,
+      "slab of 2 cells, 1136×818: 45 ms, error 0.0044 (0.0022 to 0.0089), measured",
+    );
+    // Ratios of time are distances: 4 -> 20 is as far as 20 -> 100.
+    const x = async (n) => Number(await circles.nth(n).getAttribute("cx"));
+    assert.ok(Math.abs((await x(2)) - (await x(0)) - ((await x(4)) - (await x(2)))) < 0.01);
+    const line = await page.locator(".forecast polyline").getAttribute("points");
+    assert.equal(line.split(" ").length, points.length - 1, "through what nothing beats");
+    const final = page.locator(".plot-final");
+    const frame = await page.evaluate(() => window.frameHeaders.at(-1));
+    assert.match(await final.locator("title").textContent(), /^final [\d.]+ ms, error /);
+    const label = await page.locator(".forecast").getAttribute("aria-label");
+    assert.equal(label, "error against time: 6 settings, 1 measured");
+    assert.ok(frame.final);
+    const again = page.waitForRequest(/\/v1\/forecasts$/);
+    await drag(page, 60, 10);
+    await again;
+    await page.waitForFunction(() => /final/.test(document.querySelector("#mark").textContent));
+    assert.notDeepEqual(page.asked.at(-1).camera, page.asked[0].camera, "of the view as it is");
+    await shot(page, "plot");
+  }));
+
+test("what goes on at rest is asked for once more, and then no more", () =>
+  withPage(async (page) => {
+    await open(page);
+    const until = Date.now() + 9000 * patience;
+    while (page.asked.length < 2 && Date.now() < until) await page.waitForTimeout(50);
+    assert.equal(page.asked.length, 2);
+    await page.waitForTimeout(6500);
+    assert.equal(page.asked.length, 2);
+  }));
+
+test("the budget's handle is the moving budget: by hand, by keys, and in the frames' size", () =>
+  withPage(async (page) => {
+    await open(page);
+    const moving = async () => movingOf(await framesOf(page, () => drag(page, 90, 20, 40)));
+    const budget = handle(page, "moving budget (ms)");
+    assert.equal(await budget.getAttribute("aria-valuetext"), "33 ms");
+    const box = await page.locator(".forecast").boundingBox();
+    const grip = await budget.boundingBox();
+    await page.mouse.move(grip.x + grip.width / 2, grip.y + 20);
+    await page.mouse.down();
+    await page.mouse.move(box.x + box.width, grip.y + 20, { steps: 5 });
+    await page.mouse.up();
+    const large = await budgetOf(page);
+    assert.ok(large > 200, `${large}`);
+    assert.equal(await control(page, "moving budget \\(ms\\)", "input").inputValue(), `${large}`);
+    const slow = await moving();
+    assert.equal(slow.at(-1).chosen.view.quality.budgetMs, large);
+    await budget.focus();
+    await page.keyboard.press("ArrowLeft");
+    assert.equal(await budgetOf(page), large - Math.max(1, Math.round(0.05 * large)));
+    await page.keyboard.press("Shift+ArrowRight");
+    assert.equal(await budgetOf(page), large - Math.max(1, Math.round(0.05 * large)) + 1);
+    await type(page, "moving budget \\(ms\\)", 2);
+    assert.equal(await budgetOf(page), 2, "down to what the wire takes");
+    assert.equal(await budget.getAttribute("aria-valuetext"), "2 ms");
+    const quick = await moving();
+    assert.equal(quick.at(-1).chosen.view.quality.budgetMs, 2);
+    const least = (frames) => Math.min(...frames.slice(-5).map(({ width }) => width));
+    assert.ok(least(quick) < least(slow), `${least(quick)} < ${least(slow)}`);
+  }));
+
+test("a limit of the error is a line that is dragged, and told like every error", () =>
+  withPage(async (page) => {
+    await open(page);
+    assert.equal(await handle(page, "max error").count(), 0);
+    await control(page, "limit the error", "input").check();
+    const limit = page.locator(".plot-handle[aria-label='max error']");
+    assert.equal(await limit.getAttribute("aria-valuetext"), "0.01");
+    const grip = await limit.boundingBox();
+    await page.mouse.move(grip.x + 40, grip.y + grip.height / 2);
+    await page.mouse.down();
+    await page.mouse.move(grip.x + 40, grip.y + grip.height / 2 - 30, { steps: 5 });
+    await page.mouse.up();
+    const error = await page.evaluate(() => window.patches.at(-1).patch.quality.maxError);
+    assert.ok(error > 0.012, `${error}`);
+    await limit.focus();
+    await page.keyboard.press("ArrowDown");
+    const less = await page.evaluate(() => window.patches.at(-1).patch.quality.maxError);
+    assert.ok(Math.abs(less - error / 1.1) < 0.01 * error, `${error} -> ${less}`);
+    await type(page, "max error \\(linear RMSE\\)", 1e-6);
+    const shown = await control(
+      page,
+      "max error \\(linear RMSE\\)",
+      'input:not([type="range"])',
+    ).inputValue();
+    assert.equal(shown, "1e-6", "readable in a narrow box");
+  }));
+
+test("a server that cannot tell says why", () =>
+  withPage(
+    async (page) => {
+      await unfold(page, "Quality");
+      await page.locator(".forecast").scrollIntoViewIfNeeded();
+      await page.getByText("no forecast for this view").waitFor();
+    },
+    { status: 422, json: { title: "No", status: 422, detail: "no forecast for this view" } },
+  ));

@@ -1,0 +1,126 @@
+// The Quality panel in a real browser: what is asked for is what the daemon's frames show, by their
+// headers and by what `chosen` says of them.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import {
+  control,
+  Daemon,
+  drag,
+  finalPicture,
+  framesOf,
+  freePort,
+  launch,
+  movingOf,
+  openPage,
+  shot,
+  type,
+  unfold,
+  watchFrames,
+  watchPatches,
+} from "./support.mjs";
+
+let browser;
+let daemon;
+
+before(async () => {
+  browser = await launch();
+  daemon = await new Daemon(await freePort()).start();
+});
+
+after(async () => {
+  await browser?.close();
+  await daemon?.kill();
+});
+
+async function withPage(run, path = "") {
+  const initScript = [watchFrames, watchPatches];
+  const page = await openPage(browser, daemon.url + path, { initScript });
+  try {
+    await finalPicture(page);
+    await unfold(page, "Quality");
+    await run(page);
+    assert.equal(await page.locator("#alert").isVisible(), false, "the server took every view");
+    assert.deepEqual(page.faults, [], "the browser's console is clean");
+  } finally {
+    await page.context().close();
+  }
+}
+
+const budget = "moving budget \\(ms\\)";
+const limited = "limit the error";
+const limit = "max error \\(linear RMSE\\)";
+
+const widthOf = (page) => page.evaluate(() => document.querySelector("#picture").width);
+const qualities = (page) =>
+  page.evaluate(() =>
+    window.patches.flatMap(({ patch }) => (patch.quality === undefined ? [] : [patch.quality])),
+  );
+const linkedQuality = (page) =>
+  page.evaluate(() => JSON.parse(decodeURIComponent(location.hash.slice(2)) || "{}").quality);
+
+test("a small budget makes moving frames small, a large one lets them be whole", () =>
+  withPage(async (page) => {
+    const full = await widthOf(page);
+    const widths = {};
+    for (const ms of [500, 5]) {
+      await type(page, budget, ms);
+      const frames = await framesOf(page, () => drag(page, 120, 30, 60));
+      const moving = movingOf(frames);
+      assert.ok(moving.length >= 3, `${moving.length} moving frames`);
+      widths[ms] = moving.at(-1).width;
+      const last = frames.at(-1);
+      assert.deepEqual([last.final, last.width], [true, full], "the final frame is whole");
+      assert.equal(last.chosen.view.quality.budgetMs, ms, "drawn for this budget");
+    }
+    assert.equal(widths[500], full);
+    assert.ok(widths[5] < full, `${widths[5]} px of ${full}`);
+  }));
+
+test("an error is asked for by a switch, and by its magnitude", () =>
+  withPage(async (page) => {
+    assert.equal(await control(page, limit, "input").isVisible(), false, "none by default");
+    await control(page, limited, "input").check();
+    assert.deepEqual(await qualities(page), [{ maxError: 0.01 }]);
+    const slider = page.getByRole("slider", { name: "max error (linear RMSE)" });
+    const box = page.getByRole("textbox", { name: "max error (linear RMSE)" });
+    assert.equal(await slider.getAttribute("aria-valuetext"), "0.01");
+    for (let n = 0; n < 20; n++) await slider.press("ArrowLeft");
+    assert.deepEqual((await qualities(page)).at(-1), { maxError: 0.001 }, "a decade is 20 presses");
+    assert.equal(await box.inputValue(), "0.001");
+    await box.fill("0.0234");
+    await box.press("Enter");
+    assert.deepEqual((await qualities(page)).at(-1), { maxError: 0.0234 });
+    assert.ok(Math.abs(Number(await slider.inputValue()) - Math.log10(0.0234)) < 0.05);
+    await shot(page, "quality");
+    await page.waitForFunction(() => location.hash.includes("0.0234"));
+    await control(page, limited, "input").uncheck();
+    assert.deepEqual((await qualities(page)).at(-1), { maxError: null });
+    assert.equal(await box.isVisible(), false);
+    await finalPicture(page);
+    assert.equal(await control(page, limited, "input").isChecked(), false);
+    await control(page, limited, "input").check();
+    assert.deepEqual((await qualities(page)).at(-1), { maxError: 0.0234 }, "the last one again");
+  }));
+
+test("a link carries budget, error and lossless, and `All defaults` takes them away", () =>
+  withPage(async (page) => {
+    assert.equal(await control(page, budget, "input").inputValue(), "66");
+    assert.equal(await control(page, limited, "input").isChecked(), true);
+    const box = page.getByRole("textbox", { name: "max error (linear RMSE)" });
+    assert.equal(await box.inputValue(), "0.002");
+    assert.equal(await control(page, "lossless final", "input").isChecked(), true);
+    const drawn = await page.evaluate(() => window.frameHeaders.at(-1).chosen.view.quality);
+    assert.deepEqual(drawn, { budgetMs: 66, maxError: 0.002, lossless: true });
+    await control(page, "lossless final", "input").uncheck();
+    await page.waitForFunction(() => /%22lossless%22:false/.test(location.hash));
+    assert.deepEqual(await linkedQuality(page), {
+      budgetMs: 66,
+      maxError: 0.002,
+      lossless: false,
+    });
+    await page.locator("#panel").getByRole("button", { name: "All defaults" }).click();
+    await finalPicture(page);
+    assert.equal(await control(page, limited, "input").isChecked(), false);
+    assert.equal(await control(page, budget, "input").inputValue(), "33");
+    await page.waitForFunction(() => !location.hash.includes("quality"));
+  }, '#!{"quality":{"budgetMs":66,"maxError":0.002,"lossless":true}}'));

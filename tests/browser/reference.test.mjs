@@ -1,0 +1,200 @@
+// The reference in a real browser: drawn once it is asked for, on the page as long as it is held,
+// gone with the view that it is of.
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import {
+  Daemon,
+  drag,
+  finalPicture,
+  freePort,
+  launch,
+  openPage,
+  patience,
+  pixels,
+  shot,
+} from "./support.mjs";
+
+let browser;
+let daemon;
+
+before(async () => {
+  browser = await launch();
+  daemon = await new Daemon(await freePort()).start("climate");
+});
+
+after(async () => {
+  await browser?.close();
+  await daemon?.kill();
+});
+
+// Small, for references cost by the pixel.
+async function withPage(run, options = {}) {
+  const page = await openPage(browser, daemon.url, {
+    viewport: { width: 420, height: 480 },
+    ...options,
+  });
+  try {
+    await finalPicture(page);
+    await run(page);
+    assert.equal(await page.locator("#alert").isVisible(), false);
+    assert.deepEqual(page.faults, [], "the browser's console is clean");
+  } finally {
+    await page.context().close();
+  }
+}
+
+const words = (page) => page.locator("#reference").textContent();
+const mark = (page) => page.locator(".mark:visible").textContent();
+
+const ready = (page) =>
+  page.waitForFunction(
+    () => /ready: hold r · error \S+ true/.test(document.querySelector("#reference").textContent),
+    null,
+    { timeout: 60_000 * patience },
+  );
+
+// Mean and largest difference of the picture's and the reference's codes, and the share of pixels
+// that differ; how far their boxes on the page are apart.
+const apart = (page) =>
+  page.evaluate(() => {
+    const canvas = document.querySelector("#picture");
+    const image = document.querySelector("#reference-picture");
+    const { width, height } = canvas;
+    const copy = new OffscreenCanvas(width, height).getContext("2d");
+    copy.drawImage(image, 0, 0, width, height);
+    const truth = copy.getImageData(0, 0, width, height).data;
+    const own = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+    let sum = 0;
+    let differ = 0;
+    for (let n = 0; n < own.length; n++) {
+      sum += Math.abs(own[n] - truth[n]);
+      if (own[n] !== truth[n]) differ += 1;
+    }
+    const a = canvas.getBoundingClientRect();
+    const b = image.getBoundingClientRect();
+    return {
+      size: [image.naturalWidth - width, image.naturalHeight - height],
+      mean: sum / own.length,
+      differ: differ / own.length,
+      boxes: ["x", "y", "width", "height"].map((key) => a[key] - b[key]),
+    };
+  });
+
+// The pixels of the picture's part of the page, as they are seen, away from what lies over it.
+async function seen(page) {
+  const box = await page.locator("#picture").boundingBox();
+  const clip = { x: box.x + 100, y: box.y + 120, width: 220, height: 100 };
+  return (await page.screenshot({ clip })).toString("base64");
+}
+
+test("r asks for the reference, shows it while it is held and no longer", () =>
+  withPage(async (page) => {
+    const before = await pixels(page);
+    const seenBefore = await seen(page);
+    const asked = page.waitForResponse((answer) => answer.request().method() === "POST");
+    await page.keyboard.down("r");
+    await page.keyboard.up("r");
+    assert.equal((await asked).status(), 202);
+    const view = JSON.parse((await asked).request().postData());
+    assert.deepEqual([view.image.width, view.image.height], [before.width, before.height]);
+    await page.waitForFunction(() =>
+      /^\s*reference \d+×\d+: \d+ %, \d+ s left\s*$/.test(
+        document.querySelector("#reference").textContent,
+      ),
+    );
+    assert.equal(await page.locator("#reference-picture").isVisible(), false);
+    await ready(page);
+    assert.equal(await seen(page), seenBefore, "it is not shown before it is held");
+    await page.keyboard.down("r");
+    await page.keyboard.down("r"); // as it repeats
+    assert.equal(await page.locator("#reference-picture").isVisible(), true);
+    assert.equal(await mark(page), "reference");
+    const { size, mean, differ, boxes } = await apart(page);
+    assert.deepEqual(size, [0, 0]);
+    assert.ok(mean > 0.01 && mean < 2, `${mean} codes apart on average`);
+    assert.ok(differ > 0.01, `${differ} of the values differ`);
+    assert.deepEqual(boxes, [0, 0, 0, 0], "pixel on pixel");
+    assert.notEqual(await seen(page), seenBefore, "another picture is seen");
+    await shot(page, "reference");
+    await page.keyboard.up("r");
+    assert.equal(await page.locator("#reference-picture").isVisible(), false);
+    assert.equal(await mark(page), "final");
+    assert.equal(await seen(page), seenBefore, "exactly as before");
+    assert.equal((await pixels(page)).hash, before.hash);
+  }));
+
+test("the error that is told is the true one of the picture", () =>
+  withPage(async (page) => {
+    await page.keyboard.press("r");
+    await ready(page);
+    const told = Number(/error (\S+) true/.exec(await words(page))[1]);
+    const { view, truth } = await page.evaluate(async () => {
+      const { src } = document.querySelector("#reference-picture");
+      const { jobs } = await (await fetch("v1/jobs")).json();
+      const job = jobs.find(({ result }) => result !== null && src.endsWith(result.picture));
+      return { view: job.kind, truth: job.result.error };
+    });
+    assert.equal(view, "reference");
+    assert.ok(Math.abs(told - truth.value) <= 0.05 * truth.value, `${told} of ${truth.value}`);
+    // In displayed codes an error is some 13 times larger at most, and a JPEG's own comes in too.
+    const { mean } = await apart(page);
+    assert.ok(mean / 255 < 13 * truth.value + 0.01, `${mean} for ${truth.value}`);
+  }));
+
+test("another view drops it: what is there, and what is being drawn", () =>
+  withPage(async (page) => {
+    await page.keyboard.press("r");
+    await ready(page);
+    await drag(page, 30, 0, 4);
+    await finalPicture(page);
+    assert.equal(await page.locator("#reference").isVisible(), false);
+    const cancelled = page.waitForResponse((answer) => answer.request().method() === "DELETE");
+    await page.keyboard.down("r");
+    assert.equal(await page.locator("#reference-picture").isVisible(), false, "not the old one");
+    await page.waitForFunction(() =>
+      /: \d+ %/.test(document.querySelector("#reference").textContent),
+    );
+    await page.keyboard.up("r");
+    await page.locator("#picture").focus();
+    await page.keyboard.press("ArrowLeft");
+    assert.equal((await cancelled).status(), 204);
+    await finalPicture(page);
+    assert.equal(await page.locator("#reference").isVisible(), false);
+    // Escape does the same, and the next hold begins anew.
+    await page.keyboard.press("r");
+    await page.waitForFunction(() =>
+      /: \d+ %/.test(document.querySelector("#reference").textContent),
+    );
+    const again = page.waitForResponse((answer) => answer.request().method() === "DELETE");
+    await page.keyboard.press("Escape");
+    assert.equal((await again).status(), 204);
+    assert.equal(await page.locator("#reference").isVisible(), false);
+    await page.keyboard.press("r");
+    await ready(page);
+  }));
+
+test("the button is held by mouse, finger or space", () =>
+  withPage(
+    async (page) => {
+      const button = page.getByRole("button", { name: "Reference: hold to see it" });
+      const isShown = () => page.locator("#reference-picture").isVisible();
+      await button.tap();
+      await ready(page);
+      assert.equal(await isShown(), false);
+      const { x, y, width, height } = await button.boundingBox();
+      assert.ok(width >= 36 && height >= 36, `as large as its neighbours: ${width} x ${height}`);
+      await page.mouse.move(x + width / 2, y + height / 2);
+      await page.mouse.down();
+      assert.equal(await isShown(), true);
+      await page.mouse.move(10, 200);
+      await page.mouse.up();
+      assert.equal(await isShown(), false, "let go elsewhere");
+      await button.focus();
+      await page.keyboard.down("Space");
+      assert.equal(await isShown(), true);
+      await page.keyboard.up("Space");
+      assert.equal(await isShown(), false);
+      await shot(page, "reference-390");
+    },
+    { viewport: { width: 390, height: 500 }, hasTouch: true, isMobile: true, colorScheme: "light" },
+  ));

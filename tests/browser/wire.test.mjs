@@ -1,0 +1,223 @@
+// The page and its wire: bytes that come one at a time, recorded sessions that come all at once.
+import assert from "node:assert/strict";
+import { connect, createServer } from "node:net";
+import { after, before, test } from "node:test";
+import {
+  Daemon,
+  drag,
+  finalPicture,
+  freePort,
+  launch,
+  openPage,
+  patience,
+  pixels,
+  state,
+} from "./support.mjs";
+
+let browser;
+let daemon;
+
+before(async () => {
+  browser = await launch();
+  daemon = await new Daemon(await freePort()).start();
+});
+
+after(async () => {
+  await browser?.close();
+  await daemon?.kill();
+});
+
+const small = { viewport: { width: 500, height: 420 } };
+
+// Between the browser and the daemon: what the daemon says goes on a byte at a time, each in a
+// segment of its own, as far as the system does not join what its reader has not yet taken.
+async function byteProxy(port) {
+  const counts = { segments: 0, reads: 0 };
+  const sockets = new Set();
+  const server = createServer({ noDelay: true }, (near) => {
+    const far = connect({ port, host: "127.0.0.1", noDelay: true });
+    sockets.add(near).add(far);
+    near.pipe(far);
+    for (const socket of [near, far]) {
+      socket.on("error", () => [near, far].forEach((each) => each.destroy()));
+    }
+    (async () => {
+      for await (const chunk of far) {
+        counts.reads += 1;
+        for (let n = 0; n < chunk.length && !near.destroyed; n++) {
+          counts.segments += 1;
+          await new Promise((resolve) => near.write(chunk.subarray(n, n + 1), resolve));
+        }
+      }
+      near.end();
+    })().catch(() => near.destroy());
+  });
+  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+  return {
+    counts,
+    port: server.address().port,
+    close: () => {
+      for (const socket of sockets) socket.destroy();
+      server.close();
+    },
+  };
+}
+
+test("page and frames that come a byte at a time are the same page and frames", async () => {
+  const proxy = await byteProxy(daemon.port);
+  const whole = await openPage(browser, daemon.url, small);
+  const torn = await openPage(browser, `http://127.0.0.1:${proxy.port}/`, small);
+  try {
+    await finalPicture(whole);
+    torn.setDefaultTimeout(60_000 * patience);
+    await finalPicture(torn);
+    assert.deepEqual(await pixels(torn), await pixels(whole));
+    assert.ok(proxy.counts.segments > 60_000, `${proxy.counts.segments} bytes, one by one`);
+    assert.ok(proxy.counts.segments > 100 * proxy.counts.reads, "fewer came in as many parts");
+    for (const page of [whole, torn]) {
+      await page.locator("#picture").focus();
+      await page.keyboard.press("ArrowRight");
+      await finalPicture(page);
+      assert.deepEqual(page.faults, []);
+    }
+    assert.deepEqual(await pixels(torn), await pixels(whole), "after a turn too");
+  } finally {
+    await whole.context().close();
+    await torn.context().close();
+    proxy.close();
+  }
+});
+
+// Runs in a page first: keeps every message that comes in and what goes out between.
+const record = () => {
+  window.tape = [];
+  const Native = window.WebSocket;
+  window.WebSocket = class extends Native {
+    constructor(...args) {
+      super(...args);
+      window.tape.length = 0;
+      this.addEventListener("message", ({ data }) => {
+        if (typeof data === "string") return window.tape.push({ text: data });
+        let binary = "";
+        for (const byte of new Uint8Array(data)) binary += String.fromCharCode(byte);
+        window.tape.push({ base64: btoa(binary) });
+      });
+    }
+    send(text) {
+      const { type, rev } = JSON.parse(text);
+      if (type === "open" || type === "patch") window.tape.push({ sent: type, rev });
+      return super.send(text);
+    }
+  };
+};
+
+// Runs in a page first: a socket that plays the tape, what follows a message of the page's as soon
+// as it was sent, all else without a pause. Pictures being decoded at a time are counted.
+const replay = (tape) => {
+  window.played = { acks: [], sent: 0, frames: 0, decodes: 0, decodesMost: 0, decoded: 0 };
+  const { played } = window;
+  const decode = window.createImageBitmap.bind(window);
+  window.createImageBitmap = async (...args) => {
+    played.decodes += 1;
+    played.decodesMost = Math.max(played.decodesMost, played.decodes);
+    try {
+      return await decode(...args);
+    } finally {
+      played.decodes -= 1;
+      played.decoded += 1;
+    }
+  };
+  window.WebSocket = class {
+    constructor() {
+      this.readyState = 0;
+      this.bufferedAmount = 0;
+      this.next = 0;
+      setTimeout(() => {
+        this.readyState = 1;
+        this.play();
+      });
+    }
+    send(text) {
+      const message = JSON.parse(text);
+      if (message.type === "ack") played.acks.push(message.seq);
+      if (message.type === "open" || message.type === "patch") {
+        played.sent += 1;
+        queueMicrotask(() => this.play());
+      }
+    }
+    close() {
+      played.closed = true;
+    }
+    play() {
+      for (; this.next < tape.length; this.next++) {
+        const entry = tape[this.next];
+        // The page's first words are waited for; what it did later nobody does now.
+        if (entry.sent !== undefined) {
+          if (entry.first && played.sent < entry.first) return;
+          continue;
+        }
+        if (entry.base64 !== undefined) played.frames += 1;
+        const data =
+          entry.text ?? Uint8Array.from(atob(entry.base64), (c) => c.charCodeAt(0)).buffer;
+        this.onmessage?.({ data });
+      }
+    }
+  };
+};
+
+async function recorded(run) {
+  const page = await openPage(browser, daemon.url, { ...small, initScript: record });
+  try {
+    await finalPicture(page);
+    await run(page);
+    await finalPicture(page);
+    const tape = await page.evaluate(() => window.tape);
+    let said = 0;
+    const opening = tape.findIndex(({ base64 }) => base64 !== undefined);
+    tape.forEach((entry, n) => {
+      if (entry.sent !== undefined && n < opening) entry.first = ++said;
+    });
+    return { tape, pixels: await pixels(page), state: await state(page) };
+  } finally {
+    await page.context().close();
+  }
+}
+
+const sessions = {
+  "a turn": (page) => drag(page, 150, 60, 80),
+  "a course of time": async (page) => {
+    await page.keyboard.press("Space");
+    await page.waitForFunction(() => Number(document.querySelector("#picture").dataset.step) >= 5);
+    await page.keyboard.press("Space");
+  },
+};
+
+for (const [name, run] of Object.entries(sessions)) {
+  test(`${name}, recorded and replayed flat out, ends in the same picture`, async () => {
+    const { tape, pixels: expected, state: last } = await recorded(run);
+    const page = await openPage(browser, daemon.url, {
+      ...small,
+      prepare: (fresh) => fresh.addInitScript(replay, tape),
+    });
+    try {
+      await page.waitForFunction(
+        (seq) => document.querySelector("#picture").dataset.seq === seq,
+        last.seq,
+      );
+      assert.deepEqual(await pixels(page), expected);
+      const played = await page.evaluate(() => window.played);
+      assert.ok(played.frames > 5, `${played.frames} frames were recorded`);
+      assert.ok(played.decodesMost <= 2, `${played.decodesMost} decoded at a time`);
+      assert.ok(played.decoded < played.frames, "what is overtaken is not decoded");
+      assert.equal(played.acks.at(-1), Number(last.seq), "the last answer counts for all");
+      assert.deepEqual(
+        played.acks,
+        [...played.acks].sort((a, b) => a - b),
+      );
+      assert.equal(played.closed, undefined, "the page takes it for the protocol that it is");
+      assert.deepEqual(page.faults, []);
+    } finally {
+      await page.context().close();
+    }
+  });
+}

@@ -1,0 +1,231 @@
+"""What the system refuses: memory, sockets, files, disk, descriptors; and a clock that jumps."""
+import json
+import os
+import pathlib
+import re
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+from shim import Shim
+from support import (PATIENCE_S, SAMPLE, Stream, Untried, ask, case, check_good,
+                     check_good_stream, cpu_s, is_sanitized, metric, need, small_view, wait_for)
+
+HERE = pathlib.Path(__file__).parent
+FAKETIME = "/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1"
+
+
+def shim_of(world):
+    return pathlib.Path(world.program).resolve().parent / "tests/libfaults_shim.so"
+
+
+def inject(world, count, *kinds, phases=("serve", "guarded")):
+    """So many rounds of each kind; the whole sweep is inject.py's own."""
+    if not shim_of(world).exists():
+        raise Untried(f"{shim_of(world)} is not built (sanitizers have their own allocator): no "
+                      f"{', '.join(kinds)} was made to fail")
+    if world.quick:
+        raise Untried("not in a quick round: inject.py --quick is a test of its own")
+    words = [word for kind in kinds for word in ("--kind", kind)]
+    words += [word for phase in phases for word in ("--phase", phase)]
+    done = subprocess.run([sys.executable, str(HERE / "inject.py"), "--program", world.program,
+                           "--count", str(count), "--seconds", "600", "--slack",
+                           str(world.slack), *words],
+                          capture_output=True, text=True, check=False)
+    need(done.returncode == 0, done.stdout[-400:] + done.stderr[-200:])
+    rows = re.findall(r"^\| \w+ \| \w+ \| [\d-]+ \| (\d+) \(.*?\) \| (\d+) ", done.stdout,
+                      re.MULTILINE)
+    need(rows, f"inject.py tells nothing: {done.stdout[-200:]}")
+    places, calls = (sum(int(row[n]) for row in rows) for n in (0, 1))
+    return f"{calls} calls failed at {places} places; nobody else was hit, it goes on"
+
+
+@case("malloc that fails", 200, 3)
+def no_malloc(world, count):
+    return inject(world, count, "malloc", "mmap")
+
+
+@case("send, recv and accept that fail", 100, 3)
+def no_sockets(world, count):
+    return inject(world, count, "send", "recv", "accept", "socket")
+
+
+@case("read, write, fsync and open that fail", 100, 3)
+def no_files(world, count):
+    return inject(world, count, "read", "write", "fsync", "open")
+
+
+@case("threads that cannot be had at the start", 10, 3)
+def no_threads(world, count):
+    return inject(world, count, "thread", phases=["start"])
+
+
+@case("random numbers that are not to be had", 50, 3)
+def no_random(world, count):
+    return inject(world, count, "random")
+
+
+@case("a disk that is full", 60, 12)
+def full_disk(world, count):
+    if os.geteuid() != 0:
+        raise Untried("a small tmpfs needs root: no full disk was tried (inject.py's ENOSPC was)")
+    folder = world.new_folder()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=128k", "none", folder],
+                      capture_output=True, check=False).returncode != 0:
+        raise Untried("no tmpfs can be mounted here: no full disk was tried")
+    try:
+        daemon = world.start("--state-dir", str(folder), SAMPLE)
+        saved = []
+        view = {"dataset": SAMPLE, "scalars": [{"field": "cloud"}] * 4}
+        while len(saved) < 1000:
+            got = ask(daemon.port, "POST", "/v1/views", view)
+            if got.status != 201:
+                break
+            saved.append(json.loads(got.body)["id"])
+        need(got.status == 507, f"a full disk is answered by {got.status}")
+        for n in range(count):
+            got = ask(daemon.port, "POST", "/v1/views", view)
+            need(got.status == 507, f"a full disk is answered by {got.status}")
+            need(ask(daemon.port, "GET", f"/v1/views/{saved[n % len(saved)]}").status == 200,
+                 "a view that was saved is gone")
+            check_good(daemon.port)
+        need(ask(daemon.port, "DELETE", f"/v1/views/{saved.pop()}").status == 204, "cannot delete")
+        need(ask(daemon.port, "POST", "/v1/views", view).status == 201, "there is room again")
+        need(not list(folder.rglob("*.part")), "a part of a file was left")
+        need(daemon.stop() == 0, "it did not end with 0")
+        again = world.start("--state-dir", str(folder), SAMPLE)
+        for name in saved:
+            need(ask(again.port, "GET", f"/v1/views/{name}").status == 200, "a saved view is lost")
+        again.stop()
+    finally:
+        world.end_case()
+        subprocess.run(["umount", folder], check=True)
+    return f"507 each time, {len(saved)} views before stay, saved again once there is room"
+
+
+def through_jumps(daemon, jump, count):
+    with Stream(daemon.port) as one:
+        for n in range(count):
+            jump((-1) ** n * (10 ** (n % 9)))
+            since = time.monotonic()
+            one.final_frame(small_view(turn=0.01 * n))
+            check_good(daemon.port)
+            need(time.monotonic() - since < PATIENCE_S / 2, "a jump of the clock holds it up")
+        jump(0)
+    need(metric(daemon.port, "windsplat_sessions") <= 1, "sessions were counted wrongly")
+    check_good_stream(daemon.port)
+
+
+@case("a clock that jumps", 40, 8)
+def clock(world, count):
+    shim = Shim(shim_of(world), world.new_folder())
+    daemon = shim.start(world.program, SAMPLE)
+    world.started.append(daemon)
+    through_jumps(daemon, shim.jump, count)
+    days = {line[:10] for line in daemon.lines}
+    need(len(days) > 1, "the log shows no jump: nothing was tried")
+    need(daemon.stop() == 0, "it did not end with 0")
+    return f"by up to {10 ** min(count - 1, 8)} s both ways; streams and requests go on"
+
+
+@case("a clock that jumps, by faketime", 20, 4)
+def faked_clock(world, count):
+    if not pathlib.Path(FAKETIME).exists():
+        raise Untried("faketime is not installed: the clock did not jump by that tool")
+    if is_sanitized(world.program):
+        raise Untried("a build with sanitizers: faketime cannot be preloaded into it")
+    file = world.new_folder() / "time"
+    file.write_text("+0\n")
+    daemon = world.start(SAMPLE, env=dict(
+        os.environ, LD_PRELOAD=FAKETIME, FAKETIME_TIMESTAMP_FILE=str(file), FAKETIME_NO_CACHE="1",
+        FAKETIME_DONT_FAKE_MONOTONIC="1", DONT_FAKE_MONOTONIC="1"))
+
+    def jump(seconds):
+        (file.parent / "next").write_text(f"{seconds:+d}\n")
+        os.replace(file.parent / "next", file)
+    through_jumps(daemon, jump, count)
+    need(daemon.stop() == 0, "it did not end with 0")
+    return "streams and requests go on"
+
+
+@case("no file descriptors left", 200, 60)
+def no_descriptors(world, count):
+    """More connections than descriptors; the listening socket must not be looked at in a loop."""
+    limit = 40
+    if is_sanitized(world.program):
+        raise Untried("a build with sanitizers: UBSan asks by a pipe whether memory can be read, "
+                      "and takes it for invalid where there is no descriptor for one")
+
+    def prepare():
+        resource.setrlimit(resource.RLIMIT_NOFILE, (limit, limit))
+    daemon = world.start(SAMPLE, prepare=prepare)
+    check_good(daemon.port)
+    held = [socket.create_connection(("127.0.0.1", daemon.port)) for _ in range(max(count, limit))]
+    time.sleep(0.5)
+    used, since = cpu_s(daemon.pid), time.monotonic()
+    time.sleep(1.5)
+    share = (cpu_s(daemon.pid) - used) / (time.monotonic() - since)
+    need(share < 0.2, f"it takes {100 * share:.0f} % of a processor while it cannot accept")
+    for one in held:
+        one.close()
+    wait_for(lambda: answers(daemon.port), PATIENCE_S, "no answer once descriptors are free")
+    failures = metric(daemon.port, "windsplat_accept_failures_total")
+    need(failures > 0 and "cannot accept" in daemon.log(), "no lack of descriptors was met")
+    need(failures < 200, f"{failures:.0f} attempts: it does not back off")
+    check_good_stream(daemon.port)
+    need(daemon.stop() == 0, "it did not end with 0")
+    return f"{failures:.0f} attempts, {100 * share:.1f} % of a processor; then it goes on"
+
+
+def answers(port):
+    try:
+        return ask(port, "GET", "/livez", timeout=2).status == 200
+    except OSError:
+        return False
+
+
+@case("a loader that is killed", 30, 6)
+def killed_loader(world, count):
+    folder = world.new_folder()
+    subprocess.run([world.program, "synth", "tornado", "--dims", "48x48x48", "--steps", "40", "-o",
+                    folder / "wind.nc"], check=True, capture_output=True)
+    daemon = world.start(str(folder / "wind.nc"), "--memory-limit", "300M")
+    target = "/v1/datasets/wind/frame.jpg?width=32&height=24&step="
+    killed = failed = 0
+    for n in range(count):
+        for child in children(daemon.pid):
+            try:
+                os.kill(child, signal.SIGKILL)
+                killed += 1
+            except ProcessLookupError:
+                continue
+        got = ask(daemon.port, "GET", f"{target}{n % 40}")
+        need(got.status in (200, 409, 422, 500, 503), f"answered by {got.status}")
+        failed += got.status != 200
+    need(killed > 0, "there was never a loader to kill")
+    wait_for(lambda: ask(daemon.port, "GET", f"{target}39").status == 200, PATIENCE_S,
+             "the file is not drawn any more")
+    zombies = [c for c in children(daemon.pid) if state_of(c) == "Z"]
+    need(len(zombies) <= 1, f"{len(zombies)} zombies")
+    return f"{killed} killed, {failed} requests failed; the file is read again"
+
+
+def children(pid):
+    out = []
+    for task in os.listdir(f"/proc/{pid}/task"):
+        try:
+            text = pathlib.Path(f"/proc/{pid}/task/{task}/children").read_text()
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        out += [int(word) for word in text.split()]
+    return out
+
+
+def state_of(pid):
+    try:
+        return pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return ""

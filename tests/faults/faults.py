@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+"""Every fault that docs/robustness/faults.md lists, tried against a running daemon. A Markdown
+table on stdout: the fault, how often it was tried, what came of it. Linux only.
+
+Usage: faults.py [--program=build/release/windsplat] [--quick] [--count=N] [--only=PART]...
+       [--list] [--require-all] [--slack=1]
+
+--quick tries each a few times; --count gives all the same number of tries; --only takes cases
+whose name has this part; --slack allows so much more time than is asked of a machine of its own. A
+tool that is not installed or a right that is missing is named, with what was therefore not tried:
+those rows say NOT TRIED, and with --require-all they are failures. Exit code 0: every case that
+was tried is ok."""
+import argparse
+import pathlib
+import sys
+import tempfile
+import time
+import traceback
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+# Cases are entered by being imported, in the order of the table.
+import cases_http  # noqa: E402, F401
+import cases_stream  # noqa: E402, F401
+import cases_access  # noqa: E402, F401
+import cases_view  # noqa: E402, F401
+import cases_data  # noqa: E402, F401
+import cases_system  # noqa: E402, F401
+import cases_life  # noqa: E402, F401
+from support import CASES, Failed, Untried, World, check_good  # noqa: E402
+
+
+def run_case(world, one, count):
+    """What came of it, and the verdict."""
+    try:
+        told = one.call(world, count)
+        daemon = world.daemon()
+        check_good(daemon.port)
+        return told, "ok"
+    except Untried as why:
+        return str(why), "NOT TRIED"
+    except Failed as fault:
+        return str(fault), "FAILED"
+    except Exception:  # a fault of the script, or one that it does not foresee
+        return " / ".join(traceback.format_exc().strip().splitlines()[-3:]), "FAILED"
+    finally:
+        world.end_case()
+
+
+def cell(text):
+    return "".join(c if c.isprintable() else "?" for c in text).replace("|", "\\|")
+
+
+def run(options, world):
+    chosen = [c for c in CASES
+              if not options.only or any(part in c.name for part in options.only)]
+    if not chosen:
+        sys.exit("faults.py: no case has such a name; --list tells them")
+    print("| fault | tried | what came of it | |\n|---|---|---|---|", flush=True)
+    verdicts = []
+    for one in chosen:
+        count = options.count or (one.quick if options.quick else one.count)
+        since = time.monotonic()
+        before = world.shared
+        told, verdict = run_case(world, one, count)
+        if before is not None and not before.alive():
+            told, verdict = f"the daemon died ({before.child.returncode}); {told}", "FAILED"
+        verdicts.append(verdict)
+        tried = "-" if verdict == "NOT TRIED" else str(count)
+        print(f"| {one.name} | {tried} | {cell(told)} | {verdict} |", flush=True)
+        print(f"{one.name}: {time.monotonic() - since:.1f} s", file=sys.stderr)
+    return verdicts
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    default = pathlib.Path(__file__).resolve().parents[2] / "build/release/windsplat"
+    parser.add_argument("--program", default=str(default))
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--count", type=int)
+    parser.add_argument("--only", action="append", default=[])
+    parser.add_argument("--slack", type=float, default=1, help="times are so much longer")
+    parser.add_argument("--list", action="store_true")
+    parser.add_argument("--require-all", action="store_true")
+    options = parser.parse_args()
+    if options.list:
+        print("\n".join(f"{c.name} ({c.count}, quick {c.quick})" for c in CASES))
+        return 0
+    with tempfile.TemporaryDirectory(prefix="windsplat-faults-") as folder:
+        world = World(options.program, pathlib.Path(folder).resolve(), options.quick,
+                      options.slack)
+        verdicts = run(options, world)
+        code = world.end()
+    untried, failed = verdicts.count("NOT TRIED"), verdicts.count("FAILED")
+    print(f"\n{len(verdicts)} faults: {len(verdicts) - untried - failed} ok, {failed} failed, "
+          f"{untried} not tried; the daemon that went through them ended with {code}")
+    return 1 if failed or code != 0 or (untried and options.require_all) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,429 @@
+#!/usr/bin/env python3
+"""Calls of the system's library that fail inside a running daemon: memory, sockets, files, threads.
+Each fails once at every place of the program that a scripted session reaches; then again with
+many failing in a row. A Markdown table on stdout. Linux only; not for builds with sanitizers,
+which have an allocator of their own.
+
+Usage: inject.py [--program=build/release/windsplat] [--shim=build/release/tests/libfaults_shim.so]
+       [--kind=malloc]... [--phase=serve|guarded|start|drain]... [--count=N] [--quick]
+       [--seconds=S] [--slack=1]
+
+The session: the page, a picture, values, a histogram, a file loaded by a job, a saved view made,
+changed and deleted, a stream with frames, a still and a patch that is wrong, the metrics. While it
+runs one call fails; what it hits may be answered by an error or be cut off, but not hang. After it
+a stream that was open all the while and a new request must work. --count and --seconds end a sweep
+early; the table says how many places were met. Phase guarded: the same on [::1] over TLS, with a
+token, with limits of one address, with logins and SIGHUPs. Phase start: the daemon starts or ends
+with a message and an exit code. Phase drain: it ends with 0 within 10 s. A kind of call of which
+none failed in a phase is a failure: then nothing was tried. Exit code 0: the daemon never died,
+hung, or refused good work afterwards."""
+import argparse
+import http.client
+import json
+import os
+import pathlib
+import secrets
+import shutil
+import signal
+import ssl
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+from shim import KINDS, Shim  # noqa: E402
+from support import (PATIENCE_S, ROOT, SAMPLE, Closed, Door, Failed, Stream,  # noqa: E402
+                     Untried, ask, check_good, check_good_stream, need, picture, small_view)
+
+STEP_S = 20  # a step that takes longer hangs
+DRAIN_S = 10
+BYSTANDERS_MAX, BYSTANDERS_SHARE = 2, 0.2  # that end since the call was made for them
+QUIET_ROUNDS = 2  # sessions without a new place end a sweep
+# Asked for its folder as the daemon starts; it ends the program where it finds no memory.
+LIBRARY = "libeccodes"
+BURST = 40  # calls in a row that fail
+SERVED = [kind for kind in KINDS if kind != "thread"]  # all threads are there from the start
+# What is called at all, by phase: each must fail there.
+CALLED = {"serve": SERVED, "guarded": SERVED,
+          "start": ["malloc", "open", "socket", "thread"], "drain": ["malloc", "send", "recv"]}
+PHASES = list(CALLED)
+LOST = (OSError, http.client.HTTPException, Closed, json.JSONDecodeError, KeyError, ValueError)
+
+
+class Session:
+    """What one visitor does. Each step is by itself; `lost` counts those that went wrong."""
+
+    def __init__(self, port, turn):
+        self.port, self.turn, self.lost, self.faults, self.words = port, turn, 0, [], []
+        self.steps = [self.page, self.rest, self.values, self.load, self.views, self.stream,
+                      self.others]
+
+    def run(self):
+        for step in self.steps:
+            since = time.monotonic()
+            try:
+                step()
+            except LOST as fault:
+                self.lost += 1
+                self.words.append(f"{step.__name__}: {type(fault).__name__} {fault}")
+            except Failed as slow:
+                self.faults.append(f"{step.__name__}: {slow}")
+            if time.monotonic() - since > STEP_S:
+                self.faults.append(f"{step.__name__} took {time.monotonic() - since:.0f} s")
+        return self
+
+    def get(self, method, target, body=None, headers=None):
+        got = ask(self.port, method, target, body, headers, timeout=STEP_S)
+        if got.status >= 500 and got.status not in (500, 503, 507):
+            raise Failed(f"{target} is answered by {got.status}")
+        if got.status >= 400:
+            problem = json.loads(got.body)
+            need("title" in problem, f"{target} is answered by {got.body[:80]!r}")
+            raise KeyError(got.status)
+        return got
+
+    def page(self):
+        self.get("GET", "/")
+        self.get("GET", "/v1")
+
+    def rest(self):
+        got = picture(self.port, SAMPLE, azimuth=self.turn, timeout=STEP_S)
+        if got.status != 200:
+            raise KeyError(got.status)
+        view = {"dataset": SAMPLE, "image": {"width": 48, "height": 32},
+                "camera": {"eye": [0.3, -2 - 0.001 * self.turn, 1]}}
+        self.get("POST", "/v1/frames", view, {"Accept": "image/png"})
+
+    def values(self):
+        self.get("GET", "/v1/datasets")
+        self.get("GET", f"/v1/datasets/{SAMPLE}")
+        self.get("GET", f"/v1/datasets/{SAMPLE}/probe?x=0&y=0&z=0.5")
+        self.get("GET", f"/v1/datasets/{SAMPLE}/fields/cloud/histogram?bins=16")
+
+    def load(self):
+        got = self.get("POST", "/v1/datasets", {"path": "small.nc"})
+        job = json.loads(got.body)
+        end = time.monotonic() + STEP_S
+        while job["state"] in ("queued", "running"):
+            need(time.monotonic() < end, f"the job stays {job['state']}")
+            time.sleep(0.01)
+            job = json.loads(self.get("GET", f"/v1/jobs/{job['id']}").body)
+        if job["state"] != "done":
+            raise KeyError(job["state"])
+        name = job["result"]
+        try:
+            self.get("GET", f"/v1/datasets/{name}/frame.jpg?width=32&height=24")
+        finally:
+            self.get("DELETE", f"/v1/datasets/{name}?forget=true")
+
+    def views(self):
+        got = self.get("POST", "/v1/views", {"dataset": SAMPLE})
+        name = json.loads(got.body)["id"]
+        self.get("PATCH", f"/v1/views/{name}", {"step": 0},
+                 {"Content-Type": "application/merge-patch+json"})
+        self.get("GET", f"/v1/views/{name}")
+        self.get("DELETE", f"/v1/views/{name}")
+
+    def stream(self):
+        with Stream(self.port, timeout=STEP_S) as one:
+            if one.status != 101:
+                raise KeyError(one.status)
+            for n in range(2):
+                one.patch(small_view(turn=0.001 * self.turn + 0.1 * n, size=(64, 48)))
+                one.answer_to_patch()
+            one.patch({"camera": {"fovY": "wide"}})
+            one.answer_to_patch()
+            one.say({"type": "still", "id": 7, "width": 40, "height": 30, "format": "png",
+                     "scale": 1})
+            while b'"id":7' not in (got := one.message())[1] and got[0] == 1:
+                pass
+
+    def others(self):
+        self.get("GET", "/metrics")
+        self.get("POST", "/v1/forecasts", {"dataset": SAMPLE})
+        self.get("GET", "/readyz")
+
+
+class GuardedSession(Session):
+    """One that logs in, too, with the right token and a wrong one, while the daemon reads its
+    configuration, its token and its certificate again."""
+
+    def __init__(self, port, turn, pid):
+        super().__init__(port, turn)
+        self.pid = pid
+        self.steps += [self.hang_up, self.login, self.page]
+
+    def hang_up(self):
+        os.kill(self.pid, signal.SIGHUP)
+        self.get("GET", "/livez")
+
+    def login(self):
+        form = {"Content-Type": "application/x-www-form-urlencoded",
+                "Origin": f"https://[::1]:{self.port.port}"}
+        for token, status in ((self.port.token, 303), ("not-the-token-at-all", 401)):
+            got = ask(self.port._replace(token=None), "POST", "/login", f"token={token}", form,
+                      timeout=STEP_S)
+            if got.status != status:
+                raise KeyError(got.status)
+
+
+class Sweep:
+    def __init__(self, options, folder):
+        self.options, self.folder = options, folder
+        root = folder / "root"
+        root.mkdir()
+        subprocess.run([options.program, "synth", "tornado", "--dims", "8x8x8", "--steps", "1",
+                        "-o", root / "small.nc"], check=True, capture_output=True)
+        self.arguments = ["--data-root", str(root), "--state-dir", str(folder / "state"),
+                          "--threads", "2", SAMPLE]
+        self.shim = Shim(options.shim, folder)
+        self.daemon = self.bystander = None
+        self.guards = None  # of phase guarded: options, TLS context, token
+        self.door = None
+        self.turn = self.bystanders_ended = 0
+        self.failures = []
+
+    def make_guards(self):
+        if not shutil.which("openssl"):
+            raise Untried("openssl is not installed: no certificate, so no TLS was tried")
+        cert, key, file = (self.folder / name for name in ("cert", "key", "token"))
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2",
+                        "-subj", "/CN=localhost", "-addext", "subjectAltName=IP:::1",
+                        "-keyout", key, "-out", cert], check=True, capture_output=True)
+        token = secrets.token_hex(24)
+        file.write_text(token + "\n")
+        file.chmod(0o600)
+        config = self.folder / "config"
+        config.write_text(json.dumps({"allow-origin": ["https://elsewhere.example"]}))
+        # Limits that are counted and never reached: an answer of 429 would be a step that is lost.
+        options = ["--tls-cert", str(cert), "--tls-key", str(key), "--token-file", str(file),
+                   "--config", str(config), "--max-render-per-address", "1000000",
+                   "--max-bytes-per-address", "1000000000",
+                   "--max-failed-logins-per-address", "1000000"]
+        return options, ssl.create_default_context(cafile=cert), token
+
+    def start(self):
+        more, how = [], {}
+        if self.guards:
+            more, how = self.guards[0], {"listen": "[::1]:0"}
+        self.daemon = self.shim.start(self.options.program, *more, *self.arguments, **how)
+        self.door = (Door("::1", self.daemon.port, *self.guards[1:]) if self.guards
+                     else Door("127.0.0.1", self.daemon.port))
+        # Undisturbed every step goes well; what is made once is made.
+        first = self.session()
+        need(not first.words and not first.faults, f"without a fault: {first.words + first.faults}")
+        self.bystander = Stream(self.door)
+        self.bystander.final_frame(small_view(turn=0.5, size=(32, 24)))
+
+    def session(self):
+        turn = self.next_turn()
+        one = (GuardedSession(self.door, turn, self.daemon.pid) if self.guards
+               else Session(self.door, turn))
+        return one.run()
+
+    def next_turn(self):
+        self.turn += 1
+        return self.turn % 300
+
+    def fail(self, text):
+        """Notes it, and goes on with a new daemon where this one is of no more use."""
+        log = self.daemon.lines[-14:] if self.daemon else []
+        self.failures.append(f"{text}; log: {' / '.join(log)}"[:2500])
+        print(f"FAILED: {self.failures[-1]}", file=sys.stderr, flush=True)
+
+    def judge(self, what, session):
+        """After a session with a failing call: the daemon lives, others are served."""
+        time.sleep(0.01)
+        try:
+            need(self.daemon.alive(), f"{what}: the daemon died ({self.daemon.child.poll()})")
+            for fault in session.faults:
+                raise Failed(f"{what}: {fault}")
+            self.ask_bystander()
+            check_good(self.door)
+            if self.turn % 8 == 0:
+                check_good_stream(self.door)
+            return
+        except (Failed, *LOST) as fault:
+            self.fail(f"{what}: {type(fault).__name__} {fault}")
+        self.renew()
+
+    def ask_bystander(self):
+        """Its next frame. What failed may have been a call for the bystander's own sake, what is
+        drawn for a view at rest; then its stream may end, and the next one must work."""
+        try:
+            self.bystander.final_frame(small_view(turn=0.01 * self.next_turn(), size=(32, 24)))
+        except Closed:
+            self.bystanders_ended += 1
+            self.bystander = Stream(self.door)
+            self.bystander.final_frame(small_view(turn=0.01 * self.next_turn(), size=(32, 24)))
+
+    def renew(self):
+        if self.bystander:
+            self.bystander.close()
+        if self.daemon and self.daemon.alive():
+            self.daemon.stop(signal.SIGKILL)
+        self.start()
+
+    def out_of_time(self, since, rounds):
+        return (rounds >= self.options.count or
+                time.monotonic() - since > self.options.seconds)
+
+    def serve(self, kind):
+        """Every place once; then runs of failing calls."""
+        since, rounds, quiet, hit, lost = time.monotonic(), 0, 0, 0, 0
+        self.bystanders_ended = 0
+        while quiet < QUIET_ROUNDS and not self.out_of_time(since, rounds):
+            self.shim.arm_sites(kind)
+            session = self.session()
+            failed = self.shim.disarm(kind)
+            rounds += 1
+            hit += failed
+            lost += session.lost
+            quiet = 0 if failed else quiet + 1
+            self.judge(f"{kind}, a new place", session)
+        all_met = quiet >= QUIET_ROUNDS
+        bursts = 0
+        calls = self.calls_of_a_session(kind)
+        while calls and bursts < (1 if self.options.quick else 10):
+            self.shim.arm(kind, at=1 + bursts * calls // 10, times=BURST)
+            session = self.session()
+            hit += self.shim.disarm(kind)
+            lost += session.lost
+            bursts += 1
+            self.judge(f"{kind}, {BURST} calls in a row", session)
+        told = "every place met" if all_met else "ended by its limit, places are left"
+        phase = "guarded" if self.guards else "serve"
+        self.must_have_failed(kind, phase, hit)
+        if self.bystanders_ended > max(BYSTANDERS_MAX, (rounds + bursts) * BYSTANDERS_SHARE):
+            self.fail(f"{kind}, {phase}: the bystander ended {self.bystanders_ended} times")
+        return (f"| {kind} | {phase} | {calls} | {self.shim.get(kind, 'known')} ({told}) | {hit} "
+                f"| {lost} of {len(session.steps) * (rounds + bursts)} steps, "
+                f"the bystander ended {self.bystanders_ended} times |")
+
+    def must_have_failed(self, kind, phase, hit):
+        """A sweep in which no call failed has tried nothing."""
+        if hit == 0:
+            self.fail(f"{kind}, {phase}: no call was made to fail")
+
+    def calls_of_a_session(self, kind):
+        self.shim.arm(kind, at=1 << 40)
+        self.session()
+        seen = self.shim.get(kind, "seen")
+        self.shim.disarm(kind)
+        return seen
+
+    def at_start(self, kind):
+        """Until it starts without meeting a new place."""
+        since, rounds, started, ended, hit, quiet = time.monotonic(), 0, 0, 0, 0, 0
+        aborts = 0
+        while quiet < QUIET_ROUNDS and not self.out_of_time(since, rounds):
+            self.shim.arm_sites(kind)
+            self.daemon = self.shim.start(self.options.program, *self.arguments, must_start=False)
+            failed = self.shim.disarm(kind)
+            rounds += 1
+            hit += failed
+            quiet = 0 if failed else quiet + 1
+            try:
+                if self.daemon.port is None:
+                    code = self.daemon.child.wait(PATIENCE_S)
+                    self.daemon.reader.join(5)
+                    ended += 1
+                    if code == -signal.SIGABRT and LIBRARY in self.daemon.log():
+                        aborts += 1
+                        continue
+                    need(code in (1, 2, 3), f"it ended with {code}")
+                    need(any(self.daemon.lines), "it ended without a message")
+                else:
+                    started += 1
+                    check_good(self.daemon.port)
+                    need(self.daemon.stop() == 0, "it was stopped and did not end with 0")
+            except (Failed, *LOST) as fault:
+                self.fail(f"{kind} at the start: {fault}")
+                if self.daemon.alive():
+                    self.daemon.stop(signal.SIGKILL)
+        told = "every place met" if quiet >= QUIET_ROUNDS else "ended by its limit, places are left"
+        self.must_have_failed(kind, "start", hit)
+        return (f"| {kind} | start | - | {self.shim.get(kind, 'known')} ({told}) | {hit} "
+                f"| {ended} ended with a message, {started} started, {aborts} were ended by "
+                "ecCodes' own checks |")
+
+    def at_drain(self, kind):
+        since, rounds, hit, quiet, slowest = time.monotonic(), 0, 0, 0, 0.0
+        while quiet < QUIET_ROUNDS and not self.out_of_time(since, rounds):
+            self.daemon = self.shim.start(self.options.program, *self.arguments)
+            with Stream(self.daemon.port) as one:
+                one.patch(small_view(turn=0.001 * self.next_turn(), size=(640, 480)))
+                self.shim.arm_sites(kind)
+                begun = time.monotonic()
+                try:
+                    code = self.daemon.stop(patience=3 * DRAIN_S)
+                except Failed as fault:
+                    code = str(fault)
+                took = time.monotonic() - begun
+                failed = self.shim.disarm(kind)
+            rounds += 1
+            hit += failed
+            quiet = 0 if failed else quiet + 1
+            slowest = max(slowest, took)
+            if code != 0 or took > DRAIN_S * self.options.slack:
+                self.fail(f"{kind} in a drain: ended with {code} after {took:.1f} s")
+        told = "every place met" if quiet >= QUIET_ROUNDS else "ended by its limit, places are left"
+        self.must_have_failed(kind, "drain", hit)
+        return (f"| {kind} | drain | - | {self.shim.get(kind, 'known')} ({told}) | {hit} "
+                f"| {rounds} drains, the longest {slowest:.1f} s |")
+
+    def run(self):
+        print("| call | while it | calls a session | places that failed | calls that failed "
+              "| steps that went wrong |\n|---|---|---|---|---|---|", flush=True)
+        for phase in self.options.phase:
+            serves = phase in ("serve", "guarded")
+            self.guards = self.make_guards() if phase == "guarded" else None
+            if serves:
+                self.start()
+            for kind in self.options.kind or CALLED[phase]:
+                self.shim.forget(kind)
+                print({"serve": self.serve, "guarded": self.serve, "start": self.at_start,
+                       "drain": self.at_drain}[phase](kind), flush=True)
+            if serves:
+                self.bystander.close()
+                code = self.daemon.stop()
+                need(code == 0, f"the daemon that lived through them ended with {code}")
+        return self.failures
+
+
+def parsed_options(words=None):
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--program", default=str(ROOT / "build/release/windsplat"))
+    parser.add_argument("--shim")
+    parser.add_argument("--kind", action="append", choices=KINDS)
+    parser.add_argument("--phase", action="append", choices=PHASES)
+    parser.add_argument("--count", type=int, default=100000, help="rounds of a sweep, at most")
+    parser.add_argument("--seconds", type=float, default=1800, help="of a sweep, at most")
+    parser.add_argument("--slack", type=float, default=1, help="times are so much longer")
+    parser.add_argument("--quick", action="store_true", help="a few rounds of every sweep")
+    options = parser.parse_args(words)
+    options.phase = options.phase or PHASES
+    if options.quick:
+        options.count, options.seconds = min(options.count, 2), min(options.seconds, 8)
+    options.shim = options.shim or str(pathlib.Path(options.program).resolve().parent
+                                       / "tests/libfaults_shim.so")
+    return options
+
+
+def main():
+    options = parsed_options()
+    with tempfile.TemporaryDirectory(prefix="windsplat-inject-") as folder:
+        try:
+            failures = Sweep(options, pathlib.Path(folder)).run()
+        except Untried as why:
+            print(f"inject.py: {why}")
+            return 1
+    print(f"\n{len(failures)} failures")
+    for text in failures:
+        print(f"- {text}")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,298 @@
+#!/usr/bin/env python3
+"""SIGTERM, SIGKILL and SIGHUP to a daemon under load, again and again. A Markdown table on stdout.
+Linux only.
+
+Usage: signals.py [--program=build/release/windsplat] [--rounds=50] [--signal=TERM]... [--quick]
+       [--slack=1]
+
+TERM: /readyz fails first, streams are closed by 1001, the daemon ends with 0 within 10 s. KILL:
+the next one on the same state folder has every view that was said to be saved, and none that is
+half written; a viewer that connects again and sends its view gets the same picture. HUP: with a
+config that is spoiled the old one stays and the log says so. Exit code 0: all of it."""
+import argparse
+import http.client
+import json
+import pathlib
+import random
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+from support import (PATIENCE_S, ROOT, SAMPLE, Closed, Daemon, Failed, Stream,  # noqa: E402
+                     Untried, ask, check_good, check_good_stream, need, small_view, wait_for)
+
+DRAIN_S = 10
+SEEN_S = 1  # from the signal until /readyz fails
+LOST = (OSError, http.client.HTTPException, Closed, Failed)
+
+
+class Load(threading.Thread):
+    """One that asks for pictures, turns a view in a stream, or saves views, until told to stop."""
+
+    def __init__(self, port, number):
+        super().__init__(daemon=True)
+        self.port, self.number, self.over = port, number, False
+        self.code = None  # by which its stream ended
+        self.done = 0
+        self.saved = {}  # id -> the step that was acknowledged last, or the two it may be
+
+    def run(self):
+        work = (self.stream, self.pictures, self.views)[self.number % 3]
+        while not self.over:
+            try:
+                work()
+            except Closed as end:
+                self.code = end.code
+                return
+            except LOST:
+                if not self.over:
+                    time.sleep(0.02)
+
+    def pictures(self):
+        ask(self.port, "GET", f"/v1/datasets/{SAMPLE}/frame.jpg?width=320&height=240"
+            f"&azimuth={self.done * 1.7 + self.number:.2f}", timeout=20)
+        self.done += 1
+
+    def stream(self):
+        with Stream(self.port, timeout=20) as one:
+            need(one.status == 101, "no stream")
+            while not self.over:
+                one.patch(small_view(turn=0.01 * self.done, size=(480, 320)))
+                one.answer_to_patch()
+                self.done += 1
+
+    def views(self):
+        """Saves a view, changes it, keeps in mind what it was told."""
+        got = ask(self.port, "POST", "/v1/views", {"dataset": SAMPLE, "step": 0}, timeout=20)
+        if got.status != 201:
+            return
+        name = json.loads(got.body)["id"]
+        self.saved[name] = {0}
+        for step in range(1, 4):
+            self.saved[name] = self.saved[name] | {step}  # either, until it is told
+            got = ask(self.port, "PATCH", f"/v1/views/{name}", {"step": step},
+                      {"Content-Type": "application/merge-patch+json"}, timeout=20)
+            if got.status == 200:
+                self.saved[name] = {step}
+        self.done += 1
+
+
+def loaded(port, count=6):
+    out = [Load(port, n) for n in range(count)]
+    for one in out:
+        one.start()
+    return out
+
+
+def stop_all(loads):
+    for one in loads:
+        one.over = True
+    for one in loads:
+        one.join(PATIENCE_S)
+        need(not one.is_alive(), "a request neither ended nor failed")
+
+
+def not_ready(connection, port):
+    """What /readyz says on a connection that was there before, or on a new one where that is no
+    more; "closed" where there is none to be had."""
+    try:
+        connection.request("GET", "/readyz")
+        answer = connection.getresponse()
+        answer.read()
+        return None if answer.status == 200 else answer.status
+    except LOST:
+        connection.close()
+    try:
+        got = ask(port, "GET", "/readyz", timeout=5)
+        return None if got.status == 200 else got.status
+    except LOST:
+        return "closed"
+
+
+def terminate(program, folder, rounds, slack=1):
+    """SIGTERM under load."""
+    slowest, codes, ready = 0.0, {}, {}
+    for _ in range(rounds):
+        daemon = Daemon(program, "--state-dir", str(folder / "state"), SAMPLE)
+        loads = loaded(daemon.port)
+        held = http.client.HTTPConnection("127.0.0.1", daemon.port, timeout=20)
+        held.connect()  # there before the drain, asks during it
+        time.sleep(random.uniform(0.2, 0.8))
+        since = time.monotonic()
+        daemon.child.send_signal(signal.SIGTERM)
+        status = wait_for(lambda at=daemon.port, one=held: not_ready(one, at), SEEN_S * slack,
+                          "/readyz goes on saying 200")
+        held.close()
+        # No further signal: a second one would end it at once.
+        code = daemon.stop(0, patience=3 * DRAIN_S * slack)
+        took = time.monotonic() - since
+        stop_all(loads)
+        need(code == 0, f"ended with {code}: {' / '.join(daemon.lines[-3:])}")
+        need(took < DRAIN_S * slack, f"a drain of {took:.1f} s")
+        need(status in (503, "closed"), f"/readyz says {status} in a drain")
+        ready[status] = ready.get(status, 0) + 1
+        slowest = max(slowest, took)
+        for one in loads:
+            if one.number % 3 == 0:
+                codes[one.code] = codes.get(one.code, 0) + 1
+    need(set(codes) <= {1001, 0, None} and codes.get(1001, 0) > 0, f"streams ended by {codes}")
+    parts = list((folder / "state").rglob("*.part"))
+    need(not parts, f"left behind: {parts[:3]}")
+    return (f"exit code 0, longest drain {slowest:.2f} s; streams ended by "
+            f"{times_each(codes, 'a close')}; /readyz {times_each(ready, '')}")
+
+
+def times_each(counts, nothing):
+    return ", ".join(f"{what or nothing} {n} times" for what, n in counts.items())
+
+
+def free_port():
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+def saved_views(port, loads, tell):
+    """Every view that was acknowledged is there, as it was told or as the last request made it."""
+    kept = 0
+    for name, steps in ((n, s) for one in loads for n, s in one.saved.items()):
+        got = ask(port, "GET", f"/v1/views/{name}")
+        need(got.status == 200, f"{tell}: a saved view is gone: {got.status}")
+        step = json.loads(got.body)["view"].get("step", 0)
+        need(step in steps, f"{tell}: a saved view has step {step}, told was {steps}")
+        kept += 1
+    return kept
+
+
+def kill(program, folder, rounds, _slack=1):
+    """SIGKILL under load, then the next one on the same port and state."""
+    state, kept, parts = folder / "state", 0, 0
+    view = small_view(size=(96, 64))
+    view["quality"] = {"budgetMs": None, "maxError": None}
+    picture = None
+    listen = f"127.0.0.1:{free_port()}"
+    everything = []
+    for n in range(rounds):
+        daemon = Daemon(program, "--state-dir", str(state), SAMPLE, listen=listen)
+        if n % 10 == 0:  # of all that were ever saved
+            kept += saved_views(daemon.port, everything, f"round {n}")
+        with Stream(daemon.port) as viewer:
+            got = viewer.final_frame(view)[64:]
+        need(picture in (None, got), "a viewer that comes back sees another picture")
+        picture = got
+        for line in daemon.lines:
+            need("left alone" not in line, f"a file in the state folder cannot be read: {line}")
+        loads = loaded(daemon.port)
+        time.sleep(random.uniform(0.05, 0.6))
+        daemon.stop(signal.SIGKILL)
+        stop_all(loads)
+        parts += len(list(state.rglob("*.part")))
+        after = Daemon(program, "--state-dir", str(state), SAMPLE, listen=listen)
+        kept += saved_views(after.port, loads, f"round {n}")
+        after.stop(signal.SIGKILL)
+        everything += loads
+    last = Daemon(program, "--state-dir", str(state), SAMPLE, listen=listen)
+    kept += saved_views(last.port, everything, "in the end")
+    check_good_stream(last.port)
+    code = last.stop()
+    need(code == 0, f"ended with {code}")
+    left = [p.name for p in state.rglob("*") if p.is_file() and not p.name.endswith(".json")]
+    need(kept > 0, "no view was ever saved")
+    need(not left, f"left behind: {left[:3]}")
+    return (f"{kept} looks at saved views, none lost or half written; the viewer's picture is the "
+            f"same each time; {parts} half-written files cleared away")
+
+
+SPOILED = ["", "{", '{"nothing": 1}', '{"listen": 7}', "\0\1\2", '{"max-sessions": -5}', "[]",
+           '{"\\u001b[31m\\n": 1}', "x" * 100000, '{"log-level": "loud"}',
+           # The half that is good must not be taken either.
+           '{"allow-origin": ["https://second.example"], "log-level": "loud"}']
+ORIGINS = ["https://first.example", "https://second.example"]
+
+
+def hang_up(program, folder, rounds, _slack=1):
+    """SIGHUP under load with a config that is good, spoiled, gone."""
+    text = subprocess.run([program, "serve", "--help"], capture_output=True, text=True,
+                          check=True).stdout
+    if "--config" not in text:
+        raise Untried("this windsplat has no --config: SIGHUP was not tried")
+    config = folder / "config"
+    allowed, other = ORIGINS
+    config.write_text(json.dumps({"allow-origin": [allowed]}))
+    daemon = Daemon(program, "--config", str(config), SAMPLE)
+    taken = 0
+    try:
+        loads = loaded(daemon.port, 3)
+        for n in range(rounds):
+            how = n % (len(SPOILED) + 2)
+            if how < len(SPOILED):
+                config.write_text(SPOILED[how])
+            elif how == len(SPOILED):
+                config.unlink(missing_ok=True)
+            else:
+                allowed, other = other, allowed
+                config.write_text(json.dumps({"allow-origin": [allowed]}))
+                taken += 1
+            said = len(daemon.lines)
+            daemon.child.send_signal(signal.SIGHUP)
+            if how <= len(SPOILED):
+                wait_for(lambda at=said: [line for line in daemon.lines[at:]
+                                          if " warn " in line or " error " in line],
+                         PATIENCE_S, f"nothing in the log about a spoiled config ({how})")
+            else:
+                wait_for(lambda at=said: [line for line in daemon.lines[at:]
+                                          if "read the configuration again" in line],
+                         PATIENCE_S, "nothing in the log about a config that is good")
+            for origin, status in ((allowed, 101), (other, 403)):
+                with Stream(daemon.port, [("Origin", origin)]) as one:
+                    need(one.status == status, f"after config {how} {origin} is answered by "
+                         f"{one.status}, not {status}")
+            check_good(daemon.port)
+        stop_all(loads)
+        need(daemon.alive(), "the daemon died")
+        need(all(line.isprintable() for line in daemon.lines), "control characters in the log")
+        code = daemon.stop()
+        need(code == 0, f"ended with {code}")
+    finally:
+        if daemon.alive():
+            daemon.stop(signal.SIGKILL)
+    return (f"{taken} times the new origin is let in and the old one refused; the old config "
+            "stays, and its origins, with each spoiled one, which the log tells; streams go on")
+
+
+LOOPS = {"TERM": terminate, "KILL": kill, "HUP": hang_up}
+QUICK_ROUNDS = {"TERM": 3, "KILL": 3, "HUP": len(SPOILED) + 2}  # HUP: each config once
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--program", default=str(ROOT / "build/release/windsplat"))
+    parser.add_argument("--rounds", type=int, default=50)
+    parser.add_argument("--signal", action="append", choices=list(LOOPS))
+    parser.add_argument("--slack", type=float, default=1, help="times are so much longer")
+    parser.add_argument("--quick", action="store_true", help="a few rounds of each")
+    options = parser.parse_args()
+    failed = 0
+    print("| signal | rounds | what came of it | |\n|---|---|---|---|", flush=True)
+    for name in options.signal or list(LOOPS):
+        rounds = QUICK_ROUNDS[name] if options.quick else options.rounds
+        with tempfile.TemporaryDirectory(prefix="windsplat-signals-") as folder:
+            try:
+                told = LOOPS[name](options.program, pathlib.Path(folder), rounds, options.slack)
+                verdict = "ok"
+            except Untried as why:
+                told, verdict, rounds = str(why), "NOT TRIED", "-"
+            except Failed as fault:
+                told, verdict = str(fault), "FAILED"
+        failed += verdict == "FAILED"
+        print(f"| SIG{name} | {rounds} | {told} | {verdict} |", flush=True)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

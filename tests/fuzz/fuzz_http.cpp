@@ -1,0 +1,59 @@
+// Whatever bytes a connection may bring -> the HTTP edge of a server in this process. Answers must
+// be HTTP, and the server must live on.
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "protocol/limits.hpp"
+#include "tests/fuzz/support/check.hpp"
+#include "tests/fuzz/support/daemon.hpp"
+
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr std::string_view last_name = "the-last-one";
+
+// How many bytes the body of the first request lacks: they are filled up, so that what comes next
+// is a request. An estimate: where it is wrong the input takes longer.
+std::size_t lacking(std::string_view input) {
+  const std::size_t end = input.find("\r\n\r\n");
+  const std::size_t at = input.find("Content-Length: ");
+  if (end == std::string_view::npos || at > end) return 0;
+  std::size_t length = 0;
+  std::from_chars(input.data() + at + 16, input.data() + end, length);
+  const std::size_t there = input.size() - end - 4;
+  if (length > windsplat::protocol::limits::http_body_bytes_max || length <= there) return 0;
+  return length - there;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static std::uint64_t runs = 0;
+  std::string bytes(fuzz::text_of(data, size));
+  const bool has_end = bytes.find("\r\n\r\n") != std::string::npos;
+  if (has_end) {
+    bytes.append(lacking(bytes), ' ');
+    bytes += "GET /livez HTTP/1.1\r\nHost: localhost\r\nX-Request-Id: ";
+    bytes += last_name;
+    bytes += "\r\nConnection: close\r\n\r\n";
+  }
+  fuzz::Peer peer;
+  if (has_end) {
+    // A request that is drawn for longer than this is left: the server has to bear that too.
+    peer.talk(bytes, milliseconds(200), [](const std::string&) { return false; });
+  } else {
+    peer.talk(bytes, milliseconds(20), [](const std::string&) { return true; });
+    peer.half_close();
+    peer.talk({}, milliseconds(10'000), [](const std::string&) { return false; });
+    fuzz::expect(peer.ended(), "who says no more is not waited for");
+  }
+  const std::size_t answers = fuzz::expect_answers(peer.heard(), peer.ended());
+  if (peer.ended() && has_end) fuzz::expect(answers > 0, "what has a header is answered");
+  if (++runs % 256 == 0) fuzz::expect_alive();
+  return 0;
+}

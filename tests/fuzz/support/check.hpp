@@ -1,0 +1,18 @@
+// What a target holds besides "no crash".
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace fuzz {
+
+// Ends the process with the words, so that libFuzzer keeps the input, unless `holds`.
+void expect(bool holds, std::string_view what, std::string_view seen = {});
+
+inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {
+  return {reinterpret_cast<const char*>(data), size};
+}
+
+}  // namespace fuzz

@@ -1,0 +1,201 @@
+// One Server on a thread, plain sockets, and the grammar of answers.
+#include "tests/fuzz/support/daemon.hpp"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "server/base/log.hpp"
+#include "server/base/thread_pool.hpp"
+#include "server/data/store.hpp"
+#include "server/net/server.hpp"
+#include "tests/fuzz/support/check.hpp"
+
+namespace fuzz {
+namespace {
+
+using namespace windsplat;
+using std::chrono::milliseconds;
+
+constexpr milliseconds end_of_life{20'000};
+
+// Never destroyed: it serves to the end of the process.
+net::Server& server() {
+  static net::Server* const the_one = [] {
+    log::configure(log::Format::text, log::Level::off);
+    auto store = std::make_shared<data::Store>(std::uint64_t{512} << 20);
+    expect(store->add("climate:8x6x4").has_value(), "a sample is there");
+    net::ServerOptions options;
+    options.port = 0;
+    options.local_hosts_only = true;
+    auto* made =
+        new net::Server(std::move(options), std::move(store), std::make_shared<ThreadPool>(1));
+    expect(made->listen().has_value(), "a free port");
+    std::thread([made] {
+      made->run();
+      expect(false, "the server serves to the end");
+    }).detach();
+    return made;
+  }();
+  return *the_one;
+}
+
+// A source address of its own for each, 127.0.0.2 and on: no tuple of addresses comes back soon.
+sockaddr_in next_source() {
+  static std::uint32_t count = 0;
+  sockaddr_in source{};
+  source.sin_family = AF_INET;
+  source.sin_addr.s_addr = htonl(0x7f000002U + count++ % 0xfffffU);
+  return source;
+}
+
+bool is_token(std::string_view name) {
+  constexpr std::string_view marks = "!#$%&'*+-.^_`|~";
+  return !name.empty() && std::all_of(name.begin(), name.end(), [marks](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+           marks.find(c) != std::string_view::npos;
+  });
+}
+
+struct Head {
+  int status = 0;
+  std::size_t length = 0;
+  bool has_length = false;
+  std::string_view type;
+};
+
+Head read_head(std::string_view head) {
+  Head out;
+  expect(head.size() >= 13 && head.starts_with("HTTP/1.1 ") && head[12] == ' ',
+         "an answer begins with its status", head);
+  const auto read = std::from_chars(head.data() + 9, head.data() + 12, out.status);
+  expect(read.ec == std::errc() && out.status >= 100 && out.status < 600,
+         "a status has three digits", head);
+  const std::size_t line_end = std::min(head.find("\r\n"), head.size());
+  std::string_view rest = head.substr(std::min(line_end + 2, head.size()));
+  while (!rest.empty()) {
+    const std::size_t end = rest.find("\r\n");
+    const std::string_view line = rest.substr(0, end);
+    const std::size_t colon = line.find(": ");
+    expect(colon != std::string_view::npos && is_token(line.substr(0, colon)),
+           "a field of an answer has a name", line);
+    const std::string_view name = line.substr(0, colon);
+    const std::string_view value = line.substr(colon + 2);
+    expect(std::none_of(value.begin(), value.end(),
+                        [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }),
+           "a field of an answer has no control characters", line);
+    if (name == "Content-Length") {
+      expect(!out.has_length, "an answer has one length", head);
+      out.has_length = true;
+      std::from_chars(value.data(), value.data() + value.size(), out.length);
+    }
+    if (name == "Content-Type") out.type = value;
+    rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 2);
+  }
+  return out;
+}
+
+void expect_problem(const Head& head, std::string_view body, std::string_view all) {
+  expect(head.status != 500, "nothing that is asked is a fault of the server's", all);
+  if (head.status < 400 || head.type == "text/plain") return;
+  expect(head.type == "application/problem+json", "a refusal says why", all);
+  if (body.empty()) return;  // of HEAD
+  expect(body.front() == '{' && body.back() == '}' &&
+             body.find("\"status\":" + std::to_string(head.status)) != std::string_view::npos,
+         "a refusal is an object that repeats its status", all);
+}
+
+}  // namespace
+
+Peer::Peer() {
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(server().port());
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socket_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  expect(socket_ >= 0, "a socket");
+  const linger at_once{1, 0};
+  const int yes = 1;
+  ::setsockopt(socket_, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+  ::setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+  const sockaddr_in from = next_source();
+  expect(::bind(socket_, reinterpret_cast<const sockaddr*>(&from), sizeof from) == 0,
+         "an address of loopback");
+  expect(::connect(socket_, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0,
+         "the server can be connected to", std::to_string(errno));
+}
+
+Peer::~Peer() { ::close(socket_); }
+
+void Peer::half_close() { ::shutdown(socket_, SHUT_WR); }
+
+void Peer::talk(std::string_view bytes, milliseconds patience,
+                const std::function<bool(const std::string&)>& done) {
+  std::array<char, std::size_t{64} * 1024> part{};
+  while (!ended_) {
+    if (bytes.empty() && done(heard_)) return;
+    pollfd about{socket_, static_cast<short>(POLLIN | (bytes.empty() ? 0 : POLLOUT)), 0};
+    const int ready = ::poll(&about, 1, static_cast<int>(patience.count()));
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready <= 0) return;
+    if (!bytes.empty() && (about.revents & POLLOUT) != 0) {
+      const ssize_t sent = ::send(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+      if (sent > 0) bytes.remove_prefix(static_cast<std::size_t>(sent));
+      // What it said before it closed is still to be heard.
+      if (sent < 0 && errno != EAGAIN && errno != EINTR) bytes = {};
+    }
+    if ((about.revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
+      const ssize_t got = ::recv(socket_, part.data(), part.size(), MSG_DONTWAIT);
+      if (got > 0) heard_.append(part.data(), static_cast<std::size_t>(got));
+      if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) ended_ = true;
+    }
+  }
+}
+
+std::size_t expect_answers(std::string_view heard, bool whole) {
+  std::size_t count = 0;
+  while (!heard.empty()) {
+    const std::size_t end = heard.find("\r\n\r\n");
+    if (end == std::string_view::npos) {
+      expect(!whole, "an answer's header has an end", heard);
+      return count;
+    }
+    const Head head = read_head(heard.substr(0, end));
+    ++count;
+    std::string_view body = heard.substr(end + 4);
+    const bool has_body = head.status >= 200 && head.status != 204 && head.status != 304;
+    expect(!has_body || head.has_length, "an answer with a body tells its length", heard);
+    // Of HEAD there is none.
+    const bool left_out = body.empty() || body.starts_with("HTTP/1.1 ");
+    const std::size_t length = has_body && !left_out ? head.length : 0;
+    if (length > body.size()) {
+      expect(!whole, "an answer's body has its length", heard.substr(0, end));
+      return count;
+    }
+    expect_problem(head, body.substr(0, length), heard.substr(0, end + 4 + length));
+    heard = body.substr(length);
+  }
+  return count;
+}
+
+void expect_alive() {
+  Peer peer;
+  peer.talk("GET /livez HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n", end_of_life,
+            [](const std::string&) { return false; });
+  expect(peer.heard().starts_with("HTTP/1.1 200 "), "the server lives", peer.heard());
+}
+
+}  // namespace fuzz

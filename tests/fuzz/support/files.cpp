@@ -1,0 +1,168 @@
+// Files in memory that take no place anywhere, and the properties of what readers give.
+#include "tests/fuzz/support/files.hpp"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "server/data/loader/messages.hpp"
+#include "tests/fuzz/support/check.hpp"
+
+namespace fuzz {
+namespace {
+
+using namespace windsplat;
+using namespace windsplat::data;
+
+constexpr std::size_t files_max = 64;
+// Larger volumes are not read: they are honest, and slow.
+constexpr std::size_t floats_max = std::size_t{1} << 20;
+
+// The one name of a process that does its work apart: of the parent, so that what a child that
+// crashed left behind is written over by the next.
+std::string name_on_disk() {
+  return (std::filesystem::temp_directory_path() / "windsplat-fuzz-").string() +
+         std::to_string(::getppid());
+}
+
+class MemoryFiles : public Files {
+ public:
+  MemoryFiles(std::map<std::string, std::string_view> files, Location location, bool on_disk)
+      : files_(std::move(files)), location_(std::move(location)), on_disk_(on_disk) {}
+  ~MemoryFiles() override {
+    if (on_disk_) ::unlink(name_on_disk().c_str());
+  }
+  MemoryFiles(const MemoryFiles&) = delete;
+  MemoryFiles& operator=(const MemoryFiles&) = delete;
+
+  [[nodiscard]] const Location& location() const override { return location_; }
+
+  Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
+    const auto found = files_.find(name);
+    if (found == files_.end()) {
+      return make_error(ErrorKind::not_found, in_quotes(name) + " is not there");
+    }
+    const int descriptor =
+        on_disk_ ? ::open(name_on_disk().c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600)
+                 : ::memfd_create("input", MFD_CLOEXEC);
+    expect(descriptor >= 0, "a file to be read");
+    const std::string_view bytes = found->second;
+    expect(::write(descriptor, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()),
+           "a file holds its bytes");
+    return InputFile::adopt(descriptor, name.substr(name.find_last_of('/') + 1));
+  }
+
+  Result<std::vector<std::string>> list(const std::string& folder) override {
+    const std::string begin = folder.empty() || folder.ends_with('/') ? folder : folder + '/';
+    std::vector<std::string> out;
+    for (const auto& [name, bytes] : files_) {
+      if (!name.starts_with(begin)) continue;
+      const std::string rest = name.substr(begin.size());
+      const std::size_t slash = rest.find('/');
+      out.push_back(slash == std::string::npos ? rest : rest.substr(0, slash + 1));
+    }
+    out.erase(std::unique(out.begin(), out.end()), out.end());
+    if (out.empty()) return make_error(ErrorKind::not_found, in_quotes(folder) + " is not there");
+    return out;
+  }
+
+  bool exists(const std::string& name) override {
+    const auto found = files_.lower_bound(name);
+    return found != files_.end() && (found->first == name || found->first.starts_with(name + '/'));
+  }
+
+ private:
+  std::map<std::string, std::string_view> files_;
+  Location location_;
+  bool on_disk_;
+};
+
+// Where the next mark begins: at the begin of a line.
+std::size_t find_mark(std::string_view input, std::size_t from) {
+  for (;;) {
+    const std::size_t at = input.find(file_mark, from);
+    if (at == std::string_view::npos || at == 0 || input[at - 1] == '\n') return at;
+    from = at + 1;
+  }
+}
+
+void expect_whole(const Volume& volume, const DatasetInfo& info, const FieldInfo& field) {
+  expect(volume.dims == info.grid.dims(), "a volume has its grid's size");
+  expect(static_cast<std::size_t>(volume.components) == field.components.size(),
+         "a volume has its field's components");
+  const std::size_t components = field.components.size();
+  expect(volume.values.size() == volume.samples() * components, "a volume has all its values");
+  Volume again = volume;
+  expect(measure_volume(again), "a volume's masks are common and nothing in it is infinite");
+  expect(again.masked == volume.masked && again.range == volume.range,
+         "a volume's range and masks are those that were told");
+}
+
+}  // namespace
+
+std::string_view first_file(std::string_view input) { return input.substr(0, find_mark(input, 0)); }
+
+std::shared_ptr<Files> files_of(std::string_view input, std::string main, Kept kept) {
+  const bool folder = kept == Kept::folder;
+  std::map<std::string, std::string_view> files;
+  Location location;
+  location.kind = folder ? Location::Kind::folder : Location::Kind::file;
+  location.folder = "/nowhere";
+  location.stem = main.substr(0, main.find('.'));
+  location.companions = true;
+  if (!folder) {
+    location.members.push_back({main, {}});
+    files[main] = first_file(input);
+  }
+  std::size_t at = find_mark(input, 0);
+  while (at != std::string_view::npos && files.size() < files_max) {
+    const std::size_t line = std::min(input.find('\n', at), input.size());
+    const std::string name(input.substr(at + file_mark.size(), line - at - file_mark.size()));
+    const std::size_t next = find_mark(input, std::min(line + 1, input.size()));
+    const std::size_t begin = std::min(line + 1, input.size());
+    // The line's end before a mark is the mark's.
+    const std::size_t end = next == std::string_view::npos ? input.size() : next - 1;
+    if (!name.empty()) files.emplace(name, input.substr(begin, std::max(begin, end) - begin));
+    at = next;
+  }
+  return std::make_shared<MemoryFiles>(std::move(files), std::move(location),
+                                       kept == Kept::on_disk);
+}
+
+void read_dataset(const std::shared_ptr<Files>& files) {
+  const auto source = open_dataset(files);
+  if (!source) {
+    expect(!source.error().message.empty(), "a refusal has a reason");
+    expect(source.error().kind != ErrorKind::internal, "no file is a fault of ours",
+           source.error().message);
+    return;
+  }
+  const DatasetInfo& info = (*source)->info();
+  const std::string told = loader::encode_info(info);
+  const auto believed = loader::decode_info(told);
+  expect(believed.has_value(), "what a reader gives is believed of a loader",
+         believed ? "" : believed.error().message);
+  const std::size_t last_field = info.fields.size() - 1;
+  const std::size_t last_step = info.steps.size() - 1;
+  const std::vector<std::pair<std::size_t, std::size_t>> reads{
+      {0, 0}, {last_field, last_step}, {last_field / 2, 0}};
+  for (const auto& [field, step] : reads) {
+    const FieldInfo& about = info.fields[field];
+    if (info.grid.samples() * about.components.size() > floats_max) continue;
+    const auto volume = (*source)->read(field, step);
+    if (volume) {
+      expect_whole(*volume, info, about);
+    } else {
+      expect(volume.error().kind != ErrorKind::internal, "no file is a fault of ours",
+             volume.error().message);
+    }
+  }
+}
+
+}  // namespace fuzz

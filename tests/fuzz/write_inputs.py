@@ -1,0 +1,152 @@
+#!/usr/bin/env python3
+"""Writes what every fuzz target begins with, into seeds/TARGET and sizes/TARGET: vectors of the
+protocol, small files of every format (seeds.py), requests, and inputs of boundary sizes (sizes.py).
+
+    tests/fuzz/write_inputs.py build/fuzz-inputs [--program build/release/windsplat]
+
+The program makes the netCDF files; without it the committed corpus alone has some.
+"""
+
+import argparse
+import json
+import pathlib
+import shutil
+import sys
+import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import loader_inputs  # noqa: E402
+import seeds  # noqa: E402
+import sizes  # noqa: E402
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MARK = b"\n#!file "
+INPUT_BYTES_MAX = 300_000
+READERS = {"nrrd": "nrrd", "raw+json": "raw", "grads": "grads", "opendx": "opendx", "zarr": "zarr",
+           "vti": "vtk_xml", "vtr": "vtk_xml", "vts": "vtk_xml", "vtu": "vtk_xml", "pvd": "vtk_xml",
+           "vtk ascii": "vtk_legacy", "vtk binary": "vtk_legacy", "hdf5": "hdf5",
+           "netcdf-4": "hdf5", "netcdf classic": "netcdf", "netcdf 64-bit": "netcdf",
+           "netcdf cdf5": "netcdf", "grib 1": "grib", "grib 2": "grib"}
+
+
+def text_of(case):
+    if "bytes" in case:
+        return bytes.fromhex(case["bytes"])
+    if "text" in case:
+        return case["text"].encode()
+    return json.dumps(case.get("document"), ensure_ascii=False).encode()
+
+
+def vectors():
+    """Read where they are, of whatever kind they are accepted or refused."""
+    for path in sorted((ROOT / "protocol/vectors").glob("*/*.json")):
+        for i, case in enumerate(json.loads(path.read_text())):
+            name = f"{path.parent.name}-{path.stem}-{i}"
+            if case["kind"] == "view":
+                text = text_of(case)
+                yield "view", name, text
+                yield "view", name + "-patch", b"{}\0" + text
+                yield "saved_view", name, (b'{"id":"0123456789","created":"2001-01-01T03:00:00Z",'
+                                           b'"view":' + text + b"}")
+                yield "http", name, sizes.post(text, target=b"/v1/frames")
+                yield "messages", name, (b'{"type":"open","id":1,"dataset":"a"}\n'
+                                         b'{"type":"patch","rev":1,"patch":' + text + b"}")
+            if case["kind"] == "clientMessage":
+                text = text_of(case)
+                opened = b'{"type":"open","id":9,"dataset":"climate"}\n'
+                yield "messages", name, opened + text.replace(b"\n", b" ")
+                yield "websocket", name, sizes.LINES + opened + text.replace(b"\n", b" ")
+
+
+TARGETS = [
+    "/", "/livez", "/readyz", "/metrics", "/view.schema.json", "/v1", "/v1/colormaps",
+    "/v1/presets", "/v1/datasets", "/v1/datasets/climate", "/v1/jobs", "/v1/jobs/1",
+    "/v1/views/0123456789", "/v1/references/abc", "/v1/stream", "*", "http://localhost/v1",
+    "/v1/datasets/climate/frame.jpeg?width=16&height=12&azimuth=30&elevation=20&zoom=1.5&quality=9",
+    "/v1/datasets/climate/frame.png?step=1&width=8&height=8&preset=top",
+    "/v1/datasets/climate/frame.npy?width=4&height=4",
+    "/v1/datasets/climate/probe?x=1&y=2&z=3&step=0",
+    "/v1/datasets/climate/fields/wind/histogram?bins=8&range=0,1&log=true&clip=0.1&step=1",
+    "/v1/datasets/climate/fields/wind/series?x=1&y=2&z=3",
+    "/v1/datasets/climate/fields/wind/range?of=all", "/v1/datasets/climate?forget=true",
+    "/%2e%2e/%2f?%00=%ff", "/v1//datasets/./climate/../climate"]
+
+
+def requests():
+    for i, target in enumerate(TARGETS):
+        for method in ("GET", "HEAD", "OPTIONS", "POST", "PUT", "PATCH", "DELETE"):
+            text = sizes.get(target.encode()).replace(b"GET", method.encode(), 1)
+            yield "http", f"target-{i}-{method}", text
+        yield "query", f"target-{i}", target.encode() + b"\0image/png;q=0.5, */*;q=0.1"
+    fields = [b"Expect: 100-continue", b"Origin: https://evil.example", b"If-None-Match: \"a\", *",
+              b"Accept-Encoding: gzip;q=0, *", b"Transfer-Encoding: chunked", b"Host: again",
+              b"Content-Length: 0", b"Content-Length: 2, 2", b" folded", b"X-Request-Id: an-id",
+              b"Connection: close", b"Upgrade: h2c", b"Range: bytes=0-1", b"X:\x80\xff"]
+    view = json.dumps(sizes.VIEW).encode()
+    for i, field in enumerate(fields):
+        yield "http", f"field-{i}", sizes.get(fields=[field])
+        yield "http", f"posted-field-{i}", sizes.post(view, fields=[field])
+    for target in (b"/v1/frames", b"/v1/forecasts", b"/v1/views", b"/v1/datasets"):
+        body = b'{"path":"a.nc"}' if target.endswith(b"datasets") else view
+        yield "http", "post-" + target.decode().replace("/", "-"), sizes.post(body, target=target)
+    stream = [b"Connection: Upgrade", b"Upgrade: websocket", b"Sec-WebSocket-Version: 13",
+              b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="]
+    pause = sizes.frame(0x81, b'{"type":"pause"}')
+    yield "http", "upgrade", sizes.get(b"/v1/stream", stream) + pause
+    yield "http", "version", sizes.get(version=b"HTTP/1.0")
+    yield "http", "two", sizes.get() + sizes.post(view) + sizes.get(b"/v1")
+
+
+def configurations():
+    whole = {"listen": "127.0.0.1:8080", "log-json": True, "sessions": 64, "memory-limit": "4G",
+             "allow-origin": ["https://a.example", "https://b.example"], "idle-timeout": 1.5e2}
+    for key, value in whole.items():
+        yield "config", key, json.dumps({key: value}).encode()
+    yield "config", "whole", json.dumps(whole, indent=1).encode()
+    for i, value in enumerate((None, {}, [1], [[]], "a\nb", "\u00e9", -0.0, 1e300, 2**64, "")):
+        yield "config", f"value-{i}", json.dumps({"a": value}).encode()
+    yield "config", "twice", b'{"a":1,"a":2}'
+
+
+def files(program):
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        (folder / "made").mkdir()
+        every = [*seeds.nrrd_seeds(), *seeds.raw_seeds(), *seeds.grads_seeds(), *seeds.dx_seeds(),
+                 *seeds.zarr_seeds(), *seeds.vtk_seeds(), *seeds.hdf5_seeds(),
+                 *seeds.grib_seeds(folder / "made")]
+        if program:
+            every += seeds.netcdf_seeds(program, folder)
+    for i, seed in enumerate(every):
+        kind = "netcdf" if next(iter(seed.files.values())).startswith(b"CDF") else (
+            READERS[seed.kind])
+        if kind == "zarr":
+            data = b"".join(MARK[1 if not n else 0:] + name.removeprefix("s.zarr/").encode() + b"\n"
+                            + part for n, (name, part) in enumerate(seed.files.items()))
+        else:
+            first = seed.files[seed.path]
+            data = first + b"".join(MARK + name.encode() + b"\n" + part
+                                    for name, part in seed.files.items() if name != seed.path)
+        if len(data) <= INPUT_BYTES_MAX:
+            yield f"reader_{kind}", f"seed-{i}", data
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("--program", help="windsplat, to write netCDF")
+    options = parser.parse_args()
+    shutil.rmtree(options.out, ignore_errors=True)
+    for kind, inputs in (("seed", vectors()), ("seed", requests()),
+                         ("seed", configurations()),
+                         ("seed", files(options.program)),
+                         ("seed", loader_inputs.loader_seeds()), ("size", sizes.sizes()),
+                         ("size", loader_inputs.loader_sizes())):
+        for target, name, data in inputs:
+            folder = options.out / f"{kind}s" / target
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / name.replace("/", "_")[:200]).write_bytes(data)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+"""The bill of materials against what the program really loads and the page really bundles.
+
+Usage: sbom.py --program=PATH
+"""
+import argparse
+import json
+import pathlib
+import re
+import subprocess
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+PROGRAM = None
+
+
+def output_of(*command):
+    return subprocess.run(command, text=True, capture_output=True, check=True).stdout
+
+
+class Bill(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.text = output_of(str(ROOT / "scripts/sbom"), PROGRAM)
+        cls.bill = json.loads(cls.text)
+        cls.required = {one["name"]: one for one in cls.bill["components"]
+                        if one["scope"] == "required"}
+
+    def test_names_itself(self):
+        self.assertEqual(self.bill["bomFormat"], "CycloneDX")
+        version = output_of(PROGRAM, "--version").split()[-1]
+        self.assertEqual(self.bill["metadata"]["component"]["version"], version)
+
+    def test_every_library_that_is_loaded_is_there_in_its_version(self):
+        loaded = set(re.findall(r"(/\S+) \(0x", output_of("ldd", PROGRAM)))
+        self.assertGreater(len(loaded), 10)
+        for path in loaded:
+            path = str(pathlib.Path(path).resolve())
+            owners = subprocess.run(["dpkg", "-S", path], text=True, capture_output=True,
+                                    check=False).stdout or output_of("dpkg", "-S", path[4:])
+            package = owners.split(":")[0]
+            version = output_of("dpkg-query", "-W", "-f", "${Version}\n", package).split()[0]
+            self.assertEqual(self.required[package]["version"], version, path)
+
+    def test_headers_that_are_compiled_in_are_there(self):
+        for name in ("libboost1.81-dev", "nlohmann-json3-dev", "libglm-dev", "libcli11-dev"):
+            self.assertIn(name, self.required)
+        self.assertNotIn("libgtest-dev", self.required)
+
+    def test_of_the_modules_those_in_the_page_alone_are_required(self):
+        lock = json.loads((ROOT / "web/package-lock.json").read_text())["packages"]
+        self.assertEqual(self.required["lil-gui"]["version"],
+                         lock["node_modules/lil-gui"]["version"])
+        required = [one["name"] for one in self.bill["components"]
+                    if one["purl"].startswith("pkg:npm/") and one["scope"] == "required"]
+        self.assertEqual(required, ["lil-gui"], "the page has one module of others")
+        modules = [one for one in self.bill["components"] if one["purl"].startswith("pkg:npm/")]
+        self.assertEqual(len(modules), len(lock) - 1)
+
+    def test_references_are_unique_and_the_text_is_the_same_again(self):
+        names = [one["bom-ref"] for one in self.bill["components"]]
+        self.assertEqual(len(names), len(set(names)))
+        self.assertEqual(self.text, output_of(str(ROOT / "scripts/sbom"), PROGRAM))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--program", required=True)
+    known, rest = parser.parse_known_args()
+    PROGRAM = known.program
+    unittest.main(argv=[__file__, *rest])

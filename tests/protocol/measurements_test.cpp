@@ -1,0 +1,160 @@
+// What REST answers about values and jobs against messages.schema.json; requests for datasets.
+#include "protocol/measurements.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "protocol/codec.hpp"
+#include "protocol/limits.hpp"
+#include "support.hpp"
+
+namespace windsplat::protocol::testing {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+ProbedField mixed_wind() { return {"wind", true, "m/s", {"m/s", "m/s", "Pa/s"}}; }
+
+PositionDescription position() {
+  return {{1, 0, 2}, {10, -45.5, 850}, {"degrees_east", "degrees_north", "hPa"}};
+}
+
+TEST(Measurements, AProbeTellsEveryFieldWithItsUnitsAndNullWhereItIsMasked) {
+  ProbeDescription probe;
+  probe.position = position();
+  probe.step = 3;
+  probe.fields = {{"cloud", false, "1", {"1"}},
+                  mixed_wind(),
+                  {"flow", true, "m", {"m", "m"}},
+                  {"qi", false, "kg/kg", {"kg/kg"}}};
+  probe.values = {std::vector{0.4}, std::vector{1.0, -2.0, 0.5}, std::vector{3.0, 4.0},
+                  std::nullopt};
+  const std::string json = encode_probe(probe);
+  expect_shape("probe", json);
+  const Json answer = Json::parse(json);
+  EXPECT_EQ(answer["values"]["cloud"], (Json{{"value", 0.4}, {"units", "1"}}));
+  EXPECT_EQ(answer["values"]["wind"]["value"], Json({1, -2, 0.5}));
+  EXPECT_EQ(answer["values"]["wind"]["componentUnits"], Json({"m/s", "m/s", "Pa/s"}));
+  EXPECT_FALSE(answer["values"]["flow"].contains("componentUnits"));
+  EXPECT_TRUE(answer["values"]["qi"]["value"].is_null());
+  EXPECT_EQ(answer["position"]["y"], -45.5);
+  EXPECT_EQ(answer["position"]["units"]["z"], "hPa");
+  EXPECT_EQ(answer["position"]["index"]["z"], 2);
+}
+
+TEST(Measurements, SeriesHistogramAndRangeHaveTheirShapes) {
+  SeriesDescription series{
+      position(), mixed_wind(), {{0, "a"}, {1, "b"}}, {std::vector{1.0, 2.0, 3.0}, std::nullopt}};
+  expect_shape("series", encode_series(series));
+  EXPECT_EQ(Json::parse(encode_series(series))["values"], Json({{1, 2, 3}, nullptr}));
+  HistogramDescription histogram;
+  histogram.counts = {1, 2};
+  expect_shape("histogram", encode_histogram(histogram));
+  EXPECT_TRUE(Json::parse(encode_histogram(histogram))["range"].is_null());
+  histogram.range = Range{1, 100};
+  histogram.log = true;
+  histogram.edges = {1, 10, 100};
+  histogram.below = 4;
+  expect_shape("histogram", encode_histogram(histogram));
+  const Json told = Json::parse(encode_histogram(histogram));
+  EXPECT_EQ(told["edges"], Json({1, 10, 100}));
+  EXPECT_EQ(told["below"], 4);
+  expect_shape("fieldRange", encode_range({Range{-1, 2}, 5, "all"}));
+  EXPECT_EQ(Json::parse(encode_range({std::nullopt, 5, "step"})),
+            (Json{{"range", nullptr}, {"masked", 5}, {"rangeOf", "step"}}));
+}
+
+TEST(Measurements, AForecastHasItsShape) {
+  ForecastPoint coarse;
+  coarse.method = "kernel";
+  coarse.width = 320;
+  coarse.height = 180;
+  coarse.coarser = 2;
+  coarse.ms = 1.5;
+  coarse.error = 0.04;
+  coarse.error_low = 0.02;
+  coarse.error_high = 0.08;
+  ForecastPoint fine = coarse;
+  fine.method = "slab";
+  fine.slab_thickness = 0.25;
+  fine.timed = fine.measured = fine.pareto = true;
+  ForecastDescription forecast{640, 360, {coarse, fine}, {}};
+  expect_shape("forecast", encode_forecast(forecast));
+  EXPECT_TRUE(Json::parse(encode_forecast(forecast))["chosen"].is_null());
+  forecast.chosen = 1;
+  expect_shape("forecast", encode_forecast(forecast));
+  const Json told = Json::parse(encode_forecast(forecast));
+  EXPECT_EQ(told["view"], (Json{{"width", 640}, {"height", 360}}));
+  EXPECT_EQ(told["chosen"], 1);
+  EXPECT_TRUE(told["points"][0]["slabThickness"].is_null());
+  EXPECT_EQ(told["points"][0]["kind"], "estimated");
+  EXPECT_EQ(told["points"][0]["coarser"], 2);
+  EXPECT_EQ(told["points"][1]["slabThickness"], 0.25);
+  EXPECT_EQ(told["points"][1]["kind"], "measured");
+  EXPECT_EQ(told["points"][1]["errorHigh"], 0.08);
+}
+
+TEST(Measurements, JobsHaveTheirShape) {
+  JobDescription job;
+  job.id = "1";
+  job.kind = "dataset";
+  job.state = "queued";
+  expect_shape("job", encode_job(job));
+  job.state = "failed";
+  job.problem.emplace();
+  job.problem->status = 422;
+  job.problem->detail = "no data";
+  expect_shape("job", encode_job(job));
+  EXPECT_EQ(Json::parse(encode_job(job))["problem"]["status"], 422);
+  job.problem.reset();
+  job.kind = "reference";
+  job.result = ReferenceDescription{"a1", "/v1/references/a1.png", 640, 480, 2e-4, 0.01, 74};
+  expect_shape("job", encode_job(job));
+  EXPECT_EQ(Json::parse(encode_job(job))["result"]["error"]["value"], 2e-4);
+  std::get<ReferenceDescription>(*job.result).psnr = std::numeric_limits<double>::infinity();
+  expect_shape("job", encode_job(job));
+  EXPECT_EQ(Json::parse(encode_job(job))["result"]["error"]["psnr"], nullptr);
+  expect_shape("jobs", encode_jobs({job, job}));
+  expect_shape("jobs", encode_jobs({}));
+}
+
+TEST(Measurements, ARequestForADatasetIsItsPathAlone) {
+  EXPECT_EQ(*parse_dataset_request(R"({"path":"a/b.nc"})"), "a/b.nc");
+  const std::string longest(limits::path_chars_max, 'p');
+  EXPECT_TRUE(parse_dataset_request(R"({"path":")" + longest + "\"}"));
+  for (const auto& [json, pointer] : std::vector<std::pair<std::string, std::string>>{
+           {R"({"path":")" + longest + "p\"}", "/path"},
+           {R"({"path":""})", "/path"},
+           {R"({"path":7})", "/path"},
+           {R"({"path":"a\nb"})", "/path"},
+           {R"({"path":"a\u0000b"})", "/path"},
+           {R"({})", "/path"},
+           {R"({"path":"a","mode":1})", "/mode"},
+           {R"([])", ""}}) {
+    const auto refused = parse_dataset_request(json);
+    ASSERT_FALSE(refused) << json;
+    EXPECT_EQ(refused.error().at.front().pointer, pointer) << json;
+  }
+  for (const char* json : {"", "{", R"({"path":"a","path":"b"})", "{\"path\":\"\xff\"}"}) {
+    const auto refused = parse_dataset_request(json);
+    ASSERT_FALSE(refused) << json;
+    EXPECT_EQ(refused.error().kind, ErrorKind::malformed) << json;
+  }
+}
+
+TEST(Views, AnUnknownKeyIsToldWhichAreKnown) {
+  const auto refused = ViewDocument::parse(R"({"depthCue":{"strenght":1}})");
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("strength"));
+  EXPECT_THAT(refused.error().message, HasSubstr("near"));
+  EXPECT_THAT(refused.error().message, HasSubstr("far"));
+}
+
+}  // namespace
+}  // namespace windsplat::protocol::testing

@@ -1,0 +1,192 @@
+// What can be named below a data root, and that nothing else can.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "server/data/files/files.hpp"
+
+namespace windsplat::data {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+
+class LocateBeneath : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "windsplat-root-XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    above_ = fs::canonical(name);
+    root_ = above_ / "root";
+    fs::create_directories(root_ / "runs/may");
+    for (const char* file : {"a.nc", "odd[1].nc", "runs/f10.nc", "runs/f2.nc", "runs/x.pvd"}) {
+      std::ofstream(root_ / file) << "data";
+    }
+    std::ofstream(above_ / "secret.nc") << "secret";
+    fs::create_symlink("a.nc", root_ / "inside.nc");
+    fs::create_symlink("../../a.nc", root_ / "runs/may/up.nc");
+    fs::create_symlink("../secret.nc", root_ / "out.nc");
+    fs::create_symlink(above_ / "secret.nc", root_ / "absolute.nc");
+    fs::create_symlink("..", root_ / "outfolder");
+    fs::create_symlink("round.nc", root_ / "round.nc");
+    ASSERT_EQ(mkfifo((root_ / "pipe.nc").c_str(), 0600), 0);
+  }
+  void TearDown() override {
+    std::error_code ignored;
+    fs::remove_all(above_, ignored);
+  }
+
+  Location located(const std::string& path) {
+    auto found = locate_beneath(root_.native(), path);
+    EXPECT_TRUE(found) << path << ": " << (found ? "" : found.error().message);
+    return found ? *found : Location{};
+  }
+  ErrorKind refusal(const std::string& path) {
+    const auto found = locate_beneath(root_.native(), path);
+    EXPECT_FALSE(found) << path;
+    if (found) return ErrorKind::internal;
+    EXPECT_THAT(found.error().message, Not(HasSubstr(root_.native()))) << "tells where the root is";
+    EXPECT_THAT(found.error().message, Not(HasSubstr(above_.filename().native())));
+    return found.error().kind;
+  }
+
+  fs::path above_;
+  fs::path root_;
+};
+
+TEST_F(LocateBeneath, AFileIsFoundAsLocateFindsIt) {
+  for (const char* path : {"a.nc", "./a.nc", "runs//f2.nc", "runs/x.pvd", "odd[1].nc"}) {
+    const Location found = located(path);
+    const auto same = locate((root_ / path).native());
+    ASSERT_TRUE(same) << path;
+    EXPECT_EQ(found.kind, Location::Kind::file);
+    ASSERT_EQ(found.members.size(), 1U);
+    EXPECT_EQ(found.members[0].path, same->members[0].path);
+    EXPECT_EQ(found.members[0].name, same->members[0].name);
+    EXPECT_EQ(found.folder, same->folder);
+    EXPECT_EQ(found.stem, same->stem);
+    EXPECT_EQ(found.companions, same->companions) << path;
+  }
+  EXPECT_TRUE(located("runs/x.pvd").companions);
+  EXPECT_FALSE(located("a.nc").companions);
+}
+
+TEST_F(LocateBeneath, LinksThatStayInsideAreResolved) {
+  EXPECT_EQ(located("inside.nc").members[0].path, (root_ / "a.nc").native());
+  EXPECT_EQ(located("inside.nc").stem, "inside");
+  EXPECT_EQ(located("runs/may/up.nc").members[0].path, (root_ / "a.nc").native());
+}
+
+TEST_F(LocateBeneath, AFolderIsAFolder) {
+  const Location found = located("runs/may/");
+  EXPECT_EQ(found.kind, Location::Kind::folder);
+  EXPECT_EQ(found.folder, (root_ / "runs/may").native());
+  EXPECT_EQ(found.stem, "may");
+  EXPECT_TRUE(found.members.empty());
+}
+
+TEST_F(LocateBeneath, APatternInTheLastPartIsASeriesInNaturalOrder) {
+  const Location found = located("runs/f*.nc");
+  EXPECT_EQ(found.kind, Location::Kind::series);
+  EXPECT_EQ(found.stem, "f");
+  ASSERT_EQ(found.members.size(), 2U);
+  EXPECT_EQ(found.members[0].name, "f2.nc");
+  EXPECT_EQ(found.members[1].path, (root_ / "runs/f10.nc").native());
+  EXPECT_EQ(refusal("runs/g*.nc"), ErrorKind::not_found);
+  EXPECT_EQ(refusal("r*/f2.nc"), ErrorKind::not_found) << "a pattern before the last part";
+  EXPECT_EQ(located("[a].nc").members.size(), 1U);
+}
+
+TEST_F(LocateBeneath, AGroupIsNamedBehindTheFile) {
+  const Location found = located("a.nc#/sub/deep");
+  EXPECT_EQ(found.inside, "sub/deep");
+  EXPECT_EQ(found.members[0].path, (root_ / "a.nc").native());
+  EXPECT_EQ(found.stem, "a");
+  EXPECT_EQ(located("runs/f*.nc#/g").inside, "g");
+  EXPECT_EQ(located("runs/f*.nc#/g").members.size(), 2U);
+  // A folder that is called so is a folder.
+  fs::create_directory(root_ / "odd#");
+  std::ofstream(root_ / "odd#/b.nc") << "data";
+  EXPECT_EQ(located("odd#/b.nc").inside, "");
+  EXPECT_EQ(located("odd#/b.nc#/g").members[0].path, (root_ / "odd#/b.nc").native());
+  EXPECT_EQ(located("odd#/b.nc#/g").inside, "g");
+
+  EXPECT_EQ(refusal("b.nc#/g"), ErrorKind::not_found);
+  EXPECT_THAT(locate_beneath(root_.native(), "b.nc#/g").error().message, HasSubstr("'b.nc': no"));
+  EXPECT_EQ(refusal("a.nc#/g#/h"), ErrorKind::not_found);
+  EXPECT_EQ(refusal("runs/may#/g"), ErrorKind::invalid);
+  EXPECT_EQ(refusal("out.nc#/g"), ErrorKind::invalid);
+  EXPECT_EQ(refusal("#/g"), ErrorKind::not_found);
+}
+
+TEST_F(LocateBeneath, WhatLeadsOutIsRefused) {
+  for (const std::string path :
+       {"..", "../secret.nc", "runs/../../secret.nc", "runs/..", "a.nc/..", "out.nc", "absolute.nc",
+        "outfolder", "outfolder/secret.nc", "outfolder/*.nc", "../*.nc", "o*.nc", "round.nc"}) {
+    EXPECT_EQ(refusal(path), ErrorKind::invalid) << path;
+  }
+  const auto inside = locate_beneath(root_.native(), (root_ / "a.nc").native());
+  ASSERT_FALSE(inside);
+  EXPECT_EQ(inside.error().kind, ErrorKind::invalid) << "absolute, though inside";
+}
+
+TEST_F(LocateBeneath, WhatIsNoFileNameIsRefused) {
+  for (const std::string path : {"", ".", "./", "./.", "/", "/etc/passwd", "http://x/a.nc",
+                                 "file:///etc/passwd", "s3://b/a.nc"}) {
+    EXPECT_EQ(refusal(path), ErrorKind::invalid) << path;
+  }
+  EXPECT_EQ(refusal(std::string("a.nc\0.png", 9)), ErrorKind::invalid);
+  EXPECT_EQ(refusal("a.nc#mode=zarr"), ErrorKind::not_found);
+  EXPECT_EQ(refusal("b.nc"), ErrorKind::not_found);
+  EXPECT_EQ(refusal("a.nc/b.nc"), ErrorKind::not_found);
+  EXPECT_EQ(refusal(std::string(300, 'x')), ErrorKind::invalid) << "longer than any name";
+}
+
+TEST_F(LocateBeneath, APipeIsRefusedWithoutWaitingForItsWriter) {
+  EXPECT_EQ(refusal("pipe.nc"), ErrorKind::invalid);
+  EXPECT_EQ(refusal("pipe*"), ErrorKind::not_found) << "a series is of files";
+}
+
+// A folder is looked into whenever its files are read, long after it was located.
+TEST_F(LocateBeneath, AFolderThatBecomesALinkLeadsNowhere) {
+  fs::create_directories(above_ / "elsewhere");
+  std::ofstream(above_ / "elsewhere/f2.nc") << "secret";
+  const auto before = direct_files(located("runs"));
+  ASSERT_TRUE(before->open("f2.nc"));
+  fs::rename(root_ / "runs", root_ / "moved");
+  fs::create_symlink(above_ / "elsewhere", root_ / "runs");
+  Location runs = located("moved");
+  runs.folder = (root_ / "runs").native();
+  const auto after = direct_files(runs);
+  EXPECT_FALSE(after->open("f2.nc"));
+  EXPECT_FALSE(after->list(""));
+  EXPECT_FALSE(after->exists("f2.nc"));
+}
+
+TEST_F(LocateBeneath, APatternIsMatchedAgainWithinTheSameBounds) {
+  const Location series = located("runs/f*.nc");
+  std::ofstream(root_ / "runs/f3.nc") << "data";
+  const auto again = locate_again(series);
+  ASSERT_TRUE(again) << again.error().message;
+  ASSERT_EQ(again->members.size(), 3U);
+  EXPECT_EQ(again->members[1].name, "f3.nc");
+  fs::create_symlink(above_ / "secret.nc", root_ / "runs/f4.nc");
+  EXPECT_FALSE(locate_again(series)) << "one leads out";
+}
+
+TEST_F(LocateBeneath, LookingUpReadsNothing) {
+  const fs::path locked = root_ / "runs/f2.nc";
+  fs::permissions(locked, fs::perms::none);
+  EXPECT_EQ(located("runs/f2.nc").members.size(), 1U);
+}
+
+}  // namespace
+}  // namespace windsplat::data

@@ -1,0 +1,17 @@
+// Where the real files are that scripts/fetch-test-data fetches.
+#pragma once
+
+#include <cstdlib>
+#include <string>
+
+namespace windsplat::data::test {
+
+inline std::string test_data(const std::string& name) {
+  const char* folder = std::getenv("WINDSPLAT_TEST_DATA");
+  std::string path = folder != nullptr ? folder : WINDSPLAT_SOURCE_DIR "/build/test-data";
+  path += '/';
+  path += name;
+  return path;
+}
+
+}  // namespace windsplat::data::test

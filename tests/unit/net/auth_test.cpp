@@ -1,0 +1,370 @@
+// Who is let in: tokens, cookies, origins, and what is told to the others. No server is needed.
+#include "server/net/auth.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+
+#include "server/net/login.hpp"
+
+namespace windsplat::net {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr const char* secret = "0123456789abcdef-._~+/==";
+constexpr const char* secret_in_base64url = "MDEyMzQ1Njc4OWFiY2RlZi0uX34rLz09";
+constexpr std::int64_t now_s = 1'900'000'000;
+
+Token token(std::string_view text = secret) { return Token::parse(text).value(); }
+
+Request request(std::string method, std::vector<std::string> path, Headers headers = {}) {
+  Request out;
+  out.method = std::move(method);
+  out.path = std::move(path);
+  out.headers = std::move(headers);
+  out.headers.emplace_back("Host", "winds.example");
+  return out;
+}
+
+Verdict verdict(const Request& request, bool upgrade = false) {
+  const Token mine = token();
+  return judge(request, upgrade, &mine, {"https://friend.example"}, now_s);
+}
+
+std::string cookie_header(const std::string& value) { return "a=b; windsplat=" + value + "; c=d"; }
+
+TEST(TokenFile, is_one_line_of_a_bearer_tokens_characters) {
+  EXPECT_TRUE(token("0123456789abcdef\n").is("0123456789abcdef"));
+  EXPECT_TRUE(token("0123456789abcdef\r\n").is("0123456789abcdef"));
+  EXPECT_TRUE(token(std::string(512, 'x')).is(std::string(512, 'x')));
+  for (const std::string& bad :
+       {std::string(), std::string("\n"), std::string("0123456789abcde"), std::string(513, 'x'),
+        std::string("0123456789abcdef\n\n"), std::string("0123456789abcdef\nsecond"),
+        std::string("0123456789 abcdef"), std::string("0123456789=abcdef"),
+        std::string("0123456789abcdef\xc3\xa4"), std::string("0123456789abcdef\0", 17),
+        std::string("================")}) {
+    const auto parsed = Token::parse(bad);
+    ASSERT_FALSE(parsed) << bad;
+    EXPECT_EQ(parsed.error().kind, ErrorKind::invalid);
+    if (bad.size() < 2) continue;
+    EXPECT_THAT(parsed.error().message, Not(HasSubstr(bad)));
+  }
+}
+
+TEST(TokenFile, is_that_token_and_no_other) {
+  const Token mine = token();
+  EXPECT_TRUE(mine.is(secret));
+  for (const char* other : {"", "0", "0123456789abcdef-._~+/=", "0123456789abcdef-._~+/===",
+                            "1123456789abcdef-._~+/==", "0123456789ABCDEF-._~+/=="}) {
+    EXPECT_FALSE(mine.is(other)) << other;
+  }
+}
+
+TEST(Cookie, is_an_hmac_of_its_end_by_the_token) {
+  // By Python's hmac: key = HMAC-SHA256(token, "windsplat cookie, version 1"), HMAC-SHA256(key,
+  // end).
+  const std::string end = "2000000000";
+  const std::string mac = "0ecadcfbdcb915cc2f78f27377d8b4326d90cdb1f9c7c3bf9baf6e16c217df2d";
+  EXPECT_EQ(token().cookie(2'000'000'000), end + "." + mac);
+}
+
+TEST(Cookie, ends_and_is_good_for_its_token_alone) {
+  const Token mine = token();
+  const std::string cookie = mine.cookie(now_s + 1);
+  EXPECT_TRUE(mine.admits(cookie, now_s));
+  EXPECT_FALSE(mine.admits(cookie, now_s + 1));
+  EXPECT_FALSE(token("another-token-of-24-char").admits(cookie, now_s));
+  const std::string mac = cookie.substr(cookie.find('.'));
+  std::string spoiled = cookie;
+  spoiled.back() = spoiled.back() == '0' ? '1' : '0';
+  for (const std::string& bad :
+       {std::string(), std::string("."), mac, std::to_string(now_s + 2) + mac, "+" + cookie,
+        " " + cookie, cookie + "0", cookie.substr(0, cookie.size() - 1), spoiled,
+        "99999999999999999999" + mac}) {
+    EXPECT_FALSE(mine.admits(bad, now_s)) << bad;
+  }
+}
+
+TEST(Cookie, has_the_port_in_its_name) {
+  const auto name = [](const char* host) {
+    Request out;
+    out.headers = {{"Host", host}};
+    return cookie_name(out);
+  };
+  EXPECT_EQ(name("winds.example"), "windsplat");
+  EXPECT_EQ(name("winds.example:8080"), "windsplat-8080");
+  EXPECT_EQ(name("[::1]"), "windsplat");
+  EXPECT_EQ(name("[::1]:8081"), "windsplat-8081");
+  EXPECT_EQ(name("winds.example:"), "windsplat");
+  const Token mine = token();
+  Request asked = request("GET", {"v1"}, {{"Cookie", cookie_header(mine.cookie(now_s + 9))}});
+  asked.headers.back().second = "winds.example:8080";  // the Host
+  EXPECT_EQ(judge(asked, false, &mine, {}, now_s), Verdict::no_token) << "another daemon's";
+  asked.headers.front().second = "windsplat-8080=" + mine.cookie(now_s + 9);
+  EXPECT_EQ(judge(asked, false, &mine, {}, now_s), Verdict::allowed);
+}
+
+TEST(TokenFile, another_one_has_to_be_shown_anew) {
+  const Token first = token();
+  const Token same = token();
+  const Token other = token("another-token-of-24-char");
+  EXPECT_FALSE(is_other_token(&first, &same));
+  EXPECT_TRUE(is_other_token(&first, &other));
+  EXPECT_TRUE(is_other_token(nullptr, &first));
+  EXPECT_FALSE(is_other_token(&first, nullptr)) << "nobody is asked any more";
+  EXPECT_FALSE(is_other_token(nullptr, nullptr));
+}
+
+TEST(TokenFile, a_secret_is_overwritten_before_it_goes) {
+  std::string text(64, 's');
+  const char* const bytes = text.data();
+  wipe(text);
+  EXPECT_TRUE(text.empty());
+  EXPECT_EQ(std::count(bytes, bytes + 64, 's'), 0);
+}
+
+TEST(Judge, health_is_open_and_nothing_else) {
+  EXPECT_EQ(verdict(request("GET", {"livez"})), Verdict::allowed);
+  EXPECT_EQ(verdict(request("HEAD", {"readyz"})), Verdict::allowed);
+  for (const std::vector<std::string>& path : {std::vector<std::string>{},
+                                               {"metrics"},
+                                               {"v1"},
+                                               {"v1", "datasets"},
+                                               {"livez", "x"},
+                                               {"index.html"},
+                                               {"login"},
+                                               {"none"}}) {
+    EXPECT_EQ(verdict(request("GET", path)), Verdict::no_token);
+    EXPECT_EQ(verdict(request("DELETE", path)), Verdict::no_token);
+    EXPECT_EQ(judge(request("GET", path), false, nullptr, {}, now_s), Verdict::allowed)
+        << "where there is no token nobody is asked";
+  }
+}
+
+TEST(Judge, a_bearer_token_lets_in) {
+  const std::string right = std::string("Bearer ") + secret;
+  const std::vector<std::string> path{"v1"};
+  EXPECT_EQ(verdict(request("GET", path, {{"Authorization", right}})), Verdict::allowed);
+  EXPECT_EQ(verdict(request("DELETE", path, {{"authorization", "bEARER  " + right.substr(7)}})),
+            Verdict::allowed);
+  EXPECT_EQ(verdict(request("GET", path, {{"Authorization", right}}), true), Verdict::allowed);
+  for (const std::string& wrong :
+       {std::string("Bearer"), std::string("Bearer "), right + "x", right + ", " + right}) {
+    EXPECT_EQ(verdict(request("GET", path, {{"Authorization", wrong}})), Verdict::wrong_token)
+        << wrong;
+  }
+  EXPECT_EQ(verdict(request("GET", path, {{"Authorization", right}, {"Authorization", right}})),
+            Verdict::wrong_token)
+      << "which of two counts is not guessed";
+  EXPECT_EQ(verdict(request("GET", path,
+                            {{"Authorization", "Bearer wrong"},
+                             {"Cookie", cookie_header(token().cookie(now_s + 9))}})),
+            Verdict::wrong_token);
+}
+
+// A proxy that asks for a password has the browser send it with every request.
+TEST(Judge, another_scheme_is_no_proof_and_no_wrong_one) {
+  const std::string basic = "Basic dXNlcjpwYXNzd29yZA==";
+  for (const std::string& other : {basic, std::string(secret), std::string("Bearers ") + secret}) {
+    const Headers alone{{"Authorization", other}};
+    EXPECT_EQ(verdict(request("GET", {"v1"}, alone)), Verdict::no_token) << other;
+    EXPECT_FALSE(shows_token(request("GET", {"v1"}, alone), false)) << other;
+  }
+  EXPECT_EQ(verdict(request(
+                "GET", {"v1"},
+                {{"Authorization", basic}, {"Cookie", cookie_header(token().cookie(now_s + 9))}})),
+            Verdict::allowed);
+  EXPECT_EQ(verdict(request("GET", {"v1", "stream"},
+                            {{"Authorization", basic},
+                             {"Sec-WebSocket-Protocol",
+                              std::string("windsplat.v1, bearer.") + secret_in_base64url}}),
+                    true),
+            Verdict::allowed);
+}
+
+// What may be a guess, right or wrong, and is counted before it is compared.
+TEST(Judge, a_guess_is_what_shows_a_token_where_one_is_asked_for) {
+  const Headers bearer{{"Authorization", "Bearer x"}};
+  const Headers offer{{"Sec-WebSocket-Protocol", "bearer.eA"}};
+  EXPECT_TRUE(shows_token(request("GET", {"v1"}, bearer), false));
+  EXPECT_TRUE(shows_token(request("GET", {"v1", "stream"}, offer), true));
+  EXPECT_FALSE(shows_token(request("GET", {"v1", "stream"}, offer), false));
+  EXPECT_FALSE(shows_token(request("GET", {"livez"}, bearer), false)) << "nothing is compared";
+  EXPECT_FALSE(shows_token(request("GET", {"v1"}, {{"Cookie", "windsplat=1.2"}}), false));
+}
+
+TEST(Judge, a_page_in_plain_http_is_not_one_of_a_server_in_tls) {
+  const Token mine = token();
+  const auto posted = [&](const char* origin, bool tls) {
+    return judge(request("POST", {"v1", "views"},
+                         {{"Origin", origin}, {"Cookie", cookie_header(mine.cookie(now_s + 9))}}),
+                 false, &mine, {"http://friend.example"}, now_s, tls);
+  };
+  EXPECT_EQ(posted("http://winds.example", true), Verdict::wrong_origin);
+  EXPECT_EQ(posted("https://winds.example", true), Verdict::allowed);
+  EXPECT_EQ(posted("http://friend.example", true), Verdict::allowed) << "it was named";
+  EXPECT_EQ(posted("http://winds.example", false), Verdict::allowed);
+  EXPECT_EQ(posted("https://winds.example", false), Verdict::allowed) << "a proxy may speak TLS";
+}
+
+TEST(Judge, a_subprotocol_lets_a_websocket_in) {
+  const std::string right = std::string("windsplat.v1, bearer.") + secret_in_base64url;
+  const auto with = [](const std::string& offers) {
+    return request("GET", {"v1", "stream"}, {{"Sec-WebSocket-Protocol", offers}});
+  };
+  EXPECT_EQ(verdict(with(right), true), Verdict::allowed);
+  EXPECT_EQ(verdict(with(right), false), Verdict::no_token) << "of an upgrade alone";
+  EXPECT_EQ(verdict(with("windsplat.v1"), true), Verdict::no_token);
+  for (const std::string& wrong : {right + "=", right + "A", right.substr(0, right.size() - 1),
+                                   std::string("bearer."), std::string("bearer.") + secret}) {
+    EXPECT_EQ(verdict(with(wrong), true), Verdict::wrong_token) << wrong;
+  }
+}
+
+TEST(Judge, a_cookie_lets_in_and_changes_something_for_pages_of_ours_alone) {
+  const std::string cookie = cookie_header(token().cookie(now_s + 100));
+  const auto with = [&](const char* method, Headers more) {
+    more.emplace_back("Cookie", cookie);
+    return request(method, {"v1", "views"}, std::move(more));
+  };
+  EXPECT_EQ(verdict(with("GET", {})), Verdict::allowed);
+  EXPECT_EQ(verdict(with("POST", {{"Origin", "http://winds.example"}})), Verdict::allowed);
+  EXPECT_EQ(verdict(with("POST", {{"Origin", "https://friend.example"}})), Verdict::allowed);
+  EXPECT_EQ(verdict(with("DELETE", {{"Sec-Fetch-Site", "same-origin"}})), Verdict::allowed);
+  for (const Headers& foreign :
+       {Headers{}, Headers{{"Origin", "http://evil.example"}}, Headers{{"Origin", "null"}},
+        Headers{{"Origin", "null"}, {"Sec-Fetch-Site", "same-origin"}},
+        Headers{{"Sec-Fetch-Site", "same-site"}}, Headers{{"Sec-Fetch-Site", "none"}}}) {
+    EXPECT_EQ(verdict(with("POST", foreign)), Verdict::wrong_origin);
+    EXPECT_EQ(verdict(with("GET", foreign), true), Verdict::wrong_origin) << "a WebSocket";
+  }
+  EXPECT_EQ(verdict(with("GET", {{"Origin", "http://winds.example"}}), true), Verdict::allowed);
+  const std::string old = "windsplat=" + token().cookie(now_s);
+  EXPECT_EQ(verdict(request("GET", {}, {{"Cookie", old}})), Verdict::no_token);
+  EXPECT_EQ(verdict(request("GET", {}, {{"Cookie", old + "; " + cookie}})), Verdict::allowed)
+      << "one of several";
+  EXPECT_EQ(verdict(request("GET", {}, {{"Cookie", "other" + cookie.substr(5)}})),
+            Verdict::no_token);
+}
+
+TEST(Judge, a_foreign_page_is_refused_even_with_the_token) {
+  const Headers headers{{"Authorization", std::string("Bearer ") + secret},
+                        {"Origin", "https://evil.example"}};
+  EXPECT_EQ(verdict(request("GET", {"v1", "stream"}, headers), true), Verdict::wrong_origin);
+  EXPECT_EQ(verdict(request("POST", {"v1", "views"}, headers)), Verdict::wrong_origin);
+  EXPECT_EQ(verdict(request("GET", {"v1"}, headers)), Verdict::allowed)
+      << "what is read the browser itself keeps from the page";
+  EXPECT_EQ(judge(request("PUT", {"v1"}, {{"Origin", "https://evil.example"}}), false, nullptr, {},
+                  now_s),
+            Verdict::wrong_origin)
+      << "without a token, too";
+}
+
+TEST(Judge, a_token_in_an_address_is_refused_before_all_else) {
+  for (const char* key : {"token", "access_token", "TOKEN"}) {
+    Request asked = request("GET", {"livez"}, {{"Authorization", std::string("Bearer ") + secret}});
+    asked.query = {{"width", "3"}, {key, secret}};
+    EXPECT_EQ(verdict(asked), Verdict::token_in_url);
+    EXPECT_EQ(judge(asked, false, nullptr, {}, now_s), Verdict::token_in_url);
+    const Response answer = turned_away(Verdict::token_in_url, asked, "/");
+    EXPECT_EQ(answer.status, 400);
+    const std::string body(answer.body.bytes.begin(), answer.body.bytes.end());
+    EXPECT_THAT(body, Not(HasSubstr(secret)));
+  }
+}
+
+std::string header_of(const Response& response, const std::string& name) {
+  for (const auto& [key, value] : response.headers) {
+    if (key == name) return value;
+  }
+  return "";
+}
+
+std::string text_of(const Response& response) {
+  return {response.body.bytes.begin(), response.body.bytes.end()};
+}
+
+TEST(TurnedAway, programs_get_a_problem_and_people_a_form) {
+  const Request program = request("GET", {"v1"}, {{"Accept", "*/*"}});
+  const Response problem = turned_away(Verdict::no_token, program, "/");
+  EXPECT_EQ(problem.status, 401);
+  EXPECT_EQ(problem.content_type, "application/problem+json");
+  EXPECT_EQ(header_of(problem, "WWW-Authenticate"), "Bearer realm=\"windsplat\"");
+  const Response wrong = turned_away(Verdict::wrong_token, program, "/");
+  EXPECT_EQ(wrong.status, 401);
+  EXPECT_THAT(header_of(wrong, "WWW-Authenticate"), HasSubstr("invalid_token"));
+
+  const Request person =
+      request("GET", {}, {{"Accept", "text/html,application/xhtml+xml,*/*;q=0.8"}});
+  const Response page = turned_away(Verdict::no_token, person, "/winds/");
+  EXPECT_EQ(page.status, 401);
+  EXPECT_THAT(page.content_type, HasSubstr("text/html"));
+  EXPECT_THAT(header_of(page, "WWW-Authenticate"), HasSubstr("Bearer"));
+  EXPECT_THAT(header_of(page, "Content-Security-Policy"), HasSubstr("form-action 'self'"));
+  EXPECT_THAT(header_of(page, "Content-Security-Policy"), Not(HasSubstr("unsafe")));
+  EXPECT_THAT(text_of(page), HasSubstr("method=\"post\" action=\"/winds/login\""));
+  EXPECT_EQ(turned_away(Verdict::wrong_origin, person, "/").status, 403);
+}
+
+Request login(const std::string& body, Headers headers = {{"Origin", "http://winds.example"}}) {
+  headers.emplace_back("Content-Type", "application/x-www-form-urlencoded; charset=utf-8");
+  Request out = request("POST", {"login"}, std::move(headers));
+  out.body = body;
+  return out;
+}
+
+TEST(Login, comes_from_a_page_of_ours) {
+  EXPECT_EQ(verdict(login("")), Verdict::allowed);
+  EXPECT_EQ(verdict(login("", {{"Sec-Fetch-Site", "same-origin"}})), Verdict::allowed);
+  EXPECT_EQ(verdict(login("", {})), Verdict::wrong_origin);
+  EXPECT_EQ(verdict(login("", {{"Origin", "https://evil.example"}})), Verdict::wrong_origin);
+  EXPECT_EQ(verdict(login("", {{"Origin", "null"}})), Verdict::wrong_origin);
+}
+
+TEST(Login, changes_the_token_for_a_cookie) {
+  const Token mine = token();
+  for (const char* body :
+       {"token=0123456789abcdef-._~%2B%2F%3D%3D", "token=+0123456789abcdef-._~%2b/==+",
+        "x=1&token=0123456789abcdef-._~%2B/=="}) {
+    const Response in = log_in(login(body), mine, "/winds/", false, now_s);
+    ASSERT_EQ(in.status, 303) << body;
+    EXPECT_EQ(header_of(in, "Location"), "/winds/");
+    const std::string cookie = header_of(in, "Set-Cookie");
+    EXPECT_THAT(cookie, HasSubstr("; Path=/winds/; Max-Age=604800; HttpOnly; SameSite=Strict"));
+    EXPECT_THAT(cookie, Not(HasSubstr("Secure")));
+    EXPECT_THAT(cookie, Not(HasSubstr(secret)));
+    const std::string value = cookie.substr(10, cookie.find(';') - 10);
+    EXPECT_TRUE(mine.admits(value, now_s + cookie_lasts_s - 1));
+    EXPECT_FALSE(mine.admits(value, now_s + cookie_lasts_s));
+  }
+}
+
+TEST(Login, a_cookie_is_for_tls_alone_where_the_page_is) {
+  const std::string body = "token=0123456789abcdef-._~%2B/==";
+  const auto cookie = [&](bool tls, const char* origin) {
+    return header_of(log_in(login(body, {{"Origin", origin}}), token(), "/", tls, now_s),
+                     "Set-Cookie");
+  };
+  EXPECT_THAT(cookie(true, "https://winds.example"), HasSubstr("; Secure"));
+  EXPECT_THAT(cookie(false, "https://winds.example"), HasSubstr("; Secure"));
+  EXPECT_THAT(cookie(false, "http://winds.example"), Not(HasSubstr("Secure")));
+}
+
+TEST(Login, with_another_token_shows_the_form_again) {
+  for (const char* body : {"", "token", "token=", "token=wrong", "nekot=0123456789abcdef-._~%2B/==",
+                           "token=%", "token=%2", "token=%zz"}) {
+    const Response out = log_in(login(body), token(), "/", false, now_s);
+    EXPECT_EQ(out.status, 401) << body;
+    EXPECT_EQ(header_of(out, "Set-Cookie"), "");
+    EXPECT_THAT(text_of(out), HasSubstr("That is not the token."));
+  }
+  Request json = login("token=0123456789abcdef-._~%2B/==");
+  json.headers.insert(json.headers.begin(), {"Content-Type", "application/json"});
+  json.headers.erase(json.headers.begin() + 2);
+  EXPECT_EQ(log_in(json, token(), "/", false, now_s).status, 415);
+}
+
+}  // namespace
+}  // namespace windsplat::net

@@ -1,0 +1,166 @@
+// What a view is told to cost before anything is read, and what is refused.
+#include "server/net/cost.hpp"
+
+#include <gtest/gtest.h>
+
+#include "server/data/store.hpp"
+
+namespace windsplat::net {
+namespace {
+
+// Lines of 100 x 80 x 60 samples and one medium.
+class CostTest : public testing::Test {
+ protected:
+  CostTest() : store_(data::StoreOptions{}) {
+    dataset_ = store_.add("tornado:100x80x60").value();
+    view_.dataset = dataset_->info().id;
+    view_.vector.field = {protocol::FieldChoice::Kind::named, "wind"};
+    view_.vector.magnitude_range = protocol::Range{0, 1};
+    view_.vector.min_magnitude = 0;
+    view_.vector.color.range = protocol::Range{0, 1};
+    view_.scalars.emplace();
+    view_.method.name = protocol::MethodName::kernel;
+    view_.method.detail = protocol::Detail::full;
+  }
+
+  Cost cost(const protocol::View& view) {
+    const auto completed = scene::complete_and_place(view, *dataset_);
+    EXPECT_TRUE(completed) << (completed ? "" : completed.error().message);
+    const auto found = cost_of(*completed, false);
+    EXPECT_TRUE(found);
+    return found.value();
+  }
+
+  protocol::ScalarView medium() {
+    protocol::ScalarView scalar;
+    for (const auto& field : dataset_->info().fields) {
+      if (field.kind == data::FieldKind::scalar) scalar.field = field.name;
+    }
+    scalar.color.range = protocol::Range{0, 1};
+    scalar.extinction.emplace(1, std::array<double, 2>{0, 1});
+    return scalar;
+  }
+
+  data::Store store_;
+  std::shared_ptr<data::Dataset> dataset_;
+  protocol::View view_;
+};
+
+constexpr double samples = 100 * 80 * 60;
+
+TEST_F(CostTest, counts_every_stop_and_every_sample) {
+  EXPECT_GE(cost(view_).kernels, samples);
+  EXPECT_LT(cost(view_).kernels, 20 * samples);
+  EXPECT_EQ(cost(view_).pixels, 1280 * 720);
+  protocol::View with_medium = view_;
+  with_medium.scalars = {medium()};
+  EXPECT_GE(cost(with_medium).kernels, cost(view_).kernels + samples);
+  protocol::View nothing = view_;
+  nothing.vector.field = {protocol::FieldChoice::Kind::none, ""};
+  EXPECT_LT(cost(nothing).kernels, samples) << "the picture alone";
+  nothing.scalars = {medium()};
+  (*nothing.scalars)[0].extinction = {{0, 0}};
+  EXPECT_LT(cost(nothing).kernels, samples) << "it absorbs nothing";
+  protocol::View unseen = view_;
+  unseen.vector.opacity = 0;
+  EXPECT_LT(cost(unseen).kernels, samples);
+}
+
+TEST_F(CostTest, a_stride_leaves_samples_out_and_a_slice_all_but_a_layer) {
+  protocol::View strided = view_;
+  strided.vector.stride = 4;
+  strided.vector.length = 0.001;
+  protocol::View plain = view_;
+  plain.vector.length = 0.001;
+  // 16 pixels at least count for each: the rest is the picture's.
+  const double picture = 1280.0 * 720 / Cost::pixels_a_kernel;
+  EXPECT_NEAR((cost(plain).kernels - picture) / (cost(strided).kernels - picture), 64, 1);
+  protocol::View sliced = plain;
+  sliced.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 3};
+  EXPECT_NEAR((cost(plain).kernels - picture) / (cost(sliced).kernels - picture), 60, 1);
+}
+
+TEST_F(CostTest, giant_kernels_cost_what_they_cover) {
+  protocol::View wide = view_;
+  wide.vector.r2 = 64;
+  EXPECT_GT(cost(wide).kernels, 100 * cost(view_).kernels);
+  EXPECT_EQ(cost(wide).dearest, "/vector/r2");
+  protocol::View longest = view_;
+  longest.vector.length = 10;
+  longest.vector.span = 64;
+  EXPECT_GT(cost(longest).kernels, 3 * cost(view_).kernels);
+  EXPECT_EQ(cost(longest).dearest, "/vector/length");
+  protocol::View large = wide;
+  large.image = {8192, 4320, "#000000"};
+  EXPECT_GT(cost(large).kernels, 20 * cost(wide).kernels);
+  protocol::View thin = view_;
+  thin.method.name = protocol::MethodName::slab;
+  thin.method.slab_thickness = 0.05;
+  EXPECT_EQ(cost(thin).dearest, "/method/slabThickness");
+}
+
+TEST_F(CostTest, what_is_averaged_or_out_of_sight_costs_less) {
+  protocol::View far = view_;
+  far.camera.eye = protocol::Vec3{0, -1000, 0};
+  far.camera.target = protocol::Vec3{0, 0, 0};
+  const double all = cost(far).kernels;
+  far.method.detail = protocol::Detail::automatic;
+  EXPECT_LT(cost(far).kernels, 0.2 * all);
+  // From within, most of the large kernels lie behind the eye or beside the picture.
+  protocol::View within = view_;
+  within.vector.r2 = 20;
+  const double from_outside = cost(within).kernels;
+  within.camera.eye = protocol::Vec3{0, 0, 0};
+  within.camera.target = protocol::Vec3{0, 1, 0};
+  within.camera.fov_y = 5;
+  EXPECT_LT(cost(within).kernels, 0.5 * from_outside);
+}
+
+TEST_F(CostTest, is_finite_and_refused_at_every_extreme_of_a_view) {
+  for (const double r2 : {0.0, 64.0}) {
+    for (const double length : {0.0, 10.0}) {
+      for (const double eye : {1e-6, 1.0, 1e6}) {
+        for (const double fov : {0.001, 179.0}) {
+          protocol::View view = view_;
+          view.image = {8192, 4320, "#000000"};
+          view.vector.r1 = 0;
+          view.vector.r2 = r2;
+          view.vector.length = length;
+          view.vector.span = 64;
+          view.camera.eye = protocol::Vec3{0, -eye, eye};
+          view.camera.target = protocol::Vec3{0, 0, 0};
+          view.camera.fov_y = fov;
+          view.scalars = {medium(), medium(), medium(), medium()};
+          const Cost found = cost(view);
+          EXPECT_TRUE(std::isfinite(found.kernels)) << r2 << ' ' << length << ' ' << eye;
+          EXPECT_GE(found.kernels, 5 * samples);
+        }
+      }
+    }
+  }
+}
+
+TEST(CheckCost, names_what_would_make_it_less_and_the_limit) {
+  Limits limits;
+  limits.pixels = 1000;
+  limits.kernels = 5000;
+  EXPECT_TRUE(check_cost({1000, 5000, "/vector/stride"}, limits));
+  const auto large = check_cost({1001, 1, "/image"}, limits);
+  ASSERT_FALSE(large);
+  EXPECT_EQ(large.error().kind, ErrorKind::too_large);
+  EXPECT_EQ(large.error().at.at(0).pointer, "/image");
+  EXPECT_NE(large.error().message.find("1000"), std::string::npos);
+  for (const double kernels : {5001.0, 1e300, std::nan("")}) {
+    const auto dear = check_cost({1, kernels, "/scalars/2/stride"}, limits);
+    ASSERT_FALSE(dear) << kernels;
+    EXPECT_EQ(dear.error().kind, ErrorKind::invalid);
+    EXPECT_EQ(dear.error().at.at(0).pointer, "/scalars/2/stride");
+    EXPECT_NE(dear.error().message.find("5e+03"), std::string::npos) << dear.error().message;
+  }
+  limits.pixels = 0;
+  limits.kernels = 0;
+  EXPECT_TRUE(check_cost({1LL << 40, 1e300, "/image"}, limits));
+}
+
+}  // namespace
+}  // namespace windsplat::net

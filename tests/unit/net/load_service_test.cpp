@@ -1,0 +1,73 @@
+// How many loads may wait: of one dataset, of all, and who is not counted.
+#include "server/net/load_service.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+
+namespace windsplat::net {
+namespace {
+
+TEST(LoadService, bounds_what_waits_for_a_dataset_and_in_all) {
+  constexpr std::size_t most = 3;
+  std::promise<void> let_go;
+  const std::shared_future<void> gone = let_go.get_future().share();
+  std::promise<void> begun;
+  std::atomic<int> ran{0};
+  int refusals = 0;
+  LoadService loads(1, most, [&] { ++refusals; });
+  ASSERT_TRUE(loads.submit({{}, [&] {
+                              begun.set_value();
+                              gone.wait();
+                            }}));
+  begun.get_future().wait();
+  const auto ask = [&](const std::shared_ptr<const void>& dataset, bool admitted = false) {
+    const CancelToken cancel;
+    const auto queued = loads.submit({cancel, [&] { ++ran; }, admitted, dataset});
+    if (!queued) {
+      EXPECT_EQ(queued.error().kind, ErrorKind::busy);
+    }
+    return static_cast<bool>(queued);
+  };
+  int taken = 0;
+  for (std::size_t n = 0; n < LoadService::datasets_full; ++n) {
+    const auto dataset = std::make_shared<const int>(0);
+    for (std::size_t one = 0; one < most; ++one) taken += ask(dataset) ? 1 : 0;
+    EXPECT_FALSE(ask(dataset)) << n;
+  }
+  EXPECT_EQ(taken, static_cast<int>(most * LoadService::datasets_full));
+  EXPECT_FALSE(ask(std::make_shared<const int>(0))) << "another one, but so many in all";
+  EXPECT_TRUE(ask(nullptr, true)) << "let in before";
+  EXPECT_EQ(refusals, static_cast<int>(LoadService::datasets_full) + 1);
+  let_go.set_value();
+  loads.end();
+  EXPECT_EQ(ran, taken + 1);
+}
+
+TEST(LoadService, one_payer_has_half_of_the_places) {
+  std::promise<void> let_go;
+  std::promise<void> begun;
+  LoadService loads(1, 4);
+  ASSERT_TRUE(loads.submit({{}, [&] {
+                              begun.set_value();
+                              let_go.get_future().wait();
+                            }}));
+  begun.get_future().wait();
+  const auto one = std::make_shared<const int>(0);
+  const auto ask = [&](const std::shared_ptr<const void>& dataset, const char* payer) {
+    return static_cast<bool>(loads.submit({{}, [] {}, false, dataset, payer}));
+  };
+  EXPECT_TRUE(ask(one, "a"));
+  EXPECT_TRUE(ask(one, "a"));
+  EXPECT_FALSE(ask(one, "a")) << "half of a dataset's";
+  EXPECT_TRUE(ask(one, "b"));
+  EXPECT_TRUE(ask(one, "b"));
+  for (int n = 0; n < 6; ++n) EXPECT_TRUE(ask(std::make_shared<const int>(n), "a")) << n;
+  EXPECT_FALSE(ask(std::make_shared<const int>(0), "a")) << "half of all";
+  EXPECT_TRUE(ask(std::make_shared<const int>(0), "b"));
+  let_go.set_value();
+}
+
+}  // namespace
+}  // namespace windsplat::net

@@ -1,0 +1,41 @@
+// Which hosts a request may be meant for, and which of them are this machine's loopback.
+#include "server/net/negotiate.hpp"
+
+#include <gtest/gtest.h>
+
+namespace windsplat::net {
+namespace {
+
+TEST(HostNames, of_loopback_are_three) {
+  for (const char* host : {"localhost", "LOCALHOST:8080", "127.0.0.1", "127.9.9.9:1", "[::1]:80"}) {
+    EXPECT_TRUE(names_loopback(host)) << host;
+  }
+  for (const char* host : {"", "localhost.example", "127.0.0.1.example", "10.0.0.1", "[::2]"}) {
+    EXPECT_FALSE(names_loopback(host)) << host;
+  }
+}
+
+// A page can have its own name resolve to this machine, but no address.
+TEST(HostNames, are_no_addresses) {
+  for (const char* host : {"10.0.0.1", "10.0.0.1:8080", "[2001:db8::1]", "[::ffff:1.2.3.4]:80"}) {
+    EXPECT_TRUE(is_address(host)) << host;
+  }
+  for (const char* host : {"", "evil.example", "10.0.0.1.example:80", "10.0.0", "10.0.0.256", "[]",
+                           "[evil.example]", "[::1", "::1"}) {
+    EXPECT_FALSE(is_address(host)) << host;
+  }
+}
+
+TEST(HostNames, may_be_given) {
+  const std::vector<std::string> origins{"https://a.example"};
+  const std::vector<std::string> names{"winds.example"};
+  for (const char* host : {"localhost:1", "a.example", "winds.example", "WINDS.example:8080"}) {
+    EXPECT_TRUE(local_host_allowed(host, origins, names)) << host;
+  }
+  for (const char* host : {"evil.example", "winds.example.evil", "x.winds.example", "10.0.0.1"}) {
+    EXPECT_FALSE(local_host_allowed(host, origins, names)) << host;
+  }
+}
+
+}  // namespace
+}  // namespace windsplat::net

@@ -1,0 +1,222 @@
+// Where memory fails in the middle of something: nothing is left half done, and no thread of a
+// service ends. Allocations of a thread fail from the one on that a test names.
+#include <gtest/gtest.h>
+
+#include <boost/asio/io_context.hpp>
+#include <cstdlib>
+#include <functional>
+#include <future>
+#include <new>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "server/net/admission.hpp"
+#include "server/net/attempt.hpp"
+#include "server/net/jobs.hpp"
+#include "server/net/load_service.hpp"
+#include "server/net/post.hpp"
+#include "server/net/render_service.hpp"
+
+namespace {
+
+constexpr int enough = -1;
+thread_local int allocations_left = enough;
+
+}  // namespace
+
+// Not inlined: the compiler would take malloc for a mismatch of delete.
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  if (allocations_left == 0) throw std::bad_alloc();
+  if (allocations_left > 0) --allocations_left;
+  if (void* const memory = std::malloc(size > 0 ? size : 1)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t /*size*/) noexcept {
+  std::free(memory);
+}
+
+namespace windsplat::net {
+namespace {
+
+// Whether `body` got through with so many allocations.
+template <class Body>
+bool with_allocations(int count, const Body& body) {
+  allocations_left = count;
+  try {
+    body();
+    allocations_left = enough;
+    return true;
+  } catch (const std::bad_alloc&) {
+    allocations_left = enough;
+    return false;
+  }
+}
+
+RenderJob job_of(RenderKind kind, std::uint64_t owner) {
+  RenderJob job;
+  job.kind = kind;
+  job.owner = owner;
+  job.payer = "an address that is longer than sixteen bytes";
+  job.run = [](std::int64_t /*queue_us*/) {};
+  return job;
+}
+
+TEST(NoMemory, a_job_that_cannot_be_queued_changes_nothing) {
+  for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
+    int failed = 0;
+    for (int count = 0;; ++count) {
+      RenderQueue queue;
+      queue.push(job_of(kind, 1), 0);
+      RenderJob later = job_of(kind, 2);
+      if (with_allocations(count, [&] { queue.push(std::move(later), 0); })) break;
+      ++failed;
+      const auto first = queue.pop();
+      ASSERT_TRUE(first);
+      EXPECT_EQ(first->job.owner, 1U);
+      queue.done(10);
+      EXPECT_TRUE(queue.empty());
+      EXPECT_FALSE(queue.pop()) << count;
+      // And who failed has its turn like anybody.
+      queue.push(job_of(kind, 2), 0);
+      ASSERT_TRUE(queue.pop());
+      queue.done(10);
+      EXPECT_TRUE(queue.empty());
+    }
+    EXPECT_GE(failed, 3);
+  }
+}
+
+TEST(NoMemory, an_address_is_known_whole_or_not_at_all) {
+  const std::string here = "2001:db8:1:2:3:4:5:6";
+  int failed = 0;
+  for (int count = 0;; ++count) {
+    Quota quota(Limits{});
+    if (with_allocations(count, [&] { quota.connect(here, false, 0); })) break;
+    ++failed;
+    EXPECT_EQ(quota.known(), 0U);
+    EXPECT_EQ(quota.connections(), 0U);
+  }
+  EXPECT_GE(failed, 2);
+}
+
+TEST(NoMemory, no_place_is_lost_among_connections_and_sessions) {
+  Limits limits;
+  limits.connections = 1;
+  limits.sessions_per_address = 1;
+  const std::string here = "2001:db8:1:2:3:4:5:6";
+  int failed = 0;
+  for (int count = 0;; ++count) {
+    Metrics metrics;
+    Admission admission(limits, metrics, [] { return 0; });
+    const auto both = [&] {
+      const auto visitor = admission.connect(here);
+      const auto seat = admission.open_session("2001:db8:1:2::/64");
+      // To go takes no memory.
+      allocations_left = 0;
+    };
+    const bool through = with_allocations(count, both);
+    const auto again = admission.connect(here);
+    ASSERT_TRUE(again);
+    EXPECT_FALSE(again->reserve) << count;
+    EXPECT_TRUE(admission.open_session("2001:db8:1:2::/64").place) << count;
+    if (through) break;
+    ++failed;
+  }
+  EXPECT_GE(failed, 4);
+}
+
+TEST(NoMemory, an_attempt_that_fails_is_told_without_any) {
+  const CancelToken cancel;
+  const CancelToken raised;
+  raised.cancel();
+  const std::function<Result<int>()> out_of_memory = []() -> Result<int> {
+    throw std::bad_alloc();
+  };
+  const std::function<Result<int>()> broken = []() -> Result<int> { throw std::exception(); };
+  ErrorKind first{};
+  ErrorKind second{};
+  ErrorKind third{};
+  EXPECT_TRUE(with_allocations(0, [&] {
+    first = std::move(attempt<int>("a test", cancel, out_of_memory)).error().kind;
+    second = std::move(attempt<int>("a test", cancel, broken)).error().kind;
+    third = std::move(attempt<int>("a test", raised, broken)).error().kind;
+  }));
+  EXPECT_EQ(first, ErrorKind::out_of_memory);
+  EXPECT_EQ(second, ErrorKind::internal);
+  EXPECT_EQ(third, ErrorKind::out_of_memory) << "there is none for its words";
+}
+
+// The thread has no memory from the first job on.
+TEST(NoMemory, threads_of_services_go_on) {
+  LoadService loads(1, 4);
+  std::promise<void> loaded;
+  EXPECT_TRUE(loads.submit({{}, [] {
+                              allocations_left = 0;
+                              throw std::bad_alloc();
+                            }}));
+  EXPECT_TRUE(loads.submit({{}, [&] { loaded.set_value(); }, false, std::make_shared<int>(0)}));
+  loaded.get_future().wait();
+
+  RenderService::Options options;
+  options.charge = [](const std::string&, std::int64_t) { throw std::bad_alloc(); };
+  RenderService renderer(options);
+  std::promise<void> drawn;
+  RenderJob failing = job_of(RenderKind::request, 1);
+  failing.run = [](std::int64_t /*queue_us*/) {
+    allocations_left = 0;
+    throw std::bad_alloc();
+  };
+  EXPECT_TRUE(renderer.submit(std::move(failing)));
+  RenderJob next = job_of(RenderKind::request, 2);
+  next.run = [&](std::int64_t /*queue_us*/) { drawn.set_value(); };
+  EXPECT_TRUE(renderer.submit(std::move(next)));
+  drawn.get_future().wait();
+}
+
+TEST(NoMemory, a_client_s_job_without_any_is_a_failed_job) {
+  Jobs jobs(4, 1);
+  const auto ask = [&] {
+    return jobs
+        .submit("test",
+                [](const Jobs::Handle&) -> Result<protocol::JobResult> {
+                  allocations_left = 0;
+                  throw std::bad_alloc();
+                })
+        .value()
+        .id;
+  };
+  const std::string first = ask();
+  const std::string second = ask();  // which finds no memory even to begin
+  for (const std::string& id : {first, second}) {
+    while (jobs.find(id).value().state == "queued" || jobs.find(id).value().state == "running") {
+      std::this_thread::yield();
+    }
+    EXPECT_EQ(jobs.find(id).value().state, "failed");
+  }
+}
+
+TEST(NoMemory, what_cannot_be_posted_is_called_at_home_and_given_up_elsewhere) {
+  boost::asio::io_context io;
+  int called = 0;
+  const auto call = [&] { ++called; };
+  const std::chrono::milliseconds patience(30);
+  bool posted = true;
+  EXPECT_TRUE(
+      with_allocations(0, [&] { posted = post_surely(io.get_executor(), call, patience); }));
+  EXPECT_FALSE(posted);
+  boost::asio::post(io, [&] {
+    const boost::asio::any_io_executor executor = io.get_executor();
+    EXPECT_TRUE(with_allocations(0, [&] { posted = post_surely(executor, call, patience); }));
+    EXPECT_TRUE(posted);
+    EXPECT_EQ(called, 1);
+    EXPECT_TRUE(post_surely(executor, call));
+    EXPECT_EQ(called, 1) << "not before its turn";
+  });
+  io.run();
+  EXPECT_EQ(called, 2);
+}
+
+}  // namespace
+}  // namespace windsplat::net

@@ -1,0 +1,350 @@
+// What each address may have, by times that are told: connections and their reserve, buckets of
+// requests, bytes and drawing, and how addresses are forgotten.
+#include "server/net/quota.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "server/net/admission.hpp"
+
+namespace windsplat::net {
+namespace {
+
+constexpr Quota::Micros second = 1'000'000;
+const std::string here = "192.0.2.1";
+const std::string there = "192.0.2.2";
+
+Limits none() {
+  Limits limits;
+  limits.connections = limits.connections_per_address = limits.sessions_per_address = 0;
+  limits.requests_per_address = limits.failed_logins_per_address = 0;
+  limits.arrivals = limits.arrivals_per_address = 0;
+  limits.messages_per_address = limits.received_per_address = 0;
+  return limits;
+}
+
+TEST(Quota, an_address_may_not_have_the_connections_of_all) {
+  Limits limits = none();
+  limits.connections = 3;
+  limits.connections_per_address = 2;
+  Quota quota(limits);
+  EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Place::ordinary);
+  EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Place::ordinary);
+  const auto third = quota.connect(here, false, 0);
+  EXPECT_EQ(third.place, Quota::Place::reserve);
+  ASSERT_TRUE(third.reason);
+  EXPECT_EQ(third.reason->kind, LimitKind::address_connections);
+  EXPECT_EQ(third.reason->limit, 2);
+  EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Place::ordinary);
+  const auto full = quota.connect("192.0.2.3", false, 0);
+  EXPECT_EQ(full.place, Quota::Place::reserve);
+  EXPECT_EQ(full.reason->kind, LimitKind::connections);
+  quota.disconnect(here, Quota::Place::ordinary);
+  EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Place::ordinary);
+}
+
+TEST(Quota, the_reserve_has_an_end_and_no_address_has_all_of_it) {
+  Limits limits = none();
+  limits.connections = 1;
+  Quota quota(limits);
+  quota.connect(here, false, 0);
+  std::size_t taken = 0;
+  while (quota.connect(here, false, 0).place == Quota::Place::reserve) ++taken;
+  EXPECT_EQ(taken, Quota::reserve_per_address);
+  for (std::size_t n = taken; n < Quota::reserve_max; ++n) {
+    const std::string other = "198.51.100." + std::to_string(n);
+    EXPECT_EQ(quota.connect(other, false, 0).place, Quota::Place::reserve) << n;
+  }
+  EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Place::none);
+  EXPECT_TRUE(quota.is_kept_out_by_others(there, false, 0));
+  EXPECT_FALSE(quota.is_kept_out_by_others(here, false, 0)) << "by itself";
+  quota.disconnect(here, Quota::Place::reserve);
+  EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Place::reserve);
+}
+
+TEST(Quota, a_proxy_counts_in_total_alone) {
+  Limits limits = none();
+  limits.connections = 8;
+  limits.connections_per_address = 1;
+  Quota quota(limits);
+  for (int n = 0; n < 8; ++n) {
+    EXPECT_EQ(quota.connect(here, true, 0).place, Quota::Place::ordinary);
+  }
+  EXPECT_EQ(quota.connect(here, true, 0).place, Quota::Place::reserve);
+}
+
+TEST(Quota, sessions_are_counted_by_address) {
+  Limits limits = none();
+  limits.sessions_per_address = 2;
+  Quota quota(limits);
+  EXPECT_FALSE(quota.open_session(here, 0));
+  EXPECT_FALSE(quota.open_session(here, 0));
+  const auto refused = quota.open_session(here, 0);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->kind, LimitKind::address_sessions);
+  EXPECT_FALSE(quota.open_session(there, 0));
+  quota.close_session(here);
+  EXPECT_FALSE(quota.open_session(here, 0));
+}
+
+TEST(Quota, requests_come_back_at_their_rate_and_health_has_its_own) {
+  Limits limits = none();
+  limits.requests_per_address = 2;
+  Quota quota(limits);
+  int at_once = 0;
+  while (!quota.request(here, false, 0)) ++at_once;
+  EXPECT_EQ(at_once, 20) << "ten seconds' worth";
+  const auto refused = quota.request(here, false, 0);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->kind, LimitKind::requests);
+  EXPECT_EQ(refused->limit, 2);
+  EXPECT_EQ(refused->retry_after_s, 1);
+  EXPECT_FALSE(quota.request(here, true, 0));
+  EXPECT_FALSE(quota.request(there, false, 0));
+  EXPECT_TRUE(quota.request(here, false, second / 2 - 1));
+  EXPECT_FALSE(quota.request(here, false, second / 2));
+  EXPECT_TRUE(quota.request(here, false, second / 2));
+}
+
+TEST(Quota, one_picture_may_go_into_debt_and_the_next_waits_until_it_is_paid) {
+  Limits limits = none();
+  limits.render_s_per_address = 6;
+  Quota quota(limits);
+  EXPECT_FALSE(quota.picture(here, 0));
+  quota.rendered(here, 6 * second, 0);
+  EXPECT_FALSE(quota.picture(here, 0)) << "all of a minute's may be had at once";
+  quota.rendered(here, 3 * second, 0);
+  const auto refused = quota.picture(here, 0);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->kind, LimitKind::render);
+  EXPECT_EQ(refused->retry_after_s, 30) << "3 s at 6 s a minute";
+  EXPECT_EQ(quota.until_paid(here, 0), 30 * second);
+  EXPECT_FALSE(quota.picture(there, 0));
+  EXPECT_TRUE(quota.picture(here, 30 * second - 1));
+  EXPECT_FALSE(quota.picture(here, 30 * second));
+}
+
+TEST(Quota, bytes_are_charged_as_they_leave) {
+  Limits limits = none();
+  limits.bytes_per_address = 1000;
+  Quota quota(limits);
+  quota.sent(here, 10'000, 0);
+  EXPECT_FALSE(quota.picture(here, 0)) << "ten seconds' worth";
+  quota.sent(here, 5000, 0);
+  const auto refused = quota.picture(here, 0);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->kind, LimitKind::bytes);
+  EXPECT_EQ(refused->retry_after_s, 5);
+  EXPECT_FALSE(quota.picture(here, 5 * second));
+}
+
+TEST(Quota, wrong_tokens_are_let_off_so_often_a_minute) {
+  Limits limits = none();
+  limits.failed_logins_per_address = 3;
+  Quota quota(limits);
+  for (int n = 0; n < 3; ++n) EXPECT_FALSE(quota.failed_login(here, 0)) << n;
+  const auto refused = quota.failed_login(here, 0);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->kind, LimitKind::logins);
+  EXPECT_EQ(refused->retry_after_s, 20);
+  EXPECT_FALSE(quota.failed_login(there, 0));
+  EXPECT_FALSE(quota.failed_login(here, 20 * second));
+}
+
+TEST(Quota, a_token_is_looked_at_while_there_were_not_too_many_wrong_ones) {
+  Limits limits = none();
+  limits.failed_logins_per_address = 2;
+  Quota quota(limits);
+  for (int n = 0; n < 100; ++n)
+    ASSERT_FALSE(quota.may_try_login(here, 0)) << "asking costs nothing";
+  quota.failed_login(here, 0);
+  EXPECT_FALSE(quota.may_try_login(here, 0));
+  quota.failed_login(here, 0);
+  const auto refused = quota.may_try_login(here, 0);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->kind, LimitKind::logins);
+  EXPECT_EQ(refused->retry_after_s, 30);
+  EXPECT_FALSE(quota.may_try_login(there, 0));
+  EXPECT_FALSE(quota.may_try_login(here, 30 * second));
+}
+
+TEST(Quota, new_connections_come_back_at_their_rate_and_tls_takes_more) {
+  Limits limits = none();
+  limits.arrivals_per_address = 2;
+  Quota quota(limits);
+  for (int n = 0; n < 4; ++n) EXPECT_FALSE(quota.arrive(here, false, true, 0)) << n;
+  const auto refused = quota.arrive(here, false, false, 0);
+  ASSERT_TRUE(refused) << "ten seconds' worth are gone";
+  EXPECT_EQ(refused->kind, LimitKind::arrivals);
+  EXPECT_FALSE(quota.arrive(there, false, false, 0));
+  EXPECT_FALSE(quota.arrive(here, true, false, 0)) << "a proxy's";
+  EXPECT_FALSE(quota.arrive(here, false, false, second / 2));
+  EXPECT_TRUE(quota.arrive(here, false, true, 2 * second));
+  EXPECT_FALSE(quota.arrive(here, false, true, 3 * second));
+}
+
+TEST(Quota, too_many_new_connections_in_all_are_refused_to_those_that_brought_them) {
+  Limits limits = none();
+  limits.arrivals = 5;
+  limits.arrivals_per_address = 3;
+  Quota quota(limits);
+  int taken = 0;
+  for (int n = 0; n < 60; ++n) taken += quota.arrive(n % 2 ? here : there, false, false, 0) ? 0 : 1;
+  EXPECT_EQ(taken, 50);
+  EXPECT_TRUE(quota.arrive(here, false, false, 0));
+  EXPECT_FALSE(quota.arrive("192.0.2.3", false, false, 0));
+  EXPECT_FALSE(quota.arrive(here, false, false, second));
+}
+
+TEST(Quota, messages_are_paid_before_more_is_read) {
+  Limits limits = none();
+  limits.messages_per_address = 10;
+  limits.received_per_address = 1000;
+  Quota quota(limits);
+  for (int n = 0; n < 20; ++n) EXPECT_EQ(quota.heard(here, 1, 0), 0) << n;
+  EXPECT_EQ(quota.heard(here, 1, 0), second / 10);
+  EXPECT_EQ(quota.heard(there, 2000, 0), 0);
+  EXPECT_EQ(quota.heard(there, 500, 0), second / 2);
+  EXPECT_EQ(quota.heard(there, 0, 2 * second), 0);
+}
+
+TEST(Quota, nought_is_no_limit) {
+  Quota quota(none());
+  for (int n = 0; n < 10'000; ++n) {
+    ASSERT_EQ(quota.connect(here, false, 0).place, Quota::Place::ordinary);
+    ASSERT_FALSE(quota.open_session(here, 0));
+    ASSERT_FALSE(quota.request(here, false, 0));
+    ASSERT_FALSE(quota.failed_login(here, 0));
+    ASSERT_FALSE(quota.may_try_login(here, 0));
+    ASSERT_FALSE(quota.arrive(here, false, true, 0));
+    ASSERT_EQ(quota.heard(here, 1U << 20, 0), 0);
+    quota.sent(here, 1U << 30, 0);
+    quota.rendered(here, 60 * second, 0);
+  }
+  EXPECT_FALSE(quota.picture(here, 0));
+}
+
+TEST(Quota, idle_addresses_are_forgotten_and_those_in_debt_are_not) {
+  Limits limits = none();
+  limits.render_s_per_address = 1;
+  Quota quota(limits);
+  quota.rendered(here, 100 * second, 0);  // 99 minutes of debt
+  quota.connect(there, false, 0);
+  for (int n = 0; n < 100; ++n) quota.request("198.51.100." + std::to_string(n), false, 0);
+  EXPECT_EQ(quota.known(), 102U);
+  const Quota::Micros later = 700 * second;
+  for (int n = 0; n < 200; ++n) quota.request("203.0.113.1", false, later);
+  EXPECT_EQ(quota.known(), 3U);
+  EXPECT_TRUE(quota.picture(here, later));
+}
+
+TEST(Quota, no_number_of_addresses_makes_it_larger_than_it_may_be) {
+  Limits limits = none();
+  limits.connections_per_address = 1;
+  Quota quota(limits);
+  quota.connect(here, false, 0);
+  for (std::size_t n = 0; n < 3 * Quota::addresses_max; ++n) {
+    quota.request("2001:db8:0:" + std::to_string(n) + "::/64", false, 1);
+  }
+  EXPECT_EQ(quota.known(), Quota::addresses_max);
+  EXPECT_EQ(quota.connect(here, false, 2).place, Quota::Place::reserve) << "its one is known";
+}
+
+TEST(Admission, gives_places_back_when_their_tickets_go) {
+  Limits limits = none();
+  limits.connections = 1;
+  Metrics metrics;
+  Admission admission(limits, metrics, [] { return 0; });
+  auto first = admission.connect(here);
+  ASSERT_TRUE(first);
+  EXPECT_FALSE(first->reserve);
+  auto second = admission.connect(here);
+  ASSERT_TRUE(second);
+  EXPECT_TRUE(second->reserve);
+  first.reset();
+  EXPECT_FALSE(admission.connect(here)->reserve);
+}
+
+TEST(Admission, answers_with_the_limit_and_when_to_try_again) {
+  Limits limits = none();
+  limits.requests_per_address = 0.1;
+  limits.connections = 1;
+  Metrics metrics;
+  Admission admission(limits, metrics, [] { return 0; });
+  const auto visitor = admission.connect("2001:db8:1:2:3::4");
+  Request request;
+  EXPECT_FALSE(admission.request(*visitor, request, false));
+  EXPECT_EQ(request.address, "2001:db8:1:2::/64");
+  const auto refused = admission.request(*visitor, request, false);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->status, 429);
+  EXPECT_EQ(refused->content_type, "application/problem+json");
+  const auto retry = std::find(refused->headers.begin(), refused->headers.end(),
+                               std::pair<std::string, std::string>("Retry-After", "10"));
+  EXPECT_NE(retry, refused->headers.end());
+  const std::string text(refused->body.bytes.begin(), refused->body.bytes.end());
+  EXPECT_NE(text.find("0.1 requests a second (--max-requests-per-address)"), std::string::npos)
+      << text;
+  // In the reserve health alone is answered, and as the server's fault.
+  const auto late = admission.connect(there);
+  EXPECT_EQ(admission.request(*late, request, false)->status, 503);
+  EXPECT_FALSE(admission.request(*late, request, true));
+}
+
+TEST(Admission, charges_what_was_refused_unread) {
+  Limits limits = none();
+  limits.requests_per_address = 0.1;
+  Metrics metrics;
+  Admission admission(limits, metrics, [] { return 0; });
+  const auto visitor = admission.connect(here);
+  EXPECT_TRUE(admission.spoiled(*visitor, {}));
+  EXPECT_FALSE(admission.spoiled(*visitor, {})) << "not worth a line";
+  Request request;
+  EXPECT_TRUE(admission.request(*visitor, request, false)) << "the same allowance";
+}
+
+TEST(Admission, refuses_what_takes_too_long) {
+  Limits limits = none();
+  limits.render_s = 2;
+  Metrics metrics;
+  Admission admission(limits, metrics, [] { return 0; });
+  const Cost cost{100, 1e9, "/vector/stride"};
+  EXPECT_TRUE(admission.check_estimate(cost, 2000));
+  const auto refused = admission.check_estimate(cost, 2001);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::invalid);
+  EXPECT_EQ(refused.error().at.front().pointer, "/vector/stride");
+  EXPECT_NE(refused.error().message.find("limit is 2 s (--max-render)"), std::string::npos);
+  limits.render_s = 0;
+  EXPECT_TRUE(Admission(limits, metrics).check_estimate(cost, 1e12));
+}
+
+TEST(Admission, charges_the_client_behind_a_trusted_proxy) {
+  Limits limits = none();
+  limits.requests_per_address = 0.1;
+  limits.trusted_proxies = {"10.0.0.0/8"};
+  Metrics metrics;
+  Admission admission(limits, metrics, [] { return 0; });
+  const auto proxy = admission.connect("10.1.2.3");
+  const auto ask = [&](const Visitor& visitor, const std::string& hops) {
+    Request request;
+    request.headers = {{"X-Forwarded-For", hops}};
+    return admission.request(visitor, request, false).has_value();
+  };
+  EXPECT_FALSE(ask(*proxy, here));
+  EXPECT_TRUE(ask(*proxy, here));
+  EXPECT_FALSE(ask(*proxy, there));
+  // Anybody else may say what they like.
+  const auto liar = admission.connect("203.0.113.9");
+  EXPECT_FALSE(ask(*liar, "198.51.100.1"));
+  EXPECT_TRUE(ask(*liar, "198.51.100.2"));
+}
+
+TEST(Metrics, names_every_limit_once) {
+  EXPECT_EQ(std::set(limit_names.begin(), limit_names.end()).size(), limit_names.size());
+  EXPECT_EQ(static_cast<std::size_t>(LimitKind::estimate) + 1, limit_names.size());
+}
+
+}  // namespace
+}  // namespace windsplat::net

@@ -1,0 +1,93 @@
+// What is told of a style before anything was measured of it.
+#include "server/quality/laws.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/quality/table.hpp"
+
+namespace windsplat::quality {
+namespace {
+
+using protocol::MethodName;
+
+const Kind both{true, true, 0.16, 1.4, 1, 1};
+const Kind media{false, true, 0.16, 1.4, 1, 1};
+
+double error_of(const Kind& kind, const Setting& setting, const Sight& sight = {2, {}, 640, 480}) {
+  return expected_error(kind, setting, sight).value;
+}
+
+// Method slab is of order 2 in the thickness of its slabs.
+TEST(Laws, SlabsErrByTheSquareOfTheirThickness) {
+  for (const Kind& kind : {both, media}) {
+    Kind dense = kind;
+    dense.thickness = 4;  // far above the least error that is told
+    const double own = error_of(dense, {MethodName::slab, 0, 0});
+    EXPECT_NEAR(error_of(dense, {MethodName::slab, 0, 0, 2}) / own, 1.0 / 4, 1e-12);
+    EXPECT_NEAR(error_of(dense, {MethodName::slab, 0, 0, 4}) / own, 1.0 / 16, 1e-12);
+    Kind thick = dense;
+    thick.thickness = 8;
+    EXPECT_NEAR(error_of(thick, {MethodName::slab, 0, 0}) / own, 4, 1e-12);
+  }
+}
+
+TEST(Laws, FewerPixelsAndCoarserDataErrMoreThanTheViewsOwn) {
+  for (const Kind& kind : {both, media}) {
+    double last = error_of(kind, {MethodName::slab, 0, 0});
+    for (const Setting& worse : {Setting{MethodName::kernel, 0, 0},
+                                 {MethodName::kernel, 1, 0},
+                                 {MethodName::kernel, 2, 0},
+                                 {MethodName::kernel, 4, 0},
+                                 {MethodName::kernel, 6, 0}}) {
+      EXPECT_GT(error_of(kind, worse), last);
+      last = error_of(kind, worse);
+    }
+    EXPECT_GT(error_of(kind, {MethodName::kernel, 1, 2}),
+              error_of(kind, {MethodName::kernel, 1, 1}));
+    EXPECT_GT(error_of(kind, {MethodName::kernel, 1, 1}),
+              error_of(kind, {MethodName::kernel, 1, 0}));
+  }
+}
+
+TEST(Laws, LinesAloneAreExactUnderSlabs) {
+  const Kind lines{true, false, 0.16, 1.4, 1, 1};
+  EXPECT_EQ(error_of(lines, {MethodName::slab, 0, 0}), error_least);
+}
+
+TEST(Laws, OfAViewThatIsNotCompletedTooEveryErrorIsPositiveAndFinite) {
+  for (const Kind& kind : {Kind{}, both, media, Kind{true, true, 1e-9, 50, 1e35, 32}}) {
+    for (const Sight& sight : {Sight{}, Sight{1e12, {0, 0, 1}, 8192, 8192}, Sight{1e-12}}) {
+      for (const Setting& setting : settings) {
+        const Expected error = expected_error(kind, setting, sight);
+        EXPECT_GT(error.value, 0);
+        EXPECT_LE(error.value, 1);
+        EXPECT_GT(expected_ms(kind, setting, sight).value, 0);
+      }
+    }
+  }
+}
+
+TEST(Laws, FewerPixelsTakeLessTime) {
+  const Sight sight{2, {}, 640, 480};
+  const auto ms = [&](const Setting& setting) { return expected_ms(both, setting, sight).value; };
+  EXPECT_LT(ms({MethodName::kernel, 2, 0}), ms({MethodName::kernel, 0, 0}));
+  EXPECT_LT(ms({MethodName::kernel, 0, 1}), ms({MethodName::kernel, 0, 0}));
+  EXPECT_GT(ms({MethodName::slab, 0, 0}), ms({MethodName::kernel, 0, 0}));
+  EXPECT_GT(ms({MethodName::slab, 0, 0, 2}), ms({MethodName::slab, 0, 0}));
+}
+
+TEST(Prior, IsTheLawsAndAsUncertainAsStylesAndSightsTogether) {
+  const Sight sight{2, {}, 640, 480};
+  for (const Setting& setting : settings) {
+    const Forecast told = prior(both, setting, sight);
+    const Expected error = expected_error(both, setting, sight);
+    EXPECT_EQ(told.error, error.value);
+    EXPECT_NEAR(told.spread, std::hypot(error.scatter.style, error.scatter.sight), 1e-12);
+    EXPECT_FALSE(told.timed);
+  }
+}
+
+}  // namespace
+}  // namespace windsplat::quality

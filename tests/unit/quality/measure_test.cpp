@@ -1,0 +1,224 @@
+// frame::survey and frame::measured_error on a small sample, against the integral itself.
+#include "server/frame/measure.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "server/data/store.hpp"
+#include "server/engine/reference/reference.hpp"
+#include "server/scene/build.hpp"
+#include "server/scene/camera.hpp"
+
+namespace windsplat::frame {
+namespace {
+
+class Measure : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto source = data::open_sample("tornado", {16, 16, 16}, 1);
+    ASSERT_TRUE(source) << source.error().message;
+    dataset = std::make_unique<data::Dataset>(std::move(*source), "tornado", 1ULL << 30);
+    protocol::View wanted;
+    wanted.dataset = "tornado";
+    wanted.image.width = 128;
+    wanted.image.height = 96;
+    auto completed = scene::complete_view(wanted, *dataset);
+    ASSERT_TRUE(completed) << completed.error().message;
+    view = std::move(*completed);
+  }
+
+  std::map<std::size_t, quality::Measured> surveyed() {
+    std::map<std::size_t, quality::Measured> found;
+    const auto done = survey(view, *dataset, pool, cancel, workspace, [&](const Surveyed& one) {
+      EXPECT_TRUE(found.emplace(one.setting, one.measured).second) << one.setting;
+      EXPECT_EQ(one.sight.pixels_high, 96);
+    });
+    EXPECT_TRUE(done) << done.error().message;
+    return found;
+  }
+
+  Frame drawn(protocol::MethodName method, Format format) {
+    protocol::View own = view;
+    own.method.name = method;
+    Encoding encoding;
+    encoding.format = format;
+    encoding.measure = true;
+    auto frame = produce(own, *dataset, encoding, pool, cancel, workspace);
+    EXPECT_TRUE(frame) << frame.error().message;
+    return frame ? std::move(*frame) : Frame();
+  }
+
+  // Of a frame's pixels, which end its bytes, against the integral.
+  double true_error(const Frame& npy) {
+    if (integral.empty()) {
+      const auto scene = scene::build_scene(view, *dataset);
+      auto picture = engine::reference::render(scene.value(), pool, cancel, {1e-7});
+      integral = std::move(picture.value().rgba);
+    }
+    std::vector<float> rgba(integral.size());
+    const std::size_t bytes = rgba.size() * sizeof(float);
+    std::memcpy(rgba.data(), npy.bytes.data() + npy.bytes.size() - bytes, bytes);
+    double squares = 0;
+    for (std::size_t i = 0; i < rgba.size(); ++i) {
+      squares += (rgba[i] - integral[i]) * (rgba[i] - integral[i]);
+    }
+    return std::sqrt(squares / static_cast<double>(rgba.size()));
+  }
+
+  std::unique_ptr<data::Dataset> dataset;
+  protocol::View view;
+  std::vector<double> integral;
+  Workspace workspace;
+  ThreadPool pool{2};
+  CancelToken cancel;
+};
+
+TEST_F(Measure, AFramesMeasuredErrorIsItsErrorAgainstTheIntegral) {
+  for (const auto method : {protocol::MethodName::slab, protocol::MethodName::kernel}) {
+    const Frame frame = drawn(method, Format::npy);
+    ASSERT_TRUE(frame.error);
+    const double ratio = *frame.error / true_error(frame);
+    EXPECT_GT(ratio, 0.7);
+    EXPECT_LT(ratio, 1.4);
+  }
+}
+
+// What thinner slabs mend less, or not at all: the rule of compositing and an early stop.
+TEST_F(Measure, OtherRulesAndEarlyStopsAreMeasuredAgainstTheIntegralToo) {
+  const protocol::MethodView usual = view.method;
+  true_error(drawn(protocol::MethodName::slab, Format::npy));  // keeps the integral
+  for (const auto& [compositing, stop] : {std::pair{protocol::Compositing::simple, 1.5e-4},
+                                          std::pair{protocol::Compositing::cd_euler, 1.5e-4},
+                                          std::pair{protocol::Compositing::analytic, 0.3}}) {
+    view.method = usual;
+    view.method.compositing = compositing;
+    view.method.stop_transmittance = stop;
+    const Frame frame = drawn(protocol::MethodName::slab, Format::npy);
+    ASSERT_TRUE(frame.error);
+    const double truth = true_error(frame);
+    EXPECT_NEAR(*frame.error / truth, 1, 0.4) << truth;
+    const auto found = surveyed();
+    const auto error_of = [&](int thinner) {
+      const quality::Setting setting{protocol::MethodName::slab, 0, 0, thinner};
+      return found.at(quality::index_of(setting).value()).error.value();
+    };
+    EXPECT_NEAR(error_of(1) / truth, 1, 0.4) << truth;
+    const double promised =
+        quality::prior(quality::style_of(view).kind, quality::settings[quality::own_setting(view)],
+                       quality::sight_of(view))
+            .error;
+    EXPECT_GT(promised, 0.2 * truth) << "before anything was measured";
+    view.method.slab_thickness /= 4;
+    EXPECT_NEAR(error_of(4) / drawn(protocol::MethodName::slab, Format::npy).error.value(), 1, 0.3);
+  }
+}
+
+TEST_F(Measure, WhatIsMeasuredIsThePictureThatIsSent) {
+  Encoding encoding;
+  for (const Format format : {Format::png, Format::npy, Format::jpeg}) {
+    const Frame measured = drawn(protocol::MethodName::slab, format);
+    encoding.format = format;
+    view.method.name = protocol::MethodName::slab;
+    const auto plain = produce(view, *dataset, encoding, pool, cancel);
+    ASSERT_TRUE(plain);
+    EXPECT_FALSE(plain->error);
+    EXPECT_EQ(measured.bytes, plain->bytes) << static_cast<int>(format);
+  }
+}
+
+TEST_F(Measure, EveryFormatOfAPictureIsToldTheSameError) {
+  const double png = drawn(protocol::MethodName::slab, Format::png).error.value();
+  const Frame jpeg = drawn(protocol::MethodName::slab, Format::jpeg);
+  EXPECT_NEAR(jpeg.error.value() / png, 1, 1e-4);
+  EXPECT_GT(jpeg.jpeg_error.value(), 0);
+}
+
+TEST_F(Measure, OnlyPicturesOfFullSizeAreMeasured) {
+  Encoding encoding;
+  encoding.measure = true;
+  encoding.half_level = 1;
+  const auto small = produce(view, *dataset, encoding, pool, cancel);
+  ASSERT_TRUE(small);
+  EXPECT_FALSE(small->error);
+}
+
+TEST_F(Measure, ASurveyTellsOfEveryAllowedSettingOnce) {
+  const auto found = surveyed();
+  for (std::size_t i = 0; i < quality::settings_count; ++i) {
+    EXPECT_EQ(found.count(i), quality::is_allowed(quality::settings[i], view) ? 1U : 0U) << i;
+  }
+  for (const auto& [setting, measured] : found) {
+    EXPECT_GT(measured.error.value(), 0) << setting;
+    EXPECT_GT(measured.ms.value(), 0) << setting;
+  }
+}
+
+// Two ways to the same number: a survey's truth is another than a frame's finer run.
+TEST_F(Measure, ASurveyAgreesWithWhatFramesMeasure) {
+  auto found = surveyed();
+  const auto error_of = [&](const quality::Setting& setting) {
+    return found.at(quality::index_of(setting).value()).error.value();
+  };
+  for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
+    const double frames = drawn(method, Format::npy).error.value();
+    EXPECT_NEAR(error_of({method, 0, 0}) / frames, 1, 0.2);
+  }
+  EXPECT_NEAR(error_of({protocol::MethodName::slab, 0, 0, 2}) /
+                  error_of({protocol::MethodName::slab, 0, 0, 4}),
+              4, 1e-3);
+}
+
+// Seen from far away the view averages its data: slabs of any thickness err alike then.
+TEST_F(Measure, ASurveyOfAveragesDrawsThemAsFramesDo) {
+  auto placed = scene::complete_and_place(view, *dataset);
+  scene::orbit(view, placed.value().placed->lattice, 20, 30, 0.05);
+  placed = scene::complete_and_place(view, *dataset);
+  EXPECT_LT(sight_of(placed.value()).value().detail, 1);
+  auto found = surveyed();
+  const auto error_of = [&](int thinner) {
+    return found.at(quality::index_of({protocol::MethodName::slab, 0, 0, thinner}).value())
+        .error.value();
+  };
+  EXPECT_NEAR(error_of(4) / error_of(1), 1, 0.1);
+}
+
+// What is told of the detail is what scenes are built by.
+TEST_F(Measure, AViewAveragesWhereItsDetailIsBelowOne) {
+  const auto placed = scene::complete_and_place(view, *dataset).value();
+  int averaged = 0;
+  for (const bool lines : {true, false}) {
+    if (!lines) view.vector.field = {protocol::FieldChoice::Kind::none, ""};
+    for (double zoom = 0.02; zoom < 4; zoom *= 1.3) {
+      scene::orbit(view, placed.placed->lattice, 20, 30, zoom);
+      const auto seen = scene::complete_and_place(view, *dataset).value();
+      const auto built = scene::build_scene(seen, *dataset).value();
+      const bool is_averaged = built.level != std::array{0, 0, 0};
+      EXPECT_EQ(scene::detail_shown(seen).value() < 1, is_averaged) << zoom;
+      averaged += is_averaged ? 1 : 0;
+    }
+  }
+  EXPECT_GT(averaged, 4);
+  EXPECT_LT(averaged, 36);
+  view.method.detail = protocol::Detail::full;
+  EXPECT_EQ(scene::detail_shown(scene::complete_and_place(view, *dataset).value()).value(), 0);
+}
+
+TEST_F(Measure, ACancelledSurveyEnds) {
+  int told = 0;
+  const CancelToken stop;
+  const auto done = survey(view, *dataset, pool, stop, workspace, [&](const Surveyed&) {
+    if (++told == 2) stop.cancel();
+  });
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().kind, ErrorKind::cancelled);
+  EXPECT_LE(told, 4);
+}
+
+}  // namespace
+}  // namespace windsplat::frame

@@ -1,0 +1,112 @@
+// Settings: how large their pictures are, what they make of a view, and where they are allowed.
+#include "server/quality/setting.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "protocol/limits.hpp"
+
+namespace windsplat::quality {
+namespace {
+
+using protocol::MethodName;
+
+protocol::View view_of(int width, int height, MethodName method = MethodName::slab) {
+  protocol::View view;
+  view.image.width = width;
+  view.image.height = height;
+  view.method.name = method;
+  return view;
+}
+
+std::size_t index(const Setting& setting) {
+  const auto at = index_of(setting);
+  if (!at) ADD_FAILURE() << "no such setting";
+  return at.value_or(0);
+}
+
+TEST(Edge, WholeLevelsHalveAndHalfLevelsHalveThePixels) {
+  EXPECT_EQ(edge_at(1280, 0), 1280);
+  EXPECT_EQ(edge_at(1280, 2), 640);
+  EXPECT_EQ(edge_at(1280, 6), 160);
+  for (const int half_level : {1, 3, 5}) {
+    const double wanted = 1280 * std::pow(2.0, -0.5 * half_level);
+    EXPECT_NEAR(edge_at(1280, half_level), wanted, 1) << half_level;
+  }
+  EXPECT_EQ(edge_at(5, 8), 1);
+  EXPECT_EQ(edge_at(1, 31), 1);
+}
+
+TEST(Edge, TheWiresLevelIsTheFinerWholeOne) {
+  EXPECT_EQ(wire_level(0), 0);
+  EXPECT_EQ(wire_level(1), 0);
+  EXPECT_EQ(wire_level(2), 1);
+  EXPECT_EQ(wire_level(5), 2);
+}
+
+TEST(Setting, EachIsThereOnceAndFoundAgain) {
+  for (std::size_t i = 0; i < settings.size(); ++i) EXPECT_EQ(index_of(settings[i]), i);
+  EXPECT_FALSE(index_of({MethodName::kernel, 7, 0}));
+  EXPECT_FALSE(index_of({MethodName::slab, 0, 0, 3}));
+}
+
+TEST(Setting, TheViewsOwnDrawsItAsItStands) {
+  for (const MethodName method : {MethodName::kernel, MethodName::slab}) {
+    const protocol::View view = view_of(640, 480, method);
+    const Setting& own = settings[own_setting(view)];
+    EXPECT_EQ(own, (Setting{method, 0, 0, 1}));
+    const protocol::View same = at_setting(view, own);
+    EXPECT_EQ(same.method.name, method);
+    EXPECT_EQ(same.method.slab_thickness, view.method.slab_thickness);
+  }
+}
+
+TEST(Setting, TakesMethodAndThicknessAndLeavesThePicture) {
+  protocol::View view = view_of(640, 480);
+  view.method.slab_thickness = 2;
+  const protocol::View thin = at_setting(view, {MethodName::slab, 0, 0, 4});
+  EXPECT_EQ(thin.method.slab_thickness, 0.5);
+  const protocol::View small = at_setting(view, {MethodName::kernel, 4, 1});
+  EXPECT_EQ(small.method.name, MethodName::kernel);
+  EXPECT_EQ(small.image.width, 640);
+  view.method.name = MethodName::reference;
+  EXPECT_EQ(at_setting(view, {MethodName::kernel, 4, 1}).method.name, MethodName::reference);
+}
+
+TEST(Allowed, AKernelViewIsDrawnBySlabsOnlyIfItAsksForAnError) {
+  protocol::View view = view_of(640, 480, MethodName::kernel);
+  EXPECT_FALSE(is_allowed({MethodName::slab, 0, 0}, view));
+  EXPECT_TRUE(is_allowed({MethodName::kernel, 0, 0}, view));
+  view.quality.max_error = 0.01;
+  EXPECT_TRUE(is_allowed({MethodName::slab, 0, 0}, view));
+}
+
+TEST(Allowed, NothingElseForTheReferenceAndNoAveragesWhereEverySampleIsAskedFor) {
+  for (const Setting& setting : settings) {
+    EXPECT_FALSE(is_allowed(setting, view_of(640, 480, MethodName::reference)));
+    protocol::View full = view_of(640, 480);
+    full.method.detail = protocol::Detail::full;
+    EXPECT_EQ(is_allowed(setting, full),
+              setting.coarser == 0 && is_allowed(setting, view_of(640, 480)));
+  }
+}
+
+TEST(Allowed, NoPictureBelow64PixelsButTheViewsOwn) {
+  EXPECT_TRUE(is_allowed({MethodName::kernel, 6, 0}, view_of(1024, 512)));
+  EXPECT_FALSE(is_allowed({MethodName::kernel, 8, 0}, view_of(1024, 512)));
+  EXPECT_FALSE(is_allowed({MethodName::kernel, 6, 0}, view_of(1024, 511)));
+  const protocol::View tiny = view_of(40, 30);
+  EXPECT_TRUE(is_allowed(settings[own_setting(tiny)], tiny));
+  EXPECT_FALSE(is_allowed({MethodName::kernel, 1, 0}, tiny));
+}
+
+TEST(Allowed, NoSlabsThinnerThanTheWiresLimit) {
+  protocol::View view = view_of(640, 480);
+  view.method.slab_thickness = 2 * protocol::limits::slab_thickness_min;
+  EXPECT_TRUE(is_allowed(settings[index({MethodName::slab, 0, 0, 2})], view));
+  EXPECT_FALSE(is_allowed(settings[index({MethodName::slab, 0, 0, 4})], view));
+}
+
+}  // namespace
+}  // namespace windsplat::quality

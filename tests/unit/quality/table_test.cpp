@@ -1,0 +1,276 @@
+// Measurements of one style -> forecasts, against closed forms.
+#include "server/quality/table.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/quality/laws.hpp"
+#include "server/quality/pick.hpp"
+
+namespace windsplat::quality {
+namespace {
+
+using protocol::MethodName;
+
+constexpr std::size_t kernel = 0;
+constexpr std::size_t half = 2;  // half the width
+const Kind kind{true, true, 0.16, 1.4, 1, 1};
+
+// A sight at that distance of every other with another number: heights apart alone.
+Sight sight_at(double steps) {
+  Sight sight{std::exp(0.5 * steps), {0, 1, 0}, 640, 480};
+  return sight;
+}
+
+double prior_of(std::size_t setting, const Sight& sight) {
+  return prior(kind, settings[setting], sight).error;
+}
+
+TEST(Table, NothingMeasuredIsThePrior) {
+  const Table table(kind);
+  const Forecasts told = table.forecasts(sight_at(0));
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    const Forecast expected = prior(kind, settings[i], sight_at(0));
+    EXPECT_EQ(told[i].error, expected.error);
+    EXPECT_EQ(told[i].spread, expected.spread);
+    EXPECT_EQ(told[i].ms, expected.ms);
+    EXPECT_FALSE(told[i].timed);
+  }
+}
+
+TEST(Table, AtAMeasuredSightWhatWasMeasured) {
+  Table table(kind);
+  const double error = 5 * prior_of(half, sight_at(0));
+  const double ms = 7 * prior(kind, settings[half], sight_at(0)).ms;
+  table.add(half, sight_at(0), {error, ms});
+  const Forecast told = table.forecast(half, sight_at(0));
+  EXPECT_NEAR(told.error / error, 1, 0.03);
+  EXPECT_NEAR(told.ms / ms, 1, 0.03);
+  EXPECT_TRUE(told.timed);
+  EXPECT_LT(told.spread, 0.1);
+  // Of another setting it says nothing.
+  EXPECT_EQ(table.forecast(kernel, sight_at(0)).error, prior_of(kernel, sight_at(0)));
+}
+
+TEST(Table, WhatOnlyTellsAnErrorNeverPushesOutATime) {
+  Table table(kind);
+  table.add(half, sight_at(0), {0.02, 50.0});
+  for (std::size_t n = 0; n < 2 * Table::measurements_max; ++n) {
+    table.add(half, sight_at(0.1 * static_cast<double>(n)), {0.02, {}});
+  }
+  EXPECT_NEAR(table.forecast(half, sight_at(0)).ms, 50, 5);
+  EXPECT_TRUE(table.forecast(half, sight_at(0)).timed);
+}
+
+TEST(Table, WhatIsNoNumberIsNotKept) {
+  Table table(kind);
+  for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    table.add(half, sight_at(0), {bad, {}});
+    table.add(half, sight_at(0), {{}, bad});
+  }
+  EXPECT_EQ(table.forecast(half, sight_at(0)).error, prior_of(half, sight_at(0)));
+  EXPECT_FALSE(table.forecast(half, sight_at(0)).timed);
+}
+
+// One measurement: E = c / (c(0) + noise^2) of its logarithm over the prior's, where c is the
+// correlated variance at that distance.
+TEST(Table, OneMeasurementCountsByItsShareOfTheVariance) {
+  const Scatter scatter = expected_error(kind, settings[half], sight_at(0)).scatter;
+  const double style = scatter.style * scatter.style;
+  const double near = scatter.sight * scatter.sight;
+  const double own = style + near + scatter.noise * scatter.noise;
+  Table table(kind);
+  table.add(half, sight_at(0), {3 * prior_of(half, sight_at(0)), {}});
+  for (const double steps : {0.0, 0.3, 1.0, 2.0, 5.0, 30.0}) {
+    const Sight sight = sight_at(steps);
+    const double shared = style + near * std::exp(-distance(sight, sight_at(0)));
+    const Forecast told = table.forecast(half, sight);
+    EXPECT_NEAR(std::log(told.error / prior_of(half, sight)), shared / own * std::log(3.0), 1e-9);
+    EXPECT_NEAR(told.spread, std::sqrt(own - shared * shared / own), 1e-9);
+  }
+}
+
+TEST(Table, SpreadGrowsWithTheDistanceAndShrinksWithMeasurements) {
+  Table table(kind);
+  table.add(kernel, sight_at(0), {0.01, {}});
+  double last = 0;
+  for (const double steps : {0.0, 0.2, 0.5, 1.0, 2.0, 4.0}) {
+    const double spread = table.forecast(kernel, sight_at(steps)).spread;
+    EXPECT_GT(spread, last) << steps;
+    EXPECT_LT(spread, prior(kind, settings[kernel], sight_at(steps)).spread);
+    last = spread;
+  }
+  table.add(kernel, sight_at(-4), {0.01, {}});
+  table.add(kernel, sight_at(8), {0.01, {}});
+  EXPECT_LT(table.forecast(kernel, sight_at(4)).spread, last);
+}
+
+// Far from what was measured a style is still the same style.
+TEST(Table, FarAwayItStaysOnTheSideOfThePriorWhereTheStyleIs) {
+  Table table(kind);
+  const double factor = 4;
+  table.add(half, sight_at(0), {factor * prior_of(half, sight_at(0)), {}});
+  const double far = table.forecast(half, sight_at(60)).error / prior_of(half, sight_at(60));
+  EXPECT_GT(far, 1.3);
+  EXPECT_LT(far, factor);
+}
+
+TEST(Table, TwoAtOneSightAreTheirGeometricMean) {
+  Table table(kind);
+  const double base = prior_of(half, sight_at(0));
+  table.add(half, sight_at(0), {base * 2, {}});
+  table.add(half, sight_at(0), {base * 8, {}});
+  EXPECT_NEAR(table.forecast(half, sight_at(0)).error / (4 * base), 1, 0.03);
+}
+
+TEST(Table, TheNearerOfTwoCountsMore) {
+  Table table(kind);
+  const auto ratio = [&](double steps) {
+    return table.forecast(half, sight_at(steps)).error / prior_of(half, sight_at(steps));
+  };
+  table.add(half, sight_at(0), {2 * prior_of(half, sight_at(0)), {}});
+  table.add(half, sight_at(3), {0.5 * prior_of(half, sight_at(3)), {}});
+  EXPECT_GT(ratio(0.5), 1.1);
+  EXPECT_LT(ratio(2.5), 0.9);
+  EXPECT_NEAR(ratio(1.5), 1, 1e-9);
+}
+
+TEST(Table, KeepsTheNewestMeasurementsOfASetting) {
+  Table table(kind);
+  const double base = prior_of(half, sight_at(0));
+  for (int i = 0; i < 40; ++i) table.add(half, sight_at(0), {base * 10, {}});
+  const auto most = static_cast<int>(Table::measurements_max);
+  for (int i = 0; i < most; ++i) table.add(half, sight_at(0), {base * 0.1, {}});
+  EXPECT_NEAR(table.forecast(half, sight_at(0)).error / (0.1 * base), 1, 0.03);
+}
+
+TEST(Table, ManyMeasurementsOfOnePlaceAreNoTrouble) {
+  Table table(kind);
+  for (int i = 0; i < 100; ++i) table.add(kernel, sight_at(0), {0.01, 5.0});
+  const Forecast told = table.forecast(kernel, sight_at(0.7));
+  EXPECT_TRUE(std::isfinite(told.error) && told.error > 0);
+  EXPECT_TRUE(std::isfinite(told.spread) && told.spread > 0);
+  EXPECT_GT(error_bound(told), told.error);
+}
+
+// An error of nothing is an error of rounding: logarithms stay finite.
+TEST(Table, AnErrorOfNothingIsTheLeastThereIs) {
+  Table table(kind);
+  table.add(kernel, sight_at(0), {0.0, 0.0});
+  const Forecast told = table.forecast(kernel, sight_at(0));
+  EXPECT_GE(told.error, error_least);
+  EXPECT_LT(told.error, 1.5 * error_least);
+  EXPECT_GT(told.ms, 0);
+}
+
+// Times that were not measured follow those that were.
+TEST(Table, AMachineOfAnotherSpeedIsOfThatSpeedInEverySetting) {
+  Table table(kind);
+  for (const std::size_t i : {kernel, half}) {
+    table.add(i, sight_at(0), {{}, 10 * prior(kind, settings[i], sight_at(0)).ms});
+  }
+  const Forecasts told = table.forecasts(sight_at(0));
+  const std::size_t other = index_of({MethodName::slab, 0, 0}).value();
+  EXPECT_FALSE(told[other].timed);
+  EXPECT_NEAR(told[other].ms / prior(kind, settings[other], sight_at(0)).ms, 10, 0.5);
+}
+
+// Where cells are smaller than what the picture resolves it averages: that errs by another law, and
+// what was measured on one side says nothing of the other.
+TEST(Table, AveragesAreKnownApartFromWhatIsDrawnOfEverySample) {
+  Table table(kind);
+  Sight near = sight_at(0);
+  near.detail = 1.1;
+  Sight far = near;
+  far.detail = 0.9;
+  const std::size_t slab = own_setting({});
+  table.add(slab, near, {3 * prior_of(slab, near), {}});
+  EXPECT_NEAR(table.forecast(slab, near).error / prior_of(slab, near), 3, 0.2);
+  EXPECT_EQ(table.forecast(slab, far).error, prior_of(slab, far));
+  EXPECT_GT(prior_of(slab, far), 10 * prior_of(slab, near));
+  // Fewer pixels err more than the averages do.
+  EXPECT_EQ(prior_of(half, far), prior_of(half, near));
+}
+
+TEST(Study, IsBegunOnceAndWantedWhereNothingIsKnown) {
+  Table table(kind);
+  EXPECT_TRUE(table.wants_study(sight_at(0)));
+  table.begin_study(sight_at(0));
+  EXPECT_FALSE(table.wants_study(sight_at(0)));
+  EXPECT_FALSE(table.wants_study(sight_at(10))) << "one at a time";
+  table.end_study(true);
+  EXPECT_FALSE(table.wants_study(sight_at(0)));
+  EXPECT_FALSE(table.wants_study(sight_at(0.1)));
+  EXPECT_TRUE(table.wants_study(sight_at(2)));
+}
+
+TEST(Study, OneThatWasCutOffIsWantedAgain) {
+  Table table(kind);
+  table.begin_study(sight_at(0));
+  table.end_study(false);
+  EXPECT_TRUE(table.wants_study(sight_at(0)));
+}
+
+TEST(Study, TheOldestAreForgotten) {
+  Table table(kind);
+  for (std::size_t i = 0; i <= Table::studies_max; ++i) {
+    table.begin_study(sight_at(2.0 * static_cast<double>(i)));
+    table.end_study(true);
+  }
+  EXPECT_TRUE(table.wants_study(sight_at(0)));
+  EXPECT_FALSE(table.wants_study(sight_at(2)));
+}
+
+TEST(Encoding, ErrsLessAtAHigherQualityAndMoreWithHalfTheChroma) {
+  const Table table(kind);
+  for (int quality = 11; quality <= 100; ++quality) {
+    EXPECT_LT(table.encoding_error(quality, true, sight_at(0)),
+              table.encoding_error(quality - 1, true, sight_at(0)));
+  }
+  EXPECT_GT(table.encoding_error(80, false, sight_at(0)),
+            table.encoding_error(80, true, sight_at(0)));
+}
+
+TEST(Encoding, FollowsWhatWasMeasured) {
+  Table table(kind);
+  const double before = table.encoding_error(60, true, sight_at(0));
+  const double measured = 3 * table.encoding_error(90, true, sight_at(0));
+  table.add_encoding(90, sight_at(0), measured);
+  EXPECT_NEAR(table.encoding_error(90, true, sight_at(0)) / measured, 1, 1e-9);
+  EXPECT_NEAR(table.encoding_error(60, true, sight_at(0)) / before, 3, 1e-9);
+  for (int i = 0; i < 20; ++i) table.add_encoding(90, sight_at(0), 2 * measured);
+  EXPECT_NEAR(table.encoding_error(90, true, sight_at(0)) / measured, 2, 1e-4)
+      << "the newest count most";
+}
+
+TEST(Encoding, NearerThereIsMoreToEncode) {
+  Table table(kind);
+  table.add_encoding(90, sight_at(0), 0.01);
+  EXPECT_GT(table.encoding_error(90, true, sight_at(-1)), 0.01);
+  EXPECT_LT(table.encoding_error(90, true, sight_at(1)), 0.01);
+}
+
+// Halving the chroma loses the same whatever the quality: squares add up.
+TEST(Encoding, HalfTheChromaAddsTheSameAtEveryQuality) {
+  Table table(kind);
+  table.add_encoding(90, sight_at(0), 0.02);
+  const auto added = [&](int quality) {
+    const double whole = table.encoding_error(quality, true, sight_at(0));
+    const double halved = table.encoding_error(quality, false, sight_at(0));
+    return std::sqrt(halved * halved - whole * whole);
+  };
+  for (const int quality : {1, 40, 70, 95}) EXPECT_NEAR(added(quality), added(90), 1e-12);
+}
+
+TEST(Encoding, WhatIsNoErrorTeachesNothing) {
+  Table table(kind);
+  const double before = table.encoding_error(90, true, sight_at(0));
+  for (const double wrong : {0.0, -1.0, std::nan(""), double{INFINITY}}) {
+    table.add_encoding(90, sight_at(0), wrong);
+  }
+  EXPECT_EQ(table.encoding_error(90, true, sight_at(0)), before);
+}
+
+}  // namespace
+}  // namespace windsplat::quality

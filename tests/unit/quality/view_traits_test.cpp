@@ -1,0 +1,132 @@
+// What of a view is its style, and how far two sights are apart.
+#include "server/quality/view_traits.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace windsplat::quality {
+namespace {
+
+protocol::View completed() {
+  protocol::View view;
+  view.dataset = "a";
+  view.camera.eye = {0, -2, 0};
+  view.camera.target = {0, 0, 0};
+  view.vector.field = {protocol::FieldChoice::Kind::named, "wind"};
+  view.vector.length = 0.5;
+  protocol::ScalarView layer;
+  layer.field = "cloud";
+  layer.extinction = {{0, 0}, {1, 3}, {2, 1}};
+  view.scalars = {layer, layer};
+  return view;
+}
+
+TEST(Sight, IsTheHeightAtTheMiddleAndTheWay) {
+  protocol::View view = completed();
+  const Sight sight = sight_of(view);
+  EXPECT_NEAR(sight.height, 4 * std::tan(view.camera.fov_y * std::acos(-1) / 360), 1e-12);
+  EXPECT_EQ(sight.direction, (protocol::Vec3{0, 1, 0}));
+  EXPECT_EQ(sight.pixels_high, view.image.height);
+  view.camera.projection = protocol::Projection::orthographic;
+  view.camera.height = 3;
+  EXPECT_EQ(sight_of(view).height, 3);
+}
+
+TEST(Sight, WithoutACameraItIsTheOtherOnesButForThePixels) {
+  protocol::View view = completed();
+  view.camera.eye = {};
+  view.image.height = 111;
+  const Sight sight = sight_of(view, {7, {1, 0, 0}, 5, 6});
+  EXPECT_EQ(sight.height, 7);
+  EXPECT_EQ(sight.direction, (protocol::Vec3{1, 0, 0}));
+  EXPECT_EQ(sight.pixels_high, 111);
+}
+
+// As large as the volume is in the picture, so large are its cells.
+TEST(Sight, DetailIsScaledFromTheOtherOnes) {
+  protocol::View view = completed();
+  view.image.height = 480;
+  Sight known = sight_of(view);
+  known.detail = 2;
+  view.camera.eye = {0, -4, 0};
+  EXPECT_NEAR(sight_of(view, known).detail, 1, 1e-12);
+  view.image.height = 960;
+  EXPECT_NEAR(sight_of(view, known).detail, 2, 1e-12);
+  EXPECT_EQ(sight_of(view).detail, 0) << "not known";
+}
+
+TEST(Style, DoesNotDependOnWhereAndWhenOneLooks) {
+  const std::string key = style_of(completed()).key;
+  protocol::View view = completed();
+  view.step = 3;
+  view.camera.eye = {5, 5, 5};
+  view.image.width = 64;
+  view.quality.max_error = 0.01;
+  view.vector.motion_time = 0.5;
+  view.method.name = protocol::MethodName::kernel;
+  EXPECT_EQ(style_of(view).key, key);
+}
+
+TEST(Style, DependsOnWhatIsShown) {
+  const std::string key = style_of(completed()).key;
+  const auto other = [&](auto change) {
+    protocol::View view = completed();
+    change(view);
+    return style_of(view).key != key;
+  };
+  EXPECT_TRUE(other([](auto& view) { view.dataset = "b"; }));
+  EXPECT_TRUE(other([](auto& view) { view.scalars->clear(); }));
+  EXPECT_TRUE(other([](auto& view) { view.vector.r2 = 3; }));
+  EXPECT_TRUE(other([](auto& view) { view.method.slab_thickness = 2; }));
+}
+
+TEST(Style, KnowsItsLinesAndItsMedium) {
+  const Kind kind = style_of(completed()).kind;
+  EXPECT_TRUE(kind.lines && kind.medium);
+  EXPECT_EQ(kind.length, 0.5);
+  EXPECT_NEAR(kind.depth, 0.5 * (3 + 3), 1e-12) << "the densest of each layer, along a line";
+  protocol::View view = completed();
+  view.scalars->clear();
+  EXPECT_FALSE(style_of(view).kind.medium);
+  view = completed();
+  view.vector.field.kind = protocol::FieldChoice::Kind::none;
+  EXPECT_FALSE(style_of(view).kind.lines);
+}
+
+// A view that nobody completed yet may show anything.
+TEST(Style, OfAViewThatIsNotCompletedIsOfLinesInAMedium) {
+  const Kind kind = style_of(protocol::View()).kind;
+  EXPECT_TRUE(kind.lines && kind.medium);
+  EXPECT_EQ(kind.length, 0);
+  EXPECT_GT(kind.depth, 0);
+}
+
+TEST(Distance, IsNoneToItselfAndAlikeBothWays) {
+  const Sight a{1, {0, 1, 0}, 640, 480};
+  const Sight b{2, {0.6, 0.8, 0}, 1280, 960};
+  EXPECT_EQ(distance(a, a), 0);
+  EXPECT_EQ(distance(a, b), distance(b, a));
+  EXPECT_GT(distance(a, b), 0);
+}
+
+TEST(Distance, GrowsWithZoomTurnAndPixels) {
+  const Sight from{1, {0, 1, 0}, 640, 480};
+  double last = 0;
+  for (const double zoom : {1.1, 1.5, 2.0, 4.0}) {
+    const double apart = distance(from, {1 / zoom, {0, 1, 0}, 640, 480});
+    EXPECT_GT(apart, last);
+    EXPECT_NEAR(apart, distance(from, {zoom, {0, 1, 0}, 640, 480}), 1e-12);
+    last = apart;
+  }
+  last = 0;
+  for (const double turn : {0.1, 0.5, 1.0, 3.0}) {
+    const double apart = distance(from, {1, {std::sin(turn), std::cos(turn), 0}, 640, 480});
+    EXPECT_GT(apart, last);
+    last = apart;
+  }
+  EXPECT_GT(distance(from, {1, {0, 1, 0}, 1280, 960}), 0);
+}
+
+}  // namespace
+}  // namespace windsplat::quality

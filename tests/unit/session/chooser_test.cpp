@@ -1,0 +1,131 @@
+// The chooser: times correct forecasts, finer settings come with patience, coarser ones at once.
+#include "server/session/chooser.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <vector>
+
+namespace windsplat::session {
+namespace {
+
+using quality::Forecasts;
+using quality::settings;
+
+constexpr double no_limit = std::numeric_limits<double>::infinity();
+constexpr Micros frame_us = 33'000;
+const quality::Sight sight{1, {0, 1, 0}, 1280, 720};
+
+// Pixels decide the time, the prior the error.
+Forecasts surveyed(double full_ms) {
+  Forecasts out = quality::Table(quality::Kind{}).forecasts(sight);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const double slabs = settings[i].method == protocol::MethodName::slab ? 4 : 1;
+    out[i].ms = full_ms * slabs * settings[i].thinner *
+                std::pow(2.0, -settings[i].half_level - 2 * settings[i].coarser);
+    out[i].spread = 0.2;
+    out[i].timed = true;
+  }
+  return out;
+}
+
+struct Drag {
+  Chooser chooser;
+  protocol::View view;
+  Micros now = 0;
+
+  // `count` frames; the settings drawn. A setting takes `slower` times what is forecast.
+  std::vector<std::size_t> run(const Forecasts& known, const quality::Aim& aim, int count,
+                               const std::function<double(int frame)>& slower) {
+    std::vector<std::size_t> drawn;
+    for (int n = 0; n < count; ++n) {
+      const std::size_t setting = chooser.choose(view, known, aim, no_limit, now);
+      drawn.push_back(setting);
+      now += frame_us;
+      chooser.learn(setting, static_cast<Micros>(1000 * slower(n) * known[setting].ms), known, now);
+    }
+    return drawn;
+  }
+};
+
+double always(int /*frame*/) { return 1; }
+
+TEST(Chooser, CorrectsForecastsByWhatFramesTook) {
+  Drag drag;
+  const Forecasts known = surveyed(100);
+  const auto drawn = drag.run(known, {50.0, std::nullopt}, 30, [](int) { return 3.0; });
+  for (std::size_t n = 2; n < drawn.size(); ++n) EXPECT_LE(3 * known[drawn[n]].ms, 50) << n;
+  const double expected =
+      1e-3 * static_cast<double>(drag.chooser.expected(drawn.back(), known, drag.now));
+  EXPECT_NEAR(expected, 3 * known[drawn.back()].ms, 0.05 * expected);
+}
+
+TEST(Chooser, GoesDownAtOnceAndUpWithPatience) {
+  Drag drag;
+  const Forecasts known = surveyed(100);
+  const quality::Aim aim{30.0, std::nullopt};
+  const auto calm = drag.run(known, aim, 20, always);
+  const auto busy = drag.run(known, aim, 60, [](int) { return 8.0; });
+  EXPECT_EQ(busy[0], calm.back());
+  EXPECT_LT(known[busy[1]].ms, known[calm.back()].ms) << "the frame after the first late one";
+  const auto after = drag.run(known, aim, 300, always);
+  for (int n = 0; n < Chooser::slack_frames - 1; ++n) EXPECT_EQ(after[n], busy.back()) << n;
+  EXPECT_EQ(after.back(), calm.back());
+}
+
+TEST(Chooser, DoesNotFlickerWhereCostsScatter) {
+  Drag drag;
+  const Forecasts known = surveyed(100);
+  const auto drawn = drag.run(known, {40.0, std::nullopt}, 400, [](int n) {
+    return n % 3 == 0 ? 1.12 : n % 3 == 1 ? 0.88 : 1.0;
+  });
+  int changes = 0;
+  for (std::size_t n = 21; n < drawn.size(); ++n) changes += drawn[n] != drawn[n - 1] ? 1 : 0;
+  EXPECT_LE(changes, 4);
+}
+
+TEST(Chooser, AnErrorIsKeptByTheFastestSettingThatDoes) {
+  const Forecasts known = surveyed(100);
+  for (const double most : {0.2, 0.08, 0.03, 0.005}) {
+    Drag drag;
+    const std::size_t chosen = drag.run(known, {std::nullopt, most}, 30, always).back();
+    ASSERT_LE(quality::error_bound(known[chosen]), most);
+    for (std::size_t i = 0; i < settings.size(); ++i) {
+      if (!quality::is_allowed(settings[i], drag.view)) continue;
+      if (quality::error_bound(known[i]) > most) continue;
+      EXPECT_LE(known[chosen].ms, known[i].ms);
+    }
+  }
+}
+
+// Nothing is surveyed: what finer pictures take is only guessed, and each is tried in its turn.
+TEST(Chooser, WithoutASurveyFinerPicturesAreTriedOneAfterTheOther) {
+  Drag drag;
+  const Forecasts guessed = quality::Table(quality::Kind{}).forecasts(sight);
+  const quality::Aim aim{30.0, std::nullopt};
+  // Ten times as slow as guessed, and then a tenth of that.
+  const auto slow = drag.run(guessed, aim, 20, [](int) { return 10.0; });
+  std::vector<std::size_t> fast;
+  for (int n = 0; n < 20; ++n) {
+    drag.now += 300'000;
+    const auto part = drag.run(guessed, aim, 6, [](int) { return 0.5; });
+    fast.insert(fast.end(), part.begin(), part.end());
+  }
+  EXPECT_LT(guessed[slow.back()].ms, 3);
+  EXPECT_LT(guessed[fast.back()].error, guessed[slow.back()].error);
+  EXPECT_LE(0.5 * guessed[fast.back()].ms, 30);
+}
+
+TEST(Chooser, LeavesOutPicturesThatTheLinkCannotCarry) {
+  Chooser chooser;
+  const Forecasts known = surveyed(10);
+  const protocol::View view;
+  const std::size_t chosen = chooser.choose(view, known, {100.0, std::nullopt}, 100'000, 0);
+  EXPECT_LE(quality::pixels_at(view, settings[chosen]), 100'000);
+  EXPECT_GT(quality::pixels_at(view, settings[chosen]), 40'000);
+}
+
+}  // namespace
+}  // namespace windsplat::session

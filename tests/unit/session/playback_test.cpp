@@ -1,0 +1,372 @@
+// Steps that run: order, pace, changes on the way, what is counted of them, and which are wished
+// for ahead.
+#include <gmock/gmock.h>
+
+#include <numeric>
+
+#include "driver.hpp"
+
+namespace session_test {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+// A dataset of `steps` steps at rest at `step`, with nothing recorded of how it came there.
+void rest_at(Driver& driver, int step) {
+  driver.patch(1, R"({"dataset":"wind","step":)" + std::to_string(step) + "}");
+  driver.settle();
+  driver.frames.clear();
+  driver.texts.clear();
+  driver.wishes.clear();
+}
+
+// Draws each frame in `cost` and acknowledges it, for `duration`.
+void run_and_acknowledge(Driver& driver, Micros duration, Micros cost, bool loaded = false) {
+  const Micros end = driver.now() + duration;
+  while (driver.now() < end) {
+    if (driver.render) {
+      driver.finish_render(cost, loaded);
+      if (!driver.frames.empty()) driver.ack(driver.frames.back().header.seq);
+    } else {
+      driver.wait(1 * ms);
+    }
+  }
+}
+
+std::vector<std::uint32_t> moving_steps(const Driver& driver) {
+  std::vector<std::uint32_t> steps;
+  for (const SendFrame& frame : driver.frames) {
+    if (!Driver::is_final(frame)) steps.push_back(frame.header.step);
+  }
+  return steps;
+}
+
+// --- order --------------------------------------------------------------------------------------
+
+TEST(Reverse, runs_down_and_begins_again_at_the_top) {
+  Driver driver;
+  rest_at(driver, 2);
+  driver.say(play(4, 0, 10, true, true));
+  run_and_acknowledge(driver, 650 * ms, 10 * ms);
+  EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 0U, 4U, 3U, 2U, 1U));
+}
+
+TEST(Reverse, without_loop_ends_at_the_bottom_and_makes_it_final) {
+  Driver driver;
+  rest_at(driver, 2);
+  driver.say(play(9, 0, 10, false, true));
+  run_and_acknowledge(driver, 1500 * ms, 10 * ms);
+  EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 0U));
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  driver.frames.clear();
+  driver.say(play(9, 0, 10, false, true));  // from where nothing follows it begins anew
+  run_and_acknowledge(driver, 150 * ms, 10 * ms);
+  EXPECT_THAT(driver.steps_shown(), ElementsAre(9U, 8U));
+}
+
+TEST(Reverse, with_drop_skips_downward_and_over_the_end) {
+  Driver driver;
+  rest_at(driver, 3);
+  driver.say(play(9, 0, 10, true, true));
+  driver.wait(105 * ms);
+  ASSERT_EQ(driver.render->view.step, 2);
+  driver.finish_render(500 * ms);  // the steps 1 to 0 and 9 to 7 go by
+  EXPECT_EQ(driver.render->view.step, 7);
+}
+
+TEST(Reverse, from_beyond_the_last_step_is_an_error) {
+  Driver driver;
+  rest_at(driver, 0);
+  driver.say(play(steps, 0, 10, true, true));
+  ASSERT_EQ(driver.errors().size(), 1U);
+  EXPECT_EQ(driver.errors()[0].problem.errors.at(0).pointer, "/from");
+}
+
+// --- changes on the way -------------------------------------------------------------------------
+
+TEST(Seamless, a_faster_pace_goes_on_from_the_present_step) {
+  Driver driver;
+  rest_at(driver, 0);
+  driver.say(play(0, 9, 1, true, true));
+  run_and_acknowledge(driver, 1010 * ms, 5 * ms);  // step 1 came just now
+  driver.frames.clear();
+  driver.say(play(0, 9, 10, true, true));
+  run_and_acknowledge(driver, 350 * ms, 5 * ms);
+  EXPECT_THAT(moving_steps(driver), ElementsAre(2U, 3U, 4U));
+}
+
+TEST(Seamless, saying_the_same_again_and_again_holds_nothing_up) {
+  Driver driver;
+  rest_at(driver, 0);
+  for (int n = 0; n < 20; ++n) {
+    driver.say(play(0, 9, 10, true, true));
+    run_and_acknowledge(driver, 22 * ms, 1 * ms);
+  }
+  EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 2U, 3U, 4U));
+}
+
+TEST(Seamless, turning_round_goes_back_over_the_steps_just_seen) {
+  Driver driver;
+  rest_at(driver, 0);
+  driver.say(play(0, 9, 10, true, true));
+  run_and_acknowledge(driver, 340 * ms, 5 * ms);
+  driver.say(play(9, 0, 10, true, true));
+  run_and_acknowledge(driver, 300 * ms, 5 * ms);
+  EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 2U, 3U, 2U, 1U, 0U));
+}
+
+TEST(Seamless, dropping_from_now_on_does_not_leap_over_what_was_late) {
+  Driver driver;
+  rest_at(driver, 0);
+  driver.say(play(0, 9, 10, true, false));
+  driver.wait(105 * ms);
+  ASSERT_EQ(driver.render->view.step, 1);
+  driver.wait(600 * ms);  // still being drawn
+  driver.say(play(0, 9, 10, true, true));
+  driver.finish_render(1 * ms);
+  EXPECT_EQ(driver.render->view.step, 2);
+}
+
+TEST(Seamless, no_loop_from_now_on_ends_at_the_last_step) {
+  Driver driver;
+  rest_at(driver, 0);
+  driver.say(play(0, 3, 10, true, true));
+  run_and_acknowledge(driver, 320 * ms, 5 * ms);
+  driver.say(play(0, 3, 10, false, true));
+  run_and_acknowledge(driver, 600 * ms, 5 * ms);
+  EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 2U, 3U));
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+}
+
+TEST(Seamless, one_step_alone_is_shown_and_nothing_runs) {
+  Driver driver;
+  rest_at(driver, 5);
+  driver.say(play(7, 7, 60, true, true));
+  driver.settle();
+  EXPECT_EQ(driver.frames.back().header.step, 7U);
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+}
+
+TEST(EveryStep, is_shown_while_the_view_is_turned_all_the_time) {
+  Driver driver;
+  rest_at(driver, 0);
+  driver.say(play(0, 9, 20, false, false));
+  std::uint32_t rev = 1;
+  for (int n = 0; n < 120; ++n) {  // a patch every 10 ms, a frame takes 25 ms
+    driver.patch(++rev, R"({"camera":{"fovY":)" + std::to_string(20 + n % 20) + "}}");
+    run_and_acknowledge(driver, 10 * ms, 25 * ms);
+  }
+  const auto shown = moving_steps(driver);
+  for (std::uint32_t step = 1; step < 10; ++step) EXPECT_THAT(shown, testing::Contains(step));
+}
+
+TEST(Scrub, at_rest_shows_the_newest_of_many_steps) {
+  Driver driver;
+  rest_at(driver, 0);
+  std::uint32_t rev = 1;
+  driver.patch(++rev, R"({"step":1})");
+  ASSERT_TRUE(driver.render);
+  for (int step = 2; step <= 8; ++step) {
+    driver.patch(++rev, R"({"step":)" + std::to_string(step) + "}");
+    driver.wait(4 * ms);
+  }
+  driver.finish_render(10 * ms);
+  ASSERT_TRUE(driver.render);
+  EXPECT_EQ(driver.render->view.step, 8);
+  driver.settle();
+  EXPECT_THAT(driver.steps_shown(), ElementsAre(1U, 8U, 8U));
+}
+
+TEST(Hidden, steps_wait_until_someone_looks_again) {
+  Driver driver;
+  rest_at(driver, 0);
+  driver.say(play(0, 9, 10, true, true));
+  run_and_acknowledge(driver, 210 * ms, 5 * ms);
+  driver.say(protocol::VisibilityMessage{true});
+  driver.wait(3370 * ms);  // no whole number of rounds
+  driver.say(protocol::VisibilityMessage{false});
+  driver.frames.clear();
+  run_and_acknowledge(driver, 250 * ms, 5 * ms);
+  EXPECT_THAT(moving_steps(driver), ElementsAre(3U, 4U));
+}
+
+// --- counts -------------------------------------------------------------------------------------
+
+TEST(PlayStats, tell_the_pace_and_that_nothing_was_left_out) {
+  Driver driver;
+  rest_at(driver, 0);
+  driver.say(play(0, 9, 25, true, true));
+  run_and_acknowledge(driver, 3200 * ms, 10 * ms);
+  const auto stats = driver.texts_of<protocol::StatsMessage>();
+  ASSERT_EQ(stats.size(), 3U) << "one a second";
+  for (const auto& told : stats) EXPECT_NEAR(told.play_fps.value_or(0), 25, 0.5);
+  EXPECT_EQ(stats.back().steps_dropped, 0U);
+  EXPECT_EQ(stats.back().steps_not_ready, 0U);
+}
+
+TEST(PlayStats, without_drop_tell_the_pace_that_drawing_allows) {
+  Driver driver;
+  rest_at(driver, 0);
+  driver.say(play(0, 9, 60, true, false));
+  run_and_acknowledge(driver, 2200 * ms, 50 * ms);
+  const auto stats = driver.texts_of<protocol::StatsMessage>();
+  ASSERT_FALSE(stats.empty());
+  EXPECT_NEAR(stats.back().play_fps.value_or(0), 20, 0.5);
+  EXPECT_EQ(stats.back().steps_dropped, 0U);
+}
+
+TEST(PlayStats, steps_shown_and_dropped_are_all_that_went_by) {
+  for (const Micros cost : {30 * ms, 70 * ms, 130 * ms, 310 * ms}) {
+    Driver driver;
+    rest_at(driver, 0);
+    driver.say(play(0, 9, 20, true, true));
+    run_and_acknowledge(driver, 4020 * ms, cost);
+    const int showing = driver.render ? 1 : 0;  // begun, so it will be shown
+    const auto shown = static_cast<std::int64_t>(moving_steps(driver).size()) + showing;
+    driver.say(protocol::PauseMessage{});
+    driver.settle();
+    const auto stats = driver.texts_of<protocol::StatsMessage>().back();
+    EXPECT_FALSE(stats.play_fps) << "nothing runs any more";
+    // 20 steps a second for 4 s, and those of the last frame's time.
+    const std::int64_t by = shown + static_cast<std::int64_t>(stats.steps_dropped);
+    EXPECT_GE(by, 79);
+    EXPECT_LE(by, 81 + cost / (50 * ms));
+    if (cost < 50 * ms) {
+      EXPECT_EQ(stats.steps_dropped, 0U);
+    }
+    if (cost > 100 * ms) {
+      EXPECT_GT(stats.steps_dropped, 20U);
+    }
+  }
+}
+
+TEST(PlayStats, count_the_steps_that_had_to_be_read_first) {
+  Driver driver;
+  rest_at(driver, 0);
+  driver.say(play(0, 9, 10, true, true));
+  run_and_acknowledge(driver, 305 * ms, 5 * ms, true);
+  EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 2U, 3U));
+  driver.patch(2, R"({"camera":{"fovY":20}})");  // its frame is not the step's first
+  run_and_acknowledge(driver, 20 * ms, 5 * ms, true);
+  driver.say(protocol::PauseMessage{});
+  driver.settle();
+  EXPECT_EQ(driver.texts_of<protocol::StatsMessage>().back().steps_not_ready, 3U);
+}
+
+// --- wishes -------------------------------------------------------------------------------------
+
+std::vector<int> iota(int first, int count) {
+  std::vector<int> out(static_cast<std::size_t>(count));
+  std::iota(out.begin(), out.end(), first);
+  return out;
+}
+
+TEST(Wish, at_rest_is_for_the_neighbours) {
+  for (const auto& [step, wanted] : std::vector<std::pair<int, std::vector<int>>>{
+           {0, {1}}, {4, {5, 3}}, {steps - 1, {steps - 2}}}) {
+    Driver driver;
+    driver.patch(1, R"({"dataset":"wind","step":)" + std::to_string(step) + "}");
+    driver.finish_render();
+    EXPECT_THAT(driver.wishes, IsEmpty()) << "not before the final frame";
+    driver.settle();
+    ASSERT_EQ(driver.wishes.size(), 1U) << "once, however often the session is woken";
+    EXPECT_EQ(driver.wishes[0].steps, wanted);
+    EXPECT_EQ(driver.wishes[0].view.dataset, "wind");
+    EXPECT_EQ(driver.wishes[0].view.step, step);
+  }
+}
+
+TEST(Wish, outlives_a_turn_of_the_camera_but_not_another_step) {
+  Driver driver;
+  rest_at(driver, 4);
+  driver.patch(2, R"({"camera":{"fovY":20}})");
+  driver.settle();
+  EXPECT_THAT(driver.wishes, IsEmpty());
+  driver.patch(3, R"({"step":7})");
+  ASSERT_EQ(driver.wishes.size(), 1U);
+  EXPECT_THAT(driver.wishes[0].steps, IsEmpty());
+  driver.settle();
+  ASSERT_EQ(driver.wishes.size(), 2U);
+  EXPECT_THAT(driver.wishes[1].steps, ElementsAre(8, 6));
+}
+
+TEST(Wish, is_said_anew_for_other_fields) {
+  Driver driver;
+  rest_at(driver, 4);
+  driver.patch(2, R"({"scalars":[{"field":"salt"}]})");
+  driver.settle();
+  ASSERT_EQ(driver.wishes.size(), 2U);
+  EXPECT_THAT(driver.wishes[0].steps, IsEmpty());
+  EXPECT_THAT(driver.wishes[1].steps, ElementsAre(5, 3));
+  ASSERT_TRUE(driver.wishes[1].view.scalars);
+  EXPECT_EQ(driver.wishes[1].view.scalars->at(0).field, "salt");
+}
+
+TEST(Wish, while_steps_run_is_for_those_ahead_in_their_order) {
+  Driver driver;
+  rest_at(driver, 6);
+  driver.say(play(0, 9, 10, true, true));
+  ASSERT_EQ(driver.wishes.size(), 1U);
+  EXPECT_THAT(driver.wishes[0].steps, ElementsAre(7, 8, 9, 0, 1, 2, 3, 4, 5)) << "each once";
+  run_and_acknowledge(driver, 105 * ms, 5 * ms);
+  ASSERT_EQ(driver.wishes.size(), 2U);
+  EXPECT_THAT(driver.wishes[1].steps, ElementsAre(8, 9, 0, 1, 2, 3, 4, 5, 6));
+  EXPECT_EQ(driver.wishes[1].view.step, 7);
+  driver.say(play(9, 0, 10, false, true));
+  ASSERT_EQ(driver.wishes.size(), 3U);
+  EXPECT_THAT(driver.wishes[2].steps, ElementsAre(6, 5, 4, 3, 2, 1, 0)) << "no loop: no further";
+}
+
+TEST(Wish, ends_with_the_run_and_comes_back_at_rest) {
+  Driver driver;
+  rest_at(driver, 0);
+  driver.say(play(0, 9, 10, true, true));
+  run_and_acknowledge(driver, 305 * ms, 5 * ms);
+  driver.say(protocol::PauseMessage{});
+  EXPECT_THAT(driver.wishes.back().steps, IsEmpty());
+  driver.settle();
+  EXPECT_THAT(driver.wishes.back().steps, ElementsAre(4, 2));
+}
+
+TEST(Wish, is_for_nothing_while_nobody_looks_and_after_the_end) {
+  Driver driver;
+  rest_at(driver, 4);
+  driver.say(protocol::VisibilityMessage{true});
+  ASSERT_EQ(driver.wishes.size(), 1U);
+  EXPECT_THAT(driver.wishes[0].steps, IsEmpty());
+  driver.say(protocol::VisibilityMessage{false});
+  ASSERT_EQ(driver.wishes.size(), 2U);
+  EXPECT_THAT(driver.wishes[1].steps, ElementsAre(5, 3));
+  driver.drain();
+  ASSERT_EQ(driver.wishes.size(), 3U);
+  EXPECT_THAT(driver.wishes[2].steps, IsEmpty());
+  EXPECT_TRUE(driver.closed);
+}
+
+TEST(Wish, goes_with_the_dataset) {
+  Driver driver;
+  rest_at(driver, 4);
+  driver.say(protocol::OpenMessage{3, "sea"});
+  ASSERT_EQ(driver.wishes.size(), 1U);
+  EXPECT_THAT(driver.wishes[0].steps, IsEmpty());
+  driver.described(3, protocol::DatasetDescription{});
+  driver.settle();
+  EXPECT_THAT(driver.wishes.back().steps, ElementsAre(1));
+  EXPECT_EQ(driver.wishes.back().view.dataset, "sea");
+}
+
+// Sixteen at most: asked of the player itself, with more steps than the driver's datasets have.
+TEST(Wish, reaches_sixteen_steps_ahead) {
+  Player player;
+  player.start(play(0, 239, 24, true, true), 230, 0);
+  auto wanted = iota(231, 9);
+  const auto wrapped = iota(0, 7);
+  wanted.insert(wanted.end(), wrapped.begin(), wrapped.end());
+  EXPECT_EQ(player.upcoming(16), wanted);
+  player.start(play(239, 0, 24, false, true), 230, 0);
+  EXPECT_EQ(player.upcoming(3), (std::vector<int>{229, 228, 227}));
+}
+
+}  // namespace
+}  // namespace session_test

@@ -1,0 +1,39 @@
+// When steps come, by the clock alone: what is late is dropped, or waits without hurry.
+#include "server/session/player.hpp"
+
+#include <gtest/gtest.h>
+
+namespace windsplat::session {
+namespace {
+
+constexpr Micros ms = 1000;
+
+// From step 0 at time 0 through 100 steps, ten a second.
+Player playing(bool drop) {
+  Player player;
+  player.start({0, 99, 10, true, drop}, 0, 0);
+  return player;
+}
+
+TEST(Player, what_is_late_is_dropped_in_one_go) {
+  Player player = playing(true);
+  EXPECT_EQ(player.advance(99 * ms, true).passed, 0);
+  const auto late = player.advance(450 * ms, false);  // steps 1 to 4 are due
+  EXPECT_EQ(late.step, 4);
+  EXPECT_EQ(late.passed, 4);
+  EXPECT_EQ(player.next_at(false), 500 * ms);
+}
+
+TEST(Player, without_drop_a_stall_is_not_caught_up_with) {
+  Player player = playing(false);
+  int step = player.advance(1000 * ms, true).step;
+  EXPECT_EQ(step, 1);
+  for (Micros now = 1000 * ms; now <= 1250 * ms; now += 10 * ms) {
+    step = player.advance(now, true).step;
+  }
+  EXPECT_GE(step, 3) << "two periods later";
+  EXPECT_LE(step, 4);
+}
+
+}  // namespace
+}  // namespace windsplat::session

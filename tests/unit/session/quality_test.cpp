@@ -1,0 +1,292 @@
+// What frames are drawn by, what they say they err, and the way to the final one.
+#include <cmath>
+#include <functional>
+#include <optional>
+
+#include "driver.hpp"
+
+namespace session_test {
+namespace {
+
+// --- settings -----------------------------------------------------------------------------------
+
+// As a survey would find them where a full picture by kernels takes `full_ms`: time goes with
+// pixels and samples, slabs take four times as long.
+quality::Forecasts surveyed(double full_ms) {
+  quality::Forecasts out = quality::Table(quality::Kind{}).forecasts({1, {0, 1, 0}, 1280, 720});
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const quality::Setting& setting = quality::settings[i];
+    const double slabs = setting.method == protocol::MethodName::slab ? 4 * setting.thinner : 1;
+    out[i].ms = full_ms * slabs * std::pow(2.0, -setting.half_level - 2 * setting.coarser);
+    out[i].spread = 0.2;
+    out[i].timed = true;
+  }
+  return out;
+}
+
+// Drags for `count` frames whose cost follows the setting; the settings drawn.
+std::vector<quality::Setting> drag(Driver& driver, int count, std::uint32_t& rev,
+                                   const std::function<Micros(const quality::Setting&)>& cost) {
+  std::vector<quality::Setting> drawn;
+  for (int n = 0; n < count; ++n) {
+    driver.patch(++rev, azimuth(n));
+    if (!driver.render) continue;
+    const quality::Setting setting = driver.render->setting;
+    drawn.push_back(setting);
+    driver.finish_render(cost(setting));
+    driver.ack(driver.frames.back().header.seq);
+  }
+  return drawn;
+}
+
+// What a setting takes on a machine that is `slower` than the one surveyed.
+std::function<Micros(const quality::Setting&)> costs(const quality::Forecasts& known,
+                                                     double slower = 1) {
+  return [known, slower](const quality::Setting& setting) {
+    return static_cast<Micros>(1000 * slower * known[quality::index_of(setting).value()].ms);
+  };
+}
+
+TEST(Setting, says_so_in_the_header_and_the_final_frame_is_full) {
+  Driver driver;
+  driver.surveyed = surveyed(400);
+  driver.patch(1, R"({"dataset":"wind","image":{"width":800,"height":600}})");
+  std::uint32_t rev = 1;
+  const auto drawn = drag(driver, 10, rev, costs(*driver.surveyed));
+  const auto moving = driver.frames.back().header;
+  ASSERT_GT(drawn.back().half_level, 0);
+  EXPECT_EQ(moving.level, drawn.back().half_level / 2);
+  EXPECT_EQ(moving.width, quality::edge_at(800, drawn.back().half_level));
+  EXPECT_EQ(moving.flags, protocol::flag_error_estimated);
+  EXPECT_FLOAT_EQ(
+      moving.error,
+      static_cast<float>((*driver.surveyed)[quality::index_of(drawn.back()).value()].error));
+  driver.measured_error = 3e-4;
+  driver.settle(400 * ms);
+  const auto final = driver.frames.back().header;
+  EXPECT_EQ(final.level, 0);
+  EXPECT_EQ(final.width, 800);
+  EXPECT_EQ(final.height, 600);
+  EXPECT_EQ(final.flags, protocol::flag_final | protocol::flag_error_measured);
+  EXPECT_FLOAT_EQ(final.error, 3e-4F);
+}
+
+TEST(Setting, keeps_the_budget_on_a_machine_that_is_slower_than_it_was) {
+  for (const double budget : {16.0, 33.0, 66.0, 100.0}) {
+    Driver driver;
+    driver.surveyed = surveyed(120);
+    driver.patch(1, R"({"dataset":"wind","quality":{"budgetMs":)" + std::to_string(budget) + "}}");
+    std::uint32_t rev = 1;
+    const auto cost = costs(*driver.surveyed, 2.5);
+    driver.finish_render(cost(driver.render->setting));
+    driver.ack(1);
+    const auto drawn = drag(driver, 60, rev, cost);
+    ASSERT_GE(drawn.size(), 60U);
+    for (std::size_t n = 10; n < drawn.size(); ++n) {
+      EXPECT_LE(cost(drawn[n]), 1000 * budget) << "frame " << n << " at " << budget << " ms";
+    }
+    // Of what the budget allows with room to spare, nothing errs less.
+    const auto error = [&](const quality::Setting& setting) {
+      return (*driver.surveyed)[quality::index_of(setting).value()].error;
+    };
+    for (const quality::Setting& setting : quality::settings) {
+      if (!quality::is_allowed(setting, driver.render ? driver.render->view : View{})) continue;
+      if (cost(setting) > 800 * budget) continue;
+      EXPECT_LE(error(drawn.back()), error(setting)) << budget << " ms";
+    }
+  }
+}
+
+TEST(Setting, one_slow_load_does_not_coarsen_what_follows) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  std::uint32_t rev = 1;
+  const auto before = drag(driver, 10, rev, [](const quality::Setting&) { return 10 * ms; }).back();
+  driver.patch(++rev, R"({"step":3})");
+  driver.finish_render(900 * ms, true);
+  driver.ack(driver.frames.back().header.seq);
+  driver.patch(++rev, azimuth(99));
+  ASSERT_TRUE(driver.render);
+  EXPECT_LE(driver.render->setting.half_level, before.half_level);
+  EXPECT_LE(driver.render->setting.coarser, before.coarser);
+}
+
+TEST(Setting, never_makes_a_picture_too_small_to_tell_anything) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","image":{"width":300,"height":200}})");
+  std::uint32_t rev = 1;
+  const auto drawn = drag(driver, 10, rev, [](const quality::Setting&) { return 5000 * ms; });
+  for (const quality::Setting& setting : drawn) {
+    EXPECT_GE(quality::edge_at(200, setting.half_level), 64);
+  }
+}
+
+TEST(Setting, comes_back_when_the_scene_has_become_cheap) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  std::uint32_t rev = 1;
+  const quality::Forecasts dear = surveyed(400);
+  const auto coarse = drag(driver, 20, rev, costs(dear));
+  ASSERT_NE(coarse.back(), quality::settings[0]) << "which would take 400 ms";
+  driver.wait(5000 * ms);
+  const quality::Forecasts cheap = surveyed(16);
+  const auto fine = drag(driver, 1000, rev, costs(cheap));
+  EXPECT_EQ(fine.back().half_level, 0);
+  EXPECT_EQ(fine.back().coarser, 0);
+}
+
+TEST(Setting, an_error_that_is_asked_for_decides_instead_of_a_budget) {
+  Driver driver;
+  driver.surveyed = surveyed(120);
+  driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.005}})");
+  std::uint32_t rev = 1;
+  driver.finish_render(costs(*driver.surveyed)(driver.render->setting));
+  driver.ack(1);
+  const auto drawn = drag(driver, 20, rev, costs(*driver.surveyed));
+  EXPECT_EQ(drawn.back().method, protocol::MethodName::slab) << "whatever it takes";
+  driver.patch(++rev, R"({"quality":{"budgetMs":16}})");
+  const auto late = drag(driver, 20, rev, costs(*driver.surveyed));
+  EXPECT_EQ(late.back().method, protocol::MethodName::kernel) << "a budget comes first";
+}
+
+// Sixteen viewers of one kind: each waits for fifteen frames of the others, and all of them shrink.
+TEST(Setting, frames_become_shorter_where_many_wait_for_the_renderer) {
+  Driver driver;
+  driver.surveyed = surveyed(33);
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  std::uint32_t rev = 1;
+  const auto cost = costs(*driver.surveyed);
+  drag(driver, 20, rev, cost);
+  Micros own = cost(driver.render ? driver.render->setting : quality::settings[0]);
+  EXPECT_GT(own, 16 * ms);
+  for (int n = 0; n < 80; ++n) {
+    driver.queue = 15 * own;
+    own = cost(drag(driver, 1, rev, cost).back());
+  }
+  EXPECT_LE(own, 9 * ms) << "33 ms over the root of 16";
+  EXPECT_GE(own, 4 * ms);
+}
+
+// --- the way to the final frame -----------------------------------------------------------------
+
+TEST(Refining, a_final_frame_that_is_long_in_coming_has_a_better_one_before_it) {
+  Driver driver;
+  driver.surveyed = surveyed(200);
+  driver.measured_error = 5e-4;
+  driver.patch(1, R"({"dataset":"wind"})");
+  std::uint32_t rev = 1;
+  const auto cost = costs(*driver.surveyed);
+  drag(driver, 20, rev, cost);
+  if (driver.render) driver.finish_render(cost(driver.render->setting));  // of the last patch
+  driver.ack(driver.frames.back().header.seq);
+  const std::size_t moved = driver.frames.size();
+  driver.wait(200 * ms);
+  std::vector<quality::Setting> drawn;
+  while (driver.render) {
+    drawn.push_back(driver.render->setting);
+    driver.finish_render(cost(driver.render->setting));
+    driver.ack(driver.frames.back().header.seq);
+    driver.wait(200 * ms);
+  }
+  ASSERT_GE(drawn.size(), 2U);
+  float before = driver.frames[moved - 1].header.error;
+  for (std::size_t n = moved; n < driver.frames.size(); ++n) {
+    EXPECT_LE(driver.frames[n].header.error, 0.5F * before) << "each is worth its time";
+    before = driver.frames[n].header.error;
+    EXPECT_EQ(Driver::is_final(driver.frames[n]), n + 1 == driver.frames.size());
+  }
+  EXPECT_EQ(drawn.back(), quality::settings[quality::own_setting(View{})]);
+}
+
+TEST(Refining, is_given_up_by_the_next_change) {
+  Driver driver;
+  driver.surveyed = surveyed(200);
+  driver.patch(1, R"({"dataset":"wind"})");
+  std::uint32_t rev = 1;
+  const auto cost = costs(*driver.surveyed);
+  drag(driver, 10, rev, cost);
+  if (driver.render) driver.finish_render(cost(driver.render->setting));
+  driver.ack(driver.frames.back().header.seq);
+  driver.wait(200 * ms);
+  ASSERT_TRUE(driver.render);
+  ASSERT_FALSE(driver.render->encoding.measure) << "not yet the final one";
+  driver.patch(++rev, azimuth(200));
+  EXPECT_TRUE(driver.cancelled);
+}
+
+TEST(Refining, slabs_become_thinner_until_the_measured_error_is_what_was_asked_for) {
+  Driver driver;
+  driver.measured_error = 1e-3;  // a quarter of it with every halving
+  driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.0001}})");
+  driver.settle();
+  ASSERT_GE(driver.frames.size(), 3U);
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  EXPECT_LE(driver.frames.back().header.error, 1e-4F);
+  for (std::size_t n = 0; n + 1 < driver.frames.size(); ++n) {
+    EXPECT_FALSE(Driver::is_final(driver.frames[n])) << n;
+  }
+}
+
+TEST(Refining, ends_where_thinner_slabs_do_not_mend_it) {
+  Driver driver;
+  driver.averaged = true;
+  driver.measured_error = 1e-2;
+  driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.003}})");
+  driver.settle();
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  EXPECT_EQ(driver.frames.back().header.error, 1e-2F);
+  EXPECT_LE(driver.frames.size(), 3U) << "one moving, one halving tried";
+}
+
+TEST(Setting, a_late_frame_of_another_dataset_teaches_nothing) {
+  const auto first_of_sea = [](Micros late) {
+    Driver driver;
+    driver.surveyed = surveyed(10);
+    driver.patch(1, R"({"dataset":"wind"})");
+    driver.patch(2, R"({"dataset":"sea"})");
+    driver.finish_render(late);
+    driver.ack(driver.frames.empty() ? 0 : driver.frames.back().header.seq);
+    EXPECT_TRUE(driver.render);
+    EXPECT_EQ(driver.render->view.dataset, "sea");
+    return driver.render->setting;
+  };
+  EXPECT_EQ(first_of_sea(2000 * ms), first_of_sea(10 * ms));
+}
+
+TEST(Refining, ends_where_no_slab_is_thin_enough) {
+  Driver driver;
+  driver.measured_error = 1;
+  driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.000001}})");
+  driver.settle();
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  EXPECT_GT(driver.frames.back().header.error, 1e-6F) << "and says that it is not";
+}
+
+TEST(Refining, a_lossless_final_frame_is_a_png) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind","quality":{"lossless":true}})");
+  driver.settle();
+  ASSERT_GE(driver.frames.size(), 2U);
+  EXPECT_EQ(driver.frames.front().header.codec, protocol::Codec::jpeg);
+  EXPECT_EQ(driver.frames.back().header.codec, protocol::Codec::png);
+}
+
+TEST(Refining, a_view_that_rests_is_surveyed_once) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  EXPECT_TRUE(driver.surveys.empty());
+  driver.settle();
+  driver.wait(5000 * ms);
+  EXPECT_EQ(driver.surveys.size(), 1U);
+  driver.say(play(0, 9, 20, true, true));
+  for (int n = 0; n < 40; ++n) {
+    if (driver.render) driver.finish_render(10 * ms);
+    driver.ack(driver.frames.back().header.seq);
+    driver.wait(10 * ms);
+  }
+  EXPECT_EQ(driver.surveys.size(), 1U) << "not while steps run";
+}
+
+}  // namespace
+}  // namespace session_test

@@ -1,0 +1,112 @@
+// The value under the cursor: where the mouse is on the picture -> the sample there -> a question
+// to the server, at most one at a time and `everyMs` apart, of the newest place only -> words
+// beside the cursor. Nothing is asked while something moves; what fails is not told. Timers and
+// the server are handed in.
+
+export interface Place<S> {
+  sample: S;
+  key: string; // two places of one key have the same value
+}
+
+export interface HoverHost<S> {
+  now(): number; // ms
+  setTimeout(run: () => void, ms: number): number;
+  clearTimeout(timer: number): void;
+  busy(): boolean; // the view moves, or nobody looks: poke() tells when that may have changed
+  find(at: [number, number]): Place<S> | null; // null: nothing is there
+  ask(sample: S, signal: AbortSignal): Promise<string[]>; // lines to show
+  show(lines: string[], at: [number, number]): void; // no lines: nothing to show
+}
+
+export const everyMs = 125;
+const restMs = 150; // the view has not changed for so long
+
+export class Hover<S> {
+  private at: [number, number] | null = null; // of the cursor, fractions of the picture
+  private asking: AbortController | null = null;
+  private askedAt = -Infinity;
+  private changedAt = -Infinity; // of the view
+  private timer: number | null = null;
+  private shown = ""; // key of what is shown; empty: nothing
+
+  constructor(private readonly host: HoverHost<S>) {}
+
+  move(at: [number, number]): void {
+    this.at = at;
+    this.plan();
+  }
+
+  // The cursor is gone: so is what it asked for.
+  leave(): void {
+    this.at = null;
+    this.asking?.abort();
+    this.asking = null;
+    this.hide();
+    if (this.timer !== null) this.host.clearTimeout(this.timer);
+    this.timer = null;
+  }
+
+  // The view, its step or its dataset may have changed under the cursor.
+  poke(): void {
+    if (this.at === null) return;
+    const key = this.host.busy() ? "" : (this.host.find(this.at)?.key ?? "");
+    if (key === this.shown && key !== "") return;
+    this.changedAt = this.host.now();
+    this.hide();
+    this.plan();
+  }
+
+  private hide(): void {
+    if (this.shown === "") return;
+    this.shown = "";
+    this.host.show([], [0, 0]);
+  }
+
+  private plan(): void {
+    if (this.timer !== null || this.asking !== null) return;
+    const due = Math.max(this.askedAt + everyMs, this.changedAt + restMs) - this.host.now();
+    if (due <= 0) {
+      this.ask();
+      return;
+    }
+    this.timer = this.host.setTimeout(() => {
+      this.timer = null;
+      this.plan();
+    }, due);
+  }
+
+  private ask(): void {
+    const { at } = this;
+    if (at === null) return;
+    const place = this.host.busy() ? null : this.host.find(at);
+    if (place === null) {
+      this.hide();
+      return;
+    }
+    if (place.key === this.shown) return;
+    this.askedAt = this.host.now();
+    const asking = new AbortController();
+    this.asking = asking;
+    void this.host
+      .ask(place.sample, asking.signal)
+      .catch(() => [])
+      .then((lines) => {
+        if (this.asking !== asking) return; // the cursor has left
+        this.asking = null;
+        this.tell(place, lines, at);
+      });
+  }
+
+  private tell(place: Place<S>, lines: string[], at: [number, number]): void {
+    const here = this.at === null || this.host.busy() ? null : this.host.find(this.at);
+    if (here?.key === place.key) {
+      // An answer that failed counts as told: it is not asked for again and again.
+      this.shown = place.key;
+      this.host.show(lines, at);
+    } else if (here !== null) {
+      this.plan();
+    } else {
+      this.hide();
+    }
+  }
+}

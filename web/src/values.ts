@@ -1,0 +1,8 @@
+// What any value may be asked or made to be.
+
+// Of JSON: neither a list nor null.
+export const isObject = (value: unknown): value is Record<string, unknown> =>
+  typeof value === "object" && value !== null && !Array.isArray(value);
+
+export const clamp = (value: number, low: number, high: number): number =>
+  Math.min(Math.max(value, low), high);

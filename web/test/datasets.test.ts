@@ -1,0 +1,130 @@
+// Datasets that cannot be read, lists of them, and files that change while they are shown: what the
+// page says and shows for messages that are made up here.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { bestDataset, pickerEntries, withState } from "../src/dataset_list";
+import type { View } from "../src/protocol";
+import { mergeView } from "../src/view_state";
+import { described, Page, problem, summaryOf } from "./page";
+
+const tooBig =
+  "the field needs 27.5 MiB; the memory limit is 20.0 MiB, of which 0.4 MiB are in use";
+
+test("where titles repeat the ids tell them apart, and what failed is told", () => {
+  const titled = (id: string, title: string, more = {}) =>
+    summaryOf(described(id, { title, ...more }));
+  const notes = ["levels were turned", "'b.nc' is damaged"];
+  const list = [
+    titled("a", "My storm"),
+    titled("b", "My storm", { state: "failed", notes }),
+    titled("c", ""),
+    titled("d", "Calm"),
+    titled("e", "Gone", { state: "failed" }),
+  ];
+  const entries = pickerEntries(list);
+  assert.deepEqual(
+    entries.map(({ text }) => text),
+    ["My storm (a)", "My storm (b) — failed", "c", "Calm", "Gone — failed"],
+  );
+  assert.deepEqual(entries.map(({ hint }) => hint).slice(0, 3), ["", "'b.nc' is damaged", ""]);
+  assert.match(entries[4]!.hint, /cannot be read/);
+});
+
+test("the dataset to begin with is one that can be read", () => {
+  const list = ["b", "climate", "c"].map((id) => summaryOf(described(id)));
+  assert.equal(bestDataset(list), "climate");
+  const without = withState(list, { id: "climate", state: "failed", notes: ["gone"] });
+  assert.equal(bestDataset(without), "b");
+  assert.equal(withState(without, { id: "climate", state: "failed", notes: ["gone"] }), without);
+  assert.equal(
+    bestDataset(without.map((one) => ({ ...one, state: "failed" as const }))),
+    undefined,
+  );
+});
+
+test("why a chosen dataset cannot be shown stays to be read", () => {
+  const storm = described("storm");
+  // The server refuses the request, then the patch, in either order; the page goes back meanwhile.
+  for (const patchFirst of [false, true]) {
+    const page = new Page([storm, described("big")]);
+    page.opened(storm);
+    page.draws();
+    page.choose("big");
+    const [id, rev] = [page.openId, page.rev];
+    const refuseId = () => page.says({ type: "error", id, problem: problem(tooBig, 507) });
+    const refuseRev = () => page.says({ type: "error", rev, problem: problem(tooBig, 507) });
+    if (patchFirst) refuseRev();
+    refuseId();
+    if (!patchFirst) refuseRev();
+    page.says({ type: "unchanged", rev: page.rev, seq: 1 });
+    assert.equal(page.alert, tooBig);
+    assert.equal(page.element("dataset").value, "storm");
+    assert.deepEqual(page.entries, ["The storm", "The big — failed"]);
+    page.app.change({ step: 1 });
+    page.draws();
+    assert.equal(page.alert, tooBig, "until it was seen to");
+    page.choose("big");
+    assert.equal(page.alert, null, "asked again");
+    page.opened(described("big"));
+    page.draws();
+    assert.equal(page.alert, null);
+    assert.deepEqual(page.entries, ["The storm", "The big"]);
+  }
+});
+
+test("when nothing can be read all are tried once, and the last word stays", () => {
+  const page = new Page([described("a"), described("b")]);
+  page.says({ type: "error", id: page.openId, problem: problem("a is damaged") });
+  assert.equal(page.sent("open").at(-1)!.dataset, "b");
+  page.says({ type: "error", id: page.openId, problem: problem("b is damaged") });
+  assert.equal(page.sent("open").length, 2);
+  assert.equal(page.alert, "b is damaged");
+});
+
+const camera = { eye: [1, 2, 3], target: [0, 0, 0], up: [0, 0, 1], fovY: 20, height: 1 };
+
+// The view that the server holds after all that was said to it.
+const told = (page: Page): View =>
+  page.sent("patch").reduce<View>((view, { patch }) => mergeView(view, patch), {});
+
+test("a dataset that cannot be opened leaves the shown one as it was", () => {
+  const storm = described("storm");
+  for (const twice of [false, true]) {
+    const page = new Page([storm, described("big"), described("other")]);
+    page.opened(storm);
+    page.draws();
+    page.app.change({ camera, scalars: [{ field: "temperature", opacity: 0.3 }] });
+    page.draws();
+    const before = page.app.said();
+    if (twice) page.choose("other");
+    page.choose("big");
+    const rev = page.rev;
+    page.says({ type: "error", id: page.openId, problem: problem(tooBig, 507) });
+    page.says({ type: "error", rev, problem: problem(tooBig, 507) });
+    assert.deepEqual(page.app.said(), before);
+    assert.deepEqual(told(page), before);
+    assert.equal(page.alert, tooBig);
+  }
+});
+
+test("who chooses what is shown while another is being opened stays with it", () => {
+  const [storm, big] = [described("storm"), described("big")];
+  for (const back of ["picker", "link"]) {
+    const page = new Page([storm, big]);
+    page.opened(storm);
+    page.draws();
+    page.app.change({ camera });
+    page.draws();
+    const before = page.app.said();
+    page.choose("big");
+    if (back === "picker") page.choose("storm");
+    else page.app.restore({ dataset: "storm", step: 2, camera } as View);
+    const wanted = back === "picker" ? before : { ...before, step: 2 };
+    assert.deepEqual(page.app.said(), wanted);
+    page.opened(big); // too late
+    assert.deepEqual(page.app.said(), wanted);
+    assert.equal(page.app.dataset().id, "storm");
+    assert.equal(page.element("dataset").value, "storm");
+    assert.equal(page.element("loading").hidden, true);
+  }
+});

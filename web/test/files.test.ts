@@ -1,0 +1,181 @@
+// Files that change, or become unreadable, while they are shown: what the page makes of a second
+// `opened` and of an `error` that nobody asked for.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { fitView, shapeOf } from "../src/fit_view";
+import type { View } from "../src/protocol";
+import { described, Page, problem } from "./page";
+
+const gone = 'dataset "storm" has steps 0 to 2';
+const damaged = "'storm.nc' is damaged: 'wind' cannot be read";
+
+function shown(): Page {
+  const page = new Page([described("storm"), described("calm")]);
+  page.opened(described("storm"));
+  page.draws();
+  return page;
+}
+
+test("a view keeps what new files can still show", () => {
+  const view: View = {
+    dataset: "storm",
+    step: 4,
+    camera: { fovY: 50 },
+    vector: {
+      field: "wind",
+      length: 0.2,
+      magnitudeRange: [0, 60],
+      minMagnitude: 3,
+      color: { by: "scalar", field: "humidity", range: [0, 1], map: "magma" },
+    },
+    scalars: [{ field: "humidity" }, { field: "temperature", stride: 2 }],
+    geometry: {
+      scale: [1, 1, 3],
+      mapping: "sphere",
+      heightField: "humidity",
+      slice: { axis: "z", index: 7 },
+    },
+  };
+  const same = described("storm", {
+    fields: ["wind", "temperature", "humidity"],
+    size: 8,
+    mappings: ["flat", "sphere"],
+  });
+  assert.deepEqual(fitView(view, same), view);
+  assert.deepEqual(fitView(view, described("storm", { steps: 3, fields: ["temperature"] })), {
+    dataset: "storm",
+    step: 2,
+    camera: { fovY: 50 },
+    vector: { length: 0.2, color: { map: "magma" } },
+    scalars: [{ field: "temperature", stride: 2 }],
+    geometry: { scale: [1, 1, 3], slice: { axis: "z", index: 3 } },
+  });
+  const calm = fitView({ ...view, vector: { field: null } }, described("storm", { fields: [] }));
+  assert.deepEqual([calm.vector, calm.scalars], [{ field: null }, undefined]);
+  assert.deepEqual(fitView({ scalars: [] }, same), { scalars: [] });
+  assert.notEqual(shapeOf(same), shapeOf(described("storm")));
+  assert.equal(shapeOf(same), shapeOf({ ...same, residentBytes: 9, notes: ["read again"] }));
+});
+
+test("files with fewer steps: the last one is shown, all else as it was", () => {
+  const page = shown();
+  page.app.change({ step: 4, vector: { length: 0.2 } });
+  page.app.change({ scalars: [{ field: "temperature", stride: 2 }] });
+  page.draws();
+  const { built } = page;
+  page.says({ type: "error", rev: page.rev, problem: problem(gone, 422, "/step") });
+  assert.match(page.alert ?? "", /steps 0 to 2/);
+  page.opened(described("storm", { steps: 3 }));
+  assert.equal(page.alert, null, "the step is not asked for any more");
+  const last = page.sent("patch").at(-1)!.patch as View;
+  assert.equal(last.step, 2);
+  const { step, vector, scalars } = page.app.view();
+  assert.deepEqual([step, vector?.length, vector?.field], [2, 0.2, "wind"]);
+  assert.deepEqual(scalars, [{ field: "temperature", stride: 2 }]);
+  assert.equal(page.element("time-slider").max, "2");
+  assert.equal(page.element("time-slider").value, "2");
+  assert.equal(page.element("time-step").textContent, "step 2 of 3");
+  assert.equal(page.element("time-label").textContent, "2001-01-01 02:00Z");
+  assert.equal(page.built, built + 1);
+  // The server may still have tried the old step, for nobody's patch.
+  page.says({ type: "error", problem: problem(gone, 422, "/step") });
+  page.draws();
+  assert.equal(page.alert, null);
+  assert.equal(page.sent("open").length, 1, "nothing is opened again");
+});
+
+test("files with more steps or of one step: the time bar follows, the step stays", () => {
+  const page = shown();
+  page.app.change({ step: 3 });
+  page.draws();
+  const patches = page.sent("patch").length;
+  page.opened(described("storm", { steps: 9 }));
+  assert.equal(page.sent("patch").length, patches, "nothing had to change");
+  assert.equal(page.element("time-slider").max, "8");
+  assert.equal(page.element("time-step").textContent, "step 3 of 9");
+  page.opened(described("storm", { steps: 1 }));
+  assert.equal((page.sent("patch").at(-1)!.patch as View).step, 0);
+  assert.equal(page.element("time-step").textContent, "one step");
+  assert.equal(page.element("time").inert, true);
+});
+
+test("steps that run go on within the new ones, and stop where there is but one", () => {
+  const page = shown();
+  page.app.playback.play(1);
+  page.opened(described("storm", { steps: 9 }));
+  assert.deepEqual(
+    page.sent("play").map(({ from, to }) => [from, to]),
+    [
+      [0, 4],
+      [0, 8],
+    ],
+  );
+  page.opened(described("storm", { steps: 1 }));
+  assert.equal(page.app.playback.running, false);
+  assert.equal(page.sent("pause").length, 1);
+});
+
+test("a field that is gone is asked for no more, and the defaults are the new ones", () => {
+  const page = shown();
+  page.app.change({ scalars: [{ field: "temperature" }], camera: { fovY: 50 } });
+  page.draws();
+  page.opened(described("storm", { fields: ["wind", "humidity"] }));
+  const view = page.app.view();
+  assert.deepEqual(view.scalars, [{ field: "humidity" }]);
+  assert.deepEqual([view.camera?.fovY, view.vector?.field], [50, "wind"]);
+  assert.equal((page.sent("patch").at(-1)!.patch as View).scalars, null);
+});
+
+test("an answer to a request that nobody waits for any more changes nothing", () => {
+  const page = shown();
+  page.choose("calm");
+  page.says({ type: "opened", id: 1, dataset: described("storm", { steps: 2 }) });
+  assert.equal(page.element("time-slider").max, "4");
+  page.opened(described("calm", { steps: 7 }));
+  assert.equal(page.element("time-slider").max, "6");
+  page.says({ type: "opened", id: 1, dataset: described("storm", { steps: 2 }) });
+  assert.equal(page.app.dataset().id, "calm");
+});
+
+test("new files that cannot be read: told until they can, and the old picture stays", () => {
+  const page = shown();
+  const patches = page.sent("patch").length;
+  page.says({ type: "error", id: page.openId, problem: problem(damaged) });
+  assert.equal(page.alert, damaged);
+  assert.deepEqual(page.entries, ["The storm — failed", "The calm"]);
+  page.app.change({ step: 1 });
+  page.draws();
+  assert.equal(page.alert, damaged, "whatever else is drawn");
+  assert.equal(page.sent("patch").length, patches + 1);
+  assert.deepEqual([page.sent("open").length, page.app.dataset().id], [1, "storm"]);
+  const { built } = page;
+  page.opened(described("storm"));
+  assert.equal(page.alert, null);
+  assert.equal(page.built, built + 1, "of other values, if not of another shape");
+  assert.deepEqual(page.entries, ["The storm", "The calm"]);
+});
+
+test("files that could not be read before the page came are told by the server's note", () => {
+  const failed = described("storm", { state: "failed", notes: ["levels were turned", damaged] });
+  const page = new Page([failed, described("calm")]);
+  assert.equal(page.sent("open").at(-1)!.dataset, "calm", "one that can be read goes first");
+  page.opened(described("calm"));
+  page.choose("storm");
+  page.opened(failed);
+  page.draws();
+  assert.equal(page.alert, damaged);
+  page.choose("calm");
+  page.opened(described("calm"));
+  assert.equal(page.alert, null);
+});
+
+test("a failed dataset after another request that failed is told of the one that is shown", () => {
+  const page = shown();
+  page.choose("calm");
+  page.says({ type: "error", id: page.openId, problem: problem("no") });
+  page.opened(described("storm", { steps: 9 }));
+  assert.equal(page.element("time-slider").max, "8", "by the id of the last request");
+  page.says({ type: "error", id: 1, problem: problem(damaged) });
+  assert.equal(page.alert, damaged, "or by that of the one that opened it");
+  assert.deepEqual(page.entries, ["The storm — failed", "The calm — failed"]);
+});

@@ -1,0 +1,80 @@
+// Error against time: axes, ticks, words, and the budget's steps.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import {
+  axisOver,
+  budgetAfter,
+  limitAfter,
+  logTicks,
+  placeOn,
+  pointText,
+  valueOn,
+  type ForecastPoint,
+} from "../src/forecast";
+
+test("an axis holds what it shall, leaves out what has no logarithm, and is wide enough", () => {
+  const axis = axisOver([0, Number.NaN, 5, 200], 30);
+  assert.ok(axis.low < 5 && axis.high > 200 && axis.low > 1);
+  const narrow = axisOver([10, 10], 30);
+  assert.ok(Math.abs(narrow.high / narrow.low - 30) < 1e-9);
+  assert.ok(Math.abs(narrow.high * narrow.low - 100) < 1e-9, "about the middle");
+  assert.ok(axisOver([], 30).low > 0);
+});
+
+test("places go by ratios and come back", () => {
+  const axis = { low: 1, high: 10_000 };
+  assert.equal(placeOn(axis, 100), 0.5);
+  assert.equal(placeOn(axis, 0), 0);
+  assert.equal(placeOn(axis, 1e9), 1);
+  assert.ok(Math.abs(valueOn(axis, 0.25) - 10) < 1e-9);
+  assert.equal(valueOn(axis, 7), 10_000);
+});
+
+test("ticks are round, and no more than there is room for", () => {
+  assert.deepEqual(logTicks({ low: 4, high: 600 }, 7), [5, 10, 20, 50, 100, 200, 500]);
+  assert.deepEqual(logTicks({ low: 4, high: 600 }, 5), [10, 100]);
+  assert.deepEqual(logTicks({ low: 2e-6, high: 0.5 }, 5), [1e-5, 1e-4, 1e-3, 1e-2, 1e-1]);
+  assert.ok(logTicks({ low: 1e-30, high: 1e30 }, 5).length <= 5);
+});
+
+const point: ForecastPoint = {
+  method: "slab",
+  slabThickness: 2,
+  width: 568,
+  height: 409,
+  coarser: 1,
+  ms: 31.4159,
+  error: 0.0112,
+  errorLow: 0.006,
+  errorHigh: 0.02,
+  kind: "estimated",
+  pareto: true,
+};
+
+test("a setting in words, by either measure of error", () => {
+  assert.equal(
+    pointText(point, "rmse"),
+    "slab of 2 cells, 568×409, data 1/2: 31.4 ms, error 0.011 (0.006 to 0.02), estimated",
+  );
+  const kernel = { ...point, method: "kernel", slabThickness: null, coarser: 0 };
+  assert.match(pointText(kernel, "psnr"), /^kernel, 568×409: 31.4 ms, PSNR 39.0 dB/);
+});
+
+test("arrow keys move the greatest error from wherever it is, finer by about a hundredth", () => {
+  for (let error = 1e-3; error < 1e-2; error = Number((error + 1e-5).toPrecision(3))) {
+    for (const way of [1, -1] as const) {
+      const by = (limitAfter(error, way, true) / error) ** way;
+      assert.ok(by > 1.004 && by < 1.016, `${error} ${way}: ${by}`);
+      const coarse = (limitAfter(error, way, false) / error) ** way;
+      assert.ok(coarse > 1.04 && coarse < 1.16, `${error} ${way}: ${coarse}`);
+    }
+  }
+});
+
+test("arrow keys move the budget by a twentieth, at least a millisecond, within the wire's", () => {
+  assert.equal(budgetAfter(100, 1, false), 105);
+  assert.equal(budgetAfter(100, -1, true), 99);
+  assert.equal(budgetAfter(3, 1, false), 4);
+  assert.equal(budgetAfter(1, -1, false), 1);
+  assert.equal(budgetAfter(9999, 1, false), 10_000);
+});

@@ -1,0 +1,161 @@
+// What the page says of frames: their errors, sizes and states by the bytes of their headers, and
+// where a picture goes on the canvas.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import { errorMetric, toggleErrorMetric } from "../src/error_text";
+import {
+  encodingWords,
+  errorWords,
+  FrameRate,
+  frameState,
+  networkMs,
+  scaleText,
+} from "../src/frame_words";
+import { parseFrameHeader, type FrameHeader } from "../src/protocol";
+import { placeOn } from "../src/viewport";
+
+interface Change {
+  flags?: number;
+  codec?: number;
+  error?: number;
+  jpegError?: number;
+  rev?: number;
+  step?: number;
+}
+
+const vectors = JSON.parse(
+  readFileSync("../protocol/vectors/valid/frame_headers.json", "utf8"),
+) as { hex: string }[];
+
+// The first valid vector, with bytes of its own where the test says so.
+function header(change: Change = {}): FrameHeader {
+  const bytes = Uint8Array.from(Buffer.from(vectors[0]!.hex.replaceAll(" ", ""), "hex"));
+  const data = new DataView(bytes.buffer);
+  const u32 = { rev: 12, step: 16, flags: 20 } as const;
+  for (const [key, at] of Object.entries(u32)) {
+    const value = change[key as keyof typeof u32];
+    if (value !== undefined) data.setUint32(at, value, true);
+  }
+  if (change.codec !== undefined) data.setUint8(28, change.codec);
+  if (change.error !== undefined) data.setFloat32(32, change.error, true);
+  if (change.jpegError !== undefined) data.setFloat32(36, change.jpegError, true);
+  return parseFrameHeader(bytes);
+}
+
+test("an error is told with its kind: bit 4 estimated, bit 2 measured", () => {
+  const text = (change: Change) => errorWords(header(change)).text;
+  assert.equal(text({ flags: 4, error: 0.011 }), "error 0.011 est.");
+  assert.equal(text({ flags: 2, error: 3.2e-4 }), "error 3.2e-4 measured");
+  assert.equal(text({ flags: 3, error: 0.5 }), "error 0.5 measured", "a final frame's");
+  assert.equal(text({ flags: 6, error: 0.5 }), "error 0.5 measured", "what is measured is known");
+  assert.equal(text({ flags: 2, error: 0 }), "error 0 measured");
+  const said = new Set([
+    errorWords(header({ flags: 4 })).title,
+    errorWords(header({ flags: 2 })).title,
+    errorWords(header({ flags: 0, error: NaN })).title,
+  ]);
+  assert.equal(said.size, 3, "each kind is explained in its own words");
+  for (const title of said) assert.match(title, /root mean square/);
+});
+
+test("an error above what the view allows says so", () => {
+  const moving = header({ flags: 4, error: 0.045 });
+  assert.equal(errorWords(moving, 0.01).text, "error 0.045 est., above 0.01");
+  assert.match(errorWords(moving, 0.01).title, /more than the view allows/);
+  for (const limit of [0.045, 0.1, null]) {
+    assert.equal(errorWords(moving, limit).text, "error 0.045 est.");
+  }
+});
+
+test("an error is told in dB as well: 20 for each power of ten, and a limit is then below", () => {
+  const text = (change: Change, limit: number | null = null) =>
+    errorWords(header({ flags: 4, ...change }), limit, "psnr").text;
+  assert.equal(text({ error: 0.1 }), "PSNR 20.0 dB est.");
+  assert.equal(text({ error: 1e-4 }), "PSNR 80.0 dB est.");
+  assert.equal(text({ error: 0.5, flags: 2 }), "PSNR 6.0 dB measured");
+  assert.equal(text({ error: 0, flags: 2 }), "PSNR ∞ dB measured");
+  assert.equal(text({ error: 0.1 }, 0.01), "PSNR 20.0 dB est., below 40.0 dB");
+  assert.equal(text({ error: NaN }), "error unknown");
+  assert.equal(encodingWords(header({ jpegError: 0.01 }), "psnr").text, "JPEG 40.0 dB");
+});
+
+test("the choice of how errors are told is the page's one, and tells who shows them", () => {
+  const told: string[] = [];
+  errorMetric.watch((metric) => told.push(metric));
+  toggleErrorMetric();
+  errorMetric.set("psnr"); // as it is already
+  toggleErrorMetric();
+  assert.deepEqual(told, ["psnr", "rmse"]);
+});
+
+test("an error that is no number, or of no kind, is unknown", () => {
+  for (const change of [
+    { flags: 4, error: NaN },
+    { flags: 2, error: NaN },
+    { flags: 2, error: Infinity },
+    { flags: 0, error: NaN },
+    { flags: 9, error: 0.25 },
+  ]) {
+    assert.equal(errorWords(header(change)).text, "error unknown", JSON.stringify(change));
+  }
+});
+
+test("the encoding's error stands apart, and a PNG has none", () => {
+  assert.equal(encodingWords(header({ jpegError: 4.1e-3 })).text, "JPEG 0.0041");
+  assert.equal(
+    encodingWords(header({ jpegError: NaN })).text,
+    "",
+    "nothing is better than a guess",
+  );
+  assert.equal(encodingWords(header({ codec: 2, jpegError: NaN })).text, "PNG lossless");
+});
+
+test("a frame is as large as the whole picture, a half of it, or so many percent", () => {
+  assert.equal(scaleText(1280, 1280), "");
+  assert.equal(scaleText(2000, 1280), "");
+  assert.equal(scaleText(640, 1280), "1/2");
+  for (const odd of [320, 319]) assert.equal(scaleText(odd, 1279), "1/4", "rounded either way");
+  assert.equal(scaleText(896, 1280), "70 %");
+  assert.equal(scaleText(1, 1280), "1 %", "never nothing");
+});
+
+test("a frame refines if it shows a view that was shown already, and is not the last word", () => {
+  const moving = header({ flags: 0, rev: 5, step: 3 });
+  assert.equal(frameState(moving, null), "moving");
+  assert.equal(frameState(moving, header({ flags: 0, rev: 4, step: 3 })), "moving");
+  assert.equal(frameState(moving, header({ flags: 0, rev: 5, step: 2 })), "moving", "time runs");
+  const again = header({ flags: 2, rev: 5, step: 3 });
+  assert.equal(frameState(again, moving), "refining");
+  assert.equal(frameState(again, again), "refining");
+  assert.equal(frameState(header({ flags: 3, rev: 5, step: 3 }), again), "final");
+  // Files that changed under a finished picture: what comes is worse than what was there.
+  assert.equal(frameState(moving, header({ flags: 1, rev: 5, step: 3 })), "moving");
+});
+
+test("pictures of any size fill a canvas of their shape, others keep theirs", () => {
+  const canvas = { width: 1280, height: 720 };
+  const all = [0, 0, 1280, 720];
+  for (const share of [1, 0.9, 0.77, 0.5, 0.31, 0.125, 0.03]) {
+    const width = Math.max(1, Math.ceil(1280 * share));
+    const height = Math.max(1, Math.ceil(720 * share));
+    assert.deepEqual(placeOn(canvas, { width, height }), all, `${width} x ${height}`);
+  }
+  assert.deepEqual(placeOn(canvas, { width: 20, height: 12 }), all, "rounding is no shape");
+  assert.deepEqual(placeOn(canvas, { width: 360, height: 360 }), [280, 0, 720, 720]);
+  assert.deepEqual(placeOn(canvas, { width: 1280, height: 360 }), [0, 180, 1280, 360]);
+});
+
+test("network time is what the server's own times do not explain, told once a patch", () => {
+  const sent = { t: 1000, queueUs: 1000, renderUs: 20_000, encodeUs: 4000 } as FrameHeader;
+  assert.equal(networkMs(sent, 1040, 0), 15);
+  assert.equal(networkMs(sent, 1040, 1000), null);
+  assert.equal(networkMs(sent, 1010, 0), 0, "never negative");
+});
+
+test("the rates count the frames and bytes of the last second", () => {
+  const rate = new FrameRate();
+  for (let now = 0; now < 2000; now += 100) rate.add(now, 50);
+  assert.deepEqual(rate.value(1950), { fps: 10, bytes: 500 });
+  assert.deepEqual(rate.value(9000), { fps: 0, bytes: 0 });
+});

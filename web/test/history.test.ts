@@ -1,0 +1,177 @@
+// Undo and redo: what is one entry, what is none, and that each way leads back.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { differences, ViewHistory } from "../src/history";
+import type { View } from "../src/protocol";
+import { mergeView } from "../src/view_state";
+
+// A user at a view, with a clock that is set by hand.
+class Desk {
+  readonly history = new ViewHistory();
+  now = 0;
+
+  constructor(public view: View = { dataset: "storm" }) {}
+
+  // ms later
+  change(patch: object, ms = 10): void {
+    this.now += ms;
+    const before = this.view;
+    this.view = mergeView(before, patch);
+    this.history.note(before, this.view, this.now);
+  }
+
+  // Not by the user's hand.
+  runs(patch: object): void {
+    this.view = mergeView(this.view, patch);
+  }
+
+  undo(): string | null {
+    const undone = this.history.undo(this.view);
+    if (undone !== null) this.view = undone.view;
+    return undone?.what ?? null;
+  }
+
+  redo(): string | null {
+    const redone = this.history.redo(this.view);
+    if (redone !== null) this.view = redone.view;
+    return redone?.what ?? null;
+  }
+}
+
+const eye = (x: number) => ({ camera: { eye: [x, -3, 0] } });
+
+test("whatever a pointer does while it is down is one entry, of any length", () => {
+  const desk = new Desk();
+  desk.history.begin(true);
+  for (let n = 1; n <= 500; n++) desk.change(eye(n), n === 250 ? 5000 : 10);
+  desk.change({ vector: { length: 2 } });
+  desk.history.end();
+  desk.change(eye(501)); // of the display frame after
+  assert.deepEqual(desk.view.camera!.eye, [501, -3, 0]);
+  desk.undo();
+  desk.undo();
+  assert.deepEqual(desk.view, { dataset: "storm" });
+  assert.equal(desk.undo(), null);
+});
+
+test("what a drag sent last joins it, also after the button is up", () => {
+  const desk = new Desk();
+  desk.history.begin(true);
+  desk.change(eye(1));
+  desk.history.end();
+  desk.change(eye(2), 16);
+  assert.equal(desk.undo(), "camera");
+  assert.deepEqual(desk.view, { dataset: "storm" });
+});
+
+test("a burst of the same is one entry, what rests between or is of another key is not", () => {
+  const desk = new Desk();
+  for (let n = 1; n <= 30; n++) desk.change(eye(n), 590);
+  desk.change(eye(100), 601);
+  desk.change({ vector: { length: 2 } });
+  desk.change({ vector: { opacity: 0.5 } });
+  assert.deepEqual([desk.undo(), desk.undo()], ["lines", "lines"]);
+  assert.deepEqual(desk.view, { dataset: "storm", ...eye(100) });
+});
+
+test("what moves only a part of the camera joins what moved all of it", () => {
+  const desk = new Desk();
+  desk.change({ camera: { eye: [1, -3, 0], target: [0, 0, 0], height: 2 } });
+  desk.change({ camera: { eye: [1, -2, 0], target: [0, 0, 0], height: 1 } });
+  desk.undo();
+  assert.deepEqual(desk.view, { dataset: "storm" });
+});
+
+test("another press is another entry, however soon", () => {
+  const desk = new Desk();
+  desk.history.begin(false);
+  desk.change(eye(1));
+  desk.history.begin(false);
+  desk.change(eye(2));
+  assert.equal(desk.undo(), "camera");
+  assert.deepEqual(desk.view.camera!.eye, [1, -3, 0]);
+});
+
+test("there and back in one gesture leaves nothing to undo", () => {
+  const desk = new Desk({ vector: { length: 1 } });
+  desk.history.begin(true);
+  desk.change({ vector: { length: 2 } });
+  desk.change({ vector: { length: 1 } });
+  assert.equal(desk.history.canUndo, false);
+});
+
+test("redo leads where undo came from, and a new change ends it", () => {
+  const desk = new Desk();
+  const seen = [desk.view];
+  for (const patch of [eye(1), { scalars: [{ field: "t" }] }, { vector: { field: null } }]) {
+    desk.change(patch, 1000);
+    seen.push(desk.view);
+  }
+  assert.deepEqual([desk.undo(), desk.undo(), desk.undo()], ["lines", "media", "camera"]);
+  assert.deepEqual(desk.view, seen[0]);
+  for (let n = 1; n < seen.length; n++) {
+    assert.notEqual(desk.redo(), null);
+    assert.deepEqual(desk.view, seen[n]);
+  }
+  assert.equal(desk.redo(), null);
+  desk.undo();
+  desk.change({ step: 2 });
+  assert.deepEqual([desk.history.canRedo, desk.undo()], [false, "time step"]);
+});
+
+test("what runs by itself and the window's size stay as they are", () => {
+  const desk = new Desk({ step: 0, image: { width: 800, height: 600 } });
+  desk.change(eye(1));
+  desk.runs({ step: 7, vector: { motion: { time: 3 } } });
+  desk.change({ image: { width: 400 } });
+  assert.equal(desk.undo(), "camera");
+  const image = { width: 400, height: 600 };
+  assert.deepEqual(desk.view, { step: 7, image, vector: { motion: { time: 3 } } });
+});
+
+test("a gesture round steps that were played takes none of them back", () => {
+  const desk = new Desk({ step: 0 });
+  desk.history.begin(true);
+  desk.change(eye(1));
+  desk.runs({ step: 3 });
+  desk.change(eye(2));
+  assert.equal(desk.undo(), "camera");
+  assert.deepEqual(desk.view, { step: 3 });
+});
+
+test("another dataset is an entry that brings the former one back as it was", () => {
+  const before: View = { dataset: "storm", step: 4, vector: { field: "wind" } };
+  const desk = new Desk(before);
+  desk.now = 1;
+  desk.view = { dataset: "calm" };
+  desk.history.note(before, desk.view, desk.now);
+  assert.equal(desk.undo(), "dataset");
+  assert.deepEqual(desk.view, before);
+});
+
+test("what makes no difference any more is passed over", () => {
+  const desk = new Desk();
+  desk.change(eye(1), 1000);
+  const stands = desk.view;
+  desk.change({ vector: { length: 99 } }, 1000);
+  desk.view = stands; // the server refused it
+  assert.equal(desk.undo(), "camera");
+});
+
+test("two hundred entries are kept", () => {
+  const desk = new Desk({ step: 0 });
+  for (let n = 1; n <= 250; n++) desk.change({ step: n }, 1000);
+  let undone = 0;
+  while (desk.undo() !== null) undone += 1;
+  assert.deepEqual([undone, desk.view.step], [200, 50]);
+});
+
+test("differences are told leaf by leaf, arrays whole", () => {
+  const a = { a: { b: 1, c: [1, 2] }, d: 1 };
+  const b = { a: { b: 1, c: [1, 3] }, e: null };
+  assert.deepEqual(differences(a, b), [
+    { path: ["a", "c"], before: [1, 2], after: [1, 3] },
+    { path: ["d"], before: 1, after: undefined },
+    { path: ["e"], before: undefined, after: null },
+  ]);
+});

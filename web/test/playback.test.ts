@@ -1,0 +1,148 @@
+// Steps that run, as the page sees them: what it says, when it takes itself for stopped; the words
+// on their pace; and the media of a view completed by what was drawn.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { paceText, stepsText } from "../src/frame_words";
+import { Playback } from "../src/playback";
+import type { ClientMessage, StatsMessage } from "../src/protocol";
+import { completeView } from "../src/view_state";
+
+class Page {
+  sent: ClientMessage[] = [];
+  live = true;
+  step = 3;
+  settings = { steps: 10, fps: 24, loop: true, drop: true };
+  readonly playback: Playback = new Playback({
+    send: (message) => {
+      if (this.live) this.sent.push(message);
+      return this.live;
+    },
+    settings: () => this.settings,
+    seek: (step) => {
+      this.playback.pause();
+      this.step = step;
+    },
+    changed: () => undefined,
+  });
+
+  frame(step: number): void {
+    this.playback.shown(step, this.step);
+    this.step = step;
+  }
+
+  said(): string[] {
+    return this.sent.map((message) =>
+      message.type === "play" ? `${message.from}>${message.to}@${message.fps}` : message.type,
+    );
+  }
+}
+
+test("play says the whole run, backward from its end", () => {
+  const page = new Page();
+  page.settings = { steps: 10, fps: 12, loop: false, drop: false };
+  page.playback.play(1);
+  page.playback.play(-1);
+  assert.deepEqual(page.sent, [
+    { type: "play", from: 0, to: 9, fps: 12, loop: false, drop: false },
+    { type: "play", from: 9, to: 0, fps: 12, loop: false, drop: false },
+  ]);
+  assert.equal(page.playback.direction, -1);
+});
+
+test("one step has nothing to play, and a lost connection plays nothing", () => {
+  const page = new Page();
+  page.settings.steps = 1;
+  page.playback.play(1);
+  assert.equal(page.playback.running, false);
+  page.settings.steps = 10;
+  page.live = false;
+  page.playback.play(1);
+  assert.equal(page.playback.running, false);
+  assert.deepEqual(page.sent, []);
+});
+
+test("a new speed is said while steps run, and only then", () => {
+  const page = new Page();
+  page.playback.again();
+  page.playback.play(-1);
+  page.settings.fps = 60;
+  page.playback.again();
+  page.playback.pause();
+  page.playback.again();
+  page.playback.pause();
+  assert.deepEqual(page.said(), ["9>0@24", "9>0@60", "pause"]);
+});
+
+test("the slider holds time and lets it run on the same way", () => {
+  const page = new Page();
+  page.playback.play(-1);
+  for (const step of [5, 6, 7]) page.playback.scrub(step);
+  assert.equal(page.playback.running, false);
+  page.playback.scrubbed();
+  assert.deepEqual(page.said(), ["9>0@24", "pause", "9>0@24"]);
+  assert.equal(page.step, 7);
+  page.playback.pause();
+  page.playback.scrub(2);
+  page.playback.scrubbed();
+  assert.equal(page.playback.running, false, "at rest it stays at rest");
+});
+
+test("without loop it ends at the end of its way", () => {
+  for (const [direction, end] of [
+    [1, 9],
+    [-1, 0],
+  ] as const) {
+    const page = new Page();
+    page.settings.loop = false;
+    page.playback.play(direction);
+    page.frame(3 + direction);
+    page.frame(9 - end);
+    assert.equal(page.playback.running, true, "the other end is no end");
+    page.frame(end);
+    assert.equal(page.playback.running, false);
+  }
+});
+
+test("a frame of the last step from before does not end what begins anew", () => {
+  const page = new Page();
+  page.settings.loop = false;
+  page.step = 9;
+  page.playback.play(1);
+  page.frame(9);
+  assert.equal(page.playback.running, true);
+  page.frame(0);
+  page.frame(9);
+  assert.equal(page.playback.running, false);
+});
+
+const stats = (change: Partial<StatsMessage>): StatsMessage => ({
+  type: "stats",
+  frames: 1,
+  dropped: 0,
+  cancelled: 0,
+  bytes: 0,
+  playFps: null,
+  stepsDropped: 0,
+  stepsNotReady: 0,
+  ...change,
+});
+
+test("the pace in words", () => {
+  assert.equal(paceText(23.96), "24 steps/s");
+  assert.equal(paceText(0.5), "0.5 steps/s");
+  assert.equal(stepsText(stats({})), "");
+  assert.equal(
+    stepsText(stats({ stepsDropped: 7, stepsNotReady: 2 })),
+    "steps: 7 left out · 2 read late",
+  );
+});
+
+test("a medium that was said in part is completed by the drawn one of its field", () => {
+  const drawn = { scalars: [{ field: "a", stride: 2, color: { map: "ice" } }, { field: "b" }] };
+  const said = { step: 4, scalars: [{ field: "a", color: { range: [0, 1] } }, { field: "c" }] };
+  assert.deepEqual(completeView(drawn as never, said as never), {
+    step: 4,
+    scalars: [{ field: "a", stride: 2, color: { map: "ice", range: [0, 1] } }, { field: "c" }],
+  });
+  assert.deepEqual(completeView(drawn as never, {}), drawn);
+});

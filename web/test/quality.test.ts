@@ -1,0 +1,87 @@
+// Quality as the page says and shows it: what frames tell of the server's choices is not taken for
+// the user's, and what the user takes back is gone at once.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { controlStates, hasErrorLimit, qualityHint } from "../src/controls";
+import { hashOfView, viewOfHash } from "../src/link";
+import type { View } from "../src/protocol";
+import { described, Page } from "./page";
+
+function shown(): Page {
+  const page = new Page([described("storm")]);
+  page.opened(described("storm"));
+  page.draws({ view: { method: { name: "slab", slabThickness: 1 } } });
+  return page;
+}
+
+test("the method that a moving frame was drawn with is not the view's", () => {
+  const page = shown();
+  page.app.change({ camera: { fovY: 40 } });
+  page.draws({ final: false, view: { method: { name: "kernel", slabThickness: 4 } } });
+  assert.deepEqual(page.app.view().method, { name: "slab", slabThickness: 1 });
+  page.app.change({ method: { name: "kernel" } });
+  assert.equal(page.app.view().method?.name, "kernel", "what the user says is");
+  page.app.change({ method: { name: null } });
+  page.draws({ view: { method: { name: "slab", slabThickness: 2 } } });
+  assert.deepEqual(page.app.view().method, { name: "slab", slabThickness: 2 }, "and the default");
+});
+
+test("quality is what was said of it, whatever older frames were drawn for", () => {
+  const page = shown();
+  page.app.change({ quality: { maxError: 0.01, lossless: true } });
+  page.draws({ view: { quality: { budgetMs: null, maxError: 0.01, lossless: true } } });
+  assert.deepEqual(page.app.view().quality, { maxError: 0.01, lossless: true });
+  page.app.change({ quality: { maxError: null } });
+  assert.equal(hasErrorLimit(page.app.view()), false, "before any frame tells");
+  const [patch] = page.sent("patch").slice(-1);
+  assert.deepEqual(patch!.patch, { quality: { maxError: null } });
+});
+
+test("the link keeps the quality, and the limit's control is there only with a limit", () => {
+  const view: View = { quality: { budgetMs: 66, maxError: 0.002, lossless: true } };
+  assert.deepEqual(viewOfHash(hashOfView(view)), view);
+  assert.equal(controlStates(view).errorLimit, true);
+  assert.equal(controlStates({ quality: { maxError: null } }).errorLimit, false);
+  assert.equal(controlStates({}).errorLimit, false);
+  assert.notEqual(qualityHint(view), qualityHint({}));
+});
+
+test("a frame gives its credit back when it is decoded, before and whether it is shown", () => {
+  const page = shown();
+  page.app.acknowledge(7, 2.5);
+  assert.deepEqual(page.sent("ack").at(-1), { type: "ack", seq: 7, decodeMs: 2.5 });
+  const before = page.sent("ack").length;
+  page.draws();
+  assert.equal(page.sent("ack").length, before, "not once more when it is shown");
+});
+
+test("the server is told when nobody looks, and when someone does again", () => {
+  const page = shown();
+  page.hide(true);
+  assert.deepEqual(page.sent("visibility").at(-1), { type: "visibility", hidden: true });
+  page.hide(false);
+  assert.deepEqual(page.sent("visibility").at(-1), { type: "visibility", hidden: false });
+});
+
+test("a new session is told the whole view in one patch, and whether anyone looks", () => {
+  const page = shown();
+  page.app.change({ camera: { fovY: 50 }, quality: { maxError: 0.003 } });
+  page.app.change({ vector: { length: 0.2 } });
+  page.again();
+  const patches = page.sent("patch");
+  assert.equal(patches.length, 1);
+  const { dataset, camera, quality, vector } = patches[0]!.patch as View;
+  assert.equal(dataset, "storm");
+  assert.deepEqual([camera, quality, vector], [{ fovY: 50 }, { maxError: 0.003 }, { length: 0.2 }]);
+  assert.equal(page.sent("open").length, 1);
+  assert.deepEqual(page.sent("visibility"), [{ type: "visibility", hidden: false }]);
+});
+
+test("a camera waits while earlier patches are held up on their way out", () => {
+  const page = shown();
+  assert.equal(page.app.cameras.ready(), true);
+  page.holdUp(100_000);
+  assert.equal(page.app.cameras.ready(), false);
+  page.holdUp(0);
+  assert.equal(page.app.cameras.ready(), true);
+});
