@@ -10,8 +10,10 @@ namespace windsplat::data::vtk {
 
 namespace {
 
-// Samples looked at over all cells: a mesh whose cells' boxes overlap more is refused.
+// Samples looked at over all cells: a mesh whose cells' boxes overlap more is refused. In all, and
+// for each sample that lies in a cell if none overlap, so that a small file cannot ask for much.
 constexpr std::uint64_t visits_max = std::uint64_t{1} << 30;
+constexpr double visits_a_sample = 1024;
 constexpr double samples_min_3d = 4096;
 constexpr double samples_min_2d = 1024;
 // Cells whose mean extents differ by less are as long as wide and high: one spacing.
@@ -168,6 +170,17 @@ class Resampler {
     return {};
   }
 
+  // How many samples shall lie in the cells.
+  [[nodiscard]] double wanted_samples() const {
+    return std::max(rank_ == 3 ? samples_min_3d : samples_min_2d,
+                    0.5 * static_cast<double>(mesh_.point_count() + mesh_.cell_count()));
+  }
+
+  [[nodiscard]] std::uint64_t visits_allowed() const {
+    const double share = visits_a_sample * wanted_samples();
+    return share < static_cast<double>(visits_max) ? static_cast<std::uint64_t>(share) : visits_max;
+  }
+
   // The distance of samples along each axis, not yet fitted to the box. Errors: no volume.
   Result<Point> wanted_spacing(const Point& length) const {
     double volume = 1;
@@ -185,10 +198,7 @@ class Resampler {
     if (!std::isfinite(volume) || !(volume > 0) || !(volume_ > 0) || !(of_cell > 0)) {
       return refuse("has cells without any volume");
     }
-    const double wanted =
-        std::max(rank_ == 3 ? samples_min_3d : samples_min_2d,
-                 0.5 * static_cast<double>(mesh_.point_count() + mesh_.cell_count()));
-    const double room = std::min(volume_, volume) / wanted;
+    const double room = std::min(volume_, volume) / wanted_samples();
     const double exponent = 1.0 / static_cast<double>(rank_);
     Point out{};
     if (high < even_ratio * low) {
@@ -262,7 +272,8 @@ class Resampler {
       if (span[d][1] <= span[d][0]) return {};
     }
     visits_ += (span[0][1] - span[0][0]) * (span[1][1] - span[1][0]) * (span[2][1] - span[2][0]);
-    if (visits_ > visits_max) return refuse("has cells that overlap too much to be resampled");
+    if (visits_ > visits_allowed())
+      return refuse("has cells that overlap, or lie thin and aslant, too much to be resampled");
     for (std::size_t k = span[2][0]; k < span[2][1]; ++k) {
       for (std::size_t j = span[1][0]; j < span[1][1]; ++j) {
         for (std::size_t i = span[0][0]; i < span[0][1]; ++i) {

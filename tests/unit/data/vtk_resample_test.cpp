@@ -385,6 +385,18 @@ TEST_F(VtkResampling, CellDataAreThoseOfTheCellThatHoldsTheSample) {
   }
 }
 
+// Slivers along the diagonal: each has the whole lattice in its box, and hardly a sample in itself.
+// Two kilobytes must not make a minute of work.
+TEST_F(VtkResampling, SliversThatAskForMoreWorkThanTheirFileIsWorthAreRefused) {
+  TestMesh mesh;
+  mesh.points = {0, 0, 0, 1e-4, 0, 0, 0, 1e-4, 0, 1, 1, 1};
+  for (int c = 0; c < 60; ++c) mesh.cell(10, {0, 1, 2, 3});
+  VtkXml xml;
+  const auto data = xml.array("Float64", "a", 1, at_points(mesh, linear));
+  EXPECT_THAT(refusal(folder_.write("a.vtu", vtu(mesh, data, "", xml))),
+              HasSubstr("too much to be resampled"));
+}
+
 // Every piece counts its points and cells from 0. A cell's value is its piece's number.
 TEST_F(VtkResampling, PiecesOfOneMeshAreOne) {
   const auto at_x = [](double from) {
