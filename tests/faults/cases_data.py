@@ -162,9 +162,9 @@ def little_space(world, count):
     def prepare():
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     refused = 0
-    daemon = world.start("tornado:256x256x256", SAMPLE, prepare=prepare)
+    daemon = world.start("tornado:400x400x400", SAMPLE, prepare=prepare)
     for n in range(count):
-        got = picture(daemon.port, "tornado:256x256x256", azimuth=n)
+        got = picture(daemon.port, "tornado:400x400x400", azimuth=n)
         refused += got.status in (500, 503, 507)
         need(got.status in (200, 500, 503, 507), f"answered by {got.status}")
         check_good(daemon.port)

@@ -172,8 +172,8 @@ TEST(Tiles, AreDeliveredOnceAndAreTheImage) {
       std::vector<int> times(pieces.size() / 4);
       ThreadPool pool(2);
       engine::RenderSpace space;
-      const auto work =
-          engine::render(scene, pool, CancelToken(), space, [&](const engine::TilePixels& tile) {
+      const auto work = engine::render(
+          scene, pool, CancelToken(), space, [&, width = width](const engine::TilePixels& tile) {
             EXPECT_TRUE(tile.x % 2 == 0 && tile.y % 2 == 0);
             for (int row = 0; row < tile.height; ++row) {
               const std::size_t at = static_cast<std::size_t>(tile.y + row) * width + tile.x;

@@ -119,8 +119,7 @@ class Levels : public testing::Test {
   static constexpr std::uint64_t coarse_bytes = fine_bytes / 8;
 
   static std::unique_ptr<Dataset> dataset_within(std::uint64_t bytes) {
-    return std::make_unique<Dataset>(std::move(*open_sample("tornado", {16, 16, 16}, 4)), "t",
-                                     bytes);
+    return std::make_unique<Dataset>(*open_sample("tornado", {16, 16, 16}, 4), "t", bytes);
   }
   static Coarsening halves(double last_width = 1) {
     Coarsening how{{1, 1, 1}, {}};

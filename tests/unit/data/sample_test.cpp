@@ -93,12 +93,12 @@ TEST(Samples, AreTheSameEveryTimeAndChangeWithTheStep) {
     EXPECT_EQ(first->info().digest, second->info().digest);
     EXPECT_NE(first->info().digest, sample(name, {24, 20, 15})->info().digest);
     // Asked in another order, so that nothing depends on what was read before.
-    const Volume later = std::move(*second->read(1, 1));
-    const Volume a = std::move(*first->read(0, 0));
-    const Volume b = std::move(*second->read(0, 0));
+    const Volume later = *second->read(1, 1);
+    const Volume a = *first->read(0, 0);
+    const Volume b = *second->read(0, 0);
     EXPECT_EQ(a.values, b.values) << name;
-    EXPECT_EQ(std::move(*first->read(1, 1)).values, later.values) << name;
-    EXPECT_NE(a.values, std::move(*first->read(0, 1)).values) << name;
+    EXPECT_EQ(first->read(1, 1)->values, later.values) << name;
+    EXPECT_NE(a.values, first->read(0, 1)->values) << name;
   }
 }
 

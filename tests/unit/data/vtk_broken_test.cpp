@@ -124,7 +124,7 @@ TEST(VtkBroken, PiecesThatCannotFillTheWholeAreRefusedBeforeMemoryIsTaken) {
       {"StructuredGrid", "<Points>" + corners + "</Points>"}};
   for (const auto& [kind, geometry] : kinds) {
     const std::string piece = "<Piece Extent=\"0 1 0 1 0 1\">" + data + geometry + "</Piece>";
-    const auto file = [&](const std::string& whole) {
+    const auto file = [&, kind = kind](const std::string& whole) {
       return refusal(folder.write("a.vtk", xml.file(kind, "WholeExtent=\"" + whole + "\"", piece)));
     };
     SCOPED_TRACE(kind);
