@@ -31,7 +31,7 @@ constexpr std::uint32_t this_machine = AUDIT_ARCH_X86_64;
 constexpr std::uint32_t this_machine = AUDIT_ARCH_AARCH64;
 #endif
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef WINDSPLAT_SANITIZED
 constexpr bool memory_is_shadowed = true;  // terabytes of it, which count as taken
 #else
 constexpr bool memory_is_shadowed = false;
@@ -161,7 +161,7 @@ bool forbid_calls() {
              SYS_brk, SYS_madvise, SYS_futex, SYS_clock_gettime, SYS_clock_nanosleep, SYS_nanosleep,
              SYS_gettimeofday, SYS_getrandom, SYS_rt_sigaction, SYS_rt_sigprocmask,
              SYS_rt_sigreturn, SYS_sigaltstack, SYS_restart_syscall, SYS_exit, SYS_exit_group,
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef WINDSPLAT_SANITIZED
              // By a pipe the sanitizers find out whether memory can be read.
              SYS_pipe2,
 #ifdef SYS_pipe

@@ -22,7 +22,7 @@ namespace windsplat::data::loader {
 
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef WINDSPLAT_SANITIZED
 constexpr bool messages_are_shown = true;  // those of the sanitizer
 #else
 constexpr bool messages_are_shown = false;

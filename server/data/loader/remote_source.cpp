@@ -45,13 +45,14 @@ std::string program_path() {
 Descriptor open_of_library(const std::vector<std::string>& folders, const std::string& path) {
   for (const std::string& folder : folders) {
     if (!path.starts_with(folder + '/') || path.find('\0') != std::string::npos) continue;
+    const std::size_t below = path.find_first_not_of('/', folder.size());
+    if (below == std::string::npos) continue;  // the folder itself
     const Descriptor root(::open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
     open_how how{};
     how.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
     how.resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS;
-    const char* below = path.c_str() + path.find_first_not_of('/', folder.size());
-    Descriptor file(
-        static_cast<int>(::syscall(SYS_openat2, root.number(), below, &how, sizeof how)));
+    Descriptor file(static_cast<int>(
+        ::syscall(SYS_openat2, root.number(), path.c_str() + below, &how, sizeof how)));
     struct stat status {};
     if (file && ::fstat(file.number(), &status) == 0 && S_ISREG(status.st_mode)) return file;
   }

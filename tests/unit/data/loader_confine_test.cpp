@@ -175,7 +175,7 @@ const std::vector<Attempt> on_memory{
      }},
 };
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#ifndef WINDSPLAT_SANITIZED
 const std::vector<Attempt> on_much_memory{
     {"more memory than allowed", ENOMEM,
      [](int) -> long {
