@@ -13,7 +13,7 @@ namespace {
 // Samples looked at over all cells: a mesh whose cells' boxes overlap more is refused. In all, and
 // for each sample that lies in a cell if none overlap, so that a small file cannot ask for much.
 constexpr std::uint64_t visits_max = std::uint64_t{1} << 30;
-constexpr double visits_a_sample = 1024;
+constexpr double visits_a_sample = 256;
 constexpr double samples_min_3d = 4096;
 constexpr double samples_min_2d = 1024;
 // Cells whose mean extents differ by less are as long as wide and high: one spacing.
