@@ -156,23 +156,23 @@ class Filter {
 
 bool forbid_calls() {
   Filter filter;
-  for (const int call : {
-         SYS_read, SYS_pread64, SYS_readv, SYS_preadv, SYS_lseek, SYS_fstat, SYS_munmap, SYS_mremap,
-             SYS_brk, SYS_madvise, SYS_futex, SYS_clock_gettime, SYS_clock_nanosleep, SYS_nanosleep,
-             SYS_gettimeofday, SYS_getrandom, SYS_rt_sigaction, SYS_rt_sigprocmask,
-             SYS_rt_sigreturn, SYS_sigaltstack, SYS_restart_syscall, SYS_exit, SYS_exit_group,
+  for (const int call :
+       {SYS_read, SYS_pread64, SYS_readv, SYS_preadv, SYS_lseek, SYS_fstat, SYS_munmap, SYS_mremap,
+        SYS_brk, SYS_madvise, SYS_futex, SYS_clock_gettime, SYS_clock_nanosleep, SYS_nanosleep,
+        SYS_gettimeofday, SYS_getrandom, SYS_rt_sigaction, SYS_rt_sigprocmask, SYS_rt_sigreturn,
+        SYS_sigaltstack, SYS_restart_syscall, SYS_exit, SYS_exit_group,
 #ifdef WINDSPLAT_SANITIZED
-             // By a pipe the sanitizers find out whether memory can be read.
-             SYS_pipe2,
+        // By a pipe the sanitizers find out whether memory can be read.
+        SYS_pipe2,
 #ifdef SYS_pipe
-             SYS_pipe,
+        SYS_pipe,
 #endif
 #endif
-             SYS_sendmsg, SYS_recvmsg, SYS_ppoll, SYS_write, SYS_writev, SYS_close, SYS_dup,
-             SYS_getpid, SYS_gettid, SYS_sched_yield, SYS_sched_getaffinity, SYS_sysinfo,
-             SYS_getrusage, SYS_fadvise64,
+        SYS_sendmsg, SYS_recvmsg, SYS_ppoll, SYS_write, SYS_writev, SYS_close, SYS_dup, SYS_getpid,
+        SYS_gettid, SYS_sched_yield, SYS_sched_getaffinity, SYS_sysinfo, SYS_getrusage,
+        SYS_fadvise64,
 #ifdef __x86_64__
-             SYS_poll, SYS_time
+        SYS_poll, SYS_time
 #endif
        }) {
     filter.allow(call);
