@@ -75,7 +75,7 @@ Result<void> Listener::listen(const std::string& address, std::uint16_t port) {
 }
 
 void Listener::start() {
-  if (!waiting_ && acceptor_.is_open()) accept();
+  if (waiting_.use_count() == 1 && acceptor_.is_open()) accept();
 }
 
 void Listener::close() {
@@ -85,8 +85,7 @@ void Listener::close() {
 }
 
 void Listener::accept() {
-  acceptor_.async_accept([this](ErrorCode fault, Tcp::socket socket) {
-    waiting_ = false;
+  acceptor_.async_accept([this, waits = waiting_](ErrorCode fault, Tcp::socket socket) {
     if (!acceptor_.is_open()) return;
     if (!fault) {
       hasten(socket);
@@ -104,13 +103,10 @@ void Listener::accept() {
     failed_();
     spare_.turn_away(acceptor_.native_handle());
     retry_.expires_after(retry_delay);
-    retry_.async_wait([this](ErrorCode cancelled) {
-      waiting_ = false;
+    retry_.async_wait([this, waits](ErrorCode cancelled) {
       if (!cancelled) accept();
     });
-    waiting_ = true;
   });
-  waiting_ = true;
 }
 
 }  // namespace windsplat::net

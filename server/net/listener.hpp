@@ -6,6 +6,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "server/base/error.hpp"
@@ -26,8 +27,8 @@ class Listener {
   Result<void> listen(const std::string& address, std::uint16_t port);
   [[nodiscard]] boost::asio::ip::tcp::endpoint endpoint() const { return endpoint_; }
 
-  // Accepts from now on. Called again it goes on where memory failed before the next connection
-  // could be waited for; else it changes nothing.
+  // Accepts from now on. Called again, and not by what was accepted, it goes on where memory failed
+  // before the next connection could be waited for or handed over; else it changes nothing.
   void start();
   void close();
 
@@ -40,7 +41,9 @@ class Listener {
   boost::asio::steady_timer retry_;
   SpareDescriptor spare_;
   boost::asio::ip::tcp::endpoint endpoint_;
-  bool waiting_ = false;  // for a connection, or for the time to try again
+  // Shared by what waits for a connection, or for the time to try again: where memory fails for a
+  // connection that has come, that goes uncalled.
+  std::shared_ptr<const char> waiting_ = std::make_shared<const char>();
 };
 
 }  // namespace windsplat::net

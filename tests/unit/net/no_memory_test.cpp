@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
+#include <chrono>
 #include <cstdlib>
 #include <functional>
 #include <future>
@@ -14,6 +15,7 @@
 #include "server/net/admission.hpp"
 #include "server/net/attempt.hpp"
 #include "server/net/jobs.hpp"
+#include "server/net/listener.hpp"
 #include "server/net/load_service.hpp"
 #include "server/net/post.hpp"
 #include "server/net/render_service.hpp"
@@ -216,6 +218,36 @@ TEST(NoMemory, what_cannot_be_posted_is_called_at_home_and_given_up_elsewhere) {
   });
   io.run();
   EXPECT_EQ(called, 2);
+}
+
+// What has come is lost with the memory that it needed; what comes next is not.
+TEST(NoMemory, the_next_connection_is_accepted_whichever_was_lost) {
+  namespace asio = boost::asio;
+  asio::io_context io;
+  const auto more = asio::make_work_guard(io);  // a server has its timers
+  asio::io_context clients;
+  int accepted = 0;
+  Listener listener(
+      io, [&](asio::ip::tcp::socket) { ++accepted; }, [] {});
+  ASSERT_TRUE(listener.listen("127.0.0.1", 0));
+  listener.start();
+  io.poll();
+  int lost = 0;
+  for (int count = 0; count < 6; ++count) {
+    asio::ip::tcp::socket first(clients);
+    first.connect(listener.endpoint());
+    if (!with_allocations(count, [&] { io.run_one_for(std::chrono::seconds(2)); })) ++lost;
+    listener.start();
+    asio::ip::tcp::socket next(clients);
+    next.connect(listener.endpoint());
+    const int before = accepted;
+    for (int turn = 0; turn < 100 && accepted == before; ++turn) {
+      io.run_one_for(std::chrono::milliseconds(20));
+    }
+    EXPECT_GT(accepted, before) << "after " << count << " allocations";
+  }
+  EXPECT_GT(lost, 0);
+  listener.close();
 }
 
 }  // namespace
