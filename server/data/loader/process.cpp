@@ -130,8 +130,13 @@ void Process::kill() {
 }
 
 std::string Process::end(std::chrono::milliseconds patience) {
+  const std::optional<int> status = reap(patience);
+  return status ? how_it_ended(*status) : std::string();
+}
+
+std::optional<int> Process::reap(std::chrono::milliseconds patience) noexcept {
   const pid_t id = this->id();
-  std::string how;
+  std::optional<int> ended;
   if (id > 0) {
     // Waited for without being reaped, so that its number stays its own until it is forgotten.
     siginfo_t about{};
@@ -148,12 +153,12 @@ std::string Process::end(std::chrono::milliseconds patience) {
     int status = 0;
     while (::waitpid(id, &status, 0) < 0 && errno == EINTR) {
     }
-    how = how_it_ended(status);
+    ended = status;
     id_ = -1;
   }
   socket_.reset();
   life_.reset();
-  return how;
+  return ended;
 }
 
 void Process::allow_cpu(std::chrono::seconds more) {

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "server/base/error.hpp"
@@ -20,7 +21,7 @@ inline constexpr int life_of_loader = 4;  // a pipe whose other end closes with 
 class Process {
  public:
   Process() = default;
-  ~Process() { end(); }
+  ~Process() { reap(std::chrono::milliseconds(0)); }
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
@@ -42,6 +43,9 @@ class Process {
   [[nodiscard]] pid_t id() const;  // -1 if there is none
 
  private:
+  // The same without words, for which there may be no memory: its status, as of waitpid.
+  std::optional<int> reap(std::chrono::milliseconds patience) noexcept;
+
   mutable std::mutex mutex_;  // of id_: a number is signalled only before it is waited for
   pid_t id_ = -1;
   Descriptor socket_;

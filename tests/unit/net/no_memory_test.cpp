@@ -1,17 +1,20 @@
 // Where memory fails in the middle of something: nothing is left half done, and no thread of a
 // service ends. Allocations of a thread fail from the one on that a test names.
 #include <gtest/gtest.h>
+#include <signal.h>
 
 #include <boost/asio/io_context.hpp>
 #include <chrono>
 #include <cstdlib>
 #include <functional>
 #include <future>
+#include <memory>
 #include <new>
 #include <string>
 #include <thread>
 #include <utility>
 
+#include "server/data/loader/process.hpp"
 #include "server/net/admission.hpp"
 #include "server/net/attempt.hpp"
 #include "server/net/jobs.hpp"
@@ -218,6 +221,14 @@ TEST(NoMemory, what_cannot_be_posted_is_called_at_home_and_given_up_elsewhere) {
   });
   io.run();
   EXPECT_EQ(called, 2);
+}
+
+TEST(NoMemory, a_loader_is_ended_by_its_object_s_end) {
+  auto process = std::make_unique<data::loader::Process>();
+  ASSERT_TRUE(process->start(WINDSPLAT_PROGRAM));
+  const pid_t id = process->id();
+  EXPECT_TRUE(with_allocations(0, [&] { process.reset(); }));
+  EXPECT_EQ(::kill(id, 0), -1) << "it still runs";
 }
 
 // What has come is lost with the memory that it needed; what comes next is not.
