@@ -67,6 +67,7 @@ function(windsplat_fault_test name script)
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endfunction()
 
+# Times that are asserted may be so much longer: tests share the machine, and sanitizers are slow.
 set(fault_slack 8)
 if(WINDSPLAT_SANITIZE)
   set(fault_slack 20)
@@ -74,8 +75,7 @@ else()
   add_library(faults_shim SHARED ${CMAKE_CURRENT_LIST_DIR}/faults/shim.cpp)
   target_link_libraries(faults_shim PRIVATE ${CMAKE_DL_LIBS})
   target_compile_options(faults_shim PRIVATE -O1 -fno-builtin)
-  windsplat_fault_test(inject inject.py --shim=$<TARGET_FILE:faults_shim>)
+  windsplat_fault_test(inject inject.py --shim=$<TARGET_FILE:faults_shim> --slack=${fault_slack})
 endif()
-# Times that are asserted may be so much longer: tests share the machine, and sanitizers are slow.
 windsplat_fault_test(table faults.py --slack=${fault_slack})
 windsplat_fault_test(signals signals.py --slack=${fault_slack})

@@ -397,6 +397,16 @@ TEST_F(VtkResampling, SliversThatAskForMoreWorkThanTheirFileIsWorthAreRefused) {
               HasSubstr("too much to be resampled"));
 }
 
+// As much overlap as a file can honestly have: a cell that lies in the cube a hundred times over.
+TEST_F(VtkResampling, CellsThatLieOneUponTheOtherAreReadWithinThatBound) {
+  TestMesh mesh = boxes(
+      1, [](const Place& p) { return p; }, as_hexahedron);
+  for (int c = 1; c < 100; ++c) mesh.cell(12, {0, 1, 3, 2, 4, 5, 7, 6});
+  const Outcome out = outcome(mesh, linear);
+  EXPECT_EQ(out.inside, 1);
+  EXPECT_LT(out.worst, 1e-5);
+}
+
 // Every piece counts its points and cells from 0. A cell's value is its piece's number.
 TEST_F(VtkResampling, PiecesOfOneMeshAreOne) {
   const auto at_x = [](double from) {
