@@ -11,6 +11,8 @@ namespace {
 
 constexpr int newton_steps = 16;
 constexpr double tolerance = 1e-6;
+// What slabs are widened by: more than a millionth in each of three coordinates moves a place.
+constexpr double slab_slack = 1e-5;
 
 using Weights = std::array<double, 8>;
 using Simplex = std::array<std::uint8_t, 4>;
@@ -117,6 +119,14 @@ Basis basis_at(Shape shape, const Point& rst) {
   return out;
 }
 
+Point cross(const Point& a, const Point& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+
 double determinant(const Point& a, const Point& b, const Point& c) {
   return a[0] * (b[1] * c[2] - b[2] * c[1]) - b[0] * (a[1] * c[2] - a[2] * c[1]) +
          c[0] * (a[1] * b[2] - a[2] * b[1]);
@@ -154,13 +164,15 @@ CellPlace place_of(const Point& rst, std::uint8_t split) {
 
 enum class Found { inside, outside, unknown };
 
-Found by_newton(Shape shape, const Corners& corners, const Point& place, CellPlace& out) {
+Found by_newton(Shape shape, const Corners& corners, const Point& place, CellPlace& out,
+                std::uint64_t& steps) {
   const bool flat = dimension_of(shape) == 2;
   const auto count = static_cast<std::size_t>(corners_of(shape));
   const bool linear = shape == Shape::triangle || shape == Shape::tetra;
   Point rst{0.5, 0.5, flat ? 0.0 : 0.5};
   if (linear) rst = {0, 0, 0};
   for (int step = 0; step < newton_steps; ++step) {
+    ++steps;
     const Basis basis = basis_at(shape, rst);
     Point rest = place;
     std::array<Point, 3> columns{};
@@ -211,14 +223,76 @@ int dimension_of(Shape shape) {
   return shape == Shape::triangle || shape == Shape::quad ? 2 : 3;
 }
 
-bool find_in_cell(Shape shape, const Corners& corners, const Point& place, CellPlace& out) {
-  const Found found = by_newton(shape, corners, place, out);
+SlantedBox::SlantedBox(Shape shape, const Corners& corners)
+    : origin_(corners[0]), count_(static_cast<std::size_t>(dimension_of(shape))) {
+  const auto corner_count = static_cast<std::size_t>(corners_of(shape));
+  const bool flat = count_ == 2;
+  // The map's slopes in the middle: the mean edges.
+  const Basis basis = basis_at(shape, {0.5, 0.5, flat ? 0.0 : 0.5});
+  std::array<Point, 3> edges{};
+  for (std::size_t i = 0; i < corner_count; ++i) {
+    for (std::size_t e = 0; e < 3; ++e) {
+      for (std::size_t d = 0; d < 3; ++d) edges[e][d] += basis.slope[e][i] * corners[i][d];
+    }
+  }
+  if (flat) {
+    edges[0][2] = edges[1][2] = 0;
+    edges[2] = {0, 0, 1};
+  }
+  // Their directions alone count; products of long ones might overflow.
+  for (Point& edge : edges) {
+    const double most = std::max({std::abs(edge[0]), std::abs(edge[1]), std::abs(edge[2])});
+    for (double& part : edge) part = most > 0 ? part / most : 0;
+  }
+  for (std::size_t n = 0; n < count_; ++n) {
+    Slab& slab = slabs_.at(n);
+    slab.normal = cross(edges.at((n + 1) % 3), edges.at((n + 2) % 3));
+    for (std::size_t i = 1; i < corner_count; ++i) {
+      const double at = dot(slab.normal, minus(corners[i], origin_));
+      slab.low = std::min(slab.low, at);
+      slab.high = std::max(slab.high, at);
+    }
+    const double slack = slab_slack * (slab.high - slab.low);
+    slab.low -= slack;
+    slab.high += slack;
+  }
+}
+
+// A slab without a direction bounds nothing.
+std::array<std::size_t, 2> SlantedBox::along_row(const Point& from, double step,
+                                                 std::size_t count) const {
+  const Point place = minus(from, origin_);
+  double first = 0;
+  auto last = static_cast<double>(count) - 1;
+  for (std::size_t n = 0; n < count_; ++n) {
+    const Slab& slab = slabs_.at(n);
+    const double at = dot(slab.normal, place);
+    const double slope = slab.normal[0] * step;
+    if (slope == 0) {
+      if (at < slab.low || at > slab.high) return {0, 0};
+      continue;
+    }
+    const double one = (slab.low - at) / slope;
+    const double other = (slab.high - at) / slope;
+    const double enter = std::ceil(std::min(one, other));
+    const double leave = std::floor(std::max(one, other));
+    if (enter > first) first = enter;
+    if (leave < last) last = leave;
+  }
+  if (!(first <= last)) return {0, 0};
+  return {static_cast<std::size_t>(first), static_cast<std::size_t>(last) + 1};
+}
+
+bool find_in_cell(Shape shape, const Corners& corners, const Point& place, CellPlace& out,
+                  std::uint64_t& steps) {
+  const Found found = by_newton(shape, corners, place, out, steps);
   if (found != Found::unknown) return found == Found::inside;
   const Shape part = dimension_of(shape) == 2 ? Shape::triangle : Shape::tetra;
   const auto split = split_of(shape);
   for (std::size_t i = 0; i < split.size(); ++i) {
     CellPlace within;
-    if (by_newton(part, corners_of_simplex(split[i], corners), place, within) == Found::inside) {
+    const Corners simplex = corners_of_simplex(split[i], corners);
+    if (by_newton(part, simplex, place, within, steps) == Found::inside) {
       out = within;
       out.split = static_cast<std::uint8_t>(i + 1);
       return true;

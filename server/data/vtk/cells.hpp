@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 namespace windsplat::data::vtk {
@@ -25,8 +26,32 @@ struct CellPlace {
 };
 
 // Finds `place` in the cell; false if it is outside, by more than a millionth of the cell. Shapes
-// of two dimensions are sought by x and y alone.
-bool find_in_cell(Shape shape, const Corners& corners, const Point& place, CellPlace& out);
+// of two dimensions are sought by x and y alone. `steps` grows by the linear systems solved: 1 of a
+// tetrahedron or triangle, some 3 of a good cell, 22 at most.
+bool find_in_cell(Shape shape, const Corners& corners, const Point& place, CellPlace& out,
+                  std::uint64_t& steps);
+
+// A slanted box around a cell: between planes parallel to what its mean edges span. All that
+// find_in_cell can find lies in it, of slivers and slanted cells little else.
+class SlantedBox {
+ public:
+  SlantedBox(Shape shape, const Corners& corners);
+
+  // Of the places `from + (step * i, 0, 0)`, i < count: the first that lies within, and one past
+  // the last.
+  [[nodiscard]] std::array<std::size_t, 2> along_row(const Point& from, double step,
+                                                     std::size_t count) const;
+
+ private:
+  struct Slab {
+    Point normal{0, 0, 0};
+    double low = 0;  // of the product with the normal, counted from origin_
+    double high = 0;
+  };
+  Point origin_;
+  std::array<Slab, 3> slabs_;
+  std::size_t count_;  // as many as the shape has dimensions
+};
 
 // One a corner; they sum to 1.
 std::array<double, 8> corner_weights(Shape shape, const CellPlace& place);

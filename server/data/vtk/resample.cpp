@@ -10,10 +10,12 @@ namespace windsplat::data::vtk {
 
 namespace {
 
-// Samples looked at over all cells: a mesh whose cells' boxes overlap more is refused. In all, and
-// for each sample that lies in a cell if none overlap, so that a small file cannot ask for much.
-constexpr std::uint64_t visits_max = std::uint64_t{1} << 30;
-constexpr double visits_a_sample = 256;
+// What may be done over all cells, counted in rows of samples that cells' boxes span and in linear
+// systems solved to find a sample in a cell: a mesh whose cells overlap so much that it takes more
+// is refused. In all (minutes), and for each sample that lies in a cell if none overlap, so that a
+// small file cannot ask for much.
+constexpr std::uint64_t work_max = std::uint64_t{1} << 32;
+constexpr double work_a_sample = 256;
 constexpr double samples_min_3d = 4096;
 constexpr double samples_min_2d = 1024;
 // Cells whose mean extents differ by less are as long as wide and high: one spacing.
@@ -176,9 +178,9 @@ class Resampler {
                     0.5 * static_cast<double>(mesh_.point_count() + mesh_.cell_count()));
   }
 
-  [[nodiscard]] std::uint64_t visits_allowed() const {
-    const double share = visits_a_sample * wanted_samples();
-    return share < static_cast<double>(visits_max) ? static_cast<std::uint64_t>(share) : visits_max;
+  [[nodiscard]] std::uint64_t work_allowed() const {
+    const double share = work_a_sample * wanted_samples();
+    return share < static_cast<double>(work_max) ? static_cast<std::uint64_t>(share) : work_max;
   }
 
   // The distance of samples along each axis, not yet fitted to the box. Errors: no volume.
@@ -271,23 +273,40 @@ class Resampler {
     for (std::size_t d = 0; d < 3; ++d) {
       if (span[d][1] <= span[d][0]) return {};
     }
-    visits_ += (span[0][1] - span[0][0]) * (span[1][1] - span[1][0]) * (span[2][1] - span[2][0]);
-    if (visits_ > visits_allowed())
-      return refuse("has cells that overlap, or lie thin and aslant, too much to be resampled");
+    const SlantedBox slanted(shape, corners);
+    const std::uint64_t allowed = work_allowed();
     for (std::size_t k = span[2][0]; k < span[2][1]; ++k) {
       for (std::size_t j = span[1][0]; j < span[1][1]; ++j) {
-        for (std::size_t i = span[0][0]; i < span[0][1]; ++i) {
-          const std::size_t sample = i * stride_[0] + j * stride_[1] + k * stride_[2];
-          if (out_.cells[sample] != no_cell) continue;
-          const Point place{out_.coordinates[order_[0]][i], out_.coordinates[order_[1]][j],
-                            out_.coordinates[order_[2]][k]};
-          if (!find_in_cell(shape, corners, place, out_.places[sample])) continue;
-          out_.cells[sample] = static_cast<std::uint32_t>(cell);
-          ++out_.inside;
+        scan_row(cell, shape, corners, slanted, {span[0][0], j, k}, span[0][1] - span[0][0]);
+        if (work_ > allowed) {
+          return refuse("has cells that overlap, or lie thin and aslant, too much to be resampled");
         }
       }
     }
     return {};
+  }
+
+  // The place of a sample, its indices and coordinates in the order of the axes.
+  [[nodiscard]] Point place_of(const std::array<std::size_t, 3>& index) const {
+    Point out{};
+    for (std::size_t d = 0; d < 3; ++d) out[d] = out_.coordinates.at(order_[d])[index[d]];
+    return out;
+  }
+
+  // Seeks `count` samples from `index` on along the first axis, those that are in no cell yet.
+  void scan_row(std::uint64_t cell, Shape shape, const Corners& corners, const SlantedBox& slanted,
+                std::array<std::size_t, 3> index, std::size_t count) {
+    const auto [from, to] = slanted.along_row(place_of(index), spacing_[0], count);
+    const std::size_t begin = index[0];
+    ++work_;
+    for (index[0] = begin + from; index[0] < begin + to; ++index[0]) {
+      const std::size_t sample =
+          index[0] * stride_[0] + index[1] * stride_[1] + index[2] * stride_[2];
+      if (out_.cells[sample] != no_cell) continue;
+      if (!find_in_cell(shape, corners, place_of(index), out_.places[sample], work_)) continue;
+      out_.cells[sample] = static_cast<std::uint32_t>(cell);
+      ++out_.inside;
+    }
   }
 
   const Mesh& mesh_;
@@ -301,7 +320,7 @@ class Resampler {
   Point spacing_{1, 1, 1};
   std::array<std::size_t, 3> dims_{1, 1, 1};  // in that order
   std::array<std::size_t, 3> stride_{};
-  std::uint64_t visits_ = 0;
+  std::uint64_t work_ = 0;
 };
 
 }  // namespace

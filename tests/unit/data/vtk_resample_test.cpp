@@ -385,23 +385,67 @@ TEST_F(VtkResampling, CellDataAreThoseOfTheCellThatHoldsTheSample) {
   }
 }
 
-// Slivers along the diagonal: each has the whole lattice in its box, and hardly a sample in itself.
-// Two kilobytes must not make a minute of work.
-TEST_F(VtkResampling, SliversThatAskForMoreWorkThanTheirFileIsWorthAreRefused) {
+// A tetrahedron along the diagonal, which has all samples in its box and few in itself: just those
+// whose barycentric coordinates are not negative.
+TestMesh slivers(double width, int count) {
   TestMesh mesh;
-  mesh.points = {0, 0, 0, 1e-4, 0, 0, 0, 1e-4, 0, 1, 1, 1};
-  for (int c = 0; c < 60; ++c) mesh.cell(10, {0, 1, 2, 3});
+  mesh.points = {0, 0, 0, width, 0, 0, 0, width, 0, 1, 1, 1};
+  for (int c = 0; c < count; ++c) mesh.cell(10, {0, 1, 2, 3});
+  return mesh;
+}
+
+TEST_F(VtkResampling, SliversHoldWhatTheirBarycentricCoordinatesSay) {
+  constexpr double width = 0.2;
+  const TestMesh mesh = slivers(width, 8);
   VtkXml xml;
   const auto data = xml.array("Float64", "a", 1, at_points(mesh, linear));
-  EXPECT_THAT(refusal(folder_.write("a.vtu", vtu(mesh, data, "", xml))),
+  const auto source = opened(folder_.write("a.vtu", vtu(mesh, data, "", xml)));
+  ASSERT_TRUE(source);
+  const auto& axes = source->info().grid.axes;
+  const Volume volume = volume_of(*source, "a");
+  std::size_t s = 0;
+  std::size_t inside = 0;
+  for (const double z : axes[2].coordinates) {
+    for (const double y : axes[1].coordinates) {
+      for (const double x : axes[0].coordinates) {
+        const double first = (x - z) / width;
+        const double second = (y - z) / width;
+        const double least = std::min({first, second, z, 1 - first - second - z});
+        const bool hidden = std::isnan(volume.values[s++]);
+        if (std::abs(least) < 1e-5) continue;
+        ASSERT_EQ(hidden, least < 0) << x << ' ' << y << ' ' << z;
+        inside += hidden ? 0 : 1;
+      }
+    }
+  }
+  EXPECT_GT(inside, 100);
+}
+
+// Wedges that lie one upon the other in half of a cube: samples of the other half are sought in
+// every one of them. A few kilobytes must not make a minute of work.
+TEST_F(VtkResampling, CellsThatAskForMoreWorkThanTheirFileIsWorthAreRefused) {
+  for (const int count : {20, 600}) {
+    TestMesh mesh;
+    mesh.points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1};
+    for (int c = 0; c < count; ++c) mesh.cell(13, {0, 1, 2, 3, 4, 5});
+    VtkXml xml;
+    const auto data = xml.array("Float64", "a", 1, at_points(mesh, linear));
+    const std::string said = refusal(folder_.write("a.vtu", vtu(mesh, data, "", xml)));
+    EXPECT_EQ(said.find("too much to be resampled") != std::string::npos, count == 600) << said;
+  }
+  // So thin that the lattice has all the samples that it may, whose rows are in every one's box.
+  const TestMesh thin = slivers(1e-4, 60);
+  VtkXml xml;
+  const auto data = xml.array("Float64", "a", 1, at_points(thin, linear));
+  EXPECT_THAT(refusal(folder_.write("a.vtu", vtu(thin, data, "", xml))),
               HasSubstr("too much to be resampled"));
 }
 
-// As much overlap as a file can honestly have: a cell that lies in the cube a hundred times over.
+// As much overlap as a file can honestly have: a cell that lies in the cube a thousand times over.
 TEST_F(VtkResampling, CellsThatLieOneUponTheOtherAreReadWithinThatBound) {
   TestMesh mesh = boxes(
       1, [](const Place& p) { return p; }, as_hexahedron);
-  for (int c = 1; c < 100; ++c) mesh.cell(12, {0, 1, 3, 2, 4, 5, 7, 6});
+  for (int c = 1; c < 1000; ++c) mesh.cell(12, {0, 1, 3, 2, 4, 5, 7, 6});
   const Outcome out = outcome(mesh, linear);
   EXPECT_EQ(out.inside, 1);
   EXPECT_LT(out.worst, 1e-5);
