@@ -142,7 +142,7 @@ Json to_json(const HelloMessage& message) {
               {"protocol", protocol_name},
               {"version", message.version},
               {"session", message.session},
-              {"limits", limits_json()},
+              {"limits", limits_json(message.image_pixels_max)},
               {"datasets", std::move(datasets)}};
 }
 

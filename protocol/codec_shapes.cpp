@@ -119,7 +119,7 @@ Problem problem_from(const Error& error) {
   return problem;
 }
 
-Json limits_json() {
+Json limits_json(std::int64_t image_pixels_max) {
   return Json{{"messageBytesMax", limits::message_bytes_max},
               {"jsonDepthMax", limits::json_depth_max},
               {"httpHeaderBytesMax", limits::http_header_bytes_max},
@@ -128,7 +128,7 @@ Json limits_json() {
               {"httpBodyTimeoutS", limits::http_body_timeout_s},
               {"writeTimeoutS", limits::write_timeout_s},
               {"imageEdgeMax", limits::image_edge_max},
-              {"imagePixelsMax", limits::image_pixels_max},
+              {"imagePixelsMax", image_pixels_max},
               {"extinctionPointsMax", limits::extinction_points_max},
               {"scalarsMax", limits::scalars_max},
               {"extinctionMax", canonical_number(limits::extinction_max)},
@@ -285,7 +285,7 @@ std::string encode_service(const ServiceDescription& service) {
   return dump(Json{{"name", service.name},
                    {"version", service.version},
                    {"links", std::move(links)},
-                   {"limits", limits_json()}});
+                   {"limits", limits_json(service.image_pixels_max)}});
 }
 
 std::string encode_color_maps(const std::vector<ColorMapDescription>& maps) {

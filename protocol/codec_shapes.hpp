@@ -7,7 +7,8 @@
 
 namespace windsplat::protocol {
 
-Json limits_json();                                            // limits.hpp, in camel case
+// limits.hpp, in camel case; of a picture's pixels the server's own limit.
+Json limits_json(std::int64_t image_pixels_max);
 Json problem_json(const Problem& problem);                     // RFC 9457
 Json frame_info_json(const FrameInfo& info);                   // Windsplat-Frame
 Json dataset_json(const DatasetDescription& dataset);          // the long form

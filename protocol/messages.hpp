@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "protocol/limits.hpp"
 #include "protocol/view.hpp"
 #include "server/base/error.hpp"
 
@@ -141,6 +142,7 @@ struct ServiceDescription {
   std::string name = "windsplat";
   std::string version;
   std::vector<std::pair<std::string, std::string>> links;
+  std::int64_t image_pixels_max = limits::image_pixels_max;  // what this server draws
 };
 
 // --- server to client -------------------------------------------------------------------------
@@ -148,7 +150,8 @@ struct ServiceDescription {
 struct HelloMessage {
   std::string version;
   std::string session;
-  std::vector<DatasetDescription> datasets;  // short forms
+  std::vector<DatasetDescription> datasets;                  // short forms
+  std::int64_t image_pixels_max = limits::image_pixels_max;  // what this server draws
 };
 struct OpenedMessage {
   std::uint32_t id = 0;

@@ -36,6 +36,12 @@ struct Limits {
   double wait_ms = 25;
   // Peers whose X-Forwarded-For is believed: addresses, or networks as ADDRESS/BITS.
   std::vector<std::string> trusted_proxies;
+
+  // What clients are told: the protocol has a limit of its own.
+  [[nodiscard]] std::int64_t pixels_told() const {
+    constexpr std::int64_t most = protocol::limits::image_pixels_max;
+    return pixels > 0 && pixels < most ? pixels : most;
+  }
 };
 
 }  // namespace windsplat::net

@@ -95,6 +95,7 @@ Response get_metrics(const Services& services) {
 Response get_service(const Services& services) {
   protocol::ServiceDescription service;
   service.version = WINDSPLAT_VERSION;
+  service.image_pixels_max = services.options.limits.pixels_told();
   const std::string& base = services.options.base_path;
   service.links = {{"page", base},
                    {"datasets", base + "v1/datasets"},

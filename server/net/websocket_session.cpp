@@ -204,7 +204,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     if (services_.draining) return drain();
     const auto datasets = services_.catalogue.list();
     if (!datasets) return close(close_fault, "the datasets cannot be listed");
-    send(protocol::HelloMessage{WINDSPLAT_VERSION, "session-" + std::to_string(id_), *datasets});
+    send(protocol::HelloMessage{WINDSPLAT_VERSION, "session-" + std::to_string(id_), *datasets,
+                                services_.options.limits.pixels_told()});
     counted_ = true;
     services_.metrics.session_opened();
     log::info("viewer came", {{"session", id_}, {"request", request_id_}});

@@ -269,7 +269,11 @@ TEST(Limits, pictures_too_large_or_too_dear_are_refused_before_anything_is_read)
         << to;
   }
   EXPECT_EQ(server.loads(), 0U);
+  EXPECT_EQ(json_of(get(server.port(), "/v1"))["limits"]["imagePixelsMax"], 10'000);
   StreamClient viewer(server.port());
+  const auto hello = viewer.next_text("hello");
+  ASSERT_TRUE(hello);
+  EXPECT_EQ((*hello)["limits"]["imagePixelsMax"], 10'000);
   viewer.say(R"({"type":"patch","rev":1,"patch":)" + dear + "}");
   const auto told = viewer.next_text("error");
   ASSERT_TRUE(told);

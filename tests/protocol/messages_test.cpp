@@ -186,6 +186,9 @@ TEST(ServerMessages, CarryTheirValues) {
   EXPECT_EQ(hello["version"], "0.1.0");
   EXPECT_EQ(hello["session"], "s-1");
   EXPECT_EQ(hello["datasets"][0]["steps"], 2);
+  EXPECT_EQ(hello["limits"], Json::parse(encode_service({}))["limits"]);
+  const Json small = Json::parse(encode(HelloMessage{"0.1.0", "s-1", {}, 640 * 480}));
+  EXPECT_EQ(small["limits"]["imagePixelsMax"], 307'200);
   const Json progress = Json::parse(encode(ProgressMessage{7, "load", 0.25, 120.5}));
   EXPECT_EQ(progress, Json::parse(R"({"type":"progress","id":7,"phase":"load","done":0.25,
                                       "etaMs":120.5})"));

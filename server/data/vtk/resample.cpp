@@ -12,10 +12,10 @@ namespace {
 
 // What may be done over all cells, counted in rows of samples that cells' boxes span and in linear
 // systems solved to find a sample in a cell: a mesh whose cells overlap so much that it takes more
-// is refused. In all (minutes), and for each sample that lies in a cell if none overlap, so that a
-// small file cannot ask for much.
-constexpr std::uint64_t work_max = std::uint64_t{1} << 32;
-constexpr double work_a_sample = 256;
+// is refused. For each sample that lies in a cell if none overlap (meshes of simulations were seen
+// to take 3 to 12), so that a small file cannot ask for much; and in all (minutes).
+constexpr double work_a_sample = 128;
+constexpr std::uint64_t work_max = std::uint64_t{1} << 31;
 constexpr double samples_min_3d = 4096;
 constexpr double samples_min_2d = 1024;
 // Cells whose mean extents differ by less are as long as wide and high: one spacing.

@@ -108,6 +108,7 @@ TEST(VtkCells, WhatIsFoundInACellLiesInItsSlantedBox) {
         steps = 0;
         if (!find_in_cell(shape, corners, place, where, steps)) continue;
         ++found;
+        ASSERT_GE(steps, 1U);
         ASSERT_LE(steps, 22U);
         ASSERT_TRUE(i >= first && i < last) << "turn " << turn << ", row " << r << ", place " << i;
       }
