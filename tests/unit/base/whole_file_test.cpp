@@ -3,15 +3,14 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <csignal>
-#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <string>
+
+#include "tests/unit/disk.hpp"
 
 namespace windsplat {
 namespace {
@@ -20,42 +19,15 @@ namespace fs = std::filesystem;
 
 class WholeFile : public testing::Test {
  protected:
-  WholeFile() {
-    std::string name = (fs::temp_directory_path() / "windsplat-base-XXXXXX").string();
-    EXPECT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
-  }
-  ~WholeFile() override { fs::remove_all(folder_); }
-
   static std::string read(const fs::path& path) {
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   }
   [[nodiscard]] std::ptrdiff_t entries() const {
-    return std::distance(fs::directory_iterator(folder_), fs::directory_iterator());
+    return std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator());
   }
 
-  fs::path folder_;
-};
-
-// No file may grow beyond this while it lives, as on a disk that is full.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FullDisk() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  void (*handler_)(int);
-  rlimit before_{};
+  test::Folder folder_;
 };
 
 TEST_F(WholeFile, IsMadeAndReplacedAndLeavesNothingBesideIt) {
@@ -75,7 +47,7 @@ TEST_F(WholeFile, WhatIsSyncedIsWrittenTheSameWay) {
   ASSERT_TRUE(write_whole_file(path, "second", Sync::now));
   EXPECT_EQ(read(path), "second");
   EXPECT_EQ(entries(), 1);
-  EXPECT_TRUE(sync_folder(folder_));
+  EXPECT_TRUE(sync_folder(folder_.path()));
   EXPECT_FALSE(sync_folder(path)) << "is no folder";
 }
 
@@ -92,7 +64,7 @@ TEST_F(WholeFile, AFailureLeavesTheOldOneAndNoPart) {
   ASSERT_TRUE(write_whole_file(path, "good"));
   Result<void> written;
   {
-    const FullDisk disk(10);
+    const test::FullDisk disk(10);
     written = write_whole_file(path, std::string(1000, 'x'));
   }
   ASSERT_FALSE(written);

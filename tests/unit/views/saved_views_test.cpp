@@ -4,12 +4,9 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <atomic>
-#include <csignal>
-#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -17,6 +14,8 @@
 #include <string>
 #include <thread>
 #include <vector>
+
+#include "tests/unit/disk.hpp"
 
 namespace windsplat::views {
 namespace {
@@ -148,13 +147,6 @@ TEST(SavedViewsInMemory, ManyThreadsAddChangeAndReadAtOnce) {
 
 class SavedViewsOnDisk : public testing::Test {
  protected:
-  SavedViewsOnDisk() {
-    std::string name = (fs::temp_directory_path() / "windsplat-views-XXXXXX").string();
-    EXPECT_NE(mkdtemp(name.data()), nullptr);
-    root_ = name;
-  }
-  ~SavedViewsOnDisk() override { fs::remove_all(root_); }
-
   [[nodiscard]] fs::path state() const { return root_ / "deep" / "state"; }
   [[nodiscard]] fs::path file_of(const std::string& id) const {
     return state() / "views" / (id + ".json");
@@ -174,7 +166,7 @@ class SavedViewsOnDisk : public testing::Test {
     return out;
   }
 
-  fs::path root_;
+  test::Folder root_;
 };
 
 TEST_F(SavedViewsOnDisk, OutlastARestart) {
@@ -288,26 +280,6 @@ TEST_F(SavedViewsOnDisk, AWriteThatNeverEndedIsClearedAway) {
   EXPECT_EQ(files(), before);
 }
 
-// No file may grow beyond this while it lives, as on a disk that is full.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FullDisk() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  void (*handler_)(int);
-  rlimit before_{};
-};
-
 TEST_F(SavedViewsOnDisk, AWriteThatFailsChangesNothing) {
   const auto views = SavedViews::open({state(), 2}).value();
   const std::string id = views->add(view_of_step(1), time_of_all)->id;
@@ -315,14 +287,15 @@ TEST_F(SavedViewsOnDisk, AWriteThatFailsChangesNothing) {
   Result<SavedView> added = make_error(ErrorKind::internal, "");
   Result<std::optional<SavedView>> changed = std::optional<SavedView>();
   {
-    const FullDisk disk(10);
+    const test::FullDisk disk(10);
     added = views->add(view_of_step(2), time_of_all);
     changed = set_step(*views, id, 2);
   }
   ASSERT_FALSE(added);
   ASSERT_FALSE(changed);
   for (const Error& error : {added.error(), changed.error()}) {
-    EXPECT_EQ(error.message.find(root_.native()), std::string::npos) << "no client's business";
+    EXPECT_EQ(error.message.find(root_.path().native()), std::string::npos)
+        << "no client's business";
   }
   EXPECT_EQ(files(), before);
   EXPECT_EQ(views->find(id)->view.view().step, 1);
