@@ -3,34 +3,12 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
-import { after, before, test } from "node:test";
-import { Daemon, finalPicture, freePort, launch, openPage, pixels, state } from "./support.mjs";
+import { test } from "node:test";
+import { finalPicture, pixels, sharedDaemon, state } from "./support.mjs";
 
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
-
-async function withPage(options, run) {
-  const page = await openPage(browser, daemon.url, options);
-  try {
-    await finalPicture(page);
-    await run(page);
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
-}
+const { withPage } = sharedDaemon();
 
 async function violations(page) {
   await page.evaluate(axe);
@@ -84,7 +62,7 @@ const openers = {
 
 for (const [name, options] of windows) {
   test(`axe finds nothing: ${name}`, () =>
-    withPage(options, async (page) => {
+    withPage(async (page) => {
       assert.deepEqual(await violations(page), [], "as it opens");
       if (await page.locator("#panel").isVisible()) {
         await unfoldAll(page);
@@ -99,11 +77,11 @@ for (const [name, options] of windows) {
         await page.keyboard.press("Escape");
         await page.locator(`#${dialog}`).waitFor({ state: "hidden" });
       }
-    }));
+    }, options));
 }
 
 test("axe's rules are looked at: a button without a name is found", () =>
-  withPage({}, async (page) => {
+  withPage(async (page) => {
     await page.evaluate(() =>
       document.querySelector("header").append(document.createElement("button")),
     );
@@ -132,7 +110,7 @@ const focused = (page) =>
   });
 
 test("the tab key reaches every control once around, and one sees where it is", () =>
-  withPage({}, async (page) => {
+  withPage(async (page) => {
     const expected = await page.evaluate(
       () =>
         [...document.querySelectorAll("button, select, input, [tabindex='0'], a[href]")].filter(
@@ -167,7 +145,7 @@ test("the tab key reaches every control once around, and one sees where it is", 
   }));
 
 test("a visit by the keyboard alone: another dataset, a turn, longer lines, the help", () =>
-  withPage({}, async (page) => {
+  withPage(async (page) => {
     const tabTo = async (selector) => {
       for (let n = 0; n < 200; n++) {
         if (await page.evaluate((s) => document.activeElement?.matches(s) ?? false, selector))
@@ -208,15 +186,19 @@ test("a visit by the keyboard alone: another dataset, a turn, longer lines, the 
   }));
 
 test("who asks for less motion gets none that nobody asked for", () =>
-  withPage({ reducedMotion: "reduce" }, async (page) => {
-    const moving = await page.evaluate(() =>
-      [...document.querySelectorAll("*")].flatMap((element) => {
-        const { animationName, animationDuration, transitionDuration } = getComputedStyle(element);
-        const long = (text) => text.split(",").some((t) => parseFloat(t) > 0.01);
-        const moves =
-          (animationName !== "none" && long(animationDuration)) || long(transitionDuration);
-        return moves ? [`${element.tagName}#${element.id}.${element.className}`] : [];
-      }),
-    );
-    assert.deepEqual(moving, []);
-  }));
+  withPage(
+    async (page) => {
+      const moving = await page.evaluate(() =>
+        [...document.querySelectorAll("*")].flatMap((element) => {
+          const { animationName, animationDuration, transitionDuration } =
+            getComputedStyle(element);
+          const long = (text) => text.split(",").some((t) => parseFloat(t) > 0.01);
+          const moves =
+            (animationName !== "none" && long(animationDuration)) || long(transitionDuration);
+          return moves ? [`${element.tagName}#${element.id}.${element.className}`] : [];
+        }),
+      );
+      assert.deepEqual(moving, []);
+    },
+    { reducedMotion: "reduce" },
+  ));

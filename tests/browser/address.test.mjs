@@ -1,32 +1,9 @@
 // The page's address with a link to a kept view, and the cards while their list is refreshed.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { Daemon, drag, finalPicture, freePort, launch, openPage } from "./support.mjs";
+import { test } from "node:test";
+import { drag, finalPicture, sharedDaemon } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
-
-async function withPage(run, path = "", options = {}) {
-  const page = await openPage(browser, daemon.url + path, {
-    viewport: { width: 900, height: 600 },
-    ...options,
-  });
-  try {
-    await run(page);
-  } finally {
-    await page.context().close();
-  }
-}
+const { withPage } = sharedDaemon({ page: { viewport: { width: 900, height: 600 } } });
 
 // Every address that the page writes.
 const watchAddress = () => {
@@ -47,7 +24,6 @@ test("a kept view that never comes: the default, the reason, and the link until 
   };
   return withPage(
     async (page) => {
-      await finalPicture(page);
       assert.match(await page.locator("#alert-text").textContent(), /did not answer in time/);
       assert.equal(await page.locator("#dataset").inputValue(), "climate");
       // What the page does by itself (its size, its dataset) has had time to be written here.
@@ -58,8 +34,9 @@ test("a kept view that never comes: the default, the reason, and the link until 
       const addresses = await page.evaluate(() => window.addresses);
       assert.match(decodeURIComponent(addresses[0]), /"camera"/, "nothing before the user's own");
     },
-    "#!view=k7",
     {
+      path: "#!view=k7",
+      alert: true,
       initScript: [watchAddress, hurry],
       prepare: (page) => page.route("**/v1/views/k7", () => {}),
     },
@@ -72,7 +49,6 @@ test("a refreshed list leaves cards, their pictures and the focus as they are", 
   const held = new Promise((resolve) => (release = resolve));
   return withPage(
     async (page) => {
-      await finalPicture(page);
       await page.keyboard.press("d");
       await page.waitForFunction(() => document.querySelectorAll(".card img").length === 3);
       await page.keyboard.press("ArrowRight");
@@ -91,7 +67,6 @@ test("a refreshed list leaves cards, their pictures and the focus as they are", 
       await page.waitForFunction(() => document.querySelectorAll(".card img").length === 4);
       assert.equal(previews.length, 4, previews.join());
     },
-    "",
     {
       prepare: async (page) => {
         await page.route(/\/v1\/datasets$/, async (route) => {

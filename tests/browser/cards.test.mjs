@@ -1,76 +1,54 @@
 // Datasets as cards, a page without any, a loading that is cancelled, and a lost connection.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import {
-  Daemon,
   drag,
   finalPicture,
-  freePort,
-  launch,
-  openPage,
   pixels,
+  sharedDaemon,
   shot,
   state,
   watchFrames,
   watchPatches,
 } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
+const shared = sharedDaemon({ page: { initScript: [watchFrames, watchPatches] } });
 
 // `alter` may change a message of the server's, hold it back (null) or let it pass (true); while
 // the wire is frozen nothing comes.
-async function withPage(run, { alter, faulty = false, path = "", ...options } = {}) {
+function withPage(run, { alter, ...options } = {}) {
   const wire = {};
-  const page = await openPage(browser, daemon.url + path, {
-    initScript: [watchFrames, watchPatches],
+  const stand = (socket) => {
+    wire.say = (message) => socket.send(JSON.stringify(message));
+    wire.close = (code) => socket.close({ code });
+    const late = [];
+    wire.thaw = () => {
+      wire.frozen = false;
+      for (const data of late.splice(0)) socket.send(data);
+    };
+    const server = socket.connectToServer();
+    server.onMessage((data) => {
+      if (wire.frozen) {
+        late.push(data);
+        return;
+      }
+      const kept = typeof data === "string" ? alter(JSON.parse(data), wire) : true;
+      if (kept !== null) socket.send(kept === true ? data : JSON.stringify(kept));
+    });
+  };
+  return shared.withPage((page) => run(page, wire), {
     ...options,
-    prepare: async (one) => {
-      await options.prepare?.(one);
-      if (alter === undefined) return;
-      await one.routeWebSocket(/\/v1\/stream/, (socket) => {
-        wire.say = (message) => socket.send(JSON.stringify(message));
-        wire.close = (code) => socket.close({ code });
-        const late = [];
-        wire.thaw = () => {
-          wire.frozen = false;
-          for (const data of late.splice(0)) socket.send(data);
-        };
-        const server = socket.connectToServer();
-        server.onMessage((data) => {
-          if (wire.frozen) {
-            late.push(data);
-            return;
-          }
-          const kept = typeof data === "string" ? alter(JSON.parse(data), wire) : true;
-          if (kept !== null) socket.send(kept === true ? data : JSON.stringify(kept));
-        });
-      });
+    prepare: async (page) => {
+      await options.prepare?.(page);
+      if (alter !== undefined) await page.routeWebSocket(/\/v1\/stream/, stand);
     },
   });
-  try {
-    await run(page, wire);
-    if (!faulty) assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
 }
 
 const card = (page, title) => page.locator(".card", { hasText: title });
 
 test("a first visit shows a picture; the cards are one press away and open what they say", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     assert.equal(await page.locator("#datasets").isVisible(), false);
     await page.locator("#datasets-button").click();
     assert.equal(await page.locator(".card").count(), 3);
@@ -96,7 +74,6 @@ test("pictures come one at a time, and one that fails says why on its card", () 
   let most = 0;
   return withPage(
     async (page) => {
-      await finalPicture(page);
       await page.keyboard.press("d");
       await card(page, "Electric").getByText("its files are damaged").waitFor();
       await page.waitForFunction(() => document.querySelectorAll(".card img").length === 2);
@@ -122,7 +99,6 @@ test("pictures come one at a time, and one that fails says why on its card", () 
 
 test("cards by keys alone: arrows, Enter, Escape", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     await page.locator("#picture").focus();
     await page.keyboard.press("d");
     const focused = () => page.evaluate(() => document.activeElement.textContent);
@@ -149,6 +125,7 @@ test("a server without datasets shows how to add one", () =>
       await shot(page, "no-dataset");
     },
     {
+      settle: false,
       alter: (message) => (message.type === "hello" ? { ...message, datasets: [] } : true),
       prepare: (page) =>
         page.route(/\/v1\/datasets$/, (r) => r.fulfill({ json: { datasets: [] } })),
@@ -158,7 +135,6 @@ test("a server without datasets shows how to add one", () =>
 test("a dataset that takes its time has a bar, and Cancel goes back to the view before", () =>
   withPage(
     async (page, wire) => {
-      await finalPicture(page);
       await drag(page, 80, 20);
       await finalPicture(page);
       const before = await pixels(page);
@@ -189,7 +165,6 @@ test("a dataset that takes its time has a bar, and Cancel goes back to the view 
 test("what was cancelled does not come back, whatever the server still says of it", () =>
   withPage(
     async (page, wire) => {
-      await finalPicture(page);
       await page.locator("#dataset").selectOption("tornado");
       await page.locator("#loading").waitFor();
       await page.locator("#cancel-button").click();
@@ -216,7 +191,6 @@ test("what was cancelled does not come back, whatever the server still says of i
 test("a lost connection: the mark says offline, the words why, and Now tries at once", () =>
   withPage(
     async (page, wire) => {
-      await finalPicture(page);
       const before = await pixels(page);
       assert.equal(await page.locator("#mark").textContent(), "final");
       wire.close(1008); // after which the page waits for long
@@ -258,7 +232,6 @@ for (const [name, options] of [
 ]) {
   test(`a small window (${name}) leaves most of the picture free, and nothing sticks out`, () =>
     withPage(async (page) => {
-      await finalPicture(page);
       const share = await page.evaluate(() => {
         const area = (element) => {
           const { width, height } = element.getBoundingClientRect();

@@ -1,16 +1,13 @@
 // The panel's controls in a real browser: what each sends, what the link keeps of it, what it
 // hides, and, for what every server draws, that the picture changes.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import {
   choose,
   control,
-  Daemon,
   finalPicture,
-  freePort,
-  launch,
-  openPage,
   pixels,
+  sharedDaemon,
   shot,
   somePicture,
   type,
@@ -18,29 +15,7 @@ import {
   watchPatches,
 } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
-
-async function withPage(run, path = "", options = {}) {
-  const page = await openPage(browser, daemon.url + path, { initScript: watchPatches, ...options });
-  try {
-    await finalPicture(page);
-    await run(page);
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
-}
+const { withPage } = sharedDaemon({ page: { initScript: watchPatches } });
 
 const isShown = (page, label, tag) => control(page, label, tag).isVisible();
 
@@ -349,32 +324,28 @@ test("screenshots of the open panel", async () => {
     ["narrow", { viewport: { width: 360, height: 800 }, hasTouch: true, isMobile: true }],
   ];
   for (const [name, options] of windows) {
-    await withPage(
-      async (page) => {
-        await somePicture(page);
-        await shot(page, `panel-${name}`);
-        await unfold(page, ...folders);
-        const wide = await page.evaluate(() => {
-          const panel = document.querySelector("#panel");
-          return panel.scrollWidth - panel.clientWidth;
-        });
-        assert.ok(wide <= 0, `the panel is ${wide} px too wide`);
-        for (const [part, title] of [
-          ["lines", "Line shape"],
-          ["geometry", "Geometry"],
-          ["method", "Method"],
-        ]) {
-          await page
-            .locator("#panel .lil-title")
-            .filter({ hasText: new RegExp(`^${title}$`) })
-            .first()
-            .evaluate((element) => element.scrollIntoView());
-          await page.waitForTimeout(250); // the folders' own opening
-          await shot(page, `panel-${name}-${part}`);
-        }
-      },
-      "",
-      options,
-    );
+    await withPage(async (page) => {
+      await somePicture(page);
+      await shot(page, `panel-${name}`);
+      await unfold(page, ...folders);
+      const wide = await page.evaluate(() => {
+        const panel = document.querySelector("#panel");
+        return panel.scrollWidth - panel.clientWidth;
+      });
+      assert.ok(wide <= 0, `the panel is ${wide} px too wide`);
+      for (const [part, title] of [
+        ["lines", "Line shape"],
+        ["geometry", "Geometry"],
+        ["method", "Method"],
+      ]) {
+        await page
+          .locator("#panel .lil-title")
+          .filter({ hasText: new RegExp(`^${title}$`) })
+          .first()
+          .evaluate((element) => element.scrollIntoView());
+        await page.waitForTimeout(250); // the folders' own opening
+        await shot(page, `panel-${name}-${part}`);
+      }
+    }, options);
   }
 });

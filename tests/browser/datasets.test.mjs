@@ -5,7 +5,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { gzipSync } from "node:zlib";
-import { Daemon, finalPicture, freePort, launch, openPage, shot, unfold } from "./support.mjs";
+import { finalPicture, launch, ownPage, shot, unfold } from "./support.mjs";
 
 let browser;
 let folder;
@@ -40,23 +40,15 @@ function writeCube(name, n, damaged = false) {
   return path;
 }
 
-// A daemon of the test's own and a page on it, before the page is loaded.
-async function ownPage(t, ...datasets) {
-  const daemon = new Daemon(await freePort());
-  t.after(() => daemon.kill());
-  await daemon.start(...datasets);
-  const page = await openPage(browser, "about:blank", { viewport: { width: 1280, height: 800 } });
-  t.after(() => page.context().close());
-  return { daemon, page };
-}
+const viewport = { width: 1280, height: 800 };
 
 const texts = (page) => page.locator("#dataset option").allTextContents();
 
 test("why a dataset of the picker cannot be shown stays to be read", async (t) => {
   const files = [writeCube("ok.nrrd", 12), writeCube("big.nrrd", 130)];
   files.push(writeCube("torn.nrrd", 12, true));
-  const { daemon, page } = await ownPage(t, "--memory-limit", "40M", ...files);
-  await page.goto(daemon.url);
+  const args = ["--memory-limit", "40M", ...files];
+  const { page } = await ownPage(t, browser, { args, viewport });
   await finalPicture(page);
   assert.deepEqual(await texts(page), ["My storm (ok)", "My storm (big)", "My storm (torn)"]);
   for (const [id, why] of [
@@ -81,18 +73,21 @@ test("why a dataset of the picker cannot be shown stays to be read", async (t) =
 });
 
 test("the page follows files that change: their steps, and that they cannot be read", async (t) => {
-  const { daemon, page } = await ownPage(t, "climate");
   let opened;
   let say;
-  await page.routeWebSocket(/\/v1\/stream/, (socket) => {
+  const listen = (socket) => {
     say = (message) => socket.send(JSON.stringify(message));
     const server = socket.connectToServer();
     server.onMessage((data) => {
       if (typeof data === "string" && data.includes('"opened"')) opened = JSON.parse(data);
       socket.send(data);
     });
+  };
+  const { page } = await ownPage(t, browser, {
+    args: ["climate"],
+    viewport,
+    prepare: (fresh) => fresh.routeWebSocket(/\/v1\/stream/, listen),
   });
-  await page.goto(daemon.url);
   await finalPicture(page);
   const { id, dataset } = opened;
   await unfold(page, "Probe");
@@ -125,8 +120,8 @@ test("the page follows files that change: their steps, and that they cannot be r
 });
 
 test("the legend tells what is too slow, and the probe's ends are times", async (t) => {
-  const { daemon, page } = await ownPage(t, "climate");
-  await page.goto(`${daemon.url}#!{"dataset":"climate","vector":{"minMagnitude":3}}`);
+  const path = '#!{"dataset":"climate","vector":{"minMagnitude":3}}';
+  const { page } = await ownPage(t, browser, { args: ["climate"], path, viewport });
   await finalPicture(page);
   const told = page.locator(".legend-lines .legend-left-out");
   assert.equal(await told.textContent(), "slower than 3 m s⁻¹ not drawn");

@@ -1,47 +1,19 @@
 // The daemon's errors in the page: every frame says one, what is asked for is kept, and a lossless
 // final frame is what the daemon has drawn, pixel by pixel.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import {
   control,
-  Daemon,
   drag,
   finalPicture,
   framesOf,
-  freePort,
-  launch,
   movingOf,
-  openPage,
+  sharedDaemon,
   type,
-  unfold,
   watchFrames,
 } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
-
-async function withPage(run) {
-  const page = await openPage(browser, daemon.url, { initScript: watchFrames });
-  try {
-    await finalPicture(page);
-    await unfold(page, "Quality");
-    await run(page);
-    assert.equal(await page.locator("#alert").isVisible(), false, "the server took every view");
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
-}
+const { withPage } = sharedDaemon({ page: { initScript: watchFrames, unfolded: ["Quality"] } });
 
 const lastFrame = (page) => page.evaluate(() => window.frameHeaders.at(-1));
 

@@ -5,47 +5,22 @@ import { execFileSync } from "node:child_process";
 import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import {
-  Daemon,
   finalPicture,
-  freePort,
-  launch,
-  openPage,
   patience,
   pixels,
   screenshots,
+  sharedDaemon,
   shot,
   state,
 } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort(), "/a/b/").start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
-
-const small = { viewport: { width: 900, height: 600 } };
-
-async function withPage(run, path = "", options = {}) {
-  const page = await openPage(browser, daemon.url + path, { ...small, ...options });
-  try {
-    await finalPicture(page);
-    await run(page);
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
-}
+const shared = sharedDaemon({ basePath: "/a/b/", page: { viewport: { width: 900, height: 600 } } });
+const { withPage } = shared;
 
 const hashOf = (view) => `#!${encodeURIComponent(JSON.stringify(view))}`;
+const linkTo = (view) => ({ path: hashOf(view) });
 
 // What the button saves: the file's name and bytes.
 async function saved(page, button) {
@@ -127,7 +102,7 @@ sys.stdout.buffer.write(found[0])
 }
 
 async function drawn(view) {
-  const answer = await fetch(`${daemon.url}v1/frames`, {
+  const answer = await fetch(`${shared.daemon.url}v1/frames`, {
     method: "POST",
     headers: { "Content-Type": "application/json", Accept: "image/png" },
     body: JSON.stringify(view),
@@ -174,7 +149,7 @@ test("a saved picture is the view's own, n times as large, with its view inside"
       assert.equal(difference(picture, await decode(page, await drawn(view))), null);
     }
     await shot(page, "save-dark");
-  }, hashOf(turned)));
+  }, linkTo(turned)));
 
 test("the legend is in the picture where the page shows it, at every scale", () =>
   withPage(async (page) => {
@@ -195,7 +170,7 @@ test("the legend is in the picture where the page shows it, at every scale", () 
       assert.deepEqual(viewIn(bytes).step, 3);
       if (scale === 2) await writeFile(join(screenshots, "saved-2x.png"), bytes);
     }
-  }, hashOf(turned)));
+  }, linkTo(turned)));
 
 test("a picture dropped on another page brings its view back, pixel for pixel", async () => {
   let bytes;
@@ -205,17 +180,20 @@ test("a picture dropped on another page brings its view back, pixel for pixel", 
       before = await pixels(page);
       ({ bytes } = await savePicture(page, 2));
     },
-    hashOf({ ...turned, vector: { field: null } }),
+    linkTo({ ...turned, vector: { field: null } }),
   );
   for (const path of ["", hashOf({ dataset: "tornado", vector: { field: "wind", length: 0.2 } })]) {
-    await withPage(async (page) => {
-      assert.notEqual((await pixels(page)).hash, before.hash);
-      await drop(page, bytes);
-      await page.waitForFunction(() => document.querySelector("#picture").dataset.step === "3");
-      await finalPicture(page);
-      assert.equal((await pixels(page)).hash, before.hash);
-      assert.equal(await page.locator("#alert").isVisible(), false);
-    }, path);
+    await withPage(
+      async (page) => {
+        assert.notEqual((await pixels(page)).hash, before.hash);
+        await drop(page, bytes);
+        await page.waitForFunction(() => document.querySelector("#picture").dataset.step === "3");
+        await finalPicture(page);
+        assert.equal((await pixels(page)).hash, before.hash);
+        assert.equal(await page.locator("#alert").isVisible(), false);
+      },
+      { path },
+    );
   }
   await withPage(async (page) => {
     await page.keyboard.press("s");
@@ -232,17 +210,20 @@ test("a picture dropped on another page brings its view back, pixel for pixel", 
 });
 
 test("a file without a view is told in the alert, and the view stays", () =>
-  withPage(async (page) => {
-    const before = await pixels(page);
-    for (const [bytes, words] of [
-      [await drawn({ ...turned, image: { width: 32, height: 32 } }), /holds no view/],
-      [Buffer.from("just a text of some length"), /no PNG/],
-    ]) {
-      await drop(page, bytes);
-      await page.locator("#alert-text").getByText(words).waitFor();
-    }
-    assert.equal((await pixels(page)).hash, before.hash);
-  }));
+  withPage(
+    async (page) => {
+      const before = await pixels(page);
+      for (const [bytes, words] of [
+        [await drawn({ ...turned, image: { width: 32, height: 32 } }), /holds no view/],
+        [Buffer.from("just a text of some length"), /no PNG/],
+      ]) {
+        await drop(page, bytes);
+        await page.locator("#alert-text").getByText(words).waitFor();
+      }
+      assert.equal((await pixels(page)).hash, before.hash);
+    },
+    { alert: true },
+  ));
 
 const pythonZip = `
 import base64, json, sys, zipfile
@@ -324,7 +305,7 @@ test("a turn round the volume looks from all sides", () =>
       const [a, b] = [await decode(page, files[0][1]), await decode(page, files[2][1])];
       assert.notEqual(difference(a, b), null);
     },
-    hashOf({ dataset: "tornado" }),
+    linkTo({ dataset: "tornado" }),
   ));
 
 test("a WebM video plays, in the frames' size and for their time", () =>
@@ -424,7 +405,7 @@ test("views are kept by name, and come back after a reload", () =>
     await name.fill("east");
     await name.press("Tab");
     await page.locator("#save-close").click();
-    await page.goto(`${daemon.url}?again`);
+    await page.goto(`${shared.daemon.url}?again`);
     await finalPicture(page);
     assert.notEqual((await state(page)).step, "3");
     await page.keyboard.press("s");
@@ -435,7 +416,7 @@ test("views are kept by name, and come back after a reload", () =>
     await page.keyboard.press("s");
     await page.getByRole("button", { name: "Delete east" }).click();
     assert.equal(await page.locator("#kept li").count(), 0);
-  }, hashOf(turned)));
+  }, linkTo(turned)));
 
 test("a renamed view's row stays, with the focus and the button under the mouse", () =>
   withPage(async (page) => {
@@ -476,21 +457,24 @@ test("behind an open dialog the page's keys do nothing, wherever the focus is", 
   }));
 
 test("a link with a view of another shape is told, and the page stays whole", () =>
-  withPage(async (page) => {
-    const before = await pixels(page);
-    for (const view of [
-      { scalars: 5 },
-      { vector: { magnitudeRange: 3 } },
-      { camera: { eye: 5 } },
-    ]) {
-      await page.evaluate((hash) => (location.hash = hash), hashOf(view));
-      await page
-        .locator("#alert-text")
-        .getByText(/no view that can be read/)
-        .waitFor();
-    }
-    assert.equal((await pixels(page)).hash, before.hash);
-  }));
+  withPage(
+    async (page) => {
+      const before = await pixels(page);
+      for (const view of [
+        { scalars: 5 },
+        { vector: { magnitudeRange: 3 } },
+        { camera: { eye: 5 } },
+      ]) {
+        await page.evaluate((hash) => (location.hash = hash), hashOf(view));
+        await page
+          .locator("#alert-text")
+          .getByText(/no view that can be read/)
+          .waitFor();
+      }
+      assert.equal((await pixels(page)).hash, before.hash);
+    },
+    { alert: true },
+  ));
 
 // A view whose link is longer than 2000 characters.
 const long = {
@@ -523,13 +507,16 @@ test("Share copies the link; a long one becomes a short one that restores the sa
     const link = await share(page);
     assert.match(link, /\/a\/b\/#!view=[\w.~-]+$/);
     assert.ok(link.length < 200, link);
-    await withPage(async (other) => {
-      assert.equal((await pixels(other)).hash, before.hash);
-      // Its own address is whole again, so that it outlives the server.
-      await other.waitForFunction(() => location.hash.startsWith("#!{"));
-      assert.deepEqual((await addressView(other)).scalars, long.scalars);
-    }, link.slice(daemon.url.length));
-  }, hashOf(long)));
+    await withPage(
+      async (other) => {
+        assert.equal((await pixels(other)).hash, before.hash);
+        // Its own address is whole again, so that it outlives the server.
+        await other.waitForFunction(() => location.hash.startsWith("#!{"));
+        assert.deepEqual((await addressView(other)).scalars, long.scalars);
+      },
+      { path: link.slice(shared.daemon.url.length) },
+    );
+  }, linkTo(long)));
 
 test("where the server keeps no views the long link is copied, and that is said", () =>
   withPage(async (page) => {
@@ -539,18 +526,17 @@ test("where the server keeps no views the long link is copied, and that is said"
     assert.deepEqual(JSON.parse(decodeURIComponent(link.split("#!")[1])).scalars, long.scalars);
     assert.match(await page.locator("#status").textContent(), /long one: no room for views/);
     page.faults = page.faults.filter((fault) => !/507/.test(fault));
-  }, hashOf(long)));
+  }, linkTo(long)));
 
-test("a short link that leads nowhere is told, and the default shown", async () => {
-  const page = await openPage(browser, `${daemon.url}#!view=no-such-view`, small);
-  try {
-    await finalPicture(page);
-    assert.match(await page.locator("#alert-text").textContent(), /^The link's view: /);
-    assert.equal(await page.locator("#dataset").inputValue(), "climate");
-  } finally {
-    await page.context().close();
-  }
-});
+test("a short link that leads nowhere is told, and the default shown", () =>
+  withPage(
+    async (page) => {
+      assert.match(await page.locator("#alert-text").textContent(), /^The link's view: /);
+      assert.equal(await page.locator("#dataset").inputValue(), "climate");
+    },
+    // The browser itself reports the answer that there is no such view.
+    { path: "#!view=no-such-view", alert: true, faulty: true },
+  ));
 
 test("the dialog fits a phone in either theme, by keyboard alone", async () => {
   for (const colorScheme of ["dark", "light"]) {
@@ -575,7 +561,6 @@ test("the dialog fits a phone in either theme, by keyboard alone", async () => {
         assert.equal(await page.locator("#save").isVisible(), false);
         assert.equal(await page.evaluate(() => document.activeElement.id), "save-button");
       },
-      "",
       { viewport: { width: 360, height: 780 }, colorScheme, hasTouch: true },
     );
   }

@@ -2,21 +2,10 @@
 // the page and slips in frames of its own, whose every pixel is known.
 import assert from "node:assert/strict";
 import { deflateSync } from "node:zlib";
-import { after, before, test } from "node:test";
-import { Daemon, finalPicture, freePort, launch, openPage, pictureBox, shot } from "./support.mjs";
+import { test } from "node:test";
+import { pictureBox, sharedDaemon, shot } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
+const shared = sharedDaemon();
 
 // --- pictures and frames that are made up -------------------------------------------------------
 
@@ -122,23 +111,18 @@ class Between {
   }
 }
 
-async function withPage(run, options = {}) {
+function withPage(run) {
   const between = new Between();
-  const page = await openPage(browser, daemon.url, {
-    prepare: (own) => between.stand(own),
-    ...options,
-  });
-  try {
-    await finalPicture(page);
-    const { width, height } = await page.evaluate(() => {
-      const { width, height } = document.querySelector("#picture");
-      return { width, height };
-    });
-    await run(page, between, { width, height });
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
+  return shared.withPage(
+    async (page) => {
+      const { width, height } = await page.evaluate(() => {
+        const { width, height } = document.querySelector("#picture");
+        return { width, height };
+      });
+      await run(page, between, { width, height });
+    },
+    { prepare: (page) => between.stand(page) },
+  );
 }
 
 // The canvas's colours at shares of its width and height, and how many colours it has in all.

@@ -1,19 +1,16 @@
 // The page's hands in a real browser: undo, the value under the cursor, axes that are clicked,
 // fingers, wheel, dense screens, keys, and a page that nobody sees.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import {
   control,
-  Daemon,
   drag,
   finalPicture,
   framesOf,
-  freePort,
-  launch,
   movingOf,
-  openPage,
   pictureBox,
   pixels,
+  sharedDaemon,
   shot,
   state,
   type,
@@ -22,33 +19,10 @@ import {
   watchPatches,
 } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
+const shared = sharedDaemon({
+  page: { viewport: { width: 1000, height: 600 }, initScript: [watchPatches, watchFrames] },
 });
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
-
-async function withPage(run, options = {}) {
-  const page = await openPage(browser, daemon.url, {
-    viewport: { width: 1000, height: 600 },
-    initScript: [watchPatches, watchFrames],
-    ...options,
-  });
-  try {
-    await finalPicture(page);
-    await run(page);
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
-}
+const { withPage } = shared;
 
 const patches = (page) => page.evaluate(() => window.patches);
 const cameras = async (page) =>
@@ -178,7 +152,7 @@ test("the value under the cursor is the one that the server probes there", () =>
     );
     const [x, y] = [ew === "E" ? east : -east, ns === "N" ? north : -north];
     const answer = await fetch(
-      `${daemon.url}v1/datasets/climate/probe?x=${x}&y=${y}&z=${z}&step=0`,
+      `${shared.daemon.url}v1/datasets/climate/probe?x=${x}&y=${y}&z=${z}&step=0`,
     ).then((response) => response.json());
     for (const axis of ["x", "y", "z"]) {
       const told = Number({ x, y, z }[axis]);

@@ -1,17 +1,15 @@
 // The page in a real browser, shown by the real daemon: what a user sees and does.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import {
   control,
-  Daemon,
   drag,
   finalPicture,
-  freePort,
-  launch,
-  openPage,
+  ownPage,
   patience,
   pictureBox,
   pixels,
+  sharedDaemon,
   shot,
   somePicture,
   state,
@@ -19,18 +17,8 @@ import {
   watchPatches,
 } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
+const shared = sharedDaemon();
+const { withPage } = shared;
 
 const phone = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
 
@@ -46,48 +34,28 @@ const mapsAreShown = (page) =>
     /linear-gradient/.test(document.querySelector(".legend-strip").style.background),
   );
 
-async function withPage(run, path = "", options = {}) {
-  const page = await openPage(browser, daemon.url + path, options);
-  try {
-    await run(page);
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
-}
-
-// A daemon of the test's own and a page on it; both are gone when the test is over, pass or fail.
-async function ownPage(t, { basePath = "/", datasets = [], ...options } = {}) {
-  const own = new Daemon(await freePort(), basePath);
-  t.after(() => own.kill());
-  await own.start(...datasets);
-  const page = await openPage(browser, own.url, options);
-  t.after(() => page.context().close());
-  return { own, page };
-}
-
-test("the climate sample is there within 3 s of load, and soon its final picture", async (t) => {
-  const page = await openPage(browser, daemon.url);
-  t.after(() => page.context().close());
-  const loaded = Date.now();
-  await somePicture(page, 3000 * patience);
-  t.diagnostic(`first picture ${Date.now() - loaded} ms after load`);
-  await finalPicture(page);
-  t.diagnostic(`final picture ${Date.now() - loaded} ms after load`);
-  assert.equal(await page.locator("#dataset").inputValue(), "climate");
-  const stats = await pixels(page);
-  assertDrawn(stats);
-  const box = await pictureBox(page);
-  assert.deepEqual([stats.width, stats.height], [Math.round(box.width), Math.round(box.height)]);
-  assert.equal(await page.locator("#mark").textContent(), "final");
-  assert.match(await page.locator("#hud-times").textContent(), /render [\d.]+ · encode [\d.]+/);
-  assert.equal(await page.locator("#status").textContent(), "live");
-  assert.deepEqual(page.faults, []);
-});
+test("the climate sample is there within 3 s of load, and soon its final picture", (t) =>
+  withPage(
+    async (page) => {
+      const loaded = Date.now();
+      await somePicture(page, 3000 * patience);
+      t.diagnostic(`first picture ${Date.now() - loaded} ms after load`);
+      await finalPicture(page);
+      t.diagnostic(`final picture ${Date.now() - loaded} ms after load`);
+      assert.equal(await page.locator("#dataset").inputValue(), "climate");
+      const stats = await pixels(page);
+      assertDrawn(stats);
+      const { width, height } = await pictureBox(page);
+      assert.deepEqual([stats.width, stats.height], [Math.round(width), Math.round(height)]);
+      assert.equal(await page.locator("#mark").textContent(), "final");
+      assert.match(await page.locator("#hud-times").textContent(), /render [\d.]+ · encode [\d.]+/);
+      assert.equal(await page.locator("#status").textContent(), "live");
+    },
+    { settle: false },
+  ));
 
 test("a drag turns the volume at once and ends in a final picture", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     const before = await state(page);
     const first = await pixels(page);
     await drag(page, 160, 60);
@@ -108,7 +76,6 @@ test("a drag turns the volume at once and ends in a final picture", () =>
 
 test("the right button moves the volume, the wheel brings it nearer", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     const before = await state(page);
     const box = await pictureBox(page);
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
@@ -134,7 +101,6 @@ test("the right button moves the volume, the wheel brings it nearer", () =>
 
 test("every dataset of the picker can be shown", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     const ids = await page.locator("#dataset option").evaluateAll((all) => all.map((o) => o.value));
     assert.ok(
       ["climate", "efield", "tornado"].every((id) => ids.includes(id)),
@@ -156,7 +122,6 @@ test("every dataset of the picker can be shown", () =>
 
 test("playing moves the step, the slider and the time; pausing keeps the step", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     const firstTime = await page.locator("#time-label").textContent();
     const first = await pixels(page);
     await page.locator("#time-fps").selectOption("2"); // slow enough not to be round again
@@ -185,7 +150,6 @@ test("playing moves the step, the slider and the time; pausing keeps the step", 
 
 test("another colour map changes the picture and the legend", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     const legend = page.locator(".legend-lines");
     const strip = () => legend.locator(".legend-strip").evaluate((e) => e.style.background);
     await mapsAreShown(page);
@@ -213,7 +177,6 @@ test("another colour map changes the picture and the legend", () =>
 
 test("lines and medium can be switched off and on", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     const all = await pixels(page);
     const switches = page
       .locator("#panel .lil-controller.lil-boolean", {
@@ -240,24 +203,24 @@ test("lines and medium can be switched off and on", () =>
 
 test("a link restores the same pixels in another window", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     await drag(page, -90, 25);
     await control(page, "map").selectOption("plasma");
     await finalPicture(page);
     await page.waitForFunction(() => /plasma/.test(location.hash) && /camera/.test(location.hash));
     const here = await pixels(page);
-    await withPage(async (other) => {
-      await finalPicture(other);
-      const there = await pixels(other);
-      assert.equal(there.hash, here.hash);
-      const { azimuth } = await state(page);
-      assert.equal((await state(other)).azimuth, azimuth);
-    }, new URL(page.url()).hash);
+    await withPage(
+      async (other) => {
+        const there = await pixels(other);
+        assert.equal(there.hash, here.hash);
+        const { azimuth } = await state(page);
+        assert.equal((await state(other)).azimuth, azimuth);
+      },
+      { path: new URL(page.url()).hash },
+    );
   }));
 
 test("a page that was here before comes back on reload and in a second tab", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     await page.reload({ waitUntil: "load" });
     await finalPicture(page);
     assertDrawn(await pixels(page));
@@ -268,27 +231,33 @@ test("a page that was here before comes back on reload and in a second tab", () 
   }));
 
 test("a link to nowhere is told and the default shown", () =>
-  withPage(async (page) => {
-    await finalPicture(page);
-    await page.locator("#alert").waitFor();
-    assert.match(await page.locator("#alert-text").textContent(), /nowhere/);
-    assert.equal(await page.locator("#dataset").inputValue(), "climate");
-    assertDrawn(await pixels(page));
-    await page.locator("#alert-close").click();
-    assert.equal(await page.locator("#alert").isVisible(), false);
-  }, '#!{"dataset":"nowhere"}'));
+  withPage(
+    async (page) => {
+      await page.locator("#alert").waitFor();
+      assert.match(await page.locator("#alert-text").textContent(), /nowhere/);
+      assert.equal(await page.locator("#dataset").inputValue(), "climate");
+      assertDrawn(await pixels(page));
+      await page.locator("#alert-close").click();
+      assert.equal(await page.locator("#alert").isVisible(), false);
+    },
+    { path: '#!{"dataset":"nowhere"}' },
+  ));
 
 test("a link with a value out of range names it and shows the rest by default", () =>
-  withPage(async (page) => {
-    await finalPicture(page);
-    await page.locator("#alert").waitFor();
-    assert.match(await page.locator("#alert-text").textContent(), /\/vector\/length/);
-    assert.equal(await page.locator("#dataset").inputValue(), "climate");
-    assertDrawn(await pixels(page));
-  }, '#!{"dataset":"climate","vector":{"length":-5}}'));
+  withPage(
+    async (page) => {
+      await page.locator("#alert").waitFor();
+      assert.match(await page.locator("#alert-text").textContent(), /\/vector\/length/);
+      assert.equal(await page.locator("#dataset").inputValue(), "climate");
+      assertDrawn(await pixels(page));
+    },
+    { path: '#!{"dataset":"climate","vector":{"length":-5}}', alert: true },
+  ));
 
 test("a killed server: the picture stays, dimmed, and comes back by itself", async (t) => {
-  const { own, page } = await ownPage(t, { initScript: [watchFrames, watchPatches] });
+  const { daemon, page } = await ownPage(t, shared.browser, {
+    initScript: [watchFrames, watchPatches],
+  });
   await finalPicture(page);
   await control(page, "map").selectOption("plasma");
   await page.locator("#time-next").click();
@@ -298,7 +267,7 @@ test("a killed server: the picture stays, dimmed, and comes back by itself", asy
   const lastFrame = () => page.evaluate(() => window.frameHeaders.at(-1));
   const frameBefore = await lastFrame();
   assert.equal(frameBefore.step, 1);
-  await own.kill("SIGKILL");
+  await daemon.kill("SIGKILL");
   await page.waitForFunction(
     () =>
       document.documentElement.dataset.connection === "waiting" &&
@@ -311,7 +280,7 @@ test("a killed server: the picture stays, dimmed, and comes back by itself", asy
     /brightness/,
   );
   await shot(page, "lost");
-  await own.start();
+  await daemon.start();
   await page.waitForFunction(() => document.documentElement.dataset.connection === "live", null, {
     timeout: 20_000 * patience,
   });
@@ -333,12 +302,12 @@ test("a killed server: the picture stays, dimmed, and comes back by itself", asy
 });
 
 test("a server that comes back with other datasets shows one, without a storm", async (t) => {
-  const { own, page } = await ownPage(t, { datasets: ["tornado"] });
+  const { daemon, page } = await ownPage(t, shared.browser, { args: ["tornado"] });
   let messages = 0;
   page.on("websocket", (socket) => socket.on("framesent", () => (messages += 1)));
   await finalPicture(page);
-  await own.kill("SIGKILL");
-  await own.start("efield");
+  await daemon.kill("SIGKILL");
+  await daemon.start("efield");
   await page.waitForFunction(() => document.querySelector("#dataset").value === "efield", null, {
     timeout: 20_000 * patience,
   });
@@ -362,87 +331,76 @@ test("the picture keeps its size while a dataset opens", async () => {
   };
   for (const size of [phone, {}, { viewport: { width: 900, height: 700 } }]) {
     const options = { ...size, initScript: watchSize };
-    await withPage(
-      async (page) => {
-        await finalPicture(page);
-        const sizes = await page.evaluate(() => [...window.sizes]);
-        assert.equal(sizes.length, 1, `${sizes.join(", ")} in ${JSON.stringify(size)}`);
-      },
-      "",
-      options,
-    );
+    await withPage(async (page) => {
+      const sizes = await page.evaluate(() => [...window.sizes]);
+      assert.equal(sizes.length, 1, `${sizes.join(", ")} in ${JSON.stringify(size)}`);
+    }, options);
   }
 });
 
 test("one finger turns, two fingers move and pinch", () =>
-  withPage(
-    async (page) => {
-      await finalPicture(page);
-      const cdp = await page.context().newCDPSession(page);
-      const box = await pictureBox(page);
-      const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
-      const touch = async (path) => {
-        const points = (at) => at.map(([dx, dy], id) => ({ x: x + dx, y: y + dy, id }));
+  withPage(async (page) => {
+    const cdp = await page.context().newCDPSession(page);
+    const box = await pictureBox(page);
+    const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+    const touch = async (path) => {
+      const points = (at) => at.map(([dx, dy], id) => ({ x: x + dx, y: y + dy, id }));
+      await cdp.send("Input.dispatchTouchEvent", {
+        type: "touchStart",
+        touchPoints: points(path[0]),
+      });
+      for (const at of path.slice(1)) {
         await cdp.send("Input.dispatchTouchEvent", {
-          type: "touchStart",
-          touchPoints: points(path[0]),
+          type: "touchMove",
+          touchPoints: points(at),
         });
-        for (const at of path.slice(1)) {
-          await cdp.send("Input.dispatchTouchEvent", {
-            type: "touchMove",
-            touchPoints: points(at),
-          });
-          await page.waitForTimeout(20);
-        }
-        await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
-        await finalPicture(page);
-        return state(page);
-      };
-      const start = await state(page);
-      const turned = await touch([[[0, 0]], [[30, 0]], [[60, 0]]]);
-      assert.ok(Number(turned.azimuth) < Number(start.azimuth) - 5);
-      assert.equal(turned.distance, start.distance);
-      const pinched = await touch([
-        [
-          [-40, 0],
-          [40, 0],
-        ],
-        [
-          [-60, 0],
-          [60, 0],
-        ],
-        [
-          [-80, 0],
-          [80, 0],
-        ],
-      ]);
-      assert.ok(
-        Number(pinched.distance) < 0.7 * Number(turned.distance),
-        "twice as wide is half as far",
-      );
-      assert.equal(pinched.azimuth, turned.azimuth, "pinching does not turn");
-      const moved = await touch([
-        [
-          [-40, 0],
-          [40, 0],
-        ],
-        [
-          [-40, 30],
-          [40, 30],
-        ],
-      ]);
-      assert.equal(moved.distance, pinched.distance);
-      assert.equal(moved.azimuth, pinched.azimuth);
-      assert.notEqual(moved.rev, pinched.rev);
-      assertDrawn(await pixels(page));
-    },
-    "",
-    phone,
-  ));
+        await page.waitForTimeout(20);
+      }
+      await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+      await finalPicture(page);
+      return state(page);
+    };
+    const start = await state(page);
+    const turned = await touch([[[0, 0]], [[30, 0]], [[60, 0]]]);
+    assert.ok(Number(turned.azimuth) < Number(start.azimuth) - 5);
+    assert.equal(turned.distance, start.distance);
+    const pinched = await touch([
+      [
+        [-40, 0],
+        [40, 0],
+      ],
+      [
+        [-60, 0],
+        [60, 0],
+      ],
+      [
+        [-80, 0],
+        [80, 0],
+      ],
+    ]);
+    assert.ok(
+      Number(pinched.distance) < 0.7 * Number(turned.distance),
+      "twice as wide is half as far",
+    );
+    assert.equal(pinched.azimuth, turned.azimuth, "pinching does not turn");
+    const moved = await touch([
+      [
+        [-40, 0],
+        [40, 0],
+      ],
+      [
+        [-40, 30],
+        [40, 30],
+      ],
+    ]);
+    assert.equal(moved.distance, pinched.distance);
+    assert.equal(moved.azimuth, pinched.azimuth);
+    assert.notEqual(moved.rev, pinched.rev);
+    assertDrawn(await pixels(page));
+  }, phone));
 
 test("everything by the keyboard", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     const start = await state(page);
     const until = (key, value) =>
       page.waitForFunction(
@@ -498,7 +456,7 @@ test("everything by the keyboard", () =>
   }));
 
 test("under a base path", async (t) => {
-  const { page } = await ownPage(t, { basePath: "/a/b/" });
+  const { page } = await ownPage(t, shared.browser, { basePath: "/a/b/" });
   await finalPicture(page);
   assertDrawn(await pixels(page));
   await mapsAreShown(page);
@@ -508,7 +466,6 @@ test("under a base path", async (t) => {
 test("on a dense screen the picture has its pixels", () =>
   withPage(
     async (page) => {
-      await finalPicture(page);
       const box = await pictureBox(page);
       const stats = await pixels(page);
       assert.deepEqual(
@@ -516,13 +473,11 @@ test("on a dense screen the picture has its pixels", () =>
         [Math.round(2 * box.width), Math.round(2 * box.height)],
       );
     },
-    "",
     { viewport: { width: 900, height: 600 }, deviceScaleFactor: 2 },
   ));
 
 test("a window that changes its size gets a picture of that size", () =>
   withPage(async (page) => {
-    await finalPicture(page);
     await page.setViewportSize({ width: 1000, height: 700 });
     const box = await pictureBox(page);
     await page.waitForFunction(
@@ -537,7 +492,6 @@ test("every control has a name, and nothing sticks out of a narrow window", asyn
   for (const width of [1440, 360]) {
     await withPage(
       async (page) => {
-        await finalPicture(page);
         const overflow = await page.evaluate(
           () => document.documentElement.scrollWidth - innerWidth,
         );
@@ -565,7 +519,6 @@ test("every control has a name, and nothing sticks out of a narrow window", asyn
         );
         assert.ok(nodes.filter((node) => roles.has(node.role?.value)).length > 20);
       },
-      "",
       { viewport: { width, height: 800 } },
     );
   }
@@ -579,14 +532,9 @@ test("screenshots of the usual windows", async () => {
     ["phone", phone],
   ];
   for (const [name, options] of windows) {
-    await withPage(
-      async (page) => {
-        await finalPicture(page);
-        await page.locator(".legend-entry").first().waitFor();
-        await shot(page, name);
-      },
-      "",
-      options,
-    );
+    await withPage(async (page) => {
+      await page.locator(".legend-entry").first().waitFor();
+      await shot(page, name);
+    }, options);
   }
 });

@@ -1,46 +1,20 @@
 // What the methods, slices, shapes, colours and the motion of the paper look like when they are
 // chosen in the panel: each changes the picture, and its own way back gives the old one.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import {
   choose,
   control,
-  Daemon,
   finalPicture,
-  freePort,
-  launch,
-  openPage,
   pixels,
+  sharedDaemon,
   shot,
   type,
   unfold,
   watchPatches,
 } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
-
-async function withPage(run, path = "") {
-  const page = await openPage(browser, daemon.url + path, { initScript: watchPatches });
-  try {
-    await finalPicture(page);
-    await run(page);
-    assert.equal(await page.locator("#alert").isVisible(), false, "the server took every view");
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
-}
+const { withPage } = sharedDaemon({ page: { initScript: watchPatches } });
 
 // The final picture after a change, kept for the eye under `name`.
 async function picture(page, name) {

@@ -2,32 +2,18 @@
 // slider and by keys; and the panel's measures, whose answers the test gives itself where it checks
 // what the page makes of them.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import {
-  Daemon,
   finalPicture,
-  freePort,
-  launch,
-  openPage,
   patience,
+  sharedDaemon,
   shot,
   state,
   unfold,
   watchPatches,
 } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
+const shared = sharedDaemon();
 
 // Keeps the steps that were shown, in order, each once.
 const watchSteps = () => {
@@ -41,29 +27,24 @@ const watchSteps = () => {
   });
 };
 
-async function withPage(run, { answers = {}, ...options } = {}) {
-  const page = await openPage(browser, "about:blank", {
+// `answers` takes the server's place: for each pattern of addresses what it says. What was asked
+// for is kept in page.asked.
+function withPage(run, { answers = {}, ...options } = {}) {
+  return shared.withPage(run, {
     viewport: { width: 1280, height: 800 },
+    initScript: [watchPatches, watchSteps],
     ...options,
+    prepare: async (page) => {
+      page.asked = [];
+      for (const [pattern, answer] of Object.entries(answers)) {
+        await page.route(new RegExp(pattern), (route) => {
+          const url = new URL(route.request().url());
+          page.asked.push(url.pathname + url.search);
+          return route.fulfill({ json: answer(url) });
+        });
+      }
+    },
   });
-  await page.addInitScript(watchPatches);
-  await page.addInitScript(watchSteps);
-  page.asked = [];
-  for (const [pattern, answer] of Object.entries(answers)) {
-    await page.route(new RegExp(pattern), (route) => {
-      const url = new URL(route.request().url());
-      page.asked.push(url.pathname + url.search);
-      return route.fulfill({ json: answer(url) });
-    });
-  }
-  try {
-    await page.goto(daemon.url);
-    await finalPicture(page);
-    await run(page);
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
 }
 
 const stepCount = (page) =>

@@ -1,18 +1,14 @@
 // Error against time in the Quality panel, in a real browser; what the server forecasts is made up
 // here, what budget and limit do to the frames is the daemon's own.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import {
   control,
-  Daemon,
   drag,
-  finalPicture,
   framesOf,
-  freePort,
-  launch,
   movingOf,
-  openPage,
   patience,
+  sharedDaemon,
   shot,
   type,
   unfold,
@@ -20,18 +16,7 @@ import {
   watchPatches,
 } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
+const shared = sharedDaemon();
 
 const points = [4, 9, 20, 45, 100, 220].map((ms, n) => ({
   method: n % 2 === 0 ? "kernel" : "slab",
@@ -48,25 +33,19 @@ const points = [4, 9, 20, 45, 100, 220].map((ms, n) => ({
   pareto: n !== 2,
 }));
 
-async function withPage(run, { status = 200, json } = {}) {
-  const asked = [];
-  const page = await openPage(browser, daemon.url, {
+// The server's forecast is `json`; page.asked holds the views that it was asked for.
+function withPage(run, { status = 200, json = { view: {}, points, chosen: 2 }, ...options } = {}) {
+  return shared.withPage(run, {
     initScript: [watchFrames, watchPatches],
-    prepare: (one) =>
-      one.route(/\/v1\/forecasts$/, (route) => {
-        asked.push(route.request().postDataJSON());
-        return route.fulfill({ status, json: json ?? { view: {}, points, chosen: 2 } });
-      }),
+    ...options,
+    prepare: async (page) => {
+      page.asked = [];
+      await page.route(/\/v1\/forecasts$/, (route) => {
+        page.asked.push(route.request().postDataJSON());
+        return route.fulfill({ status, json });
+      });
+    },
   });
-  page.asked = asked;
-  try {
-    await finalPicture(page);
-    await run(page);
-    assert.equal(await page.locator("#alert").isVisible(), false, "the server took every view");
-    if (status === 200) assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
 }
 
 const handle = (page, name) => page.getByRole("slider", { name, exact: true }).last();
@@ -190,5 +169,9 @@ test("a server that cannot tell says why", () =>
       await page.locator(".forecast").scrollIntoViewIfNeeded();
       await page.getByText("no forecast for this view").waitFor();
     },
-    { status: 422, json: { title: "No", status: 422, detail: "no forecast for this view" } },
+    {
+      status: 422,
+      faulty: true,
+      json: { title: "No", status: 422, detail: "no forecast for this view" },
+    },
   ));

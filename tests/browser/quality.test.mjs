@@ -1,50 +1,23 @@
 // The Quality panel in a real browser: what is asked for is what the daemon's frames show, by their
 // headers and by what `chosen` says of them.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import {
   control,
-  Daemon,
   drag,
   finalPicture,
   framesOf,
-  freePort,
-  launch,
   movingOf,
-  openPage,
+  sharedDaemon,
   shot,
   type,
-  unfold,
   watchFrames,
   watchPatches,
 } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
+const { withPage } = sharedDaemon({
+  page: { initScript: [watchFrames, watchPatches], unfolded: ["Quality"] },
 });
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
-
-async function withPage(run, path = "") {
-  const initScript = [watchFrames, watchPatches];
-  const page = await openPage(browser, daemon.url + path, { initScript });
-  try {
-    await finalPicture(page);
-    await unfold(page, "Quality");
-    await run(page);
-    assert.equal(await page.locator("#alert").isVisible(), false, "the server took every view");
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
-}
 
 const budget = "moving budget \\(ms\\)";
 const limited = "limit the error";
@@ -103,24 +76,27 @@ test("an error is asked for by a switch, and by its magnitude", () =>
   }));
 
 test("a link carries budget, error and lossless, and `All defaults` takes them away", () =>
-  withPage(async (page) => {
-    assert.equal(await control(page, budget, "input").inputValue(), "66");
-    assert.equal(await control(page, limited, "input").isChecked(), true);
-    const box = page.getByRole("textbox", { name: "max error (linear RMSE)" });
-    assert.equal(await box.inputValue(), "0.002");
-    assert.equal(await control(page, "lossless final", "input").isChecked(), true);
-    const drawn = await page.evaluate(() => window.frameHeaders.at(-1).chosen.view.quality);
-    assert.deepEqual(drawn, { budgetMs: 66, maxError: 0.002, lossless: true });
-    await control(page, "lossless final", "input").uncheck();
-    await page.waitForFunction(() => /%22lossless%22:false/.test(location.hash));
-    assert.deepEqual(await linkedQuality(page), {
-      budgetMs: 66,
-      maxError: 0.002,
-      lossless: false,
-    });
-    await page.locator("#panel").getByRole("button", { name: "All defaults" }).click();
-    await finalPicture(page);
-    assert.equal(await control(page, limited, "input").isChecked(), false);
-    assert.equal(await control(page, budget, "input").inputValue(), "33");
-    await page.waitForFunction(() => !location.hash.includes("quality"));
-  }, '#!{"quality":{"budgetMs":66,"maxError":0.002,"lossless":true}}'));
+  withPage(
+    async (page) => {
+      assert.equal(await control(page, budget, "input").inputValue(), "66");
+      assert.equal(await control(page, limited, "input").isChecked(), true);
+      const box = page.getByRole("textbox", { name: "max error (linear RMSE)" });
+      assert.equal(await box.inputValue(), "0.002");
+      assert.equal(await control(page, "lossless final", "input").isChecked(), true);
+      const drawn = await page.evaluate(() => window.frameHeaders.at(-1).chosen.view.quality);
+      assert.deepEqual(drawn, { budgetMs: 66, maxError: 0.002, lossless: true });
+      await control(page, "lossless final", "input").uncheck();
+      await page.waitForFunction(() => /%22lossless%22:false/.test(location.hash));
+      assert.deepEqual(await linkedQuality(page), {
+        budgetMs: 66,
+        maxError: 0.002,
+        lossless: false,
+      });
+      await page.locator("#panel").getByRole("button", { name: "All defaults" }).click();
+      await finalPicture(page);
+      assert.equal(await control(page, limited, "input").isChecked(), false);
+      assert.equal(await control(page, budget, "input").inputValue(), "33");
+      await page.waitForFunction(() => !location.hash.includes("quality"));
+    },
+    { path: '#!{"quality":{"budgetMs":66,"maxError":0.002,"lossless":true}}' },
+  ));

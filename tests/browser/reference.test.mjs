@@ -1,47 +1,14 @@
 // The reference in a real browser: drawn once it is asked for, on the page as long as it is held,
 // gone with the view that it is of.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import {
-  Daemon,
-  drag,
-  finalPicture,
-  freePort,
-  launch,
-  openPage,
-  patience,
-  pixels,
-  shot,
-} from "./support.mjs";
-
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start("climate");
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
+import { test } from "node:test";
+import { drag, finalPicture, patience, pixels, sharedDaemon, shot } from "./support.mjs";
 
 // Small, for references cost by the pixel.
-async function withPage(run, options = {}) {
-  const page = await openPage(browser, daemon.url, {
-    viewport: { width: 420, height: 480 },
-    ...options,
-  });
-  try {
-    await finalPicture(page);
-    await run(page);
-    assert.equal(await page.locator("#alert").isVisible(), false);
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
-}
+const { withPage } = sharedDaemon({
+  args: ["climate"],
+  page: { viewport: { width: 420, height: 480 } },
+});
 
 const words = (page) => page.locator("#reference").textContent();
 const mark = (page) => page.locator(".mark:visible").textContent();

@@ -1,8 +1,10 @@
 // What the browser tests share: the daemon, the browser, and a page that is watched for errors.
+import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { mkdirSync } from "node:fs";
 import { createServer } from "node:net";
 import { dirname, join } from "node:path";
+import { after, before } from "node:test";
 import { fileURLToPath } from "node:url";
 import { chromium } from "playwright-core";
 
@@ -100,6 +102,60 @@ export async function openPage(browser, url, { initScript, prepare, ...options }
   await prepare?.(page);
   await page.goto(url, { waitUntil: "load" });
   return page;
+}
+
+// One browser and one daemon for all tests of a file; `args` are the daemon's, its datasets for the
+// most part, and `page` holds the options that every page of the file has unless a test says
+// otherwise. Browser and daemon are there once the tests run, not before.
+export function sharedDaemon({ basePath = "/", args = [], page: usual = {} } = {}) {
+  const shared = { withPage };
+  before(async () => {
+    shared.browser = await launch();
+    shared.daemon = await new Daemon(await freePort(), basePath).start(...args);
+  });
+  after(async () => {
+    await shared.browser?.close();
+    await shared.daemon?.kill();
+  });
+
+  // Runs a test on a page of its own and returns what it returns; in the end nothing may be wrong.
+  // options: openPage's; `path`, what follows the daemon's address; `settle: false`, so as not to
+  // wait for the final picture first; `unfolded`, folders of the panel to open; `alert` and
+  // `faulty`, where an alert or errors in the console are part of the test.
+  async function withPage(run, options) {
+    const {
+      path = "",
+      settle = true,
+      unfolded = [],
+      alert = false,
+      faulty = false,
+      ...opening
+    } = { ...usual, ...options };
+    const page = await openPage(shared.browser, shared.daemon.url + path, opening);
+    try {
+      if (settle) await finalPicture(page);
+      await unfold(page, ...unfolded);
+      const result = await run(page);
+      const alerts = await page.locator("#alert:visible").allTextContents();
+      if (!alert) assert.deepEqual(alerts, [], "no alert is shown");
+      if (!faulty) assert.deepEqual(page.faults, [], "the browser's console is clean");
+      return result;
+    } finally {
+      await page.context().close();
+    }
+  }
+  return shared;
+}
+
+// A daemon of the test's own and a page on it; both are gone when the test is over, pass or fail.
+// options: openPage's, and the daemon's and `path` as above.
+export async function ownPage(t, browser, { basePath, args = [], path = "", ...options } = {}) {
+  const daemon = new Daemon(await freePort(), basePath);
+  t.after(() => daemon.kill());
+  await daemon.start(...args);
+  const page = await openPage(browser, daemon.url + path, options);
+  t.after(() => page.context().close());
+  return { daemon, page };
 }
 
 // Any frame at all has been drawn.

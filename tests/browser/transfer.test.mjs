@@ -1,53 +1,32 @@
 // The opacity curve's editor and the colours' range in a real browser: by mouse, keys and numbers,
 // and what pixels, frames and legend make of it.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import {
   control,
-  Daemon,
   finalPicture,
   framesOf,
-  freePort,
-  launch,
-  openPage,
   pixels,
+  sharedDaemon,
   shot,
   watchFrames,
   watchPatches,
 } from "./support.mjs";
 
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
+const shared = sharedDaemon({ page: { initScript: [watchFrames, watchPatches] } });
 
 // A page without lines, so that its pixels are the medium's.
 const mediaOnly = '#!{"dataset":"tornado","vector":{"field":null}}';
 
-async function withPage(run, path = mediaOnly, options = {}) {
-  const page = await openPage(browser, daemon.url + path, {
-    initScript: [watchFrames, watchPatches],
-    ...options,
-  });
-  try {
-    await finalPicture(page);
-    await page.locator(".transfer-point").first().scrollIntoViewIfNeeded();
-    await page.locator(".histogram-caption", { hasText: / to / }).first().waitFor();
-    await run(page);
-    assert.equal(await page.locator("#alert").isVisible(), false, "the server took every view");
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
-  } finally {
-    await page.context().close();
-  }
-}
+const withPage = (run, options) =>
+  shared.withPage(
+    async (page) => {
+      await page.locator(".transfer-point").first().scrollIntoViewIfNeeded();
+      await page.locator(".histogram-caption", { hasText: / to / }).first().waitFor();
+      await run(page);
+    },
+    { path: mediaOnly, ...options },
+  );
 
 const drawnCurve = (page) =>
   page.evaluate(() => window.frameHeaders.at(-1).chosen.view.scalars[0].extinction);
@@ -224,80 +203,86 @@ test("density scales every point of any curve; a logarithmic scale shows small o
   }));
 
 test("the range by step follows the steps, of all steps it stays, by hand it is custom", () =>
-  withPage(async (page) => {
-    const range = page.locator(".range-choice select").last();
-    const ranges = new Map();
-    for (const step of [0, 1]) {
-      const url = `${daemon.url}v1/datasets/tornado/fields/vorticity/range?step=${step}`;
-      ranges.set(step, (await (await fetch(url)).json()).range);
-    }
-    assert.notDeepEqual(ranges.get(0), ranges.get(1));
-    const close = (a, b) => a.every((end, n) => Math.abs(end - b[n]) <= 1e-5 * Math.abs(b[n]));
-    const drawn = async (wanted) => {
-      await page.waitForFunction(([low, high]) => {
-        const { view } = window.frameHeaders.at(-1)?.chosen ?? {};
-        const now = view?.scalars[0].color.range ?? [NaN, NaN];
-        const near = (a, b) => Math.abs(a - b) <= 1e-5 * Math.abs(b);
-        return near(now[0], low) && near(now[1], high);
-      }, wanted);
+  withPage(
+    async (page) => {
+      const range = page.locator(".range-choice select").last();
+      const ranges = new Map();
+      for (const step of [0, 1]) {
+        const url = `${shared.daemon.url}v1/datasets/tornado/fields/vorticity/range?step=${step}`;
+        ranges.set(step, (await (await fetch(url)).json()).range);
+      }
+      assert.notDeepEqual(ranges.get(0), ranges.get(1));
+      const close = (a, b) => a.every((end, n) => Math.abs(end - b[n]) <= 1e-5 * Math.abs(b[n]));
+      const drawn = async (wanted) => {
+        await page.waitForFunction(([low, high]) => {
+          const { view } = window.frameHeaders.at(-1)?.chosen ?? {};
+          const now = view?.scalars[0].color.range ?? [NaN, NaN];
+          const near = (a, b) => Math.abs(a - b) <= 1e-5 * Math.abs(b);
+          return near(now[0], low) && near(now[1], high);
+        }, wanted);
+        await finalPicture(page);
+      };
+      await range.selectOption("step");
+      await drawn(ranges.get(0));
+      const legend = await page.locator(".legend-medium .legend-ticks").innerHTML();
+      await page.locator("#time-next").click();
+      await drawn(ranges.get(1));
+      assert.notEqual(await page.locator(".legend-medium .legend-ticks").innerHTML(), legend);
+      const box = control(page, "colours to \\(s⁻¹\\)", "input");
+      assert.ok(close([Number(await box.inputValue())], [ranges.get(1)[1]]), "and the panel's box");
+      await page.locator("#undo-button").click();
+      await drawn(ranges.get(0));
+      assert.equal(await range.inputValue(), "step", "one undo for one step");
+      await page.locator("#redo-button").click();
+      await drawn(ranges.get(1));
+      assert.equal(await range.inputValue(), "step");
+      await range.selectOption("all");
+      const url = `${shared.daemon.url}v1/datasets/tornado/fields/vorticity/range?of=all`;
+      const all = (await (await fetch(url)).json()).range;
+      await drawn(all);
+      await page.locator("#time-next").click();
       await finalPicture(page);
-    };
-    await range.selectOption("step");
-    await drawn(ranges.get(0));
-    const legend = await page.locator(".legend-medium .legend-ticks").innerHTML();
-    await page.locator("#time-next").click();
-    await drawn(ranges.get(1));
-    assert.notEqual(await page.locator(".legend-medium .legend-ticks").innerHTML(), legend);
-    const box = control(page, "colours to \\(s⁻¹\\)", "input");
-    assert.ok(close([Number(await box.inputValue())], [ranges.get(1)[1]]), "and the panel's box");
-    await page.locator("#undo-button").click();
-    await drawn(ranges.get(0));
-    assert.equal(await range.inputValue(), "step", "one undo for one step");
-    await page.locator("#redo-button").click();
-    await drawn(ranges.get(1));
-    assert.equal(await range.inputValue(), "step");
-    await range.selectOption("all");
-    const url = `${daemon.url}v1/datasets/tornado/fields/vorticity/range?of=all`;
-    const all = (await (await fetch(url)).json()).range;
-    await drawn(all);
-    await page.locator("#time-next").click();
-    await finalPicture(page);
-    assert.ok(close(await drawnRange(page), all));
-    assert.equal(await range.inputValue(), "all");
-    const before = await pixels(page);
-    await box.fill(String(all[1] / 3));
-    await box.press("Enter");
-    await finalPicture(page);
-    assert.equal(await range.inputValue(), "custom");
-    assert.ok(close([(await drawnRange(page))[1]], [all[1] / 3]));
-    assert.notEqual((await pixels(page)).hash, before.hash);
-    await range.selectOption("step");
-    const strip = await page.locator(".histogram-strip").last().boundingBox();
-    await page.mouse.move(strip.x + 0.3 * strip.width, strip.y + 12);
-    await page.mouse.down();
-    await page.mouse.move(strip.x + 0.5 * strip.width, strip.y + 12, { steps: 4 });
-    await page.mouse.up();
-    await finalPicture(page);
-    assert.equal(await range.inputValue(), "custom", "a drag over the colours");
-  }, '#!{"dataset":"tornado","vector":{"field":null},"scalars":[{"field":"vorticity"}]}'));
+      assert.ok(close(await drawnRange(page), all));
+      assert.equal(await range.inputValue(), "all");
+      const before = await pixels(page);
+      await box.fill(String(all[1] / 3));
+      await box.press("Enter");
+      await finalPicture(page);
+      assert.equal(await range.inputValue(), "custom");
+      assert.ok(close([(await drawnRange(page))[1]], [all[1] / 3]));
+      assert.notEqual((await pixels(page)).hash, before.hash);
+      await range.selectOption("step");
+      const strip = await page.locator(".histogram-strip").last().boundingBox();
+      await page.mouse.move(strip.x + 0.3 * strip.width, strip.y + 12);
+      await page.mouse.down();
+      await page.mouse.move(strip.x + 0.5 * strip.width, strip.y + 12, { steps: 4 });
+      await page.mouse.up();
+      await finalPicture(page);
+      assert.equal(await range.inputValue(), "custom", "a drag over the colours");
+    },
+    { path: '#!{"dataset":"tornado","vector":{"field":null},"scalars":[{"field":"vorticity"}]}' },
+  ));
 
 test("the lines' colours by magnitude go by step, too", () =>
-  withPage(async (page) => {
-    await page
-      .locator("#panel .lil-gui", { hasText: /^Line colour/ })
-      .last()
-      .locator(".lil-title", { hasText: /^Histogram$/ })
-      .click();
-    const range = page.locator(".range-choice select").first();
-    const frames = await framesOf(page, async () => {
-      await range.selectOption("step");
-      await page.waitForFunction(() => window.frameHeaders.length > 0);
-    });
-    const url = `${daemon.url}v1/datasets/tornado/fields/wind/range?step=0`;
-    const wanted = (await (await fetch(url)).json()).range;
-    const drawn = frames.at(-1).chosen.view.vector.color.range;
-    assert.ok(Math.abs(drawn[1] / wanted[1] - 1) < 1e-5, `${drawn} for ${wanted}`);
-  }, '#!{"dataset":"tornado","vector":{"color":{"by":"magnitude"}}}'));
+  withPage(
+    async (page) => {
+      await page
+        .locator("#panel .lil-gui", { hasText: /^Line colour/ })
+        .last()
+        .locator(".lil-title", { hasText: /^Histogram$/ })
+        .click();
+      const range = page.locator(".range-choice select").first();
+      const frames = await framesOf(page, async () => {
+        await range.selectOption("step");
+        await page.waitForFunction(() => window.frameHeaders.length > 0);
+      });
+      const url = `${shared.daemon.url}v1/datasets/tornado/fields/wind/range?step=0`;
+      const wanted = (await (await fetch(url)).json()).range;
+      const drawn = frames.at(-1).chosen.view.vector.color.range;
+      assert.ok(Math.abs(drawn[1] / wanted[1] - 1) < 1e-5, `${drawn} for ${wanted}`);
+    },
+    { path: '#!{"dataset":"tornado","vector":{"color":{"by":"magnitude"}}}' },
+  ));
 
 test("on a phone the editor fits and a finger moves its points", () =>
   withPage(
@@ -311,6 +296,5 @@ test("on a phone the editor fits and a finger moves its points", () =>
       assert.ok(width >= 40, `${width}`);
       await shot(page, "transfer-360");
     },
-    mediaOnly,
     { viewport: { width: 360, height: 740 }, hasTouch: true, isMobile: true },
   ));

@@ -1,33 +1,12 @@
 // The page and its wire: bytes that come one at a time, recorded sessions that come all at once.
 import assert from "node:assert/strict";
 import { connect, createServer } from "node:net";
-import { after, before, test } from "node:test";
-import {
-  Daemon,
-  drag,
-  finalPicture,
-  freePort,
-  launch,
-  openPage,
-  patience,
-  pixels,
-  state,
-} from "./support.mjs";
-
-let browser;
-let daemon;
-
-before(async () => {
-  browser = await launch();
-  daemon = await new Daemon(await freePort()).start();
-});
-
-after(async () => {
-  await browser?.close();
-  await daemon?.kill();
-});
+import { test } from "node:test";
+import { drag, finalPicture, openPage, patience, pixels, sharedDaemon, state } from "./support.mjs";
 
 const small = { viewport: { width: 500, height: 420 } };
+const shared = sharedDaemon({ page: small });
+const { withPage } = shared;
 
 // Between the browser and the daemon: what the daemon says goes on a byte at a time, each in a
 // segment of its own, as far as the system does not join what its reader has not yet taken.
@@ -63,30 +42,28 @@ async function byteProxy(port) {
   };
 }
 
-test("page and frames that come a byte at a time are the same page and frames", async () => {
-  const proxy = await byteProxy(daemon.port);
-  const whole = await openPage(browser, daemon.url, small);
-  const torn = await openPage(browser, `http://127.0.0.1:${proxy.port}/`, small);
-  try {
-    await finalPicture(whole);
-    torn.setDefaultTimeout(60_000 * patience);
-    await finalPicture(torn);
-    assert.deepEqual(await pixels(torn), await pixels(whole));
-    assert.ok(proxy.counts.segments > 60_000, `${proxy.counts.segments} bytes, one by one`);
-    assert.ok(proxy.counts.segments > 100 * proxy.counts.reads, "fewer came in as many parts");
-    for (const page of [whole, torn]) {
-      await page.locator("#picture").focus();
-      await page.keyboard.press("ArrowRight");
-      await finalPicture(page);
-      assert.deepEqual(page.faults, []);
+test("page and frames that come a byte at a time are the same page and frames", () =>
+  withPage(async (whole) => {
+    const proxy = await byteProxy(shared.daemon.port);
+    const torn = await openPage(shared.browser, `http://127.0.0.1:${proxy.port}/`, small);
+    try {
+      torn.setDefaultTimeout(60_000 * patience);
+      await finalPicture(torn);
+      assert.deepEqual(await pixels(torn), await pixels(whole));
+      assert.ok(proxy.counts.segments > 60_000, `${proxy.counts.segments} bytes, one by one`);
+      assert.ok(proxy.counts.segments > 100 * proxy.counts.reads, "fewer came in as many parts");
+      for (const page of [whole, torn]) {
+        await page.locator("#picture").focus();
+        await page.keyboard.press("ArrowRight");
+        await finalPicture(page);
+        assert.deepEqual(page.faults, []);
+      }
+      assert.deepEqual(await pixels(torn), await pixels(whole), "after a turn too");
+    } finally {
+      await torn.context().close();
+      proxy.close();
     }
-    assert.deepEqual(await pixels(torn), await pixels(whole), "after a turn too");
-  } finally {
-    await whole.context().close();
-    await torn.context().close();
-    proxy.close();
-  }
-});
+  }));
 
 // Runs in a page first: keeps every message that comes in and what goes out between.
 const record = () => {
@@ -165,23 +142,21 @@ const replay = (tape) => {
   };
 };
 
-async function recorded(run) {
-  const page = await openPage(browser, daemon.url, { ...small, initScript: record });
-  try {
-    await finalPicture(page);
-    await run(page);
-    await finalPicture(page);
-    const tape = await page.evaluate(() => window.tape);
-    let said = 0;
-    const opening = tape.findIndex(({ base64 }) => base64 !== undefined);
-    tape.forEach((entry, n) => {
-      if (entry.sent !== undefined && n < opening) entry.first = ++said;
-    });
-    return { tape, pixels: await pixels(page), state: await state(page) };
-  } finally {
-    await page.context().close();
-  }
-}
+const recorded = (run) =>
+  withPage(
+    async (page) => {
+      await run(page);
+      await finalPicture(page);
+      const tape = await page.evaluate(() => window.tape);
+      let said = 0;
+      const opening = tape.findIndex(({ base64 }) => base64 !== undefined);
+      tape.forEach((entry, n) => {
+        if (entry.sent !== undefined && n < opening) entry.first = ++said;
+      });
+      return { tape, pixels: await pixels(page), state: await state(page) };
+    },
+    { initScript: record },
+  );
 
 const sessions = {
   "a turn": (page) => drag(page, 150, 60, 80),
@@ -195,29 +170,25 @@ const sessions = {
 for (const [name, run] of Object.entries(sessions)) {
   test(`${name}, recorded and replayed flat out, ends in the same picture`, async () => {
     const { tape, pixels: expected, state: last } = await recorded(run);
-    const page = await openPage(browser, daemon.url, {
-      ...small,
-      prepare: (fresh) => fresh.addInitScript(replay, tape),
-    });
-    try {
-      await page.waitForFunction(
-        (seq) => document.querySelector("#picture").dataset.seq === seq,
-        last.seq,
-      );
-      assert.deepEqual(await pixels(page), expected);
-      const played = await page.evaluate(() => window.played);
-      assert.ok(played.frames > 5, `${played.frames} frames were recorded`);
-      assert.ok(played.decodesMost <= 2, `${played.decodesMost} decoded at a time`);
-      assert.ok(played.decoded < played.frames, "what is overtaken is not decoded");
-      assert.equal(played.acks.at(-1), Number(last.seq), "the last answer counts for all");
-      assert.deepEqual(
-        played.acks,
-        [...played.acks].sort((a, b) => a - b),
-      );
-      assert.equal(played.closed, undefined, "the page takes it for the protocol that it is");
-      assert.deepEqual(page.faults, []);
-    } finally {
-      await page.context().close();
-    }
+    await withPage(
+      async (page) => {
+        await page.waitForFunction(
+          (seq) => document.querySelector("#picture").dataset.seq === seq,
+          last.seq,
+        );
+        assert.deepEqual(await pixels(page), expected);
+        const played = await page.evaluate(() => window.played);
+        assert.ok(played.frames > 5, `${played.frames} frames were recorded`);
+        assert.ok(played.decodesMost <= 2, `${played.decodesMost} decoded at a time`);
+        assert.ok(played.decoded < played.frames, "what is overtaken is not decoded");
+        assert.equal(played.acks.at(-1), Number(last.seq), "the last answer counts for all");
+        assert.deepEqual(
+          played.acks,
+          [...played.acks].sort((a, b) => a - b),
+        );
+        assert.equal(played.closed, undefined, "the page takes it for the protocol that it is");
+      },
+      { settle: false, prepare: (page) => page.addInitScript(replay, tape) },
+    );
   });
 }
