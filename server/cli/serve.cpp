@@ -72,8 +72,8 @@ class Control {
   void drain() {
     const std::lock_guard lock(mutex_);
     if (server_ == nullptr) _exit(exit_ok);
+    log::info("draining");  // before there can be word that it is done
     server_->drain();
-    log::info("draining");
   }
 
   // By one thread. Before there is anything to change it is done when there is.

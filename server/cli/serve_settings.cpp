@@ -164,6 +164,11 @@ Result<void> check_exposure(const ServeArguments& arguments, bool loopback) {
 void warn_of(const ServeSettings& settings) {
   const ServeArguments& arguments = settings.arguments;
   const net::ServerOptions& options = settings.options;
+  constexpr std::uint64_t usual_bytes_min = std::uint64_t{1} << 20;
+  if (parse_bytes(arguments.memory_limit).value_or(0) < usual_bytes_min) {
+    log::warn("hardly any data fits into the memory limit: without K, M or G it counts bytes",
+              {{"memory-limit", arguments.memory_limit}});
+  }
   for (const std::string* secret : {&arguments.token_file, &arguments.tls_key}) {
     if (!secret->empty() && others_read(*secret)) {
       log::warn("a secret can be read by others than its owner", {{"file", *secret}});

@@ -68,7 +68,9 @@ Result<void> Listener::listen(const std::string& address, std::uint16_t port) {
   }
   fault = bind(acceptor_, endpoint);
   if (fault) {
-    return make_error(ErrorKind::internal, "cannot listen on " + where + ": " + fault.message());
+    const bool taken = fault == boost::system::errc::address_in_use;
+    return make_error(ErrorKind::internal, "cannot listen on " + where + ": " + fault.message() +
+                                               (taken ? "; port 0 is any that is free" : ""));
   }
   endpoint_ = acceptor_.local_endpoint(fault);
   return {};

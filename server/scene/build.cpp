@@ -147,14 +147,17 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
   const protocol::VectorView& from = view.vector;
   VectorLayer layer;
   layer.scale = {from.scale[0], from.scale[1], from.scale[2]};
+  const data::FieldInfo& field = *fields.dataset.info().find(from.field.name);
   if (from.space == protocol::VectorSpace::world) {
-    const auto rates = world_rates(placed.grid, *fields.dataset.info().find(from.field.name),
-                                   view.geometry, placed.lattice);
+    const auto rates = world_rates(placed.grid, field, view.geometry, placed.lattice);
     if (!rates) return rates.error();
     const auto& level = fields.coarsening.halvings;
     layer.rate_x = coarsen_along(rates->x, placed.lattice.spacing[1], level[1]);
     layer.rate_y = rates->y;
     layer.rate_z = coarsen_along(rates->z, placed.lattice.spacing[2], level[2]);
+  } else if (field.component_units.size() > 2 && pressure_rate(field.component_units[2])) {
+    // Low pressure is high in the picture, so omega drawn as it stands would show rising air sink.
+    layer.scale[2] = -layer.scale[2];
   }
   layer.length = from.length.value();
   layer.span = from.span;

@@ -34,16 +34,6 @@ std::optional<double> metres(const Axis& axis) {
   return data::metres_in(axis.units);
 }
 
-// A rate of change of pressure (omega), in Pa/s per unit; empty if the unit is none.
-std::optional<double> pressure_rate(std::string_view unit) {
-  for (const std::string_view ending : {"/s", " s-1", " s^-1", " s**-1", "*s-1", ".s-1"}) {
-    if (unit.size() > ending.size() && unit.substr(unit.size() - ending.size()) == ending) {
-      return data::pascals_in(unit.substr(0, unit.size() - ending.size()));
-    }
-  }
-  return std::nullopt;
-}
-
 // d(world)/d(coordinate) at each of at least two samples, across its neighbours: exact where the
 // world is linear in the coordinate or (by_log) in its logarithm.
 std::vector<double> slopes(const Axis& axis, const std::vector<double>& world, bool by_log) {
@@ -163,6 +153,15 @@ Result<void> horizontal_rates(const data::Grid& grid, protocol::GeometryMapping 
 }
 
 }  // namespace
+
+std::optional<double> pressure_rate(std::string_view unit) {
+  for (const std::string_view ending : {"/s", " s-1", " s^-1", " s**-1", "*s-1", ".s-1"}) {
+    if (unit.size() > ending.size() && unit.substr(unit.size() - ending.size()) == ending) {
+      return data::pascals_in(unit.substr(0, unit.size() - ending.size()));
+    }
+  }
+  return std::nullopt;
+}
 
 Result<Rates> world_rates(const data::Grid& grid, const data::FieldInfo& field,
                           const protocol::GeometryView& geometry, const Lattice& lattice) {

@@ -2,6 +2,8 @@
 // differentiated. Needed when lines are to be tangent to trajectories as drawn (space = world).
 #pragma once
 
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "protocol/view.hpp"
@@ -10,6 +12,10 @@
 #include "server/scene/scene.hpp"
 
 namespace windsplat::scene {
+
+// A rate of change of pressure (omega), in Pa/s per unit; empty if the unit is none. Air rises
+// where it is negative.
+std::optional<double> pressure_rate(std::string_view unit);
 
 struct Rates {
   std::vector<double> x;  // by y index: meridians converge

@@ -155,6 +155,9 @@ TEST_F(CliServe, WhatDoesNotFitIntoTheMemoryLimitIsNamedAndSoIsTheOption) {
   const auto range = net_test::get(port, of + "fields/wind/range");
   EXPECT_EQ(range.status, 507);
   EXPECT_THAT(range.body, HasSubstr("field 'wind'"));
+  daemon.send(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0);
+  EXPECT_THAT(daemon.messages(), HasSubstr("without K, M or G it counts bytes"));
 }
 
 TEST_F(CliServe, SigintDrainsToo) {
@@ -198,6 +201,7 @@ TEST_F(CliServe, ATakenPortIsAnErrorThatNamesIt) {
   EXPECT_EQ(outcome.code, 1);
   EXPECT_EQ(outcome.out, "");
   EXPECT_THAT(outcome.err, HasSubstr(port.text()));
+  EXPECT_THAT(outcome.err, HasSubstr("port 0 is any that is free"));
 }
 
 // It serves all that it was asked to, or nothing.

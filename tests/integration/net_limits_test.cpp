@@ -273,7 +273,7 @@ TEST(Limits, pictures_too_large_or_too_dear_are_refused_before_anything_is_read)
   StreamClient viewer(server.port());
   const auto hello = viewer.next_text("hello");
   ASSERT_TRUE(hello);
-  EXPECT_EQ((*hello)["limits"]["imagePixelsMax"], 10'000);
+  EXPECT_EQ(Json::parse(*hello)["limits"]["imagePixelsMax"], 10'000);
   viewer.say(R"({"type":"patch","rev":1,"patch":)" + dear + "}");
   const auto told = viewer.next_text("error");
   ASSERT_TRUE(told);

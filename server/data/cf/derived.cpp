@@ -229,6 +229,10 @@ class DerivedFinder {
     note += in_quotes(field.info.name) + " is -omega R T / (p g) of " +
             in_quotes(variable(omega).name) + " and " + from;
     notes_.push_back(std::move(note));
+    notes_.push_back("the vertical part of " + in_quotes(plan.info.name) + " is in " +
+                     in_quotes(variable(omega).units) + ": its lines point up where air rises, " +
+                     "its magnitude mixes units, which " + in_quotes(field.info.name) +
+                     " does not");
     found_.push_back(std::move(field));
     return {};
   }

@@ -253,6 +253,7 @@ TEST(Omega, BecomesMetresASecondByTheFilesTemperature) {
     EXPECT_EQ(wind.masked, 1);
     EXPECT_TRUE(std::isnan(wind.component(0)[7]));
     EXPECT_TRUE(has_note(info, "the temperature 'ta'"));
+    EXPECT_TRUE(has_note(info, "'wind' is in 'Pa s-1': its lines point up where air rises"));
     EXPECT_EQ(has_note(info, "its values are Kelvin"), c.units == "C");
     EXPECT_TRUE(has_note(info, "'ps' is the surface pressure"));
     // Nothing is masked for lying below the surface pressure.

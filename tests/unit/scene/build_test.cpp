@@ -175,6 +175,18 @@ TEST(WorldRates, OmegaRisesWherePressureFalls) {
   }
 }
 
+// Low pressure is high in the picture, whatever a line's direction is made of.
+TEST(BuildScene, ComponentsPointUpWhereAirRises) {
+  View view;
+  view.vector.scale = {1, 2, 3};
+  for (const auto& [unit, sign] : {std::pair("m s-1", 1), {"Pa s-1", -1}, {"Pa/s", -1}}) {
+    auto dataset = weather(nullptr, unit);
+    const Scene scene = built(view, *dataset);
+    EXPECT_EQ(scene.vector->scale, glm::dvec3(1, 2, 3.0 * sign)) << unit;
+    EXPECT_TRUE(scene.vector->rate_z.empty());
+  }
+}
+
 TEST(WorldRates, HeightAxesTakeMetresPerSecondAsTheyStand) {
   data::Grid grid = atmosphere_grid();
   grid.axes[0] = axis(data::AxisKind::cartesian, "km", {0, 1, 2, 3});
