@@ -1,11 +1,14 @@
 // Arguments -> the chosen command; what escapes it -> exit codes.
 #include "server/cli/cli.hpp"
 
+#include <algorithm>
 #include <csignal>
 #include <exception>
 #include <iostream>
 #include <new>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/cli/command.hpp"
 #include "server/data/loader/loader.hpp"
@@ -17,6 +20,53 @@ constexpr const char* description =
     "windsplat draws winds and clouds from a 3-D field, on the CPU, for a browser or a file.\n"
     "Exit codes: 0 ok, 1 failed, 2 usage, 3 bad data, 130 interrupted (animate, study).\n"
     "An option that names an environment variable may be given by it; the option wins.";
+
+// How many letters are changed, added, taken away or swapped with their neighbour to make one word
+// of the other.
+std::size_t letters_between(std::string_view one, std::string_view other) {
+  std::vector<std::vector<std::size_t>> to(one.size() + 1,
+                                           std::vector<std::size_t>(other.size() + 1));
+  for (std::size_t i = 0; i <= one.size(); ++i) {
+    for (std::size_t j = 0; j <= other.size(); ++j) {
+      if (i == 0 || j == 0) {
+        to[i][j] = i + j;
+        continue;
+      }
+      const std::size_t changed = to[i - 1][j - 1] + (one[i - 1] == other[j - 1] ? 0 : 1);
+      to[i][j] = std::min({changed, to[i - 1][j] + 1, to[i][j - 1] + 1});
+      const bool swapped =
+          i > 1 && j > 1 && one[i - 1] == other[j - 2] && one[i - 2] == other[j - 1];
+      if (swapped) to[i][j] = std::min(to[i][j], to[i - 2][j - 2] + 1);
+    }
+  }
+  return to.back().back();
+}
+
+// What a command does not know, and what may have been meant.
+std::string unknown_argument(const CLI::App& app) {
+  const std::vector<std::string> extras = app.remaining(true);
+  const auto is_option = [](const std::string& word) { return word.starts_with('-'); };
+  const auto first = std::find_if(extras.begin(), extras.end(), is_option);
+  const auto chosen = app.get_subcommands();
+  const CLI::App& command = chosen.empty() ? app : *chosen.front();
+  if (first == extras.end()) {
+    const std::string& word = extras.empty() ? app.get_name() : extras.front();
+    return "'" + printable(word) + "' is one argument too many for '" + command.get_name() + "'";
+  }
+  const std::string word = first->substr(0, std::min<std::size_t>(first->find('='), 64));
+  std::string nearest;
+  std::size_t least = 3;  // farther words have little in common
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) {
+      const std::size_t letters = letters_between(word, "--" + name);
+      if (letters >= least) continue;
+      least = letters;
+      nearest = name;
+    }
+  }
+  return "'" + printable(word) + "' is no option of '" + command.get_name() + "'" +
+         (nearest.empty() ? "" : "; did you mean --" + nearest + "?");
+}
 
 int run_parsed(CLI::App& app, const Action& chosen, int argc, const char* const* argv) {
   if (argc <= 1) {
@@ -30,6 +80,10 @@ int run_parsed(CLI::App& app, const Action& chosen, int argc, const char* const*
   }
   try {
     app.parse(argc, argv);
+  } catch (const CLI::ExtrasError&) {
+    complain(unknown_argument(app));
+    complain("run with --help for more information");
+    return exit_usage;
   } catch (const CLI::ParseError& stop) {  // --help and --version too
     if (stop.get_exit_code() == 0) return app.exit(stop, std::cout, std::cerr);
     complain(printable(stop.what(), 2000));

@@ -166,7 +166,7 @@ void warn_of(const ServeSettings& settings) {
   const net::ServerOptions& options = settings.options;
   constexpr std::uint64_t usual_bytes_min = std::uint64_t{1} << 20;
   if (parse_bytes(arguments.memory_limit).value_or(0) < usual_bytes_min) {
-    log::warn("hardly any data fits into the memory limit: without K, M or G it counts bytes",
+    log::warn("hardly any data fits into the memory limit; a number without K, M or G is of bytes",
               {{"memory-limit", arguments.memory_limit}});
   }
   for (const std::string* secret : {&arguments.token_file, &arguments.tls_key}) {

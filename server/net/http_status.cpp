@@ -7,7 +7,6 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/read_until.hpp>
 #include <boost/asio/ssl/context.hpp>
-#include <boost/asio/ssl/host_name_verification.hpp>
 #include <boost/asio/ssl/stream.hpp>
 #include <boost/asio/streambuf.hpp>
 #include <boost/asio/write.hpp>
@@ -77,7 +76,14 @@ struct Exchange {
     ErrorCode is_name;  // an address is no name that a server could choose by
     (void)asio::ip::make_address(question.host, is_name);
     if (is_name) SSL_set_tlsext_host_name(stream.native_handle(), question.host.c_str());
-    stream.set_verify_callback(asio::ssl::host_name_verification(question.host));
+    SSL* ssl = stream.native_handle();
+    const int named =
+        is_name ? SSL_set1_host(ssl, question.host.c_str())
+                : X509_VERIFY_PARAM_set1_ip_asc(SSL_get0_param(ssl), question.host.c_str());
+    if (named != 1) {  // nobody is believed unchecked
+      fault = asio::error::invalid_argument;
+      return;
+    }
     stream.async_handshake(asio::ssl::stream_base::client, [this](ErrorCode ec) {
       if (!failed(ec)) ask(stream);
     });
@@ -90,6 +96,16 @@ struct Exchange {
       asio::async_read_until(over, answer, "\r\n",
                              [this](ErrorCode fault, std::size_t) { done = !failed(fault); });
     });
+  }
+
+  // Why it ended; of a certificate that was not believed also what is wrong with it.
+  [[nodiscard]] std::string reason(bool trusts_given) {
+    std::string out = fault.message();
+    if (!question.secure || fault.category() != asio::error::get_ssl_category()) return out;
+    const long result = SSL_get_verify_result(stream.native_handle());
+    if (result == X509_V_OK) return out;
+    out += std::string(" (") + X509_verify_cert_error_string(result) + ")";
+    return trusts_given ? out : out + "; --ca names certificates to trust";
   }
 
   bool failed(ErrorCode ec) {
@@ -146,7 +162,7 @@ Result<int> http_status(const std::string& url, int timeout_s, const std::string
   Exchange exchange(std::move(question), context);
   exchange.io.run_for(std::chrono::seconds(timeout_s));
   if (exchange.fault) {
-    return make_error(ErrorKind::internal, where + ": " + exchange.fault.message());
+    return make_error(ErrorKind::internal, where + ": " + exchange.reason(!ca.empty()));
   }
   if (!exchange.done) {
     return make_error(ErrorKind::internal,

@@ -155,8 +155,8 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
     layer.rate_x = coarsen_along(rates->x, placed.lattice.spacing[1], level[1]);
     layer.rate_y = rates->y;
     layer.rate_z = coarsen_along(rates->z, placed.lattice.spacing[2], level[2]);
-  } else if (field.component_units.size() > 2 && pressure_rate(field.component_units[2])) {
-    // Low pressure is high in the picture, so omega drawn as it stands would show rising air sink.
+  } else if (rises_where_negative(placed.grid, field)) {
+    // Drawn as it stands omega would show rising air sink.
     layer.scale[2] = -layer.scale[2];
   }
   layer.length = from.length.value();

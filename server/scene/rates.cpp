@@ -52,7 +52,7 @@ std::vector<double> slopes(const Axis& axis, const std::vector<double>& world, b
 
 // Coordinate units per second per unit of the component.
 Result<double> vertical_speed(const Axis& axis, double coordinate, std::string_view unit) {
-  const std::optional<double> omega = pressure_rate(unit);
+  const std::optional<double> omega = data::pascals_per_second_in(unit);
   switch (axis.kind) {
     case AxisKind::pressure: {
       if (!omega) return -coordinate / scale_height_m;
@@ -154,13 +154,12 @@ Result<void> horizontal_rates(const data::Grid& grid, protocol::GeometryMapping 
 
 }  // namespace
 
-std::optional<double> pressure_rate(std::string_view unit) {
-  for (const std::string_view ending : {"/s", " s-1", " s^-1", " s**-1", "*s-1", ".s-1"}) {
-    if (unit.size() > ending.size() && unit.substr(unit.size() - ending.size()) == ending) {
-      return data::pascals_in(unit.substr(0, unit.size() - ending.size()));
-    }
-  }
-  return std::nullopt;
+bool rises_where_negative(const data::Grid& grid, const data::FieldInfo& field) {
+  const AxisKind kind = grid.axes[2].kind;
+  const bool up_is_known =
+      kind == AxisKind::pressure || kind == AxisKind::height || kind == AxisKind::cartesian;
+  return up_is_known && field.component_units.size() > 2 &&
+         data::pascals_per_second_in(field.component_units[2]).has_value();
 }
 
 Result<Rates> world_rates(const data::Grid& grid, const data::FieldInfo& field,

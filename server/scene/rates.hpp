@@ -2,8 +2,6 @@
 // differentiated. Needed when lines are to be tangent to trajectories as drawn (space = world).
 #pragma once
 
-#include <optional>
-#include <string_view>
 #include <vector>
 
 #include "protocol/view.hpp"
@@ -13,9 +11,9 @@
 
 namespace windsplat::scene {
 
-// A rate of change of pressure (omega), in Pa/s per unit; empty if the unit is none. Air rises
-// where it is negative.
-std::optional<double> pressure_rate(std::string_view unit);
+// Whether the third component is a change of pressure (omega): where it is negative air rises, and
+// up is up in the picture on axes of pressure and of height. On numbered levels nobody knows.
+bool rises_where_negative(const data::Grid& grid, const data::FieldInfo& field);
 
 struct Rates {
   std::vector<double> x;  // by y index: meridians converge

@@ -54,6 +54,17 @@ test("the climate sample is there within 3 s of load, and soon its final picture
     { settle: false },
   ));
 
+test("a server that draws small pictures is asked for no larger ones", async (t) => {
+  const args = ["tornado", "--max-pixels", "1000000"];
+  const viewport = { width: 1920, height: 1080 };
+  const { page } = await ownPage(t, shared.browser, { args, viewport });
+  await finalPicture(page);
+  const { width, height } = await state(page);
+  const drawn = Number(width) * Number(height);
+  assert.ok(drawn <= 1_000_000 && drawn > 990_000, `${width} x ${height}`);
+  assert.equal(await page.locator("#alert").isVisible(), false);
+});
+
 test("a drag turns the volume at once and ends in a final picture", () =>
   withPage(async (page) => {
     const before = await state(page);

@@ -35,6 +35,7 @@ function withPage(run, { answers = {}, ...options } = {}) {
     initScript: [watchPatches, watchSteps],
     ...options,
     prepare: async (page) => {
+      await options.prepare?.(page);
       page.asked = [];
       for (const [pattern, answer] of Object.entries(answers)) {
         await page.route(new RegExp(pattern), (route) => {

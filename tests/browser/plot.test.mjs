@@ -39,6 +39,7 @@ function withPage(run, { status = 200, json = { view: {}, points, chosen: 2 }, .
     initScript: [watchFrames, watchPatches],
     ...options,
     prepare: async (page) => {
+      await options.prepare?.(page);
       page.asked = [];
       await page.route(/\/v1\/forecasts$/, (route) => {
         page.asked.push(route.request().postDataJSON());

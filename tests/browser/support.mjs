@@ -99,8 +99,13 @@ export async function openPage(browser, url, { initScript, prepare, ...options }
     if (message.type() === "error") page.faults.push(message.text());
   });
   page.on("pageerror", (error) => page.faults.push(String(error)));
-  await prepare?.(page);
-  await page.goto(url, { waitUntil: "load" });
+  try {
+    await prepare?.(page);
+    await page.goto(url, { waitUntil: "load" });
+  } catch (fault) {
+    await context.close();
+    throw fault;
+  }
   return page;
 }
 
@@ -111,7 +116,8 @@ export function sharedDaemon({ basePath = "/", args = [], page: usual = {} } = {
   const shared = { withPage };
   before(async () => {
     shared.browser = await launch();
-    shared.daemon = await new Daemon(await freePort(), basePath).start(...args);
+    shared.daemon = new Daemon(await freePort(), basePath);  // ended even where it does not start
+    await shared.daemon.start(...args);
   });
   after(async () => {
     await shared.browser?.close();

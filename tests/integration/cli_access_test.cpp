@@ -155,7 +155,9 @@ TEST_F(CliAccess, HealthIsCheckedOverTlsByWhomItTrusts) {
   const std::string url = line.substr(0, line.size() - 1);
   const std::string by_name =
       "https://localhost" + url.substr(std::string("https://127.0.0.1").size());
-  EXPECT_EQ(run({"healthcheck", url}).code, 1) << "signed by nobody";
+  const Outcome untrusted = run({"healthcheck", url});
+  EXPECT_EQ(untrusted.code, 1) << "signed by nobody";
+  EXPECT_THAT(untrusted.err, HasSubstr("--ca names certificates to trust"));
   EXPECT_EQ(run({"healthcheck", url, "--ca", folder.file("cert.pem")}).code, 0);
   EXPECT_EQ(run({"healthcheck", by_name}, {"WINDSPLAT_CA=" + folder.file("cert.pem")}).code, 0);
   write_file(folder.file("other.pem"), net_test::make_certificate("mine").chain);
@@ -163,9 +165,12 @@ TEST_F(CliAccess, HealthIsCheckedOverTlsByWhomItTrusts) {
   write_file(folder.file("none.pem"), "no certificate");
   EXPECT_EQ(run({"healthcheck", url, "--ca", folder.file("none.pem")}).code, 2);
   EXPECT_EQ(run({"healthcheck", url, "--ca", folder.file("absent.pem")}).code, 1);
+  // The same place by a name that the certificate does not have.
   const std::string other_name =
-      "https://127.0.0.2" + url.substr(std::string("https://127.0.0.1").size());
-  EXPECT_EQ(run({"healthcheck", other_name, "--ca", folder.file("cert.pem")}).code, 1);
+      "https://127.1" + url.substr(std::string("https://127.0.0.1").size());
+  const Outcome elsewhere = run({"healthcheck", other_name, "--ca", folder.file("cert.pem")});
+  EXPECT_EQ(elsewhere.code, 1);
+  EXPECT_THAT(elsewhere.err, HasSubstr("hostname mismatch"));
 }
 
 TEST_F(CliAccess, ACertificateThatIsNoGoodStopsTheStart) {

@@ -157,7 +157,7 @@ TEST_F(CliServe, WhatDoesNotFitIntoTheMemoryLimitIsNamedAndSoIsTheOption) {
   EXPECT_THAT(range.body, HasSubstr("field 'wind'"));
   daemon.send(SIGTERM);
   EXPECT_EQ(daemon.wait(), 0);
-  EXPECT_THAT(daemon.messages(), HasSubstr("without K, M or G it counts bytes"));
+  EXPECT_THAT(daemon.messages(), HasSubstr("hardly any data fits into the memory limit"));
 }
 
 TEST_F(CliServe, SigintDrainsToo) {

@@ -86,6 +86,15 @@ TEST(CliUsage, WrongArgumentsExitWith2AndSayWhyOnStderrAlone) {
   }
 }
 
+TEST(CliUsage, AWordThatIsNotKnownIsNamedWithWhatMayBeMeant) {
+  EXPECT_THAT(run({"render", "tornado", "-o", "x.png", "--siez", "3x3"}).err,
+              StartsWith("windsplat: '--siez' is no option of 'render'; did you mean --size?\n"));
+  EXPECT_THAT(run({"serve", "--memory-limt=4G"}).err, HasSubstr("did you mean --memory-limit?"));
+  EXPECT_THAT(run({"serve", "--banana"}).err,
+              StartsWith("windsplat: '--banana' is no option of 'serve'\n"));
+  EXPECT_THAT(run({"inspect", "tornado", "extra"}).err, HasSubstr("'extra' is one argument too"));
+}
+
 // What a user's words bring into a message cannot pose as lines or colours of the program's own.
 TEST(CliUsage, MessagesHoldNoControlCharactersOfTheArguments) {
   for (const Words& words : std::vector<Words>{

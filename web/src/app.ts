@@ -303,7 +303,7 @@ export class App {
   }
 
   private onHello(hello: HelloMessage): void {
-    this.parts.viewport.newSession();
+    this.parts.viewport.newSession(hello.limits.imagePixelsMax);
     this.answers.newSession();
     if (!this.maps.loaded) this.loadMaps();
     if (this.opening.begin(hello.datasets)) this.tellVisibility();

@@ -4,7 +4,6 @@ import { orbit, type Camera } from "./camera";
 import type { View } from "./protocol";
 
 const edgeMax = 8192; // pixels, the view's schema's
-const pixelsMax = 35_389_440;
 export const framesMax = 2000;
 
 export interface ExportSize {
@@ -13,7 +12,12 @@ export interface ExportSize {
   scale: number; // pixels a CSS pixel, less than what was asked for where a limit is in the way
 }
 
-export function exportSize(cssWidth: number, cssHeight: number, wanted: number): ExportSize {
+export function exportSize(
+  cssWidth: number,
+  cssHeight: number,
+  wanted: number,
+  pixelsMax: number, // the server's
+): ExportSize {
   const [w, h] = [Math.max(1, cssWidth), Math.max(1, cssHeight)];
   const scale = Math.min(wanted, edgeMax / Math.max(w, h), Math.sqrt(pixelsMax / (w * h)));
   const pixels = (edge: number) => Math.max(1, Math.floor(edge * scale + 1e-6));

@@ -113,6 +113,7 @@ const openSaving = saveDialog(
     dataset: () => app.dataset(),
     maps: app.maps,
     size: () => [canvas.clientWidth, canvas.clientHeight],
+    pixelsMax: () => viewport.pixelsMax,
     files,
   },
   document.baseURI,
@@ -211,11 +212,11 @@ function fillHelp(): void {
   }
 }
 
-function debouncedResize(): (width: number, height: number) => void {
+function debouncedResize(): () => void {
   let timer: number | undefined;
-  return (width, height) => {
+  return () => {
     window.clearTimeout(timer);
-    timer = window.setTimeout(() => app.resize(width, height), 120);
+    timer = window.setTimeout(() => app.resize(...viewport.size()), 120);
   };
 }
 

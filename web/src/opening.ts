@@ -12,7 +12,7 @@ import type {
 } from "./protocol";
 import type { Status } from "./status";
 import type { ViewModel } from "./view_model";
-import type { Outgoing } from "./view_state";
+import type { Outgoing, Patch } from "./view_state";
 
 export interface OpeningHost {
   say(message: ClientMessage): void;
@@ -131,7 +131,8 @@ export class Opening {
       this.host.empty();
       return false;
     }
-    if (wanted === undefined) model.state.change({ dataset: id });
+    // As large as this server draws and the window is by now.
+    model.state.change(this.host.firstView({ dataset: id }) as Patch);
     this.request(id, [model.state.restate()]);
     return true;
   }

@@ -43,7 +43,7 @@ function fill(host: SaveHost, dialog: HTMLElement): void {
 const scaleChosen = (): string => select("scale").value;
 
 const sizeChosen = (host: SaveHost, scaleMax: number): ExportSize =>
-  exportSize(...host.size(), Math.min(Number(scaleChosen()), scaleMax));
+  exportSize(...host.size(), Math.min(Number(scaleChosen()), scaleMax), host.pixelsMax());
 
 function animationChosen(): Animation {
   // Whatever is typed becomes a number that can be.

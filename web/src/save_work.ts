@@ -26,6 +26,7 @@ export interface SaveHost {
   dataset(): Dataset;
   maps: ColorMaps;
   size(): [width: number, height: number]; // CSS pixels
+  pixelsMax(): number; // of a picture that the server draws
   files: FileTarget;
 }
 

@@ -18,7 +18,7 @@ export interface ViewportEvents {
   decoded(header: FrameHeader, decodeMs: number): void; // since it came, shown or not
   drawn(frame: DrawnFrame): void;
   broken(header: FrameHeader): void; // could not be decoded
-  resized(width: number, height: number): void; // pixels to render
+  resized(): void; // size() may be another
 }
 
 const pixelsMax = 3.7e6; // a picture of 2560 x 1440; more is not worth its time
@@ -31,15 +31,17 @@ export function pictureSize(
   cssWidth: number,
   cssHeight: number,
   density: number,
+  serverPixelsMax: number,
 ): [number, number] {
   const wanted = clamp(density, 1, densityMax);
   const area = Math.max(1, cssWidth * cssHeight);
   const scale = Math.min(
     wanted,
-    Math.sqrt(pixelsMax / area),
+    Math.sqrt(Math.min(pixelsMax, serverPixelsMax) / area),
     edgeMax / Math.max(cssWidth, cssHeight, 1),
   );
-  return [Math.max(16, Math.round(cssWidth * scale)), Math.max(16, Math.round(cssHeight * scale))];
+  const pixels = (edge: number) => Math.max(16, Math.floor(edge * scale));
+  return [pixels(cssWidth), pixels(cssHeight)];
 }
 
 export interface Size {
@@ -63,6 +65,7 @@ export function placeOn(canvas: Size, picture: Size): [number, number, number, n
 }
 
 export class Viewport {
+  pixelsMax = pixelsMax; // what the server draws
   private drawn: FrameHeader | null = null; // of this session
   private readonly context: CanvasRenderingContext2D;
   private session = 0;
@@ -98,11 +101,12 @@ export class Viewport {
 
   size(): [number, number] {
     const { clientWidth, clientHeight } = this.canvas;
-    return pictureSize(clientWidth, clientHeight, window.devicePixelRatio);
+    return pictureSize(clientWidth, clientHeight, window.devicePixelRatio, this.pixelsMax);
   }
 
   // seq begins anew with each session.
-  newSession(): void {
+  newSession(serverPixelsMax: number): void {
+    this.pixelsMax = serverPixelsMax;
     this.session += 1;
     this.drawn = null;
     this.waiting = null;
@@ -175,6 +179,6 @@ export class Viewport {
 
   private report(): void {
     const { clientWidth, clientHeight } = this.canvas;
-    if (clientWidth > 0 && clientHeight > 0) this.events.resized(...this.size());
+    if (clientWidth > 0 && clientHeight > 0) this.events.resized();
   }
 }

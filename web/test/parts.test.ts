@@ -451,18 +451,21 @@ test("while the link holds patches up, moves are gathered and the newest wins", 
 });
 
 test("the picture is as sharp as the screen up to what is worth it", () => {
-  assert.deepEqual(pictureSize(800, 600, 1), [800, 600]);
-  assert.deepEqual(pictureSize(800, 600, 2), [1600, 1200]);
-  assert.deepEqual(pictureSize(400, 300, 3), [800, 600]);
-  assert.deepEqual(pictureSize(0, 0, 1), [16, 16]);
+  const most = 35_389_440; // of the server
+  assert.deepEqual(pictureSize(800, 600, 1, most), [800, 600]);
+  assert.deepEqual(pictureSize(800, 600, 2, most), [1600, 1200]);
+  assert.deepEqual(pictureSize(400, 300, 3, most), [800, 600]);
+  assert.deepEqual(pictureSize(0, 0, 1, most), [16, 16]);
   for (const [w, h, density] of [
     [3840, 2160, 2],
     [8000, 100, 1],
     [1440, 900, 2],
   ] as const) {
-    const [width, height] = pictureSize(w, h, density);
-    assert.ok(width * height <= 3.71e6 && width <= 4096 && height <= 4096);
-    assert.ok(Math.abs(width / height / (w / h) - 1) < 0.02);
+    for (const limit of [most, 300_000]) {
+      const [width, height] = pictureSize(w, h, density, limit);
+      assert.ok(width * height <= Math.min(limit, 3.7e6) && width <= 4096 && height <= 4096);
+      assert.ok(Math.abs(width / height / (w / h) - 1) < 0.02);
+    }
   }
 });
 

@@ -161,7 +161,7 @@ class DerivedFinder {
   // Pa/s a unit of a component; 0 if it is no change of pressure.
   [[nodiscard]] double omega_unit(const FileVariable& source) const {
     if (const auto unit = pascals_per_second_in(source.units)) return *unit;
-    const bool named = source.standard_name == "lagrangian_tendency_of_air_pressure";
+    const bool named = source.standard_name == omega_name;
     return named && source.units.empty() ? 1 : 0;
   }
 
@@ -229,10 +229,10 @@ class DerivedFinder {
     note += in_quotes(field.info.name) + " is -omega R T / (p g) of " +
             in_quotes(variable(omega).name) + " and " + from;
     notes_.push_back(std::move(note));
-    notes_.push_back("the vertical part of " + in_quotes(plan.info.name) + " is in " +
-                     in_quotes(variable(omega).units) + ": its lines point up where air rises, " +
-                     "its magnitude mixes units, which " + in_quotes(field.info.name) +
-                     " does not");
+    notes_.push_back(
+        "the vertical part of " + in_quotes(plan.info.name) + " is in " +
+        in_quotes(plan.info.component_units[2]) + ": its lines point up where air rises, " +
+        "its magnitude mixes units, which " + in_quotes(field.info.name) + " does not");
     found_.push_back(std::move(field));
     return {};
   }

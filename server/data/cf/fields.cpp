@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "server/data/cf/text.hpp"
+#include "server/data/cf/units.hpp"
 
 namespace windsplat::data::cf {
 
@@ -114,7 +115,10 @@ class FieldFinder {
     plan.info.dtype = dtype_of(first);
     for (const int v : components) {
       plan.info.components.push_back(variable(v).name);
-      plan.info.component_units.push_back(variable(v).units);
+      // The convention's own unit, where a file leaves it out.
+      const bool is_bare_omega =
+          variable(v).units.empty() && variable(v).standard_name == omega_name;
+      plan.info.component_units.push_back(is_bare_omega ? "Pa s-1" : variable(v).units);
       plan.info.long_name +=
           (plan.info.long_name.empty() ? "" : ", ") +
           (variable(v).long_name.empty() ? variable(v).name : variable(v).long_name);
@@ -159,7 +163,7 @@ class FieldFinder {
 
   [[nodiscard]] int rising_air(int like) const {
     const int up = standing_for(like, "upward_air_velocity");
-    return up >= 0 ? up : standing_for(like, "lagrangian_tendency_of_air_pressure");
+    return up >= 0 ? up : standing_for(like, std::string(omega_name));
   }
 
   // standard_name pairs and the quantity they are of: eastward_Q/northward_Q, x_Q/y_Q, Q_x_R/Q_y_R.

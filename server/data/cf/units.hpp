@@ -11,4 +11,7 @@ std::optional<double> metres_in(std::string_view unit);   // empty: not a length
 std::optional<double> pascals_in(std::string_view unit);  // empty: not a pressure
 std::optional<double> pascals_per_second_in(std::string_view unit);
 
+// The standard name of omega, in Pa s-1.
+inline constexpr std::string_view omega_name = "lagrangian_tendency_of_air_pressure";
+
 }  // namespace windsplat::data

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "server/data/cf/text.hpp"
+#include "server/data/cf/units.hpp"
 #include "server/data/dataset.hpp"
 #include "server/data/netcdf/file.hpp"
 
@@ -110,8 +111,8 @@ std::string component_standard_name(const DatasetInfo& info, const FieldInfo& fi
   if (component == 1) {
     return on_globe ? "northward_wind" : "y_wind";
   }
-  const bool is_omega = cf::lower(field.component_units.at(2)).starts_with("pa");
-  return is_omega ? "lagrangian_tendency_of_air_pressure" : "upward_air_velocity";
+  const bool is_omega = pascals_per_second_in(field.component_units.at(2)).has_value();
+  return std::string(is_omega ? omega_name : "upward_air_velocity");
 }
 
 // Every variable of every field once: a vector's components, then the scalars not among them.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 
 namespace windsplat::data::vtk {
@@ -13,6 +14,7 @@ constexpr int newton_steps = 16;
 constexpr double tolerance = 1e-6;
 // What slabs are widened by: more than a millionth in each of three coordinates moves a place.
 constexpr double slab_slack = 1e-5;
+constexpr double rounding_slack = 64 * std::numeric_limits<double>::epsilon();
 
 using Weights = std::array<double, 8>;
 using Simplex = std::array<std::uint8_t, 4>;
@@ -244,6 +246,10 @@ SlantedBox::SlantedBox(Shape shape, const Corners& corners)
     const double most = std::max({std::abs(edge[0]), std::abs(edge[1]), std::abs(edge[2])});
     for (double& part : edge) part = most > 0 ? part / most : 0;
   }
+  double farthest = 0;
+  for (std::size_t i = 0; i < corner_count; ++i) {
+    for (const double part : corners[i]) farthest = std::max(farthest, std::abs(part));
+  }
   for (std::size_t n = 0; n < count_; ++n) {
     Slab& slab = slabs_.at(n);
     slab.normal = cross(edges.at((n + 1) % 3), edges.at((n + 2) % 3));
@@ -252,7 +258,12 @@ SlantedBox::SlantedBox(Shape shape, const Corners& corners)
       slab.low = std::min(slab.low, at);
       slab.high = std::max(slab.high, at);
     }
-    const double slack = slab_slack * (slab.high - slab.low);
+    // And by what rounding moves a place far from 0, or in a long thin cell.
+    const double slack =
+        slab_slack * (slab.high - slab.low) +
+        rounding_slack *
+            (std::abs(slab.normal[0]) + std::abs(slab.normal[1]) + std::abs(slab.normal[2])) *
+            farthest;
     slab.low -= slack;
     slab.high += slack;
   }

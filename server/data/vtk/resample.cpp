@@ -15,6 +15,7 @@ namespace {
 // is refused. For each sample that lies in a cell if none overlap (meshes of simulations were seen
 // to take 3 to 12), so that a small file cannot ask for much; and in all (minutes).
 constexpr double work_a_sample = 128;
+constexpr std::uint64_t looks_a_work = 32;  // at samples of a row that are in a cell already
 constexpr std::uint64_t work_max = std::uint64_t{1} << 31;
 constexpr double samples_min_3d = 4096;
 constexpr double samples_min_2d = 1024;
@@ -298,7 +299,7 @@ class Resampler {
                 std::array<std::size_t, 3> index, std::size_t count) {
     const auto [from, to] = slanted.along_row(place_of(index), spacing_[0], count);
     const std::size_t begin = index[0];
-    ++work_;
+    work_ += 1 + (to - from) / looks_a_work;
     for (index[0] = begin + from; index[0] < begin + to; ++index[0]) {
       const std::size_t sample =
           index[0] * stride_[0] + index[1] * stride_[1] + index[2] * stride_[2];

@@ -210,7 +210,7 @@ TEST(HybridLevels, WithoutASurfacePressureLevelsStayLevels) {
 
 // u, v, omega and perhaps a temperature on two pressure levels.
 void write_omega(const std::string& path, const std::string& temperature_units,
-                 const std::vector<double>& temperature) {
+                 const std::vector<double>& temperature, const char* omega_units = "Pa s-1") {
   NetcdfMaker file(path);
   const int z = file.axis("plev", {50000, 100000}, "Pa", "air_pressure");
   const int y = file.axis("lat", {0, 10}, "degrees_north");
@@ -224,7 +224,7 @@ void write_omega(const std::string& path, const std::string& temperature_units,
   };
   add("ua", "eastward_wind", "m s-1", counting(8));
   add("va", "northward_wind", "m s-1", counting(8, 10));
-  add("wap", "lagrangian_tendency_of_air_pressure", "Pa s-1", {1, 1, 1, -999, -2, -2, -2, -2});
+  add("wap", "lagrangian_tendency_of_air_pressure", omega_units, {1, 1, 1, -999, -2, -2, -2, -2});
   if (!temperature.empty()) add("ta", "air_temperature", temperature_units.c_str(), temperature);
   file.text(file.variable("ps", NC_FLOAT, {y, x}, counting(4, 99000)), "units", "Pa");
 }
@@ -258,6 +258,20 @@ TEST(Omega, BecomesMetresASecondByTheFilesTemperature) {
     EXPECT_TRUE(has_note(info, "'ps' is the surface pressure"));
     // Nothing is masked for lying below the surface pressure.
     EXPECT_EQ(volume_of(**source, "ua").masked, 0);
+  }
+}
+
+// What the standard name says is Pa s-1 where the file is silent. A picture turns it by its unit.
+TEST(Omega, IsKnownByItsUnitOrItsStandardName) {
+  for (const auto& [written, told] : {std::pair("", "Pa s-1"), {"Pa/sec", "Pa/sec"}}) {
+    const Folder folder;
+    write_omega(folder / "o.nc", "", {}, written);
+    auto source = open_file(folder / "o.nc");
+    ASSERT_TRUE(source) << source.error().message;
+    const DatasetInfo& info = (*source)->info();
+    EXPECT_EQ(info.find("wind")->component_units.at(2), told);
+    EXPECT_TRUE(has_note(info, "'wind' is in '" + std::string(told) + "': its lines point up"));
+    EXPECT_NE(info.find("wind_m"), nullptr);
   }
 }
 

@@ -22,9 +22,9 @@ class Distorted {
   Corners cell(Shape shape) {
     const Corners unit = unit_cell(shape);
     const double scale = std::pow(10, uniform(-3, 3));
-    const double thickness = std::pow(10, uniform(-4, 0));
+    const double thickness = std::pow(10, uniform(-9, 0));
     const double knock = uniform(0, 1) < 0.5 ? 0 : uniform(0, 0.6);
-    const double distance = uniform(0, 1) < 0.5 ? 0 : 1e3 * scale;
+    const double distance = uniform(0, 1) < 0.5 ? 0 : scale * std::pow(10, uniform(0, 7));
     std::array<Point, 3> map{};
     for (Point& column : map) {
       for (double& part : column) part = scale * uniform(-1, 1);

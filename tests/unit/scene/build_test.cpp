@@ -179,12 +179,24 @@ TEST(WorldRates, OmegaRisesWherePressureFalls) {
 TEST(BuildScene, ComponentsPointUpWhereAirRises) {
   View view;
   view.vector.scale = {1, 2, 3};
-  for (const auto& [unit, sign] : {std::pair("m s-1", 1), {"Pa s-1", -1}, {"Pa/s", -1}}) {
+  for (const auto& [unit, sign] :
+       {std::pair("m s-1", 1), {"Pa s-1", -1}, {"Pa/s", -1}, {"hPa/sec", -1}}) {
     auto dataset = weather(nullptr, unit);
     const Scene scene = built(view, *dataset);
     EXPECT_EQ(scene.vector->scale, glm::dvec3(1, 2, 3.0 * sign)) << unit;
     EXPECT_TRUE(scene.vector->rate_z.empty());
   }
+}
+
+// Level 1 may be the highest or the lowest: then omega is drawn as it stands.
+TEST(BuildScene, OmegaOnNumberedLevelsIsNotTurned) {
+  data::Grid grid = atmosphere_grid();
+  grid.axes[2] = axis(data::AxisKind::level, "", {1, 2, 3});
+  data::FieldInfo wind = wind_info();
+  wind.component_units = {"m s-1", "m s-1", "Pa s-1"};
+  auto dataset = dataset_of(
+      std::make_unique<FakeSource>(std::move(grid), std::vector<data::FieldInfo>{wind}, 1));
+  EXPECT_EQ(built(View{}, *dataset).vector->scale, glm::dvec3(1, 1, 1));
 }
 
 TEST(WorldRates, HeightAxesTakeMetresPerSecondAsTheyStand) {
