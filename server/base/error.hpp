@@ -22,7 +22,7 @@ enum class ErrorKind {
   not_resident,   // 409, exit 1: the data are not in memory yet
   busy,           // 429, exit 1
   draining,       // 503, exit 1
-  out_of_memory,  // 507, exit 1: over the memory limit
+  out_of_memory,  // 507, exit 1: over the memory limit, or a disk that is full or read-only
   cancelled,      // 499, exit 1: nobody wants the answer any more
   internal,       // 500, exit 1: a fault of ours
 };

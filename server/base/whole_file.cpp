@@ -5,9 +5,11 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
 #include <cstddef>
 #include <string>
 #include <system_error>
+#include <utility>
 
 namespace windsplat {
 namespace {
@@ -42,6 +44,35 @@ int write_and_close(int file, std::string_view bytes, Sync sync = Sync::later) {
   return fault;
 }
 
+constexpr int links_max = 40;  // as the kernel's
+
+// The number of a descriptor that a name such as /dev/stdout, /dev/fd/3 or a link to one of them
+// stands for; -1 if it is none.
+int inherited_descriptor(fs::path path) {
+  std::error_code fault;
+  for (int i = 0; i < links_max; ++i) {
+    const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+    if (fs::equivalent(folder, "/proc/self/fd", fault)) {
+      const std::string name = path.filename().native();
+      int number = -1;
+      const auto [end, bad] = std::from_chars(name.data(), name.data() + name.size(), number);
+      return bad == std::errc() && end == name.data() + name.size() ? number : -1;
+    }
+    if (!fs::is_symlink(fs::symlink_status(path, fault))) return -1;
+    path = folder / fs::read_symlink(path, fault);
+  }
+  return -1;
+}
+
+// What others write to the same descriptor stays: nothing is opened anew or cut off.
+Result<void> write_to_descriptor(int number, const fs::path& path, std::string_view bytes) {
+  const int file = ::fcntl(number, F_DUPFD_CLOEXEC, 0);
+  if (file < 0) return file_error("cannot write", path, errno);
+  if (const int fault = write_and_close(file, bytes))
+    return file_error("cannot write", path, fault);
+  return {};
+}
+
 Result<void> write_in_place(const fs::path& path, std::string_view bytes) {
   const int file = ::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY);
   if (file < 0) return file_error("cannot write", path, errno);
@@ -64,12 +95,35 @@ int create(const fs::path& path) {
 
 }  // namespace
 
+fs::path end_of_links(fs::path path) {
+  std::error_code fault;
+  for (int i = 0; i < links_max && fs::is_symlink(fs::symlink_status(path, fault)); ++i) {
+    const fs::path target = fs::read_symlink(path, fault);
+    if (fault) break;
+    path = path.parent_path() / target;  // an absolute one stands for itself
+  }
+  return path;
+}
+
+bool is_stream(const fs::path& path) {
+  if (inherited_descriptor(path) >= 0) return true;
+  std::error_code ignored;
+  const fs::file_status status = fs::status(path, ignored);
+  return fs::is_fifo(status) || fs::is_character_file(status) || fs::is_socket(status);
+}
+
 Result<void> write_whole_file(const fs::path& path, std::string_view bytes, Sync sync) {
   std::error_code ignored;
+  if (const int number = inherited_descriptor(path); number >= 0) {
+    return write_to_descriptor(number, path, bytes);
+  }
   const fs::file_status status = fs::status(path, ignored);
   const bool replaces = fs::is_regular_file(status);
   if (fs::exists(status) && !replaces) return write_in_place(path, bytes);
-  const fs::path target = replaces ? fs::canonical(path, ignored) : path;
+  const fs::path target = end_of_links(path);
+  if (fs::is_symlink(fs::symlink_status(target, ignored))) {
+    return file_error("cannot write", path, ELOOP);
+  }
   fs::path part = target;
   part += ".";
   part += std::to_string(::getpid());

@@ -84,6 +84,41 @@ TEST_F(WholeFile, OfALinkTheFileBehindItIsWritten) {
   EXPECT_EQ(read(path), "new");
 }
 
+TEST_F(WholeFile, OfALinkWhoseFileIsNotThereYetTheFileIsMade) {
+  fs::create_directory(folder_ / "sub");
+  const fs::path link = folder_ / "link.png";
+  fs::create_symlink("sub/second.png", link);
+  fs::create_symlink("../a.png", folder_ / "sub" / "second.png");
+  ASSERT_TRUE(write_whole_file(link, "new"));
+  EXPECT_TRUE(fs::is_symlink(link));
+  EXPECT_TRUE(fs::is_symlink(folder_ / "sub" / "second.png"));
+  EXPECT_EQ(read(folder_ / "a.png"), "new");
+  EXPECT_EQ(entries(), 3) << "no part is left";
+  fs::create_symlink("round.png", folder_ / "round.png");
+  EXPECT_FALSE(write_whole_file(folder_ / "round.png", "new"));
+  EXPECT_TRUE(fs::is_symlink(folder_ / "round.png"));
+}
+
+// As /dev/stdout is where stdout goes to a file, others write there before and after.
+TEST_F(WholeFile, ADescriptorsNameIsWrittenToWhereItStands) {
+  const fs::path path = folder_ / "log";
+  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  ASSERT_GE(file, 0);
+  ASSERT_EQ(::write(file, "before ", 7), 7);
+  const std::string name = std::to_string(file);
+  fs::create_symlink("/dev/fd/" + name, folder_ / "link");
+  EXPECT_TRUE(write_whole_file("/proc/self/fd/" + name, "one "));
+  EXPECT_TRUE(write_whole_file(folder_ / "link", "two "));
+  ASSERT_EQ(::write(file, "after", 5), 5);
+  ::close(file);
+  EXPECT_EQ(read(path), "before one two after");
+  EXPECT_TRUE(is_stream(folder_ / "link"));
+  EXPECT_TRUE(is_stream("/dev/stdout"));
+  EXPECT_TRUE(is_stream("/dev/null"));
+  EXPECT_FALSE(is_stream(path));
+  EXPECT_FALSE(is_stream(folder_.path()));
+}
+
 TEST_F(WholeFile, WhatIsNoRegularFileIsWrittenToAndStays) {
   const fs::path pipe = folder_ / "pipe.png";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
