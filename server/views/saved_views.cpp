@@ -10,6 +10,7 @@
 
 #include <array>
 #include <cerrno>
+#include <cstdio>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -62,6 +63,16 @@ Error unusable(const fs::path& folder, const std::string& why) {
 
 std::string words_of(int fault) { return std::generic_category().message(fault); }
 
+void warn_if_anybody_writes(int folder, const fs::path& path) {
+  struct stat facts {};
+  if (::fstat(folder, &facts) != 0) return;
+  if ((facts.st_mode & S_IWOTH) == 0 || (facts.st_mode & S_ISVTX) != 0) return;
+  std::array<char, 8> mode{};
+  std::snprintf(mode.data(), mode.size(), "%04o", static_cast<unsigned>(facts.st_mode & 07777U));
+  log::warn("every user of this machine can change the saved views",
+            {{"folder", path.native()}, {"mode", mode.data()}});
+}
+
 // The folder itself, held against other processes for as long as the handle lives.
 Result<Handle> claim(const fs::path& folder) {
   std::error_code fault;
@@ -74,14 +85,20 @@ Result<Handle> claim(const fs::path& folder) {
                                 ? "is in use by another windsplat; --state-dir names one for this"
                                 : "cannot be locked: " + words_of(errno));
   }
-  // Who knows a view's id may change it: the list is for nobody else.
-  if (::mkdirat(handle.get(), "views", S_IRWXU) != 0 && errno != EEXIST) {
-    return unusable(folder, "cannot be written to: " + words_of(errno));
+  const Handle views(::openat(handle.get(), "views", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (views.get() < 0 && errno != ENOENT) {
+    return unusable(folder, "has views that cannot be read: " + words_of(errno));
   }
-  if (::access((folder / "views").c_str(), R_OK | W_OK | X_OK) != 0) {
-    return unusable(folder, "cannot be written to: " + words_of(errno));
-  }
+  warn_if_anybody_writes(handle.get(), folder);
+  if (views.get() >= 0) warn_if_anybody_writes(views.get(), folder / "views");
   return handle;
+}
+
+// Why nothing can be written below the folder of views, as an errno, or 0. Creates the folder where
+// it is missing. Whoever knows a view's id may change it: the list is for nobody else.
+int write_fault(const fs::path& folder) {
+  if (::mkdir(folder.c_str(), S_IRWXU) != 0 && errno != EEXIST) return errno;
+  return ::faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) == 0 ? 0 : errno;
 }
 
 // A regular file of at most file_bytes_max bytes, or what is wrong with it.
@@ -164,7 +181,12 @@ struct SavedViews::State {
            fs::is_regular_file(fs::symlink_status(path, ignored));
   }
 
+  // A folder that cannot be written to serves the views that it holds.
   void read_folder() {
+    if (const int fault = write_fault(folder); fault != 0) {
+      log::warn("the state folder cannot be written to: saved views can be read, not changed",
+                {{"folder", folder.native()}, {"fault", words_of(fault)}});
+    }
     std::error_code fault;
     int left_alone = 0;
     for (fs::directory_iterator at(folder, fault), end; !fault && at != end; at.increment(fault)) {
@@ -214,8 +236,12 @@ struct SavedViews::State {
     }
   }
 
-  [[nodiscard]] static Error disk_error(const Error& error) {
+  [[nodiscard]] Error disk_error(const Error& error) const {
     log::error("a saved view could not be changed on disk", {{"fault", error.message}});
+    if (const int fault = write_fault(folder); fault != 0) {
+      return make_error(ErrorKind::out_of_memory,
+                        "saved views cannot be changed now, only read: " + words_of(fault));
+    }
     return make_error(error.kind, error.kind == ErrorKind::out_of_memory
                                       ? "the disk that views are kept on is full"
                                       : "the view could not be changed on disk");
@@ -311,8 +337,8 @@ Result<bool> SavedViews::remove(const std::string& id, const Check& may) {
   if (state_->on_disk()) {
     std::error_code fault;
     fs::remove(state_->file_of(id), fault);  // no error where somebody else removed it
-    if (fault) return State::disk_error(make_error(ErrorKind::internal, fault.message()));
-    if (const auto ok = sync_folder(state_->folder); !ok) return State::disk_error(ok.error());
+    if (fault) return state_->disk_error(make_error(ErrorKind::internal, fault.message()));
+    if (const auto ok = sync_folder(state_->folder); !ok) return state_->disk_error(ok.error());
   }
   const std::lock_guard lock_map(state_->reading);
   state_->bytes -= entry->bytes;

@@ -25,7 +25,8 @@ struct Options {
 // Any thread. find() never waits for a disk; what changes views does, one at a time.
 class SavedViews {
  public:
-  // Reads what is there. What is no view's file is told in the log and left alone. Errors: invalid,
+  // Reads what is there. What is no view's file is told in the log and left alone, and so is a
+  // folder that cannot be written to: its views are served, changes are refused. Errors: invalid,
   // where the folder cannot be used or another process does.
   static Result<std::shared_ptr<SavedViews>> open(Options options);
   ~SavedViews();
@@ -37,7 +38,7 @@ class SavedViews {
   [[nodiscard]] Result<protocol::SavedView> find(const std::string& id) const;
 
   // Under a new id. None that is there gives way. Errors: out_of_memory (views_max, bytes_max, the
-  // disk), internal (the disk).
+  // disk is full or cannot be written to), internal (the disk fails).
   Result<protocol::SavedView> add(protocol::ViewDocument view, std::string created);
 
   // Whether what is there now may be changed; and what it becomes, or why not. Nobody else changes
@@ -47,7 +48,7 @@ class SavedViews {
   // Empty where it may not be. Errors: not_found, those of the change, those of add().
   Result<std::optional<protocol::SavedView>> replace(const std::string& id, const Check& may,
                                                      const Change& change);
-  // False where it may not be. Errors: not_found, internal (the disk).
+  // False where it may not be. Errors: not_found, those of the disk as in add().
   Result<bool> remove(const std::string& id, const Check& may);
 
  private:

@@ -5,12 +5,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <set>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -38,6 +40,31 @@ Result<std::optional<SavedView>> set_step(SavedViews& views, const std::string& 
 }
 
 std::size_t bytes_of(const SavedView& saved) { return protocol::encode_view_file(saved).size(); }
+
+TEST(SavedViewsFolder, ThatAnybodyMayChangeIsNamed) {
+  const test::Folder folder;
+  const auto warnings = [&](fs::perms state, fs::perms views) {
+    fs::create_directories(folder / "state/views");
+    fs::permissions(folder / "state", state);
+    fs::permissions(folder / "state/views", views);
+    testing::internal::CaptureStderr();
+    EXPECT_TRUE(SavedViews::open({folder / "state"}));
+    std::istringstream log(testing::internal::GetCapturedStderr());
+    std::string out;
+    for (std::string line; std::getline(log, line);) {
+      if (line.find("mode=") != std::string::npos) out += line + '\n';
+    }
+    return out;
+  };
+  const fs::perms group = fs::perms::owner_all | fs::perms::group_all;
+  const fs::perms all = fs::perms::all;
+  EXPECT_EQ(warnings(group, group | fs::perms::others_read), "");
+  EXPECT_EQ(warnings(all | fs::perms::sticky_bit, group), "");
+  const std::string state = warnings(all, group);
+  EXPECT_THAT(state, HasSubstr("/state mode=0777"));
+  EXPECT_THAT(state, testing::Not(HasSubstr("/views")));
+  EXPECT_THAT(warnings(group, all), HasSubstr("/state/views mode=0777"));
+}
 
 TEST(SavedViewsInMemory, AreFoundUnderIdsOfTheirOwn) {
   const auto views = SavedViews::open({}).value();
@@ -301,6 +328,63 @@ TEST_F(SavedViewsOnDisk, AWriteThatFailsChangesNothing) {
   EXPECT_EQ(views->find(id)->view.view().step, 1);
   EXPECT_TRUE(views->add(view_of_step(2), time_of_all)) << "what failed takes no room";
   EXPECT_FALSE(views->add(view_of_step(3), time_of_all));
+}
+
+// The folder and the one of views can be read and not written to, also by root.
+class ReadOnly {
+ public:
+  explicit ReadOnly(const fs::path& root) : root_(root), user_(::geteuid()) {
+    set(fs::perms(0555));
+    constexpr uid_t nobody = 65534;
+    EXPECT_EQ(user_ == 0 ? ::seteuid(nobody) : 0, 0);
+  }
+  ~ReadOnly() {
+    EXPECT_EQ(::seteuid(user_), 0);
+    set(fs::perms::owner_all);
+  }
+  ReadOnly(const ReadOnly&) = delete;
+  ReadOnly& operator=(const ReadOnly&) = delete;
+
+ private:
+  void set(fs::perms permissions) const {
+    fs::permissions(root_, permissions);
+    for (const auto& inside : fs::recursive_directory_iterator(root_)) {
+      fs::permissions(inside, permissions);
+    }
+  }
+
+  fs::path root_;
+  uid_t user_;
+};
+
+TEST_F(SavedViewsOnDisk, AFolderThatBecomesReadOnlyServesItsViewsAndRefusesChangesWithTheReason) {
+  const auto views = open().value();
+  const std::string id = views->add(view_of_step(1), time_of_all)->id;
+  {
+    const ReadOnly disk(root_.path());
+    EXPECT_TRUE(views->find(id));
+    const std::vector<Error> refused{views->add(view_of_step(2), time_of_all).error(),
+                                     set_step(*views, id, 2).error(),
+                                     views->remove(id, always).error()};
+    for (const Error& error : refused) {
+      EXPECT_EQ(error.kind, ErrorKind::out_of_memory) << error.message;
+      EXPECT_THAT(error.message, HasSubstr("Permission denied"));
+      EXPECT_EQ(error.message.find(root_.path().native()), std::string::npos);
+    }
+  }
+  EXPECT_TRUE(set_step(*views, id, 3)) << "it can be written to again";
+}
+
+TEST_F(SavedViewsOnDisk, AReadOnlyFolderIsOpenedAndRead) {
+  const std::string id = open().value()->add(view_of_step(1), time_of_all)->id;
+  fs::create_directory(root_ / "empty");
+  const ReadOnly disk(root_.path());
+  const auto views = open();
+  ASSERT_TRUE(views) << views.error().message;
+  EXPECT_EQ((*views)->find(id)->view.view().step, 1);
+  const auto without = SavedViews::open({root_ / "empty"});
+  ASSERT_TRUE(without) << without.error().message;
+  EXPECT_EQ((*without)->add(view_of_step(1), time_of_all).error().kind, ErrorKind::out_of_memory);
 }
 
 TEST_F(SavedViewsOnDisk, AnIdWhoseFileIsThereIsNotGivenAgain) {
