@@ -17,6 +17,7 @@ using data::AxisKind;
 using protocol::VerticalPlacement;
 
 constexpr double box_edge = 2.0;         // of the longest edge, world units
+constexpr double cell_min = 1e-19;       // its square is a float still
 constexpr double vertical_share = 0.15;  // of the longest horizontal edge, for another unit
 
 bool all_positive(const std::vector<double>& values) {
@@ -143,8 +144,10 @@ Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryV
     auto raw = raw_positions(grid.axes[a], a == 2, geometry.vertical);
     if (!raw) return raw.error();
     axes[a].positions = std::move(*raw);
-    axes[a].edges = cell_edges(axes[a].positions);
     const bool stretched = a == 2 && vertical_extent.has_value();
+    // A single layer is centred wherever it stands: beyond 2^53 half a cell more is lost.
+    if (axes[a].positions.size() == 1 && !stretched) axes[a].positions = {0};
+    axes[a].edges = cell_edges(axes[a].positions);
     axes[a].extent =
         stretched ? *vertical_extent : std::array{axes[a].edges.front(), axes[a].edges.back()};
     axes[a].thin = axes[a].positions.size() == 1 && !stretched;
@@ -173,6 +176,12 @@ Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryV
     for (std::size_t i = 0; i < axis.positions.size(); ++i) {
       lattice.positions[a].push_back((axis.positions[i] - centre) * scale);
       lattice.spacing[a].push_back((axis.edges[i + 1] - axis.edges[i]) * scale);
+    }
+    const auto& spacing = lattice.spacing[a];
+    if (*std::min_element(spacing.begin(), spacing.end()) < cell_min) {
+      return make_error(ErrorKind::bad_data, "the samples of axis \"" +
+                                                 printable(grid.axes[a].name) +
+                                                 "\" are too close together to be placed");
     }
     lattice.box_min[index] = -0.5 * world_length;
     lattice.box_max[index] = 0.5 * world_length;

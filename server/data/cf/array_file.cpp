@@ -1,6 +1,11 @@
 // What every ArrayFile does alike.
 #include "server/data/cf/array_file.hpp"
 
+#include <algorithm>
+
+#include "server/data/bytes/scalar.hpp"
+#include "server/data/limits.hpp"
+
 namespace windsplat::data::cf {
 
 int variable_named(const FileContents& contents, std::string_view name) {
@@ -19,13 +24,52 @@ Result<std::vector<double>> ArrayFile::read_all(int variable) const {
     count.push_back(contents().dimensions.at(static_cast<std::size_t>(dim)).length);
     values *= count.back();
   }
+  const double bytes = std::max(decoded_bytes(*this, variable, start, count),
+                                static_cast<double>(values) * sizeof(double));
+  if (auto fine = charge(variable, bytes); !fine) return fine.error();
   std::vector<double> out(values);
   if (values > 0) {
     if (auto done = read(variable, start, count, out.data()); !done) {
       return done.error();
     }
+    forget_chunks(variable);  // it is read once
   }
   return out;
+}
+
+Result<void> ArrayFile::charge(int variable, double bytes) const {
+  if (!stored_bytes_ || charged_.count(variable) > 0) return {};
+  const std::uint64_t most = voluntary_bytes_max(*stored_bytes_);
+  if (charged_bytes_ + bytes <= static_cast<double>(most)) {
+    charged_bytes_ += bytes;
+    charged_.insert(variable);
+    return {};
+  }
+  return make_error(
+      ErrorKind::bad_data,
+      "to open it, more than " + std::to_string(most) +
+          " bytes must be decoded, the limit for a file of " + std::to_string(*stored_bytes_) +
+          " bytes: " + in_quotes(contents().variables.at(at(variable)).name) + " is too large");
+}
+
+double decoded_bytes(const ArrayFile& file, int variable, const std::vector<std::size_t>& start,
+                     const std::vector<std::size_t>& count) {
+  const auto type = bytes::scalar_named(file.contents().variables.at(at(variable)).type);
+  const std::vector<std::size_t> chunk = file.chunk(variable);
+  auto decoded = static_cast<double>(type ? bytes::size_of(*type) : sizeof(double));
+  for (std::size_t d = 0; d < count.size(); ++d) {
+    if (count[d] == 0) return 0;
+    const std::size_t chunks = (start[d] + count[d] - 1) / chunk[d] - start[d] / chunk[d] + 1;
+    decoded *= static_cast<double>(chunks) * static_cast<double>(chunk[d]);
+  }
+  return decoded;
+}
+
+double chunk_bytes(const ArrayFile& file, int variable) {
+  const auto type = bytes::scalar_named(file.contents().variables.at(at(variable)).type);
+  auto bytes = static_cast<double>(type ? bytes::size_of(*type) : sizeof(double));
+  for (const std::size_t length : file.chunk(variable)) bytes *= static_cast<double>(length);
+  return bytes;
 }
 
 }  // namespace windsplat::data::cf

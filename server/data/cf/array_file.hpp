@@ -3,6 +3,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,6 +25,13 @@ int variable_named(const FileContents& contents, std::string_view name);
 struct Numbers {
   std::vector<double> values;  // empty if the attribute is absent or text
   bool floating = false;       // stored as float or double
+};
+
+// Chunks of a variable that were never written: read() gives NaN for them.
+struct Unwritten {
+  std::size_t chunks = 0;
+  std::size_t looked_at = 0;  // chunks that were looked for, from the first; what has none is one
+  bool is_all = true;         // there are no others
 };
 
 class ArrayFile {
@@ -52,11 +62,33 @@ class ArrayFile {
   // The same of a variable of type float32, without a detour.
   virtual Result<void> read(int variable, const std::vector<std::size_t>& start,
                             const std::vector<std::size_t>& count, float* out) const = 0;
+  // Looks for at most `most` chunks of a variable, without reading them.
+  [[nodiscard]] virtual Unwritten unwritten(int /*variable*/, std::size_t /*most*/) const {
+    return {};
+  }
   // Frees what the reader keeps of a variable between reads.
   virtual void forget_chunks(int /*variable*/) const {}
 
-  // A whole variable of few values.
+  // A whole variable of few values, for which charge() is asked first.
   [[nodiscard]] Result<std::vector<double>> read_all(int variable) const;
+
+  // How large the files are, which bounds what charge() grants. Until then there is no bound.
+  void set_stored_bytes(std::uint64_t bytes) { stored_bytes_ = bytes; }
+  [[nodiscard]] std::optional<std::uint64_t> stored_bytes() const { return stored_bytes_; }
+  // Before a variable is decoded to open the dataset, so many bytes of it; each variable is charged
+  // once. Errors: bad_data beyond voluntary_bytes_max(); nothing is charged then.
+  [[nodiscard]] Result<void> charge(int variable, double bytes) const;
+
+ private:
+  std::optional<std::uint64_t> stored_bytes_;
+  mutable double charged_bytes_ = 0;
+  mutable std::set<int> charged_;
 };
+
+// Bytes that reading a block decodes: whole chunks, as they are stored.
+double decoded_bytes(const ArrayFile& file, int variable, const std::vector<std::size_t>& start,
+                     const std::vector<std::size_t>& count);
+// The same of one chunk; of what has none a single value.
+double chunk_bytes(const ArrayFile& file, int variable);
 
 }  // namespace windsplat::data::cf

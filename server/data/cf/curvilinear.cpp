@@ -77,19 +77,24 @@ struct Table {
   std::size_t columns = 0;
 };
 
-// In the volumes' order: x fastest, from west to east and from south to north.
-std::vector<double> in_order(const Table& table, int x, std::array<std::size_t, 2> lengths,
+// In the volumes' order: x fastest, from west to east and from south to north. In place, but for
+// the exchange of rows and columns.
+std::vector<double> in_order(Table table, int x, std::array<std::size_t, 2> lengths,
                              const std::array<bool, 2>& turned) {
-  std::vector<double> out(table.values.size());
-  for (std::size_t j = 0; j < lengths[1]; ++j) {
-    for (std::size_t i = 0; i < lengths[0]; ++i) {
-      const std::size_t at_x = turned[0] ? lengths[0] - 1 - i : i;
-      const std::size_t at_y = turned[1] ? lengths[1] - 1 - j : j;
-      const bool x_slow = table.slow == x;
-      out[j * lengths[0] + i] =
-          table.values[(x_slow ? at_x : at_y) * table.columns + (x_slow ? at_y : at_x)];
+  const std::size_t width = lengths[0];
+  const std::size_t height = lengths[1];
+  std::vector<double> out = std::move(table.values);
+  if (table.slow == x) {
+    const std::vector<double> by_columns = std::exchange(out, std::vector<double>(out.size()));
+    for (std::size_t n = 0; n < out.size(); ++n) {
+      out[n] = by_columns[n % width * table.columns + n / width];
     }
   }
+  const auto row = [&](std::size_t j) { return out.data() + j * width; };
+  for (std::size_t j = 0; turned[1] && j < height / 2; ++j) {
+    std::swap_ranges(row(j), row(j + 1), row(height - 1 - j));
+  }
+  for (std::size_t j = 0; turned[0] && j < height; ++j) std::reverse(row(j), row(j + 1));
   return out;
 }
 
@@ -106,12 +111,12 @@ void unwrap(std::vector<double>& longitude, std::size_t width) {
 }
 
 // Null where a longitude or latitude is missing.
-std::shared_ptr<const Columns> columns_of(const std::array<Table, 2>& tables, int x,
+std::shared_ptr<const Columns> columns_of(std::array<Table, 2> tables, int x,
                                           std::array<std::size_t, 2> lengths,
                                           const std::array<bool, 2>& turned) {
   auto columns = std::make_shared<Columns>();
-  columns->longitude = in_order(tables[0], x, lengths, turned);
-  columns->latitude = in_order(tables[1], x, lengths, turned);
+  columns->longitude = in_order(std::move(tables[0]), x, lengths, turned);
+  columns->latitude = in_order(std::move(tables[1]), x, lengths, turned);
   const auto finite = [](const std::vector<double>& values) {
     return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
   };
@@ -168,7 +173,8 @@ Result<Bearing> find_bearing(const ArrayFile& file, const std::vector<DimensionR
   const auto length = [&](std::size_t axis) {
     return contents.dimensions[static_cast<std::size_t>(choice.space.at(axis))].length;
   };
-  bearing.columns = columns_of(tables, choice.space[0], {length(0), length(1)}, bearing.turned);
+  bearing.columns =
+      columns_of(std::move(tables), choice.space[0], {length(0), length(1)}, bearing.turned);
   return bearing;
 }
 
@@ -185,7 +191,7 @@ Result<std::shared_ptr<const Columns>> find_columns(const ArrayFile& file, const
     tables.at(longitude ? 0 : 1) = {std::move(*values), dims[0],
                                     contents.dimensions[static_cast<std::size_t>(dims[1])].length};
   }
-  return columns_of(tables, grid.space[0], {grid.length[0], grid.length[1]},
+  return columns_of(std::move(tables), grid.space[0], {grid.length[0], grid.length[1]},
                     {grid.turned[0], grid.turned[1]});
 }
 

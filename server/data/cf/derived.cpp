@@ -184,7 +184,14 @@ class DerivedFinder {
     return best;
   }
 
-  // What to add to a temperature, for which its lowest level is looked at where it says Celsius.
+  // Of a temperature that says Celsius its lowest level is looked at. Errors: bad_data beyond the
+  // limit of what opening may decode.
+  Result<void> may_look_at(int temperature) {
+    if (is_kelvin(lower(variable(temperature).units))) return {};
+    return file_.charge(temperature, decoded_step_bytes(file_, grid_, temperature, {0, 1}));
+  }
+
+  // What to add to a temperature, after may_look_at().
   Result<double> celsius_of(int temperature) {
     const FileVariable& source = variable(temperature);
     if (is_kelvin(lower(source.units))) return 0.0;
@@ -215,6 +222,11 @@ class DerivedFinder {
     std::string note = "the vertical part of ";
     std::string from = "the ICAO standard atmosphere's temperature";
     if (field.temperature >= 0) {
+      if (auto fine = may_look_at(field.temperature); !fine) {
+        notes_.push_back("the vertical part of " + in_quotes(plan.info.name) +
+                         " is not made metres a second: " + fine.error().message);
+        return {};
+      }
       auto celsius = celsius_of(field.temperature);
       if (!celsius) return celsius.error();
       field.celsius = *celsius;

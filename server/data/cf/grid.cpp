@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <unordered_set>
 #include <utility>
 
 namespace windsplat::data::cf {
@@ -27,21 +28,38 @@ std::size_t length_of(const FileContents& contents, int dimension) {
   return contents.dimensions.at(static_cast<std::size_t>(dimension)).length;
 }
 
-// Whether a blank-separated attribute of any variable names this one.
-bool is_named_by(const FileContents& contents, const std::string FileVariable::*attribute,
-                 const std::string& name) {
-  return std::any_of(contents.variables.begin(), contents.variables.end(),
-                     [&](const FileVariable& variable) {
-                       const std::string text = ' ' + variable.*attribute + ' ';
-                       return text.find(' ' + name + ' ') != std::string::npos;
-                     });
+// The words of a blank-separated attribute of all variables, gathered once: a file may have
+// thousands of variables, each with a long list.
+std::unordered_set<std::string_view> names_in(const FileContents& contents,
+                                              const std::string FileVariable::*attribute) {
+  std::unordered_set<std::string_view> out;
+  for (const FileVariable& variable : contents.variables) {
+    std::string_view rest = variable.*attribute;
+    while (!rest.empty()) {
+      const std::size_t end = std::min(rest.find(' '), rest.size());
+      if (end > 0) out.insert(rest.substr(0, end));
+      rest.remove_prefix(std::min(end + 1, rest.size()));
+    }
+  }
+  return out;
 }
+
+// What variables name in their attributes.
+struct Named {
+  explicit Named(const FileContents& contents)
+      : bounds(names_in(contents, &FileVariable::bounds)),
+        grid_mapping(names_in(contents, &FileVariable::grid_mapping)),
+        coordinates(names_in(contents, &FileVariable::coordinates)) {}
+  std::unordered_set<std::string_view> bounds;
+  std::unordered_set<std::string_view> grid_mapping;
+  std::unordered_set<std::string_view> coordinates;
+};
 
 constexpr const char* coordinate_variable = "coordinate variable";
 
 // Why a variable is no field whatever the grid; empty if it may be one.
 std::string not_a_field(const FileContents& contents, const std::vector<DimensionRole>& roles,
-                        std::size_t v) {
+                        const Named& named, std::size_t v) {
   const FileVariable& variable = contents.variables[v];
   if (!variable.unread.empty()) {
     return variable.unread;
@@ -55,16 +73,16 @@ std::string not_a_field(const FileContents& contents, const std::vector<Dimensio
   if (is_coordinate) {
     return coordinate_variable;
   }
-  if (is_named_by(contents, &FileVariable::bounds, variable.name)) {
+  if (named.bounds.count(variable.name) > 0) {
     return "bounds of a coordinate";
   }
-  if (is_named_by(contents, &FileVariable::grid_mapping, variable.name)) {
+  if (named.grid_mapping.count(variable.name) > 0) {
     return "description of the map projection";
   }
   if (variable.dims.size() >= 2 && is_position(variable)) {
     return "coordinate of more than one dimension: tells where rows and columns run";
   }
-  if (is_named_by(contents, &FileVariable::coordinates, variable.name)) {
+  if (named.coordinates.count(variable.name) > 0) {
     return "auxiliary coordinate";
   }
   return {};
@@ -95,6 +113,9 @@ std::string nothing_to_show(const FileContents& contents, const std::vector<Left
       "list are not read";
   const FileVariable* most = nullptr;
   for (const FileVariable& variable : contents.variables) {
+    if (!variable.unread.empty() && variable.dims.size() >= 2) {
+      return "no field can be read: " + in_quotes(variable.name) + " is " + variable.unread;
+    }
     if (variable.numeric && (most == nullptr || variable.dims.size() > most->dims.size())) {
       most = &variable;
     }
@@ -181,9 +202,10 @@ Result<GridChoice> choose_grid(const FileContents& contents,
                                const std::vector<DimensionRole>& roles) {
   GridChoice choice;
   std::vector<Group> groups;
+  const Named named(contents);
   for (std::size_t v = 0; v < contents.variables.size(); ++v) {
     const FileVariable& variable = contents.variables[v];
-    std::string reason = not_a_field(contents, roles, v);
+    std::string reason = not_a_field(contents, roles, named, v);
     if (reason.empty()) {
       Candidate candidate{static_cast<int>(v), lay_out(contents, roles, variable)};
       reason = misplaced(contents, variable, candidate.layout);

@@ -218,6 +218,20 @@ Result<void> read_blocks(const ArrayFile& file, int variable, const std::vector<
 
 }  // namespace
 
+double decoded_step_bytes(const ArrayFile& file, const Placement& grid, int variable,
+                          const Levels& levels) {
+  std::ptrdiff_t origin = 0;
+  std::vector<std::size_t> start;
+  std::vector<std::size_t> count;
+  double volume = sizeof(float);
+  for (const Way& way : ways_of(file, grid, variable, 0, levels, origin)) {
+    start.push_back(way.first);
+    count.push_back(way.length);
+    volume *= static_cast<double>(way.length);
+  }
+  return std::max(decoded_bytes(file, variable, start, count), volume);
+}
+
 Result<void> read_variable(const ArrayFile& file, const Placement& grid, int variable,
                            std::size_t step, const Levels& levels, float* out,
                            const Progress& tell) {

@@ -32,4 +32,9 @@ Result<void> read_variable(const ArrayFile& file, const Placement& grid, int var
                            std::size_t step, const Levels& levels, float* out,
                            const Progress& tell);
 
+// Bytes that reading those levels of a variable at one step decodes (see decoded_bytes()), at least
+// those of the volume.
+double decoded_step_bytes(const ArrayFile& file, const Placement& grid, int variable,
+                          const Levels& levels);
+
 }  // namespace windsplat::data::cf

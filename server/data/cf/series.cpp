@@ -401,6 +401,15 @@ std::vector<std::size_t> SeriesFile::chunk(int variable) const {
   return lengths;
 }
 
+// Of the first member, which stands for the others: they are not opened for it.
+Unwritten SeriesFile::unwritten(int variable, std::size_t most) const {
+  const int in_first = variables_.at(at(variable)).in_first;
+  if (in_first < 0) return {};
+  Unwritten out = first_->unwritten(in_first, most);
+  out.is_all = out.is_all && members_.size() == 1;
+  return out;
+}
+
 void SeriesFile::forget_chunks(int variable) const {
   const Variable& way = variables_.at(at(variable));
   first_->forget_chunks(way.in_first);

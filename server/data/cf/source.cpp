@@ -28,6 +28,7 @@
 #include "server/data/cf/units.hpp"
 #include "server/data/cf/vertical.hpp"
 #include "server/data/digest.hpp"
+#include "server/data/limits.hpp"
 
 namespace windsplat::data::cf {
 
@@ -46,6 +47,9 @@ class ArraySource final : public FileSource {
       return named(choice.error());
     }
     choice_ = std::move(*choice);
+    if (auto fine = check_entries(); !fine) {
+      return named(fine.error());
+    }
     info_.left_out = std::move(choice_.left_out);
     info_.notes = file_->contents().notes;
     if (auto done = find_axes(); !done) {
@@ -64,6 +68,7 @@ class ArraySource final : public FileSource {
       return named(make_error(ErrorKind::bad_data, "no field fits into the limit of 16 GiB"));
     }
     tell_valid_values();
+    tell_unwritten();
     const std::filesystem::path name(file_->name());
     info_.id = name.stem().native();
     info_.source = file_->origin();
@@ -124,6 +129,20 @@ class ArraySource final : public FileSource {
 
   [[nodiscard]] const FileDimension& dimension(int id) const {
     return file_->contents().dimensions.at(static_cast<std::size_t>(id));
+  }
+
+  // What has no coordinates in the file is counted, which takes memory for every entry.
+  [[nodiscard]] Result<void> check_entries() const {
+    const auto stored = file_->stored_bytes();
+    for (const int id : {choice_.space[0], choice_.space[1], choice_.space[2], choice_.time}) {
+      if (!stored || id < 0 || dimension(id).length <= entries_max(*stored)) continue;
+      return make_error(ErrorKind::bad_data,
+                        "the dimension " + in_quotes(dimension(id).name) + " has " +
+                            std::to_string(dimension(id).length) + " entries, more than the " +
+                            std::to_string(entries_max(*stored)) + " that a file of " +
+                            std::to_string(*stored) + " bytes may have");
+    }
+    return {};
   }
 
   Result<void> find_axes() {
@@ -331,6 +350,12 @@ class ArraySource final : public FileSource {
   }
 
   Result<void> place_by_pressure(HybridLevels hybrid) {
+    const double bytes = decoded_step_bytes(*file_, placement_, hybrid.surface, all_levels());
+    if (auto fine = file_->charge(hybrid.surface, bytes); !fine) {
+      info_.notes.push_back("levels follow the ground, but their pressures are not known (" +
+                            fine.error().message + "): the file's own coordinate is kept");
+      return {};
+    }
     std::vector<float> surface(placement_.layer());
     if (auto read = read_variable(*file_, placement_, hybrid.surface, 0, all_levels(),
                                   surface.data(), [](double) {});
@@ -422,12 +447,45 @@ class ArraySource final : public FileSource {
     info_.notes.push_back("masked beyond what the file calls valid: " + text);
   }
 
+  void tell_unwritten() {
+    constexpr std::size_t told_max = 20;
+    constexpr std::size_t chunks_of_one = 4096;
+    std::size_t left = 4 * chunks_of_one;
+    std::string text;
+    std::size_t count = 0;
+    for (const int v : choice_.variables) {
+      const Unwritten missing = file_->unwritten(v, std::min(left, chunks_of_one));
+      left -= std::min(left, missing.looked_at);
+      if (missing.chunks == 0 || ++count > told_max) continue;
+      text += text.empty() ? "" : ", ";
+      text += in_quotes(variable_name(v)) + " (" + unwritten_text(missing) + ')';
+    }
+    if (count == 0) return;
+    if (count > told_max) text += " and " + std::to_string(count - told_max) + " more";
+    info_.notes.push_back("masked where nothing was ever written, whatever the fill value: " +
+                          text);
+  }
+
+  static std::string unwritten_text(const Unwritten& missing) {
+    if (missing.is_all && missing.chunks == missing.looked_at) return "all of it";
+    return std::to_string(missing.chunks) + (missing.is_all ? " of " : " of the first ") +
+           std::to_string(missing.looked_at) + " chunks";
+  }
+
   void add_field(FieldInfo info, Plan plan) {
     if (info_.grid.samples() * info.components.size() * sizeof(float) > volume_bytes_max) {
       info_.left_out.push_back({info.name, "more than 16 GiB a step"});
       return;
     }
     if (info.kind == FieldKind::vector && follows_other_axes_) find_turning(info, plan);
+    double decoded = 0;
+    double chunk = 0;
+    for (const int v : plan.variables) {
+      decoded += decoded_step_bytes(*file_, placement_, v, all_levels());
+      chunk = std::max(chunk, chunk_bytes(*file_, v));
+    }
+    info.decoded_bytes = static_cast<std::uint64_t>(std::min(decoded, 0x1p62));
+    info.chunk_bytes = static_cast<std::uint64_t>(std::min(chunk, 0x1p62));
     info_.fields.push_back(std::move(info));
     plans_.push_back(std::move(plan));
   }

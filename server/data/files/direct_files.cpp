@@ -57,7 +57,9 @@ class DirectFiles final : public Files {
     const int descriptor = open_any(name, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (descriptor < 0) return not_opened(name, errno);
     remember(name, descriptor);
-    return InputFile::adopt(descriptor, last_part(name));
+    auto file = InputFile::adopt(descriptor, last_part(name));
+    if (file) count_opened(name, (*file)->size());
+    return file;
   }
 
   [[nodiscard]] std::vector<Companion> companions() const override { return companions_; }

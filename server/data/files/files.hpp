@@ -2,7 +2,9 @@
 // -> Files -> InputFile.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -62,6 +64,17 @@ class Files {
   virtual bool exists(const std::string& name) = 0;
   // The companions that were opened so far, the first few hundred of them.
   [[nodiscard]] virtual std::vector<Companion> companions() const { return {}; }
+  // Bytes of all files that were opened so far.
+  [[nodiscard]] std::uint64_t opened_bytes() const { return opened_bytes_; }
+
+ protected:
+  void count_opened(const std::string& name, std::uint64_t bytes) {
+    if (opened_.insert(name).second) opened_bytes_ += bytes;
+  }
+
+ private:
+  std::set<std::string> opened_;
+  std::uint64_t opened_bytes_ = 0;
 };
 
 // Opens what the location allows, by way of openat2 with RESOLVE_BENEATH for companions.

@@ -136,9 +136,14 @@ Result<Location> series(int root, const std::string& root_path, const std::strin
   out.stem = stem_of_pattern(pattern);
   out.pattern = path;
   out.root = root_path;
+  std::size_t left_out = 0;
   for (const std::string& name : *names) {
     const std::string below = (fs::path(folder) / name).native();
     const Descriptor found(open_beneath(root, below, O_PATH));
+    // A link that leads out of the root or nowhere is no file of the series.
+    const bool no_member = !found && (errno == EXDEV || errno == ELOOP || errno == ENOENT);
+    left_out += no_member ? 1U : 0U;
+    if (no_member) continue;
     if (!found) return not_reached(below, errno);
     struct stat status {};
     if (::fstat(found.number(), &status) != 0) return not_reached(below, errno);
@@ -146,6 +151,9 @@ Result<Location> series(int root, const std::string& root_path, const std::strin
     auto plain = path_of(found, below);
     if (!plain) return plain.error();
     out.members.push_back({name, std::move(*plain)});
+  }
+  if (out.members.empty() && left_out > 0) {
+    return refused(path, "matches nothing but links that lead out of the data root or nowhere");
   }
   if (out.members.empty()) {
     return make_error(ErrorKind::not_found, in_quotes(path) + ": no file matches");

@@ -14,6 +14,7 @@
 #include <system_error>
 #include <utility>
 
+#include "server/base/whole_file.hpp"
 #include "server/data/cf/axes.hpp"
 #include "server/data/cf/grid.hpp"
 #include "server/data/cf/text.hpp"
@@ -149,12 +150,6 @@ std::string there_is(const std::vector<std::string>& groups) {
   return out;
 }
 
-// A scalar has no extent, but the library still wants a place to look at.
-const std::size_t* place(const std::vector<std::size_t>& lengths) {
-  static constexpr std::size_t none = 0;
-  return lengths.empty() ? &none : lengths.data();
-}
-
 }  // namespace
 
 LibraryLock::LibraryLock() {
@@ -178,7 +173,7 @@ Result<std::string> writable_path(const std::string& path) {
     return make_error(ErrorKind::not_found, "no file name is given");
   }
   std::error_code fault;
-  fs::path plain = fs::weakly_canonical(path, fault);
+  fs::path plain = fs::weakly_canonical(end_of_links(path), fault);
   if (fault) {
     return make_error(ErrorKind::bad_data, in_quotes(path) + ": " + fault.message());
   }
@@ -188,6 +183,12 @@ Result<std::string> writable_path(const std::string& path) {
   if (!fs::is_directory(plain.parent_path(), fault)) {
     return make_error(ErrorKind::not_found, in_quotes(path) + ": there is no folder " +
                                                 in_quotes(plain.parent_path().native()));
+  }
+  // The file takes its name when it is whole: a device or a pipe would be gone then.
+  const fs::file_status status = fs::status(plain, fault);
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    return make_error(ErrorKind::invalid,
+                      in_quotes(path) + " is not a regular file, which netCDF needs");
   }
   // The library reads directions behind '#' and rewrites '\\' in names.
   if (plain.native().find_first_of("#\\") != std::string::npos ||
@@ -216,11 +217,15 @@ Result<std::unique_ptr<File>> File::open(std::shared_ptr<const InputFile> input,
 File::~File() {
   if (ncid_ >= 0) {
     const LibraryLock lock;
+    hdf5_ = Handle();
     nc_close(ncid_);
   }
 }
 
-std::string File::format() const { return classic_ ? "netCDF classic" : "netCDF-4"; }
+std::string File::format() const {
+  if (classic_) return "netCDF classic";
+  return netcdf4_ ? "netCDF-4" : "HDF5";
+}
 
 Result<void> File::look_before_opening() {
   std::array<unsigned char, 4> magic{};
@@ -258,11 +263,21 @@ Result<void> File::open_library() {
   if (H5PLget_loading_state(&plugins) < 0 || plugins != 0) {
     return make_error(ErrorKind::internal, "HDF5 would load plugins that a file names");
   }
+  if (!classic_) {
+    auto storage = survey_storage(*input_);
+    if (!storage) return storage.error();
+    storage_ = std::move(*storage);
+  }
   const int status = nc_open(input_->library_path().c_str(), NC_NOWRITE, &ncid_);
   if (status != NC_NOERR) {
     ncid_ = -1;
     return fault(std::string("cannot be read as netCDF: it is cut short or damaged (") +
                  nc_strerror(status) + ")");
+  }
+  if (!classic_) {
+    hdf5_ = open_hdf5(*input_);
+    if (!hdf5_) return fault("cannot be opened by HDF5 beside the netCDF library");
+    netcdf4_ = H5Aexists(hdf5_.id(), "_NCProperties") > 0;
   }
   int model = 0;
   int mode = 0;
@@ -327,34 +342,6 @@ std::string File::text_of(int variable, const char* attribute) const {
   return text(place_of(variable), attribute);
 }
 
-std::vector<std::size_t> File::chunk(int variable) const {
-  const std::size_t rank = contents_.variables.at(static_cast<std::size_t>(variable)).dims.size();
-  std::vector<std::size_t> lengths(rank, 1);
-  const LibraryLock lock;
-  const auto [group, id] = place_of(variable);
-  int storage = NC_CONTIGUOUS;
-  if (rank == 0 || classic_ ||
-      nc_inq_var_chunking(group, id, &storage, lengths.data()) != NC_NOERR ||
-      storage != NC_CHUNKED) {
-    std::fill(lengths.begin(), lengths.end(), 1);
-  }
-  return lengths;
-}
-
-void File::forget_chunks(int variable) const {
-  if (classic_) return;
-  const LibraryLock lock;
-  const auto [group, id] = place_of(variable);
-  std::size_t size = 0;
-  std::size_t slots = 0;
-  float preemption = 0;
-  // To be told the size of its cache, even the same, the library opens the variable anew. Where it
-  // refuses, memory is all that is lost.
-  if (nc_get_var_chunk_cache(group, id, &size, &slots, &preemption) == NC_NOERR) {
-    nc_set_var_chunk_cache(group, id, size, slots, preemption);
-  }
-}
-
 Result<void> File::scan(const std::string& group) {
   const LibraryLock lock;
   const std::vector<std::string> groups = groups_below(ncid_, "");
@@ -393,6 +380,7 @@ bool File::has_field() const {
 Result<void> File::scan_group(const std::string& path) {
   contents_ = {};
   places_.clear();
+  paths_.clear();
   dimension_ids_.clear();
   group_ = path;
   int group = ncid_;
@@ -436,6 +424,8 @@ Result<void> File::scan_dimensions(int group) {
       return fault("is damaged: a dimension cannot be read");
     }
     dimension.name = name.data();
+    // Older versions of the library tell themselves by nothing but dimension scales.
+    netcdf4_ = netcdf4_ || !is_bare(dimension);
     dimension.unlimited = std::find(unlimited.begin(), unlimited.end(), id) != unlimited.end();
     contents_.dimensions.push_back(std::move(dimension));
   }
@@ -500,40 +490,31 @@ Result<void> File::scan_variable(const Place& place, bool above) {
   int attribute = 0;
   variable.packed = nc_inq_attid(place.group, place.id, "scale_factor", &attribute) == NC_NOERR ||
                     nc_inq_attid(place.group, place.id, "add_offset", &attribute) == NC_NOERR;
+  look_at_storage(place, variable);
   contents_.variables.push_back(std::move(variable));
   places_.push_back(place);
   return {};
 }
 
-template <class Get>
-Result<void> File::read_block(int variable, const Get& get) const {
-  const LibraryLock lock;
-  // A file cut while it is open would yield zeros, not an error.
-  if (auto same = input_->check_unchanged(); !same) {
-    return same;
+void File::look_at_storage(const Place& place, FileVariable& variable) {
+  std::string path;
+  if (!classic_) {
+    std::size_t length = 0;
+    if (nc_inq_grpname_full(place.group, &length, nullptr) == NC_NOERR) {
+      path.resize(length);
+      nc_inq_grpname_full(place.group, nullptr, path.data());
+    }
+    if (path == "/") path.clear();
+    // A variable that has a dimension's name and is no coordinate of it is stored under another.
+    const std::string other = path + "/_nc4_non_coord_" + variable.name;
+    path += '/' + variable.name;
+    if (storage_.count(other) > 0) path = other;
+    const auto found = storage_.find(path);
+    variable.unread =
+        found == storage_.end() ? "where its data are stored is not known" : found->second.problem;
+    variable.numeric = variable.numeric && variable.unread.empty();
   }
-  if (const int status = get(); status != NC_NOERR) {
-    const auto& name = contents_.variables.at(static_cast<std::size_t>(variable)).name;
-    return fault("is damaged: " + in_quotes(name) + " cannot be read (" + nc_strerror(status) +
-                 ")");
-  }
-  return {};
-}
-
-Result<void> File::read(int variable, const std::vector<std::size_t>& start,
-                        const std::vector<std::size_t>& count, double* out) const {
-  return read_block(variable, [&] {
-    const auto [group, id] = place_of(variable);
-    return nc_get_vara_double(group, id, place(start), place(count), out);
-  });
-}
-
-Result<void> File::read(int variable, const std::vector<std::size_t>& start,
-                        const std::vector<std::size_t>& count, float* out) const {
-  return read_block(variable, [&] {
-    const auto [group, id] = place_of(variable);
-    return nc_get_vara_float(group, id, place(start), place(count), out);
-  });
+  paths_.push_back(std::move(path));
 }
 
 }  // namespace windsplat::data::netcdf

@@ -2,6 +2,7 @@
 // InputFile -> checks of our own -> nc_open -> FileContents and numbers.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
 #include "server/data/files/input_file.hpp"
+#include "server/data/netcdf/hdf5_storage.hpp"
 
 namespace windsplat::data::netcdf {
 
@@ -46,6 +48,7 @@ class File final : public cf::ArrayFile {
   [[nodiscard]] std::string text_of(int variable, const char* attribute) const override;
   [[nodiscard]] std::vector<std::size_t> chunk(int variable) const override;
 
+  [[nodiscard]] cf::Unwritten unwritten(int variable, std::size_t most) const override;
   // Frees the chunks that the library keeps of a variable, up to 16 MiB each.
   void forget_chunks(int variable) const override;
 
@@ -74,16 +77,23 @@ class File final : public cf::ArrayFile {
   Result<void> scan_variables(int group, bool above);
   Result<void> scan_variable(const Place& place, bool above);
   [[nodiscard]] bool has_field() const;
-  template <class Get>
-  Result<void> read_block(int variable, const Get& get) const;
+  void look_at_storage(const Place& place, FileVariable& variable);
+  void keep_chunks(int variable, const Block& block) const;
+  template <class T, class Get>
+  Result<void> read_block(int variable, const Block& block, T* out, const Get& get) const;
   [[nodiscard]] Error fault(const std::string& what) const { return input_->fault(what); }
 
   std::shared_ptr<const InputFile> input_;
   int ncid_ = -1;
   bool classic_ = false;
-  std::string group_;  // "" or "/a/b"
+  bool netcdf4_ = false;  // not HDF5 by itself
+  std::string group_;     // "" or "/a/b"
   std::vector<int> dimension_ids_;
-  std::vector<Place> places_;  // parallel to contents_.variables
+  std::vector<Place> places_;                           // parallel to contents_.variables
+  Handle hdf5_;                                         // beside the netCDF library's own
+  std::map<std::string, DatasetStorage> storage_;       // of HDF5, by path
+  std::vector<std::string> paths_;                      // likewise parallel
+  mutable std::map<std::string, AbsentChunks> absent_;  // under the LibraryLock
   FileContents contents_;
 };
 

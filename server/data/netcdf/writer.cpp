@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/base/whole_file.hpp"
 #include "server/data/cf/text.hpp"
 #include "server/data/cf/units.hpp"
 #include "server/data/dataset.hpp"
@@ -148,8 +149,12 @@ Error with_room_left(Error error, const std::string& path) {
 
 class Writer {
  public:
-  Writer(Source& source, std::string path)
-      : source_(source), info_(source.info()), part_(path + ".part"), path_(std::move(path)) {}
+  Writer(Source& source, std::string path, const CancelToken& cancel)
+      : source_(source),
+        info_(source.info()),
+        part_(netcdf_part(path)),
+        path_(std::move(path)),
+        cancel_(cancel) {}
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;
 
@@ -320,6 +325,9 @@ class Writer {
   Result<void> write_fields() {
     for (std::size_t step = 0; step < info_.steps.size(); ++step) {
       for (std::size_t field = 0; field < info_.fields.size(); ++field) {
+        if (cancel_.cancelled()) {
+          return interrupted();
+        }
         if (auto done = write_field(field, step); !done) {
           return done;
         }
@@ -341,36 +349,60 @@ class Writer {
     float* first = volume->values.data();
     std::replace_if(
         first, first + volume->values.size(), [](float v) { return std::isnan(v); }, fill_value);
-    std::vector<std::size_t> start{0, 0, 0};
-    std::vector<std::size_t> count;
-    for (std::size_t axis = 3; axis-- > 0;) {
-      count.push_back(static_cast<std::size_t>(volume->dims.at(axis)));
-    }
-    if (time_ >= 0) {
-      start.insert(start.begin(), step);
-      count.insert(count.begin(), 1);
-    }
     for (const OutVariable& variable : variables_) {
       if (variable.field != field) {
         continue;
       }
       const float* values = volume->component(static_cast<int>(variable.component));
-      if (auto done = call("writing values",
-                           [&] {
-                             return nc_put_vara_float(ncid_, variable.id, start.data(),
-                                                      count.data(), values);
-                           });
-          !done) {
+      if (auto done = write_levels(variable, step, values); !done) {
         return done;
       }
     }
     return {};
   }
 
+  // As many levels at a time as a chunk has: compressing them takes moments, so that who cancels
+  // does not wait for the rest.
+  Result<void> write_levels(const OutVariable& variable, std::size_t step, const float* values) {
+    const auto dims = info_.grid.dims();
+    const auto layer = static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]);
+    const auto levels = static_cast<std::size_t>(dims[2]);
+    const std::vector<std::size_t> chunks = chunk();
+    const std::size_t z = chunks.size() - 3;
+    for (std::size_t first = 0; first < levels; first += chunks[z]) {
+      if (cancel_.cancelled()) {
+        return interrupted();
+      }
+      std::vector<std::size_t> start(chunks.size(), 0);
+      std::vector<std::size_t> count{std::min(chunks[z], levels - first),
+                                     static_cast<std::size_t>(dims[1]),
+                                     static_cast<std::size_t>(dims[0])};
+      start[z] = first;
+      if (time_ >= 0) {
+        start[0] = step;
+        count.insert(count.begin(), 1);
+      }
+      const auto put = [&] {
+        return nc_put_vara_float(ncid_, variable.id, start.data(), count.data(),
+                                 values + first * layer);
+      };
+      if (auto done = call("writing values", put); !done) {
+        return done;
+      }
+    }
+    return {};
+  }
+
+  [[nodiscard]] Error interrupted() const {
+    return make_error(ErrorKind::cancelled,
+                      "interrupted; " + cf::in_quotes(path_) + " is not written");
+  }
+
   Source& source_;
   const DatasetInfo& info_;
   std::string part_;
   std::string path_;
+  CancelToken cancel_;
   bool finished_ = false;
   int ncid_ = -1;
   int status_ = NC_NOERR;
@@ -382,13 +414,15 @@ class Writer {
 
 }  // namespace
 
-Result<void> write_netcdf(Source& source, const std::string& path) {
+std::string netcdf_part(const std::string& path) { return end_of_links(path).native() + ".part"; }
+
+Result<void> write_netcdf(Source& source, const std::string& path, const CancelToken& cancel) {
   try {
     auto plain = netcdf::writable_path(path);
     if (!plain) {
       return plain.error();
     }
-    auto done = Writer(source, *plain).write();
+    auto done = Writer(source, *plain, cancel).write();
     return done ? done : with_room_left(done.error(), *plain);
   } catch (const std::bad_alloc&) {
     return make_error(ErrorKind::out_of_memory, "no memory to write " + cf::in_quotes(path));

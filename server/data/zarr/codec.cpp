@@ -13,6 +13,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "server/data/limits.hpp"
+
 namespace windsplat::data::zarr {
 
 namespace {
@@ -187,9 +189,7 @@ std::size_t encoded_item_bytes(const ArrayMetadata& array) {
 }  // namespace
 
 std::size_t stored_bytes_max(const ArrayMetadata& array) {
-  const std::size_t bytes = array.chunk_items() * encoded_item_bytes(array);
-  // What does not compress grows, by less than this with every compressor.
-  return bytes + bytes / 8 + 65536;
+  return stored_chunk_bytes_max(array.chunk_items() * encoded_item_bytes(array));
 }
 
 Result<Bytes> decode_chunk(const ArrayMetadata& array, Bytes stored) {

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include "server/data/limits.hpp"
+
 namespace windsplat::data::zarr {
 
 namespace {

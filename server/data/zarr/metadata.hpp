@@ -44,8 +44,6 @@ struct ArrayMetadata {
   [[nodiscard]] std::size_t chunk_items() const;
 };
 
-constexpr std::size_t chunk_bytes_max = std::size_t{1} << 30;
-
 // Errors: bad_data for what no Zarr v2 array may say; what we do not read is a `problem`.
 Result<ArrayMetadata> parse_array(const Json& json);
 

@@ -251,6 +251,22 @@ TEST(NetcdfWriter, SpeaksCf) {
   nc_close(ncid);
 }
 
+TEST(NetcdfWriter, WhatALinkLeadsToIsWrittenAlsoWhereItIsNotThereYet) {
+  FakeSource source(
+      make_info({axis("x", AxisKind::cartesian, {0, 1}), axis("y", AxisKind::cartesian, {0, 1}),
+                 axis("z", AxisKind::cartesian, {0, 1})}));
+  const Folder folder;
+  std::filesystem::create_symlink("target.nc", folder / "link.nc");
+  for (int n = 0; n < 2; ++n) {
+    ASSERT_TRUE(write_netcdf(source, folder / "link.nc"));
+    EXPECT_TRUE(std::filesystem::is_symlink(folder / "link.nc"));
+    EXPECT_TRUE(open_file(folder / "target.nc"));
+  }
+  std::filesystem::create_symlink("loop.nc", folder / "loop.nc");
+  EXPECT_FALSE(write_netcdf(source, folder / "loop.nc"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "loop.nc"));
+}
+
 TEST(NetcdfWriter, AFailureLeavesTheOldFileAndNoRemains) {
   FakeSource source(
       make_info({axis("x", AxisKind::cartesian, {0, 1}), axis("y", AxisKind::cartesian, {0, 1}),

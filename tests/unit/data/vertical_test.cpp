@@ -208,6 +208,39 @@ TEST(HybridLevels, WithoutASurfacePressureLevelsStayLevels) {
   EXPECT_EQ((*source)->info().find("pressure"), nullptr);
 }
 
+// A chunk of 256 MiB in a file of less than one: more than opening it may decode.
+std::vector<std::size_t> chunk_beyond_the_limit(std::size_t values_a_step, std::size_t rank) {
+  std::vector<std::size_t> chunk(rank, 2);
+  chunk[0] = (std::size_t{64} << 20) / values_a_step;
+  return chunk;
+}
+
+TEST(HybridLevels, WithASurfacePressureBeyondTheLimitLevelsStayLevels) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "h.nc");
+    const int t = file.dimension("time", NC_UNLIMITED);
+    const int z = file.dimension("lev", 2);
+    const int lev = file.variable("lev", NC_DOUBLE, {z}, {1, 2});
+    file.text(lev, "formula_terms", "ap: A b: B ps: PS");
+    const int y = file.axis("lat", {0, 10}, "degrees_north");
+    const int x = file.axis("lon", {0, 10}, "degrees_east");
+    file.text(file.variable("A", NC_DOUBLE, {z}, {100, 0}), "units", "hPa");
+    file.variable("B", NC_DOUBLE, {z}, {0.25, 1});
+    const int ps = file.variable("PS", NC_FLOAT, {t, y, x}, {1000, 900, 800, 700});
+    file.text(ps, "units", "hPa");
+    file.deflate(ps);
+    file.chunk(ps, chunk_beyond_the_limit(4, 3));
+    file.variable("f", NC_FLOAT, {t, z, y, x}, counting(8));
+  }
+  auto source = open_file(folder / "h.nc");
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_EQ((*source)->info().grid.axes[2].kind, AxisKind::level);
+  EXPECT_TRUE(has_note((*source)->info(), "their pressures are not known"));
+  EXPECT_TRUE(has_note((*source)->info(), "'PS' is too large"));
+  EXPECT_EQ(volume_of(**source, "f").masked, 0);
+}
+
 // u, v, omega and perhaps a temperature on two pressure levels.
 void write_omega(const std::string& path, const std::string& temperature_units,
                  const std::vector<double>& temperature, const char* omega_units = "Pa s-1") {
@@ -262,6 +295,33 @@ TEST(Omega, BecomesMetresASecondByTheFilesTemperature) {
 }
 
 // What the standard name says is Pa s-1 where the file is silent. A picture turns it by its unit.
+TEST(Omega, StaysWhereLookingAtTheTemperatureIsBeyondTheLimit) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "o.nc");
+    const int t = file.dimension("time", NC_UNLIMITED);
+    const int z = file.axis("plev", {50000, 100000}, "Pa", "air_pressure");
+    const int y = file.axis("lat", {0, 10}, "degrees_north");
+    const int x = file.axis("lon", {0, 10}, "degrees_east");
+    for (const char* name : {"u", "v", "omega", "T"}) {
+      const int v = file.variable(name, NC_FLOAT, {t, z, y, x}, counting(8));
+      file.text(v, "units", *name == 'T' ? "degC" : *name == 'o' ? "Pa s-1" : "m s-1");
+      if (*name != 'T') continue;
+      file.text(v, "standard_name", "air_temperature");
+      file.deflate(v);
+      file.chunk(v, chunk_beyond_the_limit(8, 4));
+    }
+  }
+  auto source = open_file(folder / "o.nc");
+  ASSERT_TRUE(source) << source.error().message;
+  const DatasetInfo& info = (*source)->info();
+  EXPECT_NE(info.find("wind"), nullptr);
+  EXPECT_NE(info.find("T"), nullptr);
+  EXPECT_EQ(info.find("wind_m"), nullptr);
+  EXPECT_TRUE(has_note(info, "the vertical part of 'wind' is not made metres a second"));
+  EXPECT_TRUE(has_note(info, "'T' is too large"));
+}
+
 TEST(Omega, IsKnownByItsUnitOrItsStandardName) {
   for (const auto& [written, told] : {std::pair("", "Pa s-1"), {"Pa/sec", "Pa/sec"}}) {
     const Folder folder;

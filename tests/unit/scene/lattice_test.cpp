@@ -49,6 +49,22 @@ TEST(Lattice, UnevenAxesKeepTheirPlacesAndMeetMidway) {
   }
 }
 
+TEST(Lattice, ASingleLayerIsPlacedHoweverLargeItsCoordinate) {
+  const auto lattice = place_lattice(metres({0, 1, 2}, {0, 1, 2}, {1e17}), GeometryView{});
+  ASSERT_TRUE(lattice) << lattice.error().message;
+  EXPECT_EQ(lattice->positions[2], std::vector<double>{0});
+  EXPECT_NEAR(lattice->spacing[2][0], lattice->spacing[0][0], 1e-14);
+}
+
+TEST(Lattice, PressuresThatTheLogarithmBringsTogetherAreRefused) {
+  data::Grid grid = metres({0, 1, 2}, {0, 1, 2}, {});
+  // 16 units in the last place apart, of which the logarithm leaves one or none.
+  grid.axes[2] = axis(AxisKind::pressure, "Pa", {1e5 + 4.4e-10, 1e5 + 2.2e-10, 1e5});
+  const auto lattice = place_lattice(grid, GeometryView{});
+  ASSERT_FALSE(lattice);
+  EXPECT_EQ(lattice.error().kind, ErrorKind::bad_data);
+}
+
 TEST(Lattice, PressureStandsByItsLogarithmLowPressureHigh) {
   const auto lattice = place_lattice(atmosphere_grid(), GeometryView{});
   ASSERT_TRUE(lattice);

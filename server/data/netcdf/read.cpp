@@ -1,0 +1,128 @@
+// Blocks of numbers through the netCDF library, with what HDF5 says of their chunks.
+#include <netcdf.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/data/cf/text.hpp"
+#include "server/data/netcdf/file.hpp"
+
+namespace windsplat::data::netcdf {
+
+namespace {
+
+using cf::in_quotes;
+
+// A scalar has no extent, but the library still wants a place to look at.
+const std::size_t* place(const std::vector<std::size_t>& lengths) {
+  static constexpr std::size_t none = 0;
+  return lengths.empty() ? &none : lengths.data();
+}
+
+}  // namespace
+
+std::vector<std::size_t> File::chunk(int variable) const {
+  const std::size_t rank = contents_.variables.at(static_cast<std::size_t>(variable)).dims.size();
+  std::vector<std::size_t> lengths(rank, 1);
+  const LibraryLock lock;
+  const auto [group, id] = place_of(variable);
+  int storage = NC_CONTIGUOUS;
+  if (rank == 0 || classic_ ||
+      nc_inq_var_chunking(group, id, &storage, lengths.data()) != NC_NOERR ||
+      storage != NC_CHUNKED) {
+    std::fill(lengths.begin(), lengths.end(), 1);
+  }
+  return lengths;
+}
+
+void File::forget_chunks(int variable) const {
+  if (classic_) return;
+  const LibraryLock lock;
+  const auto [group, id] = place_of(variable);
+  std::size_t size = 0;
+  std::size_t slots = 0;
+  float preemption = 0;
+  // To be told the size of its cache, even the same, the library opens the variable anew. Where it
+  // refuses, memory is all that is lost.
+  if (nc_get_var_chunk_cache(group, id, &size, &slots, &preemption) == NC_NOERR) {
+    nc_set_var_chunk_cache(group, id, size, slots, preemption);
+  }
+}
+
+// Chunks that one block after another needs are decoded once, as far as they fit.
+void File::keep_chunks(int variable, const Block& block) const {
+  constexpr double kept_bytes_max = 128 << 20;
+  const DatasetStorage& storage = storage_.at(paths_.at(cf::at(variable)));
+  if (!storage.filtered) return;
+  double one = static_cast<double>(storage.item_bytes);
+  double all = one;
+  for (std::size_t d = 0; d < storage.chunk.size(); ++d) {
+    if (block.count[d] == 0) return;
+    const std::size_t length = storage.chunk[d];
+    const std::size_t first = block.start[d] / length;
+    const std::size_t last = (block.start[d] + block.count[d] - 1) / length;
+    const std::size_t along = (last - first + 1) * length;
+    one *= static_cast<double>(length);
+    all *= static_cast<double>(along);
+  }
+  const auto wanted = static_cast<std::size_t>(all <= kept_bytes_max ? all : one);
+  const auto [group, id] = place_of(variable);
+  std::size_t size = 0;
+  std::size_t slots = 0;
+  float preemption = 0;
+  if (nc_get_var_chunk_cache(group, id, &size, &slots, &preemption) == NC_NOERR && size < wanted) {
+    nc_set_var_chunk_cache(group, id, wanted, slots, preemption);
+  }
+}
+
+cf::Unwritten File::unwritten(int variable, std::size_t most) const {
+  if (classic_) return {};
+  const LibraryLock lock;
+  const std::string& path = paths_.at(cf::at(variable));
+  return OpenDataset(hdf5_, path, storage_.at(path), absent_[path]).count_absent(most);
+}
+
+template <class T, class Get>
+Result<void> File::read_block(int variable, const Block& block, T* out, const Get& get) const {
+  const LibraryLock lock;
+  // A file cut while it is open would yield zeros, not an error.
+  if (auto same = input_->check_unchanged(); !same) {
+    return same;
+  }
+  const std::string& name = contents_.variables.at(cf::at(variable)).name;
+  std::optional<OpenDataset> dataset;
+  if (!classic_) {
+    const std::string& path = paths_.at(cf::at(variable));
+    keep_chunks(variable, block);  // first: an open dataset keeps the size of its cache
+    dataset.emplace(hdf5_, path, storage_.at(path), absent_[path]);
+    if (auto fine = dataset->check(block); !fine) {
+      return fault("is damaged: " + in_quotes(name) + ' ' + fine.error().message);
+    }
+  }
+  if (const int status = get(); status != NC_NOERR) {
+    return fault("is damaged: " + in_quotes(name) + " cannot be read (" + nc_strerror(status) +
+                 ")");
+  }
+  if (dataset) dataset->mask(block, out);
+  return {};
+}
+
+Result<void> File::read(int variable, const std::vector<std::size_t>& start,
+                        const std::vector<std::size_t>& count, double* out) const {
+  return read_block(variable, {start, count}, out, [&] {
+    const auto [group, id] = place_of(variable);
+    return nc_get_vara_double(group, id, place(start), place(count), out);
+  });
+}
+
+Result<void> File::read(int variable, const std::vector<std::size_t>& start,
+                        const std::vector<std::size_t>& count, float* out) const {
+  return read_block(variable, {start, count}, out, [&] {
+    const auto [group, id] = place_of(variable);
+    return nc_get_vara_float(group, id, place(start), place(count), out);
+  });
+}
+
+}  // namespace windsplat::data::netcdf
