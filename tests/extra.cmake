@@ -23,16 +23,30 @@ endfunction()
 find_program(SYSTEM_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
 windsplat_program_test(real ${SYSTEM_PYTHON} tests/integration/real_files.py
   --program=$<TARGET_FILE:windsplat>)
+windsplat_program_test(scripts python3 tests/integration/scripts_test.py)
 # The fuzzers do the same to the readers themselves, under the sanitizers.
 set(spoiled_count 300)
+set(drawn_options --count=340)
 if(WINDSPLAT_SANITIZE)
   set(spoiled_count 60)
+  set(drawn_options --count=68 --peak-mib=1500)  # sanitizers keep what is freed
 endif()
 windsplat_program_test(spoiled python3 tests/fuzz/mutate_files.py --program=$<TARGET_FILE:windsplat>
   --count=${spoiled_count})
+# Datasets that were mutated from within: opened, compared with the truth, drawn.
+windsplat_program_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py
+  --program=$<TARGET_FILE:windsplat> ${drawn_options})
 if(NOT WINDSPLAT_SANITIZE)
   windsplat_program_test(sbom python3 tests/integration/sbom.py --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(hardening python3 tests/tidy/check_hardening.py $<TARGET_FILE:windsplat>)
+endif()
+
+# What the program does, as text: the same in two runs. Pictures are left out, which take a minute.
+if(NOT WINDSPLAT_SANITIZE)
+  add_executable(session_transcript ${CMAKE_CURRENT_LIST_DIR}/fingerprint/session_transcript.cpp)
+  target_link_libraries(session_transcript PRIVATE windsplat_session nlohmann_json::nlohmann_json)
+  windsplat_program_test(fingerprint scripts/fingerprint --check --only=requests,sessions,inspect
+    --program=$<TARGET_FILE:windsplat> --transcripts=$<TARGET_FILE:session_transcript>)
 endif()
 
 # Cases at the edges of HTTP and WebSocket against a daemon. Sanitizers keep what is freed, so that
@@ -57,6 +71,14 @@ windsplat_edge_test(boundaries boundaries)
 foreach(attack chunked_trailer external_files url_paths)
   windsplat_edge_test(attack_${attack} attacks --attack=${attack} ${attack_options})
 endforeach()
+
+# How long others wait, which a sanitizer changes.
+if(NOT WINDSPLAT_SANITIZE)
+  add_test(NAME edge.handshakes COMMAND python3 tests/edge/handshakes.py
+    --program=$<TARGET_FILE:windsplat> --slack=8 WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+  set_tests_properties(edge.handshakes PROPERTIES LABELS integration TIMEOUT 300
+    SKIP_RETURN_CODE 77 ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+endif()
 
 # Every fault in short; calls of the system that fail, by a library that is preloaded. It stands in
 # for the allocator, which sanitizers bring of their own.

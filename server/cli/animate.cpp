@@ -210,7 +210,7 @@ Error interrupted(int done, int total) {
 Result<void> animate(const AnimateArguments& arguments, const CancelToken& cancel) {
   const auto document = assemble_view(arguments.view);
   if (!document) return document.error();
-  const auto dataset = open_dataset(arguments.view.dataset);
+  const auto dataset = open_dataset(arguments.view);
   if (!dataset) return dataset.error();
   protocol::View view = document->view();
   view.dataset = (*dataset)->info().id;
@@ -258,7 +258,7 @@ void add_animate(CLI::App& app, Action& chosen) {
   command->callback([&chosen, arguments] {
     chosen = [arguments] {
       const CancelToken cancel;
-      const SignalWatch watch([&cancel] { cancel.cancel(); });
+      const SignalWatch watch([&cancel] { cancel.cancel(); }, nullptr, {exit_interrupted});
       const auto done = animate(*arguments, cancel);
       if (done) return exit_ok;
       const int code = answer(done.error());

@@ -1,13 +1,17 @@
 // Arguments -> the chosen command; what escapes it -> exit codes.
 #include "server/cli/cli.hpp"
 
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <csignal>
 #include <exception>
 #include <iostream>
 #include <new>
+#include <sstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "server/cli/command.hpp"
@@ -18,7 +22,7 @@ namespace {
 
 constexpr const char* description =
     "windsplat draws winds and clouds from a 3-D field, on the CPU, for a browser or a file.\n"
-    "Exit codes: 0 ok, 1 failed, 2 usage, 3 bad data, 130 interrupted (animate, study).\n"
+    "Exit codes: 0 ok, 1 failed, 2 usage, 3 bad data, 130 interrupted (animate, study, synth).\n"
     "An option that names an environment variable may be given by it; the option wins.";
 
 // How many letters are changed, added, taken away or swapped with their neighbour to make one word
@@ -68,6 +72,26 @@ std::string unknown_argument(const CLI::App& app) {
          (nearest.empty() ? "" : "; did you mean --" + nearest + "?");
 }
 
+// The first option or argument that was given an empty value, as "--size"; empty if none was. An
+// empty value is no default: more likely a variable that is not set.
+std::string given_empty(const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options()) {
+    const auto& values = option->results();
+    const bool empty = std::any_of(values.begin(), values.end(),
+                                   [](const std::string& value) { return value.empty(); });
+    if (empty) return option->get_name();
+  }
+  return {};
+}
+
+// What --help and --version print is data like any other: lost, it is a failure.
+int print(const CLI::App& app, const CLI::ParseError& wanted) {
+  std::ostringstream text;
+  app.exit(wanted, text, std::cerr);
+  const auto written = write_stdout(text.str());
+  return written ? exit_ok : answer(written.error());
+}
+
 int run_parsed(CLI::App& app, const Action& chosen, int argc, const char* const* argv) {
   if (argc <= 1) {
     std::cerr << app.help();
@@ -85,12 +109,44 @@ int run_parsed(CLI::App& app, const Action& chosen, int argc, const char* const*
     complain("run with --help for more information");
     return exit_usage;
   } catch (const CLI::ParseError& stop) {  // --help and --version too
-    if (stop.get_exit_code() == 0) return app.exit(stop, std::cout, std::cerr);
+    if (stop.get_exit_code() == 0) return print(app, stop);
     complain(printable(stop.what(), 2000));
     complain("run with --help for more information");
     return exit_usage;
   }
+  if (const std::string empty = given_empty(*app.get_subcommands().front()); !empty.empty()) {
+    complain(empty + " is given an empty value");
+    return exit_usage;
+  }
   return chosen();
+}
+
+// What of memory and threads this process is limited to, as far as it is: " (limits: ...)".
+std::string memory_limits() {
+  struct Limited {
+    __rlimit_resource which;
+    const char* name;
+  };
+  std::string text;
+  for (const auto& [which, name] :
+       {Limited{RLIMIT_AS, "address space, ulimit -v"}, Limited{RLIMIT_DATA, "data, ulimit -d"}}) {
+    rlimit now{};
+    if (::getrlimit(which, &now) != 0 || now.rlim_cur == RLIM_INFINITY) continue;
+    text += (text.empty() ? "" : "; ") + std::to_string(now.rlim_cur / 1024) + " KiB of " + name;
+  }
+  return text.empty() ? text : " (limited to " + text + ')';
+}
+
+// The system refuses a thread for want of memory for its stack, or of numbers for threads.
+bool is_shortage(const std::error_code& code) {
+  return code == std::errc::resource_unavailable_try_again || code == std::errc::not_enough_memory;
+}
+
+std::string shortage(const std::string& what) {
+  const std::string limits = memory_limits();
+  return limits.empty() ? "out of memory or threads: " + what +
+                              "; threads are limited by ulimit -u, TasksMax or pids_limit"
+                        : "out of memory: " + what + limits;
 }
 
 }  // namespace
@@ -114,7 +170,10 @@ int run(int argc, const char* const* argv) {
     add_study(app, chosen);
     return run_parsed(app, chosen, argc, argv);
   } catch (const std::bad_alloc&) {
-    complain("the machine has no memory left");
+    complain("out of memory" + memory_limits());
+  } catch (const std::system_error& fault) {
+    complain(is_shortage(fault.code()) ? shortage("no thread can be started")
+                                       : "internal error: " + printable(fault.what(), 1000));
   } catch (const std::exception& fault) {
     complain("internal error: " + printable(fault.what(), 1000));
   }

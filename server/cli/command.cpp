@@ -1,14 +1,17 @@
 // The commands' common parts: numbers from words, bytes to files, errors to stderr.
 #include "server/cli/command.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
-#include <limits>
 #include <memory>
 #include <system_error>
 
 #include "server/base/whole_file.hpp"
+#include "server/cli/open_store.hpp"
 
 namespace windsplat::cli {
 namespace {
@@ -33,6 +36,35 @@ void add_threads_option(CLI::App& command, unsigned& threads) {
       ->check(CLI::Range(0U, threads_max))
       ->type_name("N")
       ->capture_default_str();
+}
+
+void add_memory_option(CLI::App& command, std::string& bytes) {
+  command
+      .add_option("--memory-limit", bytes,
+                  "Bytes for data, pictures and loaders, at least " + bytes_text(memory_bytes_min) +
+                      "; K, M, G, T are powers of 1024, as in 512M or 1.5G")
+      ->envname("WINDSPLAT_MEMORY_LIMIT")
+      ->type_name("BYTES")
+      ->capture_default_str();
+}
+
+Result<std::uint64_t> memory_limit(const std::string& text) {
+  const auto bytes = parse_bytes(text);
+  const std::string option = "--memory-limit '" + printable(text) + "' ";
+  if (!bytes) {
+    return make_error(ErrorKind::malformed,
+                      option + "is not a number of bytes such as 512M, 1.5G or 8G, at most " +
+                          bytes_text(memory_bytes_max));
+  }
+  if (*bytes > memory_bytes_max) {
+    return make_error(ErrorKind::malformed, option + "is beyond " + bytes_text(memory_bytes_max) +
+                                                ", more than a process can address");
+  }
+  if (*bytes >= memory_bytes_min) return *bytes;
+  return make_error(ErrorKind::malformed,
+                    option + "is below the least of " + bytes_text(memory_bytes_min) + ": " +
+                        bytes_text(program_bytes) + " for the program and a picture, the rest " +
+                        "for a loader and fields (a number without K, M, G or T is of bytes)");
 }
 
 void complain(std::string_view message) {
@@ -88,18 +120,29 @@ std::optional<std::array<std::int64_t, 3>> parse_extent(std::string_view text, s
 }
 
 std::optional<std::uint64_t> parse_bytes(std::string_view text) {
-  std::uint64_t number = 0;
-  const char* const end = text.data() + text.size();
-  const auto [next, fault] = std::from_chars(text.data(), end, number);
-  if (fault != std::errc() || number == 0) return std::nullopt;
-  const std::string_view unit(next, static_cast<std::size_t>(end - next));
-  if (unit.empty()) return number;
   constexpr std::string_view units = "KMGT";
-  const std::size_t power = units.find(unit[0]);
-  if (unit.size() != 1 || power == std::string_view::npos) return std::nullopt;
-  const unsigned shift = 10 * (static_cast<unsigned>(power) + 1);
-  if (number > std::numeric_limits<std::uint64_t>::max() >> shift) return std::nullopt;
-  return number << shift;
+  constexpr std::string_view digits = "0123456789";
+  double scale = 1;
+  bool is_whole = true;
+  if (!text.empty() && digits.find(text.back()) == std::string_view::npos) {
+    const std::size_t power =
+        units.find(static_cast<char>(std::toupper(static_cast<unsigned char>(text.back()))));
+    if (power == std::string_view::npos) return std::nullopt;
+    scale = std::ldexp(1.0, 10 * (static_cast<int>(power) + 1));
+    is_whole = false;
+    text.remove_suffix(1);
+  }
+  // Digits at both ends: from_chars takes signs, "inf" and "1." too.
+  const auto is_digit = [&](char one) { return digits.find(one) != std::string_view::npos; };
+  if (text.empty() || !is_digit(text.front()) || !is_digit(text.back())) return std::nullopt;
+  if (is_whole && !std::all_of(text.begin(), text.end(), is_digit)) return std::nullopt;
+  double number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [next, fault] = std::from_chars(text.data(), end, number, std::chars_format::fixed);
+  if (fault != std::errc() || next != end) return std::nullopt;
+  const double bytes = std::floor(number * scale);
+  if (bytes < 1 || bytes >= std::ldexp(1.0, 64)) return std::nullopt;
+  return static_cast<std::uint64_t>(bytes);
 }
 
 Result<std::string> read_text_file(const std::string& path, std::size_t bytes_max) {
@@ -118,7 +161,8 @@ Result<std::string> read_text_file(const std::string& path, std::size_t bytes_ma
 Result<void> write_stdout(std::string_view text) {
   const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
   if (std::fflush(stdout) == 0 && written) return {};
-  return file_error(ErrorKind::internal, "cannot write", "-");
+  return make_error(ErrorKind::internal,
+                    "cannot write to stdout: " + std::generic_category().message(errno));
 }
 
 Result<void> write_output(const std::string& path, std::span<const std::uint8_t> bytes) {

@@ -38,6 +38,12 @@ int load();
 // --threads N, or WINDSPLAT_THREADS; 0, the default, means one a hardware thread.
 void add_threads_option(CLI::App& command, unsigned& threads);
 
+// --memory-limit BYTES, or WINDSPLAT_MEMORY_LIMIT; `bytes` is the default, and outlives the
+// command.
+void add_memory_option(CLI::App& command, std::string& bytes);
+// Errors: malformed, also below memory_bytes_min and beyond memory_bytes_max (open_store.hpp).
+Result<std::uint64_t> memory_limit(const std::string& text);
+
 // One line on stderr.
 void complain(std::string_view message);
 
@@ -49,7 +55,8 @@ int exit_code(ErrorKind kind);
 // "1280x720" -> {1280, 720}: `count` whole numbers with an x between, at least 1 each.
 std::optional<std::array<std::int64_t, 3>> parse_extent(std::string_view text, std::size_t count);
 
-// "8G" -> bytes; K, M, G and T are powers of 1024. Empty if it is not of that form, 0 or too large.
+// "8G", "1.5g" -> bytes; K, M, G and T are powers of 1024. A part of a byte is left out, and beyond
+// 2^53 the value is rounded. Empty if it is not of that form, less than a byte, or 2^64 and more.
 std::optional<std::uint64_t> parse_bytes(std::string_view text);
 
 // The whole file. Errors: not_found, too_large beyond `bytes_max`.

@@ -1,6 +1,8 @@
 // CLI11's own configuration files win over the environment; here they do not.
 #include "server/cli/config_file.hpp"
 
+#include <algorithm>
+
 #include "protocol/config.hpp"
 #include "protocol/limits.hpp"
 #include "server/cli/command.hpp"
@@ -61,6 +63,9 @@ Result<void> apply(CLI::App& command, const ConfigEntry& entry) {
   }
   if (std::string fault = kind_fault(*option, entry.kind); !fault.empty()) {
     return protocol::config_error(entry.key, std::move(fault));
+  }
+  if (std::find(entry.words.begin(), entry.words.end(), "") != entry.words.end()) {
+    return protocol::config_error(entry.key, "must not be empty");
   }
   if (entry.words.empty()) return {};
   const std::vector<std::string> given = option->results();

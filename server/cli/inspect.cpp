@@ -1,35 +1,137 @@
 // windsplat inspect: dataset -> what is in it, as JSON or for a reader.
+#include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "protocol/codec.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/inspect_text.hpp"
 #include "server/cli/open_store.hpp"
+#include "server/data/budget.hpp"
+#include "server/data/limits.hpp"
 #include "server/data/store.hpp"
 #include "server/scene/describe.hpp"
 
 namespace windsplat::cli {
 namespace {
 
-// Ranges are over the whole series where reading it takes moments, else over the first step.
+// Unless asked, ranges are over the whole series where reading it takes moments, else over the
+// first step, and where even that would decode much more than is stored they are left out.
 constexpr std::uint64_t whole_series_bytes_max = 1ULL << 30;
+constexpr std::uint64_t bytes_of_a_read = 65536;  // what each read costs at least
 
 struct InspectArguments {
   std::string dataset;
+  std::string memory = "8G";
+  std::string ranges = "auto";
   bool json = false;
 };
 
+// What reading fields at one step takes, in bytes.
+constexpr double chunks_at_a_time = 4;  // those that the library keeps, and what its filters hold
+struct Cost {
+  double decoded = 0;  // of all fields together
+  double memory = 0;   // of the field that takes most, in its loader
+};
+
+Cost cost_of_step(const data::DatasetInfo& info) {
+  Cost cost;
+  for (const data::FieldInfo& field : info.fields) {
+    if (field.derived) continue;
+    const std::uint64_t volume = info.grid.samples() * field.components.size() * sizeof(float);
+    cost.decoded += static_cast<double>(std::max({field.decoded_bytes, volume, bytes_of_a_read}));
+    cost.memory =
+        std::max(cost.memory, static_cast<double>(volume) +
+                                  chunks_at_a_time * static_cast<double>(field.chunk_bytes));
+  }
+  return cost;
+}
+
+std::string size_text(double bytes) {
+  return data::megabytes(static_cast<std::uint64_t>(std::min(bytes, 0x1p40)));
+}
+
+// Which steps ranges are over, and why not over all of them; empty if they are.
+struct Choice {
+  scene::RangesOf ranges = scene::RangesOf::all_steps;
+  std::string note;
+};
+
+Choice choose_ranges(const data::DatasetInfo& info, std::uint64_t bytes_when_resident) {
+  const Cost cost = cost_of_step(info);
+  const auto steps = static_cast<double>(info.steps.size());
+  const std::string beyond = ", beyond the limit of ";
+  const std::string files = " for files of " + size_text(static_cast<double>(info.stored_bytes));
+  const bool is_sample = info.stored_bytes == 0;
+  const auto decoded_max = static_cast<double>(data::range_bytes_max(info.stored_bytes));
+  const auto memory_max = static_cast<double>(data::range_memory_max(info.stored_bytes));
+  if (!is_sample && (cost.decoded > decoded_max || cost.memory > memory_max)) {
+    const bool by_size = cost.decoded > decoded_max;
+    return {scene::RangesOf::none,
+            "ranges are not read: a step " +
+                (by_size ? "decodes " + size_text(cost.decoded) + beyond + size_text(decoded_max)
+                         : "takes " + size_text(cost.memory) + " of memory" + beyond +
+                               size_text(memory_max)) +
+                files + "; --ranges first or all reads them"};
+  }
+  const bool by_size = !is_sample && cost.decoded * steps > decoded_max;
+  if (!by_size && bytes_when_resident <= whole_series_bytes_max) return {};
+  if (info.steps.size() == 1) return {scene::RangesOf::first_step, ""};
+  return {
+      scene::RangesOf::first_step,
+      "ranges are over the first step: all " + std::to_string(info.steps.size()) +
+          (by_size ? " decode " + size_text(cost.decoded * steps) + beyond +
+                         size_text(decoded_max) + files
+                   : " have " + size_text(static_cast<double>(bytes_when_resident)) + " of values" +
+                         beyond + size_text(static_cast<double>(whole_series_bytes_max))) +
+          "; --ranges all reads them"};
+}
+
+Choice asked_ranges(const std::string& ranges) {
+  return {ranges == "all"     ? scene::RangesOf::all_steps
+          : ranges == "first" ? scene::RangesOf::first_step
+                              : scene::RangesOf::none,
+          ""};
+}
+
+// One at a time is read. Empty: there is none.
+std::string largest_field(const data::DatasetInfo& info) {
+  std::string name;
+  std::size_t components = 0;
+  for (const data::FieldInfo& field : info.fields) {
+    if (field.components.size() <= components) continue;
+    components = field.components.size();
+    name = field.name;
+  }
+  return name;
+}
+
 Result<void> inspect(const InspectArguments& arguments) {
-  data::Store store(store_options(command_bytes_max));
+  const auto limit = memory_limit(arguments.memory);
+  if (!limit) return limit.error();
+  const bool asked = arguments.ranges != "auto";
+  data::Store store(asked ? store_options(*limit) : frugal_store_options(*limit));
   const auto dataset = store.add(arguments.dataset);
   if (!dataset) return dataset.error();
   auto description = scene::describe(**dataset, scene::RangesOf::none);
   if (!description) return description.error();
-  const bool whole = description->bytes_when_resident <= whole_series_bytes_max;
-  description =
-      scene::describe(**dataset, whole ? scene::RangesOf::all_steps : scene::RangesOf::first_step);
-  if (!description) return description.error();
+  Choice choice = asked ? asked_ranges(arguments.ranges)
+                        : choose_ranges((*dataset)->info(), description->bytes_when_resident);
+  if (choice.ranges != scene::RangesOf::none) {
+    auto ranged = scene::describe(**dataset, choice.ranges);
+    if (ranged) {
+      description = std::move(ranged);
+    } else {
+      const Error error =
+          (*dataset)->with_need(ranged.error(), {largest_field((*dataset)->info())});
+      if (asked || error.kind != ErrorKind::out_of_memory) return error;
+      // What needs no field is told all the same.
+      choice.note = "ranges are not read: " + error.message;
+    }
+  }
+  if (!choice.note.empty()) description->notes.push_back(std::move(choice.note));
   return write_stdout(arguments.json ? protocol::encode_dataset(*description) + "\n"
                                      : inspect_text(*description));
 }
@@ -43,6 +145,13 @@ void add_inspect(CLI::App& app, Action& chosen) {
   command->add_option("file", arguments->dataset, "A file, or a sample's name")
       ->required()
       ->type_name("FILE");
+  add_memory_option(*command, arguments->memory);
+  command
+      ->add_option("--ranges", arguments->ranges,
+                   "Over which steps fields are read for their ranges, whatever it takes; auto: "
+                   "all, the first or none, by how much more is decoded than the file stores")
+      ->check(CLI::IsMember({"auto", "all", "first", "none"}))
+      ->capture_default_str();
   command->add_flag("--json", arguments->json, "For programs: one JSON object");
   command->callback([&chosen, arguments] {
     chosen = [arguments] {

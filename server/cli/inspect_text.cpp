@@ -19,6 +19,7 @@ using Row = std::vector<std::string>;
 // Numbers that a float32 holds exactly differ from even spacing by their rounding alone.
 constexpr double uneven_tolerance = 1e-3;  // of the mean spacing
 constexpr std::size_t steps_listed_max = 12;
+constexpr std::size_t line_bytes_max = 80;  // of notes and reasons
 
 std::string number(double value) {
   std::array<char, 40> text{};
@@ -30,6 +31,9 @@ std::string number(double value) {
 std::string word(std::string_view text, std::string_view if_empty = "-") {
   return text.empty() ? std::string(if_empty) : printable(text, 80);
 }
+
+// Text that is not cut.
+std::string whole(std::string_view text) { return printable(text, std::string::npos); }
 
 std::string byte_count(std::uint64_t bytes) {
   constexpr std::array<const char*, 5> units{"B", "KiB", "MiB", "GiB", "TiB"};
@@ -56,6 +60,27 @@ std::string table(const std::vector<Row>& rows) {
     }
     line.erase(line.find_last_not_of(' ') + 1);
     out += line + '\n';
+  }
+  return out;
+}
+
+// Words in lines of at most `line_bytes_max` as far as they fit; all lines but the first are
+// indented, and the first has at most so many bytes before it.
+std::string wrapped(std::string_view text, std::size_t indent) {
+  std::string out;
+  std::size_t line = indent;
+  while (!text.empty()) {
+    const std::string_view word = text.substr(0, text.find(' '));
+    text.remove_prefix(std::min(text.size(), word.size() + 1));
+    if (line > indent && line + 1 + word.size() > line_bytes_max) {
+      out += '\n' + std::string(indent, ' ');
+      line = indent;
+    } else if (line > indent) {
+      out += ' ';
+      ++line;
+    }
+    out += word;
+    line += word.size();
   }
   return out;
 }
@@ -110,6 +135,8 @@ std::string masked_text(const protocol::DatasetDescription& dataset,
 std::string fields_text(const protocol::DatasetDescription& dataset) {
   std::vector<Row> rows;
   bool whole = false;
+  const bool any_range = std::any_of(dataset.fields.begin(), dataset.fields.end(),
+                                     [](const auto& field) { return !field.range_of.empty(); });
   for (const protocol::FieldDescription& field : dataset.fields) {
     whole = whole || field.range_of == "all";
     std::string kind = field.kind;
@@ -121,7 +148,7 @@ std::string fields_text(const protocol::DatasetDescription& dataset) {
       }
       kind += ')';
     }
-    std::string range = field.masked ? "no value" : "made when shown";
+    std::string range = field.masked ? "no value" : any_range ? "made when shown" : "not read";
     if (field.range) {
       range = field.kind == "vector" ? "|v| " : "";
       range.append(number((*field.range)[0])).append(" .. ").append(number((*field.range)[1]));
@@ -132,6 +159,7 @@ std::string fields_text(const protocol::DatasetDescription& dataset) {
                     masked_text(dataset, field), field.dtype, word(meaning, "")});
   }
   if (rows.empty()) return "fields: none\n";
+  if (!any_range) return "fields\n" + table(rows);
   return std::string("fields (ranges over ") +
          (whole && dataset.steps.size() > 1 ? "all steps" : "the first step") + ")\n" + table(rows);
 }
@@ -164,18 +192,19 @@ std::string inspect_text(const protocol::DatasetDescription& dataset) {
          " with every field resident at every step\n\n";
   out += grid_text(dataset) + '\n' + fields_text(dataset) + '\n' + steps_text(dataset);
   if (!dataset.left_out.empty()) {
-    std::vector<Row> rows;
+    std::size_t width = 0;
+    for (const auto& left : dataset.left_out) width = std::max(width, word(left.first).size());
+    out += "\nleft out\n";
     for (const auto& [variable, reason] : dataset.left_out) {
-      rows.push_back({word(variable), printable(reason)});
+      const std::string name = word(variable);
+      out += "  " + name + std::string(width - name.size() + 2, ' ');
+      out += wrapped(whole(reason), width + 4) + '\n';
     }
-    out += "\nleft out\n" + table(rows);
   }
   if (!dataset.notes.empty()) {
     out += "\nnotes\n";
     for (const std::string& note : dataset.notes) {
-      out += "  ";
-      out += printable(note);
-      out += '\n';
+      out += "  " + wrapped(whole(note), 4) + '\n';
     }
   }
   return out;

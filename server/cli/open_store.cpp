@@ -2,7 +2,9 @@
 #include "server/cli/open_store.hpp"
 
 #include <algorithm>
+#include <string_view>
 
+#include "server/base/check.hpp"
 #include "server/data/grib/open.hpp"
 #include "server/data/loader/loader.hpp"
 
@@ -10,8 +12,8 @@ namespace windsplat::cli {
 
 namespace {
 
-// A daemon without data, pictures in work and one loader.
-constexpr std::uint64_t kept_back_bytes = std::uint64_t{128} << 20;
+// What a loader may take: a quarter of the limit within these bounds, or half of a limit of which
+// that is less than the lower one.
 constexpr std::uint64_t loader_bytes_min = std::uint64_t{256} << 20;
 constexpr std::uint64_t loader_bytes_max = std::uint64_t{2} << 30;
 
@@ -25,14 +27,34 @@ std::vector<std::string> folders_of(const std::string& joined) {
   return out;
 }
 
-}  // namespace
+std::uint64_t data_bytes_of(std::uint64_t memory_bytes) {
+  return memory_bytes - program_bytes - memory_bytes / data_bytes_a_summary_byte;
+}
 
-data::StoreOptions store_options(std::uint64_t memory_bytes, data::Storage storage) {
-  data::loader::Limits limits;
-  limits.memory_bytes = std::clamp(memory_bytes / 4, loader_bytes_min, loader_bytes_max);
-  limits.library_folders = folders_of(data::grib::definitions_folder());
+data::LimitName limit_name(std::uint64_t memory_bytes) {
+  data::LimitName name;
+  name.text = "--memory-limit " + bytes_text(memory_bytes);
+  name.raised = [](std::uint64_t data_bytes) {
+    constexpr std::uint64_t unit = std::uint64_t{1} << 20;
+    const std::uint64_t all =
+        (data_bytes + program_bytes) / (data_bytes_a_summary_byte - 1) * data_bytes_a_summary_byte +
+        data_bytes_a_summary_byte;
+    return "--memory-limit " +
+           bytes_text(std::max((all + unit - 1) / unit * unit, memory_bytes_min));
+  };
+  return name;
+}
+
+data::StoreOptions options_of(std::uint64_t memory_bytes, data::Storage storage,
+                              data::loader::Limits limits) {
   data::StoreOptions options;
-  options.bytes_max = memory_bytes - std::min(memory_bytes / 2, kept_back_bytes);
+  WINDSPLAT_CHECK(memory_bytes >= memory_bytes_min);
+  options.bytes_max = data_bytes_of(memory_bytes);
+  options.budget = std::make_shared<data::Budget>(options.bytes_max, limit_name(memory_bytes));
+  limits.memory_bytes =
+      std::clamp(memory_bytes / 4, std::min(loader_bytes_min, memory_bytes / 2), loader_bytes_max);
+  limits.library_folders = folders_of(data::grib::definitions_folder());
+  limits.budget = options.budget;
   options.storage = storage;
   options.open = [limits](const data::Location& location) -> Result<std::unique_ptr<data::Source>> {
     auto source = data::loader::open(location, limits);
@@ -40,6 +62,27 @@ data::StoreOptions store_options(std::uint64_t memory_bytes, data::Storage stora
     return std::unique_ptr<data::Source>(std::move(*source));
   };
   return options;
+}
+
+}  // namespace
+
+std::string bytes_text(std::uint64_t bytes) {
+  constexpr std::string_view units = "TGM";
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    const std::uint64_t unit = std::uint64_t{1} << (40U - 10U * i);
+    if (bytes >= unit && bytes % unit == 0) return std::to_string(bytes / unit) + units[i];
+  }
+  return std::to_string(bytes);
+}
+
+data::StoreOptions store_options(std::uint64_t memory_bytes, data::Storage storage) {
+  return options_of(memory_bytes, storage, {});
+}
+
+data::StoreOptions frugal_store_options(std::uint64_t memory_bytes) {
+  data::loader::Limits limits;
+  limits.reads_take_all = false;
+  return options_of(memory_bytes, data::Storage::float32, limits);
 }
 
 }  // namespace windsplat::cli

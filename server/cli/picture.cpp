@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "protocol/limits.hpp"
+#include "server/base/whole_file.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/open_store.hpp"
 
@@ -24,6 +25,7 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
       ->check(CLI::Range(1, 100))
       ->type_name("N")
       ->capture_default_str();
+  add_memory_option(command, arguments.memory);
 }
 
 Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments) {
@@ -66,6 +68,7 @@ Result<frame::Format> format_of(const std::string& output) {
   if (extension == ".png") return frame::Format::png;
   if (extension == ".jpg" || extension == ".jpeg") return frame::Format::jpeg;
   if (extension == ".npy") return frame::Format::npy;
+  if (is_stream(output)) return frame::Format::png;  // as "-"
   return make_error(ErrorKind::invalid,
                     "-o '" + printable(output) + "': its name must end in .png, .jpg or .npy");
 }
@@ -78,9 +81,11 @@ frame::Encoding file_encoding(frame::Format format, int quality) {
   return encoding;
 }
 
-Result<std::shared_ptr<data::Dataset>> open_dataset(const std::string& sample_or_path) {
+Result<std::shared_ptr<data::Dataset>> open_dataset(const ViewArguments& arguments) {
+  const auto limit = memory_limit(arguments.memory);
+  if (!limit) return limit.error();
   // The store keeps nothing that its datasets need after it.
-  return data::Store(store_options(command_bytes_max)).add(sample_or_path);
+  return data::Store(store_options(*limit)).add(arguments.dataset);
 }
 
 }  // namespace windsplat::cli

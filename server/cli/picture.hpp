@@ -19,10 +19,11 @@ struct ViewArguments {
   std::string step;
   std::string size;
   std::vector<std::string> settings;  // "/json/pointer=value"
-  int quality = 95;                   // JPEG: a file is kept, so it costs bytes rather than detail
+  std::string memory = "8G";
+  int quality = 95;  // JPEG: a file is kept, so it costs bytes rather than detail
 };
 
-// DATASET, --view, --size, --set and --quality; `arguments` outlives the command.
+// DATASET, --view, --size, --set, --quality and --memory-limit; `arguments` outlives the command.
 void add_view_options(CLI::App& command, ViewArguments& arguments);
 
 // The view file, then --step, --size and --set on top of it, in this order.
@@ -34,7 +35,7 @@ Result<frame::Format> format_of(const std::string& output);
 // How a kept picture is encoded, `quality` 1..100 for a JPEG; the reference is allowed.
 frame::Encoding file_encoding(frame::Format format, int quality);
 
-// A dataset of its own for this command.
-Result<std::shared_ptr<data::Dataset>> open_dataset(const std::string& sample_or_path);
+// A dataset of its own for this command. Errors: malformed for a limit that is no number.
+Result<std::shared_ptr<data::Dataset>> open_dataset(const ViewArguments& arguments);
 
 }  // namespace windsplat::cli

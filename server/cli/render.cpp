@@ -45,7 +45,7 @@ Result<void> render(const RenderArguments& arguments) {
   }
   const auto document = assemble_view(arguments.view);
   if (!document) return document.error();
-  const auto dataset = open_dataset(arguments.view.dataset);
+  const auto dataset = open_dataset(arguments.view);
   if (!dataset) return dataset.error();
   protocol::View view = document->view();
   view.dataset = (*dataset)->info().id;

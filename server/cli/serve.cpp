@@ -1,5 +1,5 @@
 // windsplat serve: datasets opened in order, then the daemon until SIGTERM or SIGINT; SIGHUP has it
-// read its configuration, token and certificate again.
+// read its configuration, token and certificate again, and try again what could not be opened.
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,15 +23,16 @@
 #include "server/cli/signals.hpp"
 #include "server/data/store.hpp"
 #include "server/net/server.hpp"
+#include "server/scene/build.hpp"
 #include "server/views/saved_views.hpp"
 
 namespace windsplat::cli {
 namespace {
 
 // What a running daemon takes over; the rest waits for the next start.
-constexpr std::array<std::string_view, 8> live_options{"token-file",   "tls-cert",   "tls-key",
+constexpr std::array<std::string_view, 9> live_options{"token-file",   "tls-cert",   "tls-key",
                                                        "allow-origin", "allow-host", "allow-remote",
-                                                       "log-format",   "log-level"};
+                                                       "allow-root",   "log-format", "log-level"};
 
 // At the end of the daemon. A disk may never answer.
 constexpr std::chrono::seconds reload_patience{1};
@@ -48,7 +49,9 @@ class Control {
   explicit Control(const CLI::App& given) : given_(given) {}
 
   // What was wanted before there was a server to change is done now.
-  void arm(net::Server& server, std::unique_ptr<ServeSettings> started) {
+  void arm(net::Server& server, std::shared_ptr<data::Store> store,
+           std::unique_ptr<ServeSettings> started) {
+    store_ = std::move(store);
     started_ = std::move(started);
     tls_ = started_->options.tls;
     while (true) {
@@ -124,6 +127,7 @@ class Control {
         {options.allow_origins, options.token, tls, options.known_hosts_only, options.allow_hosts});
     tls_ = std::move(tls);
     configure_log(settings.arguments);
+    store_->try_failed_again();
     log::info("read the configuration again");
   }
 
@@ -132,6 +136,7 @@ class Control {
   }
 
   const CLI::App& given_;
+  std::shared_ptr<data::Store> store_;
   std::unique_ptr<ServeSettings> started_;
   std::shared_ptr<net::TlsContext> tls_;  // the newest
   std::mutex mutex_;                      // of the rest, held for moments
@@ -139,19 +144,43 @@ class Control {
   bool reload_wanted_ = false;
 };
 
-// All or none: a daemon that serves half of what it was asked to is harder to notice than none.
-Result<void> open_datasets(const std::vector<std::string>& named, data::Store& store) {
+// A dataset is refused where a field that is shown at first cannot be loaded at a step: its viewers
+// would be told at each frame.
+Result<void> check_first_view(const data::Dataset& dataset) {
+  return dataset.check_room(scene::fields_of({}, dataset.info()));
+}
+
+// One bad file of many does not take the others from their viewers: it is listed as failed. The
+// value is the exit code where nothing can be served, that of bad data if any file is, else
+// exit_ok.
+int open_datasets(const std::vector<std::string>& named, data::Store& store) {
+  int code = exit_ok;
   for (const std::string& name : named.empty() ? data::sample_names() : named) {
     const auto dataset = store.add(name);
-    if (!dataset) return dataset.error();
+    if (!dataset) {
+      const Error& error = dataset.error();
+      code = code == exit_bad_data ? code : exit_code(error.kind);
+      log::warn("a dataset cannot be opened", {{"dataset", name}, {"fault", error.message}});
+      store.list_failed(name, error);
+      continue;
+    }
     const data::DatasetInfo& info = (*dataset)->info();
     log::info("opened", {{"dataset", info.id},
                          {"format", info.format},
                          {"samples", info.grid.samples()},
                          {"fields", info.fields.size()},
                          {"steps", info.steps.size()}});
+    const std::string beyond = (*dataset)->beyond_limit(scene::fields_of({}, info));
+    if (!beyond.empty()) {
+      log::warn("the memory limit may be too small for a dataset's first view",
+                {{"dataset", info.id}, {"fault", beyond.substr(2)}});
+    }
   }
-  return {};
+  if (store.all().empty()) return code;
+  if (code != exit_ok) {
+    log::warn("what cannot be opened is listed as failed", {{"datasets", store.failed().size()}});
+  }
+  return exit_ok;
 }
 
 int serve(const CLI::App& given) {
@@ -164,17 +193,23 @@ int serve(const CLI::App& given) {
   net::ServerOptions options = (*settings)->options;
   warn_of(**settings);
 
-  const auto store = std::make_shared<data::Store>(store_options(
+  data::StoreOptions stored = store_options(
       parse_bytes(arguments.memory_limit).value_or(0),
-      arguments.storage == "packed16" ? data::Storage::packed16 : data::Storage::float32));
-  if (const auto ok = open_datasets(arguments.datasets, *store); !ok) return answer(ok.error());
+      arguments.storage == "packed16" ? data::Storage::packed16 : data::Storage::float32);
+  stored.check = check_first_view;
+  const auto store = std::make_shared<data::Store>(std::move(stored));
+  if (const int code = open_datasets(arguments.datasets, *store); code != exit_ok) {
+    for (const data::Store::Failed& failed : store->failed())
+      complain(printable(failed.problem, 2000));
+    return code;
+  }
   auto views = views::SavedViews::open({arguments.state_dir});
   if (!views) return answer(views.error());
   options.views = std::move(*views);
   net::Server server(std::move(options), store, std::make_shared<ThreadPool>(arguments.threads));
   if (const auto ok = server.listen(); !ok) return answer(ok.error());
   const std::string url = server.url();
-  control->arm(server, std::move(*settings));
+  control->arm(server, store, std::move(*settings));
   int code = exit_ok;
   if (const auto ok = write_stdout(url + "\n"); !ok) {
     code = answer(ok.error());

@@ -1,6 +1,7 @@
 // Flags and environment of what one address, and all of them together, may take.
 #include "server/cli/serve_limits.hpp"
 
+#include <sstream>
 #include <string>
 
 #include "protocol/limits.hpp"
@@ -13,11 +14,23 @@ constexpr std::size_t count_max = 1'000'000;
 constexpr double number_max = 1e18;
 
 template <class Number>
+CLI::Validator up_to(Number most) {
+  return CLI::Validator(
+      [most](const std::string& text) {
+        if (CLI::Range(Number{0}, most)(text).empty()) return std::string();
+        std::ostringstream words;
+        words << "is a number from 0 (no limit) to " << most << ", not '" << text << "'";
+        return words.str();
+      },
+      "");
+}
+
+template <class Number>
 void add(CLI::App& command, const char* flag, const char* environment, Number& value, Number most,
          const char* help, const char* unit) {
   command.add_option(flag, value, help)
       ->envname(environment)
-      ->check(CLI::Range(Number{0}, most))
+      ->check(up_to(most))
       ->type_name(unit)
       ->capture_default_str()
       ->group("Limits (0: none)");
@@ -39,6 +52,12 @@ void add_limit_options(CLI::App& command, net::Limits& limits) {
       "New connections a second; one in TLS counts as 5", "N");
   add(command, "--max-arrivals-per-address", "WINDSPLAT_MAX_ARRIVALS_PER_ADDRESS",
       limits.arrivals_per_address, number_max, "Of one address", "N");
+  add(command, "--max-handshakes", "WINDSPLAT_MAX_HANDSHAKES", limits.handshake_ms, number_max,
+      "Processor time a second of TLS handshakes, of addresses that have not shown the token "
+      "recently; those that have get as much again. 127.0.0.1 and ::1 count by themselves alone",
+      "MS");
+  add(command, "--max-handshakes-per-address", "WINDSPLAT_MAX_HANDSHAKES_PER_ADDRESS",
+      limits.handshake_ms_per_address, number_max, "Of one address", "MS");
   add(command, "--max-sessions-per-address", "WINDSPLAT_MAX_SESSIONS_PER_ADDRESS",
       limits.sessions_per_address, count_max, "Viewers of one address at a time", "N");
   add(command, "--max-requests-per-address", "WINDSPLAT_MAX_REQUESTS_PER_ADDRESS",

@@ -21,6 +21,11 @@ void add_network_options(CLI::App& command, ServeArguments& arguments) {
                 "Without a token, too, allow an address that other machines reach. Nobody is asked "
                 "who they are: put a proxy in front that does")
       ->envname("WINDSPLAT_ALLOW_REMOTE");
+  command
+      .add_flag("--allow-root", arguments.allow_root,
+                "As root, too, allow an address that other machines reach. It needs none of root's "
+                "rights but to read files that only root may")
+      ->envname("WINDSPLAT_ALLOW_ROOT");
   command.add_option("--base-path", arguments.base_path, "Below which path of a proxy's it stands")
       ->envname("WINDSPLAT_BASE_PATH")
       ->type_name("PATH")
@@ -82,12 +87,7 @@ void add_data_options(CLI::App& command, ServeArguments& arguments) {
                   "Keep saved views in this folder; without it they last as long as the daemon")
       ->envname("WINDSPLAT_STATE_DIR")
       ->type_name("DIR");
-  command
-      .add_option("--memory-limit", arguments.memory_limit,
-                  "Bytes for data, pictures and loaders, with K, M, G as powers of 1024")
-      ->envname("WINDSPLAT_MEMORY_LIMIT")
-      ->type_name("BYTES")
-      ->capture_default_str();
+  add_memory_option(command, arguments.memory_limit);
   command
       .add_option("--storage", arguments.storage,
                   "Of resident data: 16 bits a value err by at most 1/131068 of a field's width")

@@ -15,6 +15,7 @@ struct ServeArguments {
   std::string config;
   std::string listen = "127.0.0.1:8080";
   bool allow_remote = false;
+  bool allow_root = false;
   std::string token_file;
   std::string tls_cert;
   std::string tls_key;

@@ -3,6 +3,7 @@
 
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -16,6 +17,7 @@
 #include "server/cli/command.hpp"
 #include "server/cli/config_file.hpp"
 #include "server/cli/listen_address.hpp"
+#include "server/cli/open_store.hpp"
 #include "server/cli/settings_file.hpp"
 
 namespace windsplat::cli {
@@ -120,10 +122,7 @@ Result<net::ServerOptions> server_options(const ServeArguments& arguments) {
     return make_error(ErrorKind::malformed, "--base-path '" + printable(arguments.base_path) +
                                                 "' is not of the form /windsplat/");
   }
-  if (!parse_bytes(arguments.memory_limit)) {
-    return make_error(ErrorKind::malformed, "--memory-limit '" + printable(arguments.memory_limit) +
-                                                "' is not a number of bytes such as 512M or 8G");
-  }
+  if (const auto limit = memory_limit(arguments.memory_limit); !limit) return limit.error();
   auto data_root = plain_folder(arguments.data_root);
   if (!data_root) return data_root.error();
   auto token = read_token(arguments.token_file);
@@ -154,21 +153,28 @@ Result<net::ServerOptions> server_options(const ServeArguments& arguments) {
 }  // namespace
 
 Result<void> check_exposure(const ServeArguments& arguments, bool loopback) {
-  if (loopback || arguments.allow_remote || !arguments.token_file.empty()) return {};
-  return make_error(ErrorKind::invalid,
-                    "--listen '" + printable(arguments.listen) +
-                        "' can be reached from other machines, and nobody who reaches it is asked "
-                        "who they are: give --token-file, or say --allow-remote if that is wanted");
+  if (loopback) return {};
+  const std::string reached =
+      "--listen '" + printable(arguments.listen) + "' can be reached from other machines, and ";
+  if (!arguments.allow_remote && arguments.token_file.empty()) {
+    return make_error(ErrorKind::invalid,
+                      reached +
+                          "nobody who reaches it is asked who they are: give --token-file, or say "
+                          "--allow-remote if that is wanted");
+  }
+  if (::geteuid() == 0 && !arguments.allow_root) {
+    return make_error(ErrorKind::invalid,
+                      reached +
+                          "this process runs as root: start it as another user (as "
+                          "deploy/windsplat.service and the Dockerfile do), or say --allow-root if "
+                          "that is wanted");
+  }
+  return {};
 }
 
 void warn_of(const ServeSettings& settings) {
   const ServeArguments& arguments = settings.arguments;
   const net::ServerOptions& options = settings.options;
-  constexpr std::uint64_t usual_bytes_min = std::uint64_t{1} << 20;
-  if (parse_bytes(arguments.memory_limit).value_or(0) < usual_bytes_min) {
-    log::warn("hardly any data fits into the memory limit; a number without K, M or G is of bytes",
-              {{"memory-limit", arguments.memory_limit}});
-  }
   for (const std::string* secret : {&arguments.token_file, &arguments.tls_key}) {
     if (!secret->empty() && others_read(*secret)) {
       log::warn("a secret can be read by others than its owner", {{"file", *secret}});
@@ -176,6 +182,12 @@ void warn_of(const ServeSettings& settings) {
   }
   if (options.tls != nullptr && net::certificate_ends(*options.tls) < std::time(nullptr)) {
     log::warn("the certificate has expired", {{"file", arguments.tls_cert}});
+  }
+  const std::string expensive =
+      options.tls != nullptr ? net::expensive_handshakes(*options.tls) : "";
+  if (!expensive.empty()) {
+    log::warn("each TLS handshake costs more than usual",
+              {{"file", arguments.tls_cert}, {"fault", expensive}});
   }
   if (!options.local_hosts_only && options.token != nullptr && options.tls == nullptr) {
     log::warn(

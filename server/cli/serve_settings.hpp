@@ -25,7 +25,8 @@ Result<std::unique_ptr<ServeSettings>> read_settings(const CLI::App& given);
 // certificate that has expired.
 void warn_of(const ServeSettings& settings);
 
-// Whether others may reach the address without being asked for a token, though nobody said so.
+// Whether others may reach the address without being asked for a token, or reach a process of
+// root's, though nobody said so. Errors: invalid.
 Result<void> check_exposure(const ServeArguments& arguments, bool loopback);
 
 }  // namespace windsplat::cli

@@ -30,7 +30,7 @@ void complain_of(const std::exception& fault) noexcept {
 }
 
 void watch(int signal_fd, int stop_fd, const std::function<void()>& on_first,
-           const std::function<void()>& on_hangup) {
+           const std::function<void()>& on_hangup, const AtOnce& on_second) {
   bool seen = false;
   std::array<pollfd, 2> events{{{signal_fd, POLLIN, 0}, {stop_fd, POLLIN, 0}}};
   while (true) {
@@ -45,7 +45,10 @@ void watch(int signal_fd, int stop_fd, const std::function<void()>& on_first,
       on_hangup();
       continue;
     }
-    if (seen) _exit(1);
+    if (seen) {
+      if (on_second.before) on_second.before();
+      _exit(on_second.code);
+    }
     seen = true;
     try {
       on_first();
@@ -96,7 +99,8 @@ void Errand::run(const std::function<void()>& call) {
   changed_.notify_all();
 }
 
-SignalWatch::SignalWatch(std::function<void()> on_first, std::function<void()> on_hangup) {
+SignalWatch::SignalWatch(std::function<void()> on_first, std::function<void()> on_hangup,
+                         AtOnce on_second) {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
@@ -112,8 +116,9 @@ SignalWatch::SignalWatch(std::function<void()> on_first, std::function<void()> o
     throw std::system_error(fault, std::generic_category(), "cannot wait for signals");
   }
   if (on_hangup) hangup_.emplace(std::move(on_hangup));
-  watcher_ = std::thread([this, on_first = std::move(on_first)] {
-    watch(signal_fd_, stop_fd_, on_first, [this] { hangup_->want(); });
+  watcher_ = std::thread([this, on_first = std::move(on_first), second = std::move(on_second)] {
+    watch(
+        signal_fd_, stop_fd_, on_first, [this] { hangup_->want(); }, second);
   });
 }
 

@@ -34,14 +34,20 @@ class Errand {
   std::thread thread_;  // last: it uses the others
 };
 
+// What a second SIGTERM or SIGINT does: it ends the process at once.
+struct AtOnce {
+  int code = 1;                            // of the exit
+  std::function<void()> before = nullptr;  // by the watching thread, while the others go on
+};
+
 // Make it before any other thread: it blocks the signals for the thread that makes it and those
 // started from there, and waits for them in a thread of its own.
 class SignalWatch {
  public:
-  // `on_first` once, by the watching thread, for SIGTERM or SIGINT: it must not wait. A second of
-  // them ends the process at once, with exit code 1. `on_hangup` after every SIGHUP, by another
-  // thread; without it that one is left alone.
-  explicit SignalWatch(std::function<void()> on_first, std::function<void()> on_hangup = nullptr);
+  // `on_first` once, by the watching thread, for SIGTERM or SIGINT: it must not wait. `on_hangup`
+  // after every SIGHUP, by another thread; without it that one is left alone.
+  explicit SignalWatch(std::function<void()> on_first, std::function<void()> on_hangup = nullptr,
+                       AtOnce on_second = {});
   ~SignalWatch();
   SignalWatch(const SignalWatch&) = delete;
   SignalWatch& operator=(const SignalWatch&) = delete;

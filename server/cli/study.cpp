@@ -41,6 +41,7 @@ struct StudyArguments {
   bool no_reference = false;
   bool no_calibration = false;
   unsigned threads = 0;
+  std::string memory = "8G";
   std::string output;
 };
 
@@ -160,9 +161,11 @@ std::string summary(const study::Report& report, const std::string& folder) {
 }
 
 int study_command(const StudyArguments& arguments) {
+  const auto limit = memory_limit(arguments.memory);
+  if (!limit) return answer(limit.error());
   const CancelToken cancel;
-  const SignalWatch watch([&cancel] { cancel.cancel(); });
-  data::Store store(store_options(command_bytes_max));
+  const SignalWatch watch([&cancel] { cancel.cancel(); }, nullptr, {exit_interrupted});
+  data::Store store(store_options(*limit));
   const auto subjects = subjects_of(arguments, store);
   if (!subjects) return answer(subjects.error());
   ThreadPool pool(arguments.threads);
@@ -212,6 +215,7 @@ void add_study(CLI::App& app, Action& chosen) {
       ->required()
       ->type_name("DIR");
   add_threads_option(*command, arguments->threads);
+  add_memory_option(*command, arguments->memory);
   command->callback(
       [&chosen, arguments] { chosen = [arguments] { return study_command(*arguments); }; });
 }

@@ -1,9 +1,13 @@
 // windsplat synth: built-in sample -> CF netCDF file.
+#include <unistd.h>
+
 #include <limits>
 #include <memory>
 #include <string>
 
+#include "server/base/cancel.hpp"
 #include "server/cli/command.hpp"
+#include "server/cli/signals.hpp"
 #include "server/data/dataset.hpp"
 
 namespace windsplat::cli {
@@ -16,7 +20,7 @@ struct SynthArguments {
   std::string output;
 };
 
-Result<void> synth(const SynthArguments& arguments) {
+Result<void> synth(const SynthArguments& arguments, const CancelToken& cancel) {
   std::array<int, 3> dims{};
   if (!arguments.dims.empty()) {
     const auto extent = parse_extent(arguments.dims, 3);
@@ -34,7 +38,7 @@ Result<void> synth(const SynthArguments& arguments) {
   }
   const auto source = data::open_sample(arguments.sample, dims, arguments.steps);
   if (!source) return source.error();
-  return data::write_netcdf(**source, arguments.output);
+  return data::write_netcdf(**source, arguments.output, cancel);
 }
 
 }  // namespace
@@ -52,8 +56,14 @@ void add_synth(CLI::App& app, Action& chosen) {
   command->add_option("-o", arguments->output, "The file to write")->required()->type_name("F.nc");
   command->callback([&chosen, arguments] {
     chosen = [arguments] {
-      const auto done = synth(*arguments);
-      return done ? exit_ok : answer(done.error());
+      const CancelToken cancel;
+      const std::string part = data::netcdf_part(arguments->output);
+      const SignalWatch watch([&cancel] { cancel.cancel(); }, nullptr,
+                              {exit_interrupted, [&part] { ::unlink(part.c_str()); }});
+      const auto done = synth(*arguments, cancel);
+      if (done) return exit_ok;
+      const int code = answer(done.error());
+      return done.error().kind == ErrorKind::cancelled ? exit_interrupted : code;
     };
   });
 }

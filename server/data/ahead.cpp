@@ -62,7 +62,9 @@ struct Ahead::State {
     if (loaded) return true;
     const Error& error = loaded.error();
     if (error.kind == ErrorKind::out_of_memory) return false;
-    if (error.kind != ErrorKind::cancelled) {
+    const bool given_up = error.kind == ErrorKind::not_resident ||
+                          error.kind == ErrorKind::not_found || error.kind == ErrorKind::draining;
+    if (!given_up) {
       log::debug("loading ahead failed", {{"dataset", wish.dataset.info().id},
                                           {"field", wish.field},
                                           {"step", wish.step},

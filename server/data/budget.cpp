@@ -1,6 +1,7 @@
 // One map of what is kept, one list in the order of use.
 #include "server/data/budget.hpp"
 
+#include <algorithm>
 #include <array>
 #include <exception>
 #include <iterator>
@@ -38,24 +39,38 @@ std::uint64_t Budget::next_owner() {
 }
 
 Result<Resident> Budget::get(const ResidentKey& key, std::uint64_t bytes, Urgency urgency,
-                             const Make& make) {
+                             const Make& make, const OwnPins& own, const CancelToken* cancel) {
   std::unique_lock lock(mutex_);
-  if (auto there = wait_for(key, lock)) {
-    return *there;
-  }
-  if (!make_room(bytes, urgency)) {
-    ++counts_.refusals;
-    return no_room(bytes);
+  for (;;) {
+    if (auto there = wait_for(key, lock)) {
+      return *there;
+    }
+    const bool there_is_room = urgency == Urgency::in_turn ? wait_for_room(bytes, own, cancel, lock)
+                                                           : make_room_beside_turn(bytes, urgency);
+    if (!there_is_room && cancel != nullptr && cancel->cancelled()) {
+      return make_error(ErrorKind::cancelled, "nobody waits for the answer");
+    }
+    if (!there_is_room) {
+      ++counts_.refusals;
+      return no_room("the field", bytes);
+    }
+    // While it waited somebody else may have begun with the same.
+    if (entries_.count(key) == 0) break;
   }
   ++counts_.misses;
   const auto entry = std::make_shared<Entry>();
   entry->bytes = bytes;
+  entry->exit.push_back({key, {}, bytes});
+  Turn turn;
+  if (urgency == Urgency::in_turn) turn = {std::this_thread::get_id(), bytes, own, cancel};
   entries_.emplace(key, entry);
   used_ += bytes;
 
+  if (urgency == Urgency::in_turn) turn_ = std::move(turn);
   lock.unlock();
   Result<Resident> answer = made(make);
   lock.lock();
+  if (urgency == Urgency::in_turn) turn_ = {};
 
   if (answer.has_value()) {
     recent_.push_front(key);
@@ -82,6 +97,16 @@ Resident Budget::find_now(const ResidentKey& key) {
   ++counts_.hits;
   touch(*found->second);
   return found->second->answer->value();
+}
+
+Resident Budget::find_held(const ResidentKey& key) {
+  if (Resident listed = find_now(key)) return listed;
+  const std::lock_guard lock(mutex_);
+  for (const Leaving& one : leaving_) {
+    if (one.key != key) continue;
+    if (Resident held = one.held.lock()) return held;
+  }
+  return nullptr;
 }
 
 bool Budget::has(const ResidentKey& key) const {
@@ -129,11 +154,19 @@ void Budget::count_read(bool ok) {
   counts_.reads_failed += ok ? 0 : 1;
 }
 
+void Budget::end() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  arrived_.notify_all();
+}
+
 BudgetCounts Budget::counts() const {
   const std::lock_guard lock(mutex_);
   BudgetCounts out = counts_;
   out.bytes_max = bytes_max_;
-  out.bytes = used_;
+  out.bytes = used_ - released();
   return out;
 }
 
@@ -166,10 +199,28 @@ void Budget::drop(std::list<ResidentKey>::iterator listed) {
   recent_.erase(listed);
 }
 
+// Listed no more, counted until it is let go of.
+void Budget::drop_held(std::list<ResidentKey>::iterator listed) {
+  Entry& entry = *entries_.find(*listed)->second;
+  entry.exit.front().held = entry.answer->value();
+  leaving_.splice(leaving_.end(), entry.exit);
+  used_ += entry.bytes;
+  drop(listed);
+}
+
 void Budget::drop_all(std::uint64_t owner, bool held_too) {
+  for (Leaving& one : leaving_) {
+    if (held_too && std::get<0>(one.key) == owner) one.in_the_way = false;
+  }
   for (auto at = recent_.begin(); at != recent_.end();) {
     const auto next = std::next(at);
-    if (std::get<0>(*at) == owner && (held_too || !is_held(*entries_.at(*at)))) drop(at);
+    if (std::get<0>(*at) == owner) {
+      if (!is_held(*entries_.at(*at))) {
+        drop(at);
+      } else if (held_too) {
+        drop_held(at);
+      }
+    }
     at = next;
   }
 }
@@ -198,10 +249,120 @@ std::uint64_t Budget::evictable_for(Urgency urgency) const {
 
 std::uint64_t Budget::room() const {
   const std::lock_guard lock(mutex_);
-  return bytes_max_ - used_ + evictable_for(Urgency::demand);
+  return bytes_max_ - used_ + released() + evictable_for(Urgency::demand);
+}
+
+std::uint64_t Budget::released() const {
+  std::uint64_t bytes = 0;
+  for (const Leaving& one : leaving_) bytes += one.held.expired() ? one.bytes : 0;
+  return bytes;
+}
+
+void Budget::count_released() {
+  for (auto at = leaving_.begin(); at != leaving_.end();) {
+    if (at->held.expired()) {
+      used_ -= at->bytes;
+      released_total_ += at->bytes;
+      if (at->in_the_way) ++counts_.evictions;
+      at = leaving_.erase(at);
+    } else {
+      ++at;
+    }
+  }
+}
+
+std::uint64_t Budget::bytes_of_pins(const OwnPins& own) const {
+  std::uint64_t bytes = 0;
+  for (const ResidentKey& key : recent_) {
+    const Entry& entry = *entries_.at(key);
+    if (own.count(entry.answer->value().get()) > 0 && is_held(entry)) bytes += entry.bytes;
+  }
+  return bytes;
+}
+
+// The least recently used first, as many as make room once they are let go of.
+void Budget::take_off_list(std::uint64_t bytes, const OwnPins& own) {
+  std::uint64_t coming = bytes_max_ - std::min(used_, bytes_max_) + evictable_for(Urgency::demand);
+  for (const Leaving& one : leaving_) coming += one.bytes;
+  for (auto at = recent_.end(); at != recent_.begin() && coming < bytes;) {
+    --at;
+    const Entry& entry = *entries_.at(*at);
+    if (!is_held(entry) || own.count(entry.answer->value().get()) > 0) continue;
+    coming += entry.bytes;
+    drop_held(at++);
+    leaving_.back().in_the_way = true;
+  }
+}
+
+// After a wait in vain: what is held takes its bytes either way, and may be asked for again.
+void Budget::list_again() {
+  for (auto at = leaving_.begin(); at != leaving_.end();) {
+    const auto next = std::next(at);
+    Resident held = at->held.lock();
+    if (held && at->in_the_way && entries_.count(at->key) == 0) {
+      const auto entry = std::make_shared<Entry>();
+      entry->bytes = at->bytes;
+      entry->answer.emplace(std::move(held));
+      std::list<ResidentKey> place(1, at->key);
+      entries_.emplace(at->key, entry);
+      entry->place = place.begin();
+      entry->listed = true;
+      recent_.splice(recent_.end(), place);
+      at->held.reset();
+      at->in_the_way = false;
+      entry->exit.splice(entry->exit.end(), leaving_, at);
+    }
+    at = next;
+  }
+}
+
+// While one in turn waits: only what is there beside all that it needs.
+bool Budget::make_room_beside_turn(std::uint64_t bytes, Urgency urgency) {
+  if (!in_turn_waits_) return make_room(bytes, urgency);
+  const bool fits = turn_needs_ <= bytes_max_ && bytes <= bytes_max_ - turn_needs_;
+  if (!fits || urgency == Urgency::ahead || !make_room(bytes, urgency)) return false;
+  turn_needs_ += bytes;
+  return true;
+}
+
+bool Budget::wait_for_room(std::uint64_t bytes, const OwnPins& own, const CancelToken* cancel,
+                           std::unique_lock<std::mutex>& lock) {
+  // Use counts have no signal: they are looked at so often.
+  constexpr std::chrono::milliseconds look_every{5};
+  using Clock = std::chrono::steady_clock;
+  std::uint64_t released_before = released_total_;
+  Clock::time_point changed = Clock::now();
+  Clock::time_point reservations_fit_at = changed;
+  bool there_is_room = false;
+  const std::uint64_t needs = bytes + turn_.bytes + bytes_of_pins(own);
+  in_turn_waits_ = true;
+  turn_needs_ = needs + reserved_;
+  for (;;) {
+    there_is_room = make_room(bytes, Urgency::demand);
+    const bool cannot_fit = needs + lasting_ > bytes_max_;
+    const bool cancelled = cancel != nullptr && cancel->cancelled();
+    if (there_is_room || cannot_fit || ended_ || cancelled) break;
+    if (needs + reserved_ <= bytes_max_) {
+      reservations_fit_at = Clock::now();
+    } else if (Clock::now() - reservations_fit_at > reservation_patience) {
+      break;
+    }
+    if (released_before != released_total_) {
+      released_before = released_total_;
+      changed = Clock::now();
+    }
+    if (Clock::now() - changed > patience) break;
+    // Resident data stay listed where reservations alone are in the way.
+    if (needs + reserved_ <= bytes_max_) take_off_list(bytes, own);
+    arrived_.wait_for(lock, look_every);
+  }
+  in_turn_waits_ = false;
+  if (!there_is_room) list_again();
+  return there_is_room;
 }
 
 bool Budget::make_room(std::uint64_t bytes, Urgency urgency) {
+  count_released();
   if (bytes > bytes_max_) {
     return false;
   }
@@ -232,10 +393,34 @@ bool Budget::make_room(std::uint64_t bytes, Urgency urgency) {
   return used_ <= bytes_max_ - bytes;
 }
 
-Error Budget::no_room(std::uint64_t bytes) const {
-  return make_error(ErrorKind::out_of_memory, "the field needs " + megabytes(bytes) +
-                                                  "; the memory limit is " + megabytes(bytes_max_) +
-                                                  ", of which " + megabytes(used_) + " are in use");
+Error Budget::no_room(const char* what, std::uint64_t bytes) const {
+  return make_error(ErrorKind::out_of_memory, std::string(what) + " needs " + megabytes(bytes) +
+                                                  "; " + limit_text() + ", of which " +
+                                                  megabytes(used_) + " are in use");
+}
+
+std::string Budget::limit_text() const {
+  return name_.text + " leaves " + megabytes(bytes_max_) + " for data";
+}
+
+Result<void> Reservation::resize(std::uint64_t bytes, Urgency urgency) {
+  if (budget_ == nullptr) return {};
+  std::unique_lock lock(budget_->mutex_);
+  // What is only asked for ahead of need is done without.
+  const bool in_turn =
+      urgency != Urgency::ahead && budget_->turn_.thread == std::this_thread::get_id();
+  if (bytes > bytes_ && !budget_->make_room(bytes - bytes_, urgency) &&
+      !(in_turn &&
+        budget_->wait_for_room(bytes - bytes_, budget_->turn_.own, budget_->turn_.cancel, lock))) {
+    ++budget_->counts_.refusals;
+    return budget_->no_room("what is beside the fields", bytes - bytes_);
+  }
+  budget_->used_ = budget_->used_ - bytes_ + bytes;
+  budget_->reserved_ = budget_->reserved_ - bytes_ + bytes;
+  if (term_ == Term::lasting) budget_->lasting_ = budget_->lasting_ - bytes_ + bytes;
+  if (bytes < bytes_) budget_->arrived_.notify_all();
+  bytes_ = bytes;
+  return {};
 }
 
 }  // namespace windsplat::data

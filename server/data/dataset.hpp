@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/data/files/stamp.hpp"
 #include "server/data/samples.hpp"
@@ -59,6 +60,9 @@ struct FieldInfo {
   std::string long_name;
   std::string dtype;     // of the file: "float32", "int16 packed", ...
   bool derived = false;  // made of other fields when it is asked for, not in the file
+  // What is decoded to read one step, whole chunks counted; 0 where that is the volume itself.
+  std::uint64_t decoded_bytes = 0;
+  std::uint64_t chunk_bytes = 0;  // the largest chunk of it, decoded
 };
 
 // A variable of the file that is not shown, and why.
@@ -117,7 +121,8 @@ struct DatasetInfo {
   std::vector<std::string> notes;  // what was done to the data: "resampled from 4096 cells ..."
   std::vector<TimeStep> steps;     // at least one
   std::string time_units;
-  std::string time_calendar;  // CF; empty means standard
+  std::string time_calendar;       // CF; empty means standard
+  std::uint64_t stored_bytes = 0;  // of the files opened by a loader; 0 for samples
 
   [[nodiscard]] const FieldInfo* find(const std::string& name) const;  // null if there is none
   [[nodiscard]] const FieldInfo* first(FieldKind kind) const;          // null if there is none
@@ -183,7 +188,10 @@ Result<std::unique_ptr<FileSource>> open_dataset(const std::shared_ptr<Files>& f
 // The same of a path or pattern (see locate()).
 Result<std::unique_ptr<Source>> open_file(const std::string& path);
 
-// Writes every field and step of a source as CF netCDF-4 that open_file reads back.
-Result<void> write_netcdf(Source& source, const std::string& path);
+// Writes every field and step of a source as CF netCDF-4 that open_file reads back. Nothing is left
+// behind where it fails or is cancelled. Errors: cancelled; those of reading and writing.
+// Until it is whole the file has the name netcdf_part(path).
+std::string netcdf_part(const std::string& path);
+Result<void> write_netcdf(Source& source, const std::string& path, const CancelToken& cancel = {});
 
 }  // namespace windsplat::data

@@ -5,6 +5,7 @@
 #include <new>
 #include <string_view>
 
+#include "server/data/axis_check.hpp"
 #include "server/data/cf/series.hpp"
 #include "server/data/cf/source.hpp"
 #include "server/data/cf/text.hpp"
@@ -47,8 +48,9 @@ Result<std::string> first_bytes(Files& files) {
 }
 
 template <class File>
-SourceResult source_of(Result<std::unique_ptr<File>> file) {
+SourceResult source_of(const Files& files, Result<std::unique_ptr<File>> file) {
   if (!file) return file.error();
+  (*file)->set_stored_bytes(files.opened_bytes());
   return cf::make_source(std::move(*file));
 }
 
@@ -95,10 +97,29 @@ SourceResult open_series(const std::shared_ptr<Files>& files) {
   const std::string& pattern = files->location().pattern;
   auto series = cf::SeriesFile::open(
       files->location().stem, members.size(),
-      [files](std::size_t m) { return open_arrays(files, files->location().members[m].name); },
+      [files](std::size_t m) {
+        auto member = open_arrays(files, files->location().members[m].name);
+        if (member) (*member)->set_stored_bytes(files->opened_bytes());
+        return member;
+      },
       pattern.substr(pattern.find_last_of('/') + 1));
-  if (!series) return series.error();
-  return cf::make_source(std::move(*series));
+  return source_of(*files, std::move(series));
+}
+
+SourceResult open_by_content(const std::shared_ptr<Files>& files) {
+  const auto head = first_bytes(*files);
+  if (!head) return head.error();
+  if (vtk::is_vtk(*head)) {
+    const auto plain = without_group(*files, files->location().members.front().name);
+    return plain ? vtk::open(files) : SourceResult(plain.error());
+  }
+  if (zarr::is_store(*files)) return source_of(*files, zarr::Store::open(files));
+  if (files->location().kind == Location::Kind::folder) {
+    return make_error(ErrorKind::bad_data, cf::in_quotes(files->location().stem) +
+                                               " is a directory, and not a Zarr store");
+  }
+  if (files->location().kind == Location::Kind::series) return open_series(files);
+  return source_of(*files, open_arrays(files, files->location().members.front().name));
 }
 
 }  // namespace
@@ -106,18 +127,12 @@ SourceResult open_series(const std::shared_ptr<Files>& files) {
 SourceResult open_dataset(const std::shared_ptr<Files>& files) {
   const std::string shown = cf::in_quotes(files->location().stem);
   try {
-    const auto head = first_bytes(*files);
-    if (!head) return head.error();
-    if (vtk::is_vtk(*head)) {
-      const auto plain = without_group(*files, files->location().members.front().name);
-      return plain ? vtk::open(files) : SourceResult(plain.error());
+    auto source = open_by_content(files);
+    if (!source) return source;
+    if (const auto ok = check_axes((*source)->info().grid); !ok) {
+      return make_error(ErrorKind::bad_data, shown + ": " + ok.error().message);
     }
-    if (zarr::is_store(*files)) return source_of(zarr::Store::open(files));
-    if (files->location().kind == Location::Kind::folder) {
-      return make_error(ErrorKind::bad_data, shown + " is a directory, and not a Zarr store");
-    }
-    if (files->location().kind == Location::Kind::series) return open_series(files);
-    return source_of(open_arrays(files, files->location().members.front().name));
+    return source;
   } catch (const std::bad_alloc&) {
     return make_error(ErrorKind::out_of_memory, "no memory to open " + shown);
   } catch (const std::exception& fault) {

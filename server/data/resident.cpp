@@ -4,14 +4,15 @@
 #include <condition_variable>
 #include <deque>
 #include <exception>
-#include <limits>
 #include <map>
 #include <mutex>
 #include <new>
+#include <set>
 #include <utility>
 
 #include "server/base/log.hpp"
 #include "server/data/digest.hpp"
+#include "server/data/limits.hpp"
 #include "server/data/packed.hpp"
 #include "server/data/store.hpp"
 
@@ -28,8 +29,6 @@ Result<VolumePtr> as_volume(const Result<Resident>& kept) {
   if (!kept) return kept.error();
   return std::static_pointer_cast<const Volume>(*kept);
 }
-
-constexpr std::size_t no_field = std::numeric_limits<std::size_t>::max();
 
 // What grows with the file in the description of a dataset.
 std::uint64_t bytes_of(const DatasetInfo& info) {
@@ -48,9 +47,10 @@ class Turnstile {
  public:
   void enter(Urgency urgency) {
     std::unique_lock lock(mutex_);
-    waiting_ += urgency == Urgency::demand ? 1 : 0;
-    free_.wait(lock, [&] { return !taken_ && (urgency == Urgency::demand || waiting_ == 0); });
-    waiting_ -= urgency == Urgency::demand ? 1 : 0;
+    const bool somebody_waits = urgency != Urgency::ahead;
+    waiting_ += somebody_waits ? 1 : 0;
+    free_.wait(lock, [&] { return !taken_ && (somebody_waits || waiting_ == 0); });
+    waiting_ -= somebody_waits ? 1 : 0;
     taken_ = true;
   }
   void leave() {
@@ -86,6 +86,7 @@ struct Dataset::State {
         info(source->info()),
         budget(std::move(shared)),
         owner(budget->next_owner()),
+        charged(budget, Reservation::Term::lasting),
         storage(how) {
     info.id = std::move(id);
     source->on_progress([this](double done) {
@@ -114,6 +115,38 @@ struct Dataset::State {
 
   [[nodiscard]] std::uint64_t values(std::size_t field) const {
     return info.grid.samples() * info.fields[field].components.size();
+  }
+
+  // Of these fields, each once.
+  [[nodiscard]] std::uint64_t bytes_at_a_step(const std::vector<std::string>& fields) const {
+    std::set<std::string> counted;
+    std::uint64_t bytes = 0;
+    for (const std::string& name : fields) {
+      const FieldInfo* const field = info.find(name);
+      if (field == nullptr || !counted.insert(name).second) continue;
+      bytes += info.grid.samples() * field->components.size() * sizeof(float);
+    }
+    return bytes;
+  }
+
+  // What counts in the limit while a field is read.
+  [[nodiscard]] std::uint64_t bytes_beside(std::uint64_t loader_bytes) const {
+    return charged.bytes() + (info.stored_bytes > 0 ? loader_bytes : 0);
+  }
+
+  // What loaders were seen to need at most beside the volumes, while they read these fields. Chunks
+  // that are needed again are kept, 128 MiB of a variable or one chunk.
+  [[nodiscard]] std::uint64_t reading_bytes(const std::vector<std::string>& fields) const {
+    constexpr std::uint64_t mib = std::uint64_t{1} << 20;
+    std::uint64_t bytes = 32 * mib;
+    for (const std::string& name : fields) {
+      const FieldInfo* const field = info.find(name);
+      if (field == nullptr || field->chunk_bytes <= sizeof(double)) continue;  // no chunks
+      const std::uint64_t kept =
+          std::min(128 * mib, field->decoded_bytes / field->components.size());
+      bytes = std::max(bytes, 64 * mib + std::max(kept, 2 * field->chunk_bytes));
+    }
+    return bytes;
   }
 
   [[nodiscard]] Error not_resident(std::size_t field, std::size_t step) const {
@@ -145,8 +178,7 @@ struct Dataset::State {
       const std::lock_guard lock(mutex);
       if (ended) {
         turnstile.leave();
-        return make_error(ErrorKind::cancelled,
-                          "nothing is read any more of " + in_quotes(info.id));
+        return why_cancelled();
       }
       ++counts.loads;
       counts.ahead += urgency == Urgency::ahead ? 1 : 0;
@@ -161,11 +193,24 @@ struct Dataset::State {
         seen[{field, step}] = {read.range, read.masked};
       } else {
         ++counts.failures;
+        if (volume.error().kind == ErrorKind::cancelled) volume = why_cancelled();
       }
     }
     turnstile.leave();
     budget->count_read(volume.has_value());
     return volume;
+  }
+
+  // Of a read that end(), forget() or evict() cancelled: whoever asked is still there. Under the
+  // mutex.
+  [[nodiscard]] Error why_cancelled() const {
+    if (ended) return make_error(ErrorKind::draining, "the server is shutting down");
+    if (forgotten) {
+      return make_error(ErrorKind::not_found,
+                        "dataset " + in_quotes(info.id) + " was removed while it was read");
+    }
+    return make_error(ErrorKind::not_resident, "the memory of dataset " + in_quotes(info.id) +
+                                                   " was released while it was read; try again");
   }
 
   Result<Resident> pack_volume(std::size_t field, const Resident& volume) {
@@ -209,7 +254,7 @@ struct Dataset::State {
   DatasetInfo info;
   std::shared_ptr<Budget> budget;
   const std::uint64_t owner;
-  Resident charged;  // stands for the info
+  Reservation charged;  // for the info
   const Storage storage;
   Turnstile turnstile;  // to the source
 
@@ -217,6 +262,7 @@ struct Dataset::State {
   Counts counts;
   std::optional<Loading> loading;
   bool ended = false;
+  bool forgotten = false;
   std::map<std::pair<std::size_t, std::size_t>, Seen> seen;  // by field and step
   std::map<std::size_t, float> errors;                       // by field, of packing
   std::deque<std::pair<std::string, std::vector<double>>> remembered;
@@ -240,6 +286,32 @@ Dataset Dataset::resident_only() const { return {state_, Manner::resident_only};
 
 Dataset Dataset::ahead() const { return {state_, Manner::ahead}; }
 
+Dataset Dataset::held() const { return {state_, Manner::held}; }
+
+Resident Dataset::find_held(const ResidentKey& key) const {
+  return manner_ == Manner::held ? state_->budget->find_held(key) : nullptr;
+}
+
+Dataset Dataset::in_turn(const CancelToken& cancel) const {
+  Dataset out(state_, Manner::in_turn);
+  out.cancel_ = cancel;
+  out.own_ = std::make_shared<OwnPins>();
+  return out;
+}
+
+Urgency Dataset::urgency() const {
+  if (manner_ == Manner::in_turn) return Urgency::in_turn;
+  return manner_ == Manner::ahead ? Urgency::ahead : Urgency::demand;
+}
+
+Result<VolumePtr> Dataset::get(const ResidentKey& key, std::uint64_t bytes,
+                               const Budget::Make& make) {
+  auto kept = state_->budget->get(key, bytes, urgency(), make, own_ ? *own_ : OwnPins(),
+                                  cancel_ ? &*cancel_ : nullptr);
+  if (kept && own_) own_->insert(kept->get());
+  return as_volume(kept);
+}
+
 Result<VolumePtr> Dataset::volume(const std::string& field, std::size_t step) {
   const Result<std::size_t> index = state_->find(field, step);
   if (!index) {
@@ -250,9 +322,9 @@ Result<VolumePtr> Dataset::volume(const std::string& field, std::size_t step) {
     const Resident there = state_->budget->find_now(key);
     return there ? as_volume(there) : state_->not_resident(*index, step);
   }
-  const Urgency urgency = manner_ == Manner::ahead ? Urgency::ahead : Urgency::demand;
-  return as_volume(state_->budget->get(key, state_->values(*index) * sizeof(float), urgency,
-                                       [&] { return state_->load(*index, step, urgency); }));
+  if (const Resident there = find_held(key)) return as_volume(there);
+  return get(key, state_->values(*index) * sizeof(float),
+             [&] { return state_->load(*index, step, urgency()); });
 }
 
 Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
@@ -269,12 +341,14 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
     const Resident there = state_->budget->find_now(key);
     return there ? as_volume(there) : state_->not_resident(*index, step);
   }
+  if (const Resident there = find_held(key)) return as_volume(there);
   const DatasetInfo& info = state_->info;
   std::uint64_t bytes = info.fields[*index].components.size() * sizeof(float);
   for (std::size_t a = 0; a < 3; ++a) {
     bytes *= static_cast<std::uint64_t>(halved(info.grid.dims()[a], how.halvings[a]));
   }
   if (const auto there = state_->budget->find(key)) {
+    if (*there && own_) own_->insert((*there)->get());
     return as_volume(*there);
   }
   // Held first, so that it is never evicted for a level that could not then be made of it.
@@ -282,11 +356,12 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
   if (!fine) {
     return fine.error();
   }
-  const Urgency urgency = manner_ == Manner::ahead ? Urgency::ahead : Urgency::demand;
-  return as_volume(state_->budget->get(key, bytes, urgency, [&] {
+  auto level = get(key, bytes, [&] {
     state_->add(&Counts::averages);
     return state_->guarded(*index, [&]() -> Result<Volume> { return coarsen(**fine, how); });
-  }));
+  });
+  if (own_) own_->erase(own_->find(fine->get()));  // given to nobody
+  return level;
 }
 
 std::vector<ResidentKey> Dataset::keys_of(const std::string& field, std::size_t step,
@@ -330,6 +405,14 @@ void Dataset::evict() {
   state_->budget->evict(state_->owner);
 }
 
+void Dataset::forget() {
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->forgotten = true;
+  }
+  evict();
+}
+
 void Dataset::end() {
   {
     const std::lock_guard lock(state_->mutex);
@@ -357,11 +440,46 @@ Dataset::Counts Dataset::counts() const {
   return state_->counts;
 }
 
-std::uint64_t Dataset::resident_bytes() const { return state_->budget->bytes_of(state_->owner); }
+std::uint64_t Dataset::resident_bytes() const {
+  return state_->budget->bytes_of(state_->owner) + state_->charged.bytes();
+}
 
 std::optional<Dataset::Loading> Dataset::loading() const {
   const std::lock_guard lock(state_->mutex);
   return state_->loading;
+}
+
+Result<void> Dataset::check_room(const std::vector<std::string>& fields) const {
+  const Budget& budget = *state_->budget;
+  for (const std::string& field : fields) {
+    const std::uint64_t bytes = state_->bytes_at_a_step({field});
+    if (bytes + state_->bytes_beside(loader_bytes_min) <= budget.bytes_max()) continue;
+    return make_error(ErrorKind::out_of_memory, in_quotes(field) + " needs " + megabytes(bytes) +
+                                                    " at a step; " + budget.limit_text() +
+                                                    beyond_limit(fields));
+  }
+  return {};
+}
+
+std::string Dataset::beyond_limit(const std::vector<std::string>& fields) const {
+  const Budget& budget = *state_->budget;
+  const std::uint64_t bytes = state_->bytes_at_a_step(fields);
+  const std::uint64_t all = bytes + state_->bytes_beside(state_->reading_bytes(fields));
+  if (all <= budget.bytes_max() || !budget.name().raised) return "";
+  std::string text = "; ";
+  if (fields.size() > 1) {
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+      text += i == 0 ? "" : i + 1 < fields.size() ? ", " : " and ";
+      text += in_quotes(fields[i]);
+    }
+    text += " need " + megabytes(bytes) + " together: ";
+  }
+  return text + budget.name().raised(all) + " would do";
+}
+
+Error Dataset::with_need(Error error, const std::vector<std::string>& fields) const {
+  if (error.kind == ErrorKind::out_of_memory) error.message += beyond_limit(fields);
+  return error;
 }
 
 Result<void> Dataset::charge_info() {
@@ -369,12 +487,7 @@ Result<void> Dataset::charge_info() {
   constexpr std::uint64_t copies = 2;  // the source has its own
   const std::uint64_t bytes = copies * bytes_of(state_->info);
   if (bytes <= free_bytes) return {};
-  auto charged =
-      state_->budget->get({state_->owner, no_field, 0, "info"}, bytes, Urgency::demand,
-                          [] { return Result<Resident>(std::make_shared<const char>()); });
-  if (!charged) return charged.error();
-  state_->charged = std::move(*charged);
-  return {};
+  return state_->charged.resize(bytes);
 }
 
 Storage Dataset::storage() const { return state_->storage; }

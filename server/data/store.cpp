@@ -5,6 +5,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <exception>
+#include <filesystem>
 #include <map>
 #include <mutex>
 #include <new>
@@ -87,9 +88,11 @@ std::string key_of(const Location& location) {
 }  // namespace
 
 struct Store::State {
+  using Clock = std::chrono::steady_clock;
+
   explicit State(StoreOptions given)
       : options(std::move(given)),
-        budget(std::make_shared<Budget>(options.bytes_max)),
+        budget(options.budget ? options.budget : std::make_shared<Budget>(options.bytes_max)),
         ahead(budget) {
     if (!options.open) options.open = open_here;
   }
@@ -104,6 +107,13 @@ struct Store::State {
     std::string refused;  // stamp with which they could not be opened anew
     std::string problem;
   };
+  struct FailedEntry {
+    std::string named;
+    std::string key;                   // of its files when they were looked at last
+    std::optional<std::string> tried;  // their stamp then; none: they are to be tried at any rate
+    Clock::time_point retry_at;        // whether the stamp has changed or not
+    Failed listed;
+  };
 
   // All under the mutex.
   [[nodiscard]] const Entry* find(const std::string& id) const {
@@ -117,11 +127,19 @@ struct Store::State {
                                  [&](const Entry& entry) { return entry.key == key; });
     return at == entries.end() ? nullptr : at->dataset;
   }
-  [[nodiscard]] std::string unique_id(const std::string& wanted) const {
+  [[nodiscard]] FailedEntry* find_failed(const std::string& id) {
+    const auto at = std::find_if(failed.begin(), failed.end(),
+                                 [&](const FailedEntry& one) { return one.listed.id == id; });
+    return at == failed.end() ? nullptr : &*at;
+  }
+  // `key`: of what failed and is replaced, so that its id is free; empty: of nothing.
+  [[nodiscard]] std::string unique_id(const std::string& wanted, const std::string& key) {
     std::string id = wanted;
-    for (int n = 2; find(id) != nullptr; ++n) {
-      id = wanted + '-' + std::to_string(n);
-    }
+    const auto is_taken = [&] {
+      const FailedEntry* const known = find_failed(id);
+      return find(id) != nullptr || (known != nullptr && (key.empty() || known->key != key));
+    };
+    for (int n = 2; is_taken(); ++n) id = wanted + '-' + std::to_string(n);
     return id;
   }
 
@@ -140,13 +158,25 @@ struct Store::State {
     }
   }
 
-  // The dataset of `key`, opened by at most one caller at a time.
+  // Under the mutex.
+  void unlist_failed(const std::string& key) {
+    failed.erase(std::remove_if(failed.begin(), failed.end(),
+                                [&](const FailedEntry& one) { return one.key == key; }),
+                 failed.end());
+  }
+
+  // The dataset of `key`, opened by at most one caller at a time. `failed_id`: of what is listed as
+  // failed and tried again, which may be taken off the list meanwhile; empty: of nothing.
   template <class Open>
   Result<Added> add(const std::string& key, const std::string& wanted_id,
-                    std::optional<Location> location, const Open& open) {
+                    std::optional<Location> location, const Open& open,
+                    const std::string& failed_id = "") {
     std::unique_lock lock(mutex);
     opened.wait(lock, [&] { return opening.count(key) == 0; });
-    if (auto there = known(key)) return Added{std::move(there), false};
+    if (auto there = known(key)) {
+      unlist_failed(key);
+      return Added{std::move(there), false};
+    }
     opening.insert(key);
     lock.unlock();
     auto made = open_entry(key, std::move(location), open);
@@ -155,12 +185,18 @@ struct Store::State {
     opened.notify_all();
     if (!made) return made.error();
     Entry& entry = made->entry;
-    entry.dataset = std::make_shared<Dataset>(std::move(made->source), unique_id(wanted_id), budget,
-                                              options.storage);
-    if (auto charged = entry.dataset->charge_info(); !charged) {
-      lock.unlock();  // its loader ends with it
-      return charged.error();
+    entry.dataset = std::make_shared<Dataset>(std::move(made->source), unique_id(wanted_id, key),
+                                              budget, options.storage);
+    auto usable = entry.dataset->charge_info();
+    if (usable && options.check) usable = options.check(*entry.dataset);
+    if (usable && !failed_id.empty() && find_failed(failed_id) == nullptr) {
+      usable = make_error(ErrorKind::not_found, "it is no longer listed");
     }
+    if (!usable) {
+      lock.unlock();  // its loader ends with it
+      return usable.error();
+    }
+    unlist_failed(key);
     if (ended) entry.dataset->end();
     entries.push_back(std::move(entry));
     return Added{entries.back().dataset, true};
@@ -198,6 +234,56 @@ struct Store::State {
     }
   }
 
+  // Tries what is listed as failed: when its files have changed and rested, once a minute as long
+  // as that is quick (what it refers to may have changed), and where it is to be tried at any rate.
+  // The ids of what could be opened.
+  std::vector<std::string> open_failed(double rest_s) {
+    constexpr std::chrono::minutes retry_every{1};
+    constexpr int share = 20;  // a disk that hangs must not keep the looks to itself
+    std::vector<FailedEntry> looked_at;
+    {
+      const std::lock_guard lock(mutex);
+      looked_at = failed;
+    }
+    std::vector<std::string> out;
+    for (const FailedEntry& entry : looked_at) {
+      if (sized_sample(entry.named)) continue;  // it would fail for the same reason
+      const auto location = locate(entry.named);
+      const FileStamp now = location ? stamp_of_all(*location, {}) : FileStamp{};
+      const bool changed = now_s() - now.changed_s >= rest_s && now.text != entry.tried;
+      const Clock::time_point begin = Clock::now();
+      if (entry.tried && !changed && begin < entry.retry_at) continue;
+      const std::string& id = entry.listed.id;
+      const std::string key = location ? key_of(*location) : "";
+      {
+        const std::lock_guard lock(mutex);
+        FailedEntry* const listed = find_failed(id);
+        if (ended || listed == nullptr) continue;  // taken off the list meanwhile
+        listed->key = key;
+        listed->tried = now.text;
+        listed->retry_at = begin + retry_every;
+      }
+      if (!location) continue;
+      const auto added = add(
+          key, id, *location, [&] { return options.open(*location); }, id);
+      if (added) {
+        if (!added->is_new) continue;
+        out.push_back(added->dataset->info().id);
+        log::info("opened: it was listed as failed", {{"dataset", out.back()}});
+        continue;
+      }
+      const std::lock_guard lock(mutex);
+      FailedEntry* const listed = find_failed(id);
+      if (listed == nullptr) continue;
+      listed->retry_at += share * (Clock::now() - begin);
+      if (listed->listed.problem == added.error().message) continue;
+      listed->listed.problem = added.error().message;
+      log::warn("a dataset that is listed as failed still cannot be opened",
+                {{"dataset", id}, {"fault", listed->listed.problem}});
+    }
+    return out;
+  }
+
   // Puts `entry` in place of the one with the dataset `old`, if that is still there; what was there
   // is given back, to end outside of the lock.
   Entry put(Entry entry, const DatasetPtr& old) {
@@ -211,16 +297,20 @@ struct Store::State {
 
   StoreOptions options;
   std::shared_ptr<Budget> budget;
-  mutable std::mutex mutex;
+  mutable std::mutex mutex;  // of all below
+  bool turn_is_taken = false;
+  std::condition_variable turn_ended;
   std::condition_variable opened;
   std::set<std::string> opening;  // keys
   std::vector<Entry> entries;
+  std::vector<FailedEntry> failed;
   bool ended = false;
   Ahead ahead;  // last: its thread uses datasets
 };
 
 Store::Store(StoreOptions options) : state_(std::make_unique<State>(std::move(options))) {}
-Store::Store(std::uint64_t bytes_max) : Store(StoreOptions{bytes_max, Storage::float32, {}}) {}
+Store::Store(std::uint64_t bytes_max)
+    : Store(StoreOptions{bytes_max, Storage::float32, {}, {}, {}}) {}
 Store::~Store() = default;
 
 Result<DatasetPtr> Store::add(const std::string& sample_or_path) {
@@ -268,17 +358,51 @@ Result<void> Store::remove(const std::string& id) {
     state_->entries.erase(state_->entries.begin() + (found - state_->entries.data()));
   }
   state_->ahead.forget(gone->info());
-  gone->evict();
+  gone->forget();
   return {};
 }
 
 Result<DatasetPtr> Store::find(const std::string& id) const {
   const std::lock_guard lock(state_->mutex);
-  const State::Entry* found = state_->find(id);
-  if (found == nullptr) {
-    return make_error(ErrorKind::not_found, "there is no dataset " + in_quotes(id));
+  if (const State::Entry* found = state_->find(id)) return found->dataset;
+  if (const State::FailedEntry* failed = state_->find_failed(id)) {
+    return make_error(ErrorKind::not_found, "dataset " + in_quotes(id) +
+                                                " could not be opened: " + failed->listed.problem);
   }
-  return found->dataset;
+  return make_error(ErrorKind::not_found, "there is no dataset " + in_quotes(id));
+}
+
+void Store::list_failed(const std::string& sample_or_path, const Error& why) {
+  const auto location = locate(sample_or_path);
+  State::FailedEntry entry;
+  entry.named = sample_or_path;
+  if (location) entry.key = key_of(*location);
+  entry.listed.problem = why.message;
+  std::string wanted =
+      location ? location->stem : std::filesystem::path(sample_or_path).stem().native();
+  const std::lock_guard lock(state_->mutex);
+  entry.listed.id = state_->unique_id(printable(wanted.empty() ? "dataset" : wanted), "");
+  state_->failed.push_back(std::move(entry));
+}
+
+void Store::try_failed_again() {
+  const std::lock_guard lock(state_->mutex);
+  for (State::FailedEntry& entry : state_->failed) entry.tried.reset();
+}
+
+bool Store::remove_failed(const std::string& id) {
+  const std::lock_guard lock(state_->mutex);
+  const State::FailedEntry* found = state_->find_failed(id);
+  if (found == nullptr) return false;
+  state_->failed.erase(state_->failed.begin() + (found - state_->failed.data()));
+  return true;
+}
+
+std::vector<Store::Failed> Store::failed() const {
+  const std::lock_guard lock(state_->mutex);
+  std::vector<Failed> out;
+  for (const State::FailedEntry& one : state_->failed) out.push_back(one.listed);
+  return out;
 }
 
 std::vector<DatasetPtr> Store::all() const {
@@ -293,12 +417,12 @@ void Store::wish(std::uint64_t owner, std::vector<Wish> wishes) {
 }
 
 std::vector<std::string> Store::look_for_changes(double rest_s) {
+  std::vector<std::string> changed = state_->open_failed(rest_s);
   std::vector<State::Entry> looked_at;
   {
     const std::lock_guard lock(state_->mutex);
     looked_at = state_->entries;
   }
-  std::vector<std::string> changed;
   for (State::Entry& entry : looked_at) {
     if (!entry.location) continue;
     const DatasetPtr old = entry.dataset;
@@ -320,7 +444,8 @@ std::vector<std::string> Store::look_for_changes(double rest_s) {
       changed.push_back(id);
       log::info("opened anew: its files have changed", {{"dataset", id}});
     } else {
-      entry.refused = now.text;
+      // For want of memory it is tried again; other faults stay until the files change.
+      if (opened.error().kind != ErrorKind::out_of_memory) entry.refused = now.text;
       entry.problem = "its files have changed and cannot be opened anew: " + opened.error().message;
       log::warn("a dataset's files have changed and cannot be opened anew",
                 {{"dataset", id}, {"error", opened.error().message}});
@@ -337,6 +462,7 @@ void Store::end() {
     state_->ended = true;
     for (const State::Entry& entry : state_->entries) entry.dataset->end();
   }
+  state_->budget->end();
   while (const DatasetPtr dataset = state_->one_that_reads()) {
     dataset->end();
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -355,16 +481,33 @@ std::string Store::problem(const std::string& id) const {
 
 BudgetCounts Store::counts() const { return state_->budget->counts(); }
 
+Store::Turn Store::take_turn(const Dataset& dataset, const CancelToken& cancel) {
+  constexpr std::chrono::milliseconds look_every{20};
+  {
+    std::unique_lock lock(state_->mutex);
+    while (state_->turn_is_taken && !cancel.cancelled()) {
+      state_->turn_ended.wait_for(lock, look_every);
+    }
+    if (cancel.cancelled()) return nullptr;
+    state_->turn_is_taken = true;
+  }
+  Turn turn(state_.get(), [](State* state) {
+    const std::lock_guard lock(state->mutex);
+    state->turn_is_taken = false;
+    state->turn_ended.notify_one();
+  });
+  for (const DatasetPtr& other : all()) {
+    if (&other->info() != &dataset.info()) other->release_idle(0);
+  }
+  return turn;
+}
+
 std::uint64_t Store::room() const { return state_->budget->room(); }
 
 Result<std::shared_ptr<const void>> Store::reserve(std::uint64_t bytes) {
-  const std::shared_ptr<Budget> budget = state_->budget;
-  const std::uint64_t owner = budget->next_owner();
-  auto held = budget->get({owner, 0, 0, "work"}, bytes, Urgency::demand,
-                          [] { return Result<Resident>(std::make_shared<const char>()); });
-  if (!held) return held.error();
-  const auto give_back = [budget, owner, kept = *held](const void*) { budget->forget(owner); };
-  return std::shared_ptr<const void>(held->get(), give_back);
+  const auto held = std::make_shared<Reservation>(state_->budget);
+  if (auto reserved = held->resize(bytes); !reserved) return reserved.error();
+  return std::shared_ptr<const void>(held);
 }
 
 }  // namespace windsplat::data

@@ -7,9 +7,11 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/data/budget.hpp"
 #include "server/data/coarsen.hpp"
@@ -37,8 +39,8 @@ class Dataset {
   [[nodiscard]] std::shared_ptr<const DatasetInfo> shared_info() const;
 
   // The field at the step; loads it if it is not resident. What a caller holds stays valid.
-  // Errors: not_found (no such field or step), bad_data, out_of_memory, cancelled (evicted while it
-  // was read).
+  // Errors: not_found (no such field or step, or forgotten while it was read), bad_data,
+  // out_of_memory, not_resident (evicted while it was read), draining (after end()).
   Result<std::shared_ptr<const Volume>> volume(const std::string& field, std::size_t step);
 
   // The field at the step, coarser: averaged once on first need, shared and counted in the memory
@@ -50,6 +52,12 @@ class Dataset {
 
   // A handle that never loads, averages or waits: what is not there is the error not_resident.
   [[nodiscard]] Dataset resident_only() const;
+  // A handle for whoever holds what it needs: found even where it was taken off the list meanwhile.
+  [[nodiscard]] Dataset held() const;
+  // A handle that waits for room where others hold it (Budget::get(), in_turn). For one thread at a
+  // time of all datasets that share a budget: one after the other has all that it needs. `cancel`
+  // ends its waits for room, with the error cancelled.
+  [[nodiscard]] Dataset in_turn(const CancelToken& cancel = {}) const;
   // A handle for what is not needed yet: it gives way to loads that somebody waits for, and evicts
   // nothing that is wished for.
   [[nodiscard]] Dataset ahead() const;
@@ -71,8 +79,10 @@ class Dataset {
 
   // Drops what nobody holds, ends a load in work.
   void evict();
+  // The same of a dataset that is on the list no more.
+  void forget();
 
-  // From now on nothing is read: who asks gets cancelled. Ends a load in work, unless it is just
+  // From now on nothing is read: who asks gets draining. Ends a load in work, unless it is just
   // beginning: loading() tells.
   void end();
 
@@ -106,6 +116,15 @@ class Dataset {
   };
   [[nodiscard]] std::optional<Loading> loading() const;
 
+  // Errors: out_of_memory, where one of the fields cannot be loaded at a step, not even alone: with
+  // what all of them need, and the limit that would do.
+  [[nodiscard]] Result<void> check_room(const std::vector<std::string>& fields) const;
+  // Of a message, where the limit leaves no room for these fields together at a step: "; ..." with
+  // what they need and the limit that would do. Empty where it does, and where nobody can raise it.
+  [[nodiscard]] std::string beyond_limit(const std::vector<std::string>& fields) const;
+  // The same behind an error for want of memory; others as they are.
+  [[nodiscard]] Error with_need(Error error, const std::vector<std::string>& fields) const;
+
   // Counts what is known of the dataset, steps and places, in the memory limit too, where that is
   // more than a megabyte. Errors: out_of_memory.
   Result<void> charge_info();
@@ -116,13 +135,20 @@ class Dataset {
   [[nodiscard]] float storage_error(const std::string& field) const;
 
  private:
-  enum class Manner { demand, resident_only, ahead };
+  enum class Manner { in_turn, demand, held, resident_only, ahead };
   struct State;
   Dataset(std::shared_ptr<State> state, Manner manner)
       : state_(std::move(state)), manner_(manner) {}
 
+  [[nodiscard]] Urgency urgency() const;
+  [[nodiscard]] Resident find_held(const ResidentKey& key) const;
+  Result<std::shared_ptr<const Volume>> get(const ResidentKey& key, std::uint64_t bytes,
+                                            const Budget::Make& make);
+
   std::shared_ptr<State> state_;
   Manner manner_ = Manner::demand;
+  std::shared_ptr<OwnPins> own_;       // of in_turn: what it gave
+  std::optional<CancelToken> cancel_;  // of in_turn
 };
 
 // Something that may be wanted soon.
@@ -138,6 +164,10 @@ struct StoreOptions {
   Storage storage = Storage::float32;
   // Opens what is no sample; the default reads files in this process.
   std::function<Result<std::unique_ptr<Source>>(const Location&)> open;
+  std::shared_ptr<Budget> budget = nullptr;  // in place of one of bytes_max, shared with sources
+  // What a dataset must pass to be listed by add(); none: nothing. Called under the store's lock,
+  // so that it must not ask the store.
+  std::function<Result<void>(const Dataset&)> check = nullptr;
 };
 
 // All datasets of a process. Thread-safe.
@@ -164,7 +194,21 @@ class Store {
   // Forgets a dataset; who holds it keeps it. Errors: not_found.
   Result<void> remove(const std::string& id);
   [[nodiscard]] Result<std::shared_ptr<Dataset>> find(const std::string& id) const;
-  [[nodiscard]] std::vector<std::shared_ptr<Dataset>> all() const;  // in the order they were added
+  [[nodiscard]] std::vector<std::shared_ptr<Dataset>> all() const;
+
+  // What was to be served and cannot be opened, under an id like a dataset's, so that who looks for
+  // it is told why. find() of the id gives the reason; add() of the same files replaces it, and so
+  // does look_for_changes() once they can be opened.
+  struct Failed {
+    std::string id;
+    std::string problem;
+  };
+  void list_failed(const std::string& sample_or_path, const Error& why);
+  [[nodiscard]] std::vector<Failed> failed() const;  // in the order they were added
+  // The next look_for_changes() tries all of them, whether their files have changed or not.
+  void try_failed_again();
+  // Takes it off the list. False: there is none of that id.
+  bool remove_failed(const std::string& id);
 
   // What `owner` will want, the soonest first, in place of what it wished before: loaded by a
   // thread of the store's own as far as memory goes, and not evicted for what is less urgent.
@@ -173,7 +217,8 @@ class Store {
 
   // Looks once whether files of a dataset changed since they were opened, and opens those anew that
   // did and have rested for `rest_s`: under the same id, what was resident of the old goes. One
-  // that cannot be opened stays as it was (problem()). Returns the ids that were opened anew.
+  // that cannot be opened stays as it was (problem()). What is listed as failed is tried when its
+  // files change, and once a minute as long as that is quick. Returns the ids that were opened.
   std::vector<std::string> look_for_changes(double rest_s = 1);
   // Ends every dataset, those to come too; returns when none is being read. What is resident stays.
   void end();
@@ -183,6 +228,11 @@ class Store {
   [[nodiscard]] std::string problem(const std::string& id) const;
 
   [[nodiscard]] BudgetCounts counts() const;
+  // The turn to load by Dataset::in_turn(), for as long as the answer is held, which the store must
+  // outlive: one at a time. First ends idle loaders of other datasets, whose memory counts too.
+  // Empty where it was cancelled before its turn came.
+  using Turn = std::shared_ptr<const void>;
+  [[nodiscard]] Turn take_turn(const Dataset& dataset, const CancelToken& cancel = {});
   // So many bytes of work count in the limit for as long as the answer is held. Errors:
   // out_of_memory.
   Result<std::shared_ptr<const void>> reserve(std::uint64_t bytes);

@@ -25,6 +25,11 @@ std::int64_t microseconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration_cast<std::chrono::microseconds>(to - from).count();
 }
 
+// Where memory is wanting it is said at once what all fields of the view need, not one by one.
+Error with_need(Error error, const protocol::View& view, const data::Dataset& dataset) {
+  return dataset.with_need(std::move(error), scene::fields_of(view, dataset.info()));
+}
+
 void name_field(const std::string& name, std::int64_t bytes, engine::WorkReport& work) {
   if (std::find(work.fields.begin(), work.fields.end(), name) != work.fields.end()) return;
   work.fields.push_back(name);
@@ -161,12 +166,23 @@ Result<image::Bytes> bytes_of(Workspace& workspace, ThreadPool& pool, const Canc
 
 }  // namespace
 
+std::uint64_t bytes_beyond_kept(int width, int height, Format format) {
+  const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+  if (pixels <= kept_pixels) return 0;
+  constexpr std::uint64_t linear = 4 * sizeof(float);
+  constexpr std::uint64_t codes = 4;  // 8 bits each, and as many of what is encoded
+  const std::uint64_t bytes_a_pixel = format == Format::jpeg  ? 2 * codes
+                                      : format == Format::png ? linear + 2 * codes
+                                                              : 2 * linear;
+  return (pixels - kept_pixels) * bytes_a_pixel;
+}
+
 Result<std::shared_ptr<const void>> load(const protocol::View& view, data::Dataset& dataset,
                                          const Encoding& encoding) {
   auto completed = complete_at(view, dataset, encoding);
-  if (!completed) return completed.error();
+  if (!completed) return with_need(completed.error(), view, dataset);
   auto scene = scene::build_scene(*completed, dataset);
-  if (!scene) return scene.error();
+  if (!scene) return with_need(scene.error(), view, dataset);
   return std::shared_ptr<const void>(std::make_shared<const scene::Scene>(std::move(*scene)));
 }
 
@@ -179,9 +195,9 @@ Result<void> draw(const protocol::View& view, data::Dataset& dataset, const Enco
   }
   const Clock::time_point start = Clock::now();
   Result<scene::Completed> completed = complete_at(view, dataset, encoding);
-  if (!completed) return completed.error();
+  if (!completed) return with_need(completed.error(), view, dataset);
   const Result<scene::Scene> scene = scene::build_scene(*completed, dataset);
-  if (!scene) return scene.error();
+  if (!scene) return with_need(scene.error(), view, dataset);
   workspace.encoding = encoding;
   workspace.background = scene->background;
   Result<engine::WorkReport> work = render_scene(*scene, pool, cancel, workspace);

@@ -62,6 +62,9 @@ struct Workspace {
   std::array<float, 3> background{};  // linear
 };
 
+// What drawing and encoding a picture take beyond one of kept_pixels (base/kept.hpp), at most.
+std::uint64_t bytes_beyond_kept(int width, int height, Format format);
+
 // What draw() will need of the dataset, loaded; it stays resident as long as the answer is held.
 // Errors: those of the scene.
 Result<std::shared_ptr<const void>> load(const protocol::View& view, data::Dataset& dataset,

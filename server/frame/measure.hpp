@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 
+#include "server/base/kept.hpp"
 #include "server/frame/frame.hpp"
 #include "server/quality/table.hpp"
 #include "server/scene/build.hpp"
@@ -46,6 +48,11 @@ struct Surveyed {
   quality::Sight sight;
   quality::Measured measured;
 };
+// Of the truth and of the picture that is compared with it.
+inline std::uint64_t survey_bytes(const protocol::ImageView& image) {
+  const auto pixels = static_cast<std::uint64_t>(image.width) * image.height;
+  return std::min<std::uint64_t>(pixels, kept_pixels) * 2 * 4 * sizeof(float);
+}
 inline bool is_worth_a_survey(const protocol::View& view) {  // nobody looks at icons for long
   return std::min(view.image.width, view.image.height) >= 64;
 }

@@ -4,9 +4,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <mutex>
 #include <utility>
 
+#include "server/base/log.hpp"
 #include "server/net/problem.hpp"
 
 namespace windsplat::net {
@@ -51,6 +53,7 @@ std::string detail_of(const Refusal& refusal) {
     case LimitKind::waiting:
     case LimitKind::arrivals:
     case LimitKind::estimate:
+    case LimitKind::handshakes:
       break;
   }
   return "more is asked for than can be done; try again";
@@ -59,12 +62,37 @@ std::string detail_of(const Refusal& refusal) {
 }  // namespace
 
 struct Admission::State {
+  // Connections in TLS that were closed because handshakes had taken too much.
+  struct Closed {
+    std::int64_t connections = 0;
+    std::string address;  // the first one's
+    bool several = false;
+    Micros since = 0;  // the first was closed; as it is logged: how long before
+  };
+
   State(const Limits& limits, std::function<Micros()> clock)
       : quota(limits), now(clock ? std::move(clock) : steady_us) {}
+
+  // Under the mutex. A value: those since the last one, to be logged; one a minute at most.
+  std::optional<Closed> count_refused_handshake(const std::string& address, Micros at) {
+    constexpr Micros log_every = 60'000'000;
+    if (closed.connections == 0) {
+      closed.address = address;
+      closed.since = at;
+    }
+    closed.several = closed.several || closed.address != address;
+    ++closed.connections;
+    if (at < log_next) return std::nullopt;
+    log_next = at + log_every;
+    closed.since = at - closed.since;
+    return std::exchange(closed, {});
+  }
 
   std::mutex mutex;
   Quota quota;
   std::function<Micros()> now;
+  Closed closed;
+  Micros log_next = std::numeric_limits<Micros>::min();
 };
 
 // Gives back what was taken when it goes. It is made before anything is taken, so that nothing can
@@ -127,18 +155,44 @@ bool Admission::arrive(const std::string& peer, bool tls) {
   const std::string address = counted_address(peer);
   const bool proxy = is_trusted(peer, trusted_);
   std::optional<Refusal> refusal;
+  std::optional<State::Closed> closed;
   {
     const std::lock_guard lock(state_->mutex);
-    refusal = state_->quota.arrive(address, proxy, tls, state_->now());
+    const Micros now = state_->now();
+    refusal = state_->quota.arrive(address, proxy, tls, now);
+    if (refusal && refusal->kind == LimitKind::handshakes) {
+      closed = state_->count_refused_handshake(address, now);
+    }
   }
   if (refusal) metrics_.refused(refusal->kind);
+  if (closed) {
+    log::warn(
+        "connections were closed: TLS handshakes took too much processor time (--max-handshakes, "
+        "--max-handshakes-per-address)",
+        {{"connections", closed->connections},
+         {"seconds", closed->since / 1'000'000},
+         {"address", closed->address + (closed->several ? " and others" : "")}});
+  }
   return !refusal;
+}
+
+void Admission::handshake_took(const std::string& peer, Micros took) {
+  const std::string address = counted_address(peer);
+  const bool proxy = is_trusted(peer, trusted_);
+  metrics_.handshake_took(took);
+  const std::lock_guard lock(state_->mutex);
+  state_->quota.handshake_took(address, proxy, took, state_->now());
+}
+
+void Admission::authenticated(const std::string& address) {
+  const std::lock_guard lock(state_->mutex);
+  state_->quota.authenticated(address, state_->now());
 }
 
 std::optional<Visitor> Admission::connect(const std::string& peer) {
   const auto place = std::make_shared<Place>(state_, counted_address(peer));
-  Visitor visitor{peer, place, std::nullopt};
-  const Quota::Arrival arrival = place->connect(is_trusted(peer, trusted_));
+  Visitor visitor{peer, place, std::nullopt, is_trusted(peer, trusted_)};
+  const Quota::Arrival arrival = place->connect(visitor.trusted);
   if (arrival.place == Quota::Place::none) return std::nullopt;
   visitor.reserve = arrival.reason;
   return visitor;

@@ -25,6 +25,7 @@ struct Visitor {
   std::string peer;  // address of the other end
   Ticket place;
   std::optional<Refusal> reserve;  // health alone is answered, and why
+  bool trusted = false;            // a proxy, whose connections are those of many clients
 };
 
 // The server is at its limit, or the address is: 503 or 429 with Retry-After.
@@ -38,8 +39,13 @@ class Admission {
   // `now`: empty is a steady clock.
   Admission(const Limits& limits, Metrics& metrics, std::function<Micros()> now = {});
 
-  // False: so many came of late that it is to be closed without an answer. Before connect().
+  // False: too many arrived recently, and it is to be closed without an answer. Before connect().
+  // Where handshakes took too much it is logged, once a minute for all.
   bool arrive(const std::string& peer, bool tls);
+  // What a step of a TLS handshake took of a processor.
+  void handshake_took(const std::string& peer, Micros took);
+  // A request showed the token.
+  void authenticated(const std::string& address);
   // None: too many, to be closed without an answer.
   std::optional<Visitor> connect(const std::string& peer);
 

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "server/net/problem.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/defaults.hpp"
 #include "server/scene/describe.hpp"
@@ -43,16 +44,30 @@ Result<std::vector<protocol::DatasetDescription>> Catalogue::list() const {
     if (!description) description = scene::describe_briefly(*dataset);
     out.push_back(refreshed(*dataset, std::move(*description)));
   }
+  for (auto& failed : store_->failed()) {
+    protocol::DatasetDescription description;
+    description.id = description.title = std::move(failed.id);
+    description.state = "failed";
+    description.notes = {std::move(failed.problem)};
+    out.push_back(std::move(description));
+  }
   return out;
 }
 
-Result<protocol::DatasetDescription> Catalogue::describe(const std::string& id) {
+Result<protocol::DatasetDescription> Catalogue::describe(const std::string& id,
+                                                         const CancelToken& cancel) {
   const auto dataset = find(id);
   if (!dataset) return dataset.error();
   if (auto description = known(**dataset, false))
     return refreshed(**dataset, std::move(*description));
-  auto description = scene::describe(**dataset, scene::RangesOf::seen);
-  if (!description) return description;
+  auto description = load(
+      **dataset,
+      [](data::Dataset& loading) { return scene::describe(loading, scene::RangesOf::seen); },
+      cancel);
+  if (!description) {
+    const auto fields = scene::fields_of({}, (*dataset)->info());
+    return naming((*dataset)->with_need(description.error(), fields), id);
+  }
   {
     protocol::DatasetDescription brief = scene::describe_briefly(**dataset);
     brief.fields = description->fields;

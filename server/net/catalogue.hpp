@@ -30,7 +30,8 @@ class Catalogue {
   [[nodiscard]] Result<std::vector<protocol::DatasetDescription>> list() const;
 
   // The long form. Loads the fields of the default view, once: not for the io thread.
-  Result<protocol::DatasetDescription> describe(const std::string& id);
+  Result<protocol::DatasetDescription> describe(const std::string& id,
+                                                const CancelToken& cancel = {});
 
   // Opens what was located and lists it, so that forget() may take it back; the value is its id.
   // What is listed already is the same dataset, and whoever listed it keeps it. Errors: those of
@@ -48,6 +49,22 @@ class Catalogue {
     return store_->look_for_changes();
   }
   [[nodiscard]] data::BudgetCounts counts() const { return store_->counts(); }
+  // Calls load(data::Dataset&), and where there is no room for it once more when its turn has come,
+  // which waits until others let go of what they hold (data::Dataset::in_turn()). `cancel` ends
+  // that; the error is cancelled then.
+  template <class Load>
+  auto load(const data::Dataset& dataset, const Load& load, const CancelToken& cancel = {}) {
+    data::Dataset handle = dataset;
+    auto loaded = load(handle);
+    if (loaded || loaded.error().kind != ErrorKind::out_of_memory) return loaded;
+    const auto turn = store_->take_turn(dataset, cancel);
+    if (!turn) {
+      loaded = make_error(ErrorKind::cancelled, "nobody waits for the answer");
+      return loaded;
+    }
+    handle = dataset.in_turn(cancel);
+    return load(handle);
+  }
   // See data::Store::reserve.
   Result<std::shared_ptr<const void>> reserve(std::uint64_t bytes) {
     return store_->reserve(bytes);
@@ -58,6 +75,8 @@ class Catalogue {
   // Whether open() brought it: it was not there when the server began.
   [[nodiscard]] bool is_opened_later(const std::string& id) const;
   void forget(const std::string& id);
+  // Takes what could not be opened off the list. False: nothing of that id is listed as failed.
+  bool forget_failed(const std::string& id) { return store_->remove_failed(id); }
 
   // Whether the view can be drawn, without loading anything. Errors: not_found (dataset), invalid
   // (with a pointer).

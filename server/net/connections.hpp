@@ -29,6 +29,7 @@ class Connection {
   virtual Since idle_since() const { return {}; }         // waits for a request's first byte
   virtual Since unasked_since() const { return {}; }      // of the reserve, without a whole request
   virtual Since handshaking_since() const { return {}; }  // of TLS
+  virtual bool is_of(const std::string& /*address*/) const { return false; }
 };
 
 class Connections {
@@ -67,16 +68,17 @@ class Connections {
   }
 
   // Where more than `most` are in a state, ends the one that is in it for longest, so that its
-  // place is free at once. False: nothing was ended.
-  bool end_longest(Connection::Since (Connection::*since)() const, std::size_t most = 0) const {
+  // place is free at once. False: nothing was ended. `since`: of a const Connection&, its Since.
+  template <class Since>
+  bool end_longest(const Since& since, std::size_t most = 0) const {
     std::size_t count = 0;
     std::shared_ptr<Connection> longest;
     for (const auto& [id, entry] : live_) {
       auto connection = entry.connection.lock();
-      const Connection::Since time = connection ? ((*connection).*since)() : std::nullopt;
+      const Connection::Since time = connection ? std::invoke(since, *connection) : std::nullopt;
       if (!time) continue;
       ++count;
-      if (!longest || *time < *((*longest).*since)()) longest = std::move(connection);
+      if (!longest || *time < *std::invoke(since, *longest)) longest = std::move(connection);
     }
     if (count <= most) return false;
     longest->abort();

@@ -27,6 +27,11 @@ struct Drawing {
   std::string payer;
 };
 
+// Room for what a picture takes beyond what a memory limit keeps back for any, held while it is
+// drawn and encoded; null where it needs none. Errors: out_of_memory, with what is needed.
+Result<std::shared_ptr<const void>> reserve_picture(Services& services, int width, int height,
+                                                    frame::Format format);
+
 // One of draw's or fail's answers comes, unless this is an error: busy. Loads of requests are
 // admitted like others; a stream has one picture at a time, so that its sessions bound them.
 Result<void> submit(Services& services, Drawing drawing);

@@ -9,6 +9,21 @@
 
 namespace windsplat::net {
 
+// Ends it, and then says so: where memory is short there may be none for the words.
+template <class Session>
+void end_failed(Session& session, const char* fault) noexcept {
+  try {
+    session.abort();
+  } catch (const std::exception&) {
+    log::error("a connection could not be ended");
+  }
+  try {
+    log::error("a connection failed", {{"request", session.request_id()}, {"fault", fault}});
+  } catch (const std::exception&) {
+    log::error("a connection failed, and there is no memory to say which");
+  }
+}
+
 // A completion handler of a session: keeps it alive, and ends it alone when something throws. Also
 // where an operation's own steps throw, which take the handler with them uncalled: what it was to
 // go on with would never come.
@@ -23,11 +38,7 @@ class Guarded {
   Guarded& operator=(Guarded&&) = delete;
   ~Guarded() {
     if (session_ == nullptr || std::uncaught_exceptions() == 0) return;
-    try {
-      session_->abort();
-    } catch (const std::exception&) {
-      log::error("a connection could not be ended");
-    }
+    end_failed(*session_, "its next step was lost");
   }
 
   template <class... Results>
@@ -36,9 +47,7 @@ class Guarded {
     try {
       body_(std::forward<Results>(results)...);
     } catch (const std::exception& fault) {
-      session->abort();  // first: where memory is short there may be none for the words
-      log::error("a connection failed",
-                 {{"request", session->request_id()}, {"fault", fault.what()}});
+      end_failed(*session, fault.what());
     }
   }
 

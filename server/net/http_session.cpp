@@ -25,7 +25,6 @@
 #include "server/net/problem.hpp"
 #include "server/net/routes.hpp"
 #include "server/net/target.hpp"
-#include "server/net/tls_context.hpp"
 #include "server/net/websocket_session.hpp"
 #include "server/net/wire.hpp"
 
@@ -38,8 +37,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr const char* hsts = "max-age=15552000";  // 180 days; said in TLS alone
 constexpr std::size_t buffer_bytes_max = std::size_t{16} * 1024;
-constexpr std::chrono::seconds tls_timeout{5};    // for a handshake
-constexpr std::size_t handshakes_max = 128;       // at a time; the longest ends for one more
 constexpr std::chrono::seconds first_timeout{5};  // for a connection's first byte
 constexpr std::chrono::seconds idle_timeout{60};  // for the next request of a connection
 constexpr std::chrono::seconds drain_idle_timeout{2};
@@ -58,9 +55,8 @@ bool is_fault_of_text(ErrorCode fault) {
 
 class HttpSession : public Connection, public std::enable_shared_from_this<HttpSession> {
  public:
-  HttpSession(asio::ip::tcp::socket socket, Services& services, Connections& connections,
-              Visitor visitor)
-      : wire_(std::move(socket), services.options.tls),
+  HttpSession(Wire wire, Services& services, Connections& connections, Visitor visitor)
+      : wire_(std::move(wire)),
         deadline_(wire_.get_executor()),
         services_(services),
         connections_(connections),
@@ -71,11 +67,15 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   HttpSession(const HttpSession&) = delete;
   HttpSession& operator=(const HttpSession&) = delete;
 
-  void start() {
-    // The drain waits for those that it found: clients that ask again and again would put it off.
-    connections_.add(id_, weak_from_this(), false, services_.draining);
-    began_ = came_ = Clock::now();
-    wire_.secure() ? begin_tls() : next_request();
+  // The drain waits for those that it found: clients that ask again and again would put it off.
+  void start(bool late) {
+    add(late);
+    next_request();
+  }
+
+  void refuse_plain(bool late) {
+    add(late);
+    refuse(problem_response(400, "Bad Request", "this port speaks TLS: say https://"));
   }
 
   void drain() override {
@@ -95,10 +95,6 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     const bool unasked = visitor_.reserve && visitor_.place && !asked_;
     return unasked ? Since(came_) : std::nullopt;
   }
-  [[nodiscard]] Since handshaking_since() const override {
-    return handshaking_ ? Since(came_) : std::nullopt;
-  }
-
   [[nodiscard]] const std::string& request_id() const { return request_.id; }
 
  private:
@@ -120,20 +116,9 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   }
   void with_no_deadline() { deadline_.expires_at(Clock::time_point::max()); }
 
-  void begin_tls() {
-    within(tls_timeout);
-    handshaking_ = true;
-    (void)connections_.end_longest(&Connection::handshaking_since, handshakes_max);
-    wire_.handshake(IoHandler(handler([this](ErrorCode fault, std::size_t) {
-      handshaking_ = false;
-      if (!fault) return next_request();
-      if (!is_plain_http(fault)) {
-        log::debug("a TLS handshake failed", {{"fault", fault.message()}});
-        return close();
-      }
-      wire_.forgo_tls();
-      refuse(problem_response(400, "Bad Request", "this port speaks TLS: say https://"));
-    })));
+  void add(bool late) {
+    connections_.add(id_, weak_from_this(), false, late);
+    began_ = came_ = Clock::now();
   }
 
   // --- reading ----------------------------------------------------------------------------------
@@ -264,6 +249,9 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     if (verdict == Verdict::wrong_token) services_.admission.failed_login(request_.address);
     if (verdict != Verdict::allowed) {
       return refuse(turned_away(verdict, request_, services_.options.base_path));
+    }
+    if (token != nullptr && !names_health(request_) && !is_login(request_)) {
+      services_.admission.authenticated(request_.address);
     }
     upgrade ? begin_stream() : read_body();
   }
@@ -518,7 +506,6 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
   void close() {
     idle_ = false;
-    handshaking_ = false;
     deadline_.cancel();
     leave_timer_.cancel();
     wire_.close();
@@ -545,8 +532,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   const std::shared_ptr<std::atomic<bool>> answer_lost_ =
       std::make_shared<std::atomic<bool>>(false);
   std::string head_;
-  bool idle_ = false;  // waits for a request's first byte
-  bool handshaking_ = false;
+  bool idle_ = false;        // waits for a request's first byte
   bool asked_ = false;       // a whole request came
   bool charged_ = false;     // the request, to its address
   bool quiet_ = false;       // it is not worth a line in the log
@@ -562,10 +548,16 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
 }  // namespace
 
-void start_http_session(asio::ip::tcp::socket socket, Services& services, Connections& connections,
-                        Visitor visitor) {
-  std::make_shared<HttpSession>(std::move(socket), services, connections, std::move(visitor))
-      ->start();
+void start_http_session(Wire wire, Services& services, Connections& connections, Visitor visitor,
+                        bool late) {
+  std::make_shared<HttpSession>(std::move(wire), services, connections, std::move(visitor))
+      ->start(late);
+}
+
+void refuse_plain_http(Wire wire, Services& services, Connections& connections, Visitor visitor,
+                       bool late) {
+  std::make_shared<HttpSession>(std::move(wire), services, connections, std::move(visitor))
+      ->refuse_plain(late);
 }
 
 }  // namespace windsplat::net

@@ -2,14 +2,18 @@
 // it is closed or becomes a stream.
 #pragma once
 
-#include <boost/asio/ip/tcp.hpp>
-
 #include "server/net/connections.hpp"
 #include "server/net/router.hpp"
 
 namespace windsplat::net {
 
-void start_http_session(boost::asio::ip::tcp::socket socket, Services& services,
-                        Connections& connections, Visitor visitor);
+class Wire;
+
+// `late`: a drain does not wait for it.
+void start_http_session(Wire wire, Services& services, Connections& connections, Visitor visitor,
+                        bool late);
+// Answers a request in plain HTTP that came where TLS is spoken.
+void refuse_plain_http(Wire wire, Services& services, Connections& connections, Visitor visitor,
+                       bool late);
 
 }  // namespace windsplat::net

@@ -20,6 +20,11 @@ struct Limits {
   // only those of addresses are refused that had more than a second's worth of late.
   double arrivals = 2000;
   double arrivals_per_address = 500;
+  // Processor time of TLS handshakes, milliseconds a second; ten seconds' worth at once, and what a
+  // handshake under way takes may go beyond. In total for addresses that have not shown the token
+  // recently, and as much again for those that have; 127.0.0.1 and ::1 have the address's alone.
+  double handshake_ms = 250;
+  double handshake_ms_per_address = 100;
   std::size_t sessions_per_address = 48;  // all of them: ServerOptions::sessions_max
   double requests_per_address = 1000;     // a second; ten seconds' worth may come at once
   double messages_per_address = 4000;     // of streams, a second

@@ -16,7 +16,8 @@
 namespace windsplat::net {
 
 struct LoadService::State {
-  State(std::size_t most, std::function<void()> told) : jobs_max(most), refused(std::move(told)) {}
+  State(std::size_t most, const char* name, std::function<void()> told)
+      : jobs_max(most), what(name), refused(std::move(told)) {}
 
   // No exception leaves it: what it keeps track of was given memory before.
 
@@ -81,6 +82,7 @@ struct LoadService::State {
   };
 
   const std::size_t jobs_max;
+  const char* const what;
   const std::function<void()> refused;
   std::mutex mutex;
   std::condition_variable wake;
@@ -90,8 +92,9 @@ struct LoadService::State {
   std::vector<std::thread> threads;
 };
 
-LoadService::LoadService(std::size_t threads, std::size_t jobs_max, std::function<void()> refused)
-    : state_(std::make_unique<State>(jobs_max, std::move(refused))) {
+LoadService::LoadService(std::size_t threads, std::size_t jobs_max, const char* what,
+                         std::function<void()> refused)
+    : state_(std::make_unique<State>(jobs_max, what, std::move(refused))) {
   state_->busy.reserve(threads);
   for (std::size_t i = 0; i < threads; ++i) {
     state_->threads.emplace_back([state = state_.get()] { state->work(); });
@@ -106,7 +109,8 @@ Result<void> LoadService::submit(Job job) {
     if (state_->ending) return make_error(ErrorKind::draining, "the server is shutting down");
     if (!state_->has_room(job)) {
       if (state_->refused) state_->refused();
-      return make_error(ErrorKind::busy, "more is asked for than can be loaded; try again");
+      return make_error(ErrorKind::busy, std::string("too many ") + state_->what +
+                                             " are waiting, of this address or in all; try again");
     }
     state_->jobs.push_back(std::move(job));
   }

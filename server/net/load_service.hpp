@@ -29,9 +29,10 @@ class LoadService {
 
   // `jobs_max`: that may wait for a dataset; for all of them datasets_full times as many. One payer
   // has half of either at most.
-  // `refused` is told each time it was too many.
+  // `what`: the jobs' name in the error of too many ("loads"). `refused` is called each time.
   static constexpr std::size_t datasets_full = 4;
-  LoadService(std::size_t threads, std::size_t jobs_max, std::function<void()> refused = {});
+  LoadService(std::size_t threads, std::size_t jobs_max, const char* what,
+              std::function<void()> refused = {});
   ~LoadService();
   LoadService(const LoadService&) = delete;
   LoadService& operator=(const LoadService&) = delete;

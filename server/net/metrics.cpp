@@ -199,6 +199,8 @@ struct Metrics::State {
       counter("windsplat_sessions_opened_total", "Viewers that ever connected.");
   Counter& accept_failures = counter("windsplat_accept_failures_total",
                                      "Connections that the system could not hand over.");
+  Counter& handshakes =
+      counter("windsplat_tls_handshake_seconds_total", "Processor time of TLS handshakes.");
   Counter& closed = counter("windsplat_connections_refused_total",
                             "Connections closed unanswered: there were too many.");
   std::array<Counter*, 2> opens{&opened("failed"), &opened("ok")};
@@ -255,6 +257,10 @@ void Metrics::answered(std::string_view route, int status) {
 }
 
 void Metrics::accept_failed() { state_->accept_failures.Increment(); }
+
+void Metrics::handshake_took(std::int64_t us) {
+  state_->handshakes.Increment(static_cast<double>(us) / us_per_s);
+}
 
 void Metrics::connection_refused() { state_->closed.Increment(); }
 

@@ -39,7 +39,8 @@ class Metrics {
   // `route` is one of those that router.cpp names.
   void answered(std::string_view route, int status);
   void accept_failed();
-  void connection_refused();  // closed unanswered: there were too many
+  void handshake_took(std::int64_t us);  // of a processor
+  void connection_refused();             // closed unanswered: there were too many
   void refused(LimitKind kind);
   void dataset_opened(bool ok);
   void background_done(bool cancelled);

@@ -43,7 +43,6 @@ Error naming(Error error, const std::string& dataset, const std::string& field) 
   }
   message += ": ";
   message += error.message;
-  message += " (--memory-limit, less what is kept back for what is not data)";
   error.message = std::move(message);
   return error;
 }

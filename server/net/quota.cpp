@@ -8,7 +8,8 @@
 namespace windsplat::net {
 namespace {
 
-constexpr double us_per_s = 1e6;
+constexpr double quota_us_per_s = 1e6;
+constexpr double quota_us_per_ms = 1e3;
 constexpr double s_per_minute = 60;
 constexpr Quota::Micros forget_after = 600'000'000;
 constexpr int quota_retry_s_max = 3600;
@@ -17,8 +18,13 @@ constexpr double at_once_s = 10;
 constexpr double received_at_once_s = 2;
 
 int whole_seconds(Quota::Micros wait) {
-  const double seconds = std::ceil(static_cast<double>(wait) / us_per_s);
+  const double seconds = std::ceil(static_cast<double>(wait) / quota_us_per_s);
   return static_cast<int>(std::clamp(seconds, 1.0, double{quota_retry_s_max}));
+}
+
+// 127.0.0.1 and ::1 as they are counted: where health checks of the machine itself come from.
+bool is_own_machine(const std::string& address) {
+  return address == "127.0.0.1" || address == "::/64";
 }
 
 bool reached(std::size_t count, std::size_t limit) { return limit > 0 && count >= limit; }
@@ -26,7 +32,7 @@ bool reached(std::size_t count, std::size_t limit) { return limit > 0 && count >
 }  // namespace
 
 void Quota::Bucket::refill(const Rate& rate, Micros now) {
-  const double came_back = rate.a_second * static_cast<double>(now - at) / us_per_s;
+  const double came_back = rate.a_second * static_cast<double>(now - at) / quota_us_per_s;
   taken = std::max(0.0, taken - came_back);
   at = now;
 }
@@ -52,7 +58,7 @@ Quota::Micros Quota::wait_for(Bucket& bucket, const Rate& rate, double room, Mic
   bucket.refill(rate, now);
   const double over = bucket.taken + room - rate.at_once;
   if (rate.a_second <= 0 || over <= 0) return 0;
-  return static_cast<Micros>(std::ceil(over / rate.a_second * us_per_s));
+  return static_cast<Micros>(std::ceil(over / rate.a_second * quota_us_per_s));
 }
 
 std::optional<Refusal> Quota::take_one(Bucket& bucket, const Rate& rate, LimitKind kind,
@@ -67,7 +73,11 @@ std::optional<Refusal> Quota::take_one(Bucket& bucket, const Rate& rate, LimitKi
 std::optional<Refusal> Quota::arrive(const std::string& address, bool trusted, bool tls,
                                      Micros now) {
   const double cost = tls ? tls_arrivals : 1;
-  Bucket& own = entry(address, now).arrivals;
+  Entry& here = entry(address, now);
+  if (tls) {
+    if (auto refusal = may_handshake(here, trusted, now)) return refusal;
+  }
+  Bucket& own = here.arrivals;
   const Rate own_rate = rate_for_ten_seconds(limits_.arrivals_per_address);
   const Rate rate = rate_for_ten_seconds(limits_.arrivals);
   // What one connection takes is never more than there may be at once.
@@ -84,6 +94,47 @@ std::optional<Refusal> Quota::arrive(const std::string& address, bool trusted, b
   if (own_rate.a_second > 0 && !trusted) own.taken += cost;
   if (rate.a_second > 0) arrivals_.taken = std::min(arrivals_.taken + cost, rate.at_once);
   return std::nullopt;
+}
+
+// Debts, like bytes and time of drawing: what a handshake takes is known when it is done.
+std::optional<Refusal> Quota::may_handshake(Entry& entry, bool trusted, Micros now) {
+  const Rate own_rate = rate_for_ten_seconds(limits_.handshake_ms_per_address);
+  const Micros own_wait = trusted ? 0 : wait_for(entry.handshakes, own_rate, 0, now);
+  if (own_wait > 0) {
+    return Refusal{LimitKind::handshakes, limits_.handshake_ms_per_address,
+                   whole_seconds(own_wait)};
+  }
+  Bucket* const shared = shared_handshakes(&entry, trusted);
+  if (shared == nullptr) return std::nullopt;
+  const Micros wait = wait_for(*shared, rate_for_ten_seconds(limits_.handshake_ms), 0, now);
+  if (wait == 0) return std::nullopt;
+  return Refusal{LimitKind::handshakes, limits_.handshake_ms, whole_seconds(wait)};
+}
+
+// The machine's own health checks must not wait for strangers: where each of its addresses has an
+// allowance, that alone bounds them.
+Quota::Bucket* Quota::shared_handshakes(const Entry* entry, bool trusted) {
+  if (trusted) return &known_handshakes_;
+  if (entry == nullptr) return &stranger_handshakes_;
+  if (limits_.handshake_ms_per_address > 0 && is_own_machine(entry->address)) return nullptr;
+  return entry->authenticated ? &known_handshakes_ : &stranger_handshakes_;
+}
+
+void Quota::handshake_took(const std::string& address, bool trusted, Micros took, Micros now) {
+  const auto charge = [&](Bucket& bucket, double ms_a_second) {
+    if (ms_a_second <= 0) return;
+    bucket.refill(rate_for_ten_seconds(ms_a_second), now);
+    bucket.taken += static_cast<double>(took) / quota_us_per_ms;
+  };
+  Entry* const here = known_entry(address);
+  if (here != nullptr && !trusted) charge(here->handshakes, limits_.handshake_ms_per_address);
+  if (Bucket* const shared = shared_handshakes(here, trusted)) {
+    charge(*shared, limits_.handshake_ms);
+  }
+}
+
+void Quota::authenticated(const std::string& address, Micros now) {
+  entry(address, now).authenticated = true;
 }
 
 Quota::Arrival Quota::connect(const std::string& address, bool trusted, Micros now) {
@@ -171,7 +222,7 @@ void Quota::rendered(const std::string& address, Micros took, Micros now) {
   if (limits_.render_s_per_address <= 0) return;
   Bucket& bucket = entry(address, now).render;
   bucket.refill(render_rate(), now);
-  bucket.taken += static_cast<double>(took) / us_per_s;
+  bucket.taken += static_cast<double>(took) / quota_us_per_s;
 }
 
 std::optional<Refusal> Quota::may_try_login(const std::string& address, Micros now) {

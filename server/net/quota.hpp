@@ -26,14 +26,15 @@ enum class LimitKind {
   logins,
   pixels,
   kernels,
-  waiting,   // work that waits: pictures, loads, jobs
-  arrivals,  // connections a second
-  estimate,  // time that a picture would take
+  waiting,     // work that waits: pictures, loads, jobs
+  arrivals,    // connections a second
+  estimate,    // time that a picture would take
+  handshakes,  // processor time of TLS handshakes
 };
 inline constexpr std::array limit_names{
     "connections", "address_connections", "sessions", "address_sessions", "requests", "bytes",
     "render",      "failed_logins",       "pixels",   "kernels",          "waiting",  "arrivals",
-    "estimate"};
+    "estimate",    "handshakes"};
 
 struct Refusal {
   LimitKind kind = LimitKind::connections;
@@ -62,6 +63,11 @@ class Quota {
   };
   // Before a connection is looked at any further: whether there were not too many of late.
   std::optional<Refusal> arrive(const std::string& address, bool trusted, bool tls, Micros now);
+  // What a TLS handshake has taken of a processor so far. Needs no memory.
+  void handshake_took(const std::string& address, bool trusted, Micros took, Micros now);
+  // The address has shown the token: until it is forgotten its handshakes do not compete with those
+  // of strangers.
+  void authenticated(const std::string& address, Micros now);
   // `trusted`: a proxy's, which brings many and counts in total alone.
   Arrival connect(const std::string& address, bool trusted, Micros now);
   // Whether it found no place because the reserve is full, of others that is.
@@ -107,13 +113,17 @@ class Quota {
     std::size_t connections = 0;
     std::size_t reserved = 0;
     std::size_t sessions = 0;
-    Bucket arrivals, requests, health, messages, received, bytes, render, logins;
+    bool authenticated = false;
+    Bucket arrivals, handshakes, requests, health, messages, received, bytes, render, logins;
     Micros seen = 0;
   };
   using Entries = std::list<Entry>;  // the one not seen for longest first
 
   [[nodiscard]] static Rate rate_for_ten_seconds(double a_second);
   [[nodiscard]] Rate request_rate() const;
+  std::optional<Refusal> may_handshake(Entry& entry, bool trusted, Micros now);
+  // What counts an address's handshakes beside its own allowance; null: nothing.
+  Bucket* shared_handshakes(const Entry* entry, bool trusted);
   [[nodiscard]] Rate byte_rate() const;
   [[nodiscard]] Rate render_rate() const;
   [[nodiscard]] Rate login_rate() const;
@@ -134,6 +144,7 @@ class Quota {
   Entries entries_;
   std::unordered_map<std::string, Entries::iterator> by_address_;
   Bucket arrivals_;  // of all
+  Bucket stranger_handshakes_, known_handshakes_;
   std::size_t connections_ = 0;
   std::size_t reserved_ = 0;
 };

@@ -100,8 +100,29 @@ std::optional<RenderQueue::Next> RenderQueue::pop(std::int64_t now_us) {
     replaced_.pop_front();
     return begin(std::move(older), false);
   }
+  if (auto unwanted = take_cancelled()) return unwanted;
   const auto kind = next_kind();
   return kind ? take(*kind) : std::nullopt;
+}
+
+// They use nobody's turn. Waiting for one of their own, they would hold what they refer to for as
+// long as owners who come anew keep the renderer busy.
+std::optional<RenderQueue::Next> RenderQueue::take_cancelled() {
+  for (Line& line : lines_) {
+    for (auto owner = line.owners.begin(); owner != line.owners.end(); ++owner) {
+      if (owner->second.front().next.job.cancel.cancelled()) {
+        return begin(take_first(line, owner), true);
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+RenderQueue::Waiting RenderQueue::take_first(Line& line, Owners::iterator owner) {
+  Waiting first = std::move(owner->second.front());
+  owner->second.pop_front();
+  if (owner->second.empty()) line.owners.erase(owner);
+  return first;
 }
 
 std::optional<RenderQueue::Next> RenderQueue::take(RenderKind kind) {
@@ -112,12 +133,9 @@ std::optional<RenderQueue::Next> RenderQueue::take(RenderKind kind) {
   const auto least =
       std::min_element(line.owners.begin(), line.owners.end(),
                        [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
-  Waiting first = std::move(least->second.front());
-  least->second.pop_front();
   line.shares.begin(least->first);
   if (kind != RenderKind::background) kinds_.begin(number_of(kind));
-  if (least->second.empty()) line.owners.erase(least);
-  return begin(std::move(first), true);
+  return begin(take_first(line, least), true);
 }
 
 RenderQueue::Next RenderQueue::begin(Waiting waiting, bool charged) {

@@ -58,7 +58,8 @@ class Shares {
 // the owners within a kind: next is whoever used least, then whoever came first. Background jobs
 // run when nothing of the others waits; one that runs is cancelled when such a job comes, and an
 // owner has one of them waiting at most: a newer one takes its place, and the older one, cancelled,
-// runs before all others so that whoever gave it is told.
+// runs before all others so that whoever gave it is told. So does the next job of an owner once it
+// is cancelled: it costs next to nothing.
 class RenderQueue {
  public:
   struct Next {
@@ -94,8 +95,9 @@ class RenderQueue {
     std::uint64_t arrival = 0;
   };
   using Jobs = std::list<Waiting>;  // which moves from one to another without memory
+  using Owners = std::map<std::uint64_t, Jobs>;
   struct Line {
-    std::map<std::uint64_t, Jobs> owners;  // none of them empty
+    Owners owners;  // none of them empty
     Shares shares;
   };
   struct Running {
@@ -110,6 +112,8 @@ class RenderQueue {
   [[nodiscard]] Line& line_of(RenderKind kind) { return lines_[static_cast<std::size_t>(kind)]; }
   [[nodiscard]] std::optional<RenderKind> next_kind() const;
   std::optional<Next> take(RenderKind kind);
+  std::optional<Next> take_cancelled();
+  static Waiting take_first(Line& line, Owners::iterator owner);
   Next begin(Waiting waiting, bool charged);
   template <class Wanted>
   [[nodiscard]] Load sum(double unknown_ms, const Wanted& wanted) const;

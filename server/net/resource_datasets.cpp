@@ -75,14 +75,18 @@ Response delete_dataset(Services& services, const std::string& id, const Request
   if (const auto ok = query.finish(); !ok) return problem_response(ok.error());
   const auto dataset = services.catalogue.find(id);
   if (!dataset) {
+    if (forget && services.catalogue.forget_failed(id)) return no_content();
     return problem_response(make_error(ErrorKind::not_found, dataset.error().message));
   }
   if (forget && !services.catalogue.is_opened_later(id)) {
     return problem_response(403, "Forbidden",
                             "only datasets that were opened by POST can be forgotten");
   }
-  (*dataset)->evict();
-  if (forget) services.catalogue.forget(id);
+  if (forget) {
+    services.catalogue.forget(id);  // first, so that reads in work end with the right reason
+  } else {
+    (*dataset)->evict();
+  }
   return no_content();
 }
 

@@ -157,6 +157,10 @@ Result<Response> draw(Services& services, const Picture& picture, data::Dataset&
   const auto setting = setting_of(services, *view, dataset);
   if (!setting) return setting.error();
   const frame::Encoding encoding = encoding_at(picture.encoding, *setting);
+  const auto room =
+      reserve_picture(services, quality::edge_at(view->image.width, encoding.half_level),
+                      quality::edge_at(view->image.height, encoding.half_level), encoding.format);
+  if (!room) return room.error();
   auto drawn = frame::produce(quality::at_setting(*view, *setting), dataset, encoding,
                               *services.pool, cancel, services.frames);
   if (!drawn) return drawn.error();

@@ -30,8 +30,10 @@ constexpr std::chrono::milliseconds turn_budget{30};  // of steps read before ot
 
 // What a question is about, found before anything is loaded.
 struct Subject {
+  Catalogue* catalogue = nullptr;
   DatasetPtr dataset;
   data::FieldInfo field;
+  CancelToken cancel;
 };
 
 Result<DatasetPtr> find_dataset(const Services& services, const std::string& id) {
@@ -40,8 +42,8 @@ Result<DatasetPtr> find_dataset(const Services& services, const std::string& id)
   return dataset;
 }
 
-Result<Subject> find_subject(const Services& services, const std::string& id,
-                             const std::string& field) {
+Result<Subject> find_subject(Services& services, const std::string& id, const std::string& field,
+                             const Request& request) {
   auto dataset = find_dataset(services, id);
   if (!dataset) return dataset.error();
   const data::FieldInfo* found = (*dataset)->info().find(field);
@@ -49,13 +51,20 @@ Result<Subject> find_subject(const Services& services, const std::string& id,
     return make_error(ErrorKind::not_found,
                       "dataset '" + printable(id) + "' has no field '" + printable(field) + "'");
   }
-  return Subject{std::move(*dataset), *found};
+  return Subject{&services.catalogue, std::move(*dataset), *found, request.cancel};
+}
+
+Result<std::shared_ptr<const data::Volume>> load(Catalogue& catalogue, const data::Dataset& dataset,
+                                                 const std::string& field, std::size_t step,
+                                                 const CancelToken& cancel) {
+  auto volume = catalogue.load(
+      dataset, [&](data::Dataset& loading) { return loading.volume(field, step); }, cancel);
+  if (!volume) return naming(dataset.with_need(volume.error(), {field}), dataset.info().id, field);
+  return volume;
 }
 
 Result<std::shared_ptr<const data::Volume>> load(const Subject& subject, std::size_t step) {
-  auto volume = subject.dataset->volume(subject.field.name, step);
-  if (!volume) return naming(volume.error(), subject.dataset->info().id, subject.field.name);
-  return volume;
+  return load(*subject.catalogue, *subject.dataset, subject.field.name, step, subject.cancel);
 }
 
 std::optional<int> read_step(QueryReader& query, const data::Dataset& dataset) {
@@ -191,8 +200,9 @@ Response histogram_response(const Subject& subject, const HistogramQuery& query,
 
 // --- probe --------------------------------------------------------------------------------------
 
-Response probe_response(data::Dataset& dataset, const std::array<std::optional<double>, 3>& at,
-                        int step, const CancelToken& cancel) {
+Response probe_response(Catalogue& catalogue, data::Dataset& dataset,
+                        const std::array<std::optional<double>, 3>& at, int step,
+                        const CancelToken& cancel) {
   const data::DatasetInfo& info = dataset.info();
   const auto place = data::nearest_sample(info.grid, at);
   if (!place) return problem_response(place.error());
@@ -203,8 +213,9 @@ Response probe_response(data::Dataset& dataset, const std::array<std::optional<d
     if (cancel.cancelled()) {
       return problem_response(make_error(ErrorKind::cancelled, "nobody waits for the answer"));
     }
-    const auto volume = dataset.volume(field.name, static_cast<std::size_t>(step));
-    if (!volume) return problem_response(naming(volume.error(), info.id, field.name));
+    const auto volume =
+        load(catalogue, dataset, field.name, static_cast<std::size_t>(step), cancel);
+    if (!volume) return problem_response(volume.error());
     out.fields.push_back(describe(field));
     out.values.push_back(data::value_at(**volume, place->index));
   }
@@ -245,7 +256,7 @@ void answer_range_of_all(Services& services, Subject subject, const Request& req
 
 void get_histogram(Services& services, const std::string& id, const std::string& field,
                    const Request& request, Reply reply) {
-  auto subject = find_subject(services, id, field);
+  auto subject = find_subject(services, id, field, request);
   if (!subject) {
     reply(problem_response(subject.error()));
     return;
@@ -274,16 +285,17 @@ void get_probe(Services& services, const std::string& id, const Request& request
     reply(problem_response(ok.error()));
     return;
   }
-  run_later(services.loads, request, std::move(reply), "a probe", dataset->get(),
-            [dataset = *dataset, at, step, cancel = request.cancel] {
-              return probe_response(*dataset, at, step, cancel);
-            });
+  run_later(
+      services.loads, request, std::move(reply), "a probe", dataset->get(),
+      [&catalogue = services.catalogue, dataset = *dataset, at, step, cancel = request.cancel] {
+        return probe_response(catalogue, *dataset, at, step, cancel);
+      });
 }
 
 void get_series(Services& services, const std::string& id, const std::string& field,
                 const Request& request, Reply reply) {
   const auto refuse = [&](const Error& error) { reply(problem_response(error)); };
-  auto subject = find_subject(services, id, field);
+  auto subject = find_subject(services, id, field, request);
   if (!subject) return refuse(subject.error());
   const data::DatasetInfo& info = subject->dataset->info();
   QueryReader query(request.query);
@@ -314,7 +326,7 @@ void get_series(Services& services, const std::string& id, const std::string& fi
 void get_range(Services& services, const std::string& id, const std::string& field,
                const Request& request, Reply reply) {
   const auto refuse = [&](const Error& error) { reply(problem_response(error)); };
-  auto subject = find_subject(services, id, field);
+  auto subject = find_subject(services, id, field, request);
   if (!subject) return refuse(subject.error());
   QueryReader query(request.query);
   const std::string of = query.text("of").value_or("step");

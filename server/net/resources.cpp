@@ -141,8 +141,8 @@ void get_dataset(Services& services, const std::string& id, const Request& reque
     return;
   }
   run_later(services.loads, request, std::move(reply), "a description", dataset->get(),
-            [&services, id]() -> Response {
-              const auto description = services.catalogue.describe(id);
+            [&services, id, cancel = request.cancel]() -> Response {
+              const auto description = services.catalogue.describe(id, cancel);
               return description ? json_response(protocol::encode_dataset(*description))
                                  : problem_response(description.error());
             });

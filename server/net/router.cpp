@@ -19,6 +19,7 @@ namespace {
 
 // Requests for pictures and descriptions that may wait at a time.
 constexpr std::size_t requests_waiting_max = 16;
+constexpr std::size_t view_changes_waiting_max = 64;  // each takes the time of a disk's sync
 constexpr std::size_t load_threads = 2;
 
 using Handler = std::function<void(const Request&, Reply)>;
@@ -316,9 +317,9 @@ Services::Services(ServerOptions server_options, std::shared_ptr<data::Store> st
       costs(pool->size()),
       jobs(static_cast<std::size_t>(protocol::limits::jobs_max),
            static_cast<std::size_t>(protocol::limits::jobs_running_max)),
-      locator(1, requests_waiting_max),
-      keeper(1, requests_waiting_max),
-      watcher(1, 1),
+      locator(1, requests_waiting_max, "files to open"),
+      keeper(1, view_changes_waiting_max, "changes of saved views"),
+      watcher(1, 1, "looks at files"),
       renderer(
           {requests_waiting_max,
            options.requests_waiting_ms_max,
@@ -326,7 +327,8 @@ Services::Services(ServerOptions server_options, std::shared_ptr<data::Store> st
            options.limits.wait_ms,
            [this](const std::string& address, std::int64_t us) { admission.rendered(address, us); },
            [this] { metrics.refused(LimitKind::waiting); }}),
-      loads(load_threads, requests_waiting_max, [this] { metrics.refused(LimitKind::waiting); }) {
+      loads(load_threads, requests_waiting_max, "loads",
+            [this] { metrics.refused(LimitKind::waiting); }) {
   options.base_path = normal_base_path(options.base_path);
   if (options.views == nullptr) options.views = views::SavedViews::open({}).value();
 }

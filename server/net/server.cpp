@@ -16,7 +16,7 @@
 #include "server/base/log.hpp"
 #include "server/net/attempt.hpp"
 #include "server/net/connections.hpp"
-#include "server/net/http_session.hpp"
+#include "server/net/handshake.hpp"
 #include "server/net/listener.hpp"
 #include "server/net/post.hpp"
 #include "server/net/router.hpp"
@@ -53,6 +53,7 @@ struct Server::State {
     if (ending.joinable()) ending.join();
     services.catalogue.end();  // so that no thread of the services' is found in a read
     services.end();            // and none answers any more
+    if (handshakes) handshakes->stop();
     // What was on its way when the loop was stopped.
     io.restart();
     while (true) {
@@ -71,7 +72,8 @@ struct Server::State {
     const std::string address = fault ? "" : peer.address().to_string();
     auto visitor = admit(address);
     if (!visitor) return services.metrics.connection_refused();
-    start_http_session(std::move(socket), services, connections, std::move(*visitor));
+    start_connection(std::move(socket), services, connections, handshakes.get(),
+                     std::move(*visitor));
   }
 
   // Who waits for nothing makes room: of all connections the one that is idle for longest, of the
@@ -209,6 +211,9 @@ struct Server::State {
   asio::io_context io{1};
   // The loop ends when it is told to, not where memory failed for all that it waited for.
   asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
+  // Null: plain TCP. Its thread posts to io, too.
+  const std::unique_ptr<HandshakeThread> handshakes{
+      services.options.tls ? std::make_unique<HandshakeThread>() : nullptr};
   Listener listener;
   asio::steady_timer look_timer;
   asio::steady_timer cancel_timer;

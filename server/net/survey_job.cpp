@@ -3,7 +3,6 @@
 
 #include <memory>
 #include <utility>
-#include <vector>
 
 #include "server/frame/measure.hpp"
 #include "server/net/attempt.hpp"
@@ -11,8 +10,6 @@
 
 namespace windsplat::net {
 namespace {
-
-using Pinned = std::vector<std::shared_ptr<const void>>;
 
 // A study that was begun in the tables, and ends there however it ends.
 class Study {
@@ -26,15 +23,15 @@ class Study {
   Study(const Study&) = delete;
   Study& operator=(const Study&) = delete;
 
-  // The averages of coarser settings, as far as there is room for them.
+  // The averages of coarser settings, as far as there is room for them. Nothing is held: until the
+  // renderer has nothing else to do, others may need the room.
   Result<void> load(data::Dataset& dataset, const CancelToken& unwanted) {
     for (const int coarser : {0, 1, 2}) {
       if (unwanted.cancelled()) return make_error(ErrorKind::cancelled, "nobody looks any more");
       frame::Encoding encoding;
       encoding.coarser = coarser;
-      auto loaded = frame::load(completed_, dataset, encoding);
+      const auto loaded = frame::load(completed_, dataset, encoding);
       if (!loaded && coarser == 0) return loaded.error();
-      if (loaded) pinned_.push_back(std::move(*loaded));
     }
     return {};
   }
@@ -44,7 +41,9 @@ class Study {
       if (unwanted.cancelled()) stop.cancel();
       services_.quality.add(style_, found.setting, found.sight, found.measured);
     };
-    complete_ = static_cast<bool>(attempt<void>("a survey", stop, [&] {
+    complete_ = static_cast<bool>(attempt<void>("a survey", stop, [&]() -> Result<void> {
+      const auto room = services_.catalogue.reserve(frame::survey_bytes(completed_.image));
+      if (!room) return room.error();  // others need it more
       return frame::survey(completed_, dataset, *services_.pool, stop, services_.frames, keep);
     }));
   }
@@ -53,7 +52,6 @@ class Study {
   Services& services_;
   protocol::View completed_;
   quality::Style style_;
-  Pinned pinned_;
   bool complete_ = false;
 };
 

@@ -22,4 +22,8 @@ Result<std::shared_ptr<TlsContext>> make_tls(const std::string& chain, const std
 // Seconds since 1970 after which clients refuse the server's own certificate.
 std::int64_t certificate_ends(const TlsContext& tls);
 
+// Why each handshake costs more than it needs to: a large RSA key, a long chain. Empty: it does
+// not.
+std::string expensive_handshakes(const TlsContext& tls);
+
 }  // namespace windsplat::net

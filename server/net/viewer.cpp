@@ -34,6 +34,11 @@ Result<session::Drawn> draw(Services& services, const session::StartRender& want
                             data::Dataset& dataset, std::int64_t queue_us,
                             const CancelToken& cancel) {
   const frame::Encoding encoding = frame_encoding(wanted.encoding, wanted.setting);
+  const protocol::ImageView& image = wanted.view.image;
+  const auto room =
+      reserve_picture(services, quality::edge_at(image.width, encoding.half_level),
+                      quality::edge_at(image.height, encoding.half_level), encoding.format);
+  if (!room) return room.error();
   auto drawn = frame::produce(quality::at_setting(wanted.view, wanted.setting), dataset, encoding,
                               *services.pool, cancel, services.frames);
   if (!drawn) return drawn.error();
@@ -152,7 +157,7 @@ void Viewer::start(const session::Describe& effect, DescribedReply reply) {
       {gone_,
        [&services = services_, effect, cancel = gone_, shared, one = describing_] {
          (*shared)(effect.id, attempt<protocol::DatasetDescription>("a description", cancel, [&] {
-                     return encoded(services.catalogue.describe(effect.dataset));
+                     return encoded(services.catalogue.describe(effect.dataset, cancel));
                    }));
        },
        true, dataset ? (*dataset)->shared_info() : nullptr});

@@ -298,7 +298,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       watching_ = false;
       controls_ = 0;
       if (fault || ended_) return;
-      if (*answer_lost_) return abort();
+      if (*answer_lost_) return end_failed(*this, "an answer for it was lost");
       const std::size_t bytes = socket_.next_layer().bytes_read() - control_bytes_;
       if (bytes == 0) message_since_.reset();
       if (bytes > 0 && !message_since_) message_since_ = Clock::now();

@@ -4,6 +4,7 @@
 #include <openssl/ssl.h>
 
 #include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/bind_executor.hpp>
 #include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/ssl/stream.hpp>
 
@@ -32,10 +33,9 @@ Wire::Wire(asio::ip::tcp::socket socket, std::shared_ptr<TlsContext> tls)
 Wire::~Wire() = default;
 Wire::Wire(Wire&&) noexcept = default;
 
-void Wire::handshake(IoHandler done) {
-  tls_->stream.async_handshake(
-      asio::ssl::stream_base::server,
-      asio::bind_cancellation_slot(tls_->stop_reading.slot(), std::move(done)));
+void Wire::handshake(const HandshakeExecutor& executor, IoHandler done) {
+  tls_->stream.async_handshake(asio::ssl::stream_base::server,
+                               asio::bind_executor(executor, std::move(done)));
 }
 
 void Wire::forgo_tls() { tls_.reset(); }

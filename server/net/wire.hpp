@@ -13,6 +13,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "server/net/handshake_thread.hpp"
 #include "server/net/stream.hpp"
 #include "server/net/tls.hpp"
 
@@ -69,7 +70,9 @@ class Wire {
   [[nodiscard]] const next_layer_type& next_layer() const { return *tcp_; }
   [[nodiscard]] bool secure() const { return tls_ != nullptr; }
 
-  void handshake(IoHandler done);
+  // Its steps run by `executor`, and so must everything else that uses this until `done` is called;
+  // what makes it fail from another thread is shutdown() of the socket's descriptor.
+  void handshake(const HandshakeExecutor& executor, IoHandler done);
   // Plain TCP from here on, after a handshake that failed.
   void forgo_tls();
   // Tells the peer that nothing follows (close_notify). Done when that has been written, whatever

@@ -46,6 +46,10 @@ Result<Scene> build_scene(const protocol::View& completed, data::Dataset& datase
 // not every sample is drawn. 0 where every sample always is.
 Result<double> detail_shown(const Completed& completed);
 
+// The fields that a view, completed or not, may load of a dataset: each once, without those that
+// are not there. Loads nothing.
+std::vector<std::string> fields_of(const protocol::View& view, const data::DatasetInfo& info);
+
 // What a completed view shows of its dataset at any step, without loading it: the names of fields,
 // and how coarse.
 struct Shown {

@@ -287,6 +287,30 @@ Result<Completed> complete_and_place(const View& view, data::Dataset& dataset) {
   return Completed{std::move(full), std::move(*placed)};
 }
 
+std::vector<std::string> fields_of(const View& view, const data::DatasetInfo& info) {
+  std::vector<std::string> fields;
+  const auto add = [&](const std::string& name) {
+    const bool is_known = std::find(fields.begin(), fields.end(), name) != fields.end();
+    if (!is_known && info.find(name) != nullptr) fields.push_back(name);
+  };
+  const FieldChoice& lines = view.vector.field;
+  if (lines.kind == FieldChoice::Kind::named) add(lines.name);
+  if (lines.kind == FieldChoice::Kind::dataset_default) {
+    const data::FieldInfo* const first = info.first(data::FieldKind::vector);
+    if (first != nullptr) add(first->name);
+  }
+  if (view.vector.color.by == ColorBy::scalar && view.vector.color.field) {
+    add(*view.vector.color.field);
+  }
+  if (view.scalars) {
+    for (const protocol::ScalarView& scalar : *view.scalars) add(scalar.field);
+  } else {
+    for (const std::string& name : default_scalars(info)) add(name);
+  }
+  if (view.geometry.height_field) add(*view.geometry.height_field);
+  return fields;
+}
+
 Result<View> complete_view(const View& view, data::Dataset& dataset) {
   auto completed = complete_and_place(view, dataset);
   if (!completed) return completed.error();

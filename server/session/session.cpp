@@ -136,6 +136,7 @@ Effects Session::on_described(std::uint32_t id, Result<protocol::DatasetDescript
   if (description) {
     effects_.emplace_back(SendText{protocol::OpenedMessage{id, std::move(*description)}});
   } else {
+    not_opened_ = description.error();
     refuse(description.error(), id, std::nullopt);
     undo(version, now);
   }
@@ -147,7 +148,10 @@ Effects Session::on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros n
   const Render render = *render_;
   render_.reset();
   if (!drawn) {
-    if (drawn.error().kind == ErrorKind::cancelled) {
+    const ErrorKind kind = drawn.error().kind;
+    // Data that were released while they were read are asked for again.
+    if (kind == ErrorKind::cancelled || kind == ErrorKind::not_resident ||
+        kind == ErrorKind::draining) {
       ++stats_.cancelled;
     } else if (!render.unwanted) {
       render_failed(render, drawn.error(), now);
@@ -176,6 +180,7 @@ void Session::follow(const protocol::OpenMessage& message, Micros now) {
   protocol::View bare;
   bare.dataset = message.dataset;
   if (const auto known = surroundings_.check(bare); !known) {
+    not_opened_ = known.error();
     refuse(known.error(), message.id, std::nullopt);
     return;
   }
@@ -224,7 +229,7 @@ void Session::follow(const protocol::PatchMessage& message, Micros now) {
 void Session::follow(const protocol::StillMessage& message, Micros /*now*/) {
   Still still{message, view_, rev_, t_};
   if (view_.dataset.empty()) {
-    refuse(make_error(ErrorKind::not_found, "no dataset is open"), message.id, std::nullopt);
+    refuse(nothing_open(), message.id, std::nullopt);
   } else if (stills_.size() >= stills_max) {
     refuse(make_error(ErrorKind::busy, "earlier stills are not finished yet"), message.id,
            std::nullopt);
@@ -240,7 +245,7 @@ void Session::follow(const protocol::StillMessage& message, Micros /*now*/) {
 
 void Session::follow(const protocol::PlayMessage& message, Micros now) {
   if (view_.dataset.empty()) {
-    refuse(make_error(ErrorKind::not_found, "no dataset is open"), std::nullopt, std::nullopt);
+    refuse(nothing_open(), std::nullopt, std::nullopt);
     return;
   }
   const auto steps = surroundings_.check(view_);
@@ -363,6 +368,7 @@ void Session::render_failed(const Render& render, const Error& error, Micros now
     // Time that ran into a step which cannot be shown stands still.
     if (!fault->rev) player_.stop();
     refuse(error, std::nullopt, fault->rev);
+    not_opened_ = error;
     undo(fault->version, now);
     return;
   }
@@ -372,6 +378,11 @@ void Session::render_failed(const Render& render, const Error& error, Micros now
   player_.stop();
   drawn_version_ = render.version;
   drawn_final_ = true;
+}
+
+Error Session::nothing_open() const {
+  if (!not_opened_) return make_error(ErrorKind::not_found, "no dataset is open");
+  return make_error(not_opened_->kind, "no dataset is open: " + not_opened_->message);
 }
 
 void Session::refuse(const Error& error, std::optional<std::uint32_t> id,

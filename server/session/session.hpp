@@ -199,6 +199,8 @@ class Session {
   [[nodiscard]] bool looks_standing(const Render& render, const Drawn& drawn) const;
   void send_frame(const Render& render, Drawn drawn,
                   Micros now);  // with the messages that go with it
+  // Why there is no dataset to play or draw.
+  [[nodiscard]] Error nothing_open() const;
   void refuse(const Error& error, std::optional<std::uint32_t> id,
               std::optional<std::uint32_t> rev);
   void close(int code, std::string reason);
@@ -242,6 +244,7 @@ class Session {
   std::deque<Change> changes_;     // from proved_ to document_
   std::deque<Opening> openings_;
   std::optional<std::uint32_t> opened_id_;  // of the last that was asked for
+  std::optional<Error> not_opened_;         // why the last view that could not be shown could not
   std::deque<Still> stills_;
   Player player_;
   struct Pace {  // steps shown since a moment

@@ -120,7 +120,7 @@ TEST_F(CliAccess, ASecretThatOthersCanReadIsWarnedOf) {
 }
 
 TEST_F(CliAccess, BeyondLoopbackATokenIsNeededOrTheFlag) {
-  const Words remote{"serve", "--listen", "0.0.0.0:0", dataset};
+  const Words remote{"serve", "--listen", "0.0.0.0:0", "--allow-root", dataset};
   const auto with = [&](const Words& more) {
     Words words = remote;
     words.insert(words.end(), more.begin(), more.end());
@@ -205,7 +205,8 @@ TEST_F(CliAccess, TheConfigurationGivesOptionsAndTheEnvironmentAndTheCommandLine
   EXPECT_THAT(url({}, {}), HasSubstr("/from-config/"));
   EXPECT_THAT(url({}, {from_environment}), HasSubstr("/from-environment/"));
   EXPECT_THAT(url({"--base-path", "/from-line/"}, {from_environment}), HasSubstr("/from-line/"));
-  write_file(folder.file("remote.json"), R"({"listen": "0.0.0.0:0", "allow-remote": true,
+  write_file(folder.file("remote.json"),
+             R"({"listen": "0.0.0.0:0", "allow-remote": true, "allow-root": true,
       "allow-origin": ["https://a.example"]})");
   Process remote({"serve", "--config", folder.file("remote.json"), "--allow-origin",
                   "https://b.example", dataset});
@@ -225,6 +226,8 @@ TEST_F(CliAccess, TheConfigurationIsRefusedWithAPointer) {
            {R"({"config": "x"})", "/config"},
            {R"({"help": true})", "/help"},
            {R"({"max-sessions": "5"})", "/max-sessions"},
+           {R"({"token-file": ""})", "/token-file"},
+           {R"({"allow-host": ["a.example", ""]})", "/allow-host"},
            {R"({"max-sessions": true})", "/max-sessions"},
            {R"({"max-sessions": 0})", "/max-sessions"},
            {R"({"max-sessions": 1.5})", "/max-sessions"},
@@ -319,13 +322,27 @@ TEST_F(CliAccess, SighupTakesAllOfTheConfigurationOrNothing) {
   stop(daemon);
 }
 
+TEST_F(CliAccess, BeyondLoopbackRootNeedsItsFlag) {
+  if (::geteuid() != 0) GTEST_SKIP() << "not root";
+  Words words{"serve", "--listen", "0.0.0.0:0", "--allow-remote", dataset};
+  const Outcome refused = run(words);
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("--allow-root"));
+  Process open(words, {"WINDSPLAT_ALLOW_ROOT=true"});
+  EXPECT_EQ(net_test::get(port_of(open), "/v1").status, 200);
+  Process local({"serve", "--listen", "127.0.0.1:0", dataset});
+  EXPECT_EQ(net_test::get(port_of(local), "/v1").status, 200) << "loopback needs no flag";
+}
+
 TEST_F(CliAccess, SighupCannotTakeTheTokenFromWhatOthersReach) {
   const std::string config = folder.file("windsplat.json");
   const std::string file = secret("token", first_token);
-  write_file(config, R"({"listen": "0.0.0.0:0", "token-file": ")" + file + "\"}");
+  write_file(config,
+             R"({"listen": "0.0.0.0:0", "allow-root": true, "token-file": ")" + file + "\"}");
   Process daemon({"serve", "--config", config, dataset});
   const auto port = port_of(daemon);
-  for (const char* without : {R"({"listen": "0.0.0.0:0"})", R"({"listen": "127.0.0.1:0"})"}) {
+  for (const char* without : {R"({"listen": "0.0.0.0:0", "allow-root": true})",
+                              R"({"listen": "127.0.0.1:0", "allow-root": true})"}) {
     write_file(config, without);
     const std::string before = daemon.messages();
     daemon.send(SIGHUP);
@@ -370,7 +387,7 @@ TEST_F(CliAccess, BeyondLoopbackWithoutATokenOnlyKnownNamesAreAnswered) {
   const auto status_for = [](std::uint16_t port, const std::string& host) {
     return net_test::raw(port, "GET /v1 HTTP/1.1\r\nHost: " + host + "\r\n\r\n").status;
   };
-  const Words remote{"serve", "--listen", "0.0.0.0:0", "--allow-remote", dataset};
+  const Words remote{"serve", "--listen", "0.0.0.0:0", "--allow-remote", "--allow-root", dataset};
   const auto with = [&](const Words& more) {
     Words words = remote;
     words.insert(words.end(), more.begin(), more.end());

@@ -17,6 +17,7 @@ namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
+using testing::Not;
 using testing::StartsWith;
 
 TEST(CliFiles, SynthInspectRender) {
@@ -75,6 +76,24 @@ TEST(CliFiles, InspectTextNamesAxesFieldsStepsAndSize) {
     EXPECT_THAT(told.out, HasSubstr(word));
   }
   EXPECT_EQ(told.out.find('\x1b'), std::string::npos);
+}
+
+TEST(CliFiles, InspectTellsWhatNeedsNoMemoryWhereRangesNeedTooMuch) {
+  const Outcome told = run({"inspect", "tornado:400", "--memory-limit", "192M"});
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_THAT(told.out, HasSubstr("400 x 400 x 400 samples"));
+  EXPECT_THAT(told.out, HasSubstr("not read"));
+  EXPECT_THAT(told.out, HasSubstr("ranges are not read: "));
+  EXPECT_THAT(told.out, Not(HasSubstr("(ranges over")));
+  // The text's lines are wrapped.
+  const Outcome whole = run({"inspect", "--json", "tornado:400", "--memory-limit", "192M"});
+  EXPECT_THAT(whole.out,
+              HasSubstr("needs 732.4 MiB; --memory-limit 192M leaves 68.0 MiB for data"));
+  EXPECT_THAT(whole.out, HasSubstr("--memory-limit 901M would do"));
+  const Outcome asked =
+      run({"inspect", "tornado:400", "--memory-limit", "192M", "--ranges", "first"});
+  EXPECT_EQ(asked.code, 1);
+  EXPECT_THAT(asked.err, HasSubstr("--memory-limit 901M would do"));
 }
 
 TEST(CliFiles, ABuiltInSampleIsNamedWithoutAFile) {

@@ -32,6 +32,17 @@ TEST(CliUsage, VersionIsOneLineOnStdout) {
   EXPECT_EQ(version.out, "windsplat " WINDSPLAT_VERSION "\n");
 }
 
+TEST(CliUsage, ALimitThatIsNoNumberIsNamedWithItsRange) {
+  for (const char* wrong : {"abc", "-1", "1e19"}) {
+    const Outcome outcome = run({"serve", "--max-handshakes", wrong});
+    EXPECT_EQ(outcome.code, 2) << wrong;
+    EXPECT_THAT(outcome.err,
+                StartsWith(std::string("windsplat: --max-handshakes: is a number from 0 (no limit) "
+                                       "to 1e+18, not '") +
+                           wrong + "'"));
+  }
+}
+
 TEST(CliUsage, WrongArgumentsExitWith2AndSayWhyOnStderrAlone) {
   const std::vector<Words> wrong{{},
                                  {"paint"},
@@ -73,7 +84,15 @@ TEST(CliUsage, WrongArgumentsExitWith2AndSayWhyOnStderrAlone) {
                                  {"serve", "--base-path", "no-slash"},
                                  {"serve", "--memory-limit", "lots"},
                                  {"serve", "--memory-limit", "0"},
+                                 {"serve", "--memory-limit", "191M"},
                                  {"serve", "--memory-limit", "99999999T"},
+                                 {"serve", "--memory-limit", "8388608T"},
+                                 {"serve", "--memory-limit", "1.5"},
+                                 {"serve", "--memory-limit", "1..5G"},
+                                 {"serve", "--memory-limit", "-1G"},
+                                 {"serve", "--memory-limit", "infM"},
+                                 {"inspect", "--memory-limit", "lots", "tornado"},
+                                 {"render", "--memory-limit", "0", "tornado", "-o", "a.png"},
                                  {"serve", "--max-sessions", "0"},
                                  {"serve", "--log-format", "xml"}};
   for (const Words& words : wrong) {
@@ -83,6 +102,29 @@ TEST(CliUsage, WrongArgumentsExitWith2AndSayWhyOnStderrAlone) {
     EXPECT_EQ(outcome.code, 2) << line << outcome.err;
     EXPECT_THAT(outcome.err, StartsWith(words.empty() ? "windsplat draws" : "windsplat: ")) << line;
     EXPECT_EQ(outcome.out, "") << line;
+  }
+}
+
+TEST(CliUsage, AMemoryLimitThatCannotHoldIsRefusedWithWhatIsNeeded) {
+  const Outcome outcome = run({"serve", "--memory-limit", "40M", "tornado"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, StartsWith("windsplat: --memory-limit '40M' is below the least of 192M: "
+                                      "112M for the program and a picture"));
+}
+
+TEST(CliUsage, AMemoryLimitMayHaveALowerCaseUnitAndDecimals) {
+  for (const char* limit : {"192m", "1.5G", "0.25g", "201326592", "128T"}) {
+    const Outcome outcome = run({"inspect", "tornado:8", "--memory-limit", limit});
+    EXPECT_EQ(outcome.code, 0) << limit << ": " << outcome.err;
+  }
+  const Outcome absurd = run({"inspect", "tornado:8", "--memory-limit", "8388608T"});
+  EXPECT_EQ(absurd.code, 2);
+  EXPECT_THAT(absurd.err, HasSubstr("'8388608T' is beyond 128T"));
+}
+
+TEST(CliUsage, HelpTellsTheLeastMemoryLimit) {
+  for (const char* command : {"serve", "render", "animate", "inspect", "study"}) {
+    EXPECT_THAT(run({command, "--help"}).out, HasSubstr("at least 192M")) << command;
   }
 }
 

@@ -135,6 +135,55 @@ TEST_F(SharedDataset, GoesWithTheLastThatCancels) {
   EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 404);
 }
 
+// A disk that does not answer until the read is cancelled.
+class StuckSource : public data::Source {
+ public:
+  StuckSource(std::unique_ptr<data::Source> source, std::shared_ptr<Gate> gate)
+      : source_(std::move(source)), gate_(std::move(gate)) {}
+  [[nodiscard]] const data::DatasetInfo& info() const override { return source_->info(); }
+  Result<data::Volume> read(std::size_t /*field*/, std::size_t /*step*/) override {
+    gate_->pass();
+    gate_->close();
+    return make_error(ErrorKind::cancelled, "reading was cancelled");
+  }
+  void cancel() override { gate_->open(); }
+
+ private:
+  std::unique_ptr<data::Source> source_;
+  std::shared_ptr<Gate> gate_;
+};
+
+// Its client is there and waits, so 499 would not be true.
+TEST(ForgottenDatasets, APictureThatWaitsForOneIsToldWhatBecameOfIt) {
+  std::string name = (fs::temp_directory_path() / "windsplat-forgot-XXXXXX").string();
+  ASSERT_NE(mkdtemp(name.data()), nullptr);
+  fs::copy_file(small_file(), name + "/posted.nc");
+  const auto gate = std::make_shared<Gate>();
+  {
+    TestServer server(
+        with_root(name),
+        [gate](const data::Location& location) -> Result<std::unique_ptr<data::Source>> {
+          auto source = data::open_dataset(data::direct_files(location));
+          if (!source) return source.error();
+          return std::unique_ptr<data::Source>(
+              std::make_unique<StuckSource>(std::move(*source), gate));
+        });
+    const std::uint16_t port = server.port();
+    ASSERT_EQ(finished_job(port, post_file(port, "posted.nc"))["state"], "done");
+    int reads = 0;
+    for (const auto& [words, status] : {std::pair("", 409), std::pair("?forget=true", 404)}) {
+      auto picture = std::async(std::launch::async, [port] {
+        return get(port, "/v1/datasets/posted/frame.jpg?width=32&height=24");
+      });
+      ASSERT_TRUE(gate->wait_for(++reads));
+      EXPECT_EQ(request(port, "DELETE", std::string("/v1/datasets/posted") + words).status, 204);
+      const Answer answer = picture.get();
+      EXPECT_EQ(answer.status, status) << answer.body;
+    }
+  }
+  fs::remove_all(name);
+}
+
 // Files that only their folders tell apart: name, size and time are the same.
 TEST(KnownRanges, AreNotThoseOfAnotherFileThatLooksTheSameFromOutside) {
   std::string name = (fs::temp_directory_path() / "windsplat-twins-XXXXXX").string();
@@ -215,7 +264,7 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesWaitForNobody) {
   std::promise<void> cancelled_ran;
   std::promise<void> other_ran;
   std::promise<void> last_ran;
-  net::LoadService loads(2, 16);  // last: its threads use all of these until they end
+  net::LoadService loads(2, 16, "loads");  // last: its threads use all of these until they end
   ASSERT_TRUE(loads.submit({{}, [&] { gate.pass(); }, false, one}));
   ASSERT_TRUE(gate.wait_for(1));
   const CancelToken unwanted;
@@ -236,7 +285,7 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesWaitForNobody) {
 // The line of one dataset is full: others still get in.
 TEST(Loads, EveryDatasetHasALineOfItsOwn) {
   Gate gate;
-  net::LoadService loads(2, 2);
+  net::LoadService loads(2, 2, "loads");
   const auto one = std::make_shared<int>(1);
   const auto two = std::make_shared<int>(2);
   ASSERT_TRUE(loads.submit({{}, [&] { gate.pass(); }, false, one}));

@@ -254,7 +254,7 @@ TEST(TlsFiles, are_refused_with_a_reason) {
   };
   EXPECT_THAT(refused("", mine.key), HasSubstr("certificate"));
   EXPECT_THAT(refused("no PEM", mine.key), HasSubstr("certificate"));
-  EXPECT_THAT(refused(mine.key, mine.key), HasSubstr("certificate"));
+  EXPECT_THAT(refused(mine.key, mine.chain), HasSubstr("swapped"));
   EXPECT_THAT(refused(mine.chain, ""), HasSubstr("key"));
   EXPECT_THAT(refused(mine.chain, mine.chain), HasSubstr("key"));
   EXPECT_THAT(refused(mine.chain, other.key), HasSubstr("key"));

@@ -1,7 +1,9 @@
 // Saved views over REST: their life from POST to DELETE, who may change them, what is refused.
 #include <gmock/gmock.h>
 
+#include <chrono>
 #include <filesystem>
+#include <future>
 #include <string>
 #include <thread>
 #include <vector>
@@ -317,6 +319,37 @@ TEST(ViewsOfAServer, AKeptViewDrawsTheSamePicture) {
   const Answer kept = post_view(server.port(), json_of(made)["view"].dump(), png);
   ASSERT_EQ(direct.status, 200) << direct.body;
   EXPECT_EQ(direct.body, kept.body);
+}
+
+// A page that saves a few views at once is no load.
+TEST(ViewChanges, TwentyAtOnceWaitForASlowDisk) {
+  windsplat::net::ServerOptions options;
+  const auto views = SavedViews::open({}).value();
+  options.views = views;
+  TestServer server(std::move(options));
+  const std::string id = views->add(windsplat::protocol::ViewDocument::parse("{}").value(), "")->id;
+  // Whoever changes views waits for this change.
+  std::promise<void> begun;
+  std::promise<void> let_go;
+  std::thread slow([&] {
+    const auto waits = [&](const windsplat::protocol::SavedView&) {
+      begun.set_value();
+      let_go.get_future().wait();
+      return false;
+    };
+    EXPECT_TRUE(views->replace(id, waits, [](const auto& now) { return now; }));
+  });
+  begun.get_future().wait();
+  std::vector<std::future<Answer>> answers;
+  for (int i = 0; i < 20; ++i) {
+    answers.push_back(std::async(std::launch::async, [&server] {
+      return request(server.port(), "POST", "/v1/views", json_type, "{}");
+    }));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // those refused would be by now
+  let_go.set_value();
+  slow.join();
+  for (auto& answer : answers) EXPECT_EQ(answer.get().status, 201);
 }
 
 }  // namespace

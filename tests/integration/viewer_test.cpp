@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <future>
+#include <memory>
+#include <string>
+#include <vector>
 
 #include "net_server.hpp"
 
@@ -44,6 +47,45 @@ TEST(Viewer, AFrameThatWaitedForAveragesSaysSoAsOneThatWaitedForFields) {
   ASSERT_GT(dataset->averages(), 0U) << "the picture is too large for a coarser level";
   EXPECT_EQ(dataset->loads(), loads);
   EXPECT_FALSE(prepared(viewer, 4, view));
+}
+
+// Data of one step and a half fit: every frame has to wait until those before it are drawn.
+TEST(Viewer, ViewersOfDifferentStepsAllGetTheirFramesWhereOneStepFits) {
+  constexpr std::uint64_t sample_bytes = 4 * sizeof(float);  // a wind and a cloud
+  constexpr std::uint64_t step_bytes = std::uint64_t{32} * 16 * 6 * sample_bytes;
+  const auto store = std::make_shared<data::Store>(step_bytes * 3 / 2);
+  ASSERT_TRUE(store->add(small_file()));
+  net::Services services({}, store, std::make_shared<ThreadPool>(2));
+  constexpr int viewers_count = 8;
+  constexpr int rounds = 5;
+  std::vector<std::unique_ptr<net::Viewer>> viewers;
+  for (int v = 0; v < viewers_count; ++v) {
+    viewers.push_back(
+        std::make_unique<net::Viewer>(services, static_cast<std::uint64_t>(v + 1), "192.0.2.1"));
+  }
+  for (int round = 0; round < rounds; ++round) {
+    std::vector<std::promise<std::string>> faults(viewers_count);
+    for (int v = 0; v < viewers_count; ++v) {
+      protocol::View view;
+      view.dataset = "small";
+      view.step = (v + round) % small_steps;
+      view.image.width = 64;
+      view.image.height = 48;
+      view.method.detail = protocol::Detail::full;
+      std::promise<std::string>& fault = faults[static_cast<std::size_t>(v)];
+      viewers[static_cast<std::size_t>(v)]->start(
+          session::StartRender{static_cast<std::uint64_t>(round + 1), view, {}, {}},
+          [&fault](std::uint64_t /*ticket*/, const Result<session::Drawn>& drawn) {
+            fault.set_value(drawn ? "" : drawn.error().message);
+          });
+    }
+    for (int v = 0; v < viewers_count; ++v) {
+      EXPECT_EQ(faults[static_cast<std::size_t>(v)].get_future().get(), "")
+          << "viewer " << v << ", round " << round;
+      viewers[static_cast<std::size_t>(v)]->done(static_cast<std::uint64_t>(round + 1));
+    }
+    EXPECT_LE(store->counts().bytes, store->counts().bytes_max);
+  }
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace windsplat::data::loader {
@@ -34,7 +35,10 @@ class Writer {
       std::memcpy(bytes_.data() + at, values.data(), values.size() * sizeof(double));
     }
   }
+  // Room for so many bytes more, and nothing beyond.
+  void reserve(std::size_t more) { bytes_.reserve(bytes_.size() + more); }
   [[nodiscard]] const std::string& bytes() const { return bytes_; }
+  [[nodiscard]] std::string take() { return std::move(bytes_); }
 
  private:
   std::string bytes_;

@@ -26,7 +26,7 @@ Fate wait_for(int socket, short events, const Deadline& deadline) {
   pollfd event{socket, events, 0};
   const int ready = ::poll(&event, 1, timeout_ms);
   if (ready < 0 && errno != EINTR) return Fate::broken;
-  return Fate::done;
+  return ready == 0 ? Fate::late : Fate::done;
 }
 
 struct alignas(cmsghdr) Control {
@@ -75,6 +75,10 @@ void take_descriptor(msghdr& message, Descriptor* place) {
 }
 
 }  // namespace
+
+Fate wait_for_message(int socket, const Deadline& deadline) {
+  return wait_for(socket, POLLIN, deadline);
+}
 
 Fate send_message(int socket, Kind kind, const char* payload, std::size_t bytes, int descriptor,
                   const Deadline& deadline) {

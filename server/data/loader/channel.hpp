@@ -44,6 +44,9 @@ enum class Fate {
   broken,  // what came is no message, or longer than it may be
 };
 
+// done: there is something to receive, or nothing more will ever come.
+Fate wait_for_message(int socket, const Deadline& deadline);
+
 struct Frame {
   std::uint32_t kind = 0;
   std::uint32_t zero = 0;

@@ -14,6 +14,7 @@
 #include <string>
 #include <utility>
 
+#include "server/data/limits.hpp"
 #include "server/data/loader/bytes.hpp"
 #include "server/data/loader/channel.hpp"
 #include "server/data/loader/confine.hpp"
@@ -54,7 +55,9 @@ class BrokeredFiles final : public Files {
   Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
     Message answer = ask(Kind::ask_open, name);
     if (answer.kind != Kind::descriptor) return decode_error(answer.payload);
-    return InputFile::adopt(answer.descriptor.give(), name.substr(name.find_last_of('/') + 1));
+    auto file = InputFile::adopt(answer.descriptor.give(), name.substr(name.find_last_of('/') + 1));
+    if (file) count_opened(name, (*file)->size());
+    return file;
   }
   Result<std::vector<std::string>> list(const std::string& folder) override {
     const Message answer = ask(Kind::ask_list, folder);
@@ -109,13 +112,25 @@ Result<void> fill(FileSource& source, std::size_t field, std::size_t step, const
   return {};
 }
 
+// Libraries take and give back buffers of a chunk's size at every read. Given back to the system
+// their pages would be cleared and mapped anew each time, which took a third of the time of a read.
+// Where there is little memory that is what it costs.
+void keep_freed_memory(std::uint64_t memory_bytes) {
+  constexpr std::uint64_t mapped_from = 32U << 20U;  // the most that glibc allows
+  constexpr std::uint64_t kept = 48U << 20U;
+  ::mallopt(M_MMAP_THRESHOLD, static_cast<int>(std::min(mapped_from, memory_bytes / 8)));
+  ::mallopt(M_TRIM_THRESHOLD, static_cast<int>(std::min(kept, memory_bytes / 8)));
+}
+
 class Loader {
  public:
   void open(const std::string& payload) {
     auto task = decode_task(payload);
     if (!task) leave();
+    keep_freed_memory(task->memory_bytes);
     Confinement how;
     how.memory_bytes = task->memory_bytes;
+    how.opening_bytes = opening_memory_bytes(0);
     how.files = task->location.members.size() + files_besides_members;
     how.socket = socket_of_loader;
     how.library_folders = std::move(task->library_folders);
@@ -124,20 +139,25 @@ class Loader {
       leave();
     }
     const auto files = std::make_shared<BrokeredFiles>(std::move(task->location));
-    auto opened = guarded([&] { return open_dataset(files); });
+    const auto opened = guarded([&]() -> Result<std::string> {
+      auto source = open_dataset(files);
+      if (!source) return source.error();
+      source_ = std::move(*source);
+      return encode_info(source_->info());
+    });
     if (!opened) {
       say(Kind::failed, encode_error(opened.error()));
       return;
     }
-    source_ = std::move(*opened);
     source_->on_progress([this](double done) { tell(done); });
-    say(Kind::opened, encode_info(source_->info()));
+    say(Kind::opened, *opened);
   }
 
   void read(Message& message) {
     Reader in(message.payload);
     const auto field = in.number<std::uint64_t>();
     const auto step = in.number<std::uint64_t>();
+    const bool keeps_memory = in.number<std::uint64_t>() != 0;
     if (!source_ || !in.complete()) leave();
     told_ = Clock::now();
     const auto done = guarded([&]() -> Result<void> {
@@ -151,7 +171,7 @@ class Loader {
       return fill(*source_, static_cast<std::size_t>(field), static_cast<std::size_t>(step),
                   memory_);
     });
-    if (memory_.bytes() > Transfer::kept_bytes_max) memory_ = Mapping();
+    if (!keeps_memory) memory_ = Mapping();
     say(done ? Kind::filled : Kind::failed, done ? std::string() : encode_error(done.error()));
   }
 
@@ -169,15 +189,6 @@ class Loader {
   Mapping memory_;  // for volumes, until another is sent
   Clock::time_point told_;
 };
-
-// Libraries take and give back buffers of a chunk's size at every read. Given back to the system
-// their pages would be cleared and mapped anew each time, which took a third of the time of a read.
-void keep_freed_memory() {
-  constexpr int mapped_from = 32 << 20;  // the most that glibc allows
-  constexpr int kept = 48 << 20;
-  ::mallopt(M_MMAP_THRESHOLD, mapped_from);
-  ::mallopt(M_TRIM_THRESHOLD, kept);
-}
 
 // Ends this process with the daemon, even while it reads: the daemon's end of the pipe closes, and
 // SIGIO ends who does not handle it. (The signal on a parent's death is no help here: it comes with
@@ -201,7 +212,6 @@ int run() {
     return 2;
   }
   static_cast<void>(::setpriority(PRIO_PROCESS, 0, niceness));
-  keep_freed_memory();
   Loader loader;
   for (;;) {
     Message message;

@@ -1,8 +1,10 @@
-// Limits, then Landlock where the kernel has it, then a list of the system calls that are left.
+// Limits, no capabilities, then Landlock where the kernel has it, then a list of the system calls
+// that are left.
 #include "server/data/loader/confine.hpp"
 
 #include <fcntl.h>
 #include <linux/audit.h>
+#include <linux/capability.h>
 #include <linux/filter.h>
 #include <linux/landlock.h>
 #include <linux/seccomp.h>
@@ -13,6 +15,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <csignal>
 #include <cstddef>
@@ -37,29 +40,54 @@ constexpr bool memory_is_shadowed = true;  // terabytes of it, which count as ta
 constexpr bool memory_is_shadowed = false;
 #endif
 
-constexpr std::uint64_t room_of_libraries = std::uint64_t{32} << 20;
-
 Error not_confined(const char* by) {
   return make_error(ErrorKind::internal, std::string("a loader cannot be confined by ") + by +
                                              ": " + std::generic_category().message(errno));
 }
 
-bool limit(__rlimit_resource which, std::uint64_t most) {
+bool limit(__rlimit_resource which, std::uint64_t most, std::uint64_t at_first) {
   rlimit now{};
   if (::getrlimit(which, &now) != 0) return false;
   const rlim_t bound = std::min<rlim_t>(most, now.rlim_max);
-  const rlimit wanted{bound, bound};
+  const rlimit wanted{std::min<rlim_t>(at_first, bound), bound};
   return ::setrlimit(which, &wanted) == 0;
 }
+bool limit(__rlimit_resource which, std::uint64_t most) { return limit(which, most, most); }
 
 Result<void> set_limits(const Confinement& how) {
   // Private memory; what is shared is given by the daemon and bounded there.
-  const bool memory =
-      memory_is_shadowed || limit(RLIMIT_DATA, how.memory_bytes + room_of_libraries);
+  const bool memory = memory_is_shadowed ||
+                      limit(RLIMIT_DATA, how.memory_bytes + room_of_libraries,
+                            std::min(how.opening_bytes, how.memory_bytes) + room_of_libraries);
   if (!memory || !limit(RLIMIT_NOFILE, how.files) || !limit(RLIMIT_FSIZE, 0) ||
       !limit(RLIMIT_CORE, 0) || !limit(RLIMIT_NPROC, 0)) {
     return not_confined("limits");
   }
+  return {};
+}
+
+// Started as root a loader would keep root's privileges. The bounding set can only be emptied by
+// who may (CAP_SETPCAP); for others nothing is left that it could bring back, with no_new_privs
+// set.
+Result<void> drop_capabilities() {
+  for (unsigned long capability = 0; ::prctl(PR_CAPBSET_READ, capability, 0, 0, 0) >= 0;
+       ++capability) {
+    if (::prctl(PR_CAPBSET_DROP, capability, 0, 0, 0) != 0 && errno != EPERM) {
+      return not_confined("capabilities");
+    }
+  }
+  if (::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0, 0, 0) != 0 && errno != EINVAL) {
+    return not_confined("capabilities");
+  }
+  __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+  std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> held{};
+  if (::syscall(SYS_capget, &header, held.data()) != 0) return not_confined("capabilities");
+  const bool holds_any = std::any_of(held.begin(), held.end(), [](const auto& set) {
+    return (set.effective | set.permitted | set.inheritable) != 0;
+  });
+  if (!holds_any) return {};  // a service manager's filter may refuse capset
+  held = {};
+  if (::syscall(SYS_capset, &header, held.data()) != 0) return not_confined("capabilities");
   return {};
 }
 
@@ -196,6 +224,7 @@ Result<void> confine(Confinement how) {
   }
   if (auto done = set_limits(how); !done) return done;
   if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) return not_confined("privileges");
+  if (auto done = drop_capabilities(); !done) return done;
   forbid_paths();
   if (!forbid_calls()) return not_confined("seccomp");
   return {};

@@ -12,17 +12,28 @@
 #include <vector>
 
 #include "server/base/error.hpp"
+#include "server/data/budget.hpp"
 #include "server/data/dataset.hpp"
 #include "server/data/files/files.hpp"
 
 namespace windsplat::data::loader {
 
-// What one loader may use. Its volumes do not count as its memory: they are the caller's.
+// What one loader may use. Its volumes do not count as its memory: they are the caller's. A call
+// that exceeds a limit fails with the reason, its loader is killed, and the next call starts
+// another.
 struct Limits {
   std::uint64_t memory_bytes = std::uint64_t{2} << 30;
-  std::chrono::milliseconds open_time{60'000};  // of the wall clock
+  // Whether reads get that, or no more than opening does (opening_memory_bytes()).
+  bool reads_take_all = true;
+  // Of the wall clock, for a call as a whole.
+  std::chrono::milliseconds open_time{60'000};
   std::chrono::milliseconds read_time{60'000};  // and beyond that:
   std::uint64_t read_bytes_per_second = 10'000'000;
+  // A loader that sends nothing and uses no processor time for so long is stopped, or waits for a
+  // disk that does not answer.
+  std::chrono::milliseconds stall_time{15'000};
+  // Where its private memory and that of the transfer count; null: nowhere.
+  std::shared_ptr<Budget> budget = nullptr;
   std::size_t opens_max = 400'000;  // files opened in answer to one call
   // Where libraries keep tables of their own, absolute: their files may be read besides.
   std::vector<std::string> library_folders{"/usr/share/eccodes/definitions"};
@@ -40,7 +51,8 @@ class RemoteSource : public Source {
   [[nodiscard]] const DatasetInfo& info() const override;
 
   // Errors: those of readers; bad_data also where the loader died, took too long or sent what it
-  // should not, and where the files are no longer those that were opened; cancelled.
+  // should not, and where the files are no longer those that were opened; out_of_memory where the
+  // limit leaves too little for the loader; cancelled.
   Result<Volume> read(std::size_t field, std::size_t step) override;
 
   // Called during reads, on the thread that reads, every 50 ms or so.

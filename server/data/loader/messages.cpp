@@ -6,6 +6,7 @@
 #include <memory>
 #include <utility>
 
+#include "server/data/axis_check.hpp"
 #include "server/data/cf/grid.hpp"
 #include "server/data/loader/bytes.hpp"
 
@@ -47,13 +48,8 @@ Axis axis_of(Reader& in, bool vertical) {
   axis.kind = static_cast<AxisKind>(in.sound() ? kind : 0);
   axis.coordinates = in.doubles(axis_max);
   const std::vector<double>& at = axis.coordinates;
-  if (at.empty()) in.fail();
   // Only a vertical axis may descend: pressure, depth, levels counted from the top.
-  const bool descends = vertical && at.size() > 1 && at[1] < at[0];
-  for (std::size_t i = 0; i < at.size(); ++i) {
-    const bool goes_on = i == 0 || (descends ? at[i] < at[i - 1] : at[i] > at[i - 1]);
-    if (!std::isfinite(at[i]) || !goes_on) in.fail();
-  }
+  if (!axis_fault(at).empty() || (!vertical && at.back() < at.front())) in.fail();
   return axis;
 }
 
@@ -78,11 +74,6 @@ Grid grid_of(Reader& in) {
   if (layer > cf::samples_max || layer * grid.axes[2].coordinates.size() > cf::samples_max) {
     in.fail();
   }
-  const auto curved = in.number<std::uint8_t>();
-  if (curved > 1) in.fail();
-  if (in.sound() && curved == 1) {
-    grid.columns = columns_of(in, static_cast<std::size_t>(layer));
-  }
   return grid;
 }
 
@@ -99,6 +90,8 @@ FieldInfo field_of(Reader& in, std::uint64_t samples) {
   field.dtype = text_of(in);
   const auto derived = in.number<std::uint8_t>();
   field.derived = derived == 1;
+  field.decoded_bytes = in.number<std::uint64_t>();
+  field.chunk_bytes = in.number<std::uint64_t>();
   const std::size_t count = field.components.size();
   const bool right_count = kind == 0 ? count == 1 : count == 2 || count == 3;
   if (kind > 1 || derived > 1 || !right_count || field.component_units.size() != count ||
@@ -127,6 +120,8 @@ void put_field(Writer& out, const FieldInfo& field) {
   out.text(field.long_name);
   out.text(field.dtype);
   out.number(static_cast<std::uint8_t>(field.derived ? 1 : 0));
+  out.number(field.decoded_bytes);
+  out.number(field.chunk_bytes);
 }
 
 Error nonsense(const char* what) {
@@ -195,11 +190,6 @@ std::string encode_info(const DatasetInfo& info) {
     out.text(*text);
   }
   for (const Axis& axis : info.grid.axes) put_axis(out, axis);
-  out.number(static_cast<std::uint8_t>(info.grid.columns ? 1 : 0));
-  if (info.grid.columns) {
-    out.doubles(info.grid.columns->longitude);
-    out.doubles(info.grid.columns->latitude);
-  }
   out.count(info.fields.size());
   for (const FieldInfo& field : info.fields) put_field(out, field);
   out.count(info.left_out.size());
@@ -213,7 +203,15 @@ std::string encode_info(const DatasetInfo& info) {
     out.number(step.value);
     out.text(step.text);
   }
-  return out.bytes();
+  // By far the largest part comes last, so that the message grows once and not beyond it.
+  out.number(static_cast<std::uint8_t>(info.grid.columns ? 1 : 0));
+  if (info.grid.columns) {
+    const Columns& columns = *info.grid.columns;
+    out.reserve((columns.longitude.size() + columns.latitude.size() + 2) * sizeof(double));
+    out.doubles(columns.longitude);
+    out.doubles(columns.latitude);
+  }
+  return out.take();
 }
 
 Result<DatasetInfo> decode_info(std::string_view bytes) {
@@ -241,6 +239,12 @@ Result<DatasetInfo> decode_info(std::string_view bytes) {
     step.value = in.number<double>();
     step.text = text_of(in);
     if (!std::isfinite(step.value)) in.fail();
+  }
+  const auto curved = in.number<std::uint8_t>();
+  if (curved > 1) in.fail();
+  if (in.sound() && curved == 1) {
+    const auto& [x, y, z] = info.grid.axes;
+    info.grid.columns = columns_of(in, x.coordinates.size() * y.coordinates.size());
   }
   if (!in.complete()) return nonsense("a description that cannot be read");
   if (info.fields.empty() || info.steps.empty()) return nonsense("a dataset without data");

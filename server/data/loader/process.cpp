@@ -6,17 +6,22 @@
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <mutex>
 #include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include "server/data/loader/confine.hpp"
 
 namespace windsplat::data::loader {
 
@@ -37,6 +42,23 @@ Error not_started(int reason) {
 Descriptor moved_up(Descriptor from) {
   constexpr int first_free = 16;
   return Descriptor(::fcntl(from.number(), F_DUPFD_CLOEXEC, first_free));
+}
+
+// Opened once, so that loaders still start where /dev/null is gone while the daemon runs: replaced
+// by a program that runs as root, or hidden by a mount. Errors: internal.
+Result<int> null_device() {
+  static std::mutex mutex;
+  static Descriptor device;
+  const std::lock_guard lock(mutex);
+  if (device) return device.number();
+  Descriptor opened(::open("/dev/null", O_RDWR | O_CLOEXEC));
+  if (!opened) {
+    const int reason = errno;
+    return make_error(ErrorKind::internal, not_started(reason).message + " ('/dev/null')");
+  }
+  device = moved_up(std::move(opened));
+  if (!device) return not_started(EMFILE);
+  return device.number();
 }
 
 // What files libraries would look for, they must not find through a user's variables.
@@ -62,14 +84,12 @@ std::vector<char*> pointers(std::vector<std::string>& words) {
   return out;
 }
 
-int spawn(const std::string& program, int socket, int life, pid_t& id) {
+int spawn(const std::string& program, int null, int socket, int life, pid_t& id) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
-  if (!messages_are_shown) {
-    posix_spawn_file_actions_addopen(&actions, 2, "/dev/null", O_WRONLY, 0);
-  }
+  posix_spawn_file_actions_adddup2(&actions, null, 0);
+  posix_spawn_file_actions_adddup2(&actions, null, 1);
+  if (!messages_are_shown) posix_spawn_file_actions_adddup2(&actions, null, 2);
   posix_spawn_file_actions_adddup2(&actions, socket, socket_of_loader);
   posix_spawn_file_actions_adddup2(&actions, life, life_of_loader);
   posix_spawn_file_actions_addclosefrom_np(&actions, life_of_loader + 1);
@@ -113,8 +133,10 @@ Result<void> Process::start(const std::string& program) {
   const Descriptor life = moved_up(Descriptor(pair[0]));
   Descriptor life_held(pair[1]);
   if (!theirs || !life) return not_started(EMFILE);
+  const auto null = null_device();
+  if (!null) return null.error();
   pid_t id = -1;
-  if (const int fault = spawn(program, theirs.number(), life.number(), id); fault != 0) {
+  if (const int fault = spawn(program, *null, theirs.number(), life.number(), id); fault != 0) {
     return not_started(fault);
   }
   const std::lock_guard lock(mutex_);
@@ -161,18 +183,51 @@ std::optional<int> Process::reap(std::chrono::milliseconds patience) noexcept {
   return ended;
 }
 
-void Process::allow_cpu(std::chrono::seconds more) {
+std::chrono::nanoseconds Process::cpu_time() const {
   const pid_t id = this->id();
   clockid_t clock{};
   timespec used{};
   if (id < 0 || ::clock_getcpuclockid(id, &clock) != 0 || ::clock_gettime(clock, &used) != 0) {
-    return;
+    return {};
   }
+  return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
+}
+
+std::uint64_t Process::private_bytes() const {
+  const pid_t id = this->id();
+  if (id < 0) return 0;
+  std::array<char, 32> name{};
+  std::snprintf(name.data(), name.size(), "/proc/%d/statm", static_cast<int>(id));
+  const Descriptor file(::open(name.data(), O_RDONLY | O_CLOEXEC));
+  std::array<char, 128> text{};
+  if (!file || ::read(file.number(), text.data(), text.size() - 1) <= 0) return 0;
+  char* at = text.data();
+  static_cast<void>(std::strtoull(at, &at, 10));  // addresses that are mapped
+  const std::uint64_t resident = std::strtoull(at, &at, 10);
+  const std::uint64_t shared = std::strtoull(at, &at, 10);
+  return (resident - std::min(shared, resident)) * static_cast<std::uint64_t>(::getpagesize());
+}
+
+void Process::allow_cpu(std::chrono::seconds more) {
+  const pid_t id = this->id();
+  if (id < 0) return;
+  const auto used = std::chrono::floor<std::chrono::seconds>(cpu_time());
   rlimit bound{};
   if (::prlimit(id, RLIMIT_CPU, nullptr, &bound) != 0) return;
-  bound.rlim_cur = std::min<rlim_t>(
-      static_cast<rlim_t>(used.tv_sec) + static_cast<rlim_t>(more.count()), bound.rlim_max);
+  bound.rlim_cur = std::min<rlim_t>(static_cast<rlim_t>((used + more).count()), bound.rlim_max);
   ::prlimit(id, RLIMIT_CPU, &bound, nullptr);
+}
+
+void Process::allow_memory(std::uint64_t bytes) {
+  const pid_t id = this->id();
+  rlimit bound{};
+  // Where there is no bound none was set: a sanitizer's shadow takes terabytes.
+  if (id < 0 || ::prlimit(id, RLIMIT_DATA, nullptr, &bound) != 0 ||
+      bound.rlim_max == RLIM_INFINITY) {
+    return;
+  }
+  bound.rlim_cur = std::min<rlim_t>(bytes + room_of_libraries, bound.rlim_max);
+  ::prlimit(id, RLIMIT_DATA, &bound, nullptr);
 }
 
 bool Process::runs() const {

@@ -34,8 +34,13 @@ class Process {
   // Waits a moment for one that is about to end, kills it otherwise; closes what belongs to it. How
   // it ended: "was ended by signal 11", "ended with code 1"; empty if there was none.
   std::string end(std::chrono::milliseconds patience = std::chrono::milliseconds(0));
+  // What it has used, and its memory that no file or other process has; 0 if there is none.
+  [[nodiscard]] std::chrono::nanoseconds cpu_time() const;
+  [[nodiscard]] std::uint64_t private_bytes() const;
   // From now on at most that many seconds of processor time.
   void allow_cpu(std::chrono::seconds more);
+  // From now on so much private memory, never more than it confined itself to.
+  void allow_memory(std::uint64_t bytes);
 
   // Started, and not yet seen to have ended by itself.
   [[nodiscard]] bool runs() const;

@@ -15,6 +15,7 @@
 
 #include "server/base/check.hpp"
 #include "server/data/digest.hpp"
+#include "server/data/limits.hpp"
 #include "server/data/loader/bytes.hpp"
 #include "server/data/loader/channel.hpp"
 #include "server/data/loader/loader.hpp"
@@ -82,6 +83,20 @@ struct RemoteSource::State {
     std::chrono::milliseconds time{};
   };
 
+  // What a call may still take.
+  struct Patience {
+    Clock::time_point end;
+    Clock::time_point moved = Clock::now();  // when something came, or the loader had computed
+    Clock::time_point looked = Clock::now();
+    std::chrono::nanoseconds cpu{};
+  };
+
+  State(Location where, Limits most)
+      : location(std::move(where)),
+        limits(std::move(most)),
+        process_memory(limits.budget),
+        transfer_memory(limits.budget) {}
+
   Location location;
   Limits limits;
   DatasetInfo info;
@@ -91,7 +106,9 @@ struct RemoteSource::State {
   std::shared_ptr<Files> files;  // while there is a loader
   Process process;
   std::optional<Transfer> transfer;  // as the loader has it mapped
-  std::mutex mutex;                  // of the two below
+  Reservation process_memory;
+  Reservation transfer_memory;  // where it is kept: else it is the volume's that comes
+  std::mutex mutex;             // of the two below
   bool under_way = false;
   bool cancelled = false;
 
@@ -100,7 +117,11 @@ struct RemoteSource::State {
     release();
     const std::string path = program_path();
     if (path.empty()) return make_error(ErrorKind::internal, "no program is set to load files");
-    if (auto started = process.start(path); !started) return started.error();
+    if (auto room = process_memory.resize(loader_bytes_min); !room) return room.error();
+    if (auto started = process.start(path); !started) {
+      release();
+      return started.error();
+    }
     files = direct_files(location);
     Task task;
     task.memory_bytes = limits.memory_bytes;
@@ -116,10 +137,13 @@ struct RemoteSource::State {
     auto answer =
         call({Kind::open, encode_task(task), -1, Kind::opened, "opening it", limits.open_time});
     if (!answer) {
+      Error error = answer.error();
+      if (error.kind == ErrorKind::out_of_memory) error.message += opening_limit();
       release();
-      return answer.error();
+      return error;
     }
     companions = files->companions();
+    if (limits.reads_take_all) process.allow_memory(limits.memory_bytes);
     return std::move(answer->payload);
   }
 
@@ -159,27 +183,80 @@ struct RemoteSource::State {
   void release() {
     process.end();
     files.reset();
+    drop_transfer();
+    static_cast<void>(process_memory.resize(0));
+  }
+
+  void drop_transfer() {
     transfer.reset();
+    static_cast<void>(transfer_memory.resize(0));
   }
 
   Result<Message> call(const Call& what) {
-    const Deadline deadline = Clock::now() + what.time;
+    Patience patience{Clock::now() + what.time};
     process.allow_cpu(std::chrono::ceil<std::chrono::seconds>(what.time));
-    Fate fate = send_message(process.socket(), what.kind, what.payload, what.descriptor, deadline);
+    Fate fate = send_message(process.socket(), what.kind, what.payload, what.descriptor,
+                             next_deadline(patience));
     std::size_t questions = 0;
     while (fate == Fate::done) {
       Message heard;
       const std::size_t bytes_max =
           what.answer == Kind::opened ? opened_bytes_max() : std::size_t{question_bytes_max};
-      fate = receive_message(process.socket(), heard, bytes_max, Descriptors::refused, deadline);
+      const Result<Fate> waited = wait(patience);
+      if (!waited) return crowded_out(waited.error(), what);
+      fate = *waited;
+      if (fate == Fate::done) {
+        fate = receive_message(process.socket(), heard, bytes_max, Descriptors::refused,
+                               next_deadline(patience));
+      }
       if (fate != Fate::done) break;
       if (heard.kind == what.answer) return heard;
       if (heard.kind == Kind::failed) return decode_error(heard.payload);
-      fate = heard.kind == Kind::progress         ? hear_progress(heard.payload)
-             : ++questions > 2 * limits.opens_max ? Fate::broken
-                                                  : answer(heard, deadline);
+      fate = heard.kind == Kind::progress ? hear_progress(heard.payload)
+             : ++questions > 2 * limits.opens_max
+                 ? Fate::broken
+                 : answer(heard, what.kind, next_deadline(patience));
+      patience.moved = Clock::now();
     }
-    return ended(fate, what);
+    return ended(fate, what, patience);
+  }
+
+  [[nodiscard]] Deadline next_deadline(const Patience& patience) const {
+    return std::min(patience.end, Clock::now() + limits.stall_time);
+  }
+
+  // Until a message begins. Processor time is progress, for a reader may compute for long. Errors:
+  // out_of_memory, for readers grow while they read.
+  [[nodiscard]] Result<Fate> wait(Patience& patience) {
+    constexpr std::chrono::milliseconds look_every{50};
+    constexpr std::chrono::seconds pause_min{1};
+    patience.looked = Clock::now();
+    for (;;) {
+      const auto now = Clock::now();
+      const auto cpu = process.cpu_time();
+      if (cpu != patience.cpu) patience.moved = now;
+      patience.cpu = cpu;
+      // Where this process was stopped as well, that is no time in which the loader stood still.
+      if (now - patience.looked > pause_min) patience.moved += now - patience.looked;
+      patience.looked = now;
+      const auto end = std::min(patience.end, patience.moved + limits.stall_time);
+      if (now >= end) return wait_for_message(process.socket(), now);
+      if (auto room = count_memory(); !room) return room.error();
+      const Fate fate = wait_for_message(process.socket(), std::min(end, now + look_every));
+      if (fate != Fate::late) return fate;
+    }
+  }
+
+  [[nodiscard]] std::string opening_limit() const {
+    const std::uint64_t bytes =
+        std::min(opening_memory_bytes(files->opened_bytes()), limits.memory_bytes);
+    return "; the limit of memory to open files of " + std::to_string(files->opened_bytes()) +
+           " bytes is " + megabytes(bytes);
+  }
+
+  // What the loader holds by itself counts in the limit.
+  Result<void> count_memory() {
+    return process_memory.resize(std::max(loader_bytes_min, process.private_bytes()));
   }
 
   [[nodiscard]] std::size_t opened_bytes_max() const {
@@ -194,7 +271,8 @@ struct RemoteSource::State {
     return Fate::done;
   }
 
-  [[nodiscard]] Fate answer(const Message& question, const Deadline& deadline) const {
+  // During a call of that kind.
+  [[nodiscard]] Fate answer(const Message& question, Kind during, const Deadline& deadline) {
     const auto say = [&](Kind kind, std::string_view payload, int descriptor = -1) {
       return send_message(process.socket(), kind, payload, descriptor, deadline);
     };
@@ -202,6 +280,7 @@ struct RemoteSource::State {
     if (name.size() > question_bytes_max) return Fate::broken;
     if (question.kind == Kind::ask_open) {
       const auto file = files->open(name);
+      if (during == Kind::open) process.allow_memory(opening_memory_bytes(files->opened_bytes()));
       return file ? say(Kind::descriptor, {}, (*file)->descriptor())
                   : say(Kind::no, encode_error(file.error()));
     }
@@ -220,27 +299,40 @@ struct RemoteSource::State {
     return Fate::broken;
   }
 
+  Error crowded_out(const Error& error, const Call& what) {
+    release();
+    return make_error(error.kind,
+                      whose_loader() + " was ended while " + what.doing + ": " + error.message);
+  }
+
   // Why there is no answer. The loader is gone after this.
-  Error ended(Fate fate, const Call& what) {
-    constexpr std::chrono::milliseconds patience{500};
-    const std::string how =
-        process.end(fate == Fate::closed ? patience : std::chrono::milliseconds(0));
-    files.reset();
-    transfer.reset();
-    const std::string name =
-        in_quotes(location.members.empty() ? location.stem : location.members.front().name);
-    std::string message = "the loader of ";
-    message += name;
-    message += ' ';
-    if (fate == Fate::late) {
-      message += "was ended after ";
-      message += seconds_text(what.time);
-    } else {
-      message += fate == Fate::closed ? how : "said what it must not and was ended";
+  Error ended(Fate fate, const Call& what, const Patience& patience) {
+    constexpr std::chrono::milliseconds time_to_end{500};
+    std::string how =
+        process.end(fate == Fate::closed ? time_to_end : std::chrono::milliseconds(0));
+    release();
+    if (fate == Fate::late && Clock::now() < patience.end) {
+      how = "made no progress for " + seconds_text(limits.stall_time) + " and was ended";
+    } else if (fate == Fate::late) {
+      how = "was ended after " + seconds_text(what.time);
+    } else if (fate != Fate::closed) {
+      how = "said what it must not and was ended";
     }
-    message += " while ";
-    message += what.doing;
-    return make_error(ErrorKind::bad_data, std::move(message));
+    return make_error(ErrorKind::bad_data, whose_loader() + ' ' + how + " while " + what.doing);
+  }
+
+  [[nodiscard]] std::string whose_loader() const {
+    return "the loader of " +
+           in_quotes(location.members.empty() ? location.stem : location.members.front().name);
+  }
+
+  // Memory for the transfer that stays for the next one is quicker, but only where volumes do not
+  // need the room.
+  bool is_worth_keeping(std::uint64_t bytes) {
+    constexpr std::uint64_t share = 8;
+    if (bytes > Transfer::kept_bytes_max) return false;
+    if (limits.budget && bytes > limits.budget->bytes_max() / share) return false;
+    return static_cast<bool>(transfer_memory.resize(bytes, Urgency::ahead));
   }
 
   Result<Volume> read(std::size_t field, std::size_t step) {
@@ -252,17 +344,18 @@ struct RemoteSource::State {
     volume.dims = info.grid.dims();
     volume.components = static_cast<int>(about.components.size());
     const std::size_t floats = volume.samples() * about.components.size();
+    const std::uint64_t bytes = floats * sizeof(float);
     const bool is_new = !transfer || transfer->floats() < floats;
     if (is_new) {
-      transfer.reset();
-      auto made = Transfer::make(floats);
+      drop_transfer();
+      auto made = Transfer::make(floats, is_worth_keeping(bytes));
       if (!made) return made.error();
       transfer = std::move(*made);
     }
     Writer request;
     request.number(static_cast<std::uint64_t>(field));
     request.number(static_cast<std::uint64_t>(step));
-    const std::uint64_t bytes = floats * sizeof(float);
+    request.number(static_cast<std::uint64_t>(transfer->is_kept() ? 1 : 0));
     Call what{Kind::read,
               request.bytes(),
               is_new ? transfer->descriptor() : -1,
@@ -273,15 +366,16 @@ struct RemoteSource::State {
     if (auto done = call(what); !done) {
       // What a loader has written to memory that is not kept goes with the loader.
       if (transfer && !transfer->is_kept()) release();
-      if (is_new) transfer.reset();  // whether the loader has it mapped is not known
+      if (is_new) drop_transfer();  // whether the loader has it mapped is not known
       return done.error();
     }
     volume.values = transfer->take(floats);
     if (!transfer->is_kept()) {
       const bool is_over = transfer->close();
-      transfer.reset();
+      drop_transfer();
       if (!is_over) release();
     }
+    if (!count_memory()) release();
     if (!measure_volume(volume)) {
       release();
       return make_error(ErrorKind::bad_data, "the loader of " + in_quotes(info.source) +
@@ -317,14 +411,14 @@ void RemoteSource::release() { state_->release(); }
 pid_t RemoteSource::process() const { return state_->process.id(); }
 
 Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits) {
-  auto state = std::make_unique<RemoteSource::State>();
-  state->location = std::move(location);
-  state->limits = std::move(limits);
+  auto state = std::make_unique<RemoteSource::State>(std::move(location), std::move(limits));
   auto encoded = state->start();
   if (!encoded) return encoded.error();
+  if (!state->count_memory()) state->release();  // it has answered, and another can be started
   auto info = decode_info(*encoded);
   if (!info) return info.error();
   state->info = std::move(*info);
+  state->info.stored_bytes = state->files->opened_bytes();
   state->digest = digest_of(*encoded);
   return std::unique_ptr<RemoteSource>(new RemoteSource(std::move(state)));
 }

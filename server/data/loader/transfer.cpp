@@ -16,7 +16,7 @@ namespace windsplat::data::loader {
 
 namespace {
 
-constexpr std::size_t copied_at_once = std::size_t{2} << 20;  // floats
+constexpr std::size_t copied_at_once = std::size_t{512} << 10;  // floats: a huge page of them
 
 Error no_memory(std::size_t bytes) {
   return make_error(ErrorKind::out_of_memory,
@@ -52,8 +52,9 @@ Mapping::~Mapping() {
   if (data_ != nullptr) ::munmap(data_, bytes());
 }
 
-Result<Transfer> Transfer::make(std::size_t floats) {
+Result<Transfer> Transfer::make(std::size_t floats, bool kept) {
   Transfer out;
+  out.kept_ = kept;
   out.memory_.reset(::memfd_create("windsplat-volume", MFD_CLOEXEC | MFD_ALLOW_SEALING));
   const std::size_t bytes = floats * sizeof(float);
   if (!out.memory_ || ::ftruncate(out.descriptor(), static_cast<off_t>(bytes)) != 0 ||

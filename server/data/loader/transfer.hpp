@@ -34,19 +34,19 @@ class Mapping {
 // The daemon's side of it.
 class Transfer {
  public:
-  // Memory that is larger is for one volume: unmapped by the loader before it says so, given back
-  // as the volume is copied out of it, and closed.
+  // Memory that is larger is never kept. What is not kept is for one volume: unmapped by the loader
+  // before it says so, given back as the volume is copied out of it, and closed.
   static constexpr std::size_t kept_bytes_max = std::size_t{32} << 20;
 
   // Room for so many floats, whose size nobody can change. Errors: out_of_memory.
-  static Result<Transfer> make(std::size_t floats);
+  static Result<Transfer> make(std::size_t floats, bool kept);
 
   [[nodiscard]] int descriptor() const { return memory_.number(); }
   [[nodiscard]] std::size_t floats() const { return mapping_.floats(); }
-  [[nodiscard]] bool is_kept() const { return mapping_.bytes() <= kept_bytes_max; }
+  [[nodiscard]] bool is_kept() const { return kept_; }
 
-  // What the first floats are now: whatever a loader does to them later is of no matter. Large
-  // memory is given back as it is copied, so that a volume is not there twice.
+  // What the first floats are now: whatever a loader does to them later is of no matter. Memory
+  // that is not kept is given back as it is copied, so that a volume is not there twice.
   [[nodiscard]] Samples take(std::size_t floats);
   // Nobody writes to it any more. False: somebody could.
   [[nodiscard]] bool close();
@@ -54,6 +54,7 @@ class Transfer {
  private:
   Descriptor memory_;
   Mapping mapping_;
+  bool kept_ = false;
 };
 
 }  // namespace windsplat::data::loader

@@ -32,6 +32,17 @@ inline void write_wind(const std::string& path, int mode) {
   }
 }
 
+// A scalar of 5 MiB whose samples differ.
+inline void write_large(const std::string& path) {
+  NetcdfMaker file(path, 0);
+  const int z = file.dimension("z", 20);
+  const int y = file.dimension("y", 256);
+  const int x = file.dimension("x", 256);
+  std::vector<double> values(std::size_t{20} * 256 * 256);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<double>(i);
+  file.variable("density", NC_FLOAT, {z, y, x}, values);
+}
+
 inline void write_floats(const std::string& path, std::size_t count, float value) {
   const std::vector<float> values(count, value);
   std::ofstream(path, std::ios::binary)

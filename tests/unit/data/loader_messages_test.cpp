@@ -55,6 +55,8 @@ DatasetInfo good() {
   heat.standard_name = "air_temperature";
   heat.long_name = "Temperature";
   heat.dtype = "int16 packed";
+  heat.decoded_bytes = 96;
+  heat.chunk_bytes = 48;
   info.fields = {wind, heat};
   info.left_out = {{"x", "not a number"}, {"y", "on another grid"}};
   info.notes = {"resampled"};
@@ -130,6 +132,8 @@ TEST(LoaderMessages, an_info_comes_out_as_it_went_in) {
     EXPECT_EQ(out->fields[f].standard_name, info.fields[f].standard_name);
     EXPECT_EQ(out->fields[f].long_name, info.fields[f].long_name);
     EXPECT_EQ(out->fields[f].dtype, info.fields[f].dtype);
+    EXPECT_EQ(out->fields[f].decoded_bytes, info.fields[f].decoded_bytes);
+    EXPECT_EQ(out->fields[f].chunk_bytes, info.fields[f].chunk_bytes);
   }
   ASSERT_EQ(out->left_out.size(), 2U);
   EXPECT_EQ(out->left_out[1].name, "y");
@@ -149,6 +153,10 @@ TEST(LoaderMessages, what_no_reader_would_say_is_refused) {
       {"the same place twice", [](DatasetInfo& i) { i.grid.axes[2].coordinates[1] = 1000; }},
       {"a turn back", [](DatasetInfo& i) { i.grid.axes[2].coordinates[3] = 2000; }},
       {"a place at infinity", [](DatasetInfo& i) { i.grid.axes[0].coordinates[2] = infinity; }},
+      {"steps too small to see",
+       [](DatasetInfo& i) {
+         i.grid.axes[0].coordinates = {0, 5e-324, 1e-323};
+       }},
       {"from east to west",
        [](DatasetInfo& i) {
          i.grid.axes[0].coordinates = {20, 0, -10};

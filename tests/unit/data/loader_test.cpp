@@ -3,6 +3,7 @@
 #include "server/data/loader/loader.hpp"
 
 #include <fcntl.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/prctl.h>
 #include <sys/stat.h>
@@ -11,6 +12,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -30,6 +32,7 @@ namespace {
 using std::chrono::milliseconds;
 using test::Folder;
 using test::NetcdfMaker;
+using testing::HasSubstr;
 
 class Loader : public testing::Test {
  protected:
@@ -96,7 +99,7 @@ TEST_F(Loader, netcdf4_files_read_as_in_this_process) {
 }
 
 // Chunks that were never written, in a file that says not to fill them in: HDF5 leaves alone what
-// it should read into, and the memory between the two had another field's numbers.
+// it should read into, and the memory between the two had another field's numbers. They are masked.
 TEST_F(Loader, what_a_library_leaves_alone_is_nothing_of_the_volume_before) {
   const std::string path = folder_ / "unfilled.nc";
   {
@@ -114,7 +117,7 @@ TEST_F(Loader, what_a_library_leaves_alone_is_nothing_of_the_volume_before) {
   const auto b = source->read(1, 0);
   ASSERT_TRUE(a && b);
   EXPECT_EQ(a->range, (std::array<float, 2>{1, 6}));
-  EXPECT_EQ(b->range, (std::array<float, 2>{0, 0}));
+  EXPECT_EQ(b->masked, 6);
 }
 
 // How many descriptors this process has to the memory of volumes.
@@ -264,34 +267,27 @@ TEST_F(Loader, what_is_no_dataset_is_the_same_error_as_in_this_process) {
   EXPECT_EQ(there.error().message, here.error().message);
 }
 
-// HDF5 reads numbers out of whatever file a dataset names; in this process it would.
-TEST_F(Loader, external_storage_reaches_no_other_file) {
+// HDF5 reads numbers out of whatever file a dataset names.
+TEST_F(Loader, external_storage_is_refused_by_name) {
   const std::string other = folder_ / "other";
   test::write_floats(other, 64, 42.0F);
   const std::string path = folder_ / "crafted.nc";
   test::write_external_storage(path, other);
-  auto here = open_file(path);
-  ASSERT_TRUE(here) << here.error().message;
-  const auto leak = (*here)->read(0, 0);
-  ASSERT_TRUE(leak) << leak.error().message;
-  ASSERT_EQ(leak->values[5], 42.0F) << "the file of this test does not do what it should";
-
-  const auto there = opened(path);
-  ASSERT_TRUE(there);
-  const auto read = there->read(0, 0);
-  ASSERT_FALSE(read);
-  EXPECT_EQ(read.error().kind, ErrorKind::bad_data);
+  for (const auto& source : {open_file(path).error(), open_path(path).error()}) {
+    EXPECT_EQ(source.kind, ErrorKind::bad_data);
+    EXPECT_THAT(source.message, HasSubstr("'secret' is in another file ('" + other + "')"));
+  }
 }
 
-TEST_F(Loader, an_external_link_reaches_no_other_file) {
+TEST_F(Loader, an_external_link_is_refused_by_name) {
   const std::string other = folder_ / "other.nc";
   test::write_wind(other, NC_NETCDF4);
   const std::string path = folder_ / "crafted.nc";
   test::write_external_link(path, other, "T");
   const auto there = open_path(path);
-  // The library gives up on such a file.
   ASSERT_FALSE(there);
   EXPECT_EQ(there.error().kind, ErrorKind::bad_data);
+  EXPECT_THAT(there.error().message, HasSubstr("external link, which is not followed: '/linked'"));
 }
 
 TEST_F(Loader, one_that_dies_is_an_error_and_the_next_read_starts_another) {
@@ -351,6 +347,75 @@ TEST_F(Loader, one_that_takes_too_long_is_ended) {
   EXPECT_EQ(::kill(id, 0), -1);
   const auto again = source->read(0, 0);
   EXPECT_TRUE(again) << again.error().message;
+}
+
+TEST_F(Loader, one_that_is_stopped_is_ended_and_others_are_read_meanwhile) {
+  const std::string path = folder_ / "a.nc";
+  const std::string other_path = folder_ / "b.nc";
+  test::write_wind(path, NC_NETCDF4);
+  test::write_wind(other_path, NC_NETCDF4);
+  Limits limits;
+  limits.stall_time = std::chrono::seconds(3);
+  const auto source = opened(path, limits);
+  const auto other = opened(other_path, Limits());
+  ASSERT_TRUE(source && other);
+  const pid_t id = source->process();
+  ASSERT_EQ(::kill(id, SIGSTOP), 0);
+  std::atomic<bool> over{false};
+  std::thread reader([&] {
+    const auto stopped = source->read(0, 0);
+    over = true;
+    ASSERT_FALSE(stopped);
+    EXPECT_EQ(stopped.error().kind, ErrorKind::bad_data);
+    EXPECT_EQ(stopped.error().message,
+              "the loader of 'a.nc' made no progress for 3.0 s and was ended while reading 'wind'");
+  });
+  EXPECT_TRUE(other->read(0, 0));
+  EXPECT_FALSE(over) << "the other is read while this one hangs";
+  reader.join();
+  EXPECT_EQ(::kill(id, 0), -1) << "it is gone";
+  const auto again = source->read(0, 0);
+  EXPECT_TRUE(again) << again.error().message;
+  EXPECT_NE(source->process(), id);
+}
+
+TEST_F(Loader, its_memory_and_that_of_the_transfer_count_while_it_is_there) {
+  const std::string path = folder_ / "a.nc";
+  test::write_wind(path, NC_NETCDF4);
+  Limits limits;
+  limits.budget = std::make_shared<Budget>(std::uint64_t{64} << 20);
+  const auto source = opened(path, limits);
+  ASSERT_TRUE(source);
+  const std::uint64_t of_process = limits.budget->counts().bytes;
+  EXPECT_GE(of_process, std::uint64_t{8} << 20);
+  ASSERT_TRUE(source->read(0, 0));
+  EXPECT_GT(limits.budget->counts().bytes, of_process) << "the memory for the next volume is kept";
+  source->release();
+  EXPECT_EQ(limits.budget->counts().bytes, 0U);
+  limits.budget = std::make_shared<Budget>(std::uint64_t{1} << 20);
+  const auto refused = open_path(path, limits);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::out_of_memory);
+  EXPECT_THAT(refused.error().message, testing::HasSubstr("needs 8.0 MiB"));
+}
+
+TEST_F(Loader, a_volume_is_the_same_where_the_memory_of_its_transfer_is_not_kept) {
+  const std::string path = folder_ / "a.nc";
+  test::write_large(path);
+  Limits limits;
+  const auto keeps = opened(path, limits);
+  // More than an eighth of this.
+  limits.budget = std::make_shared<Budget>(std::uint64_t{32} << 20);
+  const auto keeps_not = opened(path, limits);
+  ASSERT_TRUE(keeps && keeps_not);
+  const std::uint64_t before = limits.budget->counts().bytes;
+  for (int n = 0; n < 3; ++n) {
+    const auto a = keeps->read(0, 0);
+    const auto b = keeps_not->read(0, 0);
+    ASSERT_TRUE(a && b);
+    expect_same(*a, *b);
+    EXPECT_LT(limits.budget->counts().bytes, before + (std::uint64_t{4} << 20));
+  }
 }
 
 TEST_F(Loader, a_read_can_be_cancelled_from_another_thread) {
@@ -434,6 +499,7 @@ TEST_F(Loader, nothing_is_left_behind_by_200_of_them) {
   const std::string text = folder_ / "text.nc";
   test::write_wind(path, 0);
   std::ofstream(text) << "none";
+  ASSERT_FALSE(open_path(text));  // the first one opens the null device for all
   const std::size_t before = open_descriptors();
   for (int i = 0; i < 100; ++i) {
     const auto source = opened(path);

@@ -16,7 +16,7 @@ TEST(LoadService, bounds_what_waits_for_a_dataset_and_in_all) {
   std::promise<void> begun;
   std::atomic<int> ran{0};
   int refusals = 0;
-  LoadService loads(1, most, [&] { ++refusals; });
+  LoadService loads(1, most, "loads", [&] { ++refusals; });
   ASSERT_TRUE(loads.submit({{}, [&] {
                               begun.set_value();
                               gone.wait();
@@ -48,7 +48,7 @@ TEST(LoadService, bounds_what_waits_for_a_dataset_and_in_all) {
 TEST(LoadService, one_payer_has_half_of_the_places) {
   std::promise<void> let_go;
   std::promise<void> begun;
-  LoadService loads(1, 4);
+  LoadService loads(1, 4, "loads");
   ASSERT_TRUE(loads.submit({{}, [&] {
                               begun.set_value();
                               let_go.get_future().wait();

@@ -155,7 +155,7 @@ TEST(NoMemory, an_attempt_that_fails_is_told_without_any) {
 
 // The thread has no memory from the first job on.
 TEST(NoMemory, threads_of_services_go_on) {
-  LoadService loads(1, 4);
+  LoadService loads(1, 4, "loads");
   std::promise<void> loaded;
   EXPECT_TRUE(loads.submit({{}, [] {
                               allocations_left = 0;

@@ -20,6 +20,7 @@ Limits none() {
   limits.connections = limits.connections_per_address = limits.sessions_per_address = 0;
   limits.requests_per_address = limits.failed_logins_per_address = 0;
   limits.arrivals = limits.arrivals_per_address = 0;
+  limits.handshake_ms = limits.handshake_ms_per_address = 0;
   limits.messages_per_address = limits.received_per_address = 0;
   return limits;
 }
@@ -197,6 +198,76 @@ TEST(Quota, too_many_new_connections_in_all_are_refused_to_those_that_brought_th
   EXPECT_FALSE(quota.arrive(here, false, false, second));
 }
 
+TEST(Quota, an_address_that_used_up_its_handshake_time_waits_for_it) {
+  Limits limits = none();
+  limits.handshake_ms_per_address = 100;
+  Quota quota(limits);
+  ASSERT_EQ(quota.connect(here, false, 0).place, Quota::Place::ordinary);
+  ASSERT_EQ(quota.connect(there, false, 0).place, Quota::Place::ordinary);
+  quota.handshake_took(here, false, second, 0);
+  EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "ten seconds' worth at once";
+  quota.handshake_took(here, false, second / 10, 0);
+  const auto refused = quota.arrive(here, false, true, 0);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->kind, LimitKind::handshakes);
+  EXPECT_EQ(refused->limit, 100);
+  EXPECT_EQ(refused->retry_after_s, 1);
+  EXPECT_FALSE(quota.arrive(here, false, false, 0)) << "plain TCP takes no handshake";
+  EXPECT_FALSE(quota.arrive(there, false, true, 0));
+  EXPECT_FALSE(quota.arrive(here, false, true, second));
+  quota.handshake_took(there, true, 60 * second, second);
+  EXPECT_FALSE(quota.arrive(there, true, true, second)) << "a proxy brings many";
+}
+
+TEST(Quota, strangers_together_use_up_handshake_time_of_strangers_alone) {
+  Limits limits = none();
+  limits.handshake_ms = 100;
+  Quota quota(limits);
+  quota.authenticated(here, 0);
+  for (int n = 0; n < 11; ++n) {
+    const std::string stranger = "198.51.100." + std::to_string(n);
+    ASSERT_FALSE(quota.arrive(stranger, false, true, 0)) << n;
+    quota.handshake_took(stranger, false, second / 10, 0);
+  }
+  const auto refused = quota.arrive(there, false, true, 0);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->kind, LimitKind::handshakes);
+  EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "it has shown the token";
+  EXPECT_FALSE(quota.arrive(there, true, true, 0)) << "a proxy's";
+  quota.handshake_took(here, false, 2 * second, 0);
+  EXPECT_TRUE(quota.arrive(here, false, true, 0)) << "those have a limit, too";
+  EXPECT_FALSE(quota.arrive(there, false, true, second));
+}
+
+TEST(Quota, strangers_use_up_no_handshake_time_of_the_machine_itself) {
+  Limits limits = none();
+  limits.handshake_ms = 100;
+  limits.handshake_ms_per_address = 50;
+  Quota quota(limits);
+  quota.authenticated(here, 0);
+  for (const std::string& address : {there, here}) {
+    ASSERT_EQ(quota.connect(address, false, 0).place, Quota::Place::ordinary);
+    quota.handshake_took(address, false, 2 * second, 0);
+    ASSERT_TRUE(quota.arrive(address, false, true, 0)) << address;
+  }
+  EXPECT_TRUE(quota.arrive("127.0.0.2", false, true, 0)) << "a stranger like others";
+  for (const std::string own : {"127.0.0.1", "::/64"}) {
+    ASSERT_EQ(quota.connect(own, false, 0).place, Quota::Place::ordinary);
+    EXPECT_FALSE(quota.arrive(own, false, true, 0)) << own;
+    quota.handshake_took(own, false, second, 0);
+    const auto refused = quota.arrive(own, false, true, 0);
+    ASSERT_TRUE(refused) << "it has its own allowance alone";
+    EXPECT_EQ(refused->limit, 50);
+  }
+  EXPECT_FALSE(quota.arrive("127.0.0.2", false, true, 11 * second)) << "others do not pay for it";
+
+  limits.handshake_ms_per_address = 0;
+  Quota without(limits);
+  ASSERT_EQ(without.connect("127.0.0.1", false, 0).place, Quota::Place::ordinary);
+  without.handshake_took("127.0.0.1", false, 2 * second, 0);
+  EXPECT_TRUE(without.arrive("127.0.0.1", false, true, 0)) << "it is bounded all the same";
+}
+
 TEST(Quota, messages_are_paid_before_more_is_read) {
   Limits limits = none();
   limits.messages_per_address = 10;
@@ -221,6 +292,7 @@ TEST(Quota, nought_is_no_limit) {
     ASSERT_EQ(quota.heard(here, 1U << 20, 0), 0);
     quota.sent(here, 1U << 30, 0);
     quota.rendered(here, 60 * second, 0);
+    quota.handshake_took(here, false, 60 * second, 0);
   }
   EXPECT_FALSE(quota.picture(here, 0));
 }
@@ -343,7 +415,7 @@ TEST(Admission, charges_the_client_behind_a_trusted_proxy) {
 
 TEST(Metrics, names_every_limit_once) {
   EXPECT_EQ(std::set(limit_names.begin(), limit_names.end()).size(), limit_names.size());
-  EXPECT_EQ(static_cast<std::size_t>(LimitKind::estimate) + 1, limit_names.size());
+  EXPECT_EQ(static_cast<std::size_t>(LimitKind::handshakes) + 1, limit_names.size());
 }
 
 }  // namespace

@@ -169,6 +169,34 @@ TEST(RenderQueue, a_newer_background_job_takes_the_place_of_the_older_which_is_t
   EXPECT_EQ(ran, expected);
 }
 
+// What a session that is gone had asked for: newcomers, who have used nothing yet, come before it.
+TEST(RenderQueue, a_cancelled_job_does_not_wait_for_its_turn) {
+  for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
+    SCOPED_TRACE(static_cast<int>(kind));
+    Renderer make;
+    RenderQueue queue;
+    queue.push(make.job(kind, 1), 0);
+    queue.pop();
+    RenderJob second = make.job(kind, 1);
+    const CancelToken gone = second.cancel;
+    queue.push(std::move(second), 0);
+    queue.done(100'000);
+    for (std::uint64_t newcomer = 2; newcomer < 5; ++newcomer) {
+      queue.push(make.job(RenderKind::stream, newcomer), 0);
+    }
+    EXPECT_EQ(queue.pop()->job.owner, 2U) << "the first owner has used more";
+    queue.done(10'000);
+    gone.cancel();
+    EXPECT_EQ(queue.pop()->job.owner, 1U);
+    queue.done(0);
+    EXPECT_EQ(queue.pop()->job.owner, 3U);
+    queue.done(10'000);
+    EXPECT_EQ(queue.pop()->job.owner, 4U);
+    queue.done(10'000);
+    EXPECT_TRUE(queue.empty());
+  }
+}
+
 TEST(RenderQueue, counts_what_somebody_still_waits_for) {
   RenderQueue queue;
   RenderJob job;

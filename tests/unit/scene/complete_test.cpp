@@ -120,6 +120,22 @@ TEST(CompleteView, RangesComeFromTheFirstStep) {
   EXPECT_EQ(told(completed(later, *dataset)), told(completed(View{}, *dataset)));
 }
 
+TEST(CompleteView, TheFieldsThatAViewMayLoadAreKnownWithoutLoading) {
+  const auto dataset = sample_dataset("tornado", {8, 8, 8});
+  const data::DatasetInfo& info = dataset->info();
+  protocol::View view;
+  EXPECT_THAT(fields_of(view, info), testing::ElementsAre("wind", "cloud"));
+  const auto completed = complete_view(view, *dataset);
+  ASSERT_TRUE(completed);
+  EXPECT_EQ(fields_of(*completed, info), fields_of(view, info));
+  view.vector.field = {protocol::FieldChoice::Kind::none, ""};
+  view.scalars.emplace(2);
+  (*view.scalars)[0].field = "vorticity";
+  (*view.scalars)[1].field = "nothing";
+  view.geometry.height_field = "cloud";
+  EXPECT_THAT(fields_of(view, info), testing::ElementsAre("vorticity", "cloud"));
+}
+
 TEST(CompleteView, ShowsCloudsButNoTemperatureBesideAWind) {
   auto dataset = cloudy_weather();
   const View full = completed(View{}, *dataset);

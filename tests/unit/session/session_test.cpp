@@ -34,6 +34,26 @@ TEST(Open, describes_the_dataset_and_then_draws_it) {
   EXPECT_EQ(driver.render->view.image.width, 640);
 }
 
+// Of several refusals a viewer may see the last alone.
+TEST(Open, that_failed_is_why_there_is_nothing_to_play) {
+  const auto why = make_error(ErrorKind::out_of_memory, "the field needs 9 MiB");
+  const auto play = [](Driver& driver) {
+    driver.texts.clear();
+    driver.say(protocol::PlayMessage{});
+    return driver.texts_of<protocol::ErrorMessage>().at(0).problem;
+  };
+  Driver described;
+  EXPECT_EQ(play(described).status, 404) << "nothing was asked for";
+  described.say(protocol::OpenMessage{5, "wind"});
+  described.described(5, why);
+  EXPECT_EQ(play(described).status, 507);
+  EXPECT_THAT(play(described).detail, HasSubstr("no dataset is open: the field needs 9 MiB"));
+  Driver drawn;
+  drawn.patch(1, R"({"dataset":"wind"})");
+  drawn.fail_render(why);
+  EXPECT_EQ(play(drawn).status, 507);
+}
+
 // What is quick is not told; nor is what is read for somebody else's frame while ours is drawn.
 TEST(Open, how_far_reading_has_come_is_told_while_a_frame_waits_for_it) {
   Driver driver;

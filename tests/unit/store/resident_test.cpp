@@ -4,11 +4,14 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <functional>
+#include <future>
 #include <limits>
 #include <map>
 #include <mutex>
 #include <random>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "server/data/packed.hpp"
@@ -29,6 +32,7 @@ class Series : public Source {
     std::mutex mutex;
     std::vector<std::size_t> steps;
     std::atomic<bool> hold{false};
+    bool heeds_cancel = false;
     std::atomic<int> cancelled{0};
     std::atomic<int> released{0};
     [[nodiscard]] std::vector<std::size_t> read() {
@@ -53,6 +57,9 @@ class Series : public Source {
   Result<Volume> read(std::size_t /*field*/, std::size_t step) override {
     tell_progress(0.25);
     while (log_->hold) std::this_thread::yield();
+    if (log_->heeds_cancel && log_->cancelled > 0) {
+      return make_error(ErrorKind::cancelled, "reading was cancelled");
+    }
     {
       const std::lock_guard lock(log_->mutex);
       log_->steps.push_back(step);
@@ -102,6 +109,12 @@ struct Fixture {
   [[nodiscard]] bool is_resident(std::size_t step) const {
     return dataset->resident_only().volume("f", step).has_value();
   }
+  // A volume is read before it is resident.
+  void wait_until_resident(std::size_t step) const {
+    for (int i = 0; i < 10000 && !is_resident(step); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
   // Until so many volumes were read, or for ten seconds.
   void wait_for_reads(std::size_t count) const {
     for (int i = 0; i < 10000 && log->read().size() < count; ++i) {
@@ -142,7 +155,7 @@ TEST(Resident, AHandleForWhatIsThereNeverLoads) {
 TEST(Resident, WhatIsWishedForIsLoadedSoonestFirst) {
   Fixture f(10);
   f.wish({7, 8, 9, 10});
-  f.wait_for_reads(4);
+  f.wait_until_resident(10);
   EXPECT_EQ(f.log->read(), (std::vector<std::size_t>{7, 8, 9, 10}));
   for (const std::size_t step : {7, 8, 9, 10}) EXPECT_TRUE(f.is_resident(step)) << step;
   EXPECT_EQ(f.dataset->counts().ahead, 4U);
@@ -276,15 +289,37 @@ TEST(Resident, EvictionFreesWhatNobodyHolds) {
   EXPECT_EQ(f.dataset->seen("f", 1)->range[0], 1.0F) << "its range is remembered";
 }
 
-TEST(Resident, WhatIsHeldOfADatasetThatIsGoneIsNotCounted) {
+// Whoever asked is still there, so the error says what became of the data.
+TEST(Resident, ALoadThatSomebodyElseEndsSaysWhy) {
+  const std::vector<std::pair<std::function<void(Fixture&)>, ErrorKind>> ends{
+      {[](Fixture& f) { f.dataset->evict(); }, ErrorKind::not_resident},
+      {[](Fixture& f) { EXPECT_TRUE(f.store.remove("series")); }, ErrorKind::not_found},
+      {[](Fixture& f) { f.dataset->end(); }, ErrorKind::draining}};
+  for (const auto& [end, kind] : ends) {
+    Fixture f(10);
+    f.log->hold = true;
+    f.log->heeds_cancel = true;
+    auto read = std::async(std::launch::async, [&] { return f.dataset->volume("f", 7); });
+    f.wait_until_reading();
+    end(f);
+    f.log->hold = false;
+    const auto volume = read.get();
+    ASSERT_FALSE(volume);
+    EXPECT_EQ(volume.error().kind, kind) << volume.error().message;
+  }
+}
+
+TEST(Resident, WhatIsHeldOfADatasetThatIsGoneCountsUntilItIsLetGoOf) {
   Fixture f(10);
-  const auto held = f.dataset->volume("f", 3);
+  auto held = f.dataset->volume("f", 3);
   ASSERT_TRUE(f.dataset->volume("f", 4));
   EXPECT_EQ(f.store.counts().bytes, 2 * volume_bytes);
   ASSERT_TRUE(f.store.remove("series"));
   f.dataset.reset();
-  EXPECT_EQ(f.store.counts().bytes, 0U);
+  EXPECT_EQ(f.store.counts().bytes, volume_bytes);
   EXPECT_EQ((*held)->values[0], 3.0F);
+  held->reset();
+  EXPECT_EQ(f.store.counts().bytes, 0U);
 }
 
 TEST(Resident, WhatIsBeingReadIsToldUntilItIsThere) {

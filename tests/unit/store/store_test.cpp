@@ -14,12 +14,13 @@
 #include <thread>
 
 #include "tests/unit/data/netcdf_maker.hpp"
+#include "tests/unit/store/small_file.hpp"
 
 namespace windsplat::data {
 namespace {
 
 using test::Folder;
-using test::NetcdfMaker;
+using test::write_small;
 
 constexpr std::uint64_t kVolumeBytes = 4000;  // 10 x 10 x 10 float32
 
@@ -284,13 +285,6 @@ std::string numbered(int i) {
   return name;
 }
 
-void write_small(const std::string& path, double first) {
-  NetcdfMaker file(path);
-  const int y = file.axis("lat", {0, 1}, "degrees_north");
-  const int x = file.axis("lon", {0, 1}, "degrees_east");
-  file.variable("f", NC_FLOAT, {y, x}, test::counting(4, first));
-}
-
 TEST(Store, IdsAreFileNamesMadeUnique) {
   const Folder folder;
   std::filesystem::create_directory(folder / "sub");
@@ -401,59 +395,29 @@ TEST(Store, TheSameFilesAreOneDatasetHoweverOftenTheyAreAdded) {
   EXPECT_EQ(opened, 2) << "what was removed is opened anew";
 }
 
-TEST(Store, AFileThatChangesIsOpenedAnewUnderItsName) {
+TEST(Store, WhatIsRefusedStaysListedAsFailedUntilItPasses) {
   const Folder folder;
-  write_small(folder / "rain.nc", 0);
-  Store store(1 << 20);
-  const auto before = store.add(folder / "rain.nc").value();
-  const auto held = before->volume("f", 0).value();
-  EXPECT_TRUE(store.look_for_changes(0).empty()) << "nothing has changed";
-
-  write_small(folder / "new.nc", 50);
-  std::filesystem::rename(folder / "new.nc", folder / "rain.nc");
-  EXPECT_TRUE(store.look_for_changes(3600).empty()) << "it may still be being written";
-  EXPECT_EQ(store.look_for_changes(0), std::vector<std::string>{"rain"});
-  const auto after = store.find("rain").value();
-  EXPECT_NE(after, before);
-  EXPECT_EQ(after->volume("f", 0).value()->values[3], 53.0F);
-  EXPECT_EQ(held->values[3], 3.0F) << "what was held stays what it was";
-
-  std::ofstream(folder / "rain.nc", std::ios::trunc) << "no longer a file of numbers";
-  EXPECT_TRUE(store.look_for_changes(0).empty());
-  EXPECT_EQ(store.find("rain").value(), after) << "the old data stay";
-  EXPECT_NE(store.problem("rain").find("changed"), std::string::npos);
-  EXPECT_EQ(after->volume("f", 0).value()->values[3], 53.0F);
-}
-
-// One step at that hour, its third value `first` + 3.
-void write_hour(const std::string& path, double hour, double first) {
-  NetcdfMaker file(path);
-  const int t = file.axis("time", {hour}, "hours since 2001-01-01");
-  const int y = file.axis("lat", {0, 1}, "degrees_north");
-  const int x = file.axis("lon", {0, 1}, "degrees_east");
-  file.variable("f", NC_FLOAT, {t, y, x}, test::counting(4, first));
-}
-
-TEST(Store, ASeriesGrowsAndShrinksWithItsFolder) {
-  const Folder folder;
-  write_hour(folder / "f1.nc", 1, 10);
-  write_hour(folder / "f2.nc", 2, 20);
-  Store store(1 << 20);
-  const std::string id = store.add(folder / "f*.nc").value()->info().id;
-  EXPECT_TRUE(store.look_for_changes(0).empty());
-  std::ofstream(folder / "notes.txt") << "nothing of the series";
-  EXPECT_TRUE(store.look_for_changes(0).empty());
-  ASSERT_EQ(store.find(id).value()->info().steps.size(), 2U);
-
-  write_hour(folder / "f3.nc", 3, 30);
-  EXPECT_EQ(store.look_for_changes(0), std::vector<std::string>{id});
-  const auto longer = store.find(id).value();
-  ASSERT_EQ(longer->info().steps.size(), 3U);
-  EXPECT_EQ(longer->volume("f", 2).value()->values[3], 33.0F);
-
-  std::filesystem::remove(folder / "f1.nc");
-  EXPECT_EQ(store.look_for_changes(0), std::vector<std::string>{id});
-  EXPECT_EQ(store.find(id).value()->volume("f", 0).value()->values[3], 23.0F);
+  const std::string file = folder / "rain.nc";
+  write_small(file, 0);
+  bool refuses = true;
+  StoreOptions options;
+  options.bytes_max = 1 << 20;
+  options.check = [&](const Dataset& /*dataset*/) -> Result<void> {
+    if (refuses) return make_error(ErrorKind::out_of_memory, "too large");
+    return {};
+  };
+  Store store(options);
+  const auto refused = store.add(file);
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(store.all().empty());
+  store.list_failed(file, refused.error());
+  EXPECT_FALSE(store.add(file));
+  ASSERT_EQ(store.failed().size(), 1U);
+  refuses = false;
+  const auto added = store.add(file);
+  ASSERT_TRUE(added) << added.error().message;
+  EXPECT_EQ((*added)->info().id, "rain") << "under the id by which it was listed";
+  EXPECT_TRUE(store.failed().empty());
 }
 
 // Whoever waits for the same volume must not wait for ever.
@@ -500,22 +464,6 @@ TEST(Store, WhatIsKnownOfADatasetCountsInTheLimit) {
   EXPECT_EQ(store.counts().bytes, 0U);
 }
 
-// As a model does that goes on writing: the same file of the same size.
-TEST(Store, AFileThatIsWrittenOverInPlaceIsOpenedAnew) {
-  const Folder folder;
-  write_small(folder / "rain.nc", 0);
-  write_small(folder / "new.nc", 50);
-  const std::string bytes = test::bytes_of(folder / "new.nc");
-  ASSERT_EQ(bytes.size(), std::filesystem::file_size(folder / "rain.nc"));
-  Store store(1 << 20);
-  ASSERT_TRUE(store.add(folder / "rain.nc"));
-  const auto opened_at = std::filesystem::last_write_time(folder / "rain.nc");
-  std::fstream(folder / "rain.nc", std::ios::in | std::ios::out | std::ios::binary) << bytes;
-  std::filesystem::last_write_time(folder / "rain.nc", opened_at - std::chrono::seconds(5));
-  EXPECT_EQ(store.look_for_changes(1), std::vector<std::string>{"rain"});
-  EXPECT_EQ(store.find("rain").value()->volume("f", 0).value()->values[3], 53.0F);
-}
-
 // A model writes its newest file.
 TEST(Store, OfALongSeriesAChangeOfTheLastFileIsSeen) {
   const Folder folder;
@@ -548,29 +496,6 @@ TEST(Store, WhatIsRemovedWhileItIsOpenedAnewStaysAway) {
   std::ofstream(folder / "rain") << "more";
   store.look_for_changes(0);
   EXPECT_TRUE(store.all().empty());
-}
-
-TEST(Store, WhatCannotBeOpenedAnewIsTriedOnceAChange) {
-  const Folder folder;
-  write_small(folder / "rain.nc", 0);
-  std::atomic<int> opened{0};
-  StoreOptions options;
-  options.bytes_max = 1 << 20;
-  options.open = [&](const Location& location) -> Result<std::unique_ptr<Source>> {
-    ++opened;
-    return open_file(location.members.front().path);
-  };
-  Store store(options);
-  ASSERT_TRUE(store.add(folder / "rain.nc"));
-  for (const char* text : {"no numbers", "no numbers either"}) {
-    std::ofstream(folder / "rain.nc", std::ios::trunc) << text;
-    for (int look = 0; look < 3; ++look) EXPECT_TRUE(store.look_for_changes(0).empty());
-  }
-  EXPECT_EQ(opened, 3) << "at first, and once for each of two changes";
-  write_small(folder / "new.nc", 50);
-  std::filesystem::rename(folder / "new.nc", folder / "rain.nc");
-  EXPECT_EQ(store.look_for_changes(0), std::vector<std::string>{"rain"});
-  EXPECT_EQ(store.problem("rain"), "");
 }
 
 }  // namespace

@@ -1,0 +1,126 @@
+// What `inspect` reads of a file that it was not asked for, how it says so, and the way round.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/integration/cli_program.hpp"
+#include "tests/unit/data/netcdf_maker.hpp"
+
+namespace cli_test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using windsplat::data::test::counting;
+using windsplat::data::test::NetcdfMaker;
+
+json described(const std::string& path, const std::string& ranges = "auto") {
+  const Outcome told = run({"inspect", "--json", "--ranges", ranges, path});
+  EXPECT_EQ(told.code, 0) << told.err;
+  return json::parse(told.out);
+}
+
+bool has_note(const json& dataset, const std::string& part) {
+  for (const auto& note : dataset["notes"]) {
+    if (note.get<std::string>().find(part) != std::string::npos) return true;
+  }
+  return false;
+}
+
+// Eight steps of 64 x 64, in chunks of so many steps that are mostly empty.
+void write_steps(const std::string& path, std::size_t steps_of_a_chunk) {
+  NetcdfMaker file(path);
+  const int t = file.dimension("time", NC_UNLIMITED);
+  const int y = file.dimension("y", 64);
+  const int x = file.dimension("x", 64);
+  const int u = file.variable("u", NC_FLOAT, {t, y, x}, counting(std::size_t{8} * 64 * 64));
+  file.deflate(u);
+  file.chunk(u, {steps_of_a_chunk, 64, 64});
+}
+
+// Together 34 MiB as floats: within the limit, which twice as much is not.
+TEST(Inspect, CountsWhatIsDecodedOnce) {
+  const Folder folder;
+  const std::string path = folder.file("a.nc");
+  {
+    NetcdfMaker file(path);
+    const std::vector<int> dims{file.dimension("z", 30), file.dimension("y", 300),
+                                file.dimension("x", 500)};
+    for (const char* name : {"f", "g"}) {
+      const int v =
+          file.variable(name, NC_FLOAT, dims, std::vector<double>(std::size_t{30} * 300 * 500, 2));
+      file.deflate(v);
+    }
+  }
+  const json dataset = described(path);
+  for (const json& field : dataset["fields"]) {
+    EXPECT_EQ(field["range"], (json{2, 2})) << field["name"];
+  }
+}
+
+TEST(Inspect, SaysWhyRangesAreOverTheFirstStep) {
+  const Folder folder;
+  const std::string path = folder.file("a.nc");
+  write_steps(path, 1024);  // chunks of 16 MiB
+  const json one = described(path);
+  EXPECT_EQ(one["fields"][0]["rangeOf"], "step");
+  EXPECT_EQ(one["fields"][0]["range"], (json{0, 4095}));
+  EXPECT_TRUE(has_note(one,
+                       "ranges are over the first step: all 8 decode 128.0 MiB, beyond the "
+                       "limit of"));
+  const json all = described(path, "all");
+  EXPECT_EQ(all["fields"][0]["rangeOf"], "all");
+  EXPECT_EQ(all["fields"][0]["range"], (json{0, 32767}));
+  EXPECT_FALSE(has_note(all, "ranges are"));
+}
+
+TEST(Inspect, ReadsRangesBeyondTheLimitWhereItIsAsked) {
+  const Folder folder;
+  const std::string path = folder.file("a.nc");
+  write_steps(path, 8192);  // chunks of 128 MiB
+  const json none = described(path);
+  EXPECT_TRUE(none["fields"][0]["range"].is_null());
+  EXPECT_TRUE(has_note(none, "ranges are not read: a step decodes 128.0 MiB, beyond the limit of"));
+  EXPECT_TRUE(has_note(none, "; --ranges first or all reads them"));
+  const json first = described(path, "first");
+  EXPECT_EQ(first["fields"][0]["range"], (json{0, 4095}));
+  EXPECT_FALSE(has_note(first, "ranges are"));
+  EXPECT_TRUE(described(path, "none")["fields"][0]["range"].is_null());
+  EXPECT_EQ(run({"inspect", "--ranges", "some", path}).code, 2);
+}
+
+TEST(Inspect, ShowsNotesInFull) {
+  const Folder folder;
+  const std::string path = folder.file("a.nc");
+  {
+    NetcdfMaker file(path);
+    const std::vector<int> dims{file.dimension("y", 4), file.dimension("x", 4)};
+    for (const char letter : {'a', 'b', 'c', 'd', 'e', 'f'}) {
+      const int v =
+          file.variable(std::string(40, letter), NC_FLOAT, dims, counting(std::size_t{16}));
+      file.number(v, "valid_range", NC_FLOAT, {0, 12});
+    }
+  }
+  const Outcome told = run({"inspect", path});
+  ASSERT_EQ(told.code, 0) << told.err;
+  std::istringstream lines(told.out);
+  std::string text;
+  for (std::string word; lines >> word;) text += word + ' ';
+  std::size_t longest = 0;
+  const json dataset = described(path);
+  for (const auto& note : dataset["notes"]) {
+    EXPECT_THAT(text, HasSubstr(note.get<std::string>() + ' '));
+    longest = std::max(longest, note.get<std::string>().size());
+  }
+  EXPECT_GT(longest, 200U);
+  lines = std::istringstream(told.out.substr(told.out.find("\nnotes\n")));
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
+}
+
+}  // namespace
+}  // namespace cli_test
