@@ -292,6 +292,7 @@ export const watchFrames = () => {
           level: header.getUint8(31),
           error: header.getFloat32(32, true),
           jpegError: header.getFloat32(36, true),
+          renderUs: u32(44),
           chosen: chosen.get(u32(8)),
         });
       });

@@ -42,27 +42,26 @@ async function byteProxy(port) {
   };
 }
 
-test("page and frames that come a byte at a time are the same page and frames", () =>
+test("page and frames that come a byte at a time are the same page and frames", (t) =>
   withPage(async (whole) => {
     const proxy = await byteProxy(shared.daemon.port);
-    const torn = await openPage(shared.browser, `http://127.0.0.1:${proxy.port}/`, small);
-    try {
-      torn.setDefaultTimeout(60_000 * patience);
-      await finalPicture(torn);
-      assert.deepEqual(await pixels(torn), await pixels(whole));
-      assert.ok(proxy.counts.segments > 60_000, `${proxy.counts.segments} bytes, one by one`);
-      assert.ok(proxy.counts.segments > 100 * proxy.counts.reads, "fewer came in as many parts");
-      for (const page of [whole, torn]) {
-        await page.locator("#picture").focus();
-        await page.keyboard.press("ArrowRight");
-        await finalPicture(page);
-        assert.deepEqual(page.faults, []);
-      }
-      assert.deepEqual(await pixels(torn), await pixels(whole), "after a turn too");
-    } finally {
-      await torn.context().close();
-      proxy.close();
+    t.after(proxy.close);
+    const torn = await openPage(shared.browser, `http://127.0.0.1:${proxy.port}/`, {
+      ...small,
+      prepare: (page) => page.setDefaultTimeout(120_000 * patience),
+    });
+    t.after(() => torn.context().close());
+    await finalPicture(torn);
+    assert.deepEqual(await pixels(torn), await pixels(whole));
+    assert.ok(proxy.counts.segments > 60_000, `${proxy.counts.segments} bytes, one by one`);
+    assert.ok(proxy.counts.segments > 100 * proxy.counts.reads, "fewer came in as many parts");
+    for (const page of [whole, torn]) {
+      await page.locator("#picture").focus();
+      await page.keyboard.press("ArrowRight");
+      await finalPicture(page);
+      assert.deepEqual(page.faults, []);
     }
+    assert.deepEqual(await pixels(torn), await pixels(whole), "after a turn too");
   }));
 
 // Runs in a page first: keeps every message that comes in and what goes out between.
@@ -181,11 +180,9 @@ for (const [name, run] of Object.entries(sessions)) {
         assert.ok(played.frames > 5, `${played.frames} frames were recorded`);
         assert.ok(played.decodesMost <= 2, `${played.decodesMost} decoded at a time`);
         assert.ok(played.decoded < played.frames, "what is overtaken is not decoded");
-        assert.equal(played.acks.at(-1), Number(last.seq), "the last answer counts for all");
-        assert.deepEqual(
-          played.acks,
-          [...played.acks].sort((a, b) => a - b),
-        );
+        // Two are decoded at a time, and the later one may be done first.
+        assert.equal(Math.max(...played.acks), Number(last.seq), "the newest counts for all");
+        assert.equal(new Set(played.acks).size, played.acks.length, "each is answered once");
         assert.equal(played.closed, undefined, "the page takes it for the protocol that it is");
       },
       { settle: false, prepare: (page) => page.addInitScript(replay, tape) },

@@ -39,6 +39,7 @@ const [inner, tall] = [width - left - right, height - top - bottom];
 
 interface Handle {
   element: SVGElement;
+  name: string;
   across: boolean; // it moves along x
   set(place: number): void;
   step(way: 1 | -1, fine: boolean): void;
@@ -209,8 +210,13 @@ export class ForecastPlot {
     this.tell(this.limit, 1e-6, error, 1, errorText(error, errorMetric.value));
   }
 
-  private tell({ element }: Handle, min: number, now: number, max: number, text: string): void {
+  // A slider must have a value, so it becomes one with its first.
+  private tell(handle: Handle, min: number, now: number, max: number, text: string): void {
+    const { element, name } = handle;
     setAttributes(element, {
+      role: "slider",
+      tabindex: 0,
+      "aria-label": name,
       "aria-valuemin": min,
       "aria-valuenow": now,
       "aria-valuemax": max,
@@ -221,9 +227,6 @@ export class ForecastPlot {
   private handle(name: string, across: boolean, acts: Pick<Handle, "set" | "step">): Handle {
     const element = makeSvg("g", {
       class: "plot-handle",
-      role: "slider",
-      tabindex: 0,
-      "aria-label": name,
       "aria-orientation": across ? "horizontal" : "vertical",
     });
     // Wide enough for a hand; the line is what is seen.
@@ -232,7 +235,7 @@ export class ForecastPlot {
       : { x: left, y: -12, width: inner, height: 24 };
     const d = across ? `M0 ${top}v${tall}M-6 0h12v6l-6 6-6-6z` : `M${left} 0h${inner}m0-5v10l-8-5z`;
     element.append(makeSvg("rect", hold), makeSvg("path", { d }));
-    const handle = { element, across, ...acts };
+    const handle = { element, name, across, ...acts };
     this.bind(handle);
     return handle;
   }
