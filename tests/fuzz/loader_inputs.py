@@ -33,20 +33,23 @@ def field(name, components, derived=0):
     kind = bytes([0 if len(components) == 1 else 1])
     units = texts([b"m/s"] * len(components))
     names = text(b"") + text(b"") + text(b"float32")
-    return text(name) + kind + texts(components) + text(b"m/s") + units + names + bytes([derived])
+    sizes_decoded = struct.pack("<QQ", 1024, 256)  # of a step, of a chunk
+    return (text(name) + kind + texts(components) + text(b"m/s") + units + names +
+            bytes([derived]) + sizes_decoded)
 
 
 def info(axes=((0.0, 1.0), (0.0, 1.0), (1.0, 0.0)), fields=((b"wind", (b"u", b"v")),),
          columns=None, steps=(0.0,), count_of_steps=None):
     out = b"".join(map(text, (b"told", b"", b"told.nc", b"x", b"0", b"", b"")))
     out += b"".join(axis(name, values) for name, values in zip((b"x", b"y", b"z"), axes))
-    out += bytes([columns is not None])
-    if columns is not None:
-        out += doubles(columns[0]) + doubles(columns[1])
     out += struct.pack("<Q", len(fields)) + b"".join(field(*f) for f in fields)
     out += struct.pack("<Q", 1) + text(b"left") + text(b"out") + texts([b"a note"])
     out += struct.pack("<Q", len(steps) if count_of_steps is None else count_of_steps)
-    return out + b"".join(struct.pack("<d", step) + text(b"0") for step in steps)
+    out += b"".join(struct.pack("<d", step) + text(b"0") for step in steps)
+    out += bytes([columns is not None])
+    if columns is not None:
+        out += doubles(columns[0]) + doubles(columns[1])
+    return out
 
 
 def error(kind=3, message=b"bad\x1b data"):

@@ -87,10 +87,11 @@ class Watch:
 
 
 class Daemon:
-    def __init__(self, options, root, folder):
+    def __init__(self, options, root, folder, memory_limit=MEMORY_LIMIT, more=()):
+        self.memory_limit = memory_limit
         self.log = folder / "strace.log" if options.strace else None
         command = [options.program, "serve", "tornado", "--data-root", root,
-                   "--listen", "127.0.0.1:0", "--memory-limit", str(MEMORY_LIMIT)]
+                   "--listen", "127.0.0.1:0", "--memory-limit", str(memory_limit), *more]
         if self.log:
             # -D: strace is not the parent, so that the child is the daemon itself.
             command = ["strace", "-D", "-f", "-y", "-o", self.log, "-e",
@@ -106,14 +107,14 @@ class Daemon:
         self.patience = options.patience
         self.own = threading.local()
 
-    def ask(self, method, path, body=None):
+    def ask(self, method, path, body=None, more=None):
         """Status, headers and bytes of the answer."""
         for attempt in range(2):
             if not hasattr(self.own, "connection"):
                 self.own.connection = http.client.HTTPConnection("127.0.0.1", self.port,
                                                                  timeout=self.patience)
             try:
-                headers = {"Content-Type": "application/json"} if body else {}
+                headers = ({"Content-Type": "application/json"} if body else {}) | (more or {})
                 self.own.connection.request(method, path, body, headers)
                 answer = self.own.connection.getresponse()
                 return answer.status, answer.headers, answer.read()
@@ -139,7 +140,7 @@ class Daemon:
             raise Failure("/livez does not answer 200")
         status = pathlib.Path(f"/proc/{self.child.pid}/status").read_text()
         resident = int(re.search(r"VmRSS:\s+(\d+)", status)[1]) / 1024
-        if resident * 2**20 > 1.1 * MEMORY_LIMIT:
+        if resident * 2**20 > 1.1 * self.memory_limit:
             raise Failure(f"the daemon has {resident:.0f} MB resident")
         return resident, len(os.listdir(f"/proc/{self.child.pid}/fd"))
 

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Writes what every fuzz target begins with, into seeds/TARGET and sizes/TARGET: vectors of the
-protocol, small files of every format (seeds.py), requests, and inputs of boundary sizes (sizes.py).
+protocol, small files of every format (seeds.py), mutated datasets (model_mutations.py), requests,
+and inputs of boundary sizes (sizes.py).
 
     tests/fuzz/write_inputs.py build/fuzz-inputs [--program build/release/windsplat]
 
-The program makes the netCDF files; without it the committed corpus alone has some.
+The program writes the netCDF files of seeds.py. Needs python3-netcdf4, which writes the mutants'.
 """
 
 import argparse
@@ -16,12 +17,15 @@ import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import loader_inputs  # noqa: E402
+import model_mutations  # noqa: E402
+import model_writers  # noqa: E402
 import seeds  # noqa: E402
 import sizes  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MARK = b"\n#!file "
 INPUT_BYTES_MAX = 300_000
+MUTANTS = 340  # of datasets, over all formats
 READERS = {"nrrd": "nrrd", "raw+json": "raw", "grads": "grads", "opendx": "opendx", "zarr": "zarr",
            "vti": "vtk_xml", "vtr": "vtk_xml", "vts": "vtk_xml", "vtu": "vtk_xml", "pvd": "vtk_xml",
            "vtk ascii": "vtk_legacy", "vtk binary": "vtk_legacy", "hdf5": "hdf5",
@@ -118,17 +122,23 @@ def files(program):
         if program:
             every += seeds.netcdf_seeds(program, folder)
     for i, seed in enumerate(every):
-        kind = "netcdf" if next(iter(seed.files.values())).startswith(b"CDF") else (
-            READERS[seed.kind])
-        if kind == "zarr":
-            data = b"".join(MARK[1 if not n else 0:] + name.removeprefix("s.zarr/").encode() + b"\n"
-                            + part for n, (name, part) in enumerate(seed.files.items()))
-        else:
-            first = seed.files[seed.path]
-            data = first + b"".join(MARK + name.encode() + b"\n" + part
-                                    for name, part in seed.files.items() if name != seed.path)
-        if len(data) <= INPUT_BYTES_MAX:
-            yield f"reader_{kind}", f"seed-{i}", data
+        yield from reader_input(f"seed-{i}", seed.kind, seed.files, seed.path)
+    for number in range(MUTANTS):
+        model = model_mutations.mutant(0, number)
+        yield from reader_input(f"mutant-{number}", model.kind, *model_writers.written(model))
+
+
+def reader_input(name, kind, members, path):
+    """The files of a dataset as one input; nothing if that is too large."""
+    kind = "netcdf" if next(iter(members.values())).startswith(b"CDF") else READERS[kind]
+    if kind == "zarr":
+        data = b"".join(MARK[1 if not n else 0:] + member.removeprefix("s.zarr/").encode() + b"\n"
+                        + part for n, (member, part) in enumerate(members.items()))
+    else:
+        data = members[path] + b"".join(MARK + member.encode() + b"\n" + part
+                                        for member, part in members.items() if member != path)
+    if len(data) <= INPUT_BYTES_MAX:
+        yield f"reader_{kind}", name, data
 
 
 def main():

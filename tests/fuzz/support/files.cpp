@@ -1,4 +1,5 @@
-// Files in memory that take no place anywhere, and the properties of what readers give.
+// Files in memory that take no place anywhere, and the properties of what readers give and of
+// pictures of it.
 #include "tests/fuzz/support/files.hpp"
 
 #include <fcntl.h>
@@ -8,10 +9,16 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <utility>
 #include <vector>
 
+#include "protocol/view.hpp"
+#include "server/base/cancel.hpp"
+#include "server/base/thread_pool.hpp"
 #include "server/data/loader/messages.hpp"
+#include "server/data/store.hpp"
+#include "server/frame/frame.hpp"
 #include "tests/fuzz/support/check.hpp"
 
 namespace fuzz {
@@ -23,6 +30,8 @@ using namespace windsplat::data;
 constexpr std::size_t files_max = 64;
 // Larger volumes are not read: they are honest, and slow.
 constexpr std::size_t floats_max = std::size_t{1} << 20;
+// Larger grids are not drawn.
+constexpr std::size_t drawn_samples_max = std::size_t{1} << 15;
 
 // The one name of a process that does its work apart: of the parent, so that what a child that
 // crashed left behind is written over by the next.
@@ -55,6 +64,7 @@ class MemoryFiles : public Files {
     const std::string_view bytes = found->second;
     expect(::write(descriptor, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()),
            "a file holds its bytes");
+    count_opened(name, bytes.size());
     return InputFile::adopt(descriptor, name.substr(name.find_last_of('/') + 1));
   }
 
@@ -104,6 +114,45 @@ void expect_whole(const Volume& volume, const DatasetInfo& info, const FieldInfo
          "a volume's range and masks are those that were told");
 }
 
+void expect_premultiplied(const engine::Image& image) {
+  constexpr float slack = 1e-5F;
+  for (std::size_t i = 0; i + 3 < image.rgba.size(); i += 4) {
+    const float opacity = image.rgba[i + 3];
+    expect(opacity >= 0 && opacity <= 1 + slack, "an opacity is between 0 and 1");
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float color = image.rgba[i + c];
+      expect(color >= 0 && color <= opacity + slack, "a color is between 0 and its opacity");
+    }
+  }
+}
+
+// The default view but for its size and its threshold, by both methods that viewers are served.
+void draw(std::unique_ptr<FileSource> source) {
+  if (source->info().grid.samples() > drawn_samples_max) return;
+  const int last_step = static_cast<int>(source->info().steps.size()) - 1;
+  Dataset dataset(std::move(source), "a", std::uint64_t{64} << 20);
+  ThreadPool pool(1);
+  for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
+    protocol::View view;
+    view.dataset = "a";
+    view.step = last_step;
+    view.image.width = 16;
+    view.image.height = 12;
+    view.method.name = method;
+    view.vector.min_magnitude = 0;
+    frame::Encoding encoding;
+    encoding.format = frame::Format::npy;  // keeps the linear picture
+    frame::Workspace workspace;
+    const auto done = frame::draw(view, dataset, encoding, pool, CancelToken(), workspace);
+    if (done) {
+      expect_premultiplied(workspace.space.image());
+    } else {
+      expect(done.error().kind != ErrorKind::internal, "no file is a fault of ours",
+             done.error().message);
+    }
+  }
+}
+
 }  // namespace
 
 std::string_view first_file(std::string_view input) { return input.substr(0, find_mark(input, 0)); }
@@ -136,7 +185,7 @@ std::shared_ptr<Files> files_of(std::string_view input, std::string main, Kept k
 }
 
 void read_dataset(const std::shared_ptr<Files>& files) {
-  const auto source = open_dataset(files);
+  auto source = open_dataset(files);
   if (!source) {
     expect(!source.error().message.empty(), "a refusal has a reason");
     expect(source.error().kind != ErrorKind::internal, "no file is a fault of ours",
@@ -163,6 +212,7 @@ void read_dataset(const std::shared_ptr<Files>& files) {
              volume.error().message);
     }
   }
+  draw(std::move(*source));
 }
 
 }  // namespace fuzz

@@ -28,7 +28,8 @@ std::shared_ptr<windsplat::data::Files> files_of(std::string_view input, std::st
 std::string_view first_file(std::string_view input);
 
 // Opens the dataset and reads its first and last field at its first and last step. What a reader
-// gives must be what the daemon would believe of a loader, and every volume must be whole.
+// gives must be what the daemon would believe of a loader, and every volume must be whole. Small
+// datasets are drawn too, and each pixel must be a premultiplied color.
 void read_dataset(const std::shared_ptr<windsplat::data::Files>& files);
 
 }  // namespace fuzz
