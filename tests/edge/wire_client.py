@@ -17,6 +17,7 @@ import urllib.parse
 
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 FIN, MASKED = 0x80, 0x80
+NO_MASK = bytes(4)  # masks nothing, and is allowed
 ACCEPT_SALT = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"  # RFC 6455, 1.3
 STREAM_PROTOCOL = "windsplat.v1"
 
@@ -191,6 +192,17 @@ def frame(opcode, payload=b"", fin=True, rsv=0, mask=None, length=None, width=No
     return bytes([first]) + size + mask + (masked(payload, mask) if mask else payload)
 
 
+def upgrade_request(authority, key, target="/v1/stream", protocols=STREAM_PROTOCOL, fields=""):
+    """The bytes that ask for a stream; `fields` are whole lines."""
+    return (f"GET {target} HTTP/1.1\r\nHost: {authority}\r\nUpgrade: websocket\r\n"
+            f"Connection: Upgrade\r\nSec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n"
+            f"Sec-WebSocket-Protocol: {protocols}\r\n{fields}\r\n").encode()
+
+
+def new_key():
+    return base64.b64encode(os.urandom(16)).decode()
+
+
 def accept_of(key):
     return base64.b64encode(hashlib.sha1((key + ACCEPT_SALT).encode()).digest()).decode()
 
@@ -202,11 +214,9 @@ class WebSocket(Connection):
         super().__init__(target, timeout, receive_buffer)
         # One thread may read while another sends; not over TLS, which Python 3.11 does not lock.
         self.lock = threading.Lock()
-        key = base64.b64encode(os.urandom(16)).decode()
-        self.raw((f"GET {target.base}v1/stream HTTP/1.1\r\nHost: {target.authority()}\r\n"
-                  f"Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: {key}\r\n"
-                  f"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: {STREAM_PROTOCOL}\r\n"
-                  f"{target.authorization()}\r\n").encode())
+        key = new_key()
+        self.raw(upgrade_request(target.authority(), key, f"{target.base}v1/stream",
+                                 fields=target.authorization()))
         answer = self.answer()
         if answer.status != 101:
             self.close()

@@ -1,4 +1,5 @@
 """Who may connect: origins, hosts, tokens, TLS."""
+import os
 import re
 import secrets
 import shutil
@@ -95,6 +96,19 @@ def remote(world, count):
     return "refuses to start and says why"
 
 
+@case("root behind a remote address", 3, 1)
+def remote_root(world, count):
+    if os.geteuid() != 0:
+        raise Untried("not root")
+    for _ in range(count):
+        done = subprocess.run([world.program, "serve", "--listen", "0.0.0.0:0", "--allow-remote",
+                               SAMPLE],
+                              capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        need(done.returncode == 2 and "--allow-root" in done.stderr,
+             f"it ended with {done.returncode}: {done.stderr[-200:]}")
+    return "refuses to start and says why"
+
+
 # --- TLS -----------------------------------------------------------------------------------------
 
 def with_tls(world):
@@ -173,6 +187,9 @@ def tls_versions(world, _count):
     weak = re.findall(r"^(?:Accepted|Preferred).*(?:RC4|3DES|DES-CBC|NULL|EXP|MD5).*$", done.stdout,
                       re.MULTILINE)
     need(not weak, f"weak ciphers: {weak[:2]}")
+    expensive = re.findall(r"^TLSv1\.\d .*(?:ffdhe|secp384r1|secp521r1|x448).*$", done.stdout,
+                      re.MULTILINE)
+    need(not expensive, f"groups whose key exchange is expensive: {expensive[:2]}")
     need("vulnerable" not in re.sub(r"not vulnerable", "", done.stdout), "heartbleed")
     return "TLS 1.2 and 1.3 alone, no weak cipher"
 

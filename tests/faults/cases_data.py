@@ -139,12 +139,19 @@ def changing(world, count):
 
 @case("more data than --memory-limit", 40, 8)
 def little_memory(world, count):
-    daemon = world.start("--memory-limit", "40M", "tornado:160x160x160", SAMPLE)
+    daemon = world.start("--memory-limit", "192M", "tornado:200x200x200", "tornado:170x170x170",
+                         SAMPLE)
+    listed = ask(daemon.port, "GET", "/v1/datasets").body
+    need(b"'wind' needs 91.6 MiB" in listed, "no reason why one is refused at the start")
     for n in range(count):
-        got = picture(daemon.port, "tornado:160x160x160", azimuth=n)
+        got = picture(daemon.port, "tornado:200x200x200", azimuth=n)
+        need(got.status == 404 and b"could not be opened" in got.body,
+             f"refused at the start, answered by {got.status}: {got.body[:100]!r}")
+        got = picture(daemon.port, "tornado:170x170x170", (512, 512), azimuth=n)
         need(got.status == 507, f"answered by {got.status}: {got.body[:100]!r}")
+        need(b"need 75.0 MiB" in got.body, f"without what is needed: {got.body[:200]!r}")
         need(picture(daemon.port, SAMPLE, azimuth=n).status == 200, "a small one is refused too")
-    return "507; a small dataset is drawn between"
+    return "refused at the start or 507; a small dataset is drawn between"
 
 
 @case("little address space (ulimit -v)", 10, 3)
@@ -186,10 +193,10 @@ def little_cgroup(world, count):
     except OSError as fault:
         raise Untried(f"no cgroup can be made here ({fault}): none was tried") from fault
     try:
-        daemon = world.start("--memory-limit", "200M", "tornado:256x256x256", SAMPLE,
+        daemon = world.start("--memory-limit", "200M", "tornado:180x180x180", SAMPLE,
                              prepare=lambda: (group / "cgroup.procs").write_text(str(os.getpid())))
         for n in range(count):
-            got = picture(daemon.port, "tornado:256x256x256", azimuth=n)
+            got = picture(daemon.port, "tornado:180x180x180", (512, 512), azimuth=n)
             need(got.status in (200, 503, 507), f"answered by {got.status}")
             check_good(daemon.port)
         need(daemon.stop(signal.SIGTERM) == 0, "it did not end with 0")

@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 
 from shim import Shim
@@ -119,6 +120,43 @@ def through_jumps(daemon, jump, count):
     check_good_stream(daemon.port)
 
 
+@case("a state folder that becomes read-only", 10, 2)
+def read_only_state(world, count):
+    if os.geteuid() != 0:
+        raise Untried("to mount a disk read-only needs root")
+    folder = world.new_folder()
+    if subprocess.run(["mount", "-t", "tmpfs", "none", folder], capture_output=True,
+                      check=False).returncode != 0:
+        raise Untried("no tmpfs can be mounted here")
+
+    def remount(how):
+        subprocess.run(["mount", "-o", f"remount,{how}", folder], check=True)
+
+    def refused(daemon, name):
+        view = {"dataset": SAMPLE}
+        for method, path, body in (("POST", "", view), ("PUT", f"/{name}", view),
+                                   ("DELETE", f"/{name}", None)):
+            got = ask(daemon.port, method, f"/v1/views{path}", body)
+            need(got.status == 507 and b"Read-only" in got.body, f"{method}: {got.status}")
+        need(ask(daemon.port, "GET", f"/v1/views/{name}").status == 200, "the view is gone")
+
+    try:
+        for _ in range(count):
+            daemon = world.start("--state-dir", str(folder), SAMPLE)
+            name = json.loads(ask(daemon.port, "POST", "/v1/views", {}).body)["id"]
+            remount("ro")
+            refused(daemon, name)
+            need(daemon.stop() == 0, "it did not end with 0")
+            again = world.start("--state-dir", str(folder), SAMPLE)
+            refused(again, name)
+            remount("rw")
+            need(ask(again.port, "DELETE", f"/v1/views/{name}").status == 204, "cannot delete")
+            need(again.stop() == 0, "it did not end with 0")
+    finally:
+        subprocess.run(["umount", "-l", folder], check=False)
+    return "507 with the reason; it starts on such a folder and serves its views"
+
+
 @case("a clock that jumps", 40, 8)
 def clock(world, count):
     shim = Shim(shim_of(world), world.new_folder())
@@ -211,6 +249,41 @@ def killed_loader(world, count):
     zombies = [c for c in children(daemon.pid) if state_of(c) == "Z"]
     need(len(zombies) <= 1, f"{len(zombies)} zombies")
     return f"{killed} killed, {failed} requests failed; the file is read again"
+
+
+@case("a loader that is stopped", 3, 1)
+def stopped_loader(world, count):
+    """By SIGSTOP, in the middle of playback as it were; another dataset's goes on meanwhile."""
+    folder = world.new_folder()
+    for name in ("wind", "other"):
+        subprocess.run([world.program, "synth", "tornado", "--dims", "32x32x32", "--steps", "12",
+                        "-o", folder / f"{name}.nc"], check=True, capture_output=True)
+    daemon = world.start(str(folder / "wind.nc"), str(folder / "other.nc"))
+
+    def step(dataset, n):
+        return ask(daemon.port, "GET",
+                   f"/v1/datasets/{dataset}/frame.jpg?width=32&height=24&step={n}")
+    longest = 0.0
+    for n in range(0, 3 * count, 3):
+        wait_for(lambda: not children(daemon.pid), PATIENCE_S, "idle loaders do not end")
+        need(step("wind", n).status == 200, "the file is not drawn")
+        stopped = children(daemon.pid)[0]
+        os.kill(stopped, signal.SIGSTOP)
+        answers = []
+        began = time.monotonic()
+        asking = threading.Thread(target=lambda: answers.append(step("wind", n + 1)))
+        asking.start()
+        for other in range(3):
+            need(step("other", n + other).status == 200, "another dataset is held up")
+        need(asking.is_alive(), "the stopped loader answered")
+        asking.join()
+        longest = max(longest, time.monotonic() - began)
+        need(answers[0].status == 422, f"answered by {answers[0].status}")
+        need(b"made no progress for 15.0 s" in answers[0].body, f"{answers[0].body[:200]!r}")
+        need(state_of(stopped) in ("", "Z"), "the stopped loader is still there")
+        need(step("wind", n + 1).status == 200, "no new loader takes its place")
+    need(longest < 25, f"it took {longest:.1f} s")
+    return f"refused after {longest:.1f} s with the reason, read again by another loader"
 
 
 def children(pid):

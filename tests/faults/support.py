@@ -1,6 +1,5 @@
 """What the fault scripts share: a daemon with its log, requests, a stream by its bytes, and what
 /proc says of a process. Python's own library alone. Linux only."""
-import base64
 import collections
 import http.client
 import json
@@ -11,10 +10,14 @@ import socket
 import ssl
 import struct
 import subprocess
+import sys
 import threading
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "tests" / "edge"))
+from wire_client import NO_MASK, frame, new_key, upgrade_request  # noqa: E402
+
 FINAL = 1  # of a frame header's flags
 KIB, MIB = 1024, 1024 * 1024
 SAMPLE = "tornado:24x24x24"  # a dataset, and its id
@@ -241,15 +244,12 @@ class Stream:
         if door.tls:
             self.socket = door.tls.wrap_socket(self.socket, server_hostname=door.host)
         self.buffer, self.rev = b"", 0
-        key = base64.b64encode(os.urandom(16)).decode()
         if door.token:
             headers = [("Authorization", f"Bearer {door.token}"), *headers]
         more = "".join(f"{name}: {value}\r\n" for name, value in headers)
         host = f"[{door.host}]" if ":" in door.host else door.host
-        self.socket.sendall((
-            f"GET {target} HTTP/1.1\r\nHost: {host}:{door.port}\r\nUpgrade: websocket\r\n"
-            f"Connection: Upgrade\r\nSec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n"
-            f"Sec-WebSocket-Protocol: {protocols}\r\n{more}\r\n").encode())
+        self.socket.sendall(
+            upgrade_request(f"{host}:{door.port}", new_key(), target, protocols, more))
         head = b""
         while b"\r\n\r\n" not in self.buffer:
             self.receive()
@@ -284,43 +284,54 @@ class Stream:
 
     def send(self, opcode, payload=b"", fin=True, reserved=0, length=None):
         """`length`: the one told, if another than the payload's."""
-        size = len(payload) if length is None else length
-        if size < 126:
-            told = bytes([0x80 | size])
-        elif size < 65536:
-            told = b"\xfe" + struct.pack(">H", size)
-        else:
-            told = b"\xff" + struct.pack(">Q", size)
-        first = (0x80 if fin else 0) | (reserved << 4) | opcode
-        # A mask of zeros masks nothing and is allowed.
-        self.socket.sendall(bytes([first]) + told + bytes(4) + payload)
+        self.socket.sendall(frame(opcode, payload, fin, reserved, NO_MASK, length))
 
     def say(self, message):
         self.send(1, json.dumps(message).encode())
 
+    def frame(self):
+        """First byte and payload of the next frame; a ping is answered, an end is Closed."""
+        first, second = self.take(2)
+        size = second & 0x7F
+        if size == 126:
+            size = struct.unpack(">H", self.take(2))[0]
+        elif size == 127:
+            size = struct.unpack(">Q", self.take(8))[0]
+        part = self.take(size)
+        kind = first & 0x0F
+        if kind == 8:
+            code = struct.unpack(">H", part[:2])[0] if part else 0
+            raise Closed(code, part[2:].decode())
+        if kind == 9:
+            self.send(10, part)
+        return first, part
+
     def message(self):
-        """Opcode and payload of the next whole message; pings are answered, an end is Closed."""
+        """Opcode and payload of the next whole message; an end is Closed."""
         opcode, payload = None, b""
         while True:
-            first, second = self.take(2)
-            size = second & 0x7F
-            if size == 126:
-                size = struct.unpack(">H", self.take(2))[0]
-            elif size == 127:
-                size = struct.unpack(">Q", self.take(8))[0]
-            part = self.take(size)
+            first, part = self.frame()
             kind = first & 0x0F
-            if kind == 8:
-                code = struct.unpack(">H", part[:2])[0] if part else 0
-                raise Closed(code, part[2:].decode())
-            if kind == 9:
-                self.send(10, part)
             if kind >= 8:
                 continue
             opcode = kind or opcode
             payload += part
             if first & 0x80:
                 return opcode, payload
+
+    def round_trip(self):
+        """A ping and its pong: the daemon has dealt with all that was sent before."""
+        self.send(9, b"settled")
+        while self.frame() != (0x8A, b"settled"):
+            pass
+
+    def request_id(self):
+        """By which the daemon's log names this stream."""
+        for line in self.head.split(b"\r\n"):
+            name, _, value = line.partition(b":")
+            if name.lower() == b"x-request-id":
+                return value.strip().decode()
+        raise Failed(f"the answer to the upgrade has no X-Request-Id: {self.head!r}")
 
     def until_closed(self):
         """The code by which the daemon ends it; what comes before is thrown away."""
