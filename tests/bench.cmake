@@ -53,9 +53,16 @@ windsplat_smoke(memory python3 ${bench_dir}/memory.py --program=$<TARGET_FILE:wi
 windsplat_smoke(load bench_load --program=$<TARGET_FILE:windsplat> --dims=32x16x8 --rounds=1)
 windsplat_smoke(playback python3 ${bench_dir}/playback.py --program=$<TARGET_FILE:windsplat>
   --dims=32x16x8 --steps=6 --size=64x48 --memory-limit=512M)
+if(NOT WINDSPLAT_SANITIZE)  # sanitizers take more memory than the limit
+  windsplat_smoke(memory_limit python3 ${bench_dir}/playback.py
+    --program=$<TARGET_FILE:windsplat> --sessions=8 --apart --steps=12 --seconds=8 --size=160x120
+    --memory-limit=192M --check-memory)
+endif()
 windsplat_smoke(budgets python3 ${bench_dir}/budgets.py --program=$<TARGET_FILE:windsplat>
   --dataset=climate:32x16x6 --size=160x120 --frames=10 --rest=1 --budgets=16,66 --max-errors=0.05)
 windsplat_smoke(links python3 ${bench_dir}/links.py --program=$<TARGET_FILE:windsplat> --smoke)
+windsplat_smoke(preauth_cost python3 ${bench_dir}/preauth_cost.py --program=$<TARGET_FILE:windsplat>
+  --count=2 --key=P-256)
 windsplat_smoke(viewers python3 ${bench_dir}/viewers.py --program=$<TARGET_FILE:windsplat> --smoke)
 # Where there is no VTK it only says so.
 windsplat_smoke(peers python3 ${bench_dir}/peers/compare.py --build=${PROJECT_BINARY_DIR}

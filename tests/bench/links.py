@@ -53,7 +53,7 @@ def measure(options, how, mbit, trip_ms):
     daemon = None
     try:
         daemon = link.start([options.program, "serve", options.dataset, "--listen",
-                             f"{link.host}:0", "--allow-remote"])
+                             f"{link.host}:0", "--allow-remote", "--allow-root"])
         port = int(daemon.stdout.readline().strip().rstrip("/").rsplit(":", 1)[1])
         viewer = LinkViewer(link.host, link.port_of(port))
         width, height = map(int, options.size.split("x"))

@@ -4,298 +4,49 @@ daemon holds of memory, descriptors and threads, and whether it grows. Markdown 
 only.
 
 Usage: soak.py [--program=windsplat] [--dataset=tornado:32x32x32] [--minutes=20] [--sessions=200]
-       [--stay=30] [--size=160x120] [--every=5] [--max-slope=8] [--tls] [--smoke]
-       [-- options of serve]
+       [--mix=normal:8,hostile:1,deaf:1] [--stay=30] [--size=160x120] [--every=5] [--max-slope=8]
+       [--samples=FILE] [--tls] [--smoke] [-- options of serve]
 
 So many sessions at a time; each stays for about --stay seconds and another one of its kind takes
 its place. Normal ones change their view, wait for frames and acknowledge them, now and then ask
 for a still, save a view or ask by HTTP. Hostile ones send frames that are none, broken JSON,
 floods, half a message and a reset, headers letter by letter, half-open connections. Deaf ones ask
-and never read. --tls: all of it over TLS, by a certificate that openssl makes; hostile ones then
+and never read. --mix can also ask for `drag`, who change their view all the time, `slow`, who read
+20 kB/s, and `cut`, whose connection is reset within seconds; the numbers are shares of the
+sessions. --tls: all of it over TLS, by a certificate that openssl makes; hostile ones then
 also leave in the middle of a handshake or speak no TLS. Memory is looked at every --every seconds.
 The slope is the least squares' line through the least of each of twelve stretches of the samples
-after the first quarter (the warm-up), with its standard error: a large picture takes some 15 MB for
-a moment, and whether one is drawn when the clock strikes is chance; what stays shows between them.
-The line through the stretches' means, chance and all, is told beside it.
+after the first quarter (the warm-up), with its 95 % confidence interval: a large picture takes some
+15 MB for a moment, and whether one is drawn when the clock strikes is chance; what stays shows
+between them. The line through the stretches' means, chance and all, is printed beside it.
 
 Failures: a daemon that dies, stops answering /livez or ends with another code than 0; a slope
-above two standard errors and above --max-slope MB/hour; descriptors, threads or sessions that are
+above its interval's half width and above --max-slope MB/hour; descriptors, threads or sessions
+that are
 not back at the start once all have left. --smoke: some seconds, without the slope. Exit code 0:
 none."""
 import argparse
 import asyncio
-import base64
 import json
 import math
 import os
 import pathlib
-import random
 import resource
-import socket
 import ssl
-import struct
 import subprocess
 import sys
 import tempfile
 import time
 import urllib.request
 
+from soak_clients import GONE, Counts, kinds_of, seat
 from stream_client import Daemon, status_bytes
 
 MB = 1e6
 WARM_UP_SHARE, STRETCHES = 0.25, 12
 LEAVE_S = 100  # a deaf one is given up after its write's deadline or 60 s of silence
-DEAF_SIZE = (1280, 720)
-GONE = (OSError, EOFError, asyncio.IncompleteReadError, asyncio.TimeoutError, ConnectionError)
-
-
-class Client:
-    def __init__(self, options, port, chance, number):
-        self.options, self.port, self.chance = options, port, chance
-        # Limits are those of addresses: each seat has its own, beside the one that looks at health.
-        self.address = f"127.0.{1 + number // 250}.{2 + number % 250}"
-        self.reader = self.writer = None
-        self.rev = 0
-
-    async def connect(self, limit=1 << 16, plain=False):
-        context = None if plain else self.options.context
-        self.reader, self.writer = await asyncio.wait_for(
-            asyncio.open_connection("127.0.0.1", self.port, limit=limit, ssl=context,
-                                    local_addr=(self.address, 0)), 20)
-
-    async def upgrade(self):
-        key = base64.b64encode(os.urandom(16)).decode()
-        self.writer.write((
-            f"GET /v1/stream HTTP/1.1\r\nHost: 127.0.0.1:{self.port}\r\nUpgrade: websocket\r\n"
-            f"Connection: Upgrade\r\nSec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n"
-            "Sec-WebSocket-Protocol: windsplat.v1\r\n\r\n").encode())
-        head = await asyncio.wait_for(self.reader.readuntil(b"\r\n\r\n"), 20)
-        if b" 101 " not in head.split(b"\r\n")[0]:
-            raise EOFError("refused")
-
-    def send(self, opcode, payload, fin=True, length=None):
-        size = len(payload) if length is None else length
-        if size < 126:
-            told = bytes([0x80 | size])
-        elif size < 65536:
-            told = b"\xfe" + struct.pack(">H", size)
-        else:
-            told = b"\xff" + struct.pack(">Q", size)
-        self.writer.write(bytes([(0x80 if fin else 0) | opcode]) + told + bytes(4) + payload)
-
-    def patch(self, size):
-        self.rev += 1
-        angle = self.chance.uniform(0, 6.28)
-        view = {"dataset": self.options.dataset, "image": {"width": size[0], "height": size[1]},
-                "camera": {"eye": [2.4 * math.sin(angle), -2.4 * math.cos(angle), 1.2]}}
-        self.send(1, json.dumps({"type": "patch", "rev": self.rev, "t": self.rev,
-                                 "patch": view}).encode())
-
-    async def message(self):
-        first, second = await self.reader.readexactly(2)
-        size = second & 0x7F
-        if size == 126:
-            size = struct.unpack(">H", await self.reader.readexactly(2))[0]
-        elif size == 127:
-            size = struct.unpack(">Q", await self.reader.readexactly(8))[0]
-        payload = await self.reader.readexactly(size)
-        if first & 0x0F == 8:
-            raise EOFError("closed")
-        if first & 0x0F == 9:
-            self.send(10, payload)
-        return first & 0x0F, payload
-
-    def close(self, reset=False):
-        if self.writer is None:
-            return
-        if reset:
-            self.writer.transport.abort()
-        else:
-            self.writer.close()
-
-
-class Counts:
-    def __init__(self):
-        self.came = {"normal": 0, "hostile": 0, "deaf": 0}
-        self.refused = self.frames = self.requests = 0
-        self.kinds = {}
-
-
-async def normal(client, counts, until):
-    await client.connect(1 << 20)
-    await client.upgrade()
-    client.patch(client.options.size)
-    while time.monotonic() < until:
-        opcode, payload = await asyncio.wait_for(client.message(), 60)
-        if opcode != 2:
-            if b'"unchanged"' in payload or b'"error"' in payload:
-                client.patch(client.options.size)
-            continue
-        counts.frames += 1
-        seq = struct.unpack_from("<I", payload, 8)[0]
-        client.send(1, json.dumps({"type": "ack", "seq": seq, "decodeMs": 2}).encode())
-        await asyncio.sleep(client.chance.uniform(0.2, 2))  # somebody looks at it
-        turn = client.chance.random()
-        if turn < 0.05:
-            client.send(1, json.dumps({"type": "still", "id": client.rev + 1, "width": 64,
-                                       "height": 48, "format": "png", "scale": 1}).encode())
-        elif turn < 0.15:
-            await request(client, counts)
-        client.patch(client.options.size)
-        await client.writer.drain()
-    if client.chance.random() < 0.5:
-        client.send(8, struct.pack(">H", 1000))
-        await client.writer.drain()
-
-
-async def request(client, counts):
-    """A picture or a saved view by HTTP."""
-    reader, writer = await asyncio.open_connection("127.0.0.1", client.port,
-                                                   ssl=client.options.context,
-                                                   local_addr=(client.address, 0))
-    try:
-        body = json.dumps({"dataset": client.options.dataset}).encode()
-        target, more = client.chance.choice([
-            (f"GET /v1/datasets/{client.options.dataset}/frame.jpg?width=64&height=48"
-             f"&azimuth={client.chance.uniform(0, 360):.3f}", b""),
-            ("GET /metrics", b""), ("GET /v1/datasets", b""), ("POST /v1/views", body)])
-        writer.write((f"{target} HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n"
-                      "Content-Type: application/json\r\n"
-                      f"Content-Length: {len(more)}\r\n\r\n").encode() + more)
-        answer = await asyncio.wait_for(reader.read(), 30)
-        counts.requests += 1
-        if b" 201 " in answer[:20]:
-            name = json.loads(answer.split(b"\r\n\r\n", 1)[1])["id"]
-            await delete(client, name)
-    finally:
-        writer.close()
-
-
-async def delete(client, name):
-    reader, writer = await asyncio.open_connection("127.0.0.1", client.port,
-                                                   ssl=client.options.context,
-                                                   local_addr=(client.address, 0))
-    writer.write((f"DELETE /v1/views/{name} HTTP/1.1\r\nHost: 127.0.0.1\r\n"
-                  "Connection: close\r\n\r\n").encode())
-    await asyncio.wait_for(reader.read(), 30)
-    writer.close()
-
-
-async def deaf(client, _counts, until):
-    await client.connect(1024)
-    await client.upgrade()
-    client.writer.transport.pause_reading()  # over TLS Python still takes 256 KiB
-    while time.monotonic() < until and not client.writer.is_closing():
-        client.patch(DEAF_SIZE)
-        await asyncio.wait_for(client.writer.drain(), 5)
-        await asyncio.sleep(1)
-
-
-# --- what hostile ones do ------------------------------------------------------------------------
-
-async def bad_frames(client):
-    await client.upgrade()
-    spoil = client.chance.choice([(3, b"", True, None), (2, b"xx", True, None),
-                                  (1, b"\xff", True, None), (1, b"{}", True, 1 << 63),
-                                  (0, b"", True, None), (9, bytes(126), True, None)])
-    client.send(*spoil)
-    while True:
-        await asyncio.wait_for(client.message(), 20)
-
-
-async def bad_json(client):
-    await client.upgrade()
-    for _ in range(50):
-        client.send(1, client.chance.choice([b"{", b"[" * 4000, b'{"type": "ack", "seq": 1e9}',
-                                             b'{"type": "patch", "rev": 1, "patch": {"a": 1}}']))
-        await asyncio.wait_for(client.message(), 20)
-
-
-async def flood(client):
-    await client.upgrade()
-    for n in range(400):
-        client.patch((32, 24))
-        if n % 50 == 0:
-            await asyncio.wait_for(client.writer.drain(), 20)
-            await asyncio.sleep(0.01)
-
-
-async def half_message(client):
-    await client.upgrade()
-    client.send(1, b'{"type": "pa', length=4000)
-    await client.writer.drain()
-    await asyncio.sleep(client.chance.uniform(0, 3))
-
-
-async def slow_header(client):
-    for letter in b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: " + b"a" * 100:
-        client.writer.write(bytes([letter]))
-        await client.writer.drain()
-        await asyncio.sleep(0.25)
-
-
-async def half_open(client):
-    client.writer.write(b"POST /v1/frames HTTP/1.1\r\nHost: 127.0.0.1\r\n"
-                        b"Content-Length: 100\r\n\r\n{")
-    await client.writer.drain()
-    client.writer.get_extra_info("socket").shutdown(socket.SHUT_WR)  # over TLS no goodbye of its
-    await asyncio.wait_for(client.reader.read(), 20)
-
-
-async def fragments(client):
-    await client.upgrade()
-    client.send(1, b"", fin=False)
-    for _ in range(2000):
-        client.send(0, b"", fin=False)
-        await client.writer.drain()
-        await asyncio.sleep(0.005)
-
-
-async def half_handshake(client):
-    hello = bytes.fromhex("1603010200010001fc0303") + bytes(32)
-    client.writer.write(hello[:client.chance.randrange(1, len(hello))])
-    await client.writer.drain()
-    await asyncio.sleep(client.chance.uniform(0, 8))
-
-
-async def no_tls(client):
-    client.writer.write(client.chance.choice([b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
-                                              b"\x16\x03\x01\xff\xff" + bytes(70000), b"\0"]))
-    await asyncio.wait_for(client.reader.read(), 20)
-
-
-BEFORE_TLS = [half_handshake, no_tls]
-HOSTILE = [bad_frames, bad_json, flood, half_message, slow_header, half_open, fragments]
-
-
-async def hostile(client, counts, until):
-    way = client.chance.choice(HOSTILE + (BEFORE_TLS if client.options.context else []))
-    counts.kinds[way.__name__] = counts.kinds.get(way.__name__, 0) + 1
-    await client.connect(plain=way in BEFORE_TLS)
-    await asyncio.wait_for(way(client), max(1, until - time.monotonic()))
-
-
-WAYS = {"normal": normal, "hostile": hostile, "deaf": deaf}
-
-
-async def seat(number, options, port, counts, end):
-    """One place, taken by one client after the other of its kind."""
-    chance = random.Random(number + options.seed)
-    kind = {0: "hostile", 1: "deaf"}.get(number % 10, "normal")
-    await asyncio.sleep(chance.uniform(0, min(5, options.stay)))
-    while time.monotonic() < end:
-        client = Client(options, port, chance, number)
-        until = min(end, time.monotonic() + chance.uniform(0.2, 1.8) * options.stay)
-        counts.came[kind] += 1
-        try:
-            await WAYS[kind](client, counts, until)
-        except GONE as fault:
-            if isinstance(fault, EOFError) and "refused" in str(fault):
-                counts.refused += 1
-                await asyncio.sleep(1)  # as its Retry-After asks, at least
-        finally:
-            client.close(reset=kind != "normal" or chance.random() < 0.3)
-        await asyncio.sleep(chance.uniform(0, 0.5))
+# Student's t for 95 %, by degrees of freedom: 1, 2, ...
+STUDENT_T = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23]
 
 
 # --- what is looked at ---------------------------------------------------------------------------
@@ -345,7 +96,9 @@ def mean(values):
 
 
 def slope(samples, of_stretch):
-    """MB/hour and its standard error, of one figure a stretch of what came after the warm-up."""
+    """MB/hour and half of its 95 % confidence interval, of one figure a stretch of what came after
+    the warm-up. Stretches are long beside what disturbs a sample; where their residuals are still
+    correlated the interval is widened accordingly."""
     kept = samples[int(WARM_UP_SHARE * len(samples)):]
     count = min(STRETCHES, len(kept))
     if count < 3:
@@ -355,12 +108,15 @@ def slope(samples, of_stretch):
         part = kept[n * len(kept) // count:(n + 1) * len(kept) // count]
         points.append((mean([t for t, _ in part]) / 3600,
                        of_stretch([s["rss"] for _, s in part]) / MB))
-    mean_x = sum(x for x, _ in points) / count
-    mean_y = sum(y for _, y in points) / count
+    mean_x = mean([x for x, _ in points])
+    mean_y = mean([y for _, y in points])
     square = sum((x - mean_x) ** 2 for x, _ in points)
     rise = sum((x - mean_x) * (y - mean_y) for x, y in points) / square
-    rest = sum((y - mean_y - rise * (x - mean_x)) ** 2 for x, y in points)
-    return rise, math.sqrt(rest / (count - 2) / square)
+    rest = [y - mean_y - rise * (x - mean_x) for x, y in points]
+    squares = sum(one * one for one in rest)
+    alike = sum(a * b for a, b in zip(rest, rest[1:])) / squares if squares else 0
+    widened = math.sqrt((1 + alike) / (1 - alike)) if alike > 0 else 1
+    return rise, STUDENT_T[count - 3] * widened * math.sqrt(squares / (count - 2) / square)
 
 
 def settle(options, daemon, before, failures):
@@ -392,23 +148,24 @@ def report(options, counts, samples, before, after, failures):
     took = samples[-1][0] if samples else 0
     highest = max((s["rss"] for _, s in samples), default=0)
     how = "over TLS " if options.context else ""
-    print(f"{options.sessions} sessions {how}at a time for {took / 60:.1f} minutes: "
-          f"{counts.came['normal']} normal ones came, {counts.came['hostile']} hostile, "
-          f"{counts.came['deaf']} that never read; {counts.frames} frames, {counts.requests} "
-          f"requests, {counts.refused} refused. Hostile: "
-          + ", ".join(f"{n} {name}" for name, n in sorted(counts.kinds.items())) + ".\n")
+    came = ", ".join(f"{n} {kind}" for kind, n in counts.came.items() if n)
+    print(f"{options.sessions} sessions {how}at a time for {took / 60:.1f} minutes: {came} came; "
+          f"{counts.frames} frames, {counts.requests} requests, {counts.refused} refused. Hostile: "
+          + (", ".join(f"{n} {name}" for name, n in sorted(counts.kinds.items())) or "none")
+          + ".\n")
     print("| | before | most | after |\n|---|---|---|---|")
     print(f"| resident, MB | {before['rss'] / MB:.1f} | {highest / MB:.1f} "
           f"| {after['rss'] / MB:.1f} |")
     for name, key in (("descriptors", "fds"), ("threads", "threads")):
         most = max((s[key] for _, s in samples), default=0)
         print(f"| {name} | {before[key]} | {most} | {after[key]} |")
-    print("\nSlope of resident memory after the first quarter: "
+    print("\nSlope of resident memory after the first quarter, with its 95 % interval: "
           f"{rise:.2f} +- {error:.2f} MB/hour of what stays, "
           f"{rise_of_means:.2f} +- {error_of_means:.2f} of the means")
-    if not options.smoke and rise > max(2 * error, options.max_slope):
+    if not options.smoke and rise > max(error, options.max_slope):
         failures.append(f"memory grows by {rise:.2f} +- {error:.2f} MB/hour")
-    if counts.frames == 0 or counts.requests == 0 and not options.smoke:
+    asks = "normal" in options.kinds and not options.smoke
+    if counts.frames == 0 or counts.requests == 0 and asks:
         failures.append("no viewer was ever served")
 
 
@@ -419,10 +176,12 @@ def parsed_options():
     parser.add_argument("--dataset", default="tornado:32x32x32")
     parser.add_argument("--minutes", type=float, default=20)
     parser.add_argument("--sessions", type=int, default=200)
+    parser.add_argument("--mix", default="normal:8,hostile:1,deaf:1", help="kinds and shares")
     parser.add_argument("--stay", type=float, default=30, help="seconds of a session, about")
     parser.add_argument("--size", default="160x120")
     parser.add_argument("--every", type=float, default=5, help="seconds between samples")
     parser.add_argument("--max-slope", type=float, default=8, help="MB/hour that are no failure")
+    parser.add_argument("--samples", help="a file for seconds and resident MB, a line a sample")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--tls", action="store_true", help="over TLS")
     parser.add_argument("--smoke", action="store_true")
@@ -430,6 +189,10 @@ def parsed_options():
     options = parser.parse_args()
     if options.smoke:
         options.minutes, options.sessions, options.stay, options.every = 0.1, 30, 2, 0.5
+    try:
+        options.kinds = kinds_of(options.mix)
+    except ValueError as fault:
+        parser.error(str(fault))
     options.size = tuple(int(word) for word in options.size.split("x"))
     return options
 
@@ -466,6 +229,9 @@ def measure(options, folder):
     asyncio.run(soak(options, daemon, counts, samples, failures))
     if daemon.child.poll() is None:
         after = settle(options, daemon, before, failures)
+        if options.samples:
+            pathlib.Path(options.samples).write_text(
+                "".join(f"{t:.1f} {s['rss'] / MB:.2f}\n" for t, s in samples))
         report(options, counts, samples, before, after, failures)
     daemon.stop()
     if daemon.child.returncode != 0:
