@@ -62,6 +62,23 @@ sockaddr_in next_source() {
   return source;
 }
 
+// 0, or errno. A signal that interrupts connect(2), as the fuzzer's alarm every 13 s does, leaves it
+// going on: whether it succeeded is told by SO_ERROR once the socket can be written to (POSIX).
+int connect_to(int socket, const sockaddr_in& to) {
+  if (::connect(socket, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0) return 0;
+  if (errno != EINTR) return errno;
+  pollfd about{socket, POLLOUT, 0};
+  int ready = 0;
+  do {
+    ready = ::poll(&about, 1, static_cast<int>(end_of_life.count()));
+  } while (ready < 0 && errno == EINTR);
+  if (ready == 0) return ETIMEDOUT;
+  int failed = 0;
+  socklen_t size = sizeof failed;
+  const bool told = ready > 0 && ::getsockopt(socket, SOL_SOCKET, SO_ERROR, &failed, &size) == 0;
+  return told ? failed : errno;
+}
+
 bool is_token(std::string_view name) {
   constexpr std::string_view marks = "!#$%&'*+-.^_`|~";
   return !name.empty() && std::all_of(name.begin(), name.end(), [marks](char c) {
@@ -134,8 +151,8 @@ Peer::Peer() {
   const sockaddr_in from = next_source();
   expect(::bind(socket_, reinterpret_cast<const sockaddr*>(&from), sizeof from) == 0,
          "an address of loopback");
-  expect(::connect(socket_, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0,
-         "the server can be connected to", std::to_string(errno));
+  const int failed = connect_to(socket_, to);
+  expect(failed == 0, "the server can be connected to", std::to_string(failed));
 }
 
 Peer::~Peer() { ::close(socket_); }
