@@ -105,6 +105,12 @@ fs::path end_of_links(fs::path path) {
   return path;
 }
 
+fs::path part_of(const fs::path& target) {
+  fs::path part = target;
+  part += "." + std::to_string(::getpid()) + ".part";
+  return part;
+}
+
 bool is_stream(const fs::path& path) {
   if (inherited_descriptor(path) >= 0) return true;
   std::error_code ignored;
@@ -124,10 +130,7 @@ Result<void> write_whole_file(const fs::path& path, std::string_view bytes, Sync
   if (fs::is_symlink(fs::symlink_status(target, ignored))) {
     return file_error("cannot write", path, ELOOP);
   }
-  fs::path part = target;
-  part += ".";
-  part += std::to_string(::getpid());
-  part += ".part";
+  const fs::path part = part_of(target);
   const int file = create(part);
   if (file < 0) return file_error("cannot create", path, errno);
   if (replaces) fs::permissions(part, status.permissions(), ignored);

@@ -23,6 +23,9 @@ Result<void> write_whole_file(const std::filesystem::path& path, std::string_vie
 // another: one of them.
 std::filesystem::path end_of_links(std::filesystem::path path);
 
+// The name that a file has until it is whole: of this process alone, beside its place.
+std::filesystem::path part_of(const std::filesystem::path& target);
+
 // Whether a name is that of a pipe, a device or a descriptor of this process.
 bool is_stream(const std::filesystem::path& path);
 

@@ -85,13 +85,22 @@ TEST(CliSystem, APictureGoesThroughALinkToAStreamAndToStdout) {
   EXPECT_THAT(shell(draw + folder.file("without-ending")), HasSubstr("must end in"));
 }
 
+std::string part_of(const Process& process, const std::string& path) {
+  return path + "." + std::to_string(process.id()) + ".part";
+}
+
+bool begins_to_write(const Process& process, const std::string& path) {
+  const std::string part = part_of(process, path);
+  for (int i = 0; i < 6000 && !fs::exists(part); ++i) usleep(10'000);
+  return fs::exists(part);
+}
+
 TEST(CliSystem, AnInterruptedSynthLeavesNothing) {
   for (const int signal : {SIGINT, SIGTERM}) {
     const Folder folder;
     const std::string path = folder.file("large.nc");
     Process process({"synth", "tornado", "--dims", "96x96x96", "--steps", "100000", "-o", path});
-    for (int i = 0; i < 6000 && !fs::exists(path + ".part"); ++i) usleep(10'000);
-    ASSERT_TRUE(fs::exists(path + ".part")) << process.messages();
+    ASSERT_TRUE(begins_to_write(process, path)) << process.messages();
     process.send(signal);
     EXPECT_EQ(process.wait(), 130);
     EXPECT_THAT(process.messages(), HasSubstr("interrupted"));
@@ -104,13 +113,29 @@ TEST(CliSystem, ASynthThatIsInterruptedTwiceLeavesNothing) {
     const Folder folder;
     const std::string path = folder.file("large.nc");
     Process process({"synth", "tornado", "--dims", "96x96x96", "--steps", "100000", "-o", path});
-    for (int i = 0; i < 6000 && !fs::exists(path + ".part"); ++i) usleep(10'000);
-    ASSERT_TRUE(fs::exists(path + ".part")) << process.messages();
+    ASSERT_TRUE(begins_to_write(process, path)) << process.messages();
     process.send(SIGINT);
     process.send(SIGTERM);  // one SIGINT that is not yet seen would swallow the next
     EXPECT_EQ(process.wait(), 130);
     EXPECT_TRUE(fs::is_empty(fs::path(path).parent_path()));
   }
+}
+
+TEST(CliSystem, ASynthThatIsInterruptedTwiceLeavesAnotherOnesFileAlone) {
+  const Folder folder;
+  const std::string path = folder.file("large.nc");
+  const std::vector<std::string> words{"synth",   "tornado", "--dims", "96x96x96",
+                                       "--steps", "100000",  "-o",     path};
+  Process other(words);
+  ASSERT_TRUE(begins_to_write(other, path)) << other.messages();
+  Process process(words);
+  ASSERT_TRUE(begins_to_write(process, path)) << process.messages();
+  process.send(SIGINT);
+  process.send(SIGTERM);
+  EXPECT_EQ(process.wait(), 130);
+  EXPECT_TRUE(fs::exists(part_of(other, path)));
+  other.send(SIGINT);
+  EXPECT_EQ(other.wait(), 130);
 }
 
 TEST(CliSystem, SynthDoesNotTakeThePlaceOfAPipe) {

@@ -160,18 +160,19 @@ class Writer {
 
   ~Writer() {
     close();
-    if (!finished_) {
-      std::remove(part_.c_str());
-    }
+    if (is_part_) std::remove(part_.c_str());
   }
 
   Result<void> write() {
-    if (auto done = call("creating the file",
-                         [&] { return nc_create(part_.c_str(), NC_NETCDF4 | NC_CLOBBER, &ncid_); });
+    std::remove(part_.c_str());  // of a process that had this one's number and was killed
+    if (auto done =
+            call("creating the file",
+                 [&] { return nc_create(part_.c_str(), NC_NETCDF4 | NC_NOCLOBBER, &ncid_); });
         !done) {
       ncid_ = -1;
       return done;
     }
+    is_part_ = true;
     if (auto done = call("describing the data", [&] { return define(); }); !done) {
       return done;
     }
@@ -188,7 +189,7 @@ class Writer {
       return make_error(ErrorKind::internal, cf::in_quotes(path_) + " cannot take its name: " +
                                                  std::generic_category().message(errno));
     }
-    finished_ = true;
+    is_part_ = false;
     return {};
   }
 
@@ -403,7 +404,7 @@ class Writer {
   std::string part_;
   std::string path_;
   CancelToken cancel_;
-  bool finished_ = false;
+  bool is_part_ = false;  // a file of the name part_ is there
   int ncid_ = -1;
   int status_ = NC_NOERR;
   int time_ = -1;
@@ -414,7 +415,7 @@ class Writer {
 
 }  // namespace
 
-std::string netcdf_part(const std::string& path) { return end_of_links(path).native() + ".part"; }
+std::string netcdf_part(const std::string& path) { return part_of(end_of_links(path)).native(); }
 
 Result<void> write_netcdf(Source& source, const std::string& path, const CancelToken& cancel) {
   try {
