@@ -62,8 +62,8 @@ sockaddr_in next_source() {
   return source;
 }
 
-// 0, or errno. A signal that interrupts connect(2), as the fuzzer's alarm every 13 s does, leaves it
-// going on: whether it succeeded is told by SO_ERROR once the socket can be written to (POSIX).
+// 0, or errno. A signal that interrupts connect(2), as the fuzzer's alarm every 13 s does, leaves
+// it going on: SO_ERROR says whether it succeeded once the socket can be written to (POSIX).
 int connect_to(int socket, const sockaddr_in& to) {
   if (::connect(socket, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0) return 0;
   if (errno != EINTR) return errno;
