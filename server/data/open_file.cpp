@@ -132,6 +132,7 @@ SourceResult open_dataset(const std::shared_ptr<Files>& files) {
     if (const auto ok = check_axes((*source)->info().grid); !ok) {
       return make_error(ErrorKind::bad_data, shown + ": " + ok.error().message);
     }
+    files->stop_counting();  // a series or store may go on to open any number
     return source;
   } catch (const std::bad_alloc&) {
     return make_error(ErrorKind::out_of_memory, "no memory to open " + shown);

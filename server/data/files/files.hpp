@@ -64,15 +64,20 @@ class Files {
   virtual bool exists(const std::string& name) = 0;
   // The companions that were opened so far, the first few hundred of them.
   [[nodiscard]] virtual std::vector<Companion> companions() const { return {}; }
-  // Bytes of all files that were opened so far.
+  // Bytes of all files that were opened until stop_counting(), which forgets their names.
   [[nodiscard]] std::uint64_t opened_bytes() const { return opened_bytes_; }
+  void stop_counting() {
+    counts_ = false;
+    opened_.clear();
+  }
 
  protected:
   void count_opened(const std::string& name, std::uint64_t bytes) {
-    if (opened_.insert(name).second) opened_bytes_ += bytes;
+    if (counts_ && opened_.insert(name).second) opened_bytes_ += bytes;
   }
 
  private:
+  bool counts_ = true;
   std::set<std::string> opened_;
   std::uint64_t opened_bytes_ = 0;
 };

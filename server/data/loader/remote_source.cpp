@@ -102,6 +102,7 @@ struct RemoteSource::State {
   DatasetInfo info;
   std::string digest;  // of the info as it came
   std::vector<Companion> companions;
+  std::uint64_t opened_bytes = 0;  // of the files that were opened to open the dataset
   Progress progress;
   std::shared_ptr<Files> files;  // while there is a loader
   Process process;
@@ -138,10 +139,13 @@ struct RemoteSource::State {
         call({Kind::open, encode_task(task), -1, Kind::opened, "opening it", limits.open_time});
     if (!answer) {
       Error error = answer.error();
-      if (error.kind == ErrorKind::out_of_memory) error.message += opening_limit();
+      // Without files the loader has been ended already, for want of room beside others.
+      if (files && error.kind == ErrorKind::out_of_memory) error.message += opening_limit();
       release();
       return error;
     }
+    files->stop_counting();
+    opened_bytes = files->opened_bytes();
     companions = files->companions();
     if (limits.reads_take_all) process.allow_memory(limits.memory_bytes);
     return std::move(answer->payload);
@@ -418,7 +422,7 @@ Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits) {
   auto info = decode_info(*encoded);
   if (!info) return info.error();
   state->info = std::move(*info);
-  state->info.stored_bytes = state->files->opened_bytes();
+  state->info.stored_bytes = state->opened_bytes;
   state->digest = digest_of(*encoded);
   return std::unique_ptr<RemoteSource>(new RemoteSource(std::move(state)));
 }

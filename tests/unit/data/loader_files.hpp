@@ -43,6 +43,25 @@ inline void write_large(const std::string& path) {
   file.variable("density", NC_FLOAT, {z, y, x}, values);
 }
 
+// Longitudes and latitudes of a regular grid as two 2-D arrays.
+inline void write_positions(const std::string& path, std::size_t side) {
+  NetcdfMaker file(path);
+  const int y = file.dimension("y", side);
+  const int x = file.dimension("x", side);
+  for (const char* name : {"lat", "lon"}) {
+    const bool is_latitude = std::string(name) == "lat";
+    std::vector<double> values(side * side);
+    for (std::size_t n = 0; n < values.size(); ++n) {
+      values[n] = static_cast<double>(is_latitude ? n / side : n % side) / 64;
+    }
+    const int v = file.variable(name, NC_DOUBLE, {y, x}, std::move(values));
+    file.text(v, "units", is_latitude ? "degrees_north" : "degrees_east");
+    file.deflate(v);
+    file.chunk(v, {side, side});
+  }
+  file.text(file.variable("u", NC_FLOAT, {y, x}), "coordinates", "lat lon");
+}
+
 inline void write_floats(const std::string& path, std::size_t count, float value) {
   const std::vector<float> values(count, value);
   std::ofstream(path, std::ios::binary)

@@ -399,6 +399,25 @@ TEST_F(Loader, its_memory_and_that_of_the_transfer_count_while_it_is_there) {
   EXPECT_THAT(refused.error().message, testing::HasSubstr("needs 8.0 MiB"));
 }
 
+TEST_F(Loader, one_that_outgrows_the_budget_while_it_opens_is_an_error) {
+  const std::string path = folder_ / "a.nc";
+  test::write_positions(path, 1500);  // 36 MB of coordinates
+  Limits limits;
+  // What a loader takes that has done nothing, and little more.
+  limits.budget = std::make_shared<Budget>((std::uint64_t{8} << 20) + (std::uint64_t{64} << 10));
+  for (int n = 0; n < 3; ++n) {
+    const auto source = open_path(path, limits);
+    // Between two looks it may have opened the file: the loader is gone, and what it found is good.
+    if (source) {
+      EXPECT_EQ((*source)->process(), -1);
+      EXPECT_GT((*source)->info().stored_bytes, 0U);
+    } else {
+      EXPECT_EQ(source.error().kind, ErrorKind::out_of_memory);
+    }
+    EXPECT_EQ(limits.budget->counts().bytes, 0U);
+  }
+}
+
 TEST_F(Loader, a_volume_is_the_same_where_the_memory_of_its_transfer_is_not_kept) {
   const std::string path = folder_ / "a.nc";
   test::write_large(path);
