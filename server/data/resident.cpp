@@ -135,7 +135,7 @@ struct Dataset::State {
   }
 
   // What loaders were seen to need at most beside the volumes, while they read these fields. Chunks
-  // that are needed again are kept, 128 MiB of a variable or one chunk.
+  // that are needed again are kept, 128 MiB in all or one chunk.
   [[nodiscard]] std::uint64_t reading_bytes(const std::vector<std::string>& fields) const {
     constexpr std::uint64_t mib = std::uint64_t{1} << 20;
     std::uint64_t bytes = 32 * mib;

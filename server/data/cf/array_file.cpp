@@ -54,15 +54,15 @@ Result<void> ArrayFile::charge(int variable, double bytes) const {
 
 double decoded_bytes(const ArrayFile& file, int variable, const std::vector<std::size_t>& start,
                      const std::vector<std::size_t>& count) {
-  const auto type = bytes::scalar_named(file.contents().variables.at(at(variable)).type);
   const std::vector<std::size_t> chunk = file.chunk(variable);
-  auto decoded = static_cast<double>(type ? bytes::size_of(*type) : sizeof(double));
+  double chunks = 1;
   for (std::size_t d = 0; d < count.size(); ++d) {
     if (count[d] == 0) return 0;
-    const std::size_t chunks = (start[d] + count[d] - 1) / chunk[d] - start[d] / chunk[d] + 1;
-    decoded *= static_cast<double>(chunks) * static_cast<double>(chunk[d]);
+    const std::size_t along = (start[d] + count[d] - 1) / chunk[d] - start[d] / chunk[d] + 1;
+    chunks *= static_cast<double>(along);
   }
-  return decoded;
+  return chunks * std::max(chunk_bytes(file, variable),
+                           static_cast<double>(file.chunk_cost_bytes(variable)));
 }
 
 double chunk_bytes(const ArrayFile& file, int variable) {

@@ -54,6 +54,9 @@ class ArrayFile {
   // How much is best read at once along each dimension; 1 where that does not matter.
   [[nodiscard]] virtual std::vector<std::size_t> chunk(int variable) const = 0;
 
+  // Where chunk() is how it is stored: what each chunk costs at least, in decoded bytes.
+  [[nodiscard]] virtual std::size_t chunk_cost_bytes(int /*variable*/) const { return 0; }
+
   // Reads a block of a numeric variable as stored. start, count: one a dimension, slowest first;
   // `out` holds the product of the counts, the last dimension fastest. Errors: bad_data, also where
   // a file changed since it was opened.
@@ -85,7 +88,8 @@ class ArrayFile {
   mutable std::set<int> charged_;
 };
 
-// Bytes that reading a block decodes: whole chunks, as they are stored.
+// Bytes that reading a block decodes: whole chunks, as they are stored, each as
+// chunk_cost_bytes() at least.
 double decoded_bytes(const ArrayFile& file, int variable, const std::vector<std::size_t>& start,
                      const std::vector<std::size_t>& count);
 // The same of one chunk; of what has none a single value.

@@ -401,6 +401,11 @@ std::vector<std::size_t> SeriesFile::chunk(int variable) const {
   return lengths;
 }
 
+std::size_t SeriesFile::chunk_cost_bytes(int variable) const {
+  const int in_first = variables_.at(at(variable)).in_first;
+  return in_first < 0 ? 0 : first_->chunk_cost_bytes(in_first);
+}
+
 // Of the first member, which stands for the others: they are not opened for it.
 Unwritten SeriesFile::unwritten(int variable, std::size_t most) const {
   const int in_first = variables_.at(at(variable)).in_first;

@@ -38,6 +38,7 @@ class SeriesFile final : public ArrayFile {
   [[nodiscard]] Numbers numbers(int variable, const char* attribute) const override;
   [[nodiscard]] std::string text_of(int variable, const char* attribute) const override;
   [[nodiscard]] std::vector<std::size_t> chunk(int variable) const override;
+  [[nodiscard]] std::size_t chunk_cost_bytes(int variable) const override;
   [[nodiscard]] Unwritten unwritten(int variable, std::size_t most) const override;
   void forget_chunks(int variable) const override;
 

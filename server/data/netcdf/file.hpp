@@ -2,9 +2,12 @@
 // InputFile -> checks of our own -> nc_open -> FileContents and numbers.
 #pragma once
 
+#include <cstddef>
+#include <list>
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/base/error.hpp"
@@ -47,9 +50,9 @@ class File final : public cf::ArrayFile {
   [[nodiscard]] cf::Numbers numbers(int variable, const char* attribute) const override;
   [[nodiscard]] std::string text_of(int variable, const char* attribute) const override;
   [[nodiscard]] std::vector<std::size_t> chunk(int variable) const override;
+  [[nodiscard]] std::size_t chunk_cost_bytes(int variable) const override;
 
   [[nodiscard]] cf::Unwritten unwritten(int variable, std::size_t most) const override;
-  // Frees the chunks that the library keeps of a variable, up to 16 MiB each.
   void forget_chunks(int variable) const override;
 
   Result<void> read(int variable, const std::vector<std::size_t>& start,
@@ -79,6 +82,7 @@ class File final : public cf::ArrayFile {
   [[nodiscard]] bool has_field() const;
   void look_at_storage(const Place& place, FileVariable& variable);
   void keep_chunks(int variable, const Block& block) const;
+  void forget_others(int variable, std::size_t bytes) const;
   template <class T, class Get>
   Result<void> read_block(int variable, const Block& block, T* out, const Get& get) const;
   [[nodiscard]] Error fault(const std::string& what) const { return input_->fault(what); }
@@ -89,11 +93,14 @@ class File final : public cf::ArrayFile {
   bool netcdf4_ = false;  // not HDF5 by itself
   std::string group_;     // "" or "/a/b"
   std::vector<int> dimension_ids_;
-  std::vector<Place> places_;                           // parallel to contents_.variables
-  Handle hdf5_;                                         // beside the netCDF library's own
-  std::map<std::string, DatasetStorage> storage_;       // of HDF5, by path
-  std::vector<std::string> paths_;                      // likewise parallel
-  mutable std::map<std::string, AbsentChunks> absent_;  // under the LibraryLock
+  std::vector<Place> places_;                      // parallel to contents_.variables
+  Handle hdf5_;                                    // beside the netCDF library's own
+  std::map<std::string, DatasetStorage> storage_;  // of HDF5, by path
+  std::vector<std::string> paths_;                 // likewise parallel
+  // Under the LibraryLock: absent chunks by object, and the variables whose chunks the library
+  // keeps, with the bytes it may keep of each, the last read first.
+  mutable std::map<haddr_t, AbsentChunks> absent_;
+  mutable std::list<std::pair<int, std::size_t>> kept_;
   FileContents contents_;
 };
 

@@ -214,6 +214,7 @@ class Survey {
       const Handle dataset(H5Dopen2(group, name, H5P_DEFAULT), H5Dclose);
       if (!dataset) return fail("is damaged: '" + printable(path) + "' cannot be read");
       known = by_address_.emplace(address, storage_of(dataset.id())).first;
+      known->second.object = address;
     }
     found_.emplace(path, known->second);
     return true;

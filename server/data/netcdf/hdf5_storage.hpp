@@ -37,6 +37,7 @@ class Handle {
 };
 
 struct DatasetStorage {
+  haddr_t object = 0;           // in the file; links to one dataset share it
   std::string problem;          // why its numbers cannot be read; empty if they can
   std::vector<hsize_t> extent;  // as written; a netCDF dimension may be longer
   std::vector<hsize_t> chunk;   // empty: not chunked

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/data/cf/text.hpp"
+#include "server/data/limits.hpp"
 #include "server/data/netcdf/file.hpp"
 
 namespace windsplat::data::netcdf {
@@ -14,6 +15,9 @@ namespace windsplat::data::netcdf {
 namespace {
 
 using cf::in_quotes;
+
+// Of all variables together, or one chunk (resident.cpp reckons with it).
+constexpr double kept_bytes_max = 128 << 20;
 
 // A scalar has no extent, but the library still wants a place to look at.
 const std::size_t* place(const std::vector<std::size_t>& lengths) {
@@ -37,9 +41,15 @@ std::vector<std::size_t> File::chunk(int variable) const {
   return lengths;
 }
 
+std::size_t File::chunk_cost_bytes(int variable) const {
+  const bool is_chunked = !classic_ && !storage_.at(paths_.at(cf::at(variable))).chunk.empty();
+  return is_chunked ? hdf5_chunk_cost_bytes : 0;
+}
+
 void File::forget_chunks(int variable) const {
   if (classic_) return;
   const LibraryLock lock;
+  kept_.remove_if([variable](const auto& kept) { return kept.first == variable; });
   const auto [group, id] = place_of(variable);
   std::size_t size = 0;
   std::size_t slots = 0;
@@ -53,9 +63,8 @@ void File::forget_chunks(int variable) const {
 
 // Chunks that one block after another needs are decoded once, as far as they fit.
 void File::keep_chunks(int variable, const Block& block) const {
-  constexpr double kept_bytes_max = 128 << 20;
   const DatasetStorage& storage = storage_.at(paths_.at(cf::at(variable)));
-  if (!storage.filtered) return;
+  if (storage.chunk.empty()) return;
   double one = static_cast<double>(storage.item_bytes);
   double all = one;
   for (std::size_t d = 0; d < storage.chunk.size(); ++d) {
@@ -72,16 +81,33 @@ void File::keep_chunks(int variable, const Block& block) const {
   std::size_t size = 0;
   std::size_t slots = 0;
   float preemption = 0;
-  if (nc_get_var_chunk_cache(group, id, &size, &slots, &preemption) == NC_NOERR && size < wanted) {
+  if (nc_get_var_chunk_cache(group, id, &size, &slots, &preemption) != NC_NOERR) return;
+  if (storage.filtered && size < wanted) {
     nc_set_var_chunk_cache(group, id, wanted, slots, preemption);
+    size = wanted;
   }
+  forget_others(variable, size);
+}
+
+// Until what is kept of all variables fits together, those that were read longest ago first.
+void File::forget_others(int variable, std::size_t bytes) const {
+  kept_.remove_if([variable](const auto& kept) { return kept.first == variable; });
+  auto total = static_cast<double>(bytes);
+  for (const auto& kept : kept_) total += static_cast<double>(kept.second);
+  while (!kept_.empty() && total > kept_bytes_max) {
+    const auto [oldest, its_bytes] = kept_.back();
+    total -= static_cast<double>(its_bytes);
+    forget_chunks(oldest);
+  }
+  kept_.emplace_front(variable, bytes);
 }
 
 cf::Unwritten File::unwritten(int variable, std::size_t most) const {
   if (classic_) return {};
   const LibraryLock lock;
   const std::string& path = paths_.at(cf::at(variable));
-  return OpenDataset(hdf5_, path, storage_.at(path), absent_[path]).count_absent(most);
+  const DatasetStorage& storage = storage_.at(path);
+  return OpenDataset(hdf5_, path, storage, absent_[storage.object]).count_absent(most);
 }
 
 template <class T, class Get>
@@ -95,8 +121,9 @@ Result<void> File::read_block(int variable, const Block& block, T* out, const Ge
   std::optional<OpenDataset> dataset;
   if (!classic_) {
     const std::string& path = paths_.at(cf::at(variable));
+    const DatasetStorage& storage = storage_.at(path);
     keep_chunks(variable, block);  // first: an open dataset keeps the size of its cache
-    dataset.emplace(hdf5_, path, storage_.at(path), absent_[path]);
+    dataset.emplace(hdf5_, path, storage, absent_[storage.object]);
     if (auto fine = dataset->check(block); !fine) {
       return fault("is damaged: " + in_quotes(name) + ' ' + fine.error().message);
     }

@@ -12,6 +12,7 @@
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/limits.hpp"
 #include "server/data/zarr/metadata.hpp"
 
 namespace windsplat::data::zarr {
@@ -35,6 +36,9 @@ class Store final : public cf::ArrayFile {
   [[nodiscard]] cf::Numbers numbers(int variable, const char* attribute) const override;
   [[nodiscard]] std::string text_of(int variable, const char* attribute) const override;
   [[nodiscard]] std::vector<std::size_t> chunk(int variable) const override;
+  [[nodiscard]] std::size_t chunk_cost_bytes(int /*variable*/) const override {
+    return zarr_chunk_cost_bytes;
+  }
   void forget_chunks(int variable) const override;
 
   Result<void> read(int variable, const std::vector<std::size_t>& start,
