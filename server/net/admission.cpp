@@ -59,30 +59,44 @@ std::string detail_of(const Refusal& refusal) {
   return "more is asked for than can be done; try again";
 }
 
+// Connections in TLS that were closed because handshakes had taken too much.
+struct ClosedHandshakes {
+  std::int64_t connections = 0;
+  std::string address;  // the first one's
+  bool several = false;
+  Admission::Micros since = 0;  // the first was closed; as it is logged: how long before
+};
+
+void log_closed(const ClosedHandshakes& closed) {
+  log::warn(
+      "connections were closed: TLS handshakes took too much processor time (--max-handshakes, "
+      "--max-handshakes-per-address)",
+      {{"connections", closed.connections},
+       {"seconds", closed.since / 1'000'000},
+       {"address", closed.address + (closed.several ? " and others" : "")}});
+}
+
 }  // namespace
 
 struct Admission::State {
-  // Connections in TLS that were closed because handshakes had taken too much.
-  struct Closed {
-    std::int64_t connections = 0;
-    std::string address;  // the first one's
-    bool several = false;
-    Micros since = 0;  // the first was closed; as it is logged: how long before
-  };
+  using Closed = ClosedHandshakes;
 
   State(const Limits& limits, std::function<Micros()> clock)
       : quota(limits), now(clock ? std::move(clock) : steady_us) {}
 
-  // Under the mutex. A value: those since the last one, to be logged; one a minute at most.
+  // Both under the mutex. A value: those since the last one, to be logged; one a minute at most.
   std::optional<Closed> count_refused_handshake(const std::string& address, Micros at) {
-    constexpr Micros log_every = 60'000'000;
     if (closed.connections == 0) {
       closed.address = address;
       closed.since = at;
     }
     closed.several = closed.several || closed.address != address;
     ++closed.connections;
-    if (at < log_next) return std::nullopt;
+    return refused_handshakes(at);
+  }
+  std::optional<Closed> refused_handshakes(Micros at) {
+    constexpr Micros log_every = 60'000'000;
+    if (closed.connections == 0 || at < log_next) return std::nullopt;
     log_next = at + log_every;
     closed.since = at - closed.since;
     return std::exchange(closed, {});
@@ -165,23 +179,23 @@ bool Admission::arrive(const std::string& peer, bool tls) {
     }
   }
   if (refusal) metrics_.refused(refusal->kind);
-  if (closed) {
-    log::warn(
-        "connections were closed: TLS handshakes took too much processor time (--max-handshakes, "
-        "--max-handshakes-per-address)",
-        {{"connections", closed->connections},
-         {"seconds", closed->since / 1'000'000},
-         {"address", closed->address + (closed->several ? " and others" : "")}});
-  }
+  if (closed) log_closed(*closed);
   return !refusal;
 }
 
-void Admission::handshake_took(const std::string& peer, Micros took) {
-  const std::string address = counted_address(peer);
-  const bool proxy = is_trusted(peer, trusted_);
+void Admission::log_refused_handshakes() {
+  std::optional<State::Closed> closed;
+  {
+    const std::lock_guard lock(state_->mutex);
+    closed = state_->refused_handshakes(state_->now());
+  }
+  if (closed) log_closed(*closed);
+}
+
+void Admission::handshake_took(const std::string& address, bool trusted, Micros took) {
   metrics_.handshake_took(took);
   const std::lock_guard lock(state_->mutex);
-  state_->quota.handshake_took(address, proxy, took, state_->now());
+  state_->quota.handshake_took(address, trusted, took, state_->now());
 }
 
 void Admission::authenticated(const std::string& address) {
@@ -191,10 +205,11 @@ void Admission::authenticated(const std::string& address) {
 
 std::optional<Visitor> Admission::connect(const std::string& peer) {
   const auto place = std::make_shared<Place>(state_, counted_address(peer));
-  Visitor visitor{peer, place, std::nullopt, is_trusted(peer, trusted_)};
+  Visitor visitor{peer, place, std::nullopt, is_trusted(peer, trusted_), false};
   const Quota::Arrival arrival = place->connect(visitor.trusted);
   if (arrival.place == Quota::Place::none) return std::nullopt;
   visitor.reserve = arrival.reason;
+  visitor.known = arrival.known;
   return visitor;
 }
 

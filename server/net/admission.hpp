@@ -26,6 +26,7 @@ struct Visitor {
   Ticket place;
   std::optional<Refusal> reserve;  // health alone is answered, and why
   bool trusted = false;            // a proxy, whose connections are those of many clients
+  bool known = false;              // one of those, or its address has shown the token
 };
 
 // The server is at its limit, or the address is: 503 or 429 with Retry-After.
@@ -42,8 +43,11 @@ class Admission {
   // False: too many arrived recently, and it is to be closed without an answer. Before connect().
   // Where handshakes took too much it is logged, once a minute for all.
   bool arrive(const std::string& peer, bool tls);
-  // What a step of a TLS handshake took of a processor.
-  void handshake_took(const std::string& peer, Micros took);
+  // To be called again and again: logs those that were refused since that was logged last.
+  void log_refused_handshakes();
+  // What steps of a TLS handshake took of a processor; the address as it is counted. Needs no
+  // memory.
+  void handshake_took(const std::string& address, bool trusted, Micros took);
   // A request showed the token.
   void authenticated(const std::string& address);
   // None: too many, to be closed without an answer.

@@ -1,6 +1,7 @@
 // Every connection that lives, so that a drain reaches them all. Used by the io thread alone.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace windsplat::net {
@@ -28,8 +30,9 @@ class Connection {
   using Since = std::optional<std::chrono::steady_clock::time_point>;
   virtual Since idle_since() const { return {}; }         // waits for a request's first byte
   virtual Since unasked_since() const { return {}; }      // of the reserve, without a whole request
-  virtual Since handshaking_since() const { return {}; }  // of TLS
-  virtual bool is_of(const std::string& /*address*/) const { return false; }
+  virtual Since handshaking_since() const { return {}; }  // of TLS; with what follows:
+  virtual std::string_view address() const { return {}; }  // as it is counted
+  virtual bool is_known() const { return false; }  // a proxy, or the address has shown the token
 };
 
 class Connections {
@@ -82,6 +85,38 @@ class Connections {
     }
     if (count <= most) return false;
     longest->abort();
+    return true;
+  }
+
+  // Where more than `most` handshakes are under way, ends one: of strangers where there are any, of
+  // the address that has most of them the oldest.
+  bool end_handshake(std::size_t most) const {
+    struct Held {
+      std::size_t count = 0;
+      std::shared_ptr<Connection> oldest;
+    };
+    std::size_t total = 0;
+    each([&](const Connection& one) { total += one.handshaking_since() ? 1U : 0U; });
+    if (total <= most) return false;
+    std::map<std::pair<bool, std::string_view>, Held> held;
+    for (const auto& [id, entry] : live_) {
+      auto one = entry.connection.lock();
+      if (!one || !one->handshaking_since()) continue;
+      Held& of = held[{one->is_known(), one->address()}];
+      ++of.count;
+      if (!of.oldest || one->handshaking_since() < of.oldest->handshaking_since()) {
+        of.oldest = std::move(one);
+      }
+    }
+    const bool known = held.begin()->first.first;
+    const auto most_of = std::max_element(held.begin(), held.end(), [&](auto& a, auto& b) {
+      const auto rank = [&](auto& of) {
+        return std::pair(of.first.first == known, of.second.count);
+      };
+      if (rank(a) != rank(b)) return rank(a) < rank(b);
+      return a.second.oldest->handshaking_since() > b.second.oldest->handshaking_since();
+    });
+    most_of->second.oldest->abort();
     return true;
   }
 

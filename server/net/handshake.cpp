@@ -1,7 +1,8 @@
 // A TLS handshake in two halves. `Handshake` is used by the io thread alone: it holds the
-// connection's place and deadline. `TlsTask` is used by the handshake thread alone until that posts
-// it back; it holds the socket, and the other half ends it by shutdown(2), which any thread may
-// call.
+// connection's place and deadline. `TlsTask` holds the socket, and is used by the handshake thread
+// alone until that posts it back; the other half ends it by shutdown(2), which any thread may call,
+// and takes away the step that waits: so what gave back its place holds a descriptor no longer than
+// a step takes that runs, however busy that thread is.
 #include "server/net/handshake.hpp"
 
 #include <sys/socket.h>
@@ -13,6 +14,8 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "server/base/log.hpp"
@@ -30,7 +33,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds tls_timeout{5};
 constexpr std::chrono::seconds tls_reserve_timeout{2};  // of a connection of the reserve
-// At a time; the longest ends for one more.
+// At a time; for one more another ends.
 constexpr std::size_t tls_handshakes_max = 256;
 constexpr std::size_t handshakes_per_address_max = 64;
 // After which no more is read. A ClientHello has some 500 bytes, 2 KB with a post-quantum key
@@ -42,59 +45,77 @@ constexpr std::size_t last_read_bytes = std::size_t{17} * 1024;
 class TlsTask final : public HandshakeTask {
  public:
   TlsTask(asio::ip::tcp::socket socket, std::shared_ptr<TlsContext> tls, HandshakeThread& thread,
-          Admission& admission, const std::string& peer)
-      : HandshakeTask(thread, counted_address(peer)),
+          Admission& admission, const Visitor& visitor)
+      : HandshakeTask(thread, counted_address(visitor.peer)),
         handle_(socket.native_handle()),
         wire_(std::move(socket), std::move(tls)),
         io_(wire_.get_executor()),
         admission_(admission),
-        peer_(peer) {}
+        trusted_(visitor.trusted) {}
+  // What is left to charge where memory failed for the way back.
+  ~TlsTask() override { charge(); }
+  TlsTask(const TlsTask&) = delete;
+  TlsTask& operator=(const TlsTask&) = delete;
 
-  // On the io thread. `done` is called there, with the fault, unless this is abandoned.
-  template <class Done>
-  void start(Done done) {
-    failed_ = done;
-    submit([this, done = std::move(done)]() mutable {
+  // On the io thread. `done` is called there, with the fault; if it was abandoned any number of
+  // times.
+  void start(std::function<void(ErrorCode)> done) {
+    done_ = std::move(done);
+    submit([this] {
       const HandshakeExecutor executor(*this, asio::query(io_, asio::execution::context));
-      wire_.handshake(executor, IoHandler([task = shared_from_this(), io = io_,
-                                           done = std::move(done)](ErrorCode fault, std::size_t) {
-                        post_surely(io, [task, done, fault] { done(fault); });
-                      }));
+      wire_.handshake(executor, IoHandler([this, task = shared_from_this()](
+                                              ErrorCode fault, std::size_t) { outcome_ = fault; }));
     });
   }
 
-  // Any thread. The handshake fails; a step that waits for its turn is not begun.
+  // On the io thread. The handshake fails.
   void abandon() {
-    abandoned_ = true;
+    drop();
     ::shutdown(handle_, SHUT_RDWR);
+    charge();
   }
 
-  [[nodiscard]] bool is_abandoned() const { return abandoned_; }
+  [[nodiscard]] bool is_abandoned() const { return is_dropped(); }
 
   // When it is done.
   Wire take_wire() { return std::move(wire_); }
 
  private:
   bool may_go_on() override {
-    if (abandoned_) return false;
+    if (is_abandoned()) return false;
     const std::size_t bytes = wire_.next_layer().rate_policy().bytes_read();
     if (bytes <= handshake_bytes_max + last_read_bytes) return true;
     // Nothing more is read: a shutdown alone would leave what has arrived to be read.
-    abandoned_ = true;
-    post_surely(io_, [task = shared_from_this(), failed = failed_] {
-      failed(make_error_code(boost::system::errc::message_size));
-    });
+    begin_no_more();
+    go_back();
     return false;
   }
-  void step_took(std::int64_t cpu_us) override { admission_.handshake_took(peer_, cpu_us); }
+  // Charged on the io thread, which must not wait for a lock that this thread holds. What is
+  // abandoned from here on is charged by that.
+  void step_took(std::int64_t cpu_us) override {
+    unpaid_us_ += cpu_us;
+    if (outcome_ || is_abandoned()) go_back();
+  }
+  void go_back() {
+    post_surely(io_, [this, task = shared_from_this()] {
+      charge();
+      done_(outcome_.value_or(asio::error::operation_aborted));
+    });
+  }
+  void pay() override { charge(); }
+  void charge() {
+    const std::int64_t us = unpaid_us_.exchange(0);
+    if (us > 0) admission_.handshake_took(address(), trusted_, us);
+  }
 
   const int handle_;  // open as long as this lives, or wire_ after it was taken
   Wire wire_;
   const asio::any_io_executor io_;
   Admission& admission_;
-  const std::string peer_;
-  std::function<void(ErrorCode)> failed_;  // as for start(); called on the io thread
-  std::atomic<bool> abandoned_{false};
+  const bool trusted_;
+  std::function<void(ErrorCode)> done_;
+  std::optional<ErrorCode> outcome_;
+  std::atomic<std::int64_t> unpaid_us_{0};
 };
 
 class Handshake : public Connection, public std::enable_shared_from_this<Handshake> {
@@ -108,7 +129,7 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
         address_(counted_address(visitor_.peer)),
         deadline_(socket.get_executor()),
         task_(std::make_shared<TlsTask>(std::move(socket), services.options.tls, thread,
-                                        services.admission, visitor_.peer)) {}
+                                        services.admission, visitor_)) {}
   ~Handshake() override { connections_.remove(id_); }
   Handshake(const Handshake&) = delete;
   Handshake& operator=(const Handshake&) = delete;
@@ -123,11 +144,12 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
     if (!visitor_.trusted) {
       (void)connections_.end_longest(
           [this](const Connection& other) {
-            return other.is_of(address_) ? other.handshaking_since() : std::nullopt;
+            return other.address() == address_ ? other.handshaking_since() : std::nullopt;
           },
           handshakes_per_address_max);
     }
-    (void)connections_.end_longest(&Connection::handshaking_since, tls_handshakes_max);
+    (void)connections_.end_handshake(tls_handshakes_max);
+    if (!task_) return;  // it was itself that ended
     task_->start([weak = weak_from_this()](ErrorCode fault) {
       const auto self = weak.lock();
       if (self) guarded(self, [&] { self->on_done(fault); })();
@@ -146,9 +168,8 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
   [[nodiscard]] Since handshaking_since() const override {
     return task_ ? Since(came_) : std::nullopt;
   }
-  [[nodiscard]] bool is_of(const std::string& address) const override {
-    return address == address_;
-  }
+  [[nodiscard]] std::string_view address() const override { return address_; }
+  [[nodiscard]] bool is_known() const override { return visitor_.known; }
   [[nodiscard]] std::string request_id() const { return {}; }
 
  private:

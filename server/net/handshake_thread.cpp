@@ -18,6 +18,7 @@ namespace {
 // Of setpriority(2): rendering and streams get ten times this thread's share where all want the
 // same core.
 constexpr int handshake_nice = 10;
+constexpr std::size_t address_chars_max = 64;  // of one as it is counted
 
 }  // namespace
 
@@ -27,7 +28,10 @@ std::int64_t thread_cpu_us() {
   return std::int64_t{time.tv_sec} * 1'000'000 + time.tv_nsec / 1000;
 }
 
-HandshakeThread::HandshakeThread() : thread_([this] { run(); }) {}
+HandshakeThread::HandshakeThread() {
+  last_.reserve(address_chars_max);
+  thread_ = std::thread([this] { run(); });
+}
 
 HandshakeThread::~HandshakeThread() { stop(); }
 
@@ -38,40 +42,52 @@ void HandshakeThread::stop() {
     ended_ = true;
     dropped.swap(lanes_);
   }
-  dropped.clear();  // not under the lock: a step takes its connection with it
+  dropped.clear();
   changed_.notify_one();
   if (thread_.joinable()) thread_.join();
 }
 
-void HandshakeThread::add(const std::string& address, std::unique_ptr<Step> step) {
+void HandshakeThread::add(const std::string& address, const void* owner,
+                          std::unique_ptr<Step> step) {
+  Lane added;
+  added.push_back({owner, std::move(step)});
+  Lanes fresh;
+  fresh.try_emplace(address);
   {
     const std::lock_guard lock(mutex_);
     if (ended_) return;
-    const auto [lane, is_new] = lanes_.try_emplace(address);
-    try {
-      lane->second.push_back(std::move(step));
-    } catch (const std::bad_alloc&) {
-      if (is_new) lanes_.erase(lane);
-      throw;
-    }
+    lanes_.merge(fresh);  // unless there is one
+    Lane& lane = lanes_.find(address)->second;
+    lane.splice(lane.end(), added);
   }
   changed_.notify_one();
 }
 
+void HandshakeThread::drop(const std::string& address, const void* owner) {
+  Lane dropped;
+  Lanes::node_type spent;
+  const std::lock_guard lock(mutex_);
+  const auto lane = lanes_.find(address);
+  if (lane == lanes_.end()) return;
+  for (auto at = lane->second.begin(); at != lane->second.end();) {
+    const auto here = at++;
+    if (here->owner == owner) dropped.splice(dropped.end(), lane->second, here);
+  }
+  if (lane->second.empty()) spent = lanes_.extract(lane);
+}
+
 std::unique_ptr<HandshakeThread::Step> HandshakeThread::next() {
+  Lane taken;
+  Lanes::node_type spent;
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return ended_ || !lanes_.empty(); });
   if (ended_) return nullptr;
   auto lane = lanes_.upper_bound(last_);
   if (lane == lanes_.end()) lane = lanes_.begin();
-  std::unique_ptr<Step> step = std::move(lane->second.front());
-  lane->second.pop_front();
-  if (!lane->second.empty()) {
-    last_ = lane->first;
-  } else {
-    last_.swap(lanes_.extract(lane).key());
-  }
-  return step;
+  last_ = lane->first;
+  taken.splice(taken.end(), lane->second, lane->second.begin());
+  if (lane->second.empty()) spent = lanes_.extract(lane);
+  return std::move(taken.front().step);
 }
 
 void HandshakeThread::run() {

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "protocol/limits.hpp"
+#include "server/net/address.hpp"
 #include "server/net/auth.hpp"
 #include "server/net/guarded.hpp"
 #include "server/net/http_checks.hpp"
@@ -119,14 +120,21 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void add(bool late) {
     connections_.add(id_, weak_from_this(), false, late);
     began_ = came_ = Clock::now();
+    request_ = blank_request();
+  }
+
+  // Charged to the peer until it is known who asks.
+  [[nodiscard]] Request blank_request() const {
+    Request request;
+    request.peer = id_;
+    request.address = counted_address(visitor_.peer);
+    return request;
   }
 
   // --- reading ----------------------------------------------------------------------------------
 
   void next_request() {
-    request_ = Request{};
-    request_.peer = id_;
-    request_.address = visitor_.peer;
+    request_ = blank_request();
     route_ = route_other;
     is_head_ = false;
     charged_ = quiet_ = false;

@@ -139,6 +139,7 @@ void Quota::authenticated(const std::string& address, Micros now) {
 
 Quota::Arrival Quota::connect(const std::string& address, bool trusted, Micros now) {
   Entry& here = entry(address, now);
+  const bool known = trusted || here.authenticated;
   std::optional<Refusal> reason;
   if (reached(connections_, limits_.connections)) {
     reason = Refusal{LimitKind::connections, static_cast<double>(limits_.connections)};
@@ -149,13 +150,13 @@ Quota::Arrival Quota::connect(const std::string& address, bool trusted, Micros n
   if (!reason) {
     ++connections_;
     ++here.connections;
-    return {Place::ordinary, std::nullopt};
+    return {Place::ordinary, std::nullopt, known};
   }
   const bool too_many_of_it = !trusted && here.reserved >= reserve_per_address;
-  if (reserved_ >= reserve_max || too_many_of_it) return {Place::none, reason};
+  if (reserved_ >= reserve_max || too_many_of_it) return {Place::none, reason, known};
   ++reserved_;
   ++here.reserved;
-  return {Place::reserve, reason};
+  return {Place::reserve, reason, known};
 }
 
 bool Quota::is_kept_out_by_others(const std::string& address, bool trusted, Micros now) {
@@ -297,11 +298,16 @@ void Quota::forget_idle(Micros now) {
   }
 }
 
-// Whoever has a connection stays: there are fewer of those than of entries.
+// Whoever has a connection stays: there are fewer of those than of entries. Strangers go first,
+// who alone can bring many addresses.
 void Quota::make_room() {
-  const auto oldest = std::find_if(entries_.begin(), entries_.end(), [](const Entry& known) {
+  const auto is_away = [](const Entry& known) {
     return known.connections + known.reserved + known.sessions == 0;
+  };
+  auto oldest = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& known) {
+    return is_away(known) && !known.authenticated;
   });
+  if (oldest == entries_.end()) oldest = std::find_if(entries_.begin(), entries_.end(), is_away);
   if (oldest != entries_.end()) forget(oldest);
 }
 

@@ -60,6 +60,7 @@ class Quota {
   struct Arrival {
     Place place = Place::none;
     std::optional<Refusal> reason;  // of what is not ordinary
+    bool known = false;             // a proxy, or the address has shown the token
   };
   // Before a connection is looked at any further: whether there were not too many of late.
   std::optional<Refusal> arrive(const std::string& address, bool trusted, bool tls, Micros now);

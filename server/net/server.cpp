@@ -101,6 +101,7 @@ struct Server::State {
     look_timer.expires_after(look_every);
     look_timer.async_wait([this](boost::system::error_code fault) {
       looking = false;
+      if (!fault) services.admission.log_refused_handshakes();
       if (fault || services.draining) return;
       const auto look = [this] {
         auto found = attempt<std::vector<std::string>>(

@@ -3,6 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
 namespace windsplat::net {
 namespace {
 
@@ -43,6 +49,56 @@ TEST(Connections, end_the_one_that_is_idle_for_longest) {
   EXPECT_TRUE(connections.end_longest(&Connection::idle_since));
   EXPECT_FALSE(connections.end_longest(&Connection::idle_since));
   EXPECT_FALSE(busy->ended);
+}
+
+class Shaking : public Connection {
+ public:
+  Shaking(std::string address, int seconds, bool known = false)
+      : address_(std::move(address)), since_(Clock::now() - std::chrono::seconds(seconds)),
+        known_(known) {}
+  void drain() override {}
+  void abort() override { since_.reset(); }
+  [[nodiscard]] Since handshaking_since() const override { return since_; }
+  [[nodiscard]] std::string_view address() const override { return address_; }
+  [[nodiscard]] bool is_known() const override { return known_; }
+  [[nodiscard]] bool ended() const { return !since_; }
+
+ private:
+  const std::string address_;
+  Since since_;
+  const bool known_;
+};
+
+TEST(Connections, end_a_handshake_of_whom_has_most_and_strangers_first) {
+  std::vector<std::shared_ptr<Shaking>> all;
+  Connections connections;
+  const auto come = [&](const std::string& address, int seconds, bool known = false) {
+    all.push_back(std::make_shared<Shaking>(address, seconds, known));
+    connections.add(connections.next_id(), all.back(), false);
+  };
+  const auto next = [&](std::size_t most) {  // which one ended; -1: none
+    std::vector<bool> before;
+    for (const auto& one : all) before.push_back(one->ended());
+    if (!connections.end_handshake(most)) return -1;
+    for (std::size_t n = 0; n < all.size(); ++n) {
+      if (all[n]->ended() != before[n]) return static_cast<int>(n);
+    }
+    return -2;
+  };
+  EXPECT_EQ(next(0), -1);
+  come("a", 100, true);  // 0
+  come("b", 90);         // 1
+  come("c", 10);         // 2
+  come("c", 20);         // 3
+  come("a", 80, true);   // 4
+  come("a", 70, true);   // 5
+  connections.add(connections.next_id(), std::make_shared<Idle>(std::nullopt), false);
+  EXPECT_EQ(next(6), -1);
+  EXPECT_EQ(next(5), 3) << "the oldest of the stranger with two";
+  EXPECT_EQ(next(4), 1) << "one each";
+  EXPECT_EQ(next(3), 2);
+  EXPECT_EQ(next(2), 0) << "nobody else is left";
+  EXPECT_EQ(next(2), -1);
 }
 
 }  // namespace

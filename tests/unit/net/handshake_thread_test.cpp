@@ -5,11 +5,14 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <future>
+#include <memory>
 #include <stdexcept>
 #include <string>
-#include <vector>
+#include <thread>
 
 namespace windsplat::net {
 namespace {
@@ -65,6 +68,66 @@ TEST(HandshakeThread, leaves_the_processor_to_others) {
       "a", [&nice] { nice = ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())); });
   held.finish();
   EXPECT_GT(nice, ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())));
+}
+
+TEST(HandshakeThread, lets_go_of_an_owners_steps_at_once) {
+  const auto kept = std::make_shared<int>(0);
+  std::string order;
+  const int mine = 0;
+  const int other = 0;
+  Held held;
+  held.thread.submit("a", [&order, kept] { order += '1'; }, &mine);
+  held.thread.submit("a", [&order] { order += '2'; }, &other);
+  held.thread.submit("b", [&order, kept] { order += '3'; }, &mine);
+  EXPECT_EQ(kept.use_count(), 3);
+  held.thread.drop("b", &other);
+  held.thread.drop("c", &mine);
+  EXPECT_EQ(kept.use_count(), 3);
+  held.thread.drop("a", &mine);
+  EXPECT_EQ(kept.use_count(), 2) << "while the thread is busy";
+  held.thread.drop("b", &mine);
+  EXPECT_EQ(kept.use_count(), 1);
+  held.thread.submit("b", [&order] { order += '4'; });
+  held.finish();
+  EXPECT_EQ(order, "24");
+}
+
+class Task final : public HandshakeTask {
+ public:
+  explicit Task(HandshakeThread& thread) : HandshakeTask(thread, "a") {}
+  void end() { drop(); }
+  std::atomic<std::int64_t> steps{0};
+  int paid = 0;
+
+ private:
+  bool may_go_on() override { return true; }
+  void step_took(std::int64_t /*cpu_us*/) override { ++steps; }
+  void pay() override { ++paid; }
+};
+
+TEST(HandshakeTask, that_has_ended_waits_for_no_turn) {
+  Held held;
+  const auto task = std::make_shared<Task>(held.thread);
+  task->submit([] {});
+  EXPECT_EQ(task.use_count(), 2) << "the step that waits keeps it";
+  task->end();
+  EXPECT_EQ(task.use_count(), 1);
+  const auto kept = std::make_shared<int>(0);
+  task->submit([kept] { ++*kept; });
+  EXPECT_EQ(kept.use_count(), 1);
+  EXPECT_EQ(task->paid, 2);
+  held.finish();
+  EXPECT_EQ(task->steps, 0);
+  EXPECT_EQ(*kept, 0);
+}
+
+TEST(HandshakeTask, is_told_what_a_step_took_that_threw) {
+  Held held;
+  const auto task = std::make_shared<Task>(held.thread);
+  task->submit([] { throw std::runtime_error("no memory"); });
+  task->submit([] {});
+  held.finish();
+  EXPECT_EQ(task->steps, 2);
 }
 
 TEST(HandshakeThread, drops_what_waits_when_it_ends) {

@@ -323,6 +323,45 @@ TEST(Quota, no_number_of_addresses_makes_it_larger_than_it_may_be) {
   EXPECT_EQ(quota.connect(here, false, 2).place, Quota::Place::reserve) << "its one is known";
 }
 
+TEST(Quota, strangers_make_no_room_of_those_that_showed_the_token) {
+  Quota quota(none());
+  quota.authenticated(here, 0);
+  for (std::size_t n = 0; n < 3 * Quota::addresses_max; ++n) {
+    quota.arrive("2001:db8:0:" + std::to_string(n) + "::/64", false, true, 1);
+  }
+  EXPECT_EQ(quota.known(), Quota::addresses_max);
+  EXPECT_TRUE(quota.connect(here, false, 2).known);
+  EXPECT_FALSE(quota.connect(there, false, 2).known);
+  EXPECT_TRUE(quota.connect(there, true, 2).known) << "as a proxy";
+  for (std::size_t n = 0; n < 2 * Quota::addresses_max; ++n) {
+    quota.authenticated("2001:db8:1:" + std::to_string(n) + "::/64", 3);
+  }
+  EXPECT_EQ(quota.known(), Quota::addresses_max) << "of those too there is an end";
+}
+
+TEST(Admission, logs_within_a_minute_how_many_handshakes_it_refused) {
+  Limits limits = none();
+  limits.handshake_ms_per_address = 0.1;  // one at once
+  Metrics metrics;
+  Quota::Micros now = 0;
+  Admission admission(limits, metrics, [&now] { return now; });
+  testing::internal::CaptureStderr();
+  ASSERT_TRUE(admission.arrive(here, true));
+  admission.handshake_took(here, false, second);
+  for (int n = 0; n < 3; ++n) EXPECT_FALSE(admission.arrive(here, true));
+  now = 59 * second;
+  admission.log_refused_handshakes();
+  const std::string first = testing::internal::GetCapturedStderr();
+  testing::internal::CaptureStderr();
+  now = 61 * second;
+  for (int n = 0; n < 3; ++n) admission.log_refused_handshakes();
+  const std::string rest = testing::internal::GetCapturedStderr();
+  EXPECT_NE(first.find("connections=1 seconds=0 address=192.0.2.1"), std::string::npos) << first;
+  EXPECT_EQ(first.find("connections=2"), std::string::npos);
+  EXPECT_NE(rest.find("connections=2 seconds=61 address=192.0.2.1"), std::string::npos) << rest;
+  EXPECT_EQ(rest.find("connections="), rest.rfind("connections=")) << "once: " << rest;
+}
+
 TEST(Admission, gives_places_back_when_their_tickets_go) {
   Limits limits = none();
   limits.connections = 1;
