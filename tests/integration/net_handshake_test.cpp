@@ -15,6 +15,7 @@
 
 #include "certificate.hpp"
 #include "net_server.hpp"
+#include "server/net/auth.hpp"
 #include "server/net/tls.hpp"
 
 namespace net_test {
@@ -23,6 +24,7 @@ namespace {
 using testing::HasSubstr;
 using windsplat::net::Limits;
 using windsplat::net::ServerOptions;
+using windsplat::net::Token;
 
 ServerOptions over_tls(const Limits& limits = {}) {
   const Certificate made = make_certificate("handshake");
@@ -71,8 +73,9 @@ class Client {
   [[nodiscard]] SSL* ssl() const { return ssl_.get(); }
 
   // The answer to a GET, and by TLS 1.3 the tickets that come before it.
-  std::string get(const std::string& target) {
-    const std::string ask = "GET " + target + " HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n";
+  std::string get(const std::string& target, const std::string& fields = "") {
+    const std::string ask =
+        "GET " + target + " HTTP/1.1\r\nHost: x\r\nConnection: close\r\n" + fields + "\r\n";
     if (SSL_write(ssl_.get(), ask.data(), static_cast<int>(ask.size())) <= 0) return "";
     std::string answer;
     std::array<char, 65536> part{};
@@ -188,19 +191,37 @@ TEST(TlsHandshakes, of_strangers_leave_time_for_health_asked_by_the_machine_itse
   EXPECT_THAT(log, HasSubstr("connections=1 seconds=0 address=127.0.0.2"));
 }
 
-TEST(TlsHandshakes, of_an_address_give_way_to_its_newer_ones) {
-  TestServer server(over_tls());
-  std::deque<Socket> silent;
-  for (int n = 0; n < 64; ++n) silent.emplace_back(server.port());
-  Client other(server.port(), nullptr, nullptr, "127.0.0.2");
-  ASSERT_TRUE(other.shaken());
-  const auto begin = std::chrono::steady_clock::now();
-  silent.emplace_back(server.port());
-  EXPECT_TRUE(silent.front().closed_by_peer());
-  const auto waited = std::chrono::steady_clock::now() - begin;
-  // The others end by their deadline.
-  EXPECT_TRUE(silent[1].closed_by_peer(20'000));
-  EXPECT_LT(waited, (std::chrono::steady_clock::now() - begin) / 2);
+// The line between HTTP and the quota: who showed the token has handshakes of its own.
+TEST(TlsHandshakes, of_an_address_that_showed_the_token_do_not_compete_with_strangers) {
+  Limits limits;
+  limits.handshake_ms = 0.001;  // a further handshake is paid within ten minutes
+  limits.handshake_ms_per_address = 1000;
+  ServerOptions options = over_tls(limits);
+  options.token = std::make_shared<const Token>(Token::parse("a-token-of-this-test").value());
+  TestServer server(options);
+  const auto from = [&](const char* address) {
+    return std::make_unique<Client>(server.port(), nullptr, nullptr, address);
+  };
+  ASSERT_THAT(from("127.0.0.2")->get("/v1", "Authorization: Bearer a-token-of-this-test\r\n"),
+              HasSubstr(" 200 "));
+  int shaken = 0;
+  while (shaken < 5000 && from("127.0.0.3")->shaken()) ++shaken;
+  EXPECT_LT(shaken, 5000);
+  EXPECT_TRUE(from("127.0.0.2")->shaken());
+  int others = 0;
+  for (int n = 0; n < 5; ++n) others += from("127.0.0.4")->shaken() ? 1 : 0;
+  EXPECT_LT(others, 5) << "they wait for what the first stranger owes";
+}
+
+TEST(PlainHttp, at_the_port_of_tls_is_charged_to_its_address) {
+  Limits limits;
+  limits.bytes_per_address = 1;  // ten at once
+  TestServer server(over_tls(limits));
+  EXPECT_EQ(raw(server.port(), "GET /livez HTTP/1.1\r\nHost: x\r\n\r\n").status, 400);
+  const Answer picture =
+      get(Place(server.port(), true), "/v1/datasets/small/frame.jpg?width=64&height=48");
+  EXPECT_EQ(picture.status, 429);
+  EXPECT_THAT(picture.body, HasSubstr("bytes a second"));
 }
 
 // OpenSSL takes a ClientHello of 131 kB, and waits for all of it.

@@ -54,7 +54,8 @@ TEST(Connections, end_the_one_that_is_idle_for_longest) {
 class Shaking : public Connection {
  public:
   Shaking(std::string address, int seconds, bool known = false)
-      : address_(std::move(address)), since_(Clock::now() - std::chrono::seconds(seconds)),
+      : address_(std::move(address)),
+        since_(Clock::now() - std::chrono::seconds(seconds)),
         known_(known) {}
   void drain() override {}
   void abort() override { since_.reset(); }
