@@ -90,8 +90,9 @@ class TlsTask final : public HandshakeTask {
     go_back();
     return false;
   }
-  // Charged on the io thread, which must not wait for a lock that this thread holds. What is
-  // abandoned from here on is charged by that.
+  // The io thread charges it, which must not wait for a lock that this thread holds: before the
+  // next step, when the handshake is done or abandoned, and for a step that ran meanwhile by
+  // go_back().
   void step_took(std::int64_t cpu_us) override {
     unpaid_us_ += cpu_us;
     if (outcome_ || is_abandoned()) go_back();
