@@ -55,7 +55,13 @@ class DirectFiles final : public Files {
   Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
     // O_NONBLOCK: opening a pipe must not wait for a writer; adopt() refuses it.
     const int descriptor = open_any(name, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-    if (descriptor < 0) return not_opened(name, errno);
+    if (descriptor < 0) {
+      const int reason = errno;
+      if (reason == ENOENT && leads_nowhere(name)) {
+        return make_error(ErrorKind::bad_data, in_quotes(name) + ": is a link that leads nowhere");
+      }
+      return not_opened(name, reason);
+    }
     remember(name, descriptor);
     auto file = InputFile::adopt(descriptor, last_part(name));
     if (file) count_opened(name, (*file)->size());
@@ -102,6 +108,21 @@ class DirectFiles final : public Files {
   }
 
  private:
+  // Of a name that cannot be found: whether it, or a folder above it, is a link that leads nowhere.
+  // What was never written and what was lost are not the same.
+  [[nodiscard]] bool leads_nowhere(std::string name) {
+    for (;;) {
+      const Descriptor found(open_any(name, O_PATH | O_NOFOLLOW | O_CLOEXEC));
+      struct stat status {};
+      if (found) {
+        return ::fstat(found.number(), &status) == 0 && S_ISLNK(status.st_mode) && !exists(name);
+      }
+      const auto above = name.rfind('/');
+      if (above == std::string::npos || above == 0) return false;
+      name.resize(above);
+    }
+  }
+
   // -1 and errno where it may not be opened.
   [[nodiscard]] int open_any(const std::string& name, std::uint64_t flags) const {
     if (const auto member = find_member(name); member != location_.members.end()) {

@@ -247,6 +247,26 @@ TEST(Zarr, AnAbsentChunkIsTheFillValueAndNeverZeroByChance) {
   expect_same(store.values(), {-32767, 1});
 }
 
+TEST(Zarr, AChunkThatIsALinkToNowhereIsLostAndNotAbsent) {
+  namespace fs = std::filesystem;
+  const Store store;
+  store.put("f/.zarray", array_json("[1,4]", "[1,2]", "<i2", "-9"));
+  store.put("f/0.0", bytes_of_items<std::int16_t>({7, 0}));
+  fs::create_symlink("moved", store.path() + "/f/0.1");
+  EXPECT_THAT(store.fault(), HasSubstr("'f/0.1': is a link that leads nowhere"));
+  store.put("f/moved", bytes_of_items<std::int16_t>({1, 2}));
+  expect_same(store.values(), {7, 0, 1, 2});
+
+  const Store nested("n.zarr");
+  nested.put("f/.zarray", array_json("[2,2]", "[1,2]", "<i2", "-9", "null",
+                                     R"(,"dimension_separator":"/")"));
+  nested.put("f/0/0", bytes_of_items<std::int16_t>({7, 0}));
+  fs::create_symlink("moved", nested.path() + "/f/1");
+  EXPECT_THAT(nested.fault(), HasSubstr("is a link that leads nowhere"));
+  fs::create_directory(nested.path() + "/f/moved");
+  expect_same(nested.values(), {7, 0, kMasked, kMasked});
+}
+
 TEST(Zarr, AttributesOfXarrayPackMaskAndOrient) {
   for (const bool consolidated : {false, true}) {
     const Store store("named.zarr");
