@@ -134,6 +134,7 @@ Effects Session::on_described(std::uint32_t id, Result<protocol::DatasetDescript
   const std::uint64_t version = opening->version;
   openings_.erase(opening);
   if (description) {
+    not_opened_.reset();
     effects_.emplace_back(SendText{protocol::OpenedMessage{id, std::move(*description)}});
   } else {
     not_opened_ = description.error();
@@ -149,9 +150,10 @@ Effects Session::on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros n
   render_.reset();
   if (!drawn) {
     const ErrorKind kind = drawn.error().kind;
-    // Data that were released while they were read are asked for again.
-    if (kind == ErrorKind::cancelled || kind == ErrorKind::not_resident ||
-        kind == ErrorKind::draining) {
+    // Data that were released while they were read are asked for again, by the view: a still has
+    // left its queue, and is answered.
+    const bool released = kind == ErrorKind::not_resident || kind == ErrorKind::draining;
+    if (kind == ErrorKind::cancelled || (released && render.purpose != Purpose::still)) {
       ++stats_.cancelled;
     } else if (!render.unwanted) {
       render_failed(render, drawn.error(), now);
@@ -159,6 +161,7 @@ Effects Session::on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros n
     return finish(now);
   }
   learn(render, *drawn, now);
+  if (!render.unwanted && render.purpose != Purpose::still) not_opened_.reset();
   if (render.unwanted) {
     ++stats_.dropped;
   } else if (looks_standing(render, *drawn)) {

@@ -52,6 +52,16 @@ TEST(Open, that_failed_is_why_there_is_nothing_to_play) {
   drawn.patch(1, R"({"dataset":"wind"})");
   drawn.fail_render(why);
   EXPECT_EQ(play(drawn).status, 507);
+
+  // Once another one was there, what failed before it is no reason any more.
+  described.say(protocol::OpenMessage{6, "sea"});
+  described.described(6, description("sea"));
+  described.patch(1, R"({"dataset":null})");
+  EXPECT_EQ(play(described).status, 404);
+  drawn.patch(2, R"({"dataset":"sea"})");
+  drawn.finish_render();
+  drawn.patch(3, R"({"dataset":null})");
+  EXPECT_EQ(play(drawn).status, 404);
 }
 
 // What is quick is not told; nor is what is read for somebody else's frame while ours is drawn.
@@ -360,6 +370,19 @@ TEST(Still, waits_for_credit_and_gets_its_turn_while_the_view_moves) {
   int stills = 0;
   for (const SendFrame& frame : driver.frames) stills += frame.header.quality == 95 ? 1 : 0;
   EXPECT_EQ(stills, 1);
+}
+
+TEST(Still, whose_data_are_released_while_they_are_read_is_answered) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  protocol::StillMessage still;
+  still.id = 77;
+  driver.say(still);
+  driver.fail_render(make_error(ErrorKind::not_resident, "its memory was released; try again"));
+  ASSERT_EQ(driver.errors().size(), 1U);
+  EXPECT_EQ(driver.errors()[0].id, 77U);
+  EXPECT_FALSE(driver.render) << "whoever still wants it asks again";
 }
 
 TEST(Still, too_large_too_many_or_of_nothing_is_an_error) {
