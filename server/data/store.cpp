@@ -436,22 +436,29 @@ std::vector<std::string> Store::look_for_changes(double rest_s) {
     const std::string id = old->info().id;
     auto opened = State::open_entry(key_of(*entry.location), entry.location,
                                     [&] { return state_->options.open(*entry.location); });
+    Result<void> usable = opened ? Result<void>() : opened.error();
+    // For want of memory it is tried again; other faults stay until the files change.
+    bool lasts = !usable && usable.error().kind != ErrorKind::out_of_memory;
     if (opened) {
+      DatasetPtr& anew = opened->entry.dataset;
+      anew = std::make_shared<Dataset>(std::move(opened->source), id, state_->budget,
+                                       state_->options.storage);
+      (void)anew->charge_info();  // it was there before: kept, though not counted
+      if (state_->options.check) usable = state_->options.check(*anew);
+      lasts = !usable;
+    }
+    if (usable) {
       entry = std::move(opened->entry);
-      entry.dataset = std::make_shared<Dataset>(std::move(opened->source), id, state_->budget,
-                                                state_->options.storage);
-      (void)entry.dataset->charge_info();  // it was there before: kept, though not counted
       changed.push_back(id);
       log::info("opened anew: its files have changed", {{"dataset", id}});
     } else {
-      // For want of memory it is tried again; other faults stay until the files change.
-      if (opened.error().kind != ErrorKind::out_of_memory) entry.refused = now.text;
-      entry.problem = "its files have changed and cannot be opened anew: " + opened.error().message;
+      if (lasts) entry.refused = now.text;
+      entry.problem = "its files have changed and cannot be opened anew: " + usable.error().message;
       log::warn("a dataset's files have changed and cannot be opened anew",
-                {{"dataset", id}, {"error", opened.error().message}});
+                {{"dataset", id}, {"error", usable.error().message}});
     }
     state_->put(std::move(entry), old);
-    if (opened) state_->ahead.forget(old->info());
+    if (usable) state_->ahead.forget(old->info());
   }
   return changed;
 }

@@ -165,8 +165,8 @@ struct StoreOptions {
   // Opens what is no sample; the default reads files in this process.
   std::function<Result<std::unique_ptr<Source>>(const Location&)> open;
   std::shared_ptr<Budget> budget = nullptr;  // in place of one of bytes_max, shared with sources
-  // What a dataset must pass to be listed by add(); none: nothing. Called under the store's lock,
-  // so that it must not ask the store.
+  // What a dataset must pass to be listed, or opened anew; none: nothing. Called under the store's
+  // lock, so that it must not ask the store.
   std::function<Result<void>(const Dataset&)> check = nullptr;
 };
 

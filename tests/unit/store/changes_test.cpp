@@ -111,6 +111,40 @@ TEST(Store, WhatCannotBeOpenedAnewIsTriedOnceAChange) {
   EXPECT_EQ(store.problem("rain"), "");
 }
 
+// A first view that fits no more would make every frame an error.
+TEST(Store, WhatDoesNotPassTheCheckIsNotPutInPlaceOfWhatDid) {
+  const Folder folder;
+  write_small(folder / "rain.nc", 0);
+  std::atomic<int> opened{0};
+  bool is_too_large = false;
+  StoreOptions options;
+  options.bytes_max = 1 << 20;
+  options.open = [&](const Location& location) -> Result<std::unique_ptr<Source>> {
+    ++opened;
+    return open_file(location.members.front().path);
+  };
+  options.check = [&](const Dataset& /*dataset*/) -> Result<void> {
+    if (is_too_large) return make_error(ErrorKind::out_of_memory, "it needs 9 GiB");
+    return {};
+  };
+  Store store(options);
+  const auto before = store.add(folder / "rain.nc").value();
+  const auto replace = [&](double first) {
+    write_small(folder / "new.nc", first);
+    std::filesystem::rename(folder / "new.nc", folder / "rain.nc");
+  };
+  is_too_large = true;
+  replace(50);
+  for (int look = 0; look < 3; ++look) EXPECT_TRUE(store.look_for_changes(0).empty());
+  EXPECT_EQ(opened, 2) << "at first, and once for the change";
+  EXPECT_EQ(store.find("rain").value(), before) << "the old data stay";
+  EXPECT_NE(store.problem("rain").find("it needs 9 GiB"), std::string::npos);
+  is_too_large = false;
+  replace(60);
+  EXPECT_EQ(store.look_for_changes(0), std::vector<std::string>{"rain"});
+  EXPECT_EQ(store.problem("rain"), "");
+}
+
 TEST(Store, WhatIsListedAsFailedIsOpenedOnceItsFileIsReplaced) {
   const Folder folder;
   const std::string rain = folder / "rain.nc";
