@@ -15,6 +15,7 @@
 
 #include "server/base/log.hpp"
 #include "server/data/ahead.hpp"
+#include "server/data/files/locate_parts.hpp"
 
 namespace windsplat::data {
 
@@ -106,6 +107,7 @@ struct Store::State {
     std::string stamp;    // of the files as they were opened
     std::string refused;  // stamp with which they could not be opened anew
     std::string problem;
+    std::string note;
   };
   struct FailedEntry {
     std::string named;
@@ -218,6 +220,7 @@ struct Store::State {
       if (location) {
         before = stamp_of_all(*location, {});
         out.entry.listed = stamp_of(location->folder).text;
+        out.entry.note = links_left_out(*location);
       }
       auto source = open();
       if (!source) return source.error();
@@ -427,6 +430,7 @@ std::vector<std::string> Store::look_for_changes(double rest_s) {
     if (!entry.location) continue;
     const DatasetPtr old = entry.dataset;
     const bool matched = match_again(entry.location, entry.listed);
+    if (matched) entry.note = links_left_out(*entry.location);
     const FileStamp now = stamp_of_all(*entry.location, entry.companions);
     const bool same = now.text == entry.stamp || now.text == entry.refused;
     if (same || now_s() - now.changed_s < rest_s) {  // or still being written
@@ -484,6 +488,12 @@ std::string Store::problem(const std::string& id) const {
   const std::lock_guard lock(state_->mutex);
   const State::Entry* found = state_->find(id);
   return found == nullptr ? "" : found->problem;
+}
+
+std::string Store::note(const std::string& id) const {
+  const std::lock_guard lock(state_->mutex);
+  const State::Entry* found = state_->find(id);
+  return found == nullptr ? "" : found->note;
 }
 
 BudgetCounts Store::counts() const { return state_->budget->counts(); }

@@ -226,6 +226,8 @@ class Store {
   void release_idle(double idle_s = 10);
   // Why the files of a dataset, which changed, could not be opened anew; empty: nothing is wrong.
   [[nodiscard]] std::string problem(const std::string& id) const;
+  // What is to be known of the dataset's files besides its own notes; empty: nothing.
+  [[nodiscard]] std::string note(const std::string& id) const;
 
   [[nodiscard]] BudgetCounts counts() const;
   // The turn to load by Dataset::in_turn(), for as long as the answer is held, which the store must

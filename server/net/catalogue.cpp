@@ -30,6 +30,9 @@ protocol::DatasetDescription Catalogue::refreshed(const data::Dataset& dataset,
                                                   protocol::DatasetDescription description) const {
   scene::add_seen_ranges(dataset, description);
   description.resident_bytes = dataset.resident_bytes();
+  if (std::string note = store_->note(description.id); !note.empty()) {
+    description.notes.push_back(std::move(note));
+  }
   if (const std::string problem = store_->problem(description.id); !problem.empty()) {
     description.state = "failed";
     description.notes.push_back(problem);

@@ -289,6 +289,15 @@ TEST_F(DataRoot, APostedPathBecomesADatasetByWayOfAJob) {
   EXPECT_EQ(json_of(get(port(), "/v1/datasets"))["datasets"].size(), 1U);
 }
 
+TEST_F(DataRoot, LinksThatAPatternLeavesOutAreToldByTheDataset) {
+  fs::create_symlink("../../secret.nc", root_ / "runs/gcm2.nc");
+  const Json job = finished(post_path(port(), "runs/gcm*.nc").header("location"));
+  ASSERT_EQ(job["state"], "done") << job;
+  const Json told = json_of(get(port(), "/v1/datasets/" + job["result"].get<std::string>()));
+  EXPECT_EQ(told["state"], "ready");
+  EXPECT_THAT(told["notes"].dump(), HasSubstr("1 of 2 names that the pattern matches is a link"));
+}
+
 TEST_F(DataRoot, WhatCannotBeReadIsAFailedJobAndNothingElse) {
   for (const char* path : {"broken.nc", "runs"}) {
     const Answer accepted = post_path(port(), path);

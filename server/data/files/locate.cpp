@@ -5,6 +5,7 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
+#include <set>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -175,6 +176,28 @@ Result<Location> locate(const std::string& path_or_pattern) {
   out.members.push_back({plain.filename().native(), plain.native()});
   out.companions = may_have_companions(plain.filename().native());
   return out;
+}
+
+std::string links_left_out(const Location& series) {
+  if (series.kind != Location::Kind::series) return "";
+  const std::string pattern = fs::path(series.pattern).filename().native();
+  std::set<std::string_view> members;
+  for (const Location::Member& member : series.members) members.insert(member.name);
+  std::size_t links = 0;
+  std::error_code fault;
+  for (fs::directory_iterator at(series.folder, fault), end; !fault && at != end;
+       at.increment(fault)) {
+    std::error_code unknown;
+    if (!at->is_symlink(unknown)) continue;
+    const std::string name = at->path().filename().native();
+    const bool matches = ::fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0;
+    links += matches && members.count(name) == 0 ? 1U : 0U;
+  }
+  if (links == 0) return "";
+  return std::to_string(links) + " of " + std::to_string(links + members.size()) +
+         " names that the pattern matches " +
+         (links == 1 ? "is a link that leads " : "are links that lead ") +
+         (series.root.empty() ? "" : "out of the data root or ") + "to no file, and left out";
 }
 
 Result<Location> locate_again(const Location& series) {

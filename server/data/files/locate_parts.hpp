@@ -1,10 +1,12 @@
 // What the two ways of locating files share: order of names, what a series is called, which
-// formats name files beside them.
+// formats name files beside them, what of a series is left out.
 #pragma once
 
 #include <cstddef>
 #include <string>
 #include <string_view>
+
+#include "server/data/files/files.hpp"
 
 namespace windsplat::data {
 
@@ -17,5 +19,8 @@ std::string stem_of_pattern(const std::string& pattern);
 bool has_wildcard(std::string_view name);
 // Whether a file of that name is of a format whose header names files beside it.
 bool may_have_companions(const std::string& name);
+// Of links that a series' pattern matches and that are none of its files: a note that says how many
+// and why. Empty where there are none.
+std::string links_left_out(const Location& series);
 
 }  // namespace windsplat::data

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "server/data/files/files.hpp"
+#include "server/data/files/locate_parts.hpp"
 
 namespace windsplat::data {
 namespace {
@@ -184,6 +185,21 @@ TEST_F(LocateBeneath, APatternIsMatchedAgainWithinTheSameBounds) {
   const auto beside_links = locate_again(series);
   ASSERT_TRUE(beside_links) << "links that lead nowhere or out are no files of the series";
   EXPECT_EQ(beside_links->members.size(), 3U);
+}
+
+TEST_F(LocateBeneath, LinksThatAreLeftOutOfASeriesAreTold) {
+  fs::create_symlink("f2.nc", root_ / "runs/f1.nc");
+  EXPECT_EQ(links_left_out(located("runs/f*.nc")), "") << "a link to a file is that file";
+  EXPECT_EQ(links_left_out(located("runs/f2.nc")), "");
+  fs::create_symlink("../../secret.nc", root_ / "runs/f3.nc");
+  EXPECT_EQ(links_left_out(located("runs/f*.nc")),
+            "1 of 4 names that the pattern matches is a link that leads out of the data root or to "
+            "no file, and left out");
+  fs::create_symlink("nowhere.nc", root_ / "runs/f4.nc");
+  fs::create_symlink("nowhere.nc", root_ / "runs/g4.nc");
+  EXPECT_THAT(links_left_out(located("runs/f*.nc")), HasSubstr("2 of 5 names"));
+  EXPECT_EQ(links_left_out(locate((root_ / "runs/f*.nc").native()).value()),
+            "1 of 4 names that the pattern matches is a link that leads to no file, and left out");
 }
 
 TEST_F(LocateBeneath, LookingUpReadsNothing) {

@@ -72,6 +72,22 @@ TEST(Store, ASeriesGrowsAndShrinksWithItsFolder) {
   EXPECT_EQ(store.find(id).value()->volume("f", 0).value()->values[3], 23.0F);
 }
 
+TEST(Store, WhatIsLeftOutOfASeriesIsNoted) {
+  const Folder folder;
+  write_hour(folder / "f1.nc", 1, 10);
+  std::filesystem::create_symlink("nowhere.nc", folder / "f2.nc");
+  Store store(1 << 20);
+  const std::string id = store.add(folder / "f*.nc").value()->info().id;
+  EXPECT_EQ(store.note(id).find("1 of 2 names"), 0U) << store.note(id);
+  std::filesystem::create_symlink("nowhere.nc", folder / "f3.nc");
+  EXPECT_TRUE(store.look_for_changes(0).empty()) << "its files are the same";
+  EXPECT_EQ(store.note(id).find("2 of 3 names"), 0U) << store.note(id);
+  std::filesystem::remove(folder / "f3.nc");
+  write_hour(folder / "nowhere.nc", 2, 20);
+  EXPECT_EQ(store.look_for_changes(0), std::vector<std::string>{id});
+  EXPECT_EQ(store.note(id), "");
+}
+
 // As a model does that goes on writing: the same file of the same size.
 TEST(Store, AFileThatIsWrittenOverInPlaceIsOpenedAnew) {
   const Folder folder;
