@@ -403,6 +403,32 @@ std::string Budget::limit_text() const {
   return name_.text + " leaves " + megabytes(bytes_max_) + " for data";
 }
 
+Result<void> Reservation::take(std::uint64_t bytes, Urgency urgency, const OwnPins& own,
+                               const CancelToken* cancel) {
+  if (budget_ == nullptr) return {};
+  std::unique_lock lock(budget_->mutex_);
+  const bool there_is_room = urgency == Urgency::in_turn
+                                 ? budget_->wait_for_room(bytes, own, cancel, lock)
+                                 : budget_->make_room_beside_turn(bytes, urgency);
+  if (!there_is_room && cancel != nullptr && cancel->cancelled()) {
+    return make_error(ErrorKind::cancelled, "nobody waits for the answer");
+  }
+  if (!there_is_room) {
+    ++budget_->counts_.refusals;
+    return budget_->no_room("what is beside the fields", bytes);
+  }
+  set(bytes);
+  return {};
+}
+
+void Reservation::set(std::uint64_t bytes) {
+  budget_->used_ = budget_->used_ - bytes_ + bytes;
+  budget_->reserved_ = budget_->reserved_ - bytes_ + bytes;
+  if (term_ == Term::lasting) budget_->lasting_ = budget_->lasting_ - bytes_ + bytes;
+  if (bytes < bytes_) budget_->arrived_.notify_all();
+  bytes_ = bytes;
+}
+
 Result<void> Reservation::resize(std::uint64_t bytes, Urgency urgency) {
   if (budget_ == nullptr) return {};
   std::unique_lock lock(budget_->mutex_);
@@ -415,11 +441,7 @@ Result<void> Reservation::resize(std::uint64_t bytes, Urgency urgency) {
     ++budget_->counts_.refusals;
     return budget_->no_room("what is beside the fields", bytes - bytes_);
   }
-  budget_->used_ = budget_->used_ - bytes_ + bytes;
-  budget_->reserved_ = budget_->reserved_ - bytes_ + bytes;
-  if (term_ == Term::lasting) budget_->lasting_ = budget_->lasting_ - bytes_ + bytes;
-  if (bytes < bytes_) budget_->arrived_.notify_all();
-  bytes_ = bytes;
+  set(bytes);
   return {};
 }
 

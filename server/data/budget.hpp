@@ -193,6 +193,10 @@ class Reservation {
   Reservation(const Reservation&) = delete;
   Reservation& operator=(const Reservation&) = delete;
 
+  // So many from none, by the rules of Budget::get(): in_turn waits for what others hold, and
+  // others get what is there beside one in turn that waits. Errors: out_of_memory, cancelled.
+  Result<void> take(std::uint64_t bytes, Urgency urgency, const OwnPins& own,
+                    const CancelToken* cancel);
   // Errors: out_of_memory, where volumes that nobody holds do not make room for more (`ahead`:
   // those that nobody wishes for either); the size stays. Waits as Budget::get() does where it is
   // called by what that makes in turn. Without a budget all is allowed.
@@ -200,6 +204,7 @@ class Reservation {
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
+  void set(std::uint64_t bytes);  // under the budget's mutex
   std::shared_ptr<Budget> budget_;
   Term term_;
   std::uint64_t bytes_ = 0;

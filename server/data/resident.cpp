@@ -364,6 +364,14 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
   return level;
 }
 
+Result<std::shared_ptr<const void>> Dataset::reserve(std::uint64_t bytes) const {
+  const auto held = std::make_shared<Reservation>(state_->budget);
+  const auto taken =
+      held->take(bytes, urgency(), own_ ? *own_ : OwnPins(), cancel_ ? &*cancel_ : nullptr);
+  if (!taken) return taken.error();
+  return std::shared_ptr<const void>(held);
+}
+
 std::vector<ResidentKey> Dataset::keys_of(const std::string& field, std::size_t step,
                                           const Coarsening& how) const {
   const Result<std::size_t> index = state_->find(field, step);

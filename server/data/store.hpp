@@ -61,6 +61,10 @@ class Dataset {
   // A handle for what is not needed yet: it gives way to loads that somebody waits for, and evicts
   // nothing that is wished for.
   [[nodiscard]] Dataset ahead() const;
+  // So many bytes of work beside the volumes count in the limit for as long as the answer is held.
+  // A handle in_turn() waits for room; others get what is there beside one that waits. Errors:
+  // out_of_memory, cancelled.
+  [[nodiscard]] Result<std::shared_ptr<const void>> reserve(std::uint64_t bytes) const;
   // Under which keys level() keeps its answer and what that is made of; none: no such field or
   // step.
   [[nodiscard]] std::vector<ResidentKey> keys_of(const std::string& field, std::size_t step,

@@ -11,9 +11,9 @@ namespace windsplat::net {
 namespace {
 
 using DrawingPtr = std::shared_ptr<const Drawing>;
+using Held = std::shared_ptr<const void>;
 
-Result<void> enqueue(Services& services, const DrawingPtr& drawing,
-                     std::shared_ptr<const void> loaded);
+Result<void> enqueue(Services& services, const DrawingPtr& drawing, Held loaded);
 
 void load(Services& services, const DrawingPtr& drawing) {
   const auto run = [&services, drawing] {
@@ -22,7 +22,7 @@ void load(Services& services, const DrawingPtr& drawing) {
       return;
     }
     auto loaded = services.catalogue.load(*drawing->dataset, drawing->load, drawing->cancel);
-    if (!loaded) return drawing->fail(naming(loaded.error(), drawing->dataset->info().id));
+    if (!loaded) return drawing->fail(loaded.error());
     if (const auto queued = enqueue(services, drawing, std::move(*loaded)); !queued) {
       drawing->fail(queued.error());
     }
@@ -35,8 +35,7 @@ void load(Services& services, const DrawingPtr& drawing) {
   }
 }
 
-Result<void> enqueue(Services& services, const DrawingPtr& drawing,
-                     std::shared_ptr<const void> loaded) {
+Result<void> enqueue(Services& services, const DrawingPtr& drawing, Held loaded) {
   const bool after_load = loaded != nullptr;  // and was let in before
   return services.renderer.submit(
       {drawing->kind, drawing->owner, drawing->cancel,
@@ -48,17 +47,37 @@ Result<void> enqueue(Services& services, const DrawingPtr& drawing,
        after_load, drawing->cost_ms, drawing->payer});
 }
 
+Result<Held> room_for(const data::Dataset& dataset, const protocol::ImageView& image,
+                      const frame::Encoding& encoding) {
+  const int width = quality::edge_at(image.width, encoding.half_level);
+  const int height = quality::edge_at(image.height, encoding.half_level);
+  const std::uint64_t bytes = frame::bytes_beyond_kept(width, height, encoding.format);
+  if (bytes == 0) return Held();
+  auto reserved = dataset.reserve(bytes);
+  if (reserved || reserved.error().kind != ErrorKind::out_of_memory) return reserved;
+  return make_error(ErrorKind::out_of_memory,
+                    "a picture of " + std::to_string(width) + " x " + std::to_string(height) +
+                        " pixels is too large: " + reserved.error().message);
+}
+
 }  // namespace
 
-Result<std::shared_ptr<const void>> reserve_picture(Services& services, int width, int height,
-                                                    frame::Format format) {
-  const std::uint64_t bytes = frame::bytes_beyond_kept(width, height, format);
-  if (bytes == 0) return std::shared_ptr<const void>();
-  auto reserved = services.catalogue.reserve(bytes);
-  if (reserved) return reserved;
-  return make_error(reserved.error().kind, "a picture of " + std::to_string(width) + " x " +
-                                               std::to_string(height) +
-                                               " pixels is too large: " + reserved.error().message);
+Result<Held> reserve_picture(const data::Dataset& dataset, const protocol::ImageView& image,
+                             const frame::Encoding& encoding, bool after_load) {
+  if (after_load) return Held();
+  auto room = room_for(dataset, image, encoding);
+  if (room) return room;
+  return make_error(ErrorKind::not_resident, room.error().message);
+}
+
+Result<Held> load_picture(const protocol::View& view, data::Dataset& loading,
+                          const frame::Encoding& encoding) {
+  auto fields = frame::load(view, loading, encoding);
+  if (!fields) return naming(fields.error(), loading.info().id);
+  // After them, so that it is known at once where the two do not fit together.
+  auto room = room_for(loading, view.image, encoding);
+  if (!room) return room.error();
+  return Held(std::make_shared<const std::pair<Held, Held>>(std::move(*fields), std::move(*room)));
 }
 
 Result<void> submit(Services& services, Drawing drawing) {

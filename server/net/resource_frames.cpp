@@ -139,8 +139,24 @@ frame::Encoding encoding_at(frame::Encoding encoding, const quality::Setting& se
   return encoding;
 }
 
+// What a picture is loaded for, so that it is drawn as that even where more is known by then.
+using LoadedFor = std::optional<quality::Setting>;
+
+Result<std::shared_ptr<const void>> load(Services& services, const Picture& picture,
+                                         data::Dataset& loading, LoadedFor& loaded_for) {
+  const std::string& id = loading.info().id;
+  const auto view = resolve(picture, loading);
+  if (!view) return naming(view.error(), id);
+  const auto setting = setting_of(services, *view, loading);
+  if (!setting) return naming(setting.error(), id);
+  loaded_for = *setting;
+  return load_picture(quality::at_setting(*view, *setting), loading,
+                      encoding_at(picture.encoding, *setting));
+}
+
 Result<Response> draw(Services& services, const Picture& picture, data::Dataset& dataset,
-                      std::int64_t queue_us, const CancelToken& cancel) {
+                      std::int64_t queue_us, const LoadedFor& loaded_for,
+                      const CancelToken& cancel) {
   const auto view = resolve(picture, dataset);
   if (!view) return view.error();
   Response response;
@@ -154,12 +170,11 @@ Result<Response> draw(Services& services, const Picture& picture, data::Dataset&
       return response;
     }
   }
-  const auto setting = setting_of(services, *view, dataset);
+  const auto setting =
+      loaded_for ? Result<quality::Setting>(*loaded_for) : setting_of(services, *view, dataset);
   if (!setting) return setting.error();
   const frame::Encoding encoding = encoding_at(picture.encoding, *setting);
-  const auto room =
-      reserve_picture(services, quality::edge_at(view->image.width, encoding.half_level),
-                      quality::edge_at(view->image.height, encoding.half_level), encoding.format);
+  const auto room = reserve_picture(dataset, view->image, encoding, loaded_for.has_value());
   if (!room) return room.error();
   auto drawn = frame::produce(quality::at_setting(*view, *setting), dataset, encoding,
                               *services.pool, cancel, services.frames);
@@ -208,27 +223,20 @@ void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dat
       request.address.empty() ? request.peer : std::hash<std::string>{}(request.address);
   Drawing drawing{
       RenderService::Kind::request, owner, cancel, std::move(dataset), {}, {}, {}, 0, {}};
-  drawing.draw = [&services, picture, answer, cancel, id = request.id](
+  const auto loaded_for = std::make_shared<LoadedFor>();
+  drawing.draw = [&services, picture, answer, cancel, loaded_for, id = request.id](
                      data::Dataset& resident, std::int64_t queue_us, bool after_load) {
     auto response = attempt<Response>(
-        "a picture", cancel, [&] { return draw(services, *picture, resident, queue_us, cancel); },
-        id);
+        "a picture", cancel,
+        [&] { return draw(services, *picture, resident, queue_us, *loaded_for, cancel); }, id);
     if (!after_load && !response && response.error().kind == ErrorKind::not_resident) return false;
     (*answer)(response ? std::move(*response) : problem_response(response.error()));
     return true;
   };
-  drawing.load = [&services, picture, cancel, id = request.id](data::Dataset& loading) {
+  drawing.load = [&services, picture, cancel, loaded_for, id = request.id](data::Dataset& loading) {
     return attempt<std::shared_ptr<const void>>(
         "loading a picture's fields", cancel,
-        [&]() -> Result<std::shared_ptr<const void>> {
-          const auto view = resolve(*picture, loading);
-          if (!view) return view.error();
-          const auto setting = setting_of(services, *view, loading);
-          if (!setting) return setting.error();
-          return frame::load(quality::at_setting(*view, *setting), loading,
-                             encoding_at(picture->encoding, *setting));
-        },
-        id);
+        [&] { return load(services, *picture, loading, *loaded_for); }, id);
   };
   drawing.payer = request.address;
   drawing.cost_ms = estimate_ms;

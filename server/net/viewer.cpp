@@ -31,13 +31,10 @@ frame::Encoding frame_encoding(const session::Encoding& wanted, const quality::S
 }
 
 Result<session::Drawn> draw(Services& services, const session::StartRender& wanted,
-                            data::Dataset& dataset, std::int64_t queue_us,
+                            data::Dataset& dataset, std::int64_t queue_us, bool after_load,
                             const CancelToken& cancel) {
   const frame::Encoding encoding = frame_encoding(wanted.encoding, wanted.setting);
-  const protocol::ImageView& image = wanted.view.image;
-  const auto room =
-      reserve_picture(services, quality::edge_at(image.width, encoding.half_level),
-                      quality::edge_at(image.height, encoding.half_level), encoding.format);
+  const auto room = reserve_picture(dataset, wanted.view.image, encoding, after_load);
   if (!room) return room.error();
   auto drawn = frame::produce(quality::at_setting(wanted.view, wanted.setting), dataset, encoding,
                               *services.pool, cancel, services.frames);
@@ -126,8 +123,9 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
       RenderService::Kind::stream, owner_, cancel, std::move(*dataset), {}, {}, {}, 0, payer_};
   drawing.draw = [&services = services_, effect, cancel, shared](
                      data::Dataset& resident, std::int64_t queue_us, bool after_load) {
-    auto drawn = attempt<session::Drawn>(
-        "a frame", cancel, [&] { return draw(services, effect, resident, queue_us, cancel); });
+    auto drawn = attempt<session::Drawn>("a frame", cancel, [&] {
+      return draw(services, effect, resident, queue_us, after_load, cancel);
+    });
     if (!after_load && !drawn && drawn.error().kind == ErrorKind::not_resident) return false;
     if (drawn) drawn->loaded = after_load;
     (*shared)(effect.ticket, std::move(drawn));
@@ -135,8 +133,8 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
   };
   drawing.load = [effect, cancel](data::Dataset& loading) {
     return attempt<std::shared_ptr<const void>>("loading a frame's fields", cancel, [&] {
-      return frame::load(quality::at_setting(effect.view, effect.setting), loading,
-                         frame_encoding(effect.encoding, effect.setting));
+      return load_picture(quality::at_setting(effect.view, effect.setting), loading,
+                          frame_encoding(effect.encoding, effect.setting));
     });
   };
   drawing.fail = [ticket = effect.ticket, shared](const Error& error) { (*shared)(ticket, error); };

@@ -1,14 +1,16 @@
-// What a viewer's render jobs tell of the time they took.
+// What a viewer's render jobs tell of the time they took, and how they share memory that is short.
 #include "server/net/viewer.hpp"
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <future>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "net_server.hpp"
+#include "server/frame/frame.hpp"
 
 namespace net_test {
 namespace {
@@ -86,6 +88,71 @@ TEST(Viewer, ViewersOfDifferentStepsAllGetTheirFramesWhereOneStepFits) {
     }
     EXPECT_LE(store->counts().bytes, store->counts().bytes_max);
   }
+}
+
+// One picture of more pixels than are always kept room for, and the data of one step and a half.
+class LargePictures : public testing::Test {
+ protected:
+  static constexpr std::uint64_t step_bytes = std::uint64_t{32} * 16 * 6 * 4 * sizeof(float);
+  LargePictures() {
+    view_.dataset = "small";
+    view_.image.width = 2048;
+    view_.image.height = 1104;
+    view_.method.detail = protocol::Detail::full;
+    store_ = std::make_shared<data::Store>(
+        frame::bytes_beyond_kept(2048, 1104, frame::Format::jpeg) + step_bytes * 3 / 2);
+    EXPECT_TRUE(store_->add(small_file()));
+    services_ = std::make_unique<net::Services>(net::ServerOptions{}, store_,
+                                                std::make_shared<ThreadPool>(2));
+  }
+  // Why there is no frame; empty: there is one.
+  std::future<std::string> fault_of(net::Viewer& viewer, const protocol::View& view) {
+    const auto told = std::make_shared<std::promise<std::string>>();
+    viewer.start(session::StartRender{++tickets_, view, {}, {}},
+                 [told](std::uint64_t /*ticket*/, const Result<session::Drawn>& drawn) {
+                   told->set_value(drawn ? "" : drawn.error().message);
+                 });
+    return told->get_future();
+  }
+
+  protocol::View view_;
+  std::shared_ptr<data::Store> store_;
+  std::unique_ptr<net::Services> services_;
+  std::uint64_t tickets_ = 0;
+};
+
+TEST_F(LargePictures, WaitForTheRoomThatOthersHold) {
+  net::Viewer viewer(*services_, 1, "192.0.2.1");
+  ASSERT_EQ(fault_of(viewer, view_).get(), "") << "its data are resident from now on";
+  auto others = store_->reserve(step_bytes);
+  ASSERT_TRUE(others);
+  auto fault = fault_of(viewer, view_);
+  EXPECT_EQ(fault.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
+  others = make_error(ErrorKind::internal, "let go of");
+  EXPECT_EQ(fault.get(), "");
+}
+
+TEST_F(LargePictures, OfTwoViewersAreDrawnOneAfterTheOtherWhereOneFits) {
+  net::Viewer one(*services_, 1, "192.0.2.1");
+  net::Viewer other(*services_, 2, "192.0.2.2");
+  for (int round = 0; round < 4; ++round) {
+    view_.step = round % small_steps;
+    auto first = fault_of(one, view_);
+    view_.step = (round + 1) % small_steps;
+    auto second = fault_of(other, view_);
+    EXPECT_EQ(first.get(), "") << round;
+    EXPECT_EQ(second.get(), "") << round;
+    EXPECT_LE(store_->counts().bytes, store_->counts().bytes_max);
+  }
+}
+
+TEST_F(LargePictures, ThatFitNotEvenAloneAreRefusedAtOnce) {
+  net::Viewer viewer(*services_, 1, "192.0.2.1");
+  view_.image.height = 2048;
+  const std::string fault = fault_of(viewer, view_).get();
+  EXPECT_EQ(fault.find("a picture of 2048 x 2048 pixels is too large: what is beside the fields"),
+            0U)
+      << fault;
 }
 
 }  // namespace

@@ -258,8 +258,8 @@ TEST(Zarr, AChunkThatIsALinkToNowhereIsLostAndNotAbsent) {
   expect_same(store.values(), {7, 0, 1, 2});
 
   const Store nested("n.zarr");
-  nested.put("f/.zarray", array_json("[2,2]", "[1,2]", "<i2", "-9", "null",
-                                     R"(,"dimension_separator":"/")"));
+  nested.put("f/.zarray",
+             array_json("[2,2]", "[1,2]", "<i2", "-9", "null", R"(,"dimension_separator":"/")"));
   nested.put("f/0/0", bytes_of_items<std::int16_t>({7, 0}));
   fs::create_symlink("moved", nested.path() + "/f/1");
   EXPECT_THAT(nested.fault(), HasSubstr("is a link that leads nowhere"));
