@@ -2,6 +2,7 @@
 #include "server/net/load_service.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -16,17 +17,17 @@
 namespace windsplat::net {
 
 struct LoadService::State {
-  State(std::size_t most, const char* name, std::function<void()> told)
-      : jobs_max(most), what(name), refused(std::move(told)) {}
+  using Clock = std::chrono::steady_clock;
+
+  State(std::size_t at_a_time, std::size_t most, const char* name, std::function<void()> told)
+      : places(at_a_time), jobs_max(most), what(name), refused(std::move(told)) {}
 
   // No exception leaves it: what it keeps track of was given memory before.
 
   void work() {
     std::unique_lock lock(mutex);
     for (;;) {
-      auto next = jobs.end();
-      wake.wait(lock,
-                [&] { return (next = first_free()) != jobs.end() || (ending && jobs.empty()); });
+      const auto next = next_job(lock);
       if (next == jobs.end()) return;
       std::optional<Job> job(std::move(*next));
       jobs.erase(next);
@@ -34,6 +35,8 @@ struct LoadService::State {
       const std::shared_ptr<const void> dataset =
           job->cancel.cancelled() ? nullptr : std::move(job->dataset);
       if (dataset) busy.push_back(dataset);
+      const Clock::time_point begun = Clock::now();
+      running.push_back(begun);
       lock.unlock();
       try {
         job->run();
@@ -43,7 +46,26 @@ struct LoadService::State {
       job.reset();  // what it holds goes before the lock is taken
       lock.lock();
       if (dataset) busy.erase(std::find(busy.begin(), busy.end(), dataset));
+      running.erase(std::find(running.begin(), running.end(), begun));
       wake.notify_all();
+    }
+  }
+
+  // Waits for a job that may begin; at the end for none.
+  std::deque<Job>::iterator next_job(std::unique_lock<std::mutex>& lock) {
+    for (;;) {
+      const auto next = first_free();
+      if (next == jobs.end()) {
+        if (ending && jobs.empty()) return next;
+        wake.wait(lock);
+      } else if (running.size() < places) {
+        return next;
+      } else {
+        // Of those that began last there are as many as places: until one has run for long.
+        const Clock::time_point at = running[running.size() - places] + long_run;
+        if (at <= Clock::now()) return next;
+        wake.wait_until(lock, at);
+      }
     }
   }
 
@@ -81,22 +103,26 @@ struct LoadService::State {
     }
   };
 
+  const std::size_t places;
   const std::size_t jobs_max;
   const char* const what;
   const std::function<void()> refused;
   std::mutex mutex;
   std::condition_variable wake;
   std::deque<Job> jobs;
-  std::vector<std::shared_ptr<const void>> busy;  // room for one a thread
+  // Room for one a thread:
+  std::vector<std::shared_ptr<const void>> busy;
+  std::vector<Clock::time_point> running;  // since when, the oldest first
   bool ending = false;
   std::vector<std::thread> threads;
 };
 
 LoadService::LoadService(std::size_t threads, std::size_t jobs_max, const char* what,
-                         std::function<void()> refused)
-    : state_(std::make_unique<State>(jobs_max, what, std::move(refused))) {
-  state_->busy.reserve(threads);
-  for (std::size_t i = 0; i < threads; ++i) {
+                         std::function<void()> refused, std::size_t spare)
+    : state_(std::make_unique<State>(threads, jobs_max, what, std::move(refused))) {
+  state_->busy.reserve(threads + spare);
+  state_->running.reserve(threads + spare);
+  for (std::size_t i = 0; i < threads + spare; ++i) {
     state_->threads.emplace_back([state = state_.get()] { state->work(); });
   }
 }
@@ -114,7 +140,7 @@ Result<void> LoadService::submit(Job job) {
     }
     state_->jobs.push_back(std::move(job));
   }
-  state_->wake.notify_one();
+  state_->wake.notify_all();  // each may have to look when there is a place
   return {};
 }
 

@@ -1,8 +1,11 @@
 // The threads that load what a picture needs and is not resident, so that the renderer never waits
 // for a disk. Jobs in from any thread, first come first served, but for those of a dataset that one
 // of them is busy with: a dataset whose files hang holds one thread and not the others' datasets.
+// And a job that runs for long, because its files hang or it waits for memory, leaves its place to
+// the next one, as long as there are spare threads.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -30,9 +33,11 @@ class LoadService {
   // `jobs_max`: that may wait for a dataset; for all of them datasets_full times as many. One payer
   // has half of either at most.
   // `what`: the jobs' name in the error of too many ("loads"). `refused` is called each time.
+  // `spare`: threads beside the `threads` that run jobs which began less than `long_run` ago.
   static constexpr std::size_t datasets_full = 4;
+  static constexpr std::chrono::milliseconds long_run{500};
   LoadService(std::size_t threads, std::size_t jobs_max, const char* what,
-              std::function<void()> refused = {});
+              std::function<void()> refused = {}, std::size_t spare = 0);
   ~LoadService();
   LoadService(const LoadService&) = delete;
   LoadService& operator=(const LoadService&) = delete;

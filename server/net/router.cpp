@@ -21,6 +21,7 @@ namespace {
 constexpr std::size_t requests_waiting_max = 16;
 constexpr std::size_t view_changes_waiting_max = 64;  // each takes the time of a disk's sync
 constexpr std::size_t load_threads = 2;
+constexpr std::size_t load_threads_spare = 4;  // for loads that hang or wait for memory
 
 using Handler = std::function<void(const Request&, Reply)>;
 
@@ -327,8 +328,9 @@ Services::Services(ServerOptions server_options, std::shared_ptr<data::Store> st
            options.limits.wait_ms,
            [this](const std::string& address, std::int64_t us) { admission.rendered(address, us); },
            [this] { metrics.refused(LimitKind::waiting); }}),
-      loads(load_threads, requests_waiting_max, "loads",
-            [this] { metrics.refused(LimitKind::waiting); }) {
+      loads(
+          load_threads, requests_waiting_max, "loads",
+          [this] { metrics.refused(LimitKind::waiting); }, load_threads_spare) {
   options.base_path = normal_base_path(options.base_path);
   if (options.views == nullptr) options.views = views::SavedViews::open({}).value();
 }

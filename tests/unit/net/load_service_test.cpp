@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <future>
+#include <thread>
 
 namespace windsplat::net {
 namespace {
@@ -67,6 +69,42 @@ TEST(LoadService, one_payer_has_half_of_the_places) {
   EXPECT_FALSE(ask(std::make_shared<const int>(0), "a")) << "half of all";
   EXPECT_TRUE(ask(std::make_shared<const int>(0), "b"));
   let_go.set_value();
+}
+
+// Loads that wait for memory or whose files hang.
+TEST(LoadService, jobs_that_run_for_long_leave_their_places_as_far_as_there_are_spare_threads) {
+  constexpr std::size_t places = 2;
+  constexpr std::size_t spare = 2;
+  std::promise<void> let_go;
+  const std::shared_future<void> gone = let_go.get_future().share();
+  std::atomic<std::size_t> hanging{0};
+  LoadService loads(places, 16, "loads", {}, spare);
+  const auto hang = [&] {
+    EXPECT_TRUE(loads.submit({{},
+                              [&hanging, gone] {
+                                ++hanging;
+                                gone.wait();
+                              },
+                              true,
+                              std::make_shared<const int>(0)}));
+  };
+  const auto run_one = [&] {
+    auto done = std::make_shared<std::promise<void>>();
+    EXPECT_TRUE(
+        loads.submit({{}, [done] { done->set_value(); }, true, std::make_shared<const int>(0)}));
+    return done->get_future();
+  };
+  for (std::size_t n = 0; n < places; ++n) hang();
+  auto beside_two = run_one();
+  auto also_beside_two = run_one();
+  EXPECT_EQ(beside_two.wait_for(std::chrono::minutes(1)), std::future_status::ready);
+  EXPECT_EQ(also_beside_two.wait_for(std::chrono::minutes(1)), std::future_status::ready);
+  for (std::size_t n = 0; n < spare; ++n) hang();
+  while (hanging < places + spare) std::this_thread::yield();
+  auto beside_all = run_one();
+  EXPECT_EQ(beside_all.wait_for(2 * LoadService::long_run), std::future_status::timeout);
+  let_go.set_value();
+  EXPECT_EQ(beside_all.wait_for(std::chrono::minutes(1)), std::future_status::ready);
 }
 
 }  // namespace
