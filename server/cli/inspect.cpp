@@ -131,7 +131,9 @@ Result<void> inspect(const InspectArguments& arguments) {
       choice.note = "ranges are not read: " + error.message;
     }
   }
-  if (!choice.note.empty()) description->notes.push_back(std::move(choice.note));
+  for (const std::string& note : {choice.note, store.note((*dataset)->info().id)}) {
+    if (!note.empty()) description->notes.push_back(note);
+  }
   return write_stdout(arguments.json ? protocol::encode_dataset(*description) + "\n"
                                      : inspect_text(*description));
 }
