@@ -107,7 +107,9 @@ fs::path end_of_links(fs::path path) {
 
 fs::path part_of(const fs::path& target) {
   fs::path part = target;
-  part += "." + std::to_string(::getpid()) + ".part";
+  part += ".";
+  part += std::to_string(::getpid());
+  part += ".part";
   return part;
 }
 
