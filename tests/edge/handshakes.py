@@ -38,6 +38,8 @@ REFUSED_WITHIN_S = 60  # where the attacker gets little of the machine
 BYSTANDER_SHARE = 0.1
 SKIPPED = 77
 THREAD = "handshakes"
+# Not by fork: a lock of OpenSSL that the bystander's threads hold at that moment would stay locked.
+PROCESSES = multiprocessing.get_context("spawn")
 VIEW = {"image": {"width": 96, "height": 64}}
 
 
@@ -160,12 +162,12 @@ def cpu_of(task):
 class Phase:
     def __init__(self, name, daemon, seconds, hello=None, attacked=True, computed=False):
         self.name, self.computed = name, computed
-        counts = [multiprocessing.Value("q", 0) for _ in range(2)]
+        counts = [PROCESSES.Value("q", 0) for _ in range(2)]
         before, begin = Counts(daemon), time.monotonic()
         bystander = Bystander(daemon.target, seconds)
 
         def go_on(until, nice):
-            attacker = multiprocessing.Process(
+            attacker = PROCESSES.Process(
                 target=attack, args=(daemon.target.port, hello, until, *counts, nice))
             attacker.start()
             attacker.join()

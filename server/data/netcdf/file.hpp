@@ -81,7 +81,9 @@ class File final : public cf::ArrayFile {
   Result<void> scan_variable(const Place& place, bool above);
   [[nodiscard]] bool has_field() const;
   void look_at_storage(const Place& place, FileVariable& variable);
+  // Under the LibraryLock:
   void keep_chunks(int variable, const Block& block) const;
+  void free_chunks(int variable) const;
   void forget_others(int variable, std::size_t bytes) const;
   template <class T, class Get>
   Result<void> read_block(int variable, const Block& block, T* out, const Get& get) const;

@@ -49,6 +49,10 @@ std::size_t File::chunk_cost_bytes(int variable) const {
 void File::forget_chunks(int variable) const {
   if (classic_) return;
   const LibraryLock lock;
+  free_chunks(variable);
+}
+
+void File::free_chunks(int variable) const {
   kept_.remove_if([variable](const auto& kept) { return kept.first == variable; });
   const auto [group, id] = place_of(variable);
   std::size_t size = 0;
@@ -97,7 +101,7 @@ void File::forget_others(int variable, std::size_t bytes) const {
   while (!kept_.empty() && total > kept_bytes_max) {
     const auto [oldest, its_bytes] = kept_.back();
     total -= static_cast<double>(its_bytes);
-    forget_chunks(oldest);
+    free_chunks(oldest);
   }
   kept_.emplace_front(variable, bytes);
 }

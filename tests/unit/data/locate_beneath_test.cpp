@@ -199,7 +199,7 @@ TEST_F(LocateBeneath, LinksThatAreLeftOutOfASeriesAreTold) {
   fs::create_symlink("nowhere.nc", root_ / "runs/g4.nc");
   EXPECT_THAT(links_left_out(located("runs/f*.nc")), HasSubstr("2 of 5 names"));
   EXPECT_EQ(links_left_out(locate((root_ / "runs/f*.nc").native()).value()),
-            "1 of 4 names that the pattern matches is a link that leads to no file, and left out");
+            "1 of 5 names that the pattern matches is a link that leads to no file, and left out");
 }
 
 TEST_F(LocateBeneath, LookingUpReadsNothing) {
