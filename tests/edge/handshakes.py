@@ -8,9 +8,9 @@
 For each attack: requests on a connection that is open and on fresh ones must be answered within
 50 ms (the 99th percentile; three times that of the undisturbed run where that is more), the stream
 must get half of the frames it got undisturbed, and handshakes may take no more processor time than
-an address has. Where handshakes are computed at all some must be refused, and their time must have
-been spent by their own thread, however loaded the machine is. Exit code 0: all of it holds; 77:
-openssl is not installed."""
+an address has. Where handshakes are computed at all some must be refused once the address's share
+is used up, and their time must have been spent by their own thread, however loaded the machine
+is. Exit code 0: all of it holds; 77: openssl is not installed."""
 import argparse
 import json
 import multiprocessing
@@ -34,7 +34,7 @@ ADDRESS_SHARE = 0.06
 ADDRESS_AT_ONCE_S = 10 * ADDRESS_SHARE
 LIMITS = [f"--max-handshakes-per-address={1000 * ADDRESS_SHARE:g}", "--max-arrivals=0",
           "--max-arrivals-per-address=0"]
-REFUSED_WITHIN_S = 60  # where the attacker gets little of the machine
+REFUSED_WITHIN_S = 30  # where the attacker gets little of the machine
 BYSTANDER_SHARE = 0.1
 SKIPPED = 77
 THREAD = "handshakes"
@@ -203,7 +203,9 @@ class Phase:
         # What was under way when the time was used up: 64 handshakes, each a few milliseconds.
         if self.cpu_s > most_s + 0.3:
             out.append(f"{self.name}: handshakes took {self.cpu_s} s, not {most_s:.1f} s")
-        if self.computed and self.limited == 0:
+        # Less, where the attacker gets too little of the machine to use the address's share up.
+        if self.computed and self.limited == 0 and (
+                self.cpu_s > ADDRESS_AT_ONCE_S + ADDRESS_SHARE * self.seconds):
             out.append(f"{self.name}: none was refused for the time that handshakes took")
         if self.computed and self.thread_s < self.cpu_s / 2:
             out.append(f"{self.name}: of {self.cpu_s:.2f} s of handshakes their thread took"
