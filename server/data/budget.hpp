@@ -93,7 +93,7 @@ class Budget {
   // Drops all of a dataset that is no more; what somebody holds of it counts until it is let go of.
   void forget(std::uint64_t owner);
   void count_read(bool ok);
-  // Nobody waits for room any more: it is there or it is not.
+  // Ends all waits for room: later calls get what is there or an error.
   void end();
   [[nodiscard]] BudgetCounts counts() const;
   // The most that a demand could have now: what is free and what may go for it.

@@ -255,6 +255,7 @@ struct SavedViews::State {
       return full(std::to_string(options.bytes_max) + " bytes of views");
     }
     if (on_disk()) {
+      static_cast<void>(write_fault(folder));  // makes the folder where that was impossible before
       const auto written = write_whole_file(file_of(saved.id), text, Sync::now);
       if (!written) return disk_error(written.error());
     }

@@ -25,7 +25,7 @@ struct Options {
 // Any thread. find() never waits for a disk; what changes views does, one at a time.
 class SavedViews {
  public:
-  // Reads what is there. What is no view's file is told in the log and left alone, and so is a
+  // Reads what is there. Other files are logged and left alone, and so is a
   // folder that cannot be written to: its views are served, changes are refused. Errors: invalid,
   // where the folder cannot be used or another process does.
   static Result<std::shared_ptr<SavedViews>> open(Options options);

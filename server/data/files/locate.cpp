@@ -197,7 +197,8 @@ std::string links_left_out(const Location& series) {
   return std::to_string(links) + " of " + std::to_string(links + members.size()) +
          " names that the pattern matches " +
          (links == 1 ? "is a link that leads " : "are links that lead ") +
-         (series.root.empty() ? "" : "out of the data root or ") + "to no file, and left out";
+         (series.root.empty() ? "" : "out of the data root or ") + "to no file, and " +
+         (links == 1 ? "is left out" : "are left out");
 }
 
 Result<Location> locate_again(const Location& series) {

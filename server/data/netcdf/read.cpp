@@ -16,7 +16,7 @@ namespace {
 
 using cf::in_quotes;
 
-// Of all variables together, or one chunk (resident.cpp reckons with it).
+// Of all variables together, or one chunk (resident.cpp estimates with it).
 constexpr double kept_bytes_max = 128 << 20;
 
 // A scalar has no extent, but the library still wants a place to look at.

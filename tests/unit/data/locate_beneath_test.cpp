@@ -194,12 +194,13 @@ TEST_F(LocateBeneath, LinksThatAreLeftOutOfASeriesAreTold) {
   fs::create_symlink("../../secret.nc", root_ / "runs/f3.nc");
   EXPECT_EQ(links_left_out(located("runs/f*.nc")),
             "1 of 4 names that the pattern matches is a link that leads out of the data root or to "
-            "no file, and left out");
+            "no file, and is left out");
   fs::create_symlink("nowhere.nc", root_ / "runs/f4.nc");
   fs::create_symlink("nowhere.nc", root_ / "runs/g4.nc");
   EXPECT_THAT(links_left_out(located("runs/f*.nc")), HasSubstr("2 of 5 names"));
   EXPECT_EQ(links_left_out(locate((root_ / "runs/f*.nc").native()).value()),
-            "1 of 5 names that the pattern matches is a link that leads to no file, and left out");
+            "1 of 5 names that the pattern matches is a link that leads to no file, and is left "
+            "out");
 }
 
 TEST_F(LocateBeneath, LookingUpReadsNothing) {

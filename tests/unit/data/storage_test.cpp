@@ -274,21 +274,6 @@ TEST(Storage, OnlyNetcdfIsCalledNetcdf) {
   }
 }
 
-// Two names of one dataset: what one of them read, the library says of the other to be there.
-TEST(Storage, AnAbsentChunkIsMaskedUnderEveryNameOfItsDataset) {
-  const Folder folder;
-  {
-    const Hdf5Maker file(folder / "a.h5");
-    deflated_set(file, "a", {2, 4, 4}, {1, 4, 4}, 1);
-    for (const char* link : {"b", "c"}) {
-      H5Lcreate_hard(file.id(), "a", file.id(), link, H5P_DEFAULT, H5P_DEFAULT);
-    }
-  }
-  const auto source = open_file(folder / "a.h5");
-  ASSERT_TRUE(source) << source.error().message;
-  for (const char* name : {"a", "b", "c"}) EXPECT_EQ(volume_of(**source, name).masked, 16) << name;
-}
-
 // The library says of an absent chunk that it is there once it was read: of the second block, too,
 // it is masked.
 TEST(Storage, AnAbsentChunkThatSeveralBlocksReadIsMaskedInAll) {

@@ -375,6 +375,14 @@ TEST_F(SavedViewsOnDisk, AFolderThatBecomesReadOnlyServesItsViewsAndRefusesChang
   EXPECT_TRUE(set_step(*views, id, 3)) << "it can be written to again";
 }
 
+TEST_F(SavedViewsOnDisk, AFolderThatIsMissingIsMadeByTheFirstChange) {
+  const auto views = open().value();
+  fs::remove_all(state() / "views");
+  const auto saved = views->add(view_of_step(4), time_of_all);
+  ASSERT_TRUE(saved) << saved.error().message;
+  EXPECT_EQ(files().count(saved->id + ".json"), 1U);
+}
+
 TEST_F(SavedViewsOnDisk, AReadOnlyFolderIsOpenedAndRead) {
   const std::string id = open().value()->add(view_of_step(1), time_of_all)->id;
   fs::create_directory(root_ / "empty");
