@@ -116,6 +116,21 @@ test("cards by keys alone: arrows, Enter, Escape", () =>
     await finalPicture(page);
   }));
 
+test("closed and opened again within a frame, the cards keep the focus that they are given", () =>
+  withPage(async (page) => {
+    await page.evaluate(() => {
+      const [button, dialog] = ["datasets-button", "datasets"].map((id) =>
+        document.getElementById(id),
+      );
+      button.click();
+      dialog.close();
+      button.click();
+      document.querySelectorAll(".card")[1].focus();
+    });
+    await page.waitForFunction(() => document.querySelectorAll(".card img").length === 3);
+    assert.match(await page.evaluate(() => document.activeElement.textContent), /^Global/);
+  }));
+
 test("a server without datasets shows how to add one", () =>
   withPage(
     async (page) => {

@@ -13,7 +13,7 @@ import { withMarkedPrivates } from "./private_names.mjs";
 import { generateTypes } from "./types.mjs";
 
 const web = join(dirname(fileURLToPath(import.meta.url)), "..");
-const gzipBytesMax = 60_000;
+const gzipBytesMax = 150_000;
 
 function option(name, fallback) {
   const at = process.argv.indexOf(name);

@@ -2,7 +2,7 @@
 // another, and only of cards that are seen.
 import { failureText, type Api } from "./api";
 import { failureNote, type DatasetList } from "./dataset_list";
-import { make } from "./dom";
+import { make, whenClosed } from "./dom";
 import type { DatasetSummary } from "./protocol";
 
 export interface CardsHost {
@@ -47,13 +47,14 @@ export class Cards {
     private readonly host: CardsHost,
   ) {
     box.addEventListener("keydown", (event) => this.key(event));
-    dialog.addEventListener("close", () => this.clear());
+    whenClosed(dialog, () => this.clear());
   }
 
   // With what the server has now: files may have been added since it said hello.
   show(): void {
     if (this.dialog.open) return;
     const { api, list } = this.host;
+    this.clear();
     this.dialog.showModal();
     this.seen = this.observe();
     this.fill(list.all);

@@ -54,6 +54,14 @@ export function checkLabel(box: HTMLInputElement, text: string, title = ""): HTM
   return label;
 }
 
+// Runs `run` once the dialog is closed. The browser says so a frame later: by then it may be open
+// again.
+export function whenClosed(dialog: HTMLDialogElement, run: () => void): void {
+  dialog.addEventListener("close", () => {
+    if (!dialog.open) run();
+  });
+}
+
 // Tells whether the element is in sight, whenever that changes.
 export function whileSeen(element: Element, tell: (seen: boolean) => void): void {
   // Several changes may come at once, in order.

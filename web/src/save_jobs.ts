@@ -1,6 +1,6 @@
 // What runs in the dialog "Save": work -> its bar, its last words, and a file that is downloaded.
 import { failureText } from "./api";
-import { byId, make } from "./dom";
+import { byId, make, whenClosed } from "./dom";
 import { formatBytes } from "./ticks";
 
 export type Tell = (words: string, done?: number) => void; // a fraction, or nobody knows
@@ -32,7 +32,7 @@ export class Jobs {
   ) {
     const stop = () => this.job?.abort();
     button("save-cancel").addEventListener("click", stop);
-    dialog.addEventListener("close", stop);
+    whenClosed(dialog, stop);
     dialog.addEventListener("cancel", (event) => {
       if (this.running) event.preventDefault(); // Escape ends the job first
       stop();
