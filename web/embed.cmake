@@ -24,4 +24,4 @@ add_custom_command(
 
 add_library(windsplat_web STATIC ${web_out}/web_assets.cpp ${web_out}/web_assets.S)
 target_include_directories(windsplat_web PUBLIC ${PROJECT_SOURCE_DIR})
-target_link_libraries(windsplat_net PUBLIC windsplat_web)
+target_link_libraries(windsplat_api PUBLIC windsplat_web)

@@ -5,7 +5,8 @@
 
 #include "server/cli/command.hpp"
 #include "server/cli/settings_file.hpp"
-#include "server/net/server.hpp"
+#include "server/transport/http_client.hpp"
+#include "server/transport/server.hpp"
 
 namespace windsplat::cli {
 namespace {

@@ -9,9 +9,9 @@
 #include "server/cli/command.hpp"
 #include "server/cli/inspect_text.hpp"
 #include "server/cli/open_store.hpp"
-#include "server/data/budget.hpp"
-#include "server/data/limits.hpp"
-#include "server/data/store.hpp"
+#include "server/data/bytes/decode_limits.hpp"
+#include "server/data/resident/budget.hpp"
+#include "server/data/resident/store.hpp"
 #include "server/scene/describe.hpp"
 
 namespace windsplat::cli {

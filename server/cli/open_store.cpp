@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "server/base/check.hpp"
-#include "server/data/grib/open.hpp"
+#include "server/data/formats/grib/open.hpp"
 #include "server/data/loader/loader.hpp"
 
 namespace windsplat::cli {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "server/data/store.hpp"
+#include "server/data/resident/store.hpp"
 
 namespace windsplat::cli {
 

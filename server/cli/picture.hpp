@@ -8,7 +8,8 @@
 
 #include "protocol/codec.hpp"
 #include "server/base/error.hpp"
-#include "server/data/store.hpp"
+#include "server/data/open/open.hpp"
+#include "server/data/resident/dataset.hpp"
 #include "server/frame/frame.hpp"
 
 namespace windsplat::cli {

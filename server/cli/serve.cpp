@@ -21,9 +21,10 @@
 #include "server/cli/open_store.hpp"
 #include "server/cli/serve_settings.hpp"
 #include "server/cli/signals.hpp"
-#include "server/data/store.hpp"
-#include "server/net/server.hpp"
+#include "server/data/resident/store.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/scene/build.hpp"
+#include "server/transport/server.hpp"
 #include "server/views/saved_views.hpp"
 
 namespace windsplat::cli {

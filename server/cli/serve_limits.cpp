@@ -5,7 +5,7 @@
 #include <string>
 
 #include "protocol/limits.hpp"
-#include "server/net/address.hpp"
+#include "server/access/address.hpp"
 
 namespace windsplat::cli {
 namespace {

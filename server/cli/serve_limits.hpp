@@ -3,7 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "server/net/limits.hpp"
+#include "server/access/limits.hpp"
 
 namespace windsplat::cli {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "protocol/limits.hpp"
-#include "server/net/limits.hpp"
+#include "server/access/limits.hpp"
 
 namespace windsplat::cli {
 

@@ -7,7 +7,7 @@
 
 #include "server/base/error.hpp"
 #include "server/cli/serve_options.hpp"
-#include "server/net/server.hpp"
+#include "server/transport/server.hpp"
 
 namespace windsplat::cli {
 

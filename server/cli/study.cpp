@@ -19,7 +19,7 @@
 #include "server/cli/command.hpp"
 #include "server/cli/open_store.hpp"
 #include "server/cli/signals.hpp"
-#include "server/data/store.hpp"
+#include "server/data/resident/store.hpp"
 #include "server/engine/reference/reference.hpp"
 #include "server/study/report.hpp"
 

@@ -8,7 +8,8 @@
 #include "server/base/cancel.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/signals.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/formats/netcdf/writer.hpp"
+#include "server/data/samples/samples.hpp"
 
 namespace windsplat::cli {
 namespace {

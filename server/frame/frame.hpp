@@ -12,7 +12,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/base/thread_pool.hpp"
-#include "server/data/store.hpp"
+#include "server/data/resident/dataset.hpp"
 #include "server/engine/render.hpp"
 #include "server/image/encode.hpp"
 #include "server/image/jpeg_encoder.hpp"

@@ -13,7 +13,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/base/thread_pool.hpp"
-#include "server/data/store.hpp"
+#include "server/data/resident/dataset.hpp"
 #include "server/engine/reference/reference.hpp"
 #include "server/engine/render.hpp"
 #include "server/frame/difference.hpp"

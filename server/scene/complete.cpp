@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-#include "server/data/digest.hpp"
+#include "server/data/model/digest.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"

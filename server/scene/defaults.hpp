@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "protocol/view.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/volume.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::scene {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/data/measure.hpp"
+#include "server/data/model/measure.hpp"
 #include "server/scene/bend.hpp"
 #include "server/scene/build.hpp"
 

@@ -3,7 +3,7 @@
 
 #include "protocol/messages.hpp"
 #include "server/base/error.hpp"
-#include "server/data/store.hpp"
+#include "server/data/resident/dataset.hpp"
 
 namespace windsplat::scene {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "server/data/coarsen.hpp"
+#include "server/data/model/coarsen.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::scene {

@@ -6,7 +6,7 @@
 
 #include "protocol/view.hpp"
 #include "server/base/error.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::scene {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "server/data/dataset.hpp"
+#include "server/data/model/volume.hpp"
 
 namespace windsplat::scene {
 

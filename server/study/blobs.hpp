@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "server/data/dataset.hpp"
+#include "server/data/model/source.hpp"
 
 namespace windsplat::study {
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/base/check.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/scene/build.hpp"
 #include "server/study/blobs.hpp"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "protocol/view.hpp"
-#include "server/data/store.hpp"
+#include "server/data/resident/dataset.hpp"
 #include "server/study/types.hpp"
 
 namespace windsplat::study {

@@ -16,7 +16,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/data/store.hpp"
+#include "server/data/resident/dataset.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/engine/kernels/dispatch.hpp"
 #include "server/engine/render.hpp"
 #include "server/frame/frame.hpp"

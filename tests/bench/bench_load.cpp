@@ -22,8 +22,13 @@
 #include <string>
 #include <vector>
 
-#include "server/data/dataset.hpp"
+#include "server/data/formats/netcdf/writer.hpp"
 #include "server/data/loader/loader.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/open/open.hpp"
+#include "server/data/samples/samples.hpp"
 #include "support.hpp"
 #include "text_table.hpp"
 

@@ -12,8 +12,9 @@
 #include <vector>
 
 #include "protocol/codec.hpp"
-#include "server/data/dataset.hpp"
-#include "server/data/store.hpp"
+#include "server/data/open/open.hpp"
+#include "server/data/resident/dataset.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/frame/frame.hpp"
 #include "tests/bench/support.hpp"
 

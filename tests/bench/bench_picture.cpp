@@ -15,7 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/data/store.hpp"
+#include "server/data/resident/dataset.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/frame/frame.hpp"
 #include "server/image/jpeg_encoder.hpp"
 #include "server/scene/build.hpp"

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/data/samples/samples.hpp"
 #include "server/engine/kernels/dispatch.hpp"
 #include "server/scene/build.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "protocol/view.hpp"
 #include "server/base/error.hpp"
-#include "server/data/store.hpp"
+#include "server/data/resident/dataset.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::bench {

@@ -8,8 +8,8 @@
 #include <string>
 #include <string_view>
 
-#include "server/net/negotiate.hpp"
-#include "server/net/target.hpp"
+#include "server/http/negotiate.hpp"
+#include "server/http/request_target.hpp"
 #include "tests/fuzz/support/check.hpp"
 #include "tests/fuzz/support/daemon.hpp"
 

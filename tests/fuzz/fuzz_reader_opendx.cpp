@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "server/data/dx/file.hpp"
+#include "server/data/formats/dx/file.hpp"
 #include "tests/fuzz/support/check.hpp"
 #include "tests/fuzz/support/files.hpp"
 

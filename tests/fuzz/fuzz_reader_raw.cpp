@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "server/data/raw/file.hpp"
+#include "server/data/formats/raw/file.hpp"
 #include "tests/fuzz/support/check.hpp"
 #include "tests/fuzz/support/files.hpp"
 

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "server/data/vtk/source.hpp"
+#include "server/data/formats/vtk/source.hpp"
 #include "tests/fuzz/support/check.hpp"
 #include "tests/fuzz/support/files.hpp"
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string_view>
 
-#include "server/data/zarr/store.hpp"
+#include "server/data/formats/zarr/store.hpp"
 #include "tests/fuzz/support/check.hpp"
 #include "tests/fuzz/support/files.hpp"
 

@@ -10,9 +10,9 @@
 #include "protocol/limits.hpp"
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
-#include "server/data/store.hpp"
+#include "server/data/resident/store.hpp"
 #include "server/frame/frame.hpp"
-#include "server/net/catalogue.hpp"
+#include "server/work/catalogue.hpp"
 #include "tests/fuzz/support/check.hpp"
 
 namespace {

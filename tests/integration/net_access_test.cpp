@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 
 #include "net_server.hpp"
+#include "server/access/auth.hpp"
 #include "server/base/log.hpp"
-#include "server/net/auth.hpp"
 
 namespace net_test {
 namespace {

@@ -9,9 +9,10 @@
 #include <thread>
 
 #include "net_server.hpp"
-#include "server/net/drawing.hpp"
-#include "server/net/router.hpp"
-#include "server/net/viewer.hpp"
+#include "server/api/router.hpp"
+#include "server/data/open/open.hpp"
+#include "server/work/drawing.hpp"
+#include "server/work/viewer.hpp"
 #include "slow_source.hpp"
 
 namespace net_test {
@@ -310,7 +311,7 @@ TEST(Viewer, OfManyWishesThatWaitOnlyTheNewestIsWorkedOut) {
   std::promise<void> done;
   net::Services services({}, store, std::make_shared<ThreadPool>(2));
   for (int i = 0; i < 2; ++i) {
-    ASSERT_TRUE(services.loads.submit({{}, [&] { gate.pass(); }}));
+    ASSERT_TRUE(services.backend.loads.submit({{}, [&] { gate.pass(); }}));
   }
   ASSERT_TRUE(gate.wait_for(2)) << "both threads are taken";
   protocol::View of_scalar;
@@ -320,11 +321,12 @@ TEST(Viewer, OfManyWishesThatWaitOnlyTheNewestIsWorkedOut) {
   of_scalar.scalars.emplace(1);
   of_scalar.scalars->front().field = scalar;
   of_vector.scalars.emplace();
-  net::Viewer viewer(services, 1, "192.0.2.1");
+  net::Viewer viewer(services.backend, 1, "192.0.2.1");
   for (int i = 0; i < 1000; ++i) {
     viewer.start(session::Prefetch{i < 999 ? of_scalar : of_vector, {1}, {}});
   }
-  ASSERT_TRUE(services.loads.submit({{}, [&] { done.set_value(); }, true, dataset->shared_info()}));
+  ASSERT_TRUE(
+      services.backend.loads.submit({{}, [&] { done.set_value(); }, true, dataset->shared_info()}));
   gate.open();
   done.get_future().wait();
   EXPECT_FALSE(dataset->seen(scalar, 0)) << "nobody wishes for it any more";
@@ -346,14 +348,14 @@ TEST(Drawings, ARequestThatWasLetInIsNotRefusedOnceItsDataIsThere) {
   drawing.load = [&](data::Dataset& /*dataset*/) -> Result<std::shared_ptr<const void>> {
     const auto hold = [&](std::int64_t /*queue_us*/) { gate.pass(); };
     const net::RenderService::Job job{net::RenderService::Kind::request, 1, {}, hold, false, 0};
-    EXPECT_TRUE(services.renderer.submit(job));
+    EXPECT_TRUE(services.backend.renderer.submit(job));
     EXPECT_TRUE(gate.wait_for(1));
-    while (services.renderer.submit(job)) {
+    while (services.backend.renderer.submit(job)) {
     }
     return std::shared_ptr<const void>(std::make_shared<int>(1));
   };
   drawing.fail = [&](const Error& error) { told.set_value(error.message); };
-  ASSERT_TRUE(net::submit(services, std::move(drawing)));
+  ASSERT_TRUE(net::submit(services.backend, std::move(drawing)));
   ASSERT_TRUE(gate.wait_for(1));
   gate.open();
   EXPECT_EQ(told.get_future().get(), "drawn");

@@ -23,10 +23,10 @@
 
 #include "certificate.hpp"
 #include "net_server.hpp"
-#include "server/net/connections.hpp"
-#include "server/net/handshake.hpp"
-#include "server/net/router.hpp"
-#include "server/net/tls.hpp"
+#include "server/api/router.hpp"
+#include "server/transport/connections.hpp"
+#include "server/transport/handshake.hpp"
+#include "server/transport/tls.hpp"
 
 namespace net_test {
 namespace {

@@ -15,8 +15,8 @@
 
 #include "certificate.hpp"
 #include "net_server.hpp"
-#include "server/net/auth.hpp"
-#include "server/net/tls.hpp"
+#include "server/access/auth.hpp"
+#include "server/transport/tls.hpp"
 
 namespace net_test {
 namespace {

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "server/net/jobs.hpp"
+#include "server/work/jobs.hpp"
 
 namespace windsplat::net {
 namespace {

@@ -9,6 +9,7 @@
 #include "net_server.hpp"
 #include "prometheus_text.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/open/open.hpp"
 #include "slow_source.hpp"
 
 namespace net_test {

@@ -11,7 +11,7 @@
 #include "cli_program.hpp"
 #include "net_server.hpp"
 #include "server/base/kept.hpp"
-#include "server/net/references.hpp"
+#include "server/work/references.hpp"
 
 namespace net_test {
 namespace {

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "net_server.hpp"
+#include "server/transport/http_client.hpp"
 
 namespace net_test {
 namespace {

@@ -13,9 +13,10 @@
 #include <vector>
 
 #include "client.hpp"
-#include "server/data/dataset.hpp"
-#include "server/data/store.hpp"
-#include "server/net/server.hpp"
+#include "server/data/formats/netcdf/writer.hpp"
+#include "server/data/resident/store.hpp"
+#include "server/data/samples/samples.hpp"
+#include "server/transport/server.hpp"
 
 namespace net_test {
 

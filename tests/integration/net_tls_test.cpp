@@ -5,7 +5,7 @@
 
 #include "certificate.hpp"
 #include "net_server.hpp"
-#include "server/net/tls.hpp"
+#include "server/transport/tls.hpp"
 
 namespace net_test {
 namespace {

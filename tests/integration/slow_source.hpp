@@ -8,7 +8,9 @@
 #include <mutex>
 #include <utility>
 
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/model/volume.hpp"
 
 namespace net_test {
 

@@ -1,5 +1,5 @@
 // What a viewer's render jobs tell of the time they took, and how they share memory that is short.
-#include "server/net/viewer.hpp"
+#include "server/work/viewer.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "net_server.hpp"
+#include "server/api/services.hpp"
 #include "server/frame/frame.hpp"
 
 namespace net_test {
@@ -35,7 +36,7 @@ TEST(Viewer, AFrameThatWaitedForAveragesSaysSoAsOneThatWaitedForFields) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add(small_file()).value();
   net::Services services({}, store, std::make_shared<ThreadPool>(2));
-  net::Viewer viewer(services, 1, "192.0.2.1");
+  net::Viewer viewer(services.backend, 1, "192.0.2.1");
   protocol::View view;
   view.dataset = "small";
   view.image.width = 16;
@@ -63,8 +64,8 @@ TEST(Viewer, ViewersOfDifferentStepsAllGetTheirFramesWhereOneStepFits) {
   constexpr int rounds = 5;
   std::vector<std::unique_ptr<net::Viewer>> viewers;
   for (int v = 0; v < viewers_count; ++v) {
-    viewers.push_back(
-        std::make_unique<net::Viewer>(services, static_cast<std::uint64_t>(v + 1), "192.0.2.1"));
+    viewers.push_back(std::make_unique<net::Viewer>(
+        services.backend, static_cast<std::uint64_t>(v + 1), "192.0.2.1"));
   }
   for (int round = 0; round < rounds; ++round) {
     std::vector<std::promise<std::string>> faults(viewers_count);
@@ -123,7 +124,7 @@ class LargePictures : public testing::Test {
 };
 
 TEST_F(LargePictures, WaitForTheRoomThatOthersHold) {
-  net::Viewer viewer(*services_, 1, "192.0.2.1");
+  net::Viewer viewer(services_->backend, 1, "192.0.2.1");
   ASSERT_EQ(fault_of(viewer, view_).get(), "") << "its data are resident from now on";
   auto others = store_->reserve(step_bytes);
   while (!others) {  // the first picture's room goes a moment after its answer
@@ -137,8 +138,8 @@ TEST_F(LargePictures, WaitForTheRoomThatOthersHold) {
 }
 
 TEST_F(LargePictures, OfTwoViewersAreDrawnOneAfterTheOtherWhereOneFits) {
-  net::Viewer one(*services_, 1, "192.0.2.1");
-  net::Viewer other(*services_, 2, "192.0.2.2");
+  net::Viewer one(services_->backend, 1, "192.0.2.1");
+  net::Viewer other(services_->backend, 2, "192.0.2.2");
   for (int round = 0; round < 4; ++round) {
     view_.step = round % small_steps;
     auto first = fault_of(one, view_);
@@ -151,7 +152,7 @@ TEST_F(LargePictures, OfTwoViewersAreDrawnOneAfterTheOtherWhereOneFits) {
 }
 
 TEST_F(LargePictures, ThatFitNotEvenAloneAreRefusedAtOnce) {
-  net::Viewer viewer(*services_, 1, "192.0.2.1");
+  net::Viewer viewer(services_->backend, 1, "192.0.2.1");
   view_.image.height = 2048;
   const std::string fault = fault_of(viewer, view_).get();
   EXPECT_EQ(fault.find("a picture of 2048 x 2048 pixels is too large: what is beside the fields"),

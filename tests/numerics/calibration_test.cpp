@@ -8,7 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "server/data/store.hpp"
+#include "server/data/resident/dataset.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/engine/reference/reference.hpp"
 
 namespace windsplat::study {

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "scenes.hpp"
-#include "server/data/coarsen.hpp"
+#include "server/data/model/coarsen.hpp"
 
 namespace windsplat::test {
 namespace {

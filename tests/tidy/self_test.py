@@ -9,13 +9,14 @@ import check_style
 
 CLEAN = {
     "server/base/error.hpp": "#pragma once\n#include <string>\n",
-    "server/data/volume.hpp": '#pragma once\n#include "server/base/error.hpp"\n',
-    "server/data/file.cpp": '#include <netcdf.h>\n\n#include "server/data/volume.hpp"\n',
-    "server/scene/scene.hpp": '#pragma once\n#include "server/data/volume.hpp"\n',
+    "server/data/model/volume.hpp": '#pragma once\n#include "server/base/error.hpp"\n',
+    "server/data/formats/file.cpp":
+        '#include <netcdf.h>\n\n#include "server/data/model/volume.hpp"\n',
+    "server/scene/scene.hpp": '#pragma once\n#include "server/data/model/volume.hpp"\n',
     "server/scene/camera.hpp": "#pragma once\n",
     "server/engine/bin.cpp": '#include "server/scene/scene.hpp"\n',
-    "server/net/server.hpp": "#pragma once\n",
-    "server/net/listener.cpp": "#include <boost/asio.hpp>\n",
+    "server/transport/server.hpp": "#pragma once\n",
+    "server/transport/listener.cpp": "#include <boost/asio.hpp>\n",
     "protocol/codec_view.cpp": "#include <nlohmann/json.hpp>\n",
     "tests/CMakeLists.txt": "windsplat_test(unit_base unit/base unit windsplat_base)\n",
     "tests/unit/base/error_test.cpp": "TEST(Error, says_why) {\n}\n",
@@ -55,8 +56,8 @@ class Planted(unittest.TestCase):
         self.expect(check_includes, "server/engine/tile.cpp:2: server/engine may not include")
 
     def test_subfolder_obeys_its_parent(self):
-        self.plant("server/engine/kernels/k.cpp", '#include "server/net/server.hpp"\n')
-        self.expect(check_includes, "server/engine may not include server/net/server.hpp")
+        self.plant("server/engine/kernels/k.cpp", '#include "server/transport/server.hpp"\n')
+        self.expect(check_includes, "server/engine may not include server/transport/server.hpp")
 
     def test_outside_header_out_of_its_folder(self):
         for path, header in [("protocol/view.cpp", "nlohmann/json.hpp"),
@@ -65,7 +66,7 @@ class Planted(unittest.TestCase):
                              ("server/frame/f.cpp", "spng.h"),
                              ("server/session/s.cpp", "boost/beast/core.hpp"),
                              ("server/cli/c.cpp", "boost/asio.hpp"),
-                             ("server/net/n.cpp", "CLI/CLI.hpp")]:
+                             ("server/api/n.cpp", "CLI/CLI.hpp")]:
             with self.subTest(header):
                 self.plant(path, f"#include <{header}>\n")
                 self.expect(check_includes, f"{path}:1: {header} may not be named here")
@@ -85,7 +86,7 @@ class Planted(unittest.TestCase):
         self.expect(check_includes)
 
     def test_own_header_in_angle_brackets_or_by_a_short_name(self):
-        self.plant("server/data/a.cpp", "#include <server/data/volume.hpp>\n")
+        self.plant("server/data/a.cpp", "#include <server/data/model/volume.hpp>\n")
         self.plant("server/data/b.cpp", '#include "volume.hpp"\n')
         self.expect(check_includes, "is our own", "is no file of the project")
 

@@ -60,7 +60,7 @@ const entry = ({ name, type, symbol, immutable }) =>
 const listing = (assets) => `// Made by web/scripts/embed.mjs from web/dist.
 #include <array>
 
-#include "server/net/web_assets.hpp"
+#include "server/api/web_assets.hpp"
 
 extern "C" {
 ${assets.map(declaration).join("")}}

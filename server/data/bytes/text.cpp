@@ -4,7 +4,7 @@
 #include <charconv>
 #include <limits>
 
-#include "server/data/cf/text.hpp"
+#include "server/base/ascii.hpp"
 
 namespace windsplat::data::bytes {
 
@@ -24,10 +24,10 @@ std::optional<Number> to_number(std::string_view text) {
 std::vector<std::string_view> words_of(std::string_view text) {
   std::vector<std::string_view> out;
   for (;;) {
-    text = cf::trim(text);
+    text = trim(text);
     if (text.empty()) return out;
     std::size_t end = 0;
-    while (end < text.size() && !cf::is_blank(text[end])) ++end;
+    while (end < text.size() && !is_blank(text[end])) ++end;
     out.push_back(text.substr(0, end));
     text.remove_prefix(end);
   }

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include "server/data/bytes/decode_limits.hpp"
 #include "server/data/bytes/scalar.hpp"
-#include "server/data/limits.hpp"
 
 namespace windsplat::data::cf {
 

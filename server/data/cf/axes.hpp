@@ -9,7 +9,7 @@
 
 #include "server/base/error.hpp"
 #include "server/data/cf/contents.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
 
 namespace windsplat::data::cf {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
 
 namespace windsplat::data {
 

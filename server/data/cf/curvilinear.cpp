@@ -9,8 +9,8 @@
 #include <string>
 #include <utility>
 
+#include "server/base/ascii.hpp"
 #include "server/data/cf/coordinates.hpp"
-#include "server/data/cf/text.hpp"
 
 namespace windsplat::data::cf {
 

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <utility>
 
+#include "server/base/ascii.hpp"
 #include "server/data/cf/atmosphere.hpp"
-#include "server/data/cf/text.hpp"
 #include "server/data/cf/units.hpp"
 
 namespace windsplat::data::cf {

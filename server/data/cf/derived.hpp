@@ -13,7 +13,8 @@
 #include "server/data/cf/fields.hpp"
 #include "server/data/cf/read_blocks.hpp"
 #include "server/data/cf/vertical.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
 
 namespace windsplat::data::cf {
 

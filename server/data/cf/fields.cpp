@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "server/data/cf/text.hpp"
+#include "server/base/ascii.hpp"
 #include "server/data/cf/units.hpp"
 
 namespace windsplat::data::cf {

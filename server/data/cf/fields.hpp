@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "server/data/cf/contents.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
 
 namespace windsplat::data::cf {
 

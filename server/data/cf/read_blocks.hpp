@@ -7,7 +7,7 @@
 
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/model/source.hpp"
 
 namespace windsplat::data::cf {
 

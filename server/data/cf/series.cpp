@@ -8,13 +8,13 @@
 #include <string>
 #include <utility>
 
+#include "server/base/ascii.hpp"
 #include "server/data/cf/axes.hpp"
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/grid.hpp"
 #include "server/data/cf/packing.hpp"
-#include "server/data/cf/text.hpp"
 #include "server/data/cf/time.hpp"
-#include "server/data/digest.hpp"
+#include "server/data/model/digest.hpp"
 
 namespace windsplat::data::cf {
 

@@ -13,7 +13,9 @@
 #include <utility>
 #include <vector>
 
+#include "server/base/ascii.hpp"
 #include "server/base/check.hpp"
+#include "server/data/bytes/decode_limits.hpp"
 #include "server/data/cf/axes.hpp"
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/curvilinear.hpp"
@@ -23,12 +25,10 @@
 #include "server/data/cf/packing.hpp"
 #include "server/data/cf/read_blocks.hpp"
 #include "server/data/cf/rotation.hpp"
-#include "server/data/cf/text.hpp"
 #include "server/data/cf/time.hpp"
 #include "server/data/cf/units.hpp"
 #include "server/data/cf/vertical.hpp"
-#include "server/data/digest.hpp"
-#include "server/data/limits.hpp"
+#include "server/data/model/digest.hpp"
 
 namespace windsplat::data::cf {
 

@@ -10,7 +10,7 @@
 #include <system_error>
 #include <utility>
 
-#include "server/data/cf/text.hpp"
+#include "server/base/ascii.hpp"
 
 namespace windsplat::data::cf {
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
 
 namespace windsplat::data::cf {
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <string>
 
-#include "server/data/cf/text.hpp"
+#include "server/base/ascii.hpp"
 
 namespace windsplat::data {
 
@@ -57,7 +57,7 @@ template <std::size_t count>
 std::optional<double> find(const std::array<Unit, count>& table, std::string_view unit) {
   while (!unit.empty() && unit.front() == ' ') unit.remove_prefix(1);
   while (!unit.empty() && unit.back() == ' ') unit.remove_suffix(1);
-  const std::string name = cf::lower(std::string(unit));
+  const std::string name = lower(std::string(unit));
   for (const Unit& known : table) {
     if (name == known.name) return known.si;
   }

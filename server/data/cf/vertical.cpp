@@ -8,8 +8,8 @@
 #include <string_view>
 #include <utility>
 
+#include "server/base/ascii.hpp"
 #include "server/data/cf/coordinates.hpp"
-#include "server/data/cf/text.hpp"
 #include "server/data/cf/units.hpp"
 
 namespace windsplat::data::cf {

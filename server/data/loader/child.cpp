@@ -14,7 +14,7 @@
 #include <string>
 #include <utility>
 
-#include "server/data/limits.hpp"
+#include "server/data/bytes/decode_limits.hpp"
 #include "server/data/loader/bytes.hpp"
 #include "server/data/loader/channel.hpp"
 #include "server/data/loader/confine.hpp"
@@ -22,6 +22,7 @@
 #include "server/data/loader/messages.hpp"
 #include "server/data/loader/process.hpp"
 #include "server/data/loader/transfer.hpp"
+#include "server/data/open/open.hpp"
 
 namespace windsplat::data::loader {
 

@@ -12,9 +12,11 @@
 #include <vector>
 
 #include "server/base/error.hpp"
-#include "server/data/budget.hpp"
-#include "server/data/dataset.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/resident/budget.hpp"
 
 namespace windsplat::data::loader {
 

@@ -6,9 +6,9 @@
 #include <memory>
 #include <utility>
 
-#include "server/data/axis_check.hpp"
 #include "server/data/cf/grid.hpp"
 #include "server/data/loader/bytes.hpp"
+#include "server/data/model/axis_check.hpp"
 
 namespace windsplat::data::loader {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "server/base/error.hpp"
-#include "server/data/dataset.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/model/dataset_info.hpp"
 
 namespace windsplat::data::loader {
 

@@ -14,14 +14,14 @@
 #include <utility>
 
 #include "server/base/check.hpp"
-#include "server/data/digest.hpp"
-#include "server/data/limits.hpp"
+#include "server/data/bytes/decode_limits.hpp"
 #include "server/data/loader/bytes.hpp"
 #include "server/data/loader/channel.hpp"
 #include "server/data/loader/loader.hpp"
 #include "server/data/loader/messages.hpp"
 #include "server/data/loader/process.hpp"
 #include "server/data/loader/transfer.hpp"
+#include "server/data/model/digest.hpp"
 
 namespace windsplat::data::loader {
 

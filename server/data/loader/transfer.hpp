@@ -6,7 +6,7 @@
 
 #include "server/base/error.hpp"
 #include "server/data/files/descriptor.hpp"
-#include "server/data/samples.hpp"
+#include "server/data/model/sample_buffer.hpp"
 
 namespace windsplat::data::loader {
 

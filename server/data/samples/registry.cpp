@@ -5,7 +5,8 @@
 #include <string_view>
 #include <system_error>
 
-#include "server/data/dataset.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/data/samples/source.hpp"
 
 namespace windsplat::data {

@@ -9,7 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/volume.hpp"
 
 namespace windsplat::data {
 

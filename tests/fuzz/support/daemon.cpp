@@ -20,8 +20,8 @@
 
 #include "server/base/log.hpp"
 #include "server/base/thread_pool.hpp"
-#include "server/data/store.hpp"
-#include "server/net/server.hpp"
+#include "server/data/resident/store.hpp"
+#include "server/transport/server.hpp"
 #include "tests/fuzz/support/check.hpp"
 
 namespace fuzz {

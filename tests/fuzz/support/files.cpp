@@ -17,7 +17,8 @@
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/data/loader/messages.hpp"
-#include "server/data/store.hpp"
+#include "server/data/open/open.hpp"
+#include "server/data/resident/dataset.hpp"
 #include "server/frame/frame.hpp"
 #include "tests/fuzz/support/check.hpp"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <string_view>
 
-#include "server/data/dataset.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/model/source.hpp"
 
 namespace fuzz {
 

@@ -1,5 +1,5 @@
 // Axes whose coordinates are strictly monotonic and yet leave no room for cells are refused.
-#include "server/data/axis_check.hpp"
+#include "server/data/model/axis_check.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "netcdf_maker.hpp"
+#include "server/data/open/open.hpp"
 #include "vtk_maker.hpp"
 
 namespace windsplat::data::test {

@@ -1,5 +1,5 @@
 // Coarser volumes: what averages keep, what masks do, and how a dataset shares and pays for them.
-#include "server/data/coarsen.hpp"
+#include "server/data/model/coarsen.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,8 @@
 #include <limits>
 #include <random>
 
-#include "server/data/store.hpp"
+#include "server/data/resident/store.hpp"
+#include "server/data/samples/samples.hpp"
 
 namespace windsplat::data {
 namespace {

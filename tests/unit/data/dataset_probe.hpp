@@ -6,7 +6,9 @@
 #include <cstddef>
 #include <string>
 
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/model/volume.hpp"
 
 namespace windsplat::data::test {
 

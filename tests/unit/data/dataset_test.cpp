@@ -1,11 +1,12 @@
 // Grid sizes, look-up by name, and what finish_volume promises.
-#include "server/data/dataset.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/volume.hpp"
 
 namespace windsplat::data {
 namespace {

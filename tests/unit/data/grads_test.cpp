@@ -9,6 +9,7 @@
 #include <cstdlib>
 
 #include "plain_maker.hpp"
+#include "server/data/open/open.hpp"
 
 namespace windsplat::data {
 namespace {

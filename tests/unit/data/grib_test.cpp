@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "netcdf_maker.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/open/open.hpp"
 
 #ifdef WINDSPLAT_GRIB
 #include <eccodes.h>

@@ -10,9 +10,11 @@
 
 #include "dataset_probe.hpp"
 #include "netcdf_maker.hpp"
-#include "server/data/dataset.hpp"
 #include "server/data/files/files.hpp"
-#include "server/data/netcdf/file.hpp"
+#include "server/data/formats/netcdf/file.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/open/open.hpp"
 
 namespace windsplat::data::test {
 namespace {

@@ -24,7 +24,8 @@
 #include "loader_files.hpp"
 #include "netcdf_maker.hpp"
 #include "server/data/loader/messages.hpp"
-#include "server/data/store.hpp"
+#include "server/data/open/open.hpp"
+#include "server/data/resident/store.hpp"
 
 namespace windsplat::data::loader {
 namespace {

@@ -1,5 +1,5 @@
 // Histograms, percentiles and ranges against closed forms.
-#include "server/data/measure.hpp"
+#include "server/data/model/measure.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

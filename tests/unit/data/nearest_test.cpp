@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "server/data/measure.hpp"
+#include "server/data/model/measure.hpp"
 
 namespace windsplat::data {
 namespace {

@@ -8,7 +8,8 @@
 
 #include "netcdf_maker.hpp"
 #include "server/data/cf/fields.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/open/open.hpp"
 
 namespace windsplat::data::test {
 namespace {

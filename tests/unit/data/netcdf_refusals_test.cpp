@@ -7,8 +7,8 @@
 #include <memory>
 
 #include "netcdf_maker.hpp"
-#include "server/data/dataset.hpp"
-#include "server/data/netcdf/classic_header.hpp"
+#include "server/data/formats/netcdf/classic_header.hpp"
+#include "server/data/open/open.hpp"
 
 namespace windsplat::data::test {
 namespace {

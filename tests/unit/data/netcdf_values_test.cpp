@@ -7,7 +7,8 @@
 #include <memory>
 
 #include "netcdf_maker.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/open/open.hpp"
 
 namespace windsplat::data::test {
 namespace {

@@ -10,7 +10,12 @@
 #include <memory>
 
 #include "netcdf_maker.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/formats/netcdf/writer.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/open/open.hpp"
+#include "server/data/samples/samples.hpp"
 
 namespace windsplat::data::test {
 namespace {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "plain_maker.hpp"
+#include "server/data/open/open.hpp"
 
 namespace windsplat::data {
 namespace {

@@ -15,7 +15,9 @@
 
 #include "dataset_probe.hpp"
 #include "netcdf_maker.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/open/open.hpp"
 
 namespace windsplat::data::test {
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "plain_maker.hpp"
+#include "server/data/open/open.hpp"
 
 namespace windsplat::data {
 namespace {

@@ -9,7 +9,10 @@
 #include <cmath>
 #include <filesystem>
 
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/open/open.hpp"
 #include "test_data.hpp"
 
 namespace windsplat::data {

@@ -8,7 +8,10 @@
 #include <numbers>
 #include <string>
 
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/samples/samples.hpp"
 
 namespace windsplat::data {
 namespace {

@@ -26,7 +26,8 @@
 #include "dataset_probe.hpp"
 #include "loader_files.hpp"
 #include "netcdf_maker.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/open/open.hpp"
 
 extern char** environ;  // POSIX leaves its declaration to the program
 

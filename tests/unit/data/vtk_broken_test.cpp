@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
+#include "server/data/open/open.hpp"
 #include "vtk_maker.hpp"
 
 namespace windsplat::data::vtk_test {

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "server/data/vtk/cells.hpp"
+#include "server/data/formats/vtk/cells.hpp"
 
 namespace windsplat::data::vtk {
 namespace {

@@ -17,7 +17,10 @@
 #include <string>
 #include <vector>
 
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/open/open.hpp"
 
 namespace windsplat::data::vtk_test {
 

@@ -16,7 +16,8 @@
 #include <vector>
 
 #include "netcdf_maker.hpp"
-#include "server/data/dataset.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/open/open.hpp"
 
 namespace windsplat::data::test {
 namespace {

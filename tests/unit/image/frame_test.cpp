@@ -10,7 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/data/store.hpp"
+#include "server/data/resident/dataset.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/frame/frame_info.hpp"
 #include "server/image/decode.hpp"
 #include "tests/unit/scene/fake.hpp"

@@ -9,8 +9,9 @@
 #include <memory>
 #include <vector>
 
-#include "server/data/budget.hpp"
-#include "server/data/store.hpp"
+#include "server/data/resident/budget.hpp"
+#include "server/data/resident/dataset.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/frame/frame.hpp"
 #include "server/frame/reference.hpp"
 

@@ -11,7 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "server/data/store.hpp"
+#include "server/data/resident/store.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/engine/render.hpp"
 #include "server/frame/frame.hpp"
 #include "server/scene/build.hpp"

@@ -1,5 +1,5 @@
 // How addresses count, and whose word about them is taken.
-#include "server/net/address.hpp"
+#include "server/access/address.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
 // Who is let in: tokens, cookies, origins, and what is told to the others. No server is needed.
-#include "server/net/auth.hpp"
+#include "server/access/auth.hpp"
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
 
-#include "server/net/login.hpp"
+#include "server/access/login.hpp"
 
 namespace windsplat::net {
 namespace {

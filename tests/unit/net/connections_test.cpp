@@ -1,5 +1,5 @@
 // Which connection gives its place to a newcomer.
-#include "server/net/connections.hpp"
+#include "server/transport/connections.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,10 @@
 // What a view is told to cost before anything is read, and what is refused.
-#include "server/net/cost.hpp"
+#include "server/frame/cost.hpp"
 
 #include <gtest/gtest.h>
 
-#include "server/data/store.hpp"
+#include "server/access/cost_limits.hpp"
+#include "server/data/resident/store.hpp"
 
 namespace windsplat::net {
 namespace {
@@ -23,10 +24,10 @@ class CostTest : public testing::Test {
     view_.method.detail = protocol::Detail::full;
   }
 
-  Cost cost(const protocol::View& view) {
+  frame::Cost cost(const protocol::View& view) {
     const auto completed = scene::complete_and_place(view, *dataset_);
     EXPECT_TRUE(completed) << (completed ? "" : completed.error().message);
-    const auto found = cost_of(*completed, false);
+    const auto found = frame::cost_of(*completed, false);
     EXPECT_TRUE(found);
     return found.value();
   }
@@ -73,7 +74,7 @@ TEST_F(CostTest, a_stride_leaves_samples_out_and_a_slice_all_but_a_layer) {
   protocol::View plain = view_;
   plain.vector.length = 0.001;
   // 16 pixels at least count for each: the rest is the picture's.
-  const double picture = 1280.0 * 720 / Cost::pixels_a_kernel;
+  const double picture = 1280.0 * 720 / frame::Cost::pixels_a_kernel;
   EXPECT_NEAR((cost(plain).kernels - picture) / (cost(strided).kernels - picture), 64, 1);
   protocol::View sliced = plain;
   sliced.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 3};
@@ -84,19 +85,19 @@ TEST_F(CostTest, giant_kernels_cost_what_they_cover) {
   protocol::View wide = view_;
   wide.vector.r2 = 64;
   EXPECT_GT(cost(wide).kernels, 100 * cost(view_).kernels);
-  EXPECT_EQ(cost(wide).dearest, "/vector/r2");
+  EXPECT_EQ(cost(wide).dominant, "/vector/r2");
   protocol::View longest = view_;
   longest.vector.length = 10;
   longest.vector.span = 64;
   EXPECT_GT(cost(longest).kernels, 3 * cost(view_).kernels);
-  EXPECT_EQ(cost(longest).dearest, "/vector/length");
+  EXPECT_EQ(cost(longest).dominant, "/vector/length");
   protocol::View large = wide;
   large.image = {8192, 4320, "#000000"};
   EXPECT_GT(cost(large).kernels, 20 * cost(wide).kernels);
   protocol::View thin = view_;
   thin.method.name = protocol::MethodName::slab;
   thin.method.slab_thickness = 0.05;
-  EXPECT_EQ(cost(thin).dearest, "/method/slabThickness");
+  EXPECT_EQ(cost(thin).dominant, "/method/slabThickness");
 }
 
 TEST_F(CostTest, what_is_averaged_or_out_of_sight_costs_less) {
@@ -131,7 +132,7 @@ TEST_F(CostTest, is_finite_and_refused_at_every_extreme_of_a_view) {
           view.camera.target = protocol::Vec3{0, 0, 0};
           view.camera.fov_y = fov;
           view.scalars = {medium(), medium(), medium(), medium()};
-          const Cost found = cost(view);
+          const frame::Cost found = cost(view);
           EXPECT_TRUE(std::isfinite(found.kernels)) << r2 << ' ' << length << ' ' << eye;
           EXPECT_GE(found.kernels, 5 * samples);
         }

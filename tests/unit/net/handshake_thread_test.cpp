@@ -1,5 +1,5 @@
 // The order of handshakes' steps, and what may go wrong in one.
-#include "server/net/handshake_thread.hpp"
+#include "server/transport/handshake_thread.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

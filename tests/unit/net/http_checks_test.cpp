@@ -1,9 +1,9 @@
 // What HTTP allows and this server refuses, by the bytes and fields of a header alone.
-#include "server/net/http_checks.hpp"
+#include "server/http/http_checks.hpp"
 
 #include <gtest/gtest.h>
 
-#include "server/net/target.hpp"
+#include "server/http/request_target.hpp"
 
 namespace windsplat::net {
 namespace {

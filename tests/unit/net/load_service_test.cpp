@@ -1,5 +1,5 @@
 // How many loads may wait: of one dataset, of all, and who is not counted.
-#include "server/net/load_service.hpp"
+#include "server/work/load_service.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Which hosts a request may be meant for, and which of them are this machine's loopback.
-#include "server/net/negotiate.hpp"
+#include "server/http/negotiate.hpp"
 
 #include <gtest/gtest.h>
 

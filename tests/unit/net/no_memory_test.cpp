@@ -14,14 +14,14 @@
 #include <thread>
 #include <utility>
 
+#include "server/access/admission.hpp"
 #include "server/data/loader/process.hpp"
-#include "server/net/admission.hpp"
-#include "server/net/attempt.hpp"
-#include "server/net/jobs.hpp"
-#include "server/net/listener.hpp"
-#include "server/net/load_service.hpp"
-#include "server/net/post.hpp"
-#include "server/net/render_service.hpp"
+#include "server/transport/listener.hpp"
+#include "server/transport/post_or_retry.hpp"
+#include "server/work/jobs.hpp"
+#include "server/work/load_service.hpp"
+#include "server/work/render_service.hpp"
+#include "server/work/run_guarded.hpp"
 
 namespace {
 

@@ -1,6 +1,6 @@
 // What is known of sockets: whether the other end has gone, and connections that are turned away
 // when no file descriptor is left.
-#include "server/net/peer.hpp"
+#include "server/transport/peer.hpp"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -13,7 +13,7 @@
 #include <cerrno>
 #include <vector>
 
-#include "server/net/spare_descriptor.hpp"
+#include "server/transport/spare_descriptor.hpp"
 
 namespace windsplat::net {
 namespace {

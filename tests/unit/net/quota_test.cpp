@@ -1,12 +1,12 @@
 // What each address may have, by times that are told: connections and their reserve, buckets of
 // requests, bytes and drawing, and how addresses are forgotten.
-#include "server/net/quota.hpp"
+#include "server/access/quota.hpp"
 
 #include <gtest/gtest.h>
 
 #include <set>
 
-#include "server/net/admission.hpp"
+#include "server/access/admission.hpp"
 
 namespace windsplat::net {
 namespace {
@@ -420,7 +420,7 @@ TEST(Admission, refuses_what_takes_too_long) {
   limits.render_s = 2;
   Metrics metrics;
   Admission admission(limits, metrics, [] { return 0; });
-  const Cost cost{100, 1e9, "/vector/stride"};
+  const frame::Cost cost{100, 1e9, "/vector/stride"};
   EXPECT_TRUE(admission.check_estimate(cost, 2000));
   const auto refused = admission.check_estimate(cost, 2001);
   ASSERT_FALSE(refused);

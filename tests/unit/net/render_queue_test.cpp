@@ -1,15 +1,15 @@
 // Whose turn it is at the renderer: shares of time, cancelled background work, refusals. Times are
 // told, not slept.
-#include "server/net/render_queue.hpp"
+#include "server/work/render_queue.hpp"
 
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <future>
 
-#include "server/net/problem.hpp"
-#include "server/net/render_costs.hpp"
-#include "server/net/render_service.hpp"
+#include "server/http/problem.hpp"
+#include "server/work/cost_history.hpp"
+#include "server/work/render_service.hpp"
 
 namespace windsplat::net {
 namespace {

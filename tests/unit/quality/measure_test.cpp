@@ -10,7 +10,8 @@
 #include <memory>
 #include <utility>
 
-#include "server/data/store.hpp"
+#include "server/data/resident/dataset.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/engine/reference/reference.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"

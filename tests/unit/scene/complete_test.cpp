@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "server/data/samples/samples.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/colormap.hpp"
 #include "server/scene/defaults.hpp"

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "server/data/samples/samples.hpp"
 #include "server/scene/build.hpp"
 #include "tests/unit/scene/fake.hpp"
 

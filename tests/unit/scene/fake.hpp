@@ -10,8 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "server/data/dataset.hpp"
-#include "server/data/store.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/resident/dataset.hpp"
+#include "server/data/samples/samples.hpp"
 #include "server/scene/build.hpp"
 
 namespace windsplat::scene {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/data/resident/store.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/describe.hpp"
 #include "tests/unit/data/netcdf_maker.hpp"

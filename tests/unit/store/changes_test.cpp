@@ -6,7 +6,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/data/store.hpp"
+#include "server/data/open/open.hpp"
+#include "server/data/resident/store.hpp"
 #include "tests/unit/data/netcdf_maker.hpp"
 #include "tests/unit/store/small_file.hpp"
 

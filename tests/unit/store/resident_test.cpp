@@ -14,8 +14,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/data/packed.hpp"
-#include "server/data/store.hpp"
+#include "server/data/model/packed.hpp"
+#include "server/data/resident/store.hpp"
 
 namespace windsplat::data {
 namespace {

@@ -1,5 +1,5 @@
 // The store's promises: once per field and step, one budget for all, what is held stays valid.
-#include "server/data/store.hpp"
+#include "server/data/resident/store.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "server/data/open/open.hpp"
 #include "tests/unit/data/netcdf_maker.hpp"
 #include "tests/unit/store/small_file.hpp"
 

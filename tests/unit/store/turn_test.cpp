@@ -8,7 +8,7 @@
 #include <thread>
 #include <utility>
 
-#include "server/data/store.hpp"
+#include "server/data/resident/store.hpp"
 
 namespace windsplat::data {
 namespace {

@@ -1,0 +1,317 @@
+// A quota behind a lock; refusals -> problems.
+#include "server/access/admission.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <mutex>
+#include <utility>
+
+#include "server/access/cost_limits.hpp"
+#include "server/base/log.hpp"
+#include "server/http/problem.hpp"
+
+namespace windsplat::net {
+namespace {
+
+std::int64_t steady_us() {
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+}
+
+std::string number(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.15g", value);
+  return text.data();
+}
+
+std::string detail_of(const Refusal& refusal) {
+  const std::string limit = number(refusal.limit);
+  switch (refusal.kind) {
+    case LimitKind::connections:
+      return "the server has " + limit + " connections, the most it may have (--max-connections)";
+    case LimitKind::address_connections:
+      return "this address has " + limit +
+             " connections, the most it may have (--max-connections-per-address)";
+    case LimitKind::sessions:
+      return "the server has " + limit + " sessions, the most it may have (--max-sessions)";
+    case LimitKind::address_sessions:
+      return "this address has " + limit +
+             " sessions, the most it may have (--max-sessions-per-address)";
+    case LimitKind::requests:
+      return "this address may make " + limit + " requests a second (--max-requests-per-address)";
+    case LimitKind::bytes:
+      return "this address may be sent " + limit + " bytes a second (--max-bytes-per-address)";
+    case LimitKind::render:
+      return "this address may have " + limit +
+             " seconds of drawing a minute (--max-render-per-address)";
+    case LimitKind::logins:
+      return "this address may fail to log in " + limit +
+             " times a minute (--max-failed-logins-per-address)";
+    case LimitKind::pixels:
+    case LimitKind::kernels:
+    case LimitKind::waiting:
+    case LimitKind::arrivals:
+    case LimitKind::estimate:
+    case LimitKind::handshakes:
+      break;
+  }
+  return "more is asked for than can be done; try again";
+}
+
+// Connections in TLS that were closed because handshakes had taken too much.
+struct ClosedHandshakes {
+  std::int64_t connections = 0;
+  std::string address;  // the first one's
+  bool several = false;
+  Admission::Micros since = 0;  // the first was closed; as it is logged: how long before
+};
+
+void log_closed(const ClosedHandshakes& closed) {
+  log::warn(
+      "connections were closed: TLS handshakes took too much processor time (--max-handshakes, "
+      "--max-handshakes-per-address)",
+      {{"connections", closed.connections},
+       {"seconds", closed.since / 1'000'000},
+       {"address", closed.address + (closed.several ? " and others" : "")}});
+}
+
+}  // namespace
+
+struct Admission::State {
+  using Closed = ClosedHandshakes;
+
+  State(const Limits& limits, std::function<Micros()> clock)
+      : quota(limits), now(clock ? std::move(clock) : steady_us) {}
+
+  // Both under the mutex. A value: those since the last one, to be logged; one a minute at most.
+  std::optional<Closed> count_refused_handshake(const std::string& address, Micros at) {
+    if (closed.connections == 0) {
+      closed.address = address;
+      closed.since = at;
+    }
+    closed.several = closed.several || closed.address != address;
+    ++closed.connections;
+    return refused_handshakes(at);
+  }
+  std::optional<Closed> refused_handshakes(Micros at) {
+    constexpr Micros log_every = 60'000'000;
+    if (closed.connections == 0 || at < log_next) return std::nullopt;
+    log_next = at + log_every;
+    closed.since = at - closed.since;
+    return std::exchange(closed, {});
+  }
+
+  std::mutex mutex;
+  Quota quota;
+  std::function<Micros()> now;
+  Closed closed;
+  Micros log_next = std::numeric_limits<Micros>::min();
+};
+
+// Gives back what was taken when it goes. It is made before anything is taken, so that nothing can
+// fail in between, and needs no memory when it goes.
+class Admission::Place {
+ public:
+  Place(std::shared_ptr<State> state, std::string address)
+      : state_(std::move(state)), address_(std::move(address)) {}
+  ~Place() {
+    if (!session_ && connection_ == Quota::Place::none) return;
+    const std::lock_guard lock(state_->mutex);
+    if (session_) state_->quota.close_session(address_);
+    state_->quota.disconnect(address_, connection_);
+  }
+  Place(const Place&) = delete;
+  Place& operator=(const Place&) = delete;
+
+  Quota::Arrival connect(bool trusted) {
+    const std::lock_guard lock(state_->mutex);
+    const auto arrival = state_->quota.connect(address_, trusted, state_->now());
+    connection_ = arrival.place;
+    return arrival;
+  }
+  std::optional<Refusal> open_session() {
+    const std::lock_guard lock(state_->mutex);
+    const auto now = state_->now();
+    auto refusal = state_->quota.picture(address_, now);
+    if (!refusal) refusal = state_->quota.open_session(address_, now);
+    session_ = !refusal;
+    return refusal;
+  }
+
+ private:
+  const std::shared_ptr<State> state_;
+  const std::string address_;
+  Quota::Place connection_ = Quota::Place::none;
+  bool session_ = false;
+};
+
+Response refusal_response(const Refusal& refusal) {
+  const bool total = refusal.kind == LimitKind::connections || refusal.kind == LimitKind::sessions;
+  return problem_response(total ? 503 : 429, total ? "Service Unavailable" : "Too Many Requests",
+                          detail_of(refusal), refusal.retry_after_s);
+}
+
+Admission::Admission(const Limits& limits, Metrics& metrics, std::function<Micros()> now)
+    : limits_(limits), metrics_(metrics), state_(std::make_shared<State>(limits, std::move(now))) {
+  for (const std::string& text : limits.trusted_proxies) {
+    if (const auto network = Network::parse(text)) trusted_.push_back(*network);
+  }
+}
+
+std::optional<Response> Admission::answer(const std::optional<Refusal>& refusal) {
+  if (!refusal) return std::nullopt;
+  metrics_.refused(refusal->kind);
+  return refusal_response(*refusal);
+}
+
+bool Admission::arrive(const std::string& peer, bool tls) {
+  const std::string address = counted_address(peer);
+  const bool proxy = is_trusted(peer, trusted_);
+  std::optional<Refusal> refusal;
+  std::optional<State::Closed> closed;
+  {
+    const std::lock_guard lock(state_->mutex);
+    const Micros now = state_->now();
+    refusal = state_->quota.arrive(address, proxy, tls, now);
+    if (refusal && refusal->kind == LimitKind::handshakes) {
+      closed = state_->count_refused_handshake(address, now);
+    }
+  }
+  if (refusal) metrics_.refused(refusal->kind);
+  if (closed) log_closed(*closed);
+  return !refusal;
+}
+
+void Admission::log_refused_handshakes() {
+  std::optional<State::Closed> closed;
+  {
+    const std::lock_guard lock(state_->mutex);
+    closed = state_->refused_handshakes(state_->now());
+  }
+  if (closed) log_closed(*closed);
+}
+
+void Admission::handshake_took(const std::string& address, bool trusted, Micros took) {
+  metrics_.handshake_took(took);
+  const std::lock_guard lock(state_->mutex);
+  state_->quota.handshake_took(address, trusted, took, state_->now());
+}
+
+void Admission::authenticated(const std::string& address) {
+  const std::lock_guard lock(state_->mutex);
+  state_->quota.authenticated(address, state_->now());
+}
+
+std::optional<Visitor> Admission::connect(const std::string& peer) {
+  const auto place = std::make_shared<Place>(state_, counted_address(peer));
+  Visitor visitor{peer, place, std::nullopt, is_trusted(peer, trusted_), false};
+  const Quota::Arrival arrival = place->connect(visitor.trusted);
+  if (arrival.place == Quota::Place::none) return std::nullopt;
+  visitor.reserve = arrival.reason;
+  visitor.known = arrival.known;
+  return visitor;
+}
+
+bool Admission::is_kept_out_by_others(const std::string& peer) {
+  const std::string address = counted_address(peer);
+  const bool proxy = is_trusted(peer, trusted_);
+  const std::lock_guard lock(state_->mutex);
+  return state_->quota.is_kept_out_by_others(address, proxy, state_->now());
+}
+
+std::string Admission::client_of(const Visitor& visitor, const Request& request) const {
+  return counted_address(client_address(visitor.peer, request.header("X-Forwarded-For"), trusted_));
+}
+
+std::optional<Response> Admission::request(const Visitor& visitor, Request& request, bool health) {
+  request.address = client_of(visitor, request);
+  if (visitor.reserve && !health) return answer(visitor.reserve);
+  std::optional<Refusal> refusal;
+  {
+    const std::lock_guard lock(state_->mutex);
+    refusal = state_->quota.request(request.address, health, state_->now());
+  }
+  return answer(refusal);
+}
+
+bool Admission::spoiled(const Visitor& visitor, const Request& request) {
+  const std::string address = client_of(visitor, request);
+  const std::lock_guard lock(state_->mutex);
+  return !state_->quota.request(address, false, state_->now());
+}
+
+std::optional<Response> Admission::picture(const std::string& address) {
+  std::optional<Refusal> refusal;
+  {
+    const std::lock_guard lock(state_->mutex);
+    refusal = state_->quota.picture(address, state_->now());
+  }
+  return answer(refusal);
+}
+
+Admission::Seat Admission::open_session(const std::string& address) {
+  const auto place = std::make_shared<Place>(state_, address);
+  if (const auto refusal = place->open_session()) return {nullptr, answer(refusal)};
+  return {place, std::nullopt};
+}
+
+std::optional<Response> Admission::may_try_login(const std::string& address) {
+  std::optional<Refusal> refusal;
+  {
+    const std::lock_guard lock(state_->mutex);
+    refusal = state_->quota.may_try_login(address, state_->now());
+  }
+  return answer(refusal);
+}
+
+std::optional<Response> Admission::failed_login(const std::string& address) {
+  std::optional<Refusal> refusal;
+  {
+    const std::lock_guard lock(state_->mutex);
+    refusal = state_->quota.failed_login(address, state_->now());
+  }
+  return answer(refusal);
+}
+
+Admission::Micros Admission::heard(const std::string& address, std::size_t bytes) {
+  const std::lock_guard lock(state_->mutex);
+  return state_->quota.heard(address, bytes, state_->now());
+}
+
+Admission::Micros Admission::until_paid(const std::string& address) {
+  const std::lock_guard lock(state_->mutex);
+  return state_->quota.until_paid(address, state_->now());
+}
+
+void Admission::sent(const std::string& address, std::size_t bytes) {
+  const std::lock_guard lock(state_->mutex);
+  state_->quota.sent(address, bytes, state_->now());
+}
+
+void Admission::rendered(const std::string& address, Micros took) {
+  const std::lock_guard lock(state_->mutex);
+  state_->quota.rendered(address, took, state_->now());
+}
+
+Result<void> Admission::check(const frame::Cost& cost) {
+  auto fits = check_cost(cost, limits_);
+  if (!fits) {
+    metrics_.refused(fits.error().kind == ErrorKind::too_large ? LimitKind::pixels
+                                                               : LimitKind::kernels);
+  }
+  return fits;
+}
+
+Result<void> Admission::check_estimate(const frame::Cost& cost, double estimate_ms) {
+  const double limit_s = limits_.render_s;
+  if (limit_s <= 0 || estimate_ms <= 1000 * limit_s) return {};
+  metrics_.refused(LimitKind::estimate);
+  return make_error_at(ErrorKind::invalid, cost.dominant,
+                       "makes most of a picture that would take about " +
+                           number(std::ceil(estimate_ms / 1000)) + " s to draw; the limit is " +
+                           number(limit_s) + " s (--max-render)");
+}
+
+}  // namespace windsplat::net

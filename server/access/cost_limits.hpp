@@ -1,0 +1,13 @@
+// The limits of what one picture may cost.
+#pragma once
+
+#include "server/access/limits.hpp"
+#include "server/base/error.hpp"
+#include "server/frame/cost.hpp"
+
+namespace windsplat::net {
+
+// Errors: too_large at /image, invalid at the dominant setting; both state the limit.
+Result<void> check_cost(const frame::Cost& cost, const Limits& limits);
+
+}  // namespace windsplat::net

@@ -1,0 +1,188 @@
+// The login page is whole in itself, so that nothing else has to be served to strangers. Its script
+// keeps the view of a shared link, which is in the address's fragment; without scripts it works,
+// too.
+#include "server/access/login.hpp"
+
+#include <openssl/evp.h>
+
+#include <array>
+#include <optional>
+#include <string_view>
+
+#include "server/base/check.hpp"
+#include "server/base/log.hpp"
+#include "server/http/negotiate.hpp"
+#include "server/http/problem.hpp"
+
+namespace windsplat::net {
+namespace {
+
+constexpr std::string_view style =
+    ":root{color-scheme:light dark;font:16px/1.5 system-ui,sans-serif}"
+    "body{margin:0;min-height:100vh;display:grid;place-items:center}"
+    "main{width:min(22rem,90vw)}h1{font-size:1.4rem}"
+    "label,input,button{display:block;width:100%;box-sizing:border-box;font:inherit}"
+    "input,button{margin:.3rem 0 1rem;padding:.6rem}[role=alert]{font-weight:600}";
+
+constexpr std::string_view script = "document.forms[0].action+=location.hash";
+
+// "'sha256-...'" as a content policy names an inline element.
+std::string policy_hash(std::string_view text) {
+  std::array<unsigned char, 32> digest{};
+  unsigned int bytes = 0;
+  WINDSPLAT_CHECK(
+      EVP_Digest(text.data(), text.size(), digest.data(), &bytes, EVP_sha256(), nullptr) == 1);
+  std::array<unsigned char, 45> base64{};  // 32 bytes, and the NUL that OpenSSL adds
+  EVP_EncodeBlock(base64.data(), digest.data(), static_cast<int>(digest.size()));
+  return "'sha256-" + std::string(reinterpret_cast<const char*>(base64.data())) + "'";
+}
+
+const std::string& policy() {
+  static const std::string text =
+      "default-src 'none'; style-src " + policy_hash(style) + "; script-src " +
+      policy_hash(script) +
+      "; img-src data:; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
+  return text;
+}
+
+// `base_path` has only letters that HTML does not escape, `message` is ours.
+std::string page(const std::string& base_path, std::string_view message) {
+  std::string html =
+      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">"
+      "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
+      // Else the browser would say Origin: null with the form.
+      "<meta name=\"referrer\" content=\"same-origin\"><link rel=\"icon\" href=\"data:,\">"
+      "<title>windsplat: log in</title><style>";
+  html += style;
+  html += "</style></head><body><main><h1>windsplat</h1>";
+  if (!message.empty()) {
+    html += "<p role=\"alert\">";
+    html += message;
+    html += "</p>";
+  }
+  html += "<form method=\"post\" action=\"" + base_path +
+          "login\"><label for=\"token\">Access token</label>"
+          "<input id=\"token\" name=\"token\" type=\"password\" required autofocus "
+          "autocomplete=\"current-password\"><button>Log in</button></form></main><script>";
+  html += script;
+  html += "</script></body></html>\n";
+  return html;
+}
+
+void add_challenge(Response& response, bool wrong) {
+  // RFC 6750, 3: no error is named where nothing was shown.
+  response.headers.emplace_back(
+      "WWW-Authenticate",
+      wrong ? "Bearer realm=\"windsplat\", error=\"invalid_token\"" : "Bearer realm=\"windsplat\"");
+}
+
+Response login_page(const std::string& base_path, std::string_view message, bool wrong) {
+  Response response;
+  response.status = 401;
+  response.content_type = "text/html; charset=utf-8";
+  response.headers = {{"Cache-Control", "no-store"},
+                      {"Content-Security-Policy", policy()},
+                      {"Cross-Origin-Opener-Policy", "same-origin"}};
+  add_challenge(response, wrong);
+  response.body = Body::of(page(base_path, message));
+  return response;
+}
+
+bool wants_page(const Request& request) {
+  if (request.method != "GET" && request.method != "HEAD") return false;
+  constexpr std::array<std::string_view, 2> offers{"application/problem+json", "text/html"};
+  return choose_type(request.header("Accept"), offers) == 1U;
+}
+
+std::optional<unsigned> hex_digit(char c) {
+  if (c >= '0' && c <= '9') return static_cast<unsigned>(c - '0');
+  if (c >= 'a' && c <= 'f') return static_cast<unsigned>(c - 'a') + 10U;
+  if (c >= 'A' && c <= 'F') return static_cast<unsigned>(c - 'A') + 10U;
+  return std::nullopt;
+}
+
+// Of application/x-www-form-urlencoded; what is no escape stands for itself.
+std::string form_text(std::string_view text) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '%' && i + 2 < text.size()) {
+      const auto high = hex_digit(text[i + 1]);
+      const auto low = hex_digit(text[i + 2]);
+      if (high && low) {
+        out += static_cast<char>(*high << 4U | *low);
+        i += 2;
+        continue;
+      }
+    }
+    out += text[i] == '+' ? ' ' : text[i];
+  }
+  return out;
+}
+
+// The form's only field, without the spaces that come with copied text.
+std::string posted_token(const std::string& body) {
+  for (const std::string_view pair : split_list(body, '&')) {
+    const std::size_t equals = pair.find('=');
+    if (equals == std::string_view::npos || pair.substr(0, equals) != "token") continue;
+    const std::string text = form_text(pair.substr(equals + 1));
+    return std::string(trimmed(text));
+  }
+  return {};
+}
+
+}  // namespace
+
+Response turned_away(Verdict verdict, const Request& request, const std::string& base_path) {
+  switch (verdict) {
+    case Verdict::token_in_url:
+      return problem_response(400, "Bad Request",
+                              "a token does not belong into an address, where it is kept and "
+                              "logged: send it as Authorization: Bearer");
+    case Verdict::wrong_origin:
+      if (request.header("Origin").empty()) {
+        return problem_response(
+            403, "Forbidden",
+            "a cookie or the login form counts from a page alone, and no Origin "
+            "tells of one: programs send Authorization: Bearer");
+      }
+      return problem_response(403, "Forbidden",
+                              "pages of " + printable(request.header("Origin")) +
+                                  " may not connect here; --allow-origin names those that may");
+    case Verdict::allowed:
+    case Verdict::no_token:
+    case Verdict::wrong_token:
+      break;
+  }
+  const bool wrong = verdict == Verdict::wrong_token;
+  if (wants_page(request)) return login_page(base_path, "", wrong);
+  Response response = problem_response(
+      401, "Unauthorized",
+      wrong ? "that is not the token" : "a token is needed: Authorization: Bearer TOKEN");
+  add_challenge(response, wrong);
+  return response;
+}
+
+Response log_in(const Request& request, const Token& token, const std::string& base_path, bool tls,
+                std::int64_t now_s) {
+  const std::string type = request.header("Content-Type");
+  if (!equal_without_case(split_list(type, ';')[0], "application/x-www-form-urlencoded")) {
+    return problem_response(415, "Unsupported Media Type",
+                            "a login is application/x-www-form-urlencoded");
+  }
+  if (!token.is(posted_token(request.body))) {
+    log::warn("a login failed", {{"request", request.id}});
+    return login_page(base_path, "That is not the token.", true);
+  }
+  std::string cookie = cookie_name(request) + '=' + token.cookie(now_s + cookie_lasts_s);
+  cookie += "; Path=" + base_path + "; Max-Age=" + std::to_string(cookie_lasts_s) +
+            "; HttpOnly; SameSite=Strict";
+  // Behind a proxy that speaks TLS for us the page's own address tells.
+  if (tls || request.header("Origin").starts_with("https://")) cookie += "; Secure";
+  return {
+      303,
+      "",
+      {{"Location", base_path}, {"Set-Cookie", std::move(cookie)}, {"Cache-Control", "no-store"}},
+      {}};
+}
+
+}  // namespace windsplat::net

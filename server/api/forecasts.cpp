@@ -1,0 +1,74 @@
+// A posted view -> error against time of the settings that the server may choose for it. Nothing is
+// drawn or loaded.
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "protocol/codec.hpp"
+#include "protocol/measurements.hpp"
+#include "server/api/resources.hpp"
+#include "server/frame/measure.hpp"
+#include "server/http/problem.hpp"
+#include "server/quality/curve.hpp"
+#include "server/scene/build.hpp"
+
+namespace windsplat::net {
+namespace {
+
+Result<protocol::View> read_view(Services& services, const std::string& body) {
+  const auto document = protocol::ViewDocument::parse(body);
+  if (!document) return document.error();
+  protocol::View view = document->view();
+  if (view.dataset.empty()) {
+    return make_error_at(ErrorKind::invalid, "/dataset", "must name a dataset");
+  }
+  if (view.method.name == protocol::MethodName::reference) {
+    return make_error_at(ErrorKind::invalid, "/method/name",
+                         "reference is drawn one way alone: there is nothing to choose from");
+  }
+  if (const auto drawable = services.backend.check(view); !drawable) return drawable.error();
+  return view;
+}
+
+// A view's defaults may hang on its fields' ranges.
+Error naming_the_way_out(Error error) {
+  if (error.kind == ErrorKind::not_resident) error.message += "; POST /v1/frames loads it";
+  return error;
+}
+
+Result<protocol::ForecastDescription> forecast(quality::Tables& tables, const protocol::View& view,
+                                               data::Dataset resident) {
+  const auto placed = scene::complete_and_place(view, resident);
+  if (!placed) return naming_the_way_out(placed.error());
+  const auto sight = frame::sight_of(*placed);
+  if (!sight) return sight.error();
+  return quality::curve(placed->view, tables.forecasts(quality::style_of(placed->view), *sight));
+}
+
+}  // namespace
+
+void post_forecast(Services& services, const Request& request, Reply reply) {
+  if (!is_json(request.header("Content-Type"))) {
+    reply(problem_response(415, "Unsupported Media Type", "a view is application/json"));
+    return;
+  }
+  auto view = read_view(services, request.body);
+  if (!view) {
+    reply(problem_response(view.error()));
+    return;
+  }
+  const auto dataset = services.backend.catalogue.find(view->dataset);
+  if (!dataset) {
+    reply(problem_response(dataset.error()));
+    return;
+  }
+  // Of no dataset: it reads none, and waits only where every thread that loads is busy.
+  run_later(services.backend.loads, request, std::move(reply), "a forecast", nullptr,
+            [&services, view = std::move(*view), dataset = *dataset]() -> Response {
+              const auto made = forecast(services.backend.quality, view, dataset->resident_only());
+              return made ? json_response(protocol::encode_forecast(*made))
+                          : problem_response(made.error());
+            });
+}
+
+}  // namespace windsplat::net

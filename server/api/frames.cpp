@@ -1,0 +1,374 @@
+// Pictures: a query or a posted view -> a job of the renderer -> encoded bytes with their report.
+#include <array>
+#include <functional>
+#include <utility>
+
+#include "protocol/codec.hpp"
+#include "protocol/limits.hpp"
+#include "server/api/resources.hpp"
+#include "server/frame/frame_info.hpp"
+#include "server/frame/measure.hpp"
+#include "server/http/negotiate.hpp"
+#include "server/http/problem.hpp"
+#include "server/http/request_target.hpp"
+#include "server/quality/pick.hpp"
+#include "server/scene/build.hpp"
+#include "server/scene/camera.hpp"
+#include "server/work/drawing.hpp"
+#include "server/work/error_report.hpp"
+#include "server/work/run_guarded.hpp"
+
+namespace windsplat::net {
+namespace {
+
+constexpr int jpeg_quality_default = 90;
+constexpr double angle_max = 36000;  // degrees
+constexpr double zoom_min = 1e-3;
+constexpr double zoom_max = 1e3;
+
+struct Orbit {
+  double azimuth = scene::default_azimuth;
+  double elevation = scene::default_elevation;
+  double zoom = 1;
+};
+
+// What is to be drawn, checked as far as that goes without loading.
+struct Picture {
+  protocol::View view;
+  frame::Encoding encoding;
+  std::string preset;  // empty: none
+  std::optional<Orbit> orbit;
+  std::string if_none_match;
+  frame::Cost cost;  // of the view before preset and orbit, which move the camera alone
+};
+
+std::string_view media_type(frame::Format format) {
+  switch (format) {
+    case frame::Format::jpeg:
+      return "image/jpeg";
+    case frame::Format::png:
+      return "image/png";
+    case frame::Format::npy:
+      return "application/x-npy";
+  }
+  return "";
+}
+
+std::string milliseconds(std::int64_t us) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3f", static_cast<double>(us) / 1000);
+  return text.data();
+}
+
+// Headers are ASCII: other characters become the escapes that JSON has for them.
+std::string ascii_json(std::string_view json) {
+  std::string out;
+  for (std::size_t i = 0; i < json.size();) {
+    const auto lead = static_cast<unsigned char>(json[i]);
+    const std::size_t length = lead < 0x80 ? 1 : lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
+    if (length == 1) {
+      out += json[i++];
+      continue;
+    }
+    std::uint32_t code = lead & (0x7fU >> length);
+    for (std::size_t k = 1; k < length && i + k < json.size(); ++k) {
+      code = code << 6 | (static_cast<unsigned char>(json[i + k]) & 0x3fU);
+    }
+    i += length;
+    std::array<char, 16> text{};
+    if (code >= 0x10000) {
+      const std::uint32_t rest = code - 0x10000;
+      std::snprintf(text.data(), text.size(), "\\u%04x\\u%04x", 0xd800 + (rest >> 10),
+                    0xdc00 + (rest & 0x3ff));
+    } else {
+      std::snprintf(text.data(), text.size(), "\\u%04x", code);
+    }
+    out += text.data();
+  }
+  return out;
+}
+
+// Everything that the bytes of a picture follow from.
+std::string picture_etag(const protocol::View& view, const data::Dataset& dataset,
+                         const frame::Encoding& encoding) {
+  return etag_of(protocol::encode_view(view) + '\n' + dataset.info().digest + '\n' +
+                 WINDSPLAT_VERSION + '\n' + std::string(media_type(encoding.format)) + ' ' +
+                 std::to_string(encoding.quality));
+}
+
+Result<protocol::View> resolve(const Picture& picture, data::Dataset& dataset) {
+  auto view = scene::complete_view(picture.view, dataset);
+  if (!view || (picture.preset.empty() && !picture.orbit)) return view;
+  const auto placed = scene::place_dataset(view->geometry, dataset);
+  if (!placed) return placed.error();
+  const scene::Lattice& lattice = (*placed)->lattice;
+  if (!picture.preset.empty()) {
+    if (const auto ok = scene::apply_preset(*view, lattice, picture.preset); !ok) {
+      return ok.error();
+    }
+  }
+  if (picture.orbit) {
+    const Orbit& orbit = *picture.orbit;
+    scene::orbit(*view, lattice, orbit.azimuth, orbit.elevation, orbit.zoom);
+  }
+  return scene::complete_view(*view, dataset);
+}
+
+// Within a budget or an error the server may choose, and the picture is not the view's alone.
+bool is_chosen(const protocol::View& view) {
+  return view.quality.budget_ms || view.quality.max_error;
+}
+
+Result<quality::Setting> setting_of(Services& services, const protocol::View& completed,
+                                    data::Dataset& dataset) {
+  if (!is_chosen(completed) || completed.method.name == protocol::MethodName::reference) {
+    return quality::settings[quality::own_setting(completed)];
+  }
+  const auto placed = scene::complete_and_place(completed, dataset);
+  if (!placed) return placed.error();
+  const auto sight = frame::sight_of(*placed);
+  if (!sight) return sight.error();
+  const auto known = services.backend.quality.forecasts(quality::style_of(completed), *sight);
+  const quality::Aim aim{completed.quality.budget_ms, completed.quality.max_error};
+  return quality::settings[quality::pick(completed, known, aim).setting];
+}
+
+frame::Encoding encoding_at(frame::Encoding encoding, const quality::Setting& setting) {
+  encoding.half_level = setting.half_level;
+  encoding.coarser = setting.coarser;
+  return encoding;
+}
+
+// What a picture is loaded for, so that it is drawn as that even where more is known by then.
+using LoadedFor = std::optional<quality::Setting>;
+
+Result<std::shared_ptr<const void>> load(Services& services, const Picture& picture,
+                                         data::Dataset& loading, LoadedFor& loaded_for) {
+  const std::string& id = loading.info().id;
+  const auto view = resolve(picture, loading);
+  if (!view) return naming(view.error(), id);
+  const auto setting = setting_of(services, *view, loading);
+  if (!setting) return naming(setting.error(), id);
+  loaded_for = *setting;
+  return load_picture(quality::at_setting(*view, *setting), loading,
+                      encoding_at(picture.encoding, *setting));
+}
+
+Result<Response> draw(Services& services, const Picture& picture, data::Dataset& dataset,
+                      std::int64_t queue_us, const LoadedFor& loaded_for,
+                      const CancelToken& cancel) {
+  const auto view = resolve(picture, dataset);
+  if (!view) return view.error();
+  Response response;
+  if (is_chosen(*view)) {
+    response.headers = {{"Cache-Control", "no-store"}};
+  } else {
+    const std::string etag = picture_etag(*view, dataset, picture.encoding);
+    response.headers = {{"Cache-Control", "no-cache"}, {"ETag", etag}};
+    if (matches_etag(picture.if_none_match, etag)) {
+      response.status = 304;
+      return response;
+    }
+  }
+  const auto setting =
+      loaded_for ? Result<quality::Setting>(*loaded_for) : setting_of(services, *view, dataset);
+  if (!setting) return setting.error();
+  const frame::Encoding encoding = encoding_at(picture.encoding, *setting);
+  const auto room = reserve_picture(dataset, view->image, encoding, loaded_for.has_value());
+  if (!room) return room.error();
+  auto drawn = frame::produce(quality::at_setting(*view, *setting), dataset, encoding,
+                              *services.backend.pool, cancel, services.backend.frames);
+  if (!drawn) return drawn.error();
+  protocol::FrameInfo info = frame::frame_info(*drawn, drawn->view);
+  tell_error(*drawn, seen_in(*drawn, *setting), *setting, encoding, services.backend.quality, info);
+  services.metrics.stage_took(Metrics::Stage::queue, queue_us);
+  services.metrics.stage_took(Metrics::Stage::render, drawn->render_us);
+  services.metrics.stage_took(Metrics::Stage::encode, drawn->encode_us);
+  // What the server chooses is drawn at less work than was reckoned.
+  if (!is_chosen(*view)) {
+    services.backend.costs.learn(view->dataset, view->method.name, picture.cost.kernels,
+                                 drawn->render_us + drawn->encode_us);
+  }
+  response.content_type = media_type(picture.encoding.format);
+  response.headers.emplace_back("Server-Timing",
+                                "queue;dur=" + milliseconds(queue_us) +
+                                    ", render;dur=" + milliseconds(drawn->render_us) +
+                                    ", encode;dur=" + milliseconds(drawn->encode_us));
+  response.headers.emplace_back("Windsplat-Frame", ascii_json(protocol::encode_frame_info(info)));
+  response.headers.emplace_back("Vary", "Accept");
+  // A picture is meant for any page's <img>; its pixels stay out of that page's reach.
+  response.headers.emplace_back("Cross-Origin-Resource-Policy", "cross-origin");
+  response.body = Body::of(std::move(drawn->bytes));
+  return response;
+}
+
+void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dataset> dataset,
+                    const Request& request, Reply reply) {
+  if (auto refusal = services.admission.picture(request.address)) {
+    reply(std::move(*refusal));
+    return;
+  }
+  const double estimate_ms = services.backend.costs.estimate_ms(
+      asked.view.dataset, asked.view.method.name, asked.cost.kernels);
+  if (const auto fits = services.admission.check_estimate(asked.cost, estimate_ms); !fits) {
+    reply(problem_response(fits.error()));
+    return;
+  }
+  asked.if_none_match = request.header("If-None-Match");
+  const auto picture = std::make_shared<const Picture>(std::move(asked));
+  const auto answer = std::make_shared<const Reply>(std::move(reply));
+  const CancelToken cancel = request.cancel;
+  // Pictures of one address take turns with those of others, however many connections it has.
+  const std::uint64_t owner =
+      request.address.empty() ? request.peer : std::hash<std::string>{}(request.address);
+  Drawing drawing{
+      RenderService::Kind::request, owner, cancel, std::move(dataset), {}, {}, {}, 0, {}};
+  const auto loaded_for = std::make_shared<LoadedFor>();
+  drawing.draw = [&services, picture, answer, cancel, loaded_for, id = request.id](
+                     data::Dataset& resident, std::int64_t queue_us, bool after_load) {
+    auto response = attempt<Response>(
+        "a picture", cancel,
+        [&] { return draw(services, *picture, resident, queue_us, *loaded_for, cancel); }, id);
+    if (!after_load && !response && response.error().kind == ErrorKind::not_resident) return false;
+    (*answer)(response ? std::move(*response) : problem_response(response.error()));
+    return true;
+  };
+  drawing.load = [&services, picture, cancel, loaded_for, id = request.id](data::Dataset& loading) {
+    return attempt<std::shared_ptr<const void>>(
+        "loading a picture's fields", cancel,
+        [&] { return load(services, *picture, loading, *loaded_for); }, id);
+  };
+  drawing.payer = request.address;
+  drawing.cost_ms = estimate_ms;
+  drawing.fail = [answer](const Error& error) { (*answer)(problem_response(error)); };
+  if (const auto queued = submit(services.backend, std::move(drawing)); !queued) {
+    (*answer)(problem_response(queued.error()));
+  }
+}
+
+// --- GET /v1/datasets/{id}/frame.* --------------------------------------------------------------
+
+// Numbers go into the view as they were written, so that its reader names what is out of range.
+std::string view_json(const std::optional<std::string>& step,
+                      const std::optional<std::string>& width,
+                      const std::optional<std::string>& height) {
+  std::string image;
+  if (width) image += "\"width\":" + *width;
+  if (height) image += (image.empty() ? "\"height\":" : ",\"height\":") + *height;
+  std::string json = "{\"image\":{" + image + '}';
+  if (step) json += ",\"step\":" + *step;
+  return json + '}';
+}
+
+std::optional<Orbit> read_orbit(QueryReader& query) {
+  const auto azimuth = query.number("azimuth", -angle_max, angle_max);
+  const auto elevation = query.number("elevation", -90, 90);
+  const auto zoom = query.number("zoom", zoom_min, zoom_max);
+  if (!azimuth && !elevation && !zoom) return std::nullopt;
+  Orbit orbit;
+  orbit.azimuth = azimuth.value_or(orbit.azimuth);
+  orbit.elevation = elevation.value_or(orbit.elevation);
+  orbit.zoom = zoom.value_or(orbit.zoom);
+  return orbit;
+}
+
+Result<Picture> read_query(const Request& request, frame::Format format) {
+  QueryReader query(request.query);
+  Picture picture;
+  picture.encoding.format = format;
+  picture.encoding.quality = jpeg_quality_default;
+  const auto step = query.integer("step");
+  const auto width = query.integer("width");
+  const auto height = query.integer("height");
+  picture.orbit = read_orbit(query);
+  picture.preset = query.text("preset").value_or("");
+  if (format == frame::Format::jpeg) {
+    picture.encoding.quality = query.integer("quality", 1, 100).value_or(jpeg_quality_default);
+  }
+  if (const auto ok = query.finish(); !ok) return ok.error();
+  const auto document = protocol::ViewDocument::parse(view_json(step, width, height));
+  if (!document) return document.error();
+  picture.view = document->view();
+  return picture;
+}
+
+// --- POST /v1/frames ----------------------------------------------------------------------------
+
+Result<Picture> read_view(const Request& request, frame::Format format) {
+  const auto document = protocol::ViewDocument::parse(request.body);
+  if (!document) return document.error();
+  Picture picture;
+  picture.view = document->view();
+  picture.encoding.format = format;
+  picture.encoding.quality = jpeg_quality_default;
+  if (picture.view.dataset.empty()) {
+    return make_error_at(ErrorKind::invalid, "/dataset", "must name a dataset");
+  }
+  return picture;
+}
+
+}  // namespace
+
+std::optional<frame::Format> format_of_suffix(std::string_view name) {
+  if (name == "frame.jpg") return frame::Format::jpeg;
+  if (name == "frame.png") return frame::Format::png;
+  if (name == "frame.npy") return frame::Format::npy;
+  return std::nullopt;
+}
+
+void get_frame(Services& services, const std::string& id, frame::Format format,
+               const Request& request, Reply reply) {
+  auto dataset = services.backend.catalogue.find(id);
+  if (!dataset) {
+    reply(problem_response(make_error(ErrorKind::not_found, dataset.error().message)));
+    return;
+  }
+  auto picture = read_query(request, format);
+  if (!picture) {
+    reply(problem_response(picture.error()));
+    return;
+  }
+  picture->view.dataset = id;
+  auto checked = services.backend.check(picture->view);
+  if (!checked) {
+    reply(problem_response(checked.error()));
+    return;
+  }
+  picture->cost = std::move(checked->cost);
+  submit_picture(services, std::move(*picture), std::move(*dataset), request, std::move(reply));
+}
+
+void post_frame(Services& services, const Request& request, Reply reply) {
+  constexpr std::array<frame::Format, 3> formats{frame::Format::jpeg, frame::Format::png,
+                                                 frame::Format::npy};
+  constexpr std::array<std::string_view, 3> types{"image/jpeg", "image/png", "application/x-npy"};
+  if (!is_json(request.header("Content-Type"))) {
+    reply(problem_response(415, "Unsupported Media Type", "a view is application/json"));
+    return;
+  }
+  const auto type = choose_type(request.header("Accept"), types);
+  if (!type) {
+    reply(problem_response(406, "Not Acceptable",
+                           "pictures are image/jpeg, image/png or application/x-npy"));
+    return;
+  }
+  auto picture = read_view(request, formats[*type]);
+  if (!picture) {
+    reply(problem_response(picture.error()));
+    return;
+  }
+  auto checked = services.backend.check(picture->view);
+  if (!checked) {
+    reply(problem_response(checked.error()));
+    return;
+  }
+  picture->cost = std::move(checked->cost);
+  auto dataset = services.backend.catalogue.find(picture->view.dataset);
+  if (!dataset) {
+    reply(problem_response(dataset.error()));
+    return;
+  }
+  submit_picture(services, std::move(*picture), std::move(*dataset), request, std::move(reply));
+}
+
+}  // namespace windsplat::net

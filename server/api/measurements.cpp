@@ -1,0 +1,351 @@
+// Questions about a dataset's values: a query -> a job of the loads -> JSON. What
+// goes over all steps is cut into short jobs, so that pictures are drawn in between.
+#include "protocol/measurements.hpp"
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "protocol/limits.hpp"
+#include "server/api/resources.hpp"
+#include "server/data/model/measure.hpp"
+#include "server/http/problem.hpp"
+#include "server/http/request_target.hpp"
+#include "server/work/run_guarded.hpp"
+
+namespace windsplat::net {
+namespace {
+
+namespace limits = protocol::limits;
+using Clock = std::chrono::steady_clock;
+using DatasetPtr = std::shared_ptr<data::Dataset>;
+
+constexpr int histogram_bins = 64;
+constexpr std::chrono::milliseconds turn_budget{30};  // of steps read before others have their turn
+
+// What a question is about, found before anything is loaded.
+struct Subject {
+  Catalogue* catalogue = nullptr;
+  DatasetPtr dataset;
+  data::FieldInfo field;
+  CancelToken cancel;
+};
+
+Result<DatasetPtr> find_dataset(const Services& services, const std::string& id) {
+  auto dataset = services.backend.catalogue.find(id);
+  if (!dataset) return make_error(ErrorKind::not_found, dataset.error().message);
+  return dataset;
+}
+
+Result<Subject> find_subject(Services& services, const std::string& id, const std::string& field,
+                             const Request& request) {
+  auto dataset = find_dataset(services, id);
+  if (!dataset) return dataset.error();
+  const data::FieldInfo* found = (*dataset)->info().find(field);
+  if (found == nullptr) {
+    return make_error(ErrorKind::not_found,
+                      "dataset '" + printable(id) + "' has no field '" + printable(field) + "'");
+  }
+  return Subject{&services.backend.catalogue, std::move(*dataset), *found, request.cancel};
+}
+
+Result<std::shared_ptr<const data::Volume>> load(Catalogue& catalogue, const data::Dataset& dataset,
+                                                 const std::string& field, std::size_t step,
+                                                 const CancelToken& cancel) {
+  auto volume = catalogue.load(
+      dataset, [&](data::Dataset& loading) { return loading.volume(field, step); }, cancel);
+  if (!volume) return naming(dataset.with_need(volume.error(), {field}), dataset.info().id, field);
+  return volume;
+}
+
+Result<std::shared_ptr<const data::Volume>> load(const Subject& subject, std::size_t step) {
+  return load(*subject.catalogue, *subject.dataset, subject.field.name, step, subject.cancel);
+}
+
+std::optional<int> read_step(QueryReader& query, const data::Dataset& dataset) {
+  return query.integer("step", 0, static_cast<int>(dataset.info().steps.size()) - 1);
+}
+
+std::array<std::optional<double>, 3> read_place(QueryReader& query) {
+  return {query.number("x", -limits::coordinate_max, limits::coordinate_max),
+          query.number("y", -limits::coordinate_max, limits::coordinate_max),
+          query.number("z", -limits::coordinate_max, limits::coordinate_max)};
+}
+
+protocol::PositionDescription describe(const data::Place& place, const data::Grid& grid) {
+  protocol::PositionDescription out;
+  out.index = place.index;
+  out.coordinates = place.coordinates;
+  for (std::size_t a = 0; a < 3; ++a) out.units[a] = grid.axes[a].units;
+  if (grid.columns) {
+    out.units[0] = "degrees_east";
+    out.units[1] = "degrees_north";
+  }
+  return out;
+}
+
+protocol::ProbedField describe(const data::FieldInfo& field) {
+  return {field.name, field.kind == data::FieldKind::vector, field.units, field.component_units};
+}
+
+// --- over all steps -----------------------------------------------------------------------------
+
+// One pass over the steps of a field, some of them a turn.
+struct Pass {
+  Subject subject;
+  CancelToken cancel;
+  std::string payer;
+  std::shared_ptr<Reply> reply;
+  std::function<Result<void>()> begin;            // before the first step; may be empty
+  std::function<void(const data::Volume&)> take;  // one step after the other
+  std::function<Response()> finish;
+  std::size_t next_step = 0;
+};
+
+// The answer, or none when there are steps left after this turn.
+Result<std::optional<Response>> take_turn(Pass& pass) {
+  const std::size_t steps = pass.subject.dataset->info().steps.size();
+  const auto until = Clock::now() + turn_budget;
+  if (pass.begin) {
+    if (const auto ok = std::exchange(pass.begin, nullptr)(); !ok) return ok.error();
+  }
+  while (pass.next_step < steps) {
+    if (pass.cancel.cancelled()) {
+      return make_error(ErrorKind::cancelled, "nobody waits for the answer");
+    }
+    const auto volume = load(pass.subject, pass.next_step);
+    if (!volume) return volume.error();
+    pass.take(**volume);
+    ++pass.next_step;
+    if (Clock::now() >= until) break;
+  }
+  if (pass.next_step < steps) return std::optional<Response>();
+  return std::optional(pass.finish());
+}
+
+// A turn after the other, so that others' loads come between. Only the first may be refused.
+void go_on(Services& services, const std::shared_ptr<Pass>& pass, bool admitted) {
+  const auto run = [&services, pass] {
+    auto answer = attempt<std::optional<Response>>("a pass over all steps", pass->cancel,
+                                                   [&] { return take_turn(*pass); });
+    if (!answer) return (*pass->reply)(problem_response(answer.error()));
+    if (*answer) return (*pass->reply)(std::move(**answer));
+    go_on(services, pass, true);
+  };
+  const auto queued = services.backend.loads.submit(
+      {pass->cancel, run, admitted, pass->subject.dataset->shared_info(), pass->payer});
+  if (!queued) (*pass->reply)(problem_response(queued.error()));
+}
+
+std::shared_ptr<Pass> pass_over(Subject subject, const Request& request, Reply reply) {
+  auto pass = std::make_shared<Pass>();
+  pass->subject = std::move(subject);
+  pass->cancel = request.cancel;
+  pass->payer = request.address;
+  pass->reply = std::make_shared<Reply>(std::move(reply));
+  return pass;
+}
+
+Result<void> check_steps(const data::DatasetInfo& info) {
+  if (info.steps.size() <= static_cast<std::size_t>(limits::series_steps_max)) return {};
+  return make_error(ErrorKind::too_large, "the dataset has " + std::to_string(info.steps.size()) +
+                                              " steps; the limit is " +
+                                              std::to_string(limits::series_steps_max));
+}
+
+// --- histogram ----------------------------------------------------------------------------------
+
+struct HistogramQuery {
+  data::HistogramRequest request;
+  std::size_t step = 0;
+};
+
+Result<HistogramQuery> read_histogram(const Request& request, const data::Dataset& dataset) {
+  QueryReader query(request.query);
+  HistogramQuery out;
+  out.step = static_cast<std::size_t>(read_step(query, dataset).value_or(0));
+  out.request.bins = query.integer("bins", 1, limits::histogram_bins_max).value_or(histogram_bins);
+  out.request.range = query.pair("range", -limits::value_max, limits::value_max);
+  out.request.logarithmic = query.boolean("log").value_or(false);
+  const auto clip = query.number("clip", 0, limits::histogram_clip_max);
+  if (const auto ok = query.finish(); !ok) return ok.error();
+  out.request.clip = clip.value_or(0);
+  if (out.request.range && clip) {
+    return make_error(ErrorKind::invalid, "the query says either 'range' or 'clip'");
+  }
+  return out;
+}
+
+Response histogram_response(const Subject& subject, const HistogramQuery& query,
+                            const CancelToken& cancel) {
+  const auto volume = load(subject, query.step);
+  if (!volume) return problem_response(volume.error());
+  auto made = data::histogram(**volume, query.request, cancel);
+  if (!made) return problem_response(made.error());
+  protocol::HistogramDescription out;
+  out.range = made->range;
+  out.counts = std::move(made->counts);
+  out.below = made->below;
+  out.above = made->above;
+  out.masked = made->masked;
+  out.log = query.request.logarithmic;
+  if (out.log) out.edges = std::move(made->edges);
+  return json_response(protocol::encode_histogram(out));
+}
+
+// --- probe --------------------------------------------------------------------------------------
+
+Response probe_response(Catalogue& catalogue, data::Dataset& dataset,
+                        const std::array<std::optional<double>, 3>& at, int step,
+                        const CancelToken& cancel) {
+  const data::DatasetInfo& info = dataset.info();
+  const auto place = data::nearest_sample(info.grid, at);
+  if (!place) return problem_response(place.error());
+  protocol::ProbeDescription out;
+  out.position = describe(*place, info.grid);
+  out.step = step;
+  for (const data::FieldInfo& field : info.fields) {
+    if (cancel.cancelled()) {
+      return problem_response(make_error(ErrorKind::cancelled, "nobody waits for the answer"));
+    }
+    const auto volume =
+        load(catalogue, dataset, field.name, static_cast<std::size_t>(step), cancel);
+    if (!volume) return problem_response(volume.error());
+    out.fields.push_back(describe(field));
+    out.values.push_back(data::value_at(**volume, place->index));
+  }
+  return json_response(protocol::encode_probe(out));
+}
+
+// --- range --------------------------------------------------------------------------------------
+
+Response range_response(const data::FieldRange& range, const char* of) {
+  return json_response(protocol::encode_range({range.range, range.masked, of}));
+}
+
+Response step_range(const Subject& subject, std::size_t step) {
+  const auto volume = load(subject, step);
+  if (!volume) return problem_response(volume.error());
+  data::FieldRange range;
+  range.add(**volume);
+  return range_response(range, "step");
+}
+
+void answer_range_of_all(Services& services, Subject subject, const Request& request, Reply reply) {
+  auto of = subject.dataset->shared_info();
+  if (const auto known = services.backend.ranges.find(of, subject.field.name)) {
+    reply(range_response(*known, "all"));
+    return;
+  }
+  const auto pass = pass_over(std::move(subject), request, std::move(reply));
+  const auto range = std::make_shared<data::FieldRange>();
+  pass->take = [range](const data::Volume& volume) { range->add(volume); };
+  pass->finish = [&services, range, of = std::move(of), field = pass->subject.field.name] {
+    services.backend.ranges.keep(of, field, *range);
+    return range_response(*range, "all");
+  };
+  go_on(services, pass, false);
+}
+
+}  // namespace
+
+void get_histogram(Services& services, const std::string& id, const std::string& field,
+                   const Request& request, Reply reply) {
+  auto subject = find_subject(services, id, field, request);
+  if (!subject) {
+    reply(problem_response(subject.error()));
+    return;
+  }
+  const auto query = read_histogram(request, *subject->dataset);
+  if (!query) {
+    reply(problem_response(query.error()));
+    return;
+  }
+  run_later(services.backend.loads, request, std::move(reply), "a histogram",
+            subject->dataset.get(), [subject = *subject, query = *query, cancel = request.cancel] {
+              return histogram_response(subject, query, cancel);
+            });
+}
+
+void get_probe(Services& services, const std::string& id, const Request& request, Reply reply) {
+  auto dataset = find_dataset(services, id);
+  if (!dataset) {
+    reply(problem_response(dataset.error()));
+    return;
+  }
+  QueryReader query(request.query);
+  const auto at = read_place(query);
+  const int step = read_step(query, **dataset).value_or(0);
+  if (const auto ok = query.finish(); !ok) {
+    reply(problem_response(ok.error()));
+    return;
+  }
+  run_later(
+      services.backend.loads, request, std::move(reply), "a probe", dataset->get(),
+      [&catalogue = services.backend.catalogue, dataset = *dataset, at, step,
+       cancel = request.cancel] { return probe_response(catalogue, *dataset, at, step, cancel); });
+}
+
+void get_series(Services& services, const std::string& id, const std::string& field,
+                const Request& request, Reply reply) {
+  const auto refuse = [&](const Error& error) { reply(problem_response(error)); };
+  auto subject = find_subject(services, id, field, request);
+  if (!subject) return refuse(subject.error());
+  const data::DatasetInfo& info = subject->dataset->info();
+  QueryReader query(request.query);
+  const auto at = read_place(query);
+  if (const auto ok = query.finish(); !ok) return refuse(ok.error());
+  if (const auto ok = check_steps(info); !ok) return refuse(ok.error());
+
+  const auto series = std::make_shared<protocol::SeriesDescription>();
+  series->field = describe(subject->field);
+  for (const data::TimeStep& step : info.steps) series->times.push_back({step.value, step.text});
+  const auto pass = pass_over(std::move(*subject), request, std::move(reply));
+  const auto place = std::make_shared<std::optional<data::Place>>();
+  // The place is looked for on a loading thread: among many columns that takes a while.
+  pass->begin = [at, series, place, grid = &info.grid]() -> Result<void> {
+    const auto found = data::nearest_sample(*grid, at);
+    if (!found) return found.error();
+    *place = *found;
+    series->position = describe(*found, *grid);
+    return {};
+  };
+  pass->take = [series, place](const data::Volume& volume) {
+    series->values.push_back(data::value_at(volume, (*place)->index));
+  };
+  pass->finish = [series] { return json_response(protocol::encode_series(*series)); };
+  go_on(services, pass, false);
+}
+
+void get_range(Services& services, const std::string& id, const std::string& field,
+               const Request& request, Reply reply) {
+  const auto refuse = [&](const Error& error) { reply(problem_response(error)); };
+  auto subject = find_subject(services, id, field, request);
+  if (!subject) return refuse(subject.error());
+  QueryReader query(request.query);
+  const std::string of = query.text("of").value_or("step");
+  const auto step = read_step(query, *subject->dataset);
+  if (const auto ok = query.finish(); !ok) return refuse(ok.error());
+  if (of != "step" && of != "all") {
+    return refuse(make_error(ErrorKind::invalid,
+                             "the query's 'of' is step or all, not " + printable(of, 40)));
+  }
+  if (of == "step") {
+    run_later(services.backend.loads, request, std::move(reply), "a range", subject->dataset.get(),
+              [subject = *subject, step = step.value_or(0)] {
+                return step_range(subject, static_cast<std::size_t>(step));
+              });
+    return;
+  }
+  if (step) return refuse(make_error(ErrorKind::invalid, "a range of all steps has no 'step'"));
+  if (const auto ok = check_steps(subject->dataset->info()); !ok) return refuse(ok.error());
+  answer_range_of_all(services, std::move(*subject), request, std::move(reply));
+}
+
+}  // namespace windsplat::net

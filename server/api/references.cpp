@@ -1,0 +1,87 @@
+// References: a posted view -> a job that draws it; the pictures that are kept -> PNG.
+#include <string>
+#include <utility>
+
+#include "protocol/codec.hpp"
+#include "server/api/resources.hpp"
+#include "server/base/kept.hpp"
+#include "server/http/negotiate.hpp"
+#include "server/http/problem.hpp"
+#include "server/work/reference_job.hpp"
+
+namespace windsplat::net {
+namespace {
+
+constexpr std::string_view suffix = ".png";
+
+Result<protocol::View> read_view(Services& services, const Request& request) {
+  const auto document = protocol::ViewDocument::parse(request.body);
+  if (!document) return document.error();
+  protocol::View view = document->view();
+  if (view.dataset.empty()) {
+    return make_error_at(ErrorKind::invalid, "/dataset", "must name a dataset");
+  }
+  if (view.method.name == protocol::MethodName::reference) {
+    return make_error_at(ErrorKind::invalid, "/method/name",
+                         "is the method that the reference is compared with: kernel or slab");
+  }
+  const auto pixels =
+      static_cast<std::size_t>(view.image.width) * static_cast<std::size_t>(view.image.height);
+  if (pixels > kept_pixels) {
+    std::string detail = "a reference has at most " + std::to_string(kept_pixels);
+    detail += " pixels: draw larger ones with `windsplat render`";
+    return make_error_at(ErrorKind::too_large, "/image", std::move(detail));
+  }
+  if (const auto drawable = services.backend.check(view); !drawable) return drawable.error();
+  return view;
+}
+
+}  // namespace
+
+void post_reference(Services& services, const Request& request, Reply reply) {
+  const Reply answer = std::move(reply);
+  if (!is_json(request.header("Content-Type"))) {
+    answer(problem_response(415, "Unsupported Media Type", "a view is application/json"));
+    return;
+  }
+  auto view = read_view(services, request);
+  if (!view) return answer(problem_response(view.error()));
+  const auto dataset = services.backend.catalogue.find(view->dataset);
+  if (!dataset) return answer(problem_response(dataset.error()));
+  if (auto refusal = services.admission.picture(request.address)) return answer(*refusal);
+  Jobs::Terms terms;
+  terms.slow = true;
+  auto ticket = services.backend.references.admit(request.address, terms.cancel);
+  if (!ticket) return answer(problem_response(ticket.error()));
+  const auto work = [&services, view = std::move(*view), dataset = *dataset,
+                     address = request.address,
+                     ticket = std::move(*ticket)](const Jobs::Handle& handle) {
+    return draw_reference(services.backend, view, *dataset, handle, address,
+                          services.options.base_path);
+  };
+  answer(job_response(services, services.backend.jobs.submit("reference", work, terms)));
+}
+
+// What the id names never changes.
+Response get_reference(Services& services, const std::string& name, const Request& request) {
+  const bool is_png = name.size() > suffix.size() && name.ends_with(suffix);
+  const std::string id = is_png ? name.substr(0, name.size() - suffix.size()) : "";
+  const auto kept = services.backend.references.find(id);
+  if (!kept) {
+    return problem_response(
+        make_error(ErrorKind::not_found,
+                   "there is no such reference, or it is no longer kept: post its view"));
+  }
+  Response response;
+  const std::string etag = '"' + id + '"';
+  response.headers = {{"Cache-Control", "private, max-age=3600, immutable"}, {"ETag", etag}};
+  if (matches_etag(request.header("If-None-Match"), etag)) {
+    response.status = 304;
+    return response;
+  }
+  response.content_type = "image/png";
+  response.body = {kept->png, *kept->png};
+  return response;
+}
+
+}  // namespace windsplat::net

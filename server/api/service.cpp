@@ -1,0 +1,150 @@
+// The service itself: what it is, whether it lives, and what it offers by name.
+#include <memory>
+#include <utility>
+
+#include "protocol/codec.hpp"
+#include "server/api/resources.hpp"
+#include "server/api/view_schema.hpp"
+#include "server/data/model/digest.hpp"
+#include "server/http/negotiate.hpp"
+#include "server/http/problem.hpp"
+#include "server/scene/build.hpp"
+#include "server/scene/colormap.hpp"
+#include "server/work/run_guarded.hpp"
+
+namespace windsplat::net {
+namespace {
+
+constexpr int legend_colors = 64;
+
+Response health(int status, const char* state) {
+  Response response;
+  response.status = status;
+  response.content_type = "application/json";
+  response.headers = {{"Cache-Control", "no-store"}};
+  response.body = Body::of(std::string("{\"status\":\"") + state + "\"}");
+  return response;
+}
+
+}  // namespace
+
+Response json_response(std::string json) {
+  Response response;
+  response.content_type = "application/json";
+  response.headers = {{"Cache-Control", "no-store"}};
+  response.body = Body::of(std::move(json));
+  return response;
+}
+
+bool is_json(std::string_view content_type) {
+  return equal_without_case(split_list(content_type, ';')[0], "application/json");
+}
+
+bool is_merge_patch(std::string_view content_type) {
+  return equal_without_case(split_list(content_type, ';')[0], "application/merge-patch+json");
+}
+
+void run_later(LoadService& service, const Request& request, Reply reply, const char* what,
+               const data::Dataset* of, std::function<Response()> make) {
+  const auto answer = std::make_shared<const Reply>(std::move(reply));
+  const CancelToken cancel = request.cancel;
+  const auto run = [what, make = std::move(make), cancel, answer, id = request.id] {
+    auto response = attempt<Response>(what, cancel, make, id);
+    (*answer)(response ? std::move(*response) : problem_response(response.error()));
+  };
+  const auto queued = service.submit(
+      {cancel, run, false, of == nullptr ? nullptr : of->shared_info(), request.address});
+  if (!queued) (*answer)(problem_response(queued.error()));
+}
+
+std::string etag_of(std::string_view text) {
+  const std::string first = data::digest_of(text);
+  // The second half goes on from the first, so that the two do not fail together.
+  return '"' + first + data::digest_of(first + std::string(text)) + '"';
+}
+
+Response tagged_response(const Request& request, std::string_view content_type,
+                         std::string_view content) {
+  Response response;
+  const std::string etag = etag_of(content);
+  response.headers = {{"Cache-Control", "no-cache"}, {"ETag", etag}};
+  if (matches_etag(request.header("If-None-Match"), etag)) {
+    response.status = 304;
+    return response;
+  }
+  response.content_type = content_type;
+  response.body = Body::of(std::string(content));
+  return response;
+}
+
+Response get_livez() { return health(200, "live"); }
+
+Response get_readyz(const Services& services) {
+  return services.draining ? health(503, "draining") : health(200, "ready");
+}
+
+Response get_metrics(const Services& services) {
+  Response response;
+  response.content_type = "text/plain; version=0.0.4; charset=utf-8";
+  response.headers = {{"Cache-Control", "no-store"}};
+  response.body = Body::of(services.metrics.text(services.backend.catalogue.counts()));
+  return response;
+}
+
+Response get_service(const Services& services) {
+  protocol::ServiceDescription service;
+  service.version = WINDSPLAT_VERSION;
+  service.image_pixels_max = services.options.limits.pixels_told();
+  const std::string& base = services.options.base_path;
+  service.links = {{"page", base},
+                   {"datasets", base + "v1/datasets"},
+                   {"frames", base + "v1/frames"},
+                   {"references", base + "v1/references"},
+                   {"forecasts", base + "v1/forecasts"},
+                   {"views", base + "v1/views"},
+                   {"jobs", base + "v1/jobs"},
+                   {"colormaps", base + "v1/colormaps"},
+                   {"presets", base + "v1/presets"},
+                   {"stream", base + "v1/stream"},
+                   {"viewSchema", base + "view.schema.json"},
+                   {"livez", base + "livez"},
+                   {"readyz", base + "readyz"},
+                   {"metrics", base + "metrics"}};
+  return json_response(protocol::encode_service(service));
+}
+
+Response get_color_maps() {
+  std::vector<protocol::ColorMapDescription> maps;
+  for (const scene::ColorMap& map : scene::color_maps()) {
+    maps.push_back({map.name, map.kind, scene::color_map_srgb(map.name, legend_colors)});
+  }
+  return json_response(protocol::encode_color_maps(maps));
+}
+
+Response get_presets() { return json_response(protocol::encode_presets(scene::preset_names())); }
+
+Response get_view_schema(const Request& request) {
+  return tagged_response(request, "application/schema+json", view_schema_json());
+}
+
+Response get_datasets(const Services& services) {
+  const auto list = services.backend.catalogue.list();
+  if (!list) return problem_response(list.error());
+  return json_response(protocol::encode_dataset_list(*list));
+}
+
+void get_dataset(Services& services, const std::string& id, const Request& request, Reply reply) {
+  const auto dataset = services.backend.catalogue.find(id);
+  if (!dataset) {
+    reply(problem_response(make_error(ErrorKind::not_found, dataset.error().message)));
+    return;
+  }
+  run_later(services.backend.loads, request, std::move(reply), "a description", dataset->get(),
+            [&services, id, cancel = request.cancel]() -> Response {
+              const auto description = services.backend.catalogue.describe(id, cancel);
+              return description ? json_response(protocol::encode_dataset(*description))
+                                 : problem_response(description.error());
+            });
+}
+
+}  // namespace windsplat::net

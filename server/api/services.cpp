@@ -1,0 +1,40 @@
+// The members in the order in which they need each other.
+#include "server/api/services.hpp"
+
+#include <utility>
+
+#include "server/api/routes.hpp"
+#include "server/http/request_target.hpp"
+
+namespace windsplat::net {
+namespace {
+
+constexpr std::size_t view_changes_waiting_max = 64;  // each takes the time of a disk's sync
+
+}  // namespace
+
+Services::Services(ServerOptions server_options, std::shared_ptr<data::Store> store,
+                   std::shared_ptr<ThreadPool> threads)
+    : options(std::move(server_options)),
+      metrics(route_names),
+      admission(options.limits, metrics),
+      backend(
+          std::move(store), std::move(threads), metrics,
+          {options.requests_waiting_ms_max, options.limits.wait_ms,
+           [this](const std::string& address, std::int64_t us) { admission.rendered(address, us); },
+           [this](const frame::Cost& cost) { return admission.check(cost); }}),
+      locator(1, Backend::requests_waiting_max, "files to open"),
+      keeper(1, view_changes_waiting_max, "changes of saved views"),
+      watcher(1, 1, "looks at files") {
+  options.base_path = normal_base_path(options.base_path);
+  if (options.views == nullptr) options.views = views::SavedViews::open({}).value();
+}
+
+void Services::end() {
+  locator.end();  // it submits jobs
+  backend.end();
+  watcher.end();
+  keeper.end();
+}
+
+}  // namespace windsplat::net

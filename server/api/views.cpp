@@ -1,0 +1,143 @@
+// Saved views: a posted view -> a short id; its document back, changed or removed. What changes
+// views runs on a thread of its own, for it may wait for a disk.
+#include <array>
+#include <ctime>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "protocol/saved_view.hpp"
+#include "server/api/resources.hpp"
+#include "server/http/negotiate.hpp"
+#include "server/http/problem.hpp"
+
+namespace windsplat::net {
+namespace {
+
+using protocol::SavedView;
+using protocol::ViewDocument;
+using views::SavedViews;
+
+std::string text_of(const Services& services, const SavedView& saved) {
+  return protocol::encode_saved_view(saved, services.options.views->on_disk() ? "disk" : "memory");
+}
+
+std::string utc_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text.data();
+}
+
+Response saved_response(const Services& services, const SavedView& saved) {
+  std::string text = text_of(services, saved);
+  const std::string etag = etag_of(text);
+  Response response = json_response(std::move(text));
+  response.headers = {{"Cache-Control", "no-cache"}, {"ETag", etag}};
+  return response;
+}
+
+// Whether a view is the one that a request's If-Match names, where it has one, and none of those of
+// its If-None-Match (RFC 9110, 13.1).
+struct Unchanged {
+  Unchanged(const Services& of, const Request& request)
+      : services(of),
+        if_match(request.header("If-Match")),
+        if_none_match(request.header("If-None-Match")) {}
+  bool operator()(const SavedView& now) const {
+    const std::string etag = etag_of(text_of(services, now));
+    return allows_change(if_match, etag) &&
+           (if_none_match.empty() || !matches_etag(if_none_match, etag));
+  }
+
+  const Services& services;
+  std::string if_match;
+  std::string if_none_match;
+};
+
+Response changed_meanwhile() {
+  return problem_response(412, "Precondition Failed",
+                          "the view is not the one that If-Match or If-None-Match asks for");
+}
+
+void replace_later(Services& services, const std::string& id, const Request& request, Reply reply,
+                   SavedViews::Change change) {
+  run_later(services.keeper, request, std::move(reply), "a change of a saved view", nullptr,
+            [&services, id, may = Unchanged(services, request), change = std::move(change)] {
+              const auto saved = services.options.views->replace(id, may, change);
+              if (!saved) return problem_response(saved.error());
+              return *saved ? saved_response(services, **saved) : changed_meanwhile();
+            });
+}
+
+}  // namespace
+
+void post_saved_view(Services& services, const Request& request, Reply reply) {
+  if (!is_json(request.header("Content-Type"))) {
+    reply(problem_response(415, "Unsupported Media Type", "a view is application/json"));
+    return;
+  }
+  auto view = ViewDocument::parse(request.body);
+  if (!view) {
+    reply(problem_response(view.error()));
+    return;
+  }
+  run_later(services.keeper, request, std::move(reply), "saving a view", nullptr,
+            [&services, view = std::move(*view)] {
+              const auto saved = services.options.views->add(view, utc_now());
+              if (!saved) return problem_response(saved.error());
+              Response response = saved_response(services, *saved);
+              response.status = 201;
+              response.headers.emplace_back("Location",
+                                            services.options.base_path + "v1/views/" + saved->id);
+              return response;
+            });
+}
+
+Response get_view(const Services& services, const std::string& id, const Request& request) {
+  const auto saved = services.options.views->find(id);
+  if (!saved) return problem_response(saved.error());
+  return tagged_response(request, "application/json", text_of(services, *saved));
+}
+
+void put_view(Services& services, const std::string& id, const Request& request, Reply reply) {
+  if (!is_json(request.header("Content-Type"))) {
+    reply(problem_response(415, "Unsupported Media Type", "a view is application/json"));
+    return;
+  }
+  auto view = ViewDocument::parse(request.body);
+  if (!view) {
+    reply(problem_response(view.error()));
+    return;
+  }
+  replace_later(services, id, request, std::move(reply),
+                [view = std::move(*view)](const ViewDocument&) { return view; });
+}
+
+void patch_view(Services& services, const std::string& id, const Request& request, Reply reply) {
+  const std::string type = request.header("Content-Type");
+  if (!is_json(type) && !is_merge_patch(type)) {
+    Response response = problem_response(415, "Unsupported Media Type",
+                                         "a change of a view is application/merge-patch+json");
+    response.headers.emplace_back("Accept-Patch", "application/merge-patch+json, application/json");
+    reply(std::move(response));
+    return;
+  }
+  replace_later(services, id, request, std::move(reply),
+                [patch = request.body](const ViewDocument& now) { return now.patched(patch); });
+}
+
+void delete_view(Services& services, const std::string& id, const Request& request, Reply reply) {
+  run_later(services.keeper, request, std::move(reply), "removing a saved view", nullptr,
+            [&services, id, may = Unchanged(services, request)]() -> Response {
+              const auto removed = services.options.views->remove(id, may);
+              if (!removed) return problem_response(removed.error());
+              if (!*removed) return changed_meanwhile();
+              return {204, "", {{"Cache-Control", "no-store"}}, {}};
+            });
+}
+
+}  // namespace windsplat::net

@@ -1,0 +1,269 @@
+// Keys of ecCodes -> Header, Grid and values; scanning modes are put right here.
+#include "server/data/formats/grib/fields.hpp"
+
+#include <eccodes.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "server/data/cf/time.hpp"
+#include "server/data/formats/grib/open.hpp"
+
+namespace windsplat::data::grib {
+
+namespace {
+
+constexpr long points_max = 1L << 28;
+
+Error broken(const std::string& what) { return make_error(ErrorKind::bad_data, what); }
+
+void say_nothing(const codes_context* /*context*/, int /*level*/, const char* /*text*/) {}
+
+// The library keeps tables of its own between calls.
+class LibraryLock {
+ public:
+  LibraryLock() : lock_(mutex()) {
+    static const bool quiet = (codes_context_set_logging_proc(nullptr, say_nothing), true);
+    static_cast<void>(quiet);
+  }
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex mutex;
+    return mutex;
+  }
+  std::lock_guard<std::mutex> lock_;
+};
+
+class Message {
+ public:
+  explicit Message(const std::vector<unsigned char>& bytes)
+      : handle_(codes_handle_new_from_message(nullptr, bytes.data(), bytes.size())) {}
+  ~Message() {
+    if (handle_ != nullptr) codes_handle_delete(handle_);
+  }
+  Message(const Message&) = delete;
+  Message& operator=(const Message&) = delete;
+
+  [[nodiscard]] codes_handle* handle() const { return handle_; }
+  [[nodiscard]] std::string text(const char* key) const {
+    std::array<char, 512> out{};
+    std::size_t length = out.size();
+    if (codes_get_string(handle_, key, out.data(), &length) != CODES_SUCCESS) return {};
+    return {out.data()};
+  }
+  [[nodiscard]] long whole(const char* key, long otherwise) const {
+    long value = 0;
+    return codes_get_long(handle_, key, &value) == CODES_SUCCESS ? value : otherwise;
+  }
+  [[nodiscard]] double number(const char* key) const {
+    double value = 0;
+    return codes_get_double(handle_, key, &value) == CODES_SUCCESS
+               ? value
+               : std::numeric_limits<double>::quiet_NaN();
+  }
+  // As many numbers as expected; nothing otherwise.
+  [[nodiscard]] std::vector<double> numbers(const char* key, std::size_t expected) const {
+    std::size_t count = 0;
+    if (codes_get_size(handle_, key, &count) != CODES_SUCCESS || count != expected) return {};
+    std::vector<double> out(count);
+    if (codes_get_double_array(handle_, key, out.data(), &count) != CODES_SUCCESS) return {};
+    out.resize(count == expected ? count : 0);
+    return out;
+  }
+
+ private:
+  codes_handle* handle_;
+};
+
+// Longitudes go on beyond 360 rather than back to 0.
+std::vector<double> longitudes(const Message& message, std::size_t count) {
+  const double first = message.number("longitudeOfFirstGridPointInDegrees");
+  const double last = message.number("longitudeOfLastGridPointInDegrees");
+  const bool westward = message.whole("iScansNegatively", 0) != 0;
+  double span = std::fmod(westward ? first - last : last - first, 360.0);
+  if (span <= 0 && count > 1) span += 360;
+  std::vector<double> out(count, first);
+  for (std::size_t i = 1; i < count; ++i) {
+    const double way = span * static_cast<double>(i) / static_cast<double>(count - 1);
+    out[i] = westward ? first - way : first + way;
+  }
+  return out;
+}
+
+std::vector<double> even_latitudes(const Message& message, std::size_t count) {
+  const double first = message.number("latitudeOfFirstGridPointInDegrees");
+  const double last = message.number("latitudeOfLastGridPointInDegrees");
+  std::vector<double> out(count, first);
+  for (std::size_t j = 1; j < count; ++j) {
+    out[j] = first + (last - first) * static_cast<double>(j) / static_cast<double>(count - 1);
+  }
+  return out;
+}
+
+// A run of the Gaussian latitudes, of which the file tells the first and last to a thousandth.
+std::vector<double> gaussian_latitudes(const Message& message, std::size_t count) {
+  const long number = message.whole("N", 0);
+  if (number < 1 || number > 20000 || count > static_cast<std::size_t>(2 * number)) return {};
+  std::vector<double> all(static_cast<std::size_t>(2 * number));
+  if (codes_get_gaussian_latitudes(number, all.data()) != CODES_SUCCESS) return {};
+  const double first = message.number("latitudeOfFirstGridPointInDegrees");
+  const double last = message.number("latitudeOfLastGridPointInDegrees");
+  if (first < last) std::reverse(all.begin(), all.end());
+  for (std::size_t from = 0; from + count <= all.size(); ++from) {
+    if (std::abs(all[from] - first) < 2e-3 && std::abs(all[from + count - 1] - last) < 2e-3) {
+      const auto begin = all.begin() + static_cast<std::ptrdiff_t>(from);
+      return {begin, begin + static_cast<std::ptrdiff_t>(count)};
+    }
+  }
+  return {};
+}
+
+void find_coordinates(const Message& message, Grid& grid) {
+  const bool odd = message.whole("jPointsAreConsecutive", 0) != 0 ||
+                   message.whole("alternativeRowScanning", 0) != 0;
+  if (grid.type == "regular_ll" || grid.type == "regular_gg") {
+    grid.longitude = longitudes(message, grid.columns);
+    grid.latitude = grid.type == "regular_ll" ? even_latitudes(message, grid.rows)
+                                              : gaussian_latitudes(message, grid.rows);
+  } else if (odd) {
+    grid.problem = "its projected grid is scanned in another order than row by row";
+    return;
+  } else {
+    grid.projected = true;
+    grid.columns_fall = message.whole("iScansNegatively", 0) != 0;
+    grid.rows_fall = message.whole("jScansPositively", 1) == 0;
+    const std::size_t points = grid.rows * grid.columns;
+    grid.longitude = message.numbers("longitudes", points);
+    grid.latitude = message.numbers("latitudes", points);
+  }
+  const auto finite = [](const std::vector<double>& list) {
+    return !list.empty() &&
+           std::all_of(list.begin(), list.end(), [](double v) { return std::isfinite(v); });
+  };
+  if (!finite(grid.longitude) || !finite(grid.latitude)) {
+    grid.problem = "ecCodes finds no coordinates of its grid " + in_quotes(grid.type);
+  }
+}
+
+// ecCodes divides by the length of the unit, and knows none of others than these.
+bool has_known_time_unit(const Message& message) {
+  constexpr auto units = std::to_array<long>({-1, 0, 1, 2, 3, 10, 11, 12, 13, 14, 254});
+  const long unit = message.whole("indicatorOfUnitOfTimeRange", -1);
+  return std::find(units.begin(), units.end(), unit) != units.end();
+}
+
+double hours_of_validity(const Message& message) {
+  if (!has_known_time_unit(message)) return std::numeric_limits<double>::quiet_NaN();
+  const long date = message.whole("validityDate", -1);
+  const long time = message.whole("validityTime", -1);
+  const cf::Date day{date / 10000, static_cast<int>(date / 100 % 100),
+                     static_cast<int>(date % 100)};
+  constexpr auto calendar = cf::Calendar::proleptic_gregorian;
+  if (date < 0 || time < 0 || time > 2400 || !cf::is_valid(day, calendar)) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  const auto days = cf::day_number(day, calendar) - cf::day_number({1970, 1, 1}, calendar);
+  const auto minutes = time / 100 * 60 + time % 100;
+  return static_cast<double>(days) * 24 + static_cast<double>(minutes) / 60;
+}
+
+// Flag table 3.3, bit 5 (edition 1: table 7): components along the rows and columns. Of some
+// templates ecCodes has no key of its own for it, but the octet.
+bool is_along_grid(const Message& message) {
+  const long along = message.whole("uvRelativeToGrid", -1);
+  if (along >= 0) return along != 0;
+  return (message.whole("resolutionAndComponentFlags", 0) & 8) != 0;
+}
+
+std::string known(const std::string& text) { return text == "unknown" || text == "~" ? "" : text; }
+
+}  // namespace
+
+std::string definitions_folder() {
+  const LibraryLock lock;
+  char* const path = codes_definition_path(nullptr);
+  return path == nullptr ? "" : path;
+}
+
+Result<Header> read_header(const std::vector<unsigned char>& bytes) {
+  const LibraryLock lock;
+  const Message message(bytes);
+  if (message.handle() == nullptr) return broken("is not understood by ecCodes");
+  Header out;
+  out.short_name = known(message.text("shortName"));
+  if (out.short_name.empty()) out.short_name = "param" + message.text("paramId");
+  if (out.short_name == "param" || out.short_name == "param0") {
+    out.short_name = "param_" + message.text("discipline") + "_" +
+                     message.text("parameterCategory") + "_" + message.text("parameterNumber");
+  }
+  out.name = known(message.text("name"));
+  out.standard_name = known(message.text("cfName"));
+  out.units = known(message.text("units"));
+  out.level_type = known(message.text("typeOfLevel"));
+  out.level = message.number("level");
+  out.hours = hours_of_validity(message);
+  out.relative_to_grid = is_along_grid(message);
+  out.grid_key = message.text("md5GridSection");
+  if (!std::isfinite(out.level)) return broken("has no level");
+  if (!std::isfinite(out.hours)) return broken("has no date of validity");
+  return out;
+}
+
+Result<Grid> read_grid(const std::vector<unsigned char>& bytes) {
+  const LibraryLock lock;
+  const Message message(bytes);
+  if (message.handle() == nullptr) return broken("is not understood by ecCodes");
+  Grid grid;
+  grid.type = message.text("gridType");
+  constexpr auto known_types = std::to_array<const char*>(
+      {"regular_ll", "regular_gg", "lambert", "polar_stereographic", "mercator"});
+  if (std::find(known_types.begin(), known_types.end(), grid.type) == known_types.end()) {
+    grid.problem = "on a grid of the type " + in_quotes(grid.type) + ", which is not read";
+    return grid;
+  }
+  const bool latitudes = grid.type == "regular_ll" || grid.type == "regular_gg";
+  const long columns = message.whole(latitudes ? "Ni" : "Nx", -1);
+  const long rows = message.whole(latitudes ? "Nj" : "Ny", -1);
+  if (columns < 1 || rows < 1 || columns > points_max / rows ||
+      message.whole("numberOfDataPoints", -1) != columns * rows) {
+    grid.problem = "its grid's numbers of rows, columns and points do not fit together";
+    return grid;
+  }
+  grid.columns = static_cast<std::size_t>(columns);
+  grid.rows = static_cast<std::size_t>(rows);
+  find_coordinates(message, grid);
+  return grid;
+}
+
+Result<std::vector<float>> read_values(const std::vector<unsigned char>& bytes, const Grid& grid) {
+  const LibraryLock lock;
+  const Message message(bytes);
+  if (message.handle() == nullptr) return broken("is not understood by ecCodes");
+  constexpr double missing = -1e300;
+  if (message.whole("numberOfDataPoints", -1) != static_cast<long>(grid.rows * grid.columns) ||
+      codes_set_double(message.handle(), "missingValue", missing) != CODES_SUCCESS) {
+    return broken("does not hold as many points as its grid");
+  }
+  const std::vector<double> values = message.numbers("values", grid.rows * grid.columns);
+  if (values.empty()) return broken("holds no values that ecCodes can decode");
+  const bool by_columns = message.whole("jPointsAreConsecutive", 0) != 0;
+  const bool alternating = message.whole("alternativeRowScanning", 0) != 0;
+  const std::size_t run = by_columns ? grid.rows : grid.columns;
+  std::vector<float> out(values.size());
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const std::size_t slow = k / run;
+    const std::size_t fast = alternating && slow % 2 == 1 ? run - 1 - k % run : k % run;
+    const bool fits = std::abs(values[k]) <= static_cast<double>(std::numeric_limits<float>::max());
+    out[by_columns ? fast * grid.columns + slow : slow * grid.columns + fast] =
+        fits ? static_cast<float>(values[k]) : std::numeric_limits<float>::quiet_NaN();
+  }
+  return out;
+}
+
+}  // namespace windsplat::data::grib

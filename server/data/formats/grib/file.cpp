@@ -1,0 +1,346 @@
+// Messages -> groups -> variables whose dimensions are shared where their coordinates agree.
+#include "server/data/formats/grib/file.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string_view>
+
+#include "server/data/formats/grib/open.hpp"
+
+namespace windsplat::data::grib {
+
+namespace {
+
+constexpr std::size_t groups_max = 8192;
+constexpr std::size_t grids_max = 256;
+
+// Edition 1 writes thousandths of a degree where edition 2 writes millionths.
+bool is_same(const Grid& a, const Grid& b) {
+  const auto close = [](const std::vector<double>& left, const std::vector<double>& right) {
+    return std::equal(left.begin(), left.end(), right.begin(), right.end(),
+                      [](double l, double r) { return std::abs(l - r) < 1e-3; });
+  };
+  return a.type == b.type && a.problem == b.problem && a.columns == b.columns && a.rows == b.rows &&
+         close(a.longitude, b.longitude) && close(a.latitude, b.latitude);
+}
+
+FileVariable level_axis(const std::string& type) {
+  FileVariable out;
+  out.axis = "Z";
+  if (type == "isobaricInhPa" || type == "isobaricInPa") {
+    out.standard_name = "air_pressure";
+    out.units = type == "isobaricInhPa" ? "hPa" : "Pa";
+  } else if (type.starts_with("heightAbove")) {
+    out.standard_name = type == "heightAboveSea" ? "altitude" : "height";
+    out.units = "m";
+  } else if (type.starts_with("depthBelow")) {
+    out.standard_name = "depth";
+    out.units = "m";
+    out.positive = "down";
+  } else {
+    out.standard_name = "model_level_number";
+    out.positive = type.starts_with("hybrid") || type == "sigma" ? "down" : "";
+  }
+  return out;
+}
+
+// The library names winds eastward and northward whatever the message's flag says; of those along
+// the grid's rows and columns CF says x and y, and nobody turns them then.
+bool tell_by_grid(FileVariable& variable) {
+  constexpr std::string_view eastward = "eastward_";
+  constexpr std::string_view northward = "northward_";
+  std::string& name = variable.standard_name;
+  if (name.starts_with(eastward)) {
+    name.replace(0, eastward.size(), "x_");
+  } else if (name.starts_with(northward)) {
+    name.replace(0, northward.size(), "y_");
+  } else {
+    return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<cf::ArrayFile>> open(std::shared_ptr<const InputFile> input) {
+  return File::open(std::move(input));
+}
+
+Result<std::unique_ptr<cf::ArrayFile>> File::open(std::shared_ptr<const InputFile> input) {
+  std::unique_ptr<File> file(new File(std::move(input)));
+  if (auto done = file->scan(); !done) return done.error();
+  file->add_variables();
+  if (auto fine = file->check_any_field(); !fine) return fine.error();
+  return std::unique_ptr<cf::ArrayFile>(std::move(file));
+}
+
+Result<std::size_t> File::grid_of(const std::vector<unsigned char>& message,
+                                  const std::string& key) {
+  if (const auto known = grid_keys_.find(key); known != grid_keys_.end()) return known->second;
+  if (grid_keys_.size() >= grids_max) {
+    return input_->fault("has more than " + std::to_string(grids_max) + " grids");
+  }
+  auto grid = read_grid(message);
+  if (!grid) return input_->fault("has a message that " + grid.error().message);
+  const auto at = std::find_if(grids_.begin(), grids_.end(),
+                               [&](const Grid& other) { return is_same(other, *grid); });
+  const auto index = static_cast<std::size_t>(at - grids_.begin());
+  if (at == grids_.end()) grids_.push_back(std::move(*grid));
+  grid_keys_.emplace(key, index);
+  return index;
+}
+
+Result<void> File::scan() {
+  auto places = find_fields(*input_);
+  if (!places) return places.error();
+  places_ = std::move(*places);
+  if (places_.empty()) return input_->fault("has no GRIB field");
+  std::set<int> editions;
+  std::map<std::string, std::size_t> unread;
+  for (std::size_t f = 0; f < places_.size(); ++f) {
+    editions.insert(places_[f].edition);
+    const auto message = read_message(*input_, places_[f]);
+    if (!message) return message.error();
+    const auto header = read_header(*message);
+    if (!header) {
+      ++unread[header.error().message];
+      continue;
+    }
+    const auto grid = grid_of(*message, header->grid_key);
+    if (!grid) return grid.error();
+    auto at = std::find_if(groups_.begin(), groups_.end(), [&](const Group& group) {
+      return group.header.short_name == header->short_name &&
+             group.header.level_type == header->level_type && group.grid == *grid;
+    });
+    if (at == groups_.end()) {
+      if (groups_.size() >= groups_max) {
+        return input_->fault("has more than " + std::to_string(groups_max) + " variables");
+      }
+      groups_.push_back({*header, *grid, {}, 0});
+      at = groups_.end() - 1;
+    }
+    if (!at->fields.emplace(std::pair(header->hours, header->level), f).second) ++at->repeated;
+  }
+  for (const auto& [reason, count] : unread) {
+    contents_.notes.push_back(std::to_string(count) + " messages left out: each " + reason);
+  }
+  format_ = editions.size() == 2 ? "GRIB 1 and 2" : "GRIB " + std::to_string(*editions.begin());
+  return {};
+}
+
+// Where every field is unread, the reason is worth more than that there is none.
+Result<void> File::check_any_field() const {
+  for (const Content& held : held_) {
+    if (!held.numbers.empty()) return {};
+  }
+  if (groups_.empty()) {
+    return input_->fault("has no field that can be read" +
+                         (contents_.notes.empty() ? std::string() : ": " + contents_.notes[0]));
+  }
+  const Group& group = groups_.front();
+  return input_->fault("has no field that can be read: " + in_quotes(group.header.short_name) +
+                       " is " + grids_[group.grid].problem);
+}
+
+void File::add_variables() {
+  for (std::size_t g = 0; g < groups_.size(); ++g) add_field(g);
+}
+
+// A dimension with its coordinates, shared by all that have the same ones.
+int File::axis(const std::string& name, const std::vector<double>& values,
+               const FileVariable& like) {
+  std::string free = name;
+  for (int n = 2;; ++n) {
+    const auto at = std::find_if(contents_.variables.begin(), contents_.variables.end(),
+                                 [&](const FileVariable& known) { return known.name == free; });
+    if (at == contents_.variables.end()) break;
+    const auto v = static_cast<std::size_t>(at - contents_.variables.begin());
+    if (held_[v].group < 0 && held_[v].numbers == values && at->dims.size() == 1) {
+      return at->dims[0];
+    }
+    free = name + "_" + std::to_string(n);
+  }
+  contents_.dimensions.push_back({free, values.size(), false});
+  FileVariable variable = like;
+  variable.name = free;
+  variable.type = "float64";
+  variable.numeric = true;
+  variable.dims = {static_cast<int>(contents_.dimensions.size()) - 1};
+  contents_.variables.push_back(std::move(variable));
+  held_.push_back({values, -1, {}, {}});
+  return static_cast<int>(contents_.dimensions.size()) - 1;
+}
+
+// Latitude and longitude, or rows and columns with both as variables of two dimensions.
+std::vector<int> File::grid_dimensions(std::size_t g) {
+  if (const auto known = grid_dims_.find(g); known != grid_dims_.end()) return known->second;
+  const Grid& grid = grids_[g];
+  FileVariable latitude;
+  latitude.standard_name = "latitude";
+  latitude.units = "degrees_north";
+  FileVariable longitude;
+  longitude.standard_name = "longitude";
+  longitude.units = "degrees_east";
+  std::vector<int> dims;
+  if (!grid.projected) {
+    dims = {axis("latitude", grid.latitude, latitude),
+            axis("longitude", grid.longitude, longitude)};
+  } else {
+    const std::string number = g == 0 ? "" : "_" + std::to_string(g + 1);
+    contents_.dimensions.push_back({"y" + number, grid.rows, false, grid.rows_fall});
+    contents_.dimensions.push_back({"x" + number, grid.columns, false, grid.columns_fall});
+    const int x = static_cast<int>(contents_.dimensions.size()) - 1;
+    dims = {x - 1, x};
+    for (const bool north : {true, false}) {
+      FileVariable position = north ? latitude : longitude;
+      position.name = (north ? "latitude_of_points" : "longitude_of_points") + number;
+      position.type = "float64";
+      position.numeric = true;
+      position.dims = dims;
+      contents_.variables.push_back(std::move(position));
+      held_.push_back({north ? grid.latitude : grid.longitude, -1, {}, {}});
+    }
+  }
+  grid_dims_[g] = dims;
+  return dims;
+}
+
+void File::add_field(std::size_t g) {
+  const Group& group = groups_[g];
+  const Header& header = group.header;
+  FileVariable variable;
+  variable.name = header.short_name;
+  const auto taken = [&] {
+    return std::any_of(contents_.variables.begin(), contents_.variables.end(),
+                       [&](const FileVariable& known) { return known.name == variable.name; });
+  };
+  if (taken()) variable.name += "_" + header.level_type;
+  const std::string base = variable.name;
+  for (int n = 2; taken(); ++n) variable.name = base + "_" + std::to_string(n);
+  variable.type = "float32";
+  variable.standard_name = header.standard_name;
+  variable.long_name = header.name;
+  variable.units = header.units;
+  variable.unread = grids_[group.grid].problem;
+  variable.numeric = variable.unread.empty();
+  Content held;
+  held.group = static_cast<int>(g);
+  std::set<double> times;
+  std::set<double> levels;
+  for (const auto& [place, field] : group.fields) {
+    times.insert(place.first);
+    levels.insert(place.second);
+  }
+  held.times.assign(times.begin(), times.end());
+  held.levels.assign(levels.begin(), levels.end());
+  if (variable.numeric) {
+    FileVariable time;
+    time.standard_name = "time";
+    time.units = "hours since 1970-01-01 00:00:00";
+    time.calendar = "proleptic_gregorian";
+    variable.dims.push_back(axis("time", held.times, time));
+    if (levels.size() > 1) {
+      variable.dims.push_back(axis(header.level_type.empty() ? "level" : header.level_type,
+                                   held.levels, level_axis(header.level_type)));
+    }
+    const auto grid = grid_dimensions(group.grid);
+    variable.dims.insert(variable.dims.end(), grid.begin(), grid.end());
+  }
+  if (group.repeated > 0) {
+    contents_.notes.push_back(in_quotes(variable.name) + ": " + std::to_string(group.repeated) +
+                              " more messages of the same times and levels (ensemble members or "
+                              "the like) are left out; the first ones are taken");
+  }
+  if (header.relative_to_grid && grids_[group.grid].projected && tell_by_grid(variable)) {
+    contents_.notes.push_back(in_quotes(variable.name) +
+                              " is along the rows or columns of its grid, not to east or north");
+  }
+  contents_.variables.push_back(std::move(variable));
+  held_.push_back(std::move(held));
+}
+
+cf::Numbers File::numbers(int /*variable*/, const char* /*attribute*/) const { return {}; }
+
+std::string File::text_of(int /*variable*/, const char* /*attribute*/) const { return {}; }
+
+std::vector<std::size_t> File::chunk(int variable) const {
+  const auto& dims = contents_.variables.at(static_cast<std::size_t>(variable)).dims;
+  std::vector<std::size_t> out(dims.size(), 1);
+  const Content& held = held_.at(static_cast<std::size_t>(variable));
+  if (held.group < 0 || dims.size() < 2) return out;
+  for (std::size_t d = dims.size() - 2; d < dims.size(); ++d) {
+    out[d] = contents_.dimensions[static_cast<std::size_t>(dims[d])].length;
+  }
+  return out;
+}
+
+void File::forget_chunks(int /*variable*/) const {
+  const std::lock_guard lock(mutex_);
+  last_values_ = {};
+}
+
+Result<const std::vector<float>*> File::values_of(std::size_t field, const Grid& grid) const {
+  if (last_values_.empty() || last_field_ != field) {
+    const auto message = read_message(*input_, places_[field]);
+    if (!message) return message.error();
+    auto values = read_values(*message, grid);
+    if (!values) return input_->fault("has a message that " + values.error().message);
+    last_values_ = std::move(*values);
+    last_field_ = field;
+  }
+  return &last_values_;
+}
+
+template <class Out>
+Result<void> File::read_block(int variable, const std::vector<std::size_t>& start,
+                              const std::vector<std::size_t>& count, Out* out) const {
+  const Content& held = held_.at(static_cast<std::size_t>(variable));
+  const auto& dims = contents_.variables[static_cast<std::size_t>(variable)].dims;
+  const std::size_t rank = dims.size();
+  const std::size_t columns = contents_.dimensions[static_cast<std::size_t>(dims.back())].length;
+  const std::size_t rows = rank < 2 ? 1 : count[rank - 2];
+  const std::size_t first_row = rank < 2 ? 0 : start[rank - 2];
+  const auto copy_rows = [&](const auto* from) {
+    for (std::size_t j = 0; j < rows; ++j) {
+      const auto* row = from + (first_row + j) * columns + start.back();
+      out = std::transform(row, row + count.back(), out,
+                           [](auto value) { return static_cast<Out>(value); });
+    }
+  };
+  if (held.group < 0) {
+    copy_rows(held.numbers.data());
+    return {};
+  }
+  const std::lock_guard lock(mutex_);
+  if (auto same = input_->check_unchanged(); !same) return same;
+  const Group& group = groups_[static_cast<std::size_t>(held.group)];
+  const bool has_levels = rank == 4;
+  for (std::size_t t = 0; t < count[0]; ++t) {
+    for (std::size_t l = 0; l < (has_levels ? count[1] : 1); ++l) {
+      const double level = held.levels[has_levels ? start[1] + l : 0];
+      const auto at = group.fields.find({held.times[start[0] + t], level});
+      if (at == group.fields.end()) {
+        out = std::fill_n(out, rows * count.back(), std::numeric_limits<Out>::quiet_NaN());
+        continue;
+      }
+      const auto values = values_of(at->second, grids_[group.grid]);
+      if (!values) return values.error();
+      copy_rows((*values)->data());
+    }
+  }
+  return {};
+}
+
+Result<void> File::read(int variable, const std::vector<std::size_t>& start,
+                        const std::vector<std::size_t>& count, double* out) const {
+  return read_block(variable, start, count, out);
+}
+
+Result<void> File::read(int variable, const std::vector<std::size_t>& start,
+                        const std::vector<std::size_t>& count, float* out) const {
+  return read_block(variable, start, count, out);
+}
+
+}  // namespace windsplat::data::grib

@@ -1,0 +1,79 @@
+// The fields of a GRIB file put together to arrays over time, level, row and column.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/data/cf/array_file.hpp"
+#include "server/data/files/input_file.hpp"
+#include "server/data/formats/grib/fields.hpp"
+#include "server/data/formats/grib/index.hpp"
+
+namespace windsplat::data::grib {
+
+class File final : public cf::ArrayFile {
+ public:
+  static Result<std::unique_ptr<cf::ArrayFile>> open(std::shared_ptr<const InputFile> input);
+
+  [[nodiscard]] const FileContents& contents() const override { return contents_; }
+  [[nodiscard]] const std::string& name() const override { return input_->name(); }
+  [[nodiscard]] std::string format() const override { return format_; }
+  [[nodiscard]] std::string identity() const override { return input_->identity(); }
+  [[nodiscard]] cf::Numbers numbers(int variable, const char* attribute) const override;
+  [[nodiscard]] std::string text_of(int variable, const char* attribute) const override;
+  [[nodiscard]] std::vector<std::size_t> chunk(int variable) const override;
+  Result<void> read(int variable, const std::vector<std::size_t>& start,
+                    const std::vector<std::size_t>& count, double* out) const override;
+  Result<void> read(int variable, const std::vector<std::size_t>& start,
+                    const std::vector<std::size_t>& count, float* out) const override;
+  void forget_chunks(int variable) const override;
+
+ private:
+  // A quantity on one kind of level and one grid: time and level -> field.
+  struct Group {
+    Header header;  // of its first field
+    std::size_t grid = 0;
+    std::map<std::pair<double, double>, std::size_t> fields;
+    std::size_t repeated = 0;
+  };
+  // What the variable of the same index holds: numbers, or a group's fields.
+  struct Content {
+    std::vector<double> numbers;
+    int group = -1;
+    std::vector<double> times;
+    std::vector<double> levels;
+  };
+
+  explicit File(std::shared_ptr<const InputFile> input) : input_(std::move(input)) {}
+  Result<void> scan();
+  Result<std::size_t> grid_of(const std::vector<unsigned char>& message, const std::string& key);
+  void add_variables();
+  [[nodiscard]] Result<void> check_any_field() const;
+  std::vector<int> grid_dimensions(std::size_t grid);
+  int axis(const std::string& name, const std::vector<double>& values, const FileVariable& like);
+  void add_field(std::size_t group);
+  template <class Out>
+  Result<void> read_block(int variable, const std::vector<std::size_t>& start,
+                          const std::vector<std::size_t>& count, Out* out) const;
+  Result<const std::vector<float>*> values_of(std::size_t field, const Grid& grid) const;
+
+  std::shared_ptr<const InputFile> input_;
+  std::string format_;
+  std::vector<FieldPlace> places_;
+  std::vector<Grid> grids_;
+  std::map<std::string, std::size_t> grid_keys_;  // of their bytes; several may tell one grid
+  std::vector<Group> groups_;
+  std::map<std::size_t, std::vector<int>> grid_dims_;
+  std::vector<Content> held_;  // parallel to the variables
+  FileContents contents_;
+
+  mutable std::mutex mutex_;  // of the field decoded last
+  mutable std::size_t last_field_ = 0;
+  mutable std::vector<float> last_values_;
+};
+
+}  // namespace windsplat::data::grib

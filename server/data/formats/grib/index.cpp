@@ -1,0 +1,155 @@
+// Total lengths lead from message to message, section lengths from section to section.
+#include "server/data/formats/grib/index.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include "server/data/formats/grib/open.hpp"
+
+namespace windsplat::data::grib {
+
+namespace {
+
+constexpr std::uint64_t message_bytes_max = std::uint64_t{1} << 30;
+constexpr std::size_t fields_max = 1'000'000;
+constexpr std::size_t heading_max = 128;
+constexpr std::uint64_t gap_max = 65536;  // between messages: headings and padding
+
+std::uint64_t big_endian(const unsigned char* at, std::size_t bytes) {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < bytes; ++i) value = value << 8U | at[i];
+  return value;
+}
+
+// The next "GRIB" at or after an offset; the file's size where there is none within reach.
+Result<std::uint64_t> next_message(const InputFile& input, std::uint64_t offset) {
+  const std::uint64_t rest = input.size() - offset;
+  // Most messages follow each other without a gap.
+  for (const std::uint64_t reach : {std::uint64_t{16}, gap_max}) {
+    std::vector<char> window(std::min(rest, reach));
+    if (window.empty()) break;
+    if (auto done = input.read(offset, window.data(), window.size()); !done) return done.error();
+    const auto at = std::string_view(window.data(), window.size()).find("GRIB");
+    if (at != std::string_view::npos) return offset + at;
+  }
+  return input.size();
+}
+
+// The sections of a message of edition 2; a field ends with each section 7.
+Result<void> split(const InputFile& input, const Part& message, std::vector<FieldPlace>& out) {
+  std::array<Part, 8> known{};
+  std::vector<FieldPlace> found;
+  std::uint64_t at = message.offset + 16;
+  const std::uint64_t end = message.offset + message.bytes - 4;
+  while (at < end) {
+    std::array<unsigned char, 5> head{};
+    if (end - at < head.size()) return input.fault("has a broken section of a GRIB message");
+    if (auto done = input.read(at, head.data(), head.size()); !done) return done;
+    const std::uint64_t bytes = big_endian(head.data(), 4);
+    const std::size_t number = head[4];
+    if (bytes < head.size() || bytes > end - at || number < 1 || number > 7) {
+      return input.fault("has a broken section of a GRIB message at byte " + std::to_string(at));
+    }
+    known.at(number) = {at, bytes};
+    at += bytes;
+    if (number != 7) continue;
+    FieldPlace field{2, {}, true};
+    for (const Part& part : known) {
+      if (part.bytes > 0) field.parts.push_back(part);
+    }
+    found.push_back(std::move(field));
+    if (out.size() + found.size() > fields_max) break;
+  }
+  if (found.size() == 1) found.front() = {2, {message}, false};
+  out.insert(out.end(), found.begin(), found.end());
+  return {};
+}
+
+}  // namespace
+
+bool is_grib(const InputFile& input) {
+  const auto head = input.head(heading_max + 8);
+  if (!head) return false;
+  const auto at = head->find("GRIB");
+  if (at >= heading_max || at + 8 > head->size()) return false;  // so is npos
+  const bool is_heading = std::all_of(
+      head->begin(), head->begin() + static_cast<long>(at),
+      [](char c) { return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == 1 || c == 3; });
+  return is_heading && ((*head)[at + 7] == 1 || (*head)[at + 7] == 2);
+}
+
+Result<std::vector<FieldPlace>> find_fields(const InputFile& input) {
+  std::vector<FieldPlace> out;
+  std::uint64_t offset = 0;
+  while (offset < input.size()) {
+    const auto start = next_message(input, offset);
+    if (!start) return start.error();
+    if (*start == input.size()) break;
+    std::array<unsigned char, 16> head{};
+    if (input.size() - *start < head.size()) return input.fault("is cut short in a GRIB message");
+    if (auto done = input.read(*start, head.data(), head.size()); !done) return done.error();
+    const int edition = head[7];
+    if (edition != 1 && edition != 2) {
+      return input.fault("has a GRIB message of edition " + std::to_string(edition) +
+                         "; 1 and 2 are read");
+    }
+    const std::uint64_t bytes =
+        edition == 1 ? big_endian(head.data() + 4, 3) : big_endian(head.data() + 8, 8);
+    if (edition == 1 && bytes >= 0x800000) {
+      return input.fault("has a GRIB 1 message of more than 8 MiB, which is not read");
+    }
+    const std::string place = " at byte " + std::to_string(*start);
+    if (bytes < 24 || bytes > message_bytes_max) {
+      return input.fault("has a GRIB message" + place + " of " + std::to_string(bytes) +
+                         " bytes; 24 to " + std::to_string(message_bytes_max) + " are read");
+    }
+    std::array<char, 4> tail{};
+    if (bytes > input.size() - *start) return input.fault("is cut short in the message" + place);
+    if (auto done = input.read(*start + bytes - 4, tail.data(), 4); !done) return done.error();
+    if (std::memcmp(tail.data(), "7777", 4) != 0) {
+      return input.fault("has a GRIB message" + place + " without its end marker");
+    }
+    const Part message{*start, bytes};
+    if (edition == 1) {
+      out.push_back({1, {message}, false});
+    } else if (auto done = split(input, message, out); !done) {
+      return done.error();
+    }
+    if (out.size() > fields_max) {
+      return input.fault("has more than " + std::to_string(fields_max) + " GRIB fields");
+    }
+    offset = *start + bytes;
+  }
+  return out;
+}
+
+Result<std::vector<unsigned char>> read_message(const InputFile& input, const FieldPlace& field) {
+  std::uint64_t bytes = field.split ? 20 : 0;
+  for (const Part& part : field.parts) bytes += part.bytes;
+  if (bytes > message_bytes_max) return input.fault("has a GRIB field of more than 1 GiB");
+  std::vector<unsigned char> out(bytes);
+  std::size_t at = field.split ? 16 : 0;
+  for (const Part& part : field.parts) {
+    if (auto done = input.read(part.offset, out.data() + at, part.bytes); !done) {
+      return done.error();
+    }
+    at += part.bytes;
+  }
+  if (field.split) {
+    // The discipline is that of the message the sections come from, which section 0 begins.
+    std::memcpy(out.data(), "GRIB\xff\xff", 6);
+    if (auto done = input.read(field.parts.front().offset - 10, out.data() + 6, 2); !done) {
+      return done.error();
+    }
+    for (std::size_t i = 0; i < 8; ++i) {
+      out[8 + i] = static_cast<unsigned char>(bytes >> (8 * (7 - i)));
+    }
+    std::memcpy(out.data() + at, "7777", 4);
+  }
+  return out;
+}
+
+}  // namespace windsplat::data::grib

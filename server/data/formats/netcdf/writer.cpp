@@ -1,0 +1,438 @@
+// Source -> CF 1.8 netCDF-4. Every field and step goes to a neighbouring temporary name first and
+// takes its own name when it is whole.
+#include "server/data/formats/netcdf/writer.hpp"
+
+#include <netcdf.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <new>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "server/base/ascii.hpp"
+#include "server/base/whole_file.hpp"
+#include "server/data/cf/units.hpp"
+#include "server/data/formats/netcdf/file.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
+
+namespace windsplat::data {
+
+namespace {
+
+constexpr int deflate_level = 1;  // most of the gain at a fraction of the time
+constexpr std::size_t chunk_bytes = std::size_t{4} << 20;
+constexpr float fill_value = NC_FILL_FLOAT;
+
+struct OutVariable {
+  std::string name;
+  std::size_t field = 0;      // whose volume holds it
+  std::size_t component = 0;  // which array of that volume
+  int id = -1;
+};
+
+// One call of the library under its lock.
+template <class Call>
+Result<void> call(const char* what, Call&& library_call) {
+  const netcdf::LibraryLock lock;
+  const int status = std::forward<Call>(library_call)();
+  if (status != NC_NOERR) {
+    return make_error(ErrorKind::internal,
+                      std::string("writing netCDF failed: ") + what + ": " + nc_strerror(status));
+  }
+  return {};
+}
+
+int put_text(int ncid, int variable, const char* name, const std::string& text) {
+  return text.empty() ? NC_NOERR : nc_put_att_text(ncid, variable, name, text.size(), text.c_str());
+}
+
+struct AxisWords {
+  const char* letter;
+  std::string standard_name;
+  std::string units;
+  std::string positive;
+};
+
+// What an axis says of itself, with CF's words where it is silent.
+AxisWords words_of(const Axis& axis, std::size_t which) {
+  constexpr std::array<const char*, 3> axis_letters{"X", "Y", "Z"};
+  AxisWords words{axis_letters.at(which), axis.standard_name, axis.units, ""};
+  const auto silent = [&](const char* name, const char* units) {
+    words.standard_name = words.standard_name.empty() ? name : words.standard_name;
+    words.units = words.units.empty() ? units : words.units;
+  };
+  const bool falls =
+      axis.coordinates.size() > 1 && axis.coordinates.back() < axis.coordinates.front();
+  switch (axis.kind) {
+    case AxisKind::longitude:
+      silent("longitude", "degrees_east");
+      break;
+    case AxisKind::latitude:
+      silent("latitude", "degrees_north");
+      break;
+    case AxisKind::pressure:
+      silent("air_pressure", "hPa");
+      words.positive = "down";
+      break;
+    case AxisKind::height:
+      silent("height", "m");
+      words.positive = "up";
+      break;
+    case AxisKind::depth:
+      silent("depth", "m");
+      words.positive = "down";
+      break;
+    case AxisKind::level:
+      silent("", "level");
+      words.positive = falls ? "down" : "up";
+      break;
+    case AxisKind::cartesian:
+      break;
+  }
+  return words;
+}
+
+std::string component_standard_name(const DatasetInfo& info, const FieldInfo& field,
+                                    std::size_t component) {
+  if (field.kind == FieldKind::scalar) {
+    return field.standard_name;
+  }
+  if (field.name != "wind") {
+    return {};
+  }
+  const bool on_globe = info.grid.axes[0].kind == AxisKind::longitude;
+  if (component == 0) {
+    return on_globe ? "eastward_wind" : "x_wind";
+  }
+  if (component == 1) {
+    return on_globe ? "northward_wind" : "y_wind";
+  }
+  const bool is_omega = pascals_per_second_in(field.component_units.at(2)).has_value();
+  return std::string(is_omega ? omega_name : "upward_air_velocity");
+}
+
+// Every variable of every field once: a vector's components, then the scalars not among them.
+std::vector<OutVariable> plan_variables(const DatasetInfo& info) {
+  std::vector<OutVariable> out;
+  for (const FieldKind kind : {FieldKind::vector, FieldKind::scalar}) {
+    for (std::size_t f = 0; f < info.fields.size(); ++f) {
+      if (info.fields[f].kind != kind || info.fields[f].derived) {
+        continue;
+      }
+      for (std::size_t c = 0; c < info.fields[f].components.size(); ++c) {
+        const std::string& name = info.fields[f].components[c];
+        const bool is_planned = std::any_of(out.begin(), out.end(),
+                                            [&](const OutVariable& v) { return v.name == name; });
+        if (!is_planned) {
+          out.push_back({name, f, c, -1});
+        }
+      }
+    }
+  }
+  return out;
+}
+
+// The library says "HDF error" where the disk is full.
+Error with_room_left(Error error, const std::string& path) {
+  std::error_code fault;
+  const auto room = std::filesystem::space(std::filesystem::path(path).parent_path(), fault);
+  if (!fault && error.kind == ErrorKind::internal) {
+    error.message += " (the disk has " + std::to_string(room.available >> 20) + " MiB left)";
+  }
+  return error;
+}
+
+class Writer {
+ public:
+  Writer(Source& source, std::string path, const CancelToken& cancel)
+      : source_(source),
+        info_(source.info()),
+        part_(netcdf_part(path)),
+        path_(std::move(path)),
+        cancel_(cancel) {}
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
+
+  ~Writer() {
+    close();
+    if (is_part_) std::remove(part_.c_str());
+  }
+
+  Result<void> write() {
+    std::remove(part_.c_str());  // of a process that had this one's number and was killed
+    if (auto done =
+            call("creating the file",
+                 [&] { return nc_create(part_.c_str(), NC_NETCDF4 | NC_NOCLOBBER, &ncid_); });
+        !done) {
+      ncid_ = -1;
+      return done;
+    }
+    is_part_ = true;
+    if (auto done = call("describing the data", [&] { return define(); }); !done) {
+      return done;
+    }
+    if (auto done = call("writing coordinates", [&] { return write_coordinates(); }); !done) {
+      return done;
+    }
+    if (auto done = write_fields(); !done) {
+      return done;
+    }
+    if (auto done = call("closing the file", [&] { return close_library(); }); !done) {
+      return done;
+    }
+    if (std::rename(part_.c_str(), path_.c_str()) != 0) {
+      return make_error(ErrorKind::internal, in_quotes(path_) + " cannot take its name: " +
+                                                 std::generic_category().message(errno));
+    }
+    is_part_ = false;
+    return {};
+  }
+
+ private:
+  int close_library() {
+    const int status = ncid_ < 0 ? NC_NOERR : nc_close(ncid_);
+    ncid_ = -1;
+    return status;
+  }
+
+  void close() {
+    const netcdf::LibraryLock lock;
+    close_library();
+  }
+
+  // The first failure of a row of calls is remembered, and the rest are skipped.
+  template <class Call>
+  void then(Call&& next) {
+    if (status_ == NC_NOERR) {
+      status_ = std::forward<Call>(next)();
+    }
+  }
+
+  int define() {
+    then([&] { return put_text(ncid_, NC_GLOBAL, "Conventions", "CF-1.8"); });
+    then([&] { return put_text(ncid_, NC_GLOBAL, "title", info_.title); });
+    then([&] {
+      return put_text(ncid_, NC_GLOBAL, "source",
+                      std::string("windsplat ") + WINDSPLAT_VERSION + ", " + info_.source);
+    });
+    define_time();
+    for (std::size_t which = 3; which-- > 0;) {
+      define_axis(which);
+    }
+    variables_ = plan_variables(info_);
+    for (OutVariable& variable : variables_) {
+      define_variable(variable);
+    }
+    then([&] { return nc_enddef(ncid_); });
+    return status_;
+  }
+
+  // A dimension of time is only written where the data have one to tell.
+  void define_time() {
+    if (info_.steps.size() < 2 && info_.time_units.empty()) {
+      return;
+    }
+    int dimension = -1;
+    then([&] { return nc_def_dim(ncid_, "time", info_.steps.size(), &dimension); });
+    then([&] { return nc_def_var(ncid_, "time", NC_DOUBLE, 1, &dimension, &time_); });
+    then([&] { return put_text(ncid_, time_, "axis", "T"); });
+    then([&] { return put_text(ncid_, time_, "standard_name", "time"); });
+    then([&] { return put_text(ncid_, time_, "units", info_.time_units); });
+    then([&] { return put_text(ncid_, time_, "calendar", info_.time_calendar); });
+    dimensions_.push_back(dimension);
+  }
+
+  void define_axis(std::size_t which) {
+    constexpr std::array<const char*, 3> known_names{"x", "y", "z"};
+    const Axis& axis = info_.grid.axes.at(which);
+    const std::string name = axis.name.empty() ? known_names.at(which) : axis.name;
+    const AxisWords words = words_of(axis, which);
+    int dimension = -1;
+    int& id = axes_.at(which);
+    then([&] { return nc_def_dim(ncid_, name.c_str(), axis.coordinates.size(), &dimension); });
+    then([&] { return nc_def_var(ncid_, name.c_str(), NC_DOUBLE, 1, &dimension, &id); });
+    then([&] { return put_text(ncid_, id, "axis", words.letter); });
+    then([&] { return put_text(ncid_, id, "standard_name", words.standard_name); });
+    then([&] { return put_text(ncid_, id, "units", words.units); });
+    then([&] { return put_text(ncid_, id, "positive", words.positive); });
+    dimensions_.push_back(dimension);
+  }
+
+  // One step, as many levels as fit: a step is read at a time.
+  [[nodiscard]] std::vector<std::size_t> chunk() const {
+    const auto dims = info_.grid.dims();
+    const std::size_t row = static_cast<std::size_t>(dims[0]) * sizeof(float);
+    const auto y = std::clamp<std::size_t>(chunk_bytes / row, 1, static_cast<std::size_t>(dims[1]));
+    const auto z =
+        std::clamp<std::size_t>(chunk_bytes / (row * y), 1, static_cast<std::size_t>(dims[2]));
+    std::vector<std::size_t> out{z, y, static_cast<std::size_t>(dims[0])};
+    if (time_ >= 0) {
+      out.insert(out.begin(), 1);
+    }
+    return out;
+  }
+
+  void define_variable(OutVariable& variable) {
+    const FieldInfo& field = info_.fields.at(variable.field);
+    const std::vector<std::size_t> chunks = chunk();
+    int& id = variable.id;
+    then([&] {
+      return nc_def_var(ncid_, variable.name.c_str(), NC_FLOAT,
+                        static_cast<int>(dimensions_.size()), dimensions_.data(), &id);
+    });
+    then([&] { return nc_def_var_chunking(ncid_, id, NC_CHUNKED, chunks.data()); });
+    then([&] { return nc_def_var_deflate(ncid_, id, 1, 1, deflate_level); });
+    then([&] { return nc_def_var_fill(ncid_, id, NC_FILL, &fill_value); });
+    const std::string units = variable.component < field.component_units.size()
+                                  ? field.component_units[variable.component]
+                                  : field.units;
+    then([&] { return put_text(ncid_, id, "units", units); });
+    then([&] {
+      return put_text(ncid_, id, "standard_name",
+                      component_standard_name(info_, field, variable.component));
+    });
+    if (field.kind == FieldKind::scalar) {
+      then([&] { return put_text(ncid_, id, "long_name", field.long_name); });
+    } else {
+      then([&] {
+        return put_text(ncid_, id, "windsplat_vector",
+                        field.name + ' ' + std::to_string(variable.component));
+      });
+    }
+  }
+
+  int write_coordinates() {
+    for (std::size_t which = 0; which < 3; ++which) {
+      then([&] {
+        return nc_put_var_double(ncid_, axes_.at(which),
+                                 info_.grid.axes.at(which).coordinates.data());
+      });
+    }
+    if (time_ >= 0) {
+      std::vector<double> values;
+      for (const TimeStep& step : info_.steps) {
+        values.push_back(step.value);
+      }
+      then([&] { return nc_put_var_double(ncid_, time_, values.data()); });
+    }
+    return status_;
+  }
+
+  Result<void> write_fields() {
+    for (std::size_t step = 0; step < info_.steps.size(); ++step) {
+      for (std::size_t field = 0; field < info_.fields.size(); ++field) {
+        if (cancel_.cancelled()) {
+          return interrupted();
+        }
+        if (auto done = write_field(field, step); !done) {
+          return done;
+        }
+      }
+    }
+    return {};
+  }
+
+  Result<void> write_field(std::size_t field, std::size_t step) {
+    const bool is_wanted = std::any_of(variables_.begin(), variables_.end(),
+                                       [&](const OutVariable& v) { return v.field == field; });
+    if (!is_wanted) {
+      return {};
+    }
+    auto volume = source_.read(field, step);  // takes the library's lock itself if it needs it
+    if (!volume) {
+      return volume.error();
+    }
+    float* first = volume->values.data();
+    std::replace_if(
+        first, first + volume->values.size(), [](float v) { return std::isnan(v); }, fill_value);
+    for (const OutVariable& variable : variables_) {
+      if (variable.field != field) {
+        continue;
+      }
+      const float* values = volume->component(static_cast<int>(variable.component));
+      if (auto done = write_levels(variable, step, values); !done) {
+        return done;
+      }
+    }
+    return {};
+  }
+
+  // As many levels at a time as a chunk has: compressing them takes moments, so that who cancels
+  // does not wait for the rest.
+  Result<void> write_levels(const OutVariable& variable, std::size_t step, const float* values) {
+    const auto dims = info_.grid.dims();
+    const auto layer = static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]);
+    const auto levels = static_cast<std::size_t>(dims[2]);
+    const std::vector<std::size_t> chunks = chunk();
+    const std::size_t z = chunks.size() - 3;
+    for (std::size_t first = 0; first < levels; first += chunks[z]) {
+      if (cancel_.cancelled()) {
+        return interrupted();
+      }
+      std::vector<std::size_t> start(chunks.size(), 0);
+      std::vector<std::size_t> count{std::min(chunks[z], levels - first),
+                                     static_cast<std::size_t>(dims[1]),
+                                     static_cast<std::size_t>(dims[0])};
+      start[z] = first;
+      if (time_ >= 0) {
+        start[0] = step;
+        count.insert(count.begin(), 1);
+      }
+      const auto put = [&] {
+        return nc_put_vara_float(ncid_, variable.id, start.data(), count.data(),
+                                 values + first * layer);
+      };
+      if (auto done = call("writing values", put); !done) {
+        return done;
+      }
+    }
+    return {};
+  }
+
+  [[nodiscard]] Error interrupted() const {
+    return make_error(ErrorKind::cancelled, "interrupted; " + in_quotes(path_) + " is not written");
+  }
+
+  Source& source_;
+  const DatasetInfo& info_;
+  std::string part_;
+  std::string path_;
+  CancelToken cancel_;
+  bool is_part_ = false;  // a file of the name part_ is there
+  int ncid_ = -1;
+  int status_ = NC_NOERR;
+  int time_ = -1;
+  std::array<int, 3> axes_{-1, -1, -1};
+  std::vector<int> dimensions_;  // time if there is one, z, y, x
+  std::vector<OutVariable> variables_;
+};
+
+}  // namespace
+
+std::string netcdf_part(const std::string& path) { return part_of(end_of_links(path)).native(); }
+
+Result<void> write_netcdf(Source& source, const std::string& path, const CancelToken& cancel) {
+  try {
+    auto plain = netcdf::writable_path(path);
+    if (!plain) {
+      return plain.error();
+    }
+    auto done = Writer(source, *plain, cancel).write();
+    return done ? done : with_room_left(done.error(), *plain);
+  } catch (const std::bad_alloc&) {
+    return make_error(ErrorKind::out_of_memory, "no memory to write " + in_quotes(path));
+  } catch (const std::exception& fault) {
+    return make_error(ErrorKind::internal,
+                      "writing " + in_quotes(path) + " failed: " + printable(fault.what()));
+  }
+}
+
+}  // namespace windsplat::data

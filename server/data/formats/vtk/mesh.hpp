@@ -1,0 +1,74 @@
+// Points and cells of structured and unstructured grids, in memory. Snapshot -> checked indices.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/formats/vtk/cells.hpp"
+#include "server/data/formats/vtk/snapshot.hpp"
+
+namespace windsplat::data::vtk {
+
+struct Mesh {
+  std::vector<double> points;  // x y z of each; NaN where a point is hidden or missing
+  // Structured: points along i, j, k, cells in the same order. All zero: unstructured.
+  std::array<std::int64_t, 3> counts{0, 0, 0};
+  std::vector<bool> hidden;  // structured: cells not shown; empty: none
+  // Unstructured: one a cell; Shape::none is passed over. Indices begin at `first` in `corners`.
+  std::vector<Shape> shapes;
+  std::vector<std::uint32_t> first;
+  std::vector<std::uint32_t> corners;
+  std::map<int, std::uint64_t> unread;  // how many cells of each of VTK's types are passed over
+
+  [[nodiscard]] std::uint64_t point_count() const { return points_read; }
+  [[nodiscard]] std::uint64_t cell_count() const;
+  // A cell's shape, and its corners' points.
+  Shape cell(std::uint64_t index, std::array<std::uint32_t, 8>& out) const;
+  // Frees what is only needed to find places in cells.
+  void forget_points();
+
+  std::uint64_t points_read = 0;
+};
+
+// Errors: bad_data.
+Result<Mesh> read_mesh(const std::shared_ptr<const InputFile>& file, const Snapshot& snapshot);
+
+// Differs if points or cells do; before forget_points().
+std::string digest_of_mesh(const Mesh& mesh);
+
+// What the ghost array among a piece's point or cell data says; empty if there is none.
+Result<std::vector<double>> read_ghosts(const std::shared_ptr<const InputFile>& file,
+                                        const std::vector<StoredArray>& arrays);
+// Whether one of its values has one of these bits.
+bool has_bit(double ghost, unsigned bits);
+
+// Where a piece's points (of_cells: cells) lie in the whole: calls row(i j k in the whole, how
+// many) for each row along i, in the piece's order. Errors: those of row.
+template <class Row>
+Result<void> for_rows(const Extent& whole, const Extent& piece, bool of_cells, const Row& row) {
+  const auto all = of_cells ? whole.cells() : whole.points();
+  const auto part = of_cells ? piece.cells() : piece.points();
+  std::array<std::int64_t, 3> from{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    // A piece of one layer of points at the whole's end has no cells of its own.
+    from[a] = std::min(piece.first[a] - whole.first[a], all[a] - part[a]);
+  }
+  for (std::int64_t k = 0; k < part[2]; ++k) {
+    for (std::int64_t j = 0; j < part[1]; ++j) {
+      const std::array<std::int64_t, 3> at{from[0], from[1] + j, from[2] + k};
+      if (auto done = row(at, static_cast<std::size_t>(part[0])); !done) return done;
+    }
+  }
+  return {};
+}
+
+// How many points (of_cells: cells) of the whole lie in no piece. Not of unstructured grids.
+std::uint64_t uncovered(const Snapshot& snapshot, bool of_cells);
+
+}  // namespace windsplat::data::vtk

@@ -1,0 +1,19 @@
+// VTK files as a dataset: XML .vti .vtr .vts .vtu .pvd and legacy .vtk, or a series of them.
+#pragma once
+
+#include <memory>
+#include <string_view>
+
+#include "server/base/error.hpp"
+#include "server/data/files/files.hpp"
+#include "server/data/model/source.hpp"
+
+namespace windsplat::data::vtk {
+
+// Whether the first bytes of a file are those of VTK's formats.
+bool is_vtk(std::string_view head);
+
+// Errors: bad_data, not_found.
+Result<std::unique_ptr<FileSource>> open(const std::shared_ptr<Files>& files);
+
+}  // namespace windsplat::data::vtk

@@ -1,0 +1,53 @@
+// What .zarray says of an array, as plain data, checked. Json -> ArrayMetadata.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/formats/zarr/json.hpp"
+
+namespace windsplat::data::zarr {
+
+struct Dtype {
+  char kind = 'f';        // b, i, u, f as in NumPy
+  std::size_t bytes = 4;  // of one item
+  bool big_endian = false;
+};
+
+enum class Compressor { none, zlib, gzip, zstd, lz4, blosc };
+
+// numcodecs' filters, undone in the reverse of their order.
+struct Filter {
+  enum class Kind { shuffle, delta, fixed_scale_offset };
+  Kind kind = Kind::shuffle;
+  std::size_t element_bytes = 0;  // shuffle
+  Dtype decoded;                  // the others
+  Dtype encoded;
+  double scale = 1;  // fixed_scale_offset: decoded = encoded / scale + offset
+  double offset = 0;
+};
+
+struct ArrayMetadata {
+  std::vector<std::size_t> shape;
+  std::vector<std::size_t> chunks;  // of the same rank, each at least 1
+  Dtype dtype;
+  bool column_major = false;
+  char separator = '.';
+  Compressor compressor = Compressor::none;
+  std::vector<Filter> filters;
+  std::optional<double> fill_value;  // none: what an absent chunk holds is undefined
+  std::string problem;               // why its numbers cannot be read; empty if they can
+
+  [[nodiscard]] std::size_t chunk_items() const;
+};
+
+// Errors: bad_data for what no Zarr v2 array may say; what we do not read is a `problem`.
+Result<ArrayMetadata> parse_array(const Json& json);
+
+// The number an attribute or fill_value means, texts NaN, Infinity and -Infinity among them.
+std::optional<double> as_number(const Json& json);
+
+}  // namespace windsplat::data::zarr

@@ -1,0 +1,174 @@
+// Place in a grid's own units -> the sample whose cell it lies in.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "server/base/check.hpp"
+#include "server/data/model/measure.hpp"
+
+namespace windsplat::data {
+
+namespace {
+
+constexpr double turn = 360;
+constexpr double radians_per_degree = 3.14159265358979323846 / 180;
+// Of the box's size: a place that was computed may miss its edge by rounding.
+constexpr double edge_tolerance = 1e-6;
+constexpr std::array<const char*, 3> letters{"x", "y", "z"};
+
+std::string number(double value) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.7g", value);
+  return text.data();
+}
+
+std::string interval(const std::array<double, 2>& box, const std::string& units) {
+  std::string text = number(box[0]);
+  text.append(" to ").append(number(box[1]));
+  if (!units.empty()) text.append(" ").append(printable(units, 80));
+  return text;
+}
+
+Error outside(std::size_t axis, double at, const std::string& box) {
+  std::string message = letters[axis];
+  message.append(" = ").append(number(at)).append(" is outside the data's box: ").append(box);
+  return make_error(ErrorKind::invalid, std::move(message));
+}
+
+Error absent(std::size_t axis) {
+  return make_error(ErrorKind::invalid, std::string(letters[axis]) + " is required");
+}
+
+bool goes_round(const Axis& axis) {
+  return axis.kind == AxisKind::longitude && axis.units.substr(0, 3) != "rad";
+}
+
+double difference(double a, double b, bool round) {
+  return std::abs(round ? std::remainder(a - b, turn) : a - b);
+}
+
+// From half a cell before the axis's least coordinate to half a cell after its greatest.
+std::array<double, 2> box_of(const Axis& axis) {
+  const std::vector<double>& c = axis.coordinates;
+  const std::size_t n = c.size();
+  std::array<double, 2> box{c.front() - (c[1] - c[0]) / 2, c.back() + (c[n - 1] - c[n - 2]) / 2};
+  if (box[0] > box[1]) std::swap(box[0], box[1]);
+  if (axis.kind == AxisKind::latitude && axis.units.substr(0, 3) != "rad") {
+    box[0] = std::min(std::max(box[0], -90.0), std::min(c.front(), c.back()));
+    box[1] = std::max(std::min(box[1], 90.0), std::max(c.front(), c.back()));
+  }
+  return box;
+}
+
+bool within(const std::array<double, 2>& box, double at, bool round) {
+  const double slack = edge_tolerance * (box[1] - box[0]);
+  if (!round) return at >= box[0] - slack && at <= box[1] + slack;
+  // The first of its turns at or beyond the box's lower end.
+  const double first = box[0] - slack;
+  return at + turn * std::ceil((first - at) / turn) <= box[1] + slack;
+}
+
+Result<int> nearest_along(const Axis& axis, std::size_t letter, const std::optional<double>& at) {
+  if (axis.coordinates.size() == 1) return 0;
+  if (!at) return absent(letter);
+  const bool round = goes_round(axis);
+  const std::array<double, 2> box = box_of(axis);
+  if (!within(box, *at, round)) return outside(letter, *at, interval(box, axis.units));
+  const auto nearest = std::min_element(
+      axis.coordinates.begin(), axis.coordinates.end(),
+      [&](double a, double b) { return difference(a, *at, round) < difference(b, *at, round); });
+  return static_cast<int>(nearest - axis.coordinates.begin());
+}
+
+// In degrees of arc, by haversines: exact for small distances too.
+double distance(double lon_a, double lat_a, double lon_b, double lat_b) {
+  const double across = std::sin((lon_a - lon_b) * radians_per_degree / 2);
+  const double along = std::sin((lat_a - lat_b) * radians_per_degree / 2);
+  const double h = along * along + std::cos(lat_a * radians_per_degree) *
+                                       std::cos(lat_b * radians_per_degree) * across * across;
+  return 2 * std::asin(std::sqrt(std::clamp(h, 0.0, 1.0))) / radians_per_degree;
+}
+
+// Half the way to the farthest of the column's neighbours: what may belong to its cell.
+double reach(const Columns& columns, const std::array<int, 3>& dims, int x, int y) {
+  const auto at = [&](int i, int j) {
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(dims[0]) +
+           static_cast<std::size_t>(i);
+  };
+  const std::size_t own = at(x, y);
+  double farthest = 0;
+  for (int j = std::max(0, y - 1); j <= std::min(dims[1] - 1, y + 1); ++j) {
+    for (int i = std::max(0, x - 1); i <= std::min(dims[0] - 1, x + 1); ++i) {
+      const std::size_t other = at(i, j);
+      farthest = std::max(farthest, distance(columns.longitude[own], columns.latitude[own],
+                                             columns.longitude[other], columns.latitude[other]));
+    }
+  }
+  return farthest / 2;
+}
+
+Result<void> nearest_column(const Grid& grid, const std::array<std::optional<double>, 3>& at,
+                            Place& place) {
+  const Columns& columns = *grid.columns;
+  const std::array<int, 3> dims = grid.dims();
+  WINDSPLAT_CHECK(columns.longitude.size() == columns.latitude.size() &&
+                  columns.longitude.size() ==
+                      static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]));
+  if (!at[0]) return absent(0);
+  if (!at[1]) return absent(1);
+  if (std::abs(*at[1]) > 90) return outside(1, *at[1], "latitudes are -90 to 90 degrees");
+  double least = std::numeric_limits<double>::infinity();
+  std::size_t nearest = 0;
+  for (std::size_t i = 0; i < columns.latitude.size(); ++i) {
+    // No great circle is shorter than the difference in latitude.
+    if (std::abs(columns.latitude[i] - *at[1]) >= least) continue;
+    const double d = distance(*at[0], *at[1], columns.longitude[i], columns.latitude[i]);
+    if (d >= least) continue;
+    least = d;
+    nearest = i;
+  }
+  const int x = static_cast<int>(nearest % static_cast<std::size_t>(dims[0]));
+  const int y = static_cast<int>(nearest / static_cast<std::size_t>(dims[0]));
+  const bool rim = x == 0 || y == 0 || x == dims[0] - 1 || y == dims[1] - 1;
+  if (rim && columns.latitude.size() > 1 &&
+      least > reach(columns, dims, x, y) * (1 + edge_tolerance)) {
+    const auto [west, east] =
+        std::minmax_element(columns.longitude.begin(), columns.longitude.end());
+    const auto [south, north] =
+        std::minmax_element(columns.latitude.begin(), columns.latitude.end());
+    std::string box = "no column is near latitude ";
+    box.append(number(*at[1])).append("; columns stand at longitudes ");
+    box.append(interval({*west, *east}, "")).append(", latitudes ");
+    box.append(interval({*south, *north}, "degrees"));
+    return outside(0, *at[0], box);
+  }
+  place.index[0] = x;
+  place.index[1] = y;
+  place.coordinates[0] = columns.longitude[nearest];
+  place.coordinates[1] = columns.latitude[nearest];
+  return {};
+}
+
+}  // namespace
+
+Result<Place> nearest_sample(const Grid& grid, const std::array<std::optional<double>, 3>& at) {
+  Place place;
+  std::size_t first_plain = 0;
+  if (grid.columns) {
+    if (auto found = nearest_column(grid, at, place); !found) return found.error();
+    first_plain = 2;
+  }
+  for (std::size_t a = first_plain; a < 3; ++a) {
+    const auto index = nearest_along(grid.axes[a], a, at[a]);
+    if (!index) return index.error();
+    place.index[a] = *index;
+    place.coordinates[a] = grid.axes[a].coordinates[static_cast<std::size_t>(*index)];
+  }
+  return place;
+}
+
+}  // namespace windsplat::data

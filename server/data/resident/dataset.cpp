@@ -1,0 +1,512 @@
+// One dataset's volumes: from the budget's cache, or read, unpacked or averaged into it.
+#include "server/data/resident/dataset.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <new>
+#include <set>
+#include <utility>
+
+#include "server/base/log.hpp"
+#include "server/data/bytes/decode_limits.hpp"
+#include "server/data/model/digest.hpp"
+#include "server/data/model/packed.hpp"
+
+namespace windsplat::data {
+
+namespace {
+
+using VolumePtr = std::shared_ptr<const Volume>;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t remembered_max = 256;
+
+Result<VolumePtr> as_volume(const Result<Resident>& kept) {
+  if (!kept) return kept.error();
+  return std::static_pointer_cast<const Volume>(*kept);
+}
+
+// What grows with the file in the description of a dataset.
+std::uint64_t bytes_of(const DatasetInfo& info) {
+  std::uint64_t bytes = 0;
+  for (const Axis& axis : info.grid.axes) bytes += axis.coordinates.size() * sizeof(double);
+  if (info.grid.columns) {
+    bytes +=
+        (info.grid.columns->longitude.size() + info.grid.columns->latitude.size()) * sizeof(double);
+  }
+  for (const TimeStep& step : info.steps) bytes += sizeof step + step.text.capacity();
+  return bytes;
+}
+
+// One reader at a time; those that somebody waits for come first.
+class Turnstile {
+ public:
+  void enter(Urgency urgency) {
+    std::unique_lock lock(mutex_);
+    const bool somebody_waits = urgency != Urgency::ahead;
+    waiting_ += somebody_waits ? 1 : 0;
+    free_.wait(lock, [&] { return !taken_ && (somebody_waits || waiting_ == 0); });
+    waiting_ -= somebody_waits ? 1 : 0;
+    taken_ = true;
+  }
+  void leave() {
+    {
+      const std::lock_guard lock(mutex_);
+      taken_ = false;
+      used_at_ = Clock::now();
+    }
+    free_.notify_all();
+  }
+  // Enters if nobody is inside, waits, or was inside within that time.
+  bool enter_if_idle(double idle_s) {
+    const std::lock_guard lock(mutex_);
+    const std::chrono::duration<double> rest = Clock::now() - used_at_;
+    if (taken_ || waiting_ > 0 || rest.count() < idle_s) return false;
+    taken_ = true;
+    return true;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable free_;
+  Clock::time_point used_at_ = Clock::now();
+  bool taken_ = false;
+  int waiting_ = 0;
+};
+
+}  // namespace
+
+struct Dataset::State {
+  State(std::unique_ptr<Source> from, std::string id, std::shared_ptr<Budget> shared, Storage how)
+      : source(std::move(from)),
+        info(source->info()),
+        budget(std::move(shared)),
+        owner(budget->next_owner()),
+        charged(budget, Reservation::Term::lasting),
+        storage(how) {
+    info.id = std::move(id);
+    source->on_progress([this](double done) {
+      const std::lock_guard lock(mutex);
+      if (loading) loading->done = done;
+    });
+  }
+  ~State() { budget->forget(owner); }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
+  // Checked: where a field and a step are. Errors: not_found.
+  [[nodiscard]] Result<std::size_t> find(const std::string& field, std::size_t step) const {
+    const FieldInfo* found = info.find(field);
+    if (found == nullptr) {
+      return make_error(ErrorKind::not_found,
+                        "dataset " + in_quotes(info.id) + " has no field " + in_quotes(field));
+    }
+    if (step >= info.steps.size()) {
+      return make_error(ErrorKind::not_found, "dataset " + in_quotes(info.id) + " has no step " +
+                                                  std::to_string(step) + "; its last is " +
+                                                  std::to_string(info.steps.size() - 1));
+    }
+    return static_cast<std::size_t>(found - info.fields.data());
+  }
+
+  [[nodiscard]] std::uint64_t values(std::size_t field) const {
+    return info.grid.samples() * info.fields[field].components.size();
+  }
+
+  // Of these fields, each once.
+  [[nodiscard]] std::uint64_t bytes_at_a_step(const std::vector<std::string>& fields) const {
+    std::set<std::string> counted;
+    std::uint64_t bytes = 0;
+    for (const std::string& name : fields) {
+      const FieldInfo* const field = info.find(name);
+      if (field == nullptr || !counted.insert(name).second) continue;
+      bytes += info.grid.samples() * field->components.size() * sizeof(float);
+    }
+    return bytes;
+  }
+
+  // What counts in the limit while a field is read.
+  [[nodiscard]] std::uint64_t bytes_beside(std::uint64_t loader_bytes) const {
+    return charged.bytes() + (info.stored_bytes > 0 ? loader_bytes : 0);
+  }
+
+  // What loaders were seen to need at most beside the volumes, while they read these fields. Chunks
+  // that are needed again are kept, 128 MiB in all or one chunk.
+  [[nodiscard]] std::uint64_t reading_bytes(const std::vector<std::string>& fields) const {
+    constexpr std::uint64_t mib = std::uint64_t{1} << 20;
+    std::uint64_t bytes = 32 * mib;
+    for (const std::string& name : fields) {
+      const FieldInfo* const field = info.find(name);
+      if (field == nullptr || field->chunk_bytes <= sizeof(double)) continue;  // no chunks
+      const std::uint64_t kept =
+          std::min(128 * mib, field->decoded_bytes / field->components.size());
+      bytes = std::max(bytes, 64 * mib + std::max(kept, 2 * field->chunk_bytes));
+    }
+    return bytes;
+  }
+
+  [[nodiscard]] Error not_resident(std::size_t field, std::size_t step) const {
+    return make_error(ErrorKind::not_resident, in_quotes(info.fields[field].name) + " at step " +
+                                                   std::to_string(step) + " is not in memory yet");
+  }
+
+  // Reads the volume from its source, or has it from its packed form.
+  Result<Resident> load(std::size_t field, std::size_t step, Urgency urgency) {
+    const ResidentKey twin{owner, field, step, packed_variant};
+    if (const Resident packed = budget->find_now(twin)) {
+      add(&Counts::unpacked);
+      return guarded(field, [&]() -> Result<Volume> {
+        return unpack(*std::static_pointer_cast<const PackedVolume>(packed));
+      });
+    }
+    auto volume = read(field, step, urgency);
+    if (volume && storage == Storage::packed16) {
+      // Where there is no room for it the volume itself is all that is kept.
+      (void)budget->get(twin, values(field) * sizeof(std::uint16_t), Urgency::ahead,
+                        [&] { return pack_volume(field, *volume); });
+    }
+    return volume;
+  }
+
+  Result<Resident> read(std::size_t field, std::size_t step, Urgency urgency) {
+    turnstile.enter(urgency);
+    {
+      const std::lock_guard lock(mutex);
+      if (ended) {
+        turnstile.leave();
+        return why_cancelled();
+      }
+      ++counts.loads;
+      counts.ahead += urgency == Urgency::ahead ? 1 : 0;
+      loading = Loading{info.fields[field].name, step, 0};
+    }
+    auto volume = guarded(field, [&] { return source->read(field, step); });
+    {
+      const std::lock_guard lock(mutex);
+      loading.reset();
+      if (volume) {
+        const auto& read = *std::static_pointer_cast<const Volume>(*volume);
+        seen[{field, step}] = {read.range, read.masked};
+      } else {
+        ++counts.failures;
+        if (volume.error().kind == ErrorKind::cancelled) volume = why_cancelled();
+      }
+    }
+    turnstile.leave();
+    budget->count_read(volume.has_value());
+    return volume;
+  }
+
+  // Of a read that end(), forget() or evict() cancelled: whoever asked is still there. Under the
+  // mutex.
+  [[nodiscard]] Error why_cancelled() const {
+    if (ended) return make_error(ErrorKind::draining, "the server is shutting down");
+    if (forgotten) {
+      return make_error(ErrorKind::not_found,
+                        "dataset " + in_quotes(info.id) + " was removed while it was read");
+    }
+    return make_error(ErrorKind::not_resident, "the memory of dataset " + in_quotes(info.id) +
+                                                   " was released while it was read; try again");
+  }
+
+  Result<Resident> pack_volume(std::size_t field, const Resident& volume) {
+    auto packed = pack(*std::static_pointer_cast<const Volume>(volume));
+    if (!packed) {
+      return make_error(ErrorKind::invalid, "the values lie too far apart to be packed");
+    }
+    const std::lock_guard lock(mutex);
+    for (int c = 0; c < packed->components; ++c) {
+      errors[field] = std::max(errors[field], packed->error(c));
+    }
+    return Resident(std::make_shared<const PackedVolume>(std::move(*packed)));
+  }
+
+  // Runs what makes a volume; what it throws becomes an error.
+  template <class Make>
+  Result<Resident> guarded(std::size_t field, const Make& make) const {
+    try {
+      Result<Volume> volume = make();
+      if (!volume) {
+        return volume.error();
+      }
+      return Resident(std::make_shared<const Volume>(std::move(*volume)));
+    } catch (const std::bad_alloc&) {
+      return make_error(ErrorKind::out_of_memory,
+                        "the machine has no memory left for " + in_quotes(info.fields[field].name));
+    } catch (const std::exception& fault) {
+      // What a fault of ours says is for the log: it may name places in the source.
+      log::error("loading failed", {{"field", info.fields[field].name}, {"fault", fault.what()}});
+      return make_error(ErrorKind::internal,
+                        "loading " + in_quotes(info.fields[field].name) + " failed");
+    }
+  }
+
+  void add(std::uint64_t Counts::*count) {
+    const std::lock_guard lock(mutex);
+    ++(counts.*count);
+  }
+
+  std::unique_ptr<Source> source;
+  DatasetInfo info;
+  std::shared_ptr<Budget> budget;
+  const std::uint64_t owner;
+  Reservation charged;  // for the info
+  const Storage storage;
+  Turnstile turnstile;  // to the source
+
+  mutable std::mutex mutex;  // of all below
+  Counts counts;
+  std::optional<Loading> loading;
+  bool ended = false;
+  bool forgotten = false;
+  std::map<std::pair<std::size_t, std::size_t>, Seen> seen;  // by field and step
+  std::map<std::size_t, float> errors;                       // by field, of packing
+  std::deque<std::pair<std::string, std::vector<double>>> remembered;
+  std::string kept_key;
+  std::any kept_value;
+};
+
+Dataset::Dataset(std::unique_ptr<Source> source, std::string id, std::uint64_t bytes_max)
+    : Dataset(std::move(source), std::move(id), std::make_shared<Budget>(bytes_max)) {}
+
+Dataset::Dataset(std::unique_ptr<Source> source, std::string id, std::shared_ptr<Budget> budget,
+                 Storage storage)
+    : state_(
+          std::make_shared<State>(std::move(source), std::move(id), std::move(budget), storage)) {}
+
+const DatasetInfo& Dataset::info() const { return state_->info; }
+
+std::shared_ptr<const DatasetInfo> Dataset::shared_info() const { return {state_, &state_->info}; }
+
+Dataset Dataset::resident_only() const { return {state_, Manner::resident_only}; }
+
+Dataset Dataset::ahead() const { return {state_, Manner::ahead}; }
+
+Dataset Dataset::held() const { return {state_, Manner::held}; }
+
+Resident Dataset::find_held(const ResidentKey& key) const {
+  return manner_ == Manner::held ? state_->budget->find_held(key) : nullptr;
+}
+
+Dataset Dataset::in_turn(const CancelToken& cancel) const {
+  Dataset out(state_, Manner::in_turn);
+  out.cancel_ = cancel;
+  out.own_ = std::make_shared<OwnPins>();
+  return out;
+}
+
+Urgency Dataset::urgency() const {
+  if (manner_ == Manner::in_turn) return Urgency::in_turn;
+  return manner_ == Manner::ahead ? Urgency::ahead : Urgency::demand;
+}
+
+Result<VolumePtr> Dataset::get(const ResidentKey& key, std::uint64_t bytes,
+                               const Budget::Make& make) {
+  auto kept = state_->budget->get(key, bytes, urgency(), make, own_ ? *own_ : OwnPins(),
+                                  cancel_ ? &*cancel_ : nullptr);
+  if (kept && own_) own_->insert(kept->get());
+  return as_volume(kept);
+}
+
+Result<VolumePtr> Dataset::volume(const std::string& field, std::size_t step) {
+  const Result<std::size_t> index = state_->find(field, step);
+  if (!index) {
+    return index.error();
+  }
+  const ResidentKey key{state_->owner, *index, step, ""};
+  if (manner_ == Manner::resident_only) {
+    const Resident there = state_->budget->find_now(key);
+    return there ? as_volume(there) : state_->not_resident(*index, step);
+  }
+  if (const Resident there = find_held(key)) return as_volume(there);
+  return get(key, state_->values(*index) * sizeof(float),
+             [&] { return state_->load(*index, step, urgency()); });
+}
+
+Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
+                                 const Coarsening& how) {
+  if (how.halvings == std::array{0, 0, 0}) {
+    return volume(field, step);
+  }
+  const Result<std::size_t> index = state_->find(field, step);
+  if (!index) {
+    return index.error();
+  }
+  const ResidentKey key{state_->owner, *index, step, digest_of(key_of(how))};
+  if (manner_ == Manner::resident_only) {
+    const Resident there = state_->budget->find_now(key);
+    return there ? as_volume(there) : state_->not_resident(*index, step);
+  }
+  if (const Resident there = find_held(key)) return as_volume(there);
+  const DatasetInfo& info = state_->info;
+  std::uint64_t bytes = info.fields[*index].components.size() * sizeof(float);
+  for (std::size_t a = 0; a < 3; ++a) {
+    bytes *= static_cast<std::uint64_t>(halved(info.grid.dims()[a], how.halvings[a]));
+  }
+  if (const auto there = state_->budget->find(key)) {
+    if (*there && own_) own_->insert((*there)->get());
+    return as_volume(*there);
+  }
+  // Held first, so that it is never evicted for a level that could not then be made of it.
+  const auto fine = volume(field, step);
+  if (!fine) {
+    return fine.error();
+  }
+  auto level = get(key, bytes, [&] {
+    state_->add(&Counts::averages);
+    return state_->guarded(*index, [&]() -> Result<Volume> { return coarsen(**fine, how); });
+  });
+  if (own_) own_->erase(own_->find(fine->get()));  // given to nobody
+  return level;
+}
+
+Result<std::shared_ptr<const void>> Dataset::reserve(std::uint64_t bytes) const {
+  const auto held = std::make_shared<Reservation>(state_->budget);
+  const auto taken =
+      held->take(bytes, urgency(), own_ ? *own_ : OwnPins(), cancel_ ? &*cancel_ : nullptr);
+  if (!taken) return taken.error();
+  return std::shared_ptr<const void>(held);
+}
+
+std::vector<ResidentKey> Dataset::keys_of(const std::string& field, std::size_t step,
+                                          const Coarsening& how) const {
+  const Result<std::size_t> index = state_->find(field, step);
+  if (!index) return {};
+  if (how.halvings == std::array{0, 0, 0}) return {{state_->owner, *index, step, ""}};
+  return {{state_->owner, *index, step, digest_of(key_of(how))}};
+}
+
+std::any Dataset::kept(const std::string& key) const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->kept_key == key ? state_->kept_value : std::any();
+}
+
+void Dataset::keep(std::string key, std::any value) {
+  const std::lock_guard lock(state_->mutex);
+  state_->kept_key = std::move(key);
+  state_->kept_value = std::move(value);
+}
+
+Result<std::vector<double>> Dataset::remembered(
+    const std::string& key, const std::function<Result<std::vector<double>>()>& make) {
+  {
+    const std::lock_guard lock(state_->mutex);
+    for (const auto& [known, numbers] : state_->remembered) {
+      if (known == key) return numbers;
+    }
+  }
+  auto numbers = make();
+  if (numbers) {
+    const std::lock_guard lock(state_->mutex);
+    state_->remembered.emplace_back(key, *numbers);
+    if (state_->remembered.size() > remembered_max) state_->remembered.pop_front();
+  }
+  return numbers;
+}
+
+void Dataset::evict() {
+  state_->source->cancel();
+  state_->budget->evict(state_->owner);
+}
+
+void Dataset::forget() {
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->forgotten = true;
+  }
+  evict();
+}
+
+void Dataset::end() {
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->ended = true;
+  }
+  state_->source->cancel();
+}
+
+void Dataset::release_idle(double idle_s) {
+  if (!state_->turnstile.enter_if_idle(idle_s)) return;
+  state_->source->release();
+  state_->turnstile.leave();
+}
+
+std::optional<Dataset::Seen> Dataset::seen(const std::string& field, std::size_t step) const {
+  const Result<std::size_t> index = state_->find(field, step);
+  if (!index) return std::nullopt;
+  const std::lock_guard lock(state_->mutex);
+  const auto found = state_->seen.find({*index, step});
+  return found == state_->seen.end() ? std::nullopt : std::optional(found->second);
+}
+
+Dataset::Counts Dataset::counts() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->counts;
+}
+
+std::uint64_t Dataset::resident_bytes() const {
+  return state_->budget->bytes_of(state_->owner) + state_->charged.bytes();
+}
+
+std::optional<Dataset::Loading> Dataset::loading() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->loading;
+}
+
+Result<void> Dataset::check_room(const std::vector<std::string>& fields) const {
+  const Budget& budget = *state_->budget;
+  for (const std::string& field : fields) {
+    const std::uint64_t bytes = state_->bytes_at_a_step({field});
+    if (bytes + state_->bytes_beside(loader_bytes_min) <= budget.bytes_max()) continue;
+    return make_error(ErrorKind::out_of_memory, in_quotes(field) + " needs " + megabytes(bytes) +
+                                                    " at a step; " + budget.limit_text() +
+                                                    beyond_limit(fields));
+  }
+  return {};
+}
+
+std::string Dataset::beyond_limit(const std::vector<std::string>& fields) const {
+  const Budget& budget = *state_->budget;
+  const std::uint64_t bytes = state_->bytes_at_a_step(fields);
+  const std::uint64_t all = bytes + state_->bytes_beside(state_->reading_bytes(fields));
+  if (all <= budget.bytes_max() || !budget.name().raised) return "";
+  std::string text = "; ";
+  if (fields.size() > 1) {
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+      text += i == 0 ? "" : i + 1 < fields.size() ? ", " : " and ";
+      text += in_quotes(fields[i]);
+    }
+    text += " need " + megabytes(bytes) + " together: ";
+  }
+  return text + budget.name().raised(all) + " would do";
+}
+
+Error Dataset::with_need(Error error, const std::vector<std::string>& fields) const {
+  if (error.kind == ErrorKind::out_of_memory) error.message += beyond_limit(fields);
+  return error;
+}
+
+Result<void> Dataset::charge_info() {
+  constexpr std::uint64_t free_bytes = std::uint64_t{1} << 20;
+  constexpr std::uint64_t copies = 2;  // the source has its own
+  const std::uint64_t bytes = copies * bytes_of(state_->info);
+  if (bytes <= free_bytes) return {};
+  return state_->charged.resize(bytes);
+}
+
+Storage Dataset::storage() const { return state_->storage; }
+
+float Dataset::storage_error(const std::string& field) const {
+  const Result<std::size_t> index = state_->find(field, 0);
+  if (!index) return 0;
+  const std::lock_guard lock(state_->mutex);
+  const auto found = state_->errors.find(*index);
+  return found == state_->errors.end() ? 0 : found->second;
+}
+
+}  // namespace windsplat::data

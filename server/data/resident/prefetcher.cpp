@@ -1,0 +1,138 @@
+// Owners in turn, each one's soonest wish first; what cannot be loaded waits for other wishes.
+#include "server/data/resident/prefetcher.hpp"
+
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "server/base/log.hpp"
+
+namespace windsplat::data {
+
+struct Ahead::State {
+  explicit State(std::shared_ptr<Budget> shared)
+      : budget(std::move(shared)), thread([this] { work(); }) {}
+
+  void work() {
+    std::unique_lock lock(mutex);
+    for (;;) {
+      wake.wait(lock, [this] { return stopping || !queues.empty(); });
+      if (stopping) return;
+      const std::uint64_t owner = next_owner();
+      Queue& queue = queues[owner];
+      const std::uint64_t said = queue.said;
+      std::optional<Wish> wish = std::move(queue.wishes.front());
+      queue.wishes.pop_front();
+      if (queue.wishes.empty()) queues.erase(owner);
+      lock.unlock();
+      const bool full = !load(*wish);
+      wish.reset();
+      lock.lock();
+      // No room for this one: there is none for the later ones either, until others are said.
+      const auto rest = queues.find(owner);
+      if (full && rest != queues.end() && rest->second.said == said) queues.erase(rest);
+    }
+  }
+
+  // The one after the last, in a ring.
+  std::uint64_t next_owner() {
+    auto next = queues.upper_bound(last);
+    if (next == queues.end()) next = queues.begin();
+    last = next->first;
+    return last;
+  }
+
+  // False: there is no memory for it.
+  static bool load(const Wish& wish) noexcept {
+    try {
+      return try_to_load(wish);
+    } catch (const std::exception&) {
+      log::error("loading ahead failed");  // without its words: there may be no memory for them
+      return false;
+    }
+  }
+  static bool try_to_load(const Wish& wish) {
+    const auto loaded = wish.dataset.ahead().level(wish.field, wish.step, wish.how);
+    if (loaded) return true;
+    const Error& error = loaded.error();
+    if (error.kind == ErrorKind::out_of_memory) return false;
+    const bool given_up = error.kind == ErrorKind::not_resident ||
+                          error.kind == ErrorKind::not_found || error.kind == ErrorKind::draining;
+    if (!given_up) {
+      log::debug("loading ahead failed", {{"dataset", wish.dataset.info().id},
+                                          {"field", wish.field},
+                                          {"step", wish.step},
+                                          {"error", error.message}});
+    }
+    return true;
+  }
+
+  const std::shared_ptr<Budget> budget;
+  std::mutex mutex;
+  std::condition_variable wake;
+  struct Queue {
+    std::deque<Wish> wishes;  // not yet loaded; never empty
+    std::uint64_t said = 0;   // tells it from later ones of the owner
+  };
+  std::map<std::uint64_t, Queue> queues;  // by owner
+  std::uint64_t said = 0;
+  std::uint64_t last = 0;
+  bool stopping = false;
+  std::thread thread;  // last: it uses all of the above
+};
+
+Ahead::Ahead(std::shared_ptr<Budget> budget) : state_(std::make_unique<State>(std::move(budget))) {}
+
+Ahead::~Ahead() {
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->stopping = true;
+  }
+  state_->wake.notify_one();
+  state_->thread.join();
+}
+
+void Ahead::wish(std::uint64_t owner, std::vector<Wish> wishes) {
+  if (wishes.empty()) {  // as destructors say it: without memory, which an empty deque has
+    state_->budget->wish(owner, {});
+    const std::lock_guard lock(state_->mutex);
+    state_->queues.erase(owner);
+    return;
+  }
+  std::vector<ResidentKey> keys;
+  std::deque<Wish> absent;
+  for (Wish& wish : wishes) {
+    const auto own = wish.dataset.keys_of(wish.field, wish.step, wish.how);
+    keys.insert(keys.end(), own.begin(), own.end());
+    const bool there = std::all_of(
+        own.begin(), own.end(), [&](const ResidentKey& key) { return state_->budget->has(key); });
+    if (!there) absent.push_back(std::move(wish));
+  }
+  state_->budget->wish(owner, keys);
+  {
+    const std::lock_guard lock(state_->mutex);
+    if (absent.empty()) {
+      state_->queues.erase(owner);
+    } else {
+      state_->queues[owner] = {std::move(absent), ++state_->said};
+    }
+  }
+  state_->wake.notify_one();
+}
+
+void Ahead::forget(const DatasetInfo& info) {
+  const std::lock_guard lock(state_->mutex);
+  for (auto at = state_->queues.begin(); at != state_->queues.end();) {
+    auto& queue = at->second.wishes;
+    std::erase_if(queue, [&](const Wish& wish) { return &wish.dataset.info() == &info; });
+    at = queue.empty() ? state_->queues.erase(at) : std::next(at);
+  }
+}
+
+}  // namespace windsplat::data

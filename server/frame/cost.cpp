@@ -1,0 +1,150 @@
+// Samples in sight times what each covers.
+#include "server/frame/cost.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "server/data/model/coarsen.hpp"
+#include "server/scene/camera.hpp"
+
+namespace windsplat::frame {
+namespace {
+
+constexpr double footprint = 5.9;         // area of a splat in cells: pi 1.37^2
+constexpr double covered_min = 16;        // pixels: kernels are drawn into blocks of 4 x 4
+constexpr double reference_height = 720;  // pixels, for which a view gives its radii
+
+// The part of the volume that is in sight: which share, and how large a world unit is there.
+struct VisiblePart {
+  double share = 1;
+  double px = 1;   // mean pixels a world unit
+  double px2 = 1;  // mean of its square
+};
+
+// Between the depths of the box the frustum holds V = 4 h^2 a (f^3 - n^3) / 3, h its half height at
+// depth 1 and a its aspect; the means of 1 / d and 1 / d^2 over it follow.
+VisiblePart visible_part(const scene::Camera& camera, const scene::Lattice& lattice) {
+  const auto [near, far] = scene::view_depths(camera, lattice);
+  const double depth = std::max(far - near, 1e-9);
+  const double aspect = static_cast<double>(camera.width) / camera.height;
+  const double scale = 0.5 * camera.height / camera.half_height;
+  const double section = 4 * camera.half_height * camera.half_height * aspect;
+  const glm::dvec3 box = lattice.box_max - lattice.box_min;
+  const double volume = std::max(box.x * box.y * box.z, 1e-30);
+  VisiblePart part;
+  double seen = section * depth;
+  if (camera.perspective) {
+    const double cubes = far * far * far - near * near * near;
+    seen = section * cubes / 3;
+    part.px = scale * 1.5 * (far * far - near * near) / cubes;
+    part.px2 = scale * scale * 3 * depth / cubes;
+  } else {
+    part.px = scale;
+    part.px2 = scale * scale;
+  }
+  part.share = std::clamp(seen / volume, 0.0, 1.0);
+  return part;
+}
+
+class Counting {
+ public:
+  Counting(const scene::Completed& completed, const scene::Camera& camera,
+           const std::array<int, 3>& level)
+      : view_(completed.view),
+        lattice_(completed.placed->lattice),
+        visible_(visible_part(camera, lattice_)),
+        pixels_(static_cast<double>(camera.width) * camera.height) {
+    const auto slice = scene::slice_of(view_.geometry);
+    for (std::size_t a = 0; a < 3; ++a) {
+      const bool one = slice && slice->axis == static_cast<int>(a);
+      samples_[a] = one ? 1.0 : data::halved(lattice_.dims[a], level[a]);
+      cell_[a] = scene::cell_size(lattice_, a) * std::exp2(level[a]);
+    }
+  }
+
+  Cost count() {
+    cost_.pixels = static_cast<std::int64_t>(pixels_);
+    add("/image", pixels_ / Cost::pixels_a_kernel);
+    const bool lines = view_.vector.field.kind == protocol::FieldChoice::Kind::named;
+    if (lines && view_.vector.opacity > 0) add_lines(view_.vector);
+    for (std::size_t n = 0; n < view_.scalars->size(); ++n) {
+      add_medium((*view_.scalars)[n], "/scalars/" + std::to_string(n));
+    }
+    if (view_.method.name == protocol::MethodName::slab) {
+      const double deep = std::hypot(samples_[0], samples_[1], samples_[2]);
+      const double slabs = deep / view_.method.slab_thickness;
+      add("/method/slabThickness", pixels_ * slabs / Cost::pixels_a_kernel);
+    }
+    return cost_;
+  }
+
+ private:
+  void add(std::string pointer, double kernels) {
+    cost_.kernels += kernels;
+    if (kernels <= most_) return;
+    most_ = kernels;
+    cost_.dominant = std::move(pointer);
+  }
+
+  [[nodiscard]] double stops(int stride) const {
+    double count = 1;
+    for (const double samples : samples_) count *= std::ceil(samples / stride);
+    return count;
+  }
+
+  [[nodiscard]] double drawn(double covered) const {
+    return visible_.share * std::clamp(covered, covered_min, std::max(pixels_, covered_min)) /
+           Cost::pixels_a_kernel;
+  }
+
+  // As long as the style allows, within its kernel's box.
+  void add_lines(const protocol::VectorView& vector) {
+    const double widest = *std::max_element(cell_.begin(), cell_.end());
+    const double length =
+        std::min(*vector.length, std::max(vector.span, 1.0) * vector.stride * widest * 2);
+    const double wide = 2 * std::max(1.0, vector.r2 * view_.image.height / reference_height);
+    const double longish = length * visible_.px;
+    const double count = stops(vector.stride);
+    const double covering = count * drawn((longish + wide) * wide);
+    add("/vector/stride", count);
+    add(wide > longish ? "/vector/r2" : "/vector/length", covering);
+  }
+
+  void add_medium(const protocol::ScalarView& scalar, const std::string& pointer) {
+    const bool absorbs = std::any_of(scalar.extinction->begin(), scalar.extinction->end(),
+                                     [](const auto& point) { return point[1] > 0; });
+    if (!absorbs) return;
+    const double face = (cell_[0] * cell_[1] + cell_[1] * cell_[2] + cell_[2] * cell_[0]) / 3;
+    const double covered = footprint * face * scalar.stride * scalar.stride * visible_.px2;
+    const double count = stops(scalar.stride);
+    add(pointer + "/stride", count * (1 + drawn(covered)));
+  }
+
+  const protocol::View& view_;
+  const scene::Lattice& lattice_;
+  const VisiblePart visible_;
+  const double pixels_;
+  std::array<double, 3> samples_{};
+  std::array<double, 3> cell_{};
+  Cost cost_;
+  double most_ = -1;
+};
+
+}  // namespace
+
+Result<Cost> cost_of(const scene::Completed& completed, bool bent) {
+  const auto camera = scene::resolve_camera(completed.view, completed.placed->lattice);
+  if (!camera) return camera.error();
+  std::array<int, 3> level{0, 0, 0};
+  if (!bent) {
+    const auto shown = scene::shown_by(completed);
+    if (!shown) return shown.error();
+    level = shown->coarsening.halvings;
+  }
+  return Counting(completed, *camera, level).count();
+}
+
+}  // namespace windsplat::frame

@@ -1,0 +1,28 @@
+// What a picture takes at most, told from its view and its dataset's description before anything is
+// read or queued.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "server/base/error.hpp"
+#include "server/scene/build.hpp"
+
+namespace windsplat::frame {
+
+// Work is counted in kernels: one for each stop of the lines and each sample of each medium that is
+// looked at, and one more for every pixels_a_kernel pixels that it covers, that slabs pass, or that
+// the picture has. A kernel's own work is about that of so many pixels.
+struct Cost {
+  static constexpr double pixels_a_kernel = 16;
+
+  std::int64_t pixels = 0;
+  double kernels = 0;
+  std::string dominant;  // JSON pointer to the setting with the largest share
+};
+
+// `completed` is placed flat. `bent`: it will be drawn on a bent lattice, of which every sample is
+// drawn. What lies outside the picture counts by its share of the volume.
+Result<Cost> cost_of(const scene::Completed& completed, bool bent);
+
+}  // namespace windsplat::frame

@@ -1,0 +1,54 @@
+// Problem -> response; answers that may be tried again later say when.
+#include "server/http/problem.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "protocol/codec.hpp"
+#include "server/http/request_id.hpp"
+
+namespace windsplat::net {
+namespace {
+
+constexpr const char* problem_type = "application/problem+json";
+
+Response respond(const protocol::Problem& problem, int retry_after_s) {
+  Response response;
+  response.status = problem.status;
+  response.content_type = problem_type;
+  response.headers = {{"Cache-Control", "no-store"}};
+  if (problem.status == 409 || problem.status == 429 || problem.status == 503) {
+    response.headers.emplace_back("Retry-After", std::to_string(std::max(1, retry_after_s)));
+  }
+  response.body = Body::of(protocol::encode_problem(problem));
+  return response;
+}
+
+}  // namespace
+
+Response problem_response(const Error& error) {
+  return respond(protocol::problem_from(error), error.retry_after_s);
+}
+
+Response problem_response(int status, std::string title, std::string detail, int retry_after_s) {
+  protocol::Problem problem;
+  problem.status = status;
+  problem.title = std::move(title);
+  problem.detail = std::move(detail);
+  return respond(problem, retry_after_s);
+}
+
+void name_request(Response& response, const std::string& request_id) {
+  response.headers.emplace_back(request_id_header, request_id);
+  if (response.content_type != problem_type) return;
+  // The id has nothing to escape, and a problem has other members.
+  std::string json = "{\"requestId\":\"";
+  json += request_id;
+  json += "\",";
+  const auto rest = response.body.bytes.subspan(1);
+  json.append(rest.begin(), rest.end());
+  response.body = Body::of(std::move(json));
+}
+
+}  // namespace windsplat::net

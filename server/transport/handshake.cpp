@@ -1,0 +1,225 @@
+// A TLS handshake in two halves. `Handshake` is used by the io thread alone: it holds the
+// connection's place and deadline. `TlsTask` holds the socket, and is used by the handshake thread
+// alone until that posts it back; the other half ends it by shutdown(2), which any thread may call,
+// and takes away the step that waits: so what gave back its place holds a descriptor no longer than
+// a step takes that runs, however busy that thread is.
+#include "server/transport/handshake.hpp"
+
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <atomic>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "server/access/address.hpp"
+#include "server/api/services.hpp"
+#include "server/base/log.hpp"
+#include "server/transport/guarded.hpp"
+#include "server/transport/http_session.hpp"
+#include "server/transport/post_or_retry.hpp"
+#include "server/transport/tls_context.hpp"
+#include "server/transport/wire.hpp"
+
+namespace windsplat::net {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::seconds tls_timeout{5};
+constexpr std::chrono::seconds tls_reserve_timeout{2};  // of a connection of the reserve
+// At a time; for one more another ends.
+constexpr std::size_t tls_handshakes_max = 256;
+constexpr std::size_t handshakes_per_address_max = 64;
+// After which no more is read. A ClientHello has some 500 bytes, 2 KB with a post-quantum key
+// share; OpenSSL would take 131 kB.
+constexpr std::size_t handshake_bytes_max = std::size_t{16} * 1024;
+// One read of Asio's: the client's last message may come with the data that follow it.
+constexpr std::size_t last_read_bytes = std::size_t{17} * 1024;
+
+class TlsTask final : public HandshakeTask {
+ public:
+  TlsTask(asio::ip::tcp::socket socket, std::shared_ptr<TlsContext> tls, HandshakeThread& thread,
+          Admission& admission, const Visitor& visitor)
+      : HandshakeTask(thread, counted_address(visitor.peer)),
+        handle_(socket.native_handle()),
+        wire_(std::move(socket), std::move(tls)),
+        io_(wire_.get_executor()),
+        admission_(admission),
+        trusted_(visitor.trusted) {}
+  // What is left to charge where memory failed for the way back.
+  ~TlsTask() override { charge(); }
+  TlsTask(const TlsTask&) = delete;
+  TlsTask& operator=(const TlsTask&) = delete;
+
+  // On the io thread. `done` is called there, with the fault; if it was abandoned any number of
+  // times.
+  void start(std::function<void(ErrorCode)> done) {
+    done_ = std::move(done);
+    submit([this] {
+      const HandshakeExecutor executor(*this, asio::query(io_, asio::execution::context));
+      wire_.handshake(executor, IoHandler([this, task = shared_from_this()](
+                                              ErrorCode fault, std::size_t) { outcome_ = fault; }));
+    });
+  }
+
+  // On the io thread. The handshake fails.
+  void abandon() {
+    drop();
+    ::shutdown(handle_, SHUT_RDWR);
+    charge();
+  }
+
+  [[nodiscard]] bool is_abandoned() const { return is_dropped(); }
+
+  // When it is done.
+  Wire take_wire() { return std::move(wire_); }
+
+ private:
+  bool may_go_on() override {
+    if (is_abandoned()) return false;
+    const std::size_t bytes = wire_.next_layer().rate_policy().bytes_read();
+    if (bytes <= handshake_bytes_max + last_read_bytes) return true;
+    // Nothing more is read: a shutdown alone would leave what has arrived to be read.
+    begin_no_more();
+    go_back();
+    return false;
+  }
+  // The io thread charges it, which must not wait for a lock that this thread holds: before the
+  // next step, when the handshake is done or abandoned, and for a step that ran meanwhile by
+  // go_back().
+  void step_took(std::int64_t cpu_us) override {
+    unpaid_us_ += cpu_us;
+    if (outcome_ || is_abandoned()) go_back();
+  }
+  void go_back() {
+    post_surely(io_, [this, task = shared_from_this()] {
+      charge();
+      done_(outcome_.value_or(asio::error::operation_aborted));
+    });
+  }
+  void pay() override { charge(); }
+  void charge() {
+    const std::int64_t us = unpaid_us_.exchange(0);
+    if (us > 0) admission_.handshake_took(address(), trusted_, us);
+  }
+
+  const int handle_;  // open as long as this lives, or wire_ after it was taken
+  Wire wire_;
+  const asio::any_io_executor io_;
+  Admission& admission_;
+  const bool trusted_;
+  std::function<void(ErrorCode)> done_;
+  std::optional<ErrorCode> outcome_;
+  std::atomic<std::int64_t> unpaid_us_{0};
+};
+
+class Handshake : public Connection, public std::enable_shared_from_this<Handshake> {
+ public:
+  Handshake(asio::ip::tcp::socket socket, Services& services, Connections& connections,
+            HandshakeThread& thread, Visitor visitor)
+      : services_(services),
+        connections_(connections),
+        id_(connections.next_id()),
+        visitor_(std::move(visitor)),
+        address_(counted_address(visitor_.peer)),
+        deadline_(socket.get_executor()),
+        task_(std::make_shared<TlsTask>(std::move(socket), services.options.tls, thread,
+                                        services.admission, visitor_)) {}
+  ~Handshake() override { connections_.remove(id_); }
+  Handshake(const Handshake&) = delete;
+  Handshake& operator=(const Handshake&) = delete;
+
+  void start() {
+    late_ = services_.draining;
+    connections_.add(id_, weak_from_this(), false, late_);
+    deadline_.expires_after(visitor_.reserve ? tls_reserve_timeout : tls_timeout);
+    deadline_.async_wait(guarded(shared_from_this(), [this](ErrorCode fault) {
+      if (!fault) abort();
+    }));
+    if (!visitor_.trusted) {
+      (void)connections_.end_longest(
+          [this](const Connection& other) {
+            return other.address() == address_ ? other.handshaking_since() : std::nullopt;
+          },
+          handshakes_per_address_max);
+    }
+    (void)connections_.end_handshake(tls_handshakes_max);
+    if (!task_) return;  // it was itself that ended
+    task_->start([weak = weak_from_this()](ErrorCode fault) {
+      const auto self = weak.lock();
+      if (self) guarded(self, [&] { self->on_done(fault); })();
+    });
+  }
+
+  void drain() override {}  // it is waited for
+  void abort() override {
+    if (task_) task_->abandon();
+    end();
+  }
+
+  [[nodiscard]] Since unasked_since() const override {
+    return visitor_.reserve ? handshaking_since() : std::nullopt;
+  }
+  [[nodiscard]] Since handshaking_since() const override {
+    return task_ ? Since(came_) : std::nullopt;
+  }
+  [[nodiscard]] std::string_view address() const override { return address_; }
+  [[nodiscard]] bool is_known() const override { return visitor_.known; }
+  [[nodiscard]] std::string request_id() const { return {}; }
+
+ private:
+  void on_done(ErrorCode fault) {
+    if (!task_) return;
+    if (task_->is_abandoned()) return abort();  // a step that was dropped may still hold its wire
+    // From here on its descriptor is the wire's, which may close it.
+    Wire wire = std::exchange(task_, nullptr)->take_wire();
+    if (!fault) {
+      start_http_session(std::move(wire), services_, connections_, std::move(visitor_), late_);
+    } else if (is_plain_http(fault)) {
+      wire.forgo_tls();
+      refuse_plain_http(std::move(wire), services_, connections_, std::move(visitor_), late_);
+    } else {
+      log::debug("a TLS handshake failed", {{"fault", fault.message()}});
+    }
+    end();
+  }
+
+  void end() {
+    task_.reset();
+    deadline_.cancel();      // whose handler holds the last reference
+    visitor_.place.reset();  // now, and not when that has gone
+  }
+
+  Services& services_;
+  Connections& connections_;
+  const std::uint64_t id_;
+  Visitor visitor_;
+  const std::string address_;
+  const Clock::time_point came_ = Clock::now();
+  asio::steady_timer deadline_;
+  std::shared_ptr<TlsTask> task_;  // null: it is done
+  bool late_ = false;              // it came while a drain waits for the others
+};
+
+}  // namespace
+
+void start_connection(asio::ip::tcp::socket socket, Services& services, Connections& connections,
+                      HandshakeThread* handshakes, Visitor visitor) {
+  if (handshakes == nullptr) {
+    start_http_session(Wire(std::move(socket), nullptr), services, connections, std::move(visitor),
+                       services.draining);
+    return;
+  }
+  std::make_shared<Handshake>(std::move(socket), services, connections, *handshakes,
+                              std::move(visitor))
+      ->start();
+}
+
+}  // namespace windsplat::net

@@ -1,0 +1,280 @@
+// Puts the network side together: one io thread, one renderer, and an orderly end.
+#include "server/transport/server.hpp"
+
+#include <atomic>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <exception>
+#include <new>
+#include <thread>
+#include <utility>
+
+#include "server/api/router.hpp"
+#include "server/base/check.hpp"
+#include "server/base/log.hpp"
+#include "server/transport/connections.hpp"
+#include "server/transport/handshake.hpp"
+#include "server/transport/listener.hpp"
+#include "server/transport/post_or_retry.hpp"
+#include "server/work/run_guarded.hpp"
+
+namespace windsplat::net {
+namespace {
+
+namespace asio = boost::asio;
+
+constexpr std::chrono::seconds look_every{1};
+// Where memory is short, for others to give theirs back.
+constexpr std::chrono::milliseconds after_a_fault{10};
+
+}  // namespace
+
+struct Server::State {
+  State(ServerOptions options, std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool> pool)
+      : services(std::move(options), std::move(store), std::move(pool)),
+        listener(
+            io, [this](asio::ip::tcp::socket socket) { accepted(std::move(socket)); },
+            [this] { services.metrics.accept_failed(); }),
+        look_timer(io),
+        cancel_timer(io),
+        abort_timer(io) {
+    connections.on_empty([this] {
+      if (services.draining) end();
+    });
+  }
+
+  ~State() {
+    connections.on_empty(nullptr);
+    connections.each([](Connection& connection) { connection.abort(); });
+    services.backend.renderer.cancel_all();
+    if (ending.joinable()) ending.join();
+    services.backend.catalogue.end();  // so that no thread of the services' is found in a read
+    services.end();                    // and none answers any more
+    if (handshakes) handshakes->stop();
+    // What was on its way when the loop was stopped.
+    io.restart();
+    while (true) {
+      try {
+        io.poll();
+        break;
+      } catch (const std::exception& fault) {
+        tell_fault("a fault reached the io loop", fault);
+      }
+    }
+  }
+
+  void accepted(asio::ip::tcp::socket socket) {
+    boost::system::error_code fault;
+    const auto peer = socket.remote_endpoint(fault);
+    const std::string address = fault ? "" : peer.address().to_string();
+    auto visitor = admit(address);
+    if (!visitor) return services.metrics.connection_refused();
+    start_connection(std::move(socket), services, connections, handshakes.get(),
+                     std::move(*visitor));
+  }
+
+  // Who waits for nothing makes room: of all connections the one that is idle for longest, of the
+  // reserve the one without a request.
+  std::optional<Visitor> admit(const std::string& address) {
+    Admission& admission = services.admission;
+    if (!admission.arrive(address, services.options.tls != nullptr)) return std::nullopt;
+    auto visitor = admission.connect(address);
+    const auto& reason = visitor ? visitor->reserve : std::nullopt;
+    if (visitor && reason && reason->kind == LimitKind::connections &&
+        connections.end_longest(&Connection::idle_since)) {
+      visitor.reset();
+      visitor = admission.connect(address);
+    }
+    if (!visitor && admission.is_kept_out_by_others(address) &&
+        connections.end_longest(&Connection::unasked_since)) {
+      visitor = admission.connect(address);
+    }
+    return visitor;
+  }
+
+  // Every second, one look at a time: a slow disk makes them fewer.
+  void look_after_data() {
+    looking = false;
+    look_timer.expires_after(look_every);
+    look_timer.async_wait([this](boost::system::error_code fault) {
+      looking = false;
+      if (!fault) services.admission.log_refused_handshakes();
+      if (fault || services.draining) return;
+      const auto look = [this] {
+        auto found = attempt<std::vector<std::string>>("a look at the files", never, [this] {
+          return services.backend.catalogue.look_after();
+        });
+        std::vector<std::string> changed;
+        if (found) changed = std::move(*found);
+        const auto go_on_looking = [this, changed = std::move(changed)] {
+          looking = false;
+          tell_changes(changed);
+          look_after_data();
+        };
+        while (!post_surely(io.get_executor(), go_on_looking) && !services.draining) {
+        }
+      };
+      if (!services.watcher.submit({never, look, true})) return look_after_data();
+      looking = true;
+    });
+    looking = true;
+  }
+
+  void tell_changes(const std::vector<std::string>& datasets) {
+    for (const std::string& dataset : datasets) {
+      services.backend.quality.forget(dataset);
+      connections.each([&](Connection& connection) { connection.on_changed(dataset); });
+    }
+  }
+
+  // What goes on by itself, each step asking for the next; a step that found no memory to ask is
+  // asked for again here.
+  void go_on() {
+    if (services.draining && !end_is_near) begin_drain();
+    if (services.draining) return;
+    listener.start();
+    if (!looking) look_after_data();
+  }
+
+  // On the io thread.
+  void change(Access access) {
+    ServerOptions& options = services.options;
+    WINDSPLAT_CHECK((access.tls == nullptr) == (options.tls == nullptr));
+    const bool other_token = is_other_token(options.token.get(), access.token.get());
+    options.allow_origins = std::move(access.allow_origins);
+    options.token = std::move(access.token);
+    options.tls = std::move(access.tls);
+    options.known_hosts_only = access.known_hosts_only;
+    options.allow_hosts = std::move(access.allow_hosts);
+    if (!other_token) return;
+    connections.each([](Connection& connection) {
+      try {
+        connection.on_new_token();
+      } catch (const std::exception&) {
+        connection.abort();  // it must not go on under the old one
+      }
+    });
+  }
+
+  // On the io thread.
+  void begin_drain() {
+    services.draining = true;
+    if (end_is_near) return;
+    cancel_timer.expires_after(services.options.drain_cancel_after);
+    cancel_timer.async_wait([this](boost::system::error_code fault) {
+      if (fault) return;
+      services.backend.renderer.cancel_all();
+      ending = std::thread([this] {
+        try {
+          services.backend.catalogue.end();
+        } catch (const std::exception& failure) {
+          tell_fault("what is read could not be ended", failure);
+        }
+      });
+    });
+    abort_timer.expires_after(services.options.drain_abort_after);
+    abort_timer.async_wait([this](boost::system::error_code fault) {
+      if (fault) return;
+      connections.each([](Connection& connection) { connection.abort(); });
+      end();
+    });
+    end_is_near = true;
+    services.backend.jobs.cancel_all();
+    connections.each([](Connection& connection) {
+      try {
+        connection.drain();
+      } catch (const std::exception&) {
+        connection.abort();
+      }
+    });
+    if (connections.size() == 0) end();
+  }
+
+  void end() {
+    listener.close();
+    connections.each([](Connection& connection) { connection.abort(); });  // those that came late
+    look_timer.cancel();
+    cancel_timer.cancel();
+    abort_timer.cancel();
+    try {
+      asio::post(io, [this] { io.stop(); });
+    } catch (const std::bad_alloc&) {
+      io.stop();
+    }
+  }
+
+  // Both before io: sessions that are still in it when it goes take their leave of them. Threads of
+  // the services post to io: they end before it does, in ~State.
+  Connections connections;
+  Services services;
+  asio::io_context io{1};
+  // The loop ends when it is told to, not where memory failed for all that it waited for.
+  asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
+  // Null: plain TCP. Its thread posts to io, too.
+  const std::unique_ptr<HandshakeThread> handshakes{
+      services.options.tls ? std::make_unique<HandshakeThread>() : nullptr};
+  Listener listener;
+  asio::steady_timer look_timer;
+  asio::steady_timer cancel_timer;
+  asio::steady_timer abort_timer;
+  const CancelToken never;   // of what nobody gives up
+  bool looking = false;      // waits for the next look, or for what the present one finds
+  bool end_is_near = false;  // a drain's timers run
+  std::thread ending;        // of what is read, when a drain takes long
+};
+
+Server::Server(ServerOptions options, std::shared_ptr<data::Store> store,
+               std::shared_ptr<ThreadPool> pool)
+    : state_(std::make_unique<State>(std::move(options), std::move(store), std::move(pool))) {}
+
+Server::~Server() = default;
+
+Result<void> Server::listen() {
+  const ServerOptions& options = state_->services.options;
+  return state_->listener.listen(options.address, options.port);
+}
+
+std::uint16_t Server::port() const { return state_->listener.endpoint().port(); }
+
+std::string Server::url() const {
+  auto address = state_->listener.endpoint().address();
+  std::string host = address.to_string();
+  if (address.is_unspecified()) {
+    host = "127.0.0.1";  // every address of this machine, so this one too
+  } else if (address.is_v6()) {
+    host = '[' + host + ']';
+  }
+  const char* const scheme = state_->services.options.tls != nullptr ? "https://" : "http://";
+  return scheme + host + ':' + std::to_string(port()) + state_->services.options.base_path;
+}
+
+void Server::run() {
+  WINDSPLAT_CHECK(port() != 0);
+  while (!state_->io.stopped()) {
+    try {
+      state_->go_on();
+      state_->io.run();
+    } catch (const std::exception& fault) {
+      tell_fault("a fault reached the io loop", fault);
+      std::this_thread::sleep_for(after_a_fault);
+    }
+  }
+}
+
+void Server::drain() {
+  // Whoever asks for the end gets it, however long there is no memory for it.
+  while (
+      !post_surely(state_->io.get_executor(), [state = state_.get()] { state->begin_drain(); })) {
+  }
+}
+
+void Server::change(Access access) {
+  asio::post(state_->io, [state = state_.get(), access = std::move(access)]() mutable {
+    state->change(std::move(access));
+  });
+}
+
+}  // namespace windsplat::net

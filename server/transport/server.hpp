@@ -1,0 +1,49 @@
+// The daemon's network side: one listener, HTTP and WebSocket sessions, one renderer.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/access/auth.hpp"
+#include "server/api/server_options.hpp"
+#include "server/base/error.hpp"
+#include "server/base/thread_pool.hpp"
+#include "server/data/resident/store.hpp"
+#include "server/transport/tls.hpp"
+
+namespace windsplat::net {
+
+// What can be changed while the server runs.
+struct Access {
+  std::vector<std::string> allow_origins;
+  std::shared_ptr<const Token> token;
+  std::shared_ptr<TlsContext> tls;  // of connections that come; null only where it was before
+  bool known_hosts_only = false;
+  std::vector<std::string> allow_hosts;
+};
+
+class Server {
+ public:
+  Server(ServerOptions options, std::shared_ptr<data::Store> store,
+         std::shared_ptr<ThreadPool> pool);
+  ~Server();
+
+  Result<void> listen();  // binds; errors name address and port
+  [[nodiscard]] std::uint16_t port() const;
+  [[nodiscard]] std::string url() const;  // to open in a browser, with the base path
+
+  void run();  // serves until drained; blocks
+  // Any thread: /readyz fails, streams close with 1001, frames in work end or are given up, and
+  // run() returns within 10 s.
+  void drain();
+  // Any thread. Another token ends the streams that were opened before.
+  void change(Access access);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace windsplat::net

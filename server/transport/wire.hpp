@@ -1,0 +1,151 @@
+// One connection's bytes, in plain TCP or in TLS: a single type, so that what is built on it (all
+// of Beast's HTTP and WebSocket) is compiled once. Only the files of those sessions may include
+// this.
+#pragma once
+
+#include <array>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/websocket/teardown.hpp>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <type_traits>
+#include <utility>
+
+#include "server/transport/handshake_thread.hpp"
+#include "server/transport/stream.hpp"
+#include "server/transport/tls.hpp"
+
+namespace windsplat::net {
+
+// A completion handler whose type is forgotten, so that the TLS layer is compiled once for all of
+// them. Called once.
+class IoHandler {
+ public:
+  template <class Handler, class = std::enable_if_t<!std::is_same_v<Handler, IoHandler>>>
+  explicit IoHandler(Handler handler)
+      : held_(std::make_unique<Held<Handler>>(std::move(handler))) {}
+
+  void operator()(ErrorCode fault, std::size_t bytes) {
+    Anything& held = *held_;
+    held.call(std::move(held_), fault, bytes);
+  }
+  void operator()(ErrorCode fault) { (*this)(fault, 0); }
+
+ private:
+  struct Anything {
+    virtual ~Anything() = default;
+    virtual void call(std::unique_ptr<Anything> self, ErrorCode fault, std::size_t bytes) = 0;
+  };
+  template <class Handler>
+  struct Held final : Anything {
+    explicit Held(Handler given) : handler(std::move(given)) {}
+    void call(std::unique_ptr<Anything> self, ErrorCode fault, std::size_t bytes) override {
+      Handler own(std::move(handler));
+      self.reset();  // memory goes back before the call, as Asio has it
+      own(fault, bytes);
+    }
+    Handler handler;
+  };
+
+  std::unique_ptr<Anything> held_;
+};
+
+// An AsyncReadStream and AsyncWriteStream of Asio's, for completion handlers alone. One read and
+// one write may be under way at a time. What is pending lives on when it is moved.
+class Wire {
+ public:
+  using executor_type = TcpStream::executor_type;
+  using next_layer_type = TcpStream;
+
+  // `tls` null: plain TCP. Otherwise handshake() comes first.
+  Wire(asio::ip::tcp::socket socket, std::shared_ptr<TlsContext> tls);
+  ~Wire();
+  Wire(Wire&&) noexcept;
+  Wire& operator=(Wire&&) = delete;
+
+  executor_type get_executor() { return tcp().get_executor(); }
+  next_layer_type& next_layer() { return tcp(); }
+  [[nodiscard]] const next_layer_type& next_layer() const { return *tcp_; }
+  [[nodiscard]] bool secure() const { return tls_ != nullptr; }
+
+  // Its steps run by `executor`, and so must everything else that uses this until `done` is called;
+  // what makes it fail from another thread is shutdown() of the socket's descriptor.
+  void handshake(const HandshakeExecutor& executor, IoHandler done);
+  // Plain TCP from here on, after a handshake that failed.
+  void forgo_tls();
+  // Tells the peer that nothing follows (close_notify). Done when that has been written, whatever
+  // the peer says to it; nothing may be written afterwards.
+  void say_goodbye(IoHandler done);
+  void close();  // everything under way ends with a fault
+
+  // What came of HTTP or WebSocket, without TLS's own bytes, since forget() was called last.
+  [[nodiscard]] std::size_t bytes_read() const;
+  void forget();
+
+  template <class Buffers, class Handler>
+  void async_read_some(const Buffers& buffers, Handler&& handler) {
+    if (!secure()) {
+      tcp().async_read_some(buffers, std::forward<Handler>(handler));
+    } else {
+      read_tls(first_of(buffers), IoHandler(std::forward<Handler>(handler)));
+    }
+  }
+  template <class Buffers, class Handler>
+  void async_write_some(const Buffers& buffers, Handler&& handler) {
+    if (!secure()) {
+      tcp().async_write_some(buffers, std::forward<Handler>(handler));
+    } else {
+      write_tls(gathered(buffers), IoHandler(std::forward<Handler>(handler)));
+    }
+  }
+
+ private:
+  struct Tls;
+
+  TcpStream& tcp() { return *tcp_; }
+  using Record = std::array<std::uint8_t, 16384>;  // what one of TLS holds
+  Record& record();                                // made when first wanted
+  void read_tls(asio::mutable_buffer into, IoHandler done);
+  void write_tls(asio::const_buffer from, IoHandler done);
+
+  template <class Buffers>
+  static asio::mutable_buffer first_of(const Buffers& buffers) {
+    for (auto at = asio::buffer_sequence_begin(buffers); at != asio::buffer_sequence_end(buffers);
+         ++at) {
+      if (const asio::mutable_buffer buffer(*at); buffer.size() > 0) return buffer;
+    }
+    return {};
+  }
+  // Small pieces go into one record, and so into one packet: a frame's head with its picture.
+  template <class Buffers>
+  asio::const_buffer gathered(const Buffers& buffers) {
+    const auto begin = asio::buffer_sequence_begin(buffers);
+    if (begin == asio::buffer_sequence_end(buffers)) return {};
+    const asio::const_buffer first(*begin);
+    if (first.size() >= std::tuple_size_v<Record> || first.size() == asio::buffer_size(buffers))
+      return first;
+    return asio::buffer(record().data(), asio::buffer_copy(asio::buffer(record()), buffers));
+  }
+
+  std::unique_ptr<TcpStream> tcp_;  // where it lies does not change: what is under way knows it
+  std::unique_ptr<Tls> tls_;
+};
+
+// Beast's end of a WebSocket's connection.
+template <class Handler>
+void async_teardown(beast::role_type role, Wire& wire, Handler&& handler) {
+  using beast::websocket::async_teardown;
+  if (!wire.secure()) {
+    async_teardown(role, wire.next_layer().socket(), std::forward<Handler>(handler));
+    return;
+  }
+  wire.say_goodbye(IoHandler(
+      [role, &wire, handler = std::forward<Handler>(handler)](ErrorCode, std::size_t) mutable {
+        using beast::websocket::async_teardown;
+        async_teardown(role, wire.next_layer().socket(), std::move(handler));
+      }));
+}
+
+}  // namespace windsplat::net

@@ -1,0 +1,48 @@
+// The members in the order in which they need each other.
+#include "server/work/backend.hpp"
+
+#include <utility>
+
+#include "protocol/limits.hpp"
+
+namespace windsplat::net {
+namespace {
+
+constexpr std::size_t load_threads = 2;
+constexpr std::size_t load_threads_spare = 4;  // for loads that hang or wait for memory
+
+}  // namespace
+
+Backend::Backend(std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool> threads,
+                 Metrics& metrics_of_server, BackendOptions options)
+    : catalogue(std::move(store)),
+      metrics(metrics_of_server),
+      pool(std::move(threads)),
+      costs(pool->size()),
+      jobs(static_cast<std::size_t>(protocol::limits::jobs_max),
+           static_cast<std::size_t>(protocol::limits::jobs_running_max)),
+      renderer({requests_waiting_max,
+                options.requests_waiting_ms_max,
+                {},
+                options.wait_ms,
+                std::move(options.charge),
+                [this] { metrics.refused(LimitKind::waiting); }}),
+      loads(
+          load_threads, requests_waiting_max, "loads",
+          [this] { metrics.refused(LimitKind::waiting); }, load_threads_spare),
+      check_cost_(std::move(options.check_cost)) {}
+
+Result<Catalogue::Checked> Backend::check(const protocol::View& view) {
+  auto checked = catalogue.check(view);
+  if (!checked) return checked;
+  if (const auto fits = check_cost_(checked->cost); !fits) return fits.error();
+  return checked;
+}
+
+void Backend::end() {
+  jobs.end();  // they wait for the others
+  loads.end();
+  renderer.end();
+}
+
+}  // namespace windsplat::net

@@ -1,0 +1,234 @@
+// A list of jobs in order of arrival; each thread takes the first that waits.
+#include "server/work/jobs.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <list>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "server/work/run_guarded.hpp"
+
+namespace windsplat::net {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double progress_for_eta = 0.01;  // less says nothing about the rest
+
+enum class Stage { queued, running, done, failed, cancelled };
+
+const char* name_of(Stage stage) {
+  switch (stage) {
+    case Stage::queued:
+      return "queued";
+    case Stage::running:
+      return "running";
+    case Stage::done:
+      return "done";
+    case Stage::failed:
+      return "failed";
+    case Stage::cancelled:
+      return "cancelled";
+  }
+  return "failed";
+}
+
+struct Job {
+  std::string id;
+  std::string kind;
+  Jobs::Work work;  // empty once it was taken or cancelled
+  CancelToken cancel;
+  bool slow = false;
+  Stage stage = Stage::queued;
+  Clock::time_point since;
+  std::atomic<double> progress{0};
+  std::optional<protocol::JobResult> result;
+  std::optional<Error> error;
+
+  [[nodiscard]] bool finished() const { return stage != Stage::queued && stage != Stage::running; }
+};
+
+protocol::JobDescription describe(const Job& job) {
+  protocol::JobDescription out;
+  out.id = job.id;
+  out.kind = job.kind;
+  out.state = name_of(job.stage);
+  out.progress = job.progress;
+  if (job.stage == Stage::running && out.progress >= progress_for_eta) {
+    const std::chrono::duration<double, std::milli> taken = Clock::now() - job.since;
+    out.eta_ms = taken.count() * (1 - out.progress) / out.progress;
+  }
+  out.result = job.result;
+  if (job.error) out.problem = protocol::problem_from(*job.error);
+  return out;
+}
+
+// Throws nothing.
+Result<protocol::JobResult> run_guarded(const Jobs::Work& work, const std::shared_ptr<Job>& job) {
+  return attempt<protocol::JobResult>("of a client", job->cancel, [&] {
+    return work({job->cancel, [job](double done) { job->progress = std::clamp(done, 0.0, 1.0); }});
+  });
+}
+
+}  // namespace
+
+struct Jobs::State {
+  using Shared = std::shared_ptr<Job>;
+
+  void work() {
+    std::unique_lock lock(mutex);
+    while (true) {
+      Shared job;
+      wake.wait(lock, [&] { return stopping || (job = first_queued()) != nullptr; });
+      if (stopping) return;
+      if (job->slow) ++slow_running;
+      job->stage = Stage::running;
+      job->since = Clock::now();
+      Work task = std::exchange(job->work, nullptr);
+      lock.unlock();
+      auto outcome = run_guarded(task, job);
+      task = nullptr;  // what it holds goes before the lock is taken
+      lock.lock();
+      finish(*job, std::move(outcome));
+      if (job->slow) --slow_running;
+    }
+  }
+
+  // Moves alone: no exception may leave the thread.
+  static void finish(Job& job, Result<protocol::JobResult> outcome) noexcept {
+    if (outcome) {
+      job.stage = Stage::done;
+      job.progress = 1;
+      job.result = std::move(*outcome);
+      return;
+    }
+    Error error = std::move(outcome).error();
+    const bool cancelled = error.kind == ErrorKind::cancelled;
+    job.stage = cancelled ? Stage::cancelled : Stage::failed;
+    if (!cancelled) job.error = std::move(error);
+  }
+
+  // The rest under the mutex.
+  [[nodiscard]] Shared first_queued() const {
+    const bool slow_too = slow_running < slow_max;
+    const auto at = std::find_if(jobs.begin(), jobs.end(), [&](const Shared& job) {
+      return job->stage == Stage::queued && (slow_too || !job->slow);
+    });
+    return at == jobs.end() ? nullptr : *at;
+  }
+
+  [[nodiscard]] Result<Shared> find(const std::string& id) const {
+    const auto at =
+        std::find_if(jobs.begin(), jobs.end(), [&](const Shared& job) { return job->id == id; });
+    if (at == jobs.end()) {
+      return make_error(ErrorKind::not_found, "there is no job '" + printable(id, 40) + "'");
+    }
+    return *at;
+  }
+
+  [[nodiscard]] bool make_room() {
+    if (jobs.size() < known_max) return true;
+    const auto oldest =
+        std::find_if(jobs.begin(), jobs.end(), [](const Shared& job) { return job->finished(); });
+    if (oldest == jobs.end()) return false;
+    jobs.erase(oldest);
+    return true;
+  }
+
+  static void cancel(Job& job) {
+    job.cancel.cancel();
+    if (job.stage != Stage::queued) return;
+    job.stage = Stage::cancelled;
+    job.work = nullptr;
+  }
+
+  std::size_t known_max = 1;
+  std::size_t slow_max = 1;  // that run at a time
+  std::size_t slow_running = 0;
+  mutable std::mutex mutex;
+  std::condition_variable wake;
+  std::list<Shared> jobs;
+  std::uint64_t next_id = 1;
+  bool stopping = false;
+  std::vector<std::thread> threads;
+};
+
+Jobs::Jobs(std::size_t known_max, std::size_t running_max) : state_(std::make_unique<State>()) {
+  state_->known_max = known_max;
+  state_->slow_max = std::max<std::size_t>(running_max, 2) - 1;
+  for (std::size_t i = 0; i < running_max; ++i) {
+    state_->threads.emplace_back([state = state_.get()] { state->work(); });
+  }
+}
+
+Jobs::~Jobs() { end(); }
+
+void Jobs::end() {
+  cancel_all();
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->stopping = true;
+  }
+  state_->wake.notify_all();
+  for (std::thread& thread : state_->threads) thread.join();
+  state_->threads.clear();
+}
+
+Result<protocol::JobDescription> Jobs::submit(std::string kind, Work work, const Terms& terms) {
+  const auto job = std::make_shared<Job>();
+  job->kind = std::move(kind);
+  job->work = std::move(work);
+  job->cancel = terms.cancel;
+  job->slow = terms.slow;
+  protocol::JobDescription described;
+  {
+    const std::lock_guard lock(state_->mutex);
+    if (state_->stopping) return make_error(ErrorKind::draining, "the server is shutting down");
+    if (!state_->make_room()) {
+      return make_error(ErrorKind::busy, std::to_string(state_->known_max) +
+                                             " jobs wait or run, and more there may not be; try "
+                                             "again when one is done");
+    }
+    job->id = std::to_string(state_->next_id++);
+    state_->jobs.push_back(job);
+    described = describe(*job);
+  }
+  state_->wake.notify_one();
+  return described;
+}
+
+std::vector<protocol::JobDescription> Jobs::list() const {
+  const std::lock_guard lock(state_->mutex);
+  std::vector<protocol::JobDescription> out;
+  for (const auto& job : state_->jobs) out.push_back(describe(*job));
+  return out;
+}
+
+Result<protocol::JobDescription> Jobs::find(const std::string& id) const {
+  const std::lock_guard lock(state_->mutex);
+  const auto job = state_->find(id);
+  if (!job) return job.error();
+  return describe(**job);
+}
+
+Result<void> Jobs::cancel(const std::string& id) {
+  const std::lock_guard lock(state_->mutex);
+  const auto job = state_->find(id);
+  if (!job) return job.error();
+  State::cancel(**job);
+  return {};
+}
+
+void Jobs::cancel_all() {
+  const std::lock_guard lock(state_->mutex);
+  for (const auto& job : state_->jobs) State::cancel(*job);
+}
+
+}  // namespace windsplat::net

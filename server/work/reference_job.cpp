@@ -1,0 +1,131 @@
+// Strips -> the renderer's queue, one after the other; the picture and its error -> what is kept.
+#include "server/work/reference_job.hpp"
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "protocol/codec.hpp"
+#include "server/data/model/digest.hpp"
+#include "server/frame/reference.hpp"
+#include "server/scene/build.hpp"
+#include "server/work/run_guarded.hpp"
+
+namespace windsplat::net {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds strip_time{100};
+constexpr std::chrono::milliseconds notice_time{20};
+
+// What a job's thread waits for at the renderer; it lives until both are done with it.
+struct Strip {
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::optional<Result<void>> outcome;
+};
+
+// Who draws, and who pays for it.
+struct Artist {
+  std::uint64_t owner = 0;
+  std::string payer;
+};
+
+// Runs `draw` on the renderer's thread while nobody else needs it, again where others came between,
+// until it says something else than `cancelled`, or the job is. Takes a copy of `draw`, which may
+// outlive the call by a moment.
+Result<void> in_background(Backend& backend, const Artist& artist, const CancelToken& unwanted,
+                           const std::function<Result<void>(const CancelToken&)>& draw) {
+  while (!unwanted.cancelled()) {
+    const auto strip = std::make_shared<Strip>();
+    RenderJob job;
+    job.kind = RenderKind::background;
+    job.owner = artist.owner;
+    job.payer = artist.payer;
+    const CancelToken stop = job.cancel;
+    job.run = [strip, draw, stop](std::int64_t /*queue_us*/) {
+      auto outcome = attempt<void>("a reference", stop, [&] { return draw(stop); });
+      const std::lock_guard lock(strip->mutex);
+      strip->outcome = std::move(outcome);
+      strip->changed.notify_one();
+    };
+    if (auto queued = backend.renderer.submit(std::move(job)); !queued) return queued.error();
+    std::unique_lock lock(strip->mutex);
+    while (
+        !strip->changed.wait_for(lock, notice_time, [&] { return strip->outcome.has_value(); })) {
+      if (!unwanted.cancelled()) continue;
+      stop.cancel();
+      return make_error(ErrorKind::cancelled, "nobody wants the reference any more");
+    }
+    Result<void> outcome = *strip->outcome;
+    if (outcome || outcome.error().kind != ErrorKind::cancelled) return outcome;
+  }
+  return make_error(ErrorKind::cancelled, "nobody wants the reference any more");
+}
+
+// Everything that the picture and its error follow from.
+std::string id_of(const protocol::View& completed, const data::Dataset& dataset) {
+  const std::string text =
+      protocol::encode_view(completed) + '\n' + dataset.info().digest + '\n' + WINDSPLAT_VERSION;
+  const std::string first = data::digest_of(text);
+  return first + data::digest_of(first + text);
+}
+
+}  // namespace
+
+Result<protocol::JobResult> draw_reference(Backend& backend, const protocol::View& view,
+                                           data::Dataset& dataset, const Jobs::Handle& handle,
+                                           const std::string& payer, const std::string& base_path) {
+  auto completed = scene::complete_view(view, dataset);
+  if (!completed) return completed.error();
+  completed->quality = {};  // says how a stream is to draw it, not what it shows
+  protocol::ReferenceDescription description;
+  description.id = id_of(*completed, dataset);
+  if (const auto kept = backend.references.find(description.id)) return kept->description;
+  const frame::WorkMemory memory{
+      [&](std::uint64_t bytes) { return backend.catalogue.reserve(bytes); },
+      [&] { return backend.catalogue.room(); }};
+  auto begun = frame::ReferenceDrawing::begin(*completed, dataset, backend.pool->size(),
+                                              handle.cancel, memory);
+  if (!begun) return begun.error();
+  const std::shared_ptr<frame::ReferenceDrawing> drawing = std::move(*begun);
+  const Artist artist{backend.references.next_owner(), payer};
+  while (drawing->done() < 1) {
+    const auto drawn = in_background(backend, artist, handle.cancel,
+                                     [&backend, drawing](const CancelToken& stop) -> Result<void> {
+                                       const auto until = Clock::now() + strip_time;
+                                       drawing->draw(*backend.pool, stop,
+                                                     [until] { return Clock::now() >= until; });
+                                       return {};
+                                     });
+    if (!drawn) return drawn.error();
+    handle.tell_progress(drawing->done());
+  }
+  const auto difference = std::make_shared<frame::Difference>();
+  const auto compared =
+      in_background(backend, artist, handle.cancel,
+                    [&backend, drawing, difference](const CancelToken& stop) -> Result<void> {
+                      const auto found = drawing->compare(*backend.pool, stop, backend.frames);
+                      if (!found) return found.error();
+                      *difference = *found;
+                      return {};
+                    });
+  if (!compared) return compared.error();
+  auto png = drawing->encode_png();
+  if (!png) return png.error();
+  description.picture = base_path + "v1/references/" + description.id + ".png";
+  description.width = drawing->width();
+  description.height = drawing->height();
+  description.rmse = difference->rmse;
+  description.max = difference->max;
+  description.psnr = difference->psnr;
+  backend.references.keep({description, std::make_shared<const image::Bytes>(std::move(*png))});
+  return protocol::JobResult(std::move(description));
+}
+
+}  // namespace windsplat::net

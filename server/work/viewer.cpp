@@ -1,0 +1,228 @@
+// Effects of a session -> render jobs; what they bring -> the session's own words.
+#include "server/work/viewer.hpp"
+
+#include <mutex>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "protocol/codec.hpp"
+#include "server/frame/frame_info.hpp"
+#include "server/frame/measure.hpp"
+#include "server/scene/build.hpp"
+#include "server/work/calibration_job.hpp"
+#include "server/work/drawing.hpp"
+#include "server/work/error_report.hpp"
+#include "server/work/run_guarded.hpp"
+
+namespace windsplat::net {
+namespace {
+
+frame::Encoding frame_encoding(const session::Encoding& wanted, const quality::Setting& setting) {
+  frame::Encoding encoding;
+  const bool png = wanted.codec == protocol::Codec::png;
+  encoding.format = png ? frame::Format::png : frame::Format::jpeg;
+  encoding.quality = wanted.quality;
+  encoding.subsampling = wanted.full_chroma ? image::Subsampling::s444 : image::Subsampling::s420;
+  encoding.half_level = setting.half_level;
+  encoding.coarser = setting.coarser;
+  encoding.measure = wanted.measure;
+  return encoding;
+}
+
+Result<session::Drawn> draw(Backend& backend, const session::StartRender& wanted,
+                            data::Dataset& dataset, std::int64_t queue_us, bool after_load,
+                            const CancelToken& cancel) {
+  const frame::Encoding encoding = frame_encoding(wanted.encoding, wanted.setting);
+  const auto room = reserve_picture(dataset, wanted.view.image, encoding, after_load);
+  if (!room) return room.error();
+  auto drawn = frame::produce(quality::at_setting(wanted.view, wanted.setting), dataset, encoding,
+                              *backend.pool, cancel, backend.frames);
+  if (!drawn) return drawn.error();
+  session::Drawn out;
+  out.info = frame::frame_info(*drawn, drawn->view);
+  Seen seen = seen_in(*drawn, wanted.setting);
+  tell_error(*drawn, seen, wanted.setting, encoding, backend.quality, out.info);
+  out.style = std::move(seen.style);
+  out.sight = seen.sight;
+  out.view_json = protocol::encode_view(drawn->view);
+  out.payload = std::make_shared<const std::vector<std::uint8_t>>(std::move(drawn->bytes));
+  out.queue_us = queue_us;
+  out.render_us = drawn->render_us;
+  out.measure_us = drawn->measure_us;
+  out.encode_us = drawn->encode_us;
+  backend.metrics.stage_took(Metrics::Stage::queue, out.queue_us);
+  backend.metrics.stage_took(Metrics::Stage::render, out.render_us);
+  backend.metrics.stage_took(Metrics::Stage::encode, out.encode_us);
+  return out;
+}
+
+// Made into text here, and what may be long left out: the io thread has others to serve.
+Result<protocol::DatasetDescription> encoded(Result<protocol::DatasetDescription> description) {
+  if (!description) return description;
+  description->encoded =
+      std::make_shared<const std::string>(protocol::encode_dataset(*description));
+  description->steps = {};
+  description->axes = {};
+  return description;
+}
+
+constexpr int describing_max = 4;  // of a session at a time
+
+Result<std::vector<data::Wish>> wishes_of(const data::Dataset& dataset,
+                                          const session::Prefetch& wanted) {
+  data::Dataset ahead = dataset.ahead();
+  const auto completed = frame::complete_at(quality::at_setting(wanted.view, wanted.setting), ahead,
+                                            frame_encoding({}, wanted.setting));
+  if (!completed) return completed.error();
+  const auto shown = scene::shown_by(*completed);
+  if (!shown) return shown.error();
+  std::vector<data::Wish> wishes;
+  for (const int step : wanted.steps) {
+    for (const std::string& field : shown->fields) {
+      wishes.push_back({dataset, field, static_cast<std::size_t>(step), shown->coarsening});
+    }
+  }
+  return wishes;
+}
+
+}  // namespace
+
+// What is wished for next. A dataset has one job waiting at most, however often a viewer changes
+// its mind; the job works out what is wished for when its turn has come.
+struct Viewer::Wishes {
+  struct Newest {
+    data::Dataset dataset;
+    session::Prefetch effect;
+  };
+  std::mutex mutex;  // held while a wish is said, so that none is said after it was taken back
+  std::optional<Newest> newest;           // until it is worked out
+  const data::DatasetInfo* of = nullptr;  // which dataset the newest was about; told apart only
+  std::uint64_t epoch = 0;                // counts wishes taken back and datasets left
+  std::set<const data::DatasetInfo*> queued;
+};
+
+Viewer::Viewer(Backend& backend, std::uint64_t owner, std::string payer)
+    : backend_(backend),
+      owner_(owner),
+      payer_(std::move(payer)),
+      wishes_(std::make_shared<Wishes>()) {}
+
+void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
+  survey_.cancel();  // the view rests no more
+  const CancelToken cancel;
+  running_.emplace(effect.ticket, cancel);
+  auto dataset = backend_.catalogue.find(effect.view.dataset);
+  if (!dataset) return reply(effect.ticket, dataset.error());
+  // A still may be larger than the view that was checked when it came.
+  if (const auto fits = backend_.check(effect.view); !fits) {
+    return reply(effect.ticket, fits.error());
+  }
+  const auto shared = std::make_shared<const DrawnReply>(std::move(reply));
+  Drawing drawing{
+      RenderService::Kind::stream, owner_, cancel, std::move(*dataset), {}, {}, {}, 0, payer_};
+  drawing.draw = [&backend = backend_, effect, cancel, shared](
+                     data::Dataset& resident, std::int64_t queue_us, bool after_load) {
+    auto drawn = attempt<session::Drawn>("a frame", cancel, [&] {
+      return draw(backend, effect, resident, queue_us, after_load, cancel);
+    });
+    if (!after_load && !drawn && drawn.error().kind == ErrorKind::not_resident) return false;
+    if (drawn) drawn->loaded = after_load;
+    (*shared)(effect.ticket, std::move(drawn));
+    return true;
+  };
+  drawing.load = [effect, cancel](data::Dataset& loading) {
+    return attempt<std::shared_ptr<const void>>("loading a frame's fields", cancel, [&] {
+      return load_picture(quality::at_setting(effect.view, effect.setting), loading,
+                          frame_encoding(effect.encoding, effect.setting));
+    });
+  };
+  drawing.fail = [ticket = effect.ticket, shared](const Error& error) { (*shared)(ticket, error); };
+  // Jobs of streams are refused at the server's end alone.
+  if (const auto queued = submit(backend_, std::move(drawing)); !queued) {
+    (*shared)(effect.ticket, queued.error());
+  }
+}
+
+void Viewer::start(const session::Describe& effect, DescribedReply reply) {
+  const auto shared = std::make_shared<const DescribedReply>(std::move(reply));
+  if (describing_.use_count() > describing_max) {
+    const auto busy = make_error(ErrorKind::busy, "earlier datasets are not opened yet");
+    return (*shared)(effect.id, busy);
+  }
+  const auto dataset = backend_.catalogue.find(effect.dataset);
+  const auto queued = backend_.loads.submit(
+      {gone_,
+       [&backend = backend_, effect, cancel = gone_, shared, one = describing_] {
+         (*shared)(effect.id, attempt<protocol::DatasetDescription>("a description", cancel, [&] {
+                     return encoded(backend.catalogue.describe(effect.dataset, cancel));
+                   }));
+       },
+       true, dataset ? (*dataset)->shared_info() : nullptr});
+  if (!queued) (*shared)(effect.id, queued.error());
+}
+
+void Viewer::start(const session::Prefetch& effect) {
+  const auto found = backend_.catalogue.find(effect.view.dataset);
+  if (effect.steps.empty() || !found) {
+    wish_no_more();
+    return;
+  }
+  const auto of = (*found)->shared_info();
+  {
+    const std::lock_guard lock(wishes_->mutex);
+    if (wishes_->of != of.get()) ++wishes_->epoch;
+    wishes_->of = of.get();
+    wishes_->newest.emplace(Wishes::Newest{**found, effect});
+    if (!wishes_->queued.insert(of.get()).second) return;
+  }
+  // To know which fields at which detail, the view has to be completed: not here.
+  const auto run = [&backend = backend_, owner = owner_, wishes = wishes_, key = of.get()] {
+    work_out(backend, owner, *wishes, key);
+  };
+  (void)backend_.loads.submit({gone_, run, true, of});
+}
+
+void Viewer::work_out(Backend& backend, std::uint64_t owner, Wishes& wishes,
+                      const data::DatasetInfo* of) {
+  std::optional<Wishes::Newest> newest;
+  std::uint64_t epoch = 0;
+  {
+    const std::lock_guard lock(wishes.mutex);
+    wishes.queued.erase(of);
+    if (!wishes.newest || wishes.of != of) return;
+    newest = std::exchange(wishes.newest, std::nullopt);
+    epoch = wishes.epoch;
+  }
+  auto found = attempt<std::vector<data::Wish>>(
+      "what comes next", {}, [&] { return wishes_of(newest->dataset, newest->effect); });
+  const std::lock_guard lock(wishes.mutex);
+  if (found && wishes.epoch == epoch) backend.catalogue.wish(owner, std::move(*found));
+}
+
+void Viewer::wish_no_more() {
+  const std::lock_guard lock(wishes_->mutex);
+  wishes_->newest.reset();
+  wishes_->of = nullptr;
+  ++wishes_->epoch;
+  backend_.catalogue.wish(owner_, {});
+}
+
+void Viewer::start(const session::Survey& effect) {
+  survey_.cancel();
+  survey_ = CancelToken();
+  submit_survey(backend_, owner_, effect.view, survey_);
+}
+
+void Viewer::cancel(std::uint64_t ticket) {
+  if (const auto found = running_.find(ticket); found != running_.end()) found->second.cancel();
+}
+
+void Viewer::cancel_all() {
+  gone_.cancel();
+  survey_.cancel();
+  wish_no_more();
+  for (const auto& [ticket, token] : running_) token.cancel();
+}
+
+}  // namespace windsplat::net
