@@ -1,5 +1,5 @@
 // The 64-byte little-endian header of a binary frame. Offsets are the wire's; see "The wire" in
-// ARCHITECTURE.md.
+// docs/design/wire-format.md.
 #pragma once
 
 #include <array>

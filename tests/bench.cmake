@@ -1,4 +1,4 @@
-# The benchmarks: run by hand (HACKING.md). A tiny run of each is a test, so that none can rot.
+# The benchmarks: run by hand (docs/benchmarks). A tiny run of each is a test, so that none can rot.
 set(bench_dir ${CMAKE_CURRENT_LIST_DIR}/bench)
 # What the engine is measured against is built plainly: for the baseline instruction set, with what
 # -O2 vectorises (g++ 12: loops where that costs nothing), without what -O3 adds.

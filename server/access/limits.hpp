@@ -12,7 +12,7 @@ namespace windsplat::net {
 
 // An address is an IPv4 address or an IPv6 network of 64 bits (address.hpp). The defaults are meant
 // never to be met by people, a room of them behind one address among these;
-// docs/robustness/limits.md says what happens at each.
+// docs/user/configuration.md says what happens at each.
 struct Limits {
   std::size_t connections = 512;
   std::size_t connections_per_address = 256;

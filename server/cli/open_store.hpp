@@ -9,8 +9,8 @@
 namespace windsplat::cli {
 
 // Of a memory limit the daemon itself: program, libraries, threads, sessions, and one picture of
-// 1920 x 1088 pixels that is drawn, measured and encoded (docs/robustness/limits.md has what was
-// measured). Loaders, larger pictures and references are counted as they come.
+// 1920 x 1088 pixels that is drawn, measured and encoded (measured:
+// docs/benchmarks/server.md). Loaders, larger pictures and references are counted as they come.
 constexpr std::uint64_t program_bytes = std::uint64_t{112} << 20;
 // What the renderer keeps about the samples of a frame: 16 bytes for each 64 samples.
 constexpr std::uint64_t data_bytes_a_summary_byte = 16;

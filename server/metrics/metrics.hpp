@@ -1,6 +1,6 @@
 // What the server counts about itself: events in from any thread, text in Prometheus' exposition
 // format out. Every series is there from the start, so that no client can make more of them.
-// docs/metrics.md describes each.
+// docs/user/metrics.md describes each.
 #pragma once
 
 #include <cstddef>

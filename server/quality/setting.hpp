@@ -21,7 +21,8 @@ struct Setting {
   bool operator==(const Setting&) const = default;
 };
 
-// Strides and other stops are not among them: at equal time they err more (docs/study).
+// Strides and other stops are not among them: at equal time their error is larger
+// (docs/benchmarks/error.md).
 inline constexpr std::array<Setting, 26> settings{{
     {protocol::MethodName::kernel, 0, 0},  {protocol::MethodName::kernel, 1, 0},
     {protocol::MethodName::kernel, 2, 0},  {protocol::MethodName::kernel, 3, 0},

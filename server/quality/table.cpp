@@ -15,7 +15,7 @@ constexpr double ms_least = 1e-3;
 constexpr double near = 0.5;  // a study as near as this would tell nothing new
 constexpr std::size_t nearest_max = 6;
 
-// Linear RMSE of a JPEG of quality 90, the median of the samples (docs/study).
+// Linear RMSE of a JPEG of quality 90, the median of the samples (docs/benchmarks/error.md).
 constexpr double encoding_error_of_lines = 9.5e-3;
 constexpr double encoding_error_of_media = 2.4e-3;
 // What halving the chroma adds to it, whatever the quality.

@@ -65,9 +65,9 @@ struct Heights {
   std::shared_ptr<const data::Volume> values;
 };
 
-// Where samples stand in the world (ARCHITECTURE: "The world"). `heights` replace the vertical
-// coordinate. Errors: bad_data (coordinates that do not ascend), invalid with a pointer into
-// /geometry (a mapping, placement or height field that this grid does not allow).
+// Where samples stand in the world (docs/design/rendering-model.md, "World space"). `heights`
+// replace the vertical coordinate. Errors: bad_data (coordinates that do not ascend), invalid with
+// a pointer into /geometry (a mapping, placement or height field that this grid does not allow).
 Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryView& geometry,
                               const Heights* heights = nullptr);
 

@@ -59,7 +59,7 @@ struct ColorTable {
 // +x (east), below 360. scalar: the value of a second field; a masked one is drawn mid-grey.
 enum class LineColor { world_z, screen_z, rise, magnitude, direction, scalar, constant };
 
-// The vector kernel (Crawfis & Max, "Vector Kernels"; formulas in ARCHITECTURE.md, "Lines").
+// The vector kernel (Crawfis & Max, "Vector Kernels"; formulas in docs/design/rendering-model.md).
 struct VectorLayer {
   std::shared_ptr<const data::Volume> field;
   glm::dvec3 scale{1, 1, 1};  // times each component before anything else
@@ -114,7 +114,7 @@ struct DepthCue {
 // double precision, pixel by pixel.
 enum class Method { kernel, slab, reference };
 
-// A line inside its homogeneous piece of medium: ARCHITECTURE.md, "One kernel, composited".
+// A line inside its homogeneous piece of medium (docs/design/rendering-model.md).
 enum class Compositing { simple, cd_naive, cd, analytic, cd_euler };
 
 // Only the samples of one layer are drawn, and of vectors the part within the layer's plane: the

@@ -15,7 +15,7 @@ namespace windsplat::study {
 
 namespace {
 
-constexpr double footprint_integral = 1.4476982547;  // C of ARCHITECTURE.md, "The medium"
+constexpr double footprint_integral = 1.4476982547;  // C of docs/design/rendering-model.md
 constexpr int pixels = 9;                            // of the row, from the line's tail to its head
 constexpr double row_width = 2e-4;                   // of the row, in cells: g = 1 over all of it
 constexpr double line_opacity = 0.6;

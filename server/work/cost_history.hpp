@@ -16,7 +16,7 @@ namespace windsplat::net {
 // Thread-safe.
 class RenderCosts {
  public:
-  // Where nothing is known: a thread's time, within what was measured (docs/robustness/limits.md).
+  // Where nothing is known: a thread's time, within what was measured (docs/user/configuration.md).
   static constexpr double us_a_kernel_unknown = 0.006;
   // Several times what was ever measured. What took longer was kept from the processor, and must
   // not have such pictures refused for good.

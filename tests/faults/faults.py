@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every fault that docs/robustness/faults.md lists, tried against a running daemon. A Markdown
+"""Every fault that docs/design/testing.md lists, tried against a running daemon. A Markdown
 table on stdout: the fault, how often it was tried, what came of it. Linux only.
 
 Usage: faults.py [--program=build/release/windsplat] [--quick] [--count=N] [--only=PART]...

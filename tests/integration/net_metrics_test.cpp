@@ -223,7 +223,7 @@ TEST(MetricsAt, the_root_and_below_the_base_path) {
 }
 
 TEST_F(MetricsTest, are_all_in_the_manual_and_the_manual_has_no_others) {
-  std::ifstream manual(WINDSPLAT_SOURCE_DIR "/docs/metrics.md");
+  std::ifstream manual(WINDSPLAT_SOURCE_DIR "/docs/user/metrics.md");
   std::map<std::string, std::string> types;
   const std::regex row(R"(^\| `([a-z_]+)` \| (counter|gauge|histogram) \|.*)");
   for (std::string line; std::getline(manual, line);) {

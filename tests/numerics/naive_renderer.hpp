@@ -1,6 +1,6 @@
 // The oracle of the engine: every kernel in visibility order, every pixel of its bounding box, the
-// formulas as ARCHITECTURE.md states them. No tiles, no bricks, no tables of its own, no early
-// stop.
+// formulas as docs/design/rendering-model.md states them. No tiles, no bricks, no tables of its
+// own, no early stop.
 #pragma once
 
 #include <vector>

@@ -1,60 +1,27 @@
 #!/usr/bin/env python3
-"""Checks that includes follow ARCHITECTURE.md: which folder may see which, and where each outside
-library may be named. Usage: check_includes.py [ROOT]"""
+"""Checks that includes follow the table of dependencies in docs/design/overview.md, and where each
+outside library may be named. Usage: check_includes.py [ROOT]"""
+import itertools
 import pathlib
 import re
 import sys
 
 import tree
 
-# folder -> what it may include besides itself. A name ending in .hpp allows that header alone.
-MAY_INCLUDE = {
-    "server/base": [],
-    "protocol": ["server/base"],
-    "server/data/files": ["server/base"],
-    "server/data/bytes": ["server/base", "server/data/files"],
-    "server/data/model": ["server/base", "server/data/files"],
-    "server/data/samples": ["server/base", "server/data/model"],
-    "server/data/cf": ["server/base", "server/data/files", "server/data/bytes",
-                       "server/data/model"],
-    "server/data/formats": ["server/base", "server/data/files", "server/data/bytes",
-                            "server/data/model", "server/data/cf"],
-    "server/data/open": ["server/base", "server/data/files", "server/data/model", "server/data/cf",
-                         "server/data/formats"],
-    "server/data/resident": ["server/base", "server/data/files", "server/data/bytes",
-                             "server/data/model", "server/data/samples", "server/data/open"],
-    "server/data/loader": ["server/base", "server/data/files", "server/data/bytes",
-                           "server/data/model", "server/data/cf", "server/data/open",
-                           "server/data/resident"],
-    "server/scene": ["server/base", "protocol", "server/data/model", "server/data/resident",
-                     "server/data/cf/units.hpp"],
-    "server/engine": ["server/base", "server/scene/scene.hpp"],
-    "server/image": ["server/base"],
-    "server/quality": ["server/base", "protocol"],
-    "server/frame": ["server/base", "protocol", "server/data/model", "server/data/resident",
-                     "server/scene", "server/engine", "server/image", "server/quality"],
-    "server/study": ["server/base", "protocol", "server/data/model", "server/data/resident",
-                     "server/data/samples", "server/scene", "server/engine", "server/image",
-                     "server/quality", "server/frame"],
-    "server/session": ["server/base", "protocol", "server/scene", "server/quality"],
-    "server/views": ["server/base", "protocol"],
-    "server/metrics": ["server/base", "protocol", "server/data/resident/budget.hpp",
-                       "server/session/effects.hpp"],
-    "server/work": ["server/base", "protocol", "server/data/files", "server/data/model",
-                    "server/data/resident", "server/scene", "server/image", "server/quality",
-                    "server/frame", "server/session", "server/metrics"],
-    "server/http": ["server/base", "protocol"],
-    "server/access": ["server/base", "protocol", "server/frame/cost.hpp", "server/metrics",
-                      "server/http"],
-    "server/api": ["server/base", "protocol", "server/data/files", "server/data/model",
-                   "server/data/resident", "server/scene", "server/quality", "server/frame",
-                   "server/views", "server/metrics", "server/work", "server/http", "server/access"],
-    "server/transport": ["server/base", "protocol", "server/data/resident", "server/session",
-                         "server/metrics", "server/work", "server/http", "server/access",
-                         "server/api"],
-    "server/cli": ["server", "protocol"],
-    "server/main.cpp": ["server", "protocol"],
-}
+PROJECT = pathlib.Path(__file__).resolve().parents[2]
+TABLE_HEAD = "| folder | may include |"
+
+
+def dependencies(text):
+    """The Markdown table after TABLE_HEAD: folder -> what it may include besides itself. A name
+    ending in .hpp allows that header alone."""
+    lines = text.partition(TABLE_HEAD + "\n")[2].splitlines()
+    rows = itertools.takewhile(lambda line: line.startswith("|"), lines)
+    named = [[re.findall(r"`([^`]+)`", cell) for cell in row.split("|")[1:3]] for row in rows]
+    return {folders[0]: allowed for folders, allowed in named if folders}
+
+
+MAY_INCLUDE = dependencies((PROJECT / "docs/design/overview.md").read_text())
 
 # outside header -> the files that may name it, or include a header of ours that does
 CONFINED = [
@@ -134,7 +101,7 @@ def complaints_about(path, number, quote, included, known, brought):
     if path.startswith("tests/"):
         return
     if home is None:
-        yield f"{where}: no rule tells what this folder may include"
+        yield f"{where}: docs/design/overview.md has no row for this folder"
     elif not is_allowed(home, included):
         yield f"{where}: {home} may not include {included}"
 
@@ -153,5 +120,4 @@ def check(root):
 
 
 if __name__ == "__main__":
-    default = pathlib.Path(__file__).resolve().parents[2]
-    sys.exit(tree.report("includes", check(pathlib.Path(sys.argv[1] if sys.argv[1:] else default))))
+    sys.exit(tree.report("includes", check(pathlib.Path(sys.argv[1] if sys.argv[1:] else PROJECT))))

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""Checks what HACKING.md says of size and wording: long lines, functions and files, notes of work
-put off, paths of somebody's machine, test folders without a test. Usage: check_style.py [ROOT]"""
+"""Checks what CONTRIBUTING.md says of size and wording: long lines, functions and files, notes of
+work put off, paths of somebody's machine, test folders without a test.
+
+Usage: check_style.py [ROOT]"""
 import pathlib
 import re
 import sys

@@ -5,6 +5,7 @@ import tempfile
 import unittest
 
 import check_includes
+import check_links
 import check_style
 
 CLEAN = {
@@ -90,9 +91,15 @@ class Planted(unittest.TestCase):
         self.plant("server/data/b.cpp", '#include "volume.hpp"\n')
         self.expect(check_includes, "is our own", "is no file of the project")
 
+    def test_table_of_dependencies(self):
+        rows = "|---|---|\n| `a` | |\n| `b` | `a`, `c/d.hpp` |\n\n| `e` | `a` |\n"
+        self.assertEqual(check_includes.dependencies(check_includes.TABLE_HEAD + "\n" + rows),
+                         {"a": [], "b": ["a", "c/d.hpp"]})
+        self.assertEqual(check_includes.dependencies(rows), {})
+
     def test_new_folder_needs_a_rule(self):
         self.plant("server/extra/e.cpp", '#include "server/base/error.hpp"\n')
-        self.expect(check_includes, "no rule")
+        self.expect(check_includes, "has no row for this folder")
 
     def test_long_line_function_and_file(self):
         self.plant("server/base/a.cpp", "//" + "x" * 99 + "\n")
@@ -112,6 +119,18 @@ class Planted(unittest.TestCase):
         self.plant("server/base/a.cpp", "// TO" + "DO: later\n")
         self.plant("docs/b.md", "Look into /ho" + "me/me/notes.\n")
         self.expect(check_style, "docs/b.md:1: a path", "server/base/a.cpp:1: a note")
+
+    def test_links_and_anchors(self):
+        self.plant("docs/a.md", "# One `b` (c)\n## Two\n## Two\n[b](b.md#x-y) [c](#one-b-c)\n"
+                   "[d](#two-1) [e](https://example.org/none.md) ![f](../README.md)\n"
+                   "```\n[none](in-code.md)\n# no-heading\n```\n")
+        self.plant("docs/b.md", "# X, y\n")
+        self.plant("server/base/a.cpp", "// docs/b.md, \"X, y\"\n")
+        self.expect(check_links)
+        self.plant("docs/c.md", "[a](gone.md)\n\n[b](b.md#z) [c](a.md#no-heading)\n")
+        self.plant("server/base/a.cpp", "// see docs/d.md\n// ARCHITECTURE.md\n")
+        self.expect(check_links, "docs/c.md:1: gone.md", "docs/c.md:3: b.md#z", "#no-heading",
+                    "a.cpp:1: docs/d.md", "a.cpp:2: ARCHITECTURE.md")
 
     def test_folder_of_tests_without_a_test(self):
         self.plant("tests/unit/base/error_test.cpp", "// nothing yet\n")

@@ -1,5 +1,5 @@
-// Raw files and the JSON that describes them (docs/formats.md): what is expected follows from that
-// page.
+// Raw files and the JSON that describes them (docs/user/formats.md): what is expected follows from
+// that page.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// The JSON text that describes raw files (docs/formats.md) -> plain data.
+// The JSON text that describes raw files (docs/user/formats.md) -> plain data.
 #pragma once
 
 #include <array>

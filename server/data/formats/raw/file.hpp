@@ -1,4 +1,4 @@
-// Raw files described by JSON (docs/formats.md). Files -> description -> arrays of cf.
+// Raw files described by JSON (docs/user/formats.md). Files -> description -> arrays of cf.
 #pragma once
 
 #include <memory>
