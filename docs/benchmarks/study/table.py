@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A study's study.json -> the tables of README.md beside this file, as Markdown.
+"""A study's study.json -> the tables of docs/benchmarks/error.md, as Markdown.
 Usage: table.py DIR/study.json [SCENE...]"""
 import json
 import sys
@@ -51,7 +51,7 @@ def stiffness(rows):
 
 
 def calibrations(scenes):
-    print("| sample | errors told | compared | within a factor of 2 | median, told over true | "
+    print("| sample | reported error | compared | within a factor of 2 | median, reported / true | "
           "within the bound |")
     print("|---|---|---|---|---|---|")
     for scene in scenes:
@@ -67,7 +67,7 @@ def calibrations(scenes):
 def main():
     with open(sys.argv[1], encoding="utf-8") as file:
         study = json.load(file)
-    print("| scene | method | RMSE | PSNR, dB | FLIP | ms | on the front |")
+    print("| scene | method | RMSE | PSNR, dB | FLIP | ms | Pareto front |")
     print("|---|---|---|---|---|---|---|")
     for scene in study["scenes"]:
         if scene["name"] in sys.argv[2:] or len(sys.argv) == 2:
