@@ -112,18 +112,18 @@ struct Admission::State {
 
 // Gives back what was taken when it goes. It is made before anything is taken, so that nothing can
 // fail in between, and needs no memory when it goes.
-class Admission::Place {
+class Admission::Slot {
  public:
-  Place(std::shared_ptr<State> state, std::string address)
+  Slot(std::shared_ptr<State> state, std::string address)
       : state_(std::move(state)), address_(std::move(address)) {}
-  ~Place() {
-    if (!session_ && connection_ == Quota::Place::none) return;
+  ~Slot() {
+    if (!session_ && connection_ == Quota::Slot::none) return;
     const std::lock_guard lock(state_->mutex);
     if (session_) state_->quota.close_session(address_);
     state_->quota.disconnect(address_, connection_);
   }
-  Place(const Place&) = delete;
-  Place& operator=(const Place&) = delete;
+  Slot(const Slot&) = delete;
+  Slot& operator=(const Slot&) = delete;
 
   Quota::Arrival connect(bool trusted) {
     const std::lock_guard lock(state_->mutex);
@@ -143,7 +143,7 @@ class Admission::Place {
  private:
   const std::shared_ptr<State> state_;
   const std::string address_;
-  Quota::Place connection_ = Quota::Place::none;
+  Quota::Slot connection_ = Quota::Slot::none;
   bool session_ = false;
 };
 
@@ -205,10 +205,10 @@ void Admission::authenticated(const std::string& address) {
 }
 
 std::optional<Visitor> Admission::connect(const std::string& peer) {
-  const auto place = std::make_shared<Place>(state_, counted_address(peer));
+  const auto place = std::make_shared<Slot>(state_, counted_address(peer));
   Visitor visitor{peer, place, std::nullopt, is_trusted(peer, trusted_), false};
   const Quota::Arrival arrival = place->connect(visitor.trusted);
-  if (arrival.place == Quota::Place::none) return std::nullopt;
+  if (arrival.place == Quota::Slot::none) return std::nullopt;
   visitor.reserve = arrival.reason;
   visitor.known = arrival.known;
   return visitor;
@@ -236,7 +236,7 @@ std::optional<Response> Admission::request(const Visitor& visitor, Request& requ
   return answer(refusal);
 }
 
-bool Admission::spoiled(const Visitor& visitor, const Request& request) {
+bool Admission::count_malformed(const Visitor& visitor, const Request& request) {
   const std::string address = client_of(visitor, request);
   const std::lock_guard lock(state_->mutex);
   return !state_->quota.request(address, false, state_->now());
@@ -252,7 +252,7 @@ std::optional<Response> Admission::picture(const std::string& address) {
 }
 
 Admission::Seat Admission::open_session(const std::string& address) {
-  const auto place = std::make_shared<Place>(state_, address);
+  const auto place = std::make_shared<Slot>(state_, address);
   if (const auto refusal = place->open_session()) return {nullptr, answer(refusal)};
   return {place, std::nullopt};
 }
@@ -275,14 +275,14 @@ std::optional<Response> Admission::failed_login(const std::string& address) {
   return answer(refusal);
 }
 
-Admission::Micros Admission::heard(const std::string& address, std::size_t bytes) {
+Admission::Micros Admission::message_received(const std::string& address, std::size_t bytes) {
   const std::lock_guard lock(state_->mutex);
-  return state_->quota.heard(address, bytes, state_->now());
+  return state_->quota.message_received(address, bytes, state_->now());
 }
 
-Admission::Micros Admission::until_paid(const std::string& address) {
+Admission::Micros Admission::throttle_delay(const std::string& address) {
   const std::lock_guard lock(state_->mutex);
-  return state_->quota.until_paid(address, state_->now());
+  return state_->quota.throttle_delay(address, state_->now());
 }
 
 void Admission::sent(const std::string& address, std::size_t bytes) {

@@ -60,7 +60,7 @@ class Admission {
   std::optional<Response> request(const Visitor& visitor, Request& request, bool health);
   // A request that was refused before it was understood counts as one all the same. False: there
   // were too many, and this one is not worth a line in the log.
-  bool spoiled(const Visitor& visitor, const Request& request);
+  bool count_malformed(const Visitor& visitor, const Request& request);
   // Whether that address may have a picture drawn.
   std::optional<Response> picture(const std::string& address);
   // A place for a stream, or why there is none.
@@ -74,9 +74,9 @@ class Admission {
   // What a wrong token is answered where there were too many of that address; none: as ever.
   std::optional<Response> failed_login(const std::string& address);
   // A message of a stream came: how long nothing more is to be read of it.
-  Micros heard(const std::string& address, std::size_t bytes);
+  Micros message_received(const std::string& address, std::size_t bytes);
   // How long a stream's next frame has to wait for what its address owes.
-  Micros until_paid(const std::string& address);
+  Micros throttle_delay(const std::string& address);
 
   void sent(const std::string& address, std::size_t bytes);
   void rendered(const std::string& address, Micros took);
@@ -87,7 +87,7 @@ class Admission {
 
  private:
   struct State;
-  class Place;
+  class Slot;
   [[nodiscard]] std::string client_of(const Visitor& visitor, const Request& request) const;
   std::optional<Response> answer(const std::optional<Refusal>& refusal);
 

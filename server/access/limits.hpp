@@ -43,7 +43,7 @@ struct Limits {
   std::vector<std::string> trusted_proxies;
 
   // What clients are told: the protocol has a limit of its own.
-  [[nodiscard]] std::int64_t pixels_told() const {
+  [[nodiscard]] std::int64_t pixels_max_reported() const {
     constexpr std::int64_t most = protocol::limits::image_pixels_max;
     return pixels > 0 && pixels < most ? pixels : most;
   }

@@ -150,13 +150,13 @@ Quota::Arrival Quota::connect(const std::string& address, bool trusted, Micros n
   if (!reason) {
     ++connections_;
     ++here.connections;
-    return {Place::ordinary, std::nullopt, known};
+    return {Slot::ordinary, std::nullopt, known};
   }
   const bool too_many_of_it = !trusted && here.reserved >= reserve_per_address;
-  if (reserved_ >= reserve_max || too_many_of_it) return {Place::none, reason, known};
+  if (reserved_ >= reserve_max || too_many_of_it) return {Slot::none, reason, known};
   ++reserved_;
   ++here.reserved;
-  return {Place::reserve, reason, known};
+  return {Slot::reserve, reason, known};
 }
 
 bool Quota::is_kept_out_by_others(const std::string& address, bool trusted, Micros now) {
@@ -164,13 +164,13 @@ bool Quota::is_kept_out_by_others(const std::string& address, bool trusted, Micr
          (trusted || entry(address, now).reserved < reserve_per_address);
 }
 
-void Quota::disconnect(const std::string& address, Place place) {
+void Quota::disconnect(const std::string& address, Slot place) {
   Entry* const here = known_entry(address);
   if (here == nullptr) return;
-  if (place == Place::ordinary) {
+  if (place == Slot::ordinary) {
     --connections_;
     --here->connections;
-  } else if (place == Place::reserve) {
+  } else if (place == Slot::reserve) {
     --reserved_;
     --here->reserved;
   }
@@ -206,7 +206,7 @@ std::optional<Refusal> Quota::picture(const std::string& address, Micros now) {
   return Refusal{LimitKind::render, limits_.render_s_per_address, whole_seconds(render)};
 }
 
-Quota::Micros Quota::until_paid(const std::string& address, Micros now) {
+Quota::Micros Quota::throttle_delay(const std::string& address, Micros now) {
   Entry& here = entry(address, now);
   return std::max(wait_for(here.bytes, byte_rate(), 0, now),
                   wait_for(here.render, render_rate(), 0, now));
@@ -232,7 +232,7 @@ std::optional<Refusal> Quota::may_try_login(const std::string& address, Micros n
   return Refusal{LimitKind::logins, limits_.failed_logins_per_address, whole_seconds(wait)};
 }
 
-Quota::Micros Quota::heard(const std::string& address, std::size_t bytes, Micros now) {
+Quota::Micros Quota::message_received(const std::string& address, std::size_t bytes, Micros now) {
   Entry& here = entry(address, now);
   const auto take = [&](Bucket& bucket, double a_second, double much) -> Micros {
     if (a_second <= 0) return 0;

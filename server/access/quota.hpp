@@ -34,9 +34,9 @@ class Quota {
   explicit Quota(const Limits& limits) : limits_(limits) {}
 
   // What a connection that comes is: one like others, one of the reserve (and why), or too much.
-  enum class Place { ordinary, reserve, none };
+  enum class Slot { ordinary, reserve, none };
   struct Arrival {
-    Place place = Place::none;
+    Slot place = Slot::none;
     std::optional<Refusal> reason;  // of what is not ordinary
     bool known = false;             // a proxy, or the address has shown the token
   };
@@ -51,7 +51,7 @@ class Quota {
   Arrival connect(const std::string& address, bool trusted, Micros now);
   // Whether it found no place because the reserve is full, of others that is.
   [[nodiscard]] bool is_kept_out_by_others(const std::string& address, bool trusted, Micros now);
-  void disconnect(const std::string& address, Place place);  // needs no memory
+  void disconnect(const std::string& address, Slot place);  // needs no memory
 
   std::optional<Refusal> open_session(const std::string& address, Micros now);
   void close_session(const std::string& address);  // needs no memory
@@ -61,14 +61,14 @@ class Quota {
   // Whether a picture may be begun: nothing is owed of bytes and renderer's time.
   std::optional<Refusal> picture(const std::string& address, Micros now);
   // How long until nothing is owed.
-  Micros until_paid(const std::string& address, Micros now);
+  Micros throttle_delay(const std::string& address, Micros now);
 
   void sent(const std::string& address, std::size_t bytes, Micros now);
   void rendered(const std::string& address, Micros took, Micros now);
   // Asked before a token is compared: there were not too many wrong ones of late.
   std::optional<Refusal> may_try_login(const std::string& address, Micros now);
   // A message of a stream: how long nothing more is to be read of it.
-  Micros heard(const std::string& address, std::size_t bytes, Micros now);
+  Micros message_received(const std::string& address, std::size_t bytes, Micros now);
   // Refused where there were too many of late; the others are let off with being told so.
   std::optional<Refusal> failed_login(const std::string& address, Micros now);
 

@@ -40,9 +40,10 @@ Result<protocol::ForecastDescription> forecast(quality::Tables& tables, const pr
                                                data::Dataset resident) {
   const auto placed = scene::complete_and_place(view, resident);
   if (!placed) return naming_the_way_out(placed.error());
-  const auto sight = frame::sight_of(*placed);
-  if (!sight) return sight.error();
-  return quality::curve(placed->view, tables.forecasts(quality::style_of(placed->view), *sight));
+  const auto viewpoint = frame::viewpoint_of(*placed);
+  if (!viewpoint) return viewpoint.error();
+  return quality::curve(placed->view,
+                        tables.forecasts(quality::signature_of(placed->view), *viewpoint));
 }
 
 }  // namespace

@@ -126,9 +126,10 @@ Result<quality::Setting> setting_of(Services& services, const protocol::View& co
   }
   const auto placed = scene::complete_and_place(completed, dataset);
   if (!placed) return placed.error();
-  const auto sight = frame::sight_of(*placed);
-  if (!sight) return sight.error();
-  const auto known = services.backend.quality.forecasts(quality::style_of(completed), *sight);
+  const auto viewpoint = frame::viewpoint_of(*placed);
+  if (!viewpoint) return viewpoint.error();
+  const auto known =
+      services.backend.quality.forecasts(quality::signature_of(completed), *viewpoint);
   const quality::Aim aim{completed.quality.budget_ms, completed.quality.max_error};
   return quality::settings[quality::pick(completed, known, aim).setting];
 }
@@ -146,9 +147,9 @@ Result<std::shared_ptr<const void>> load(Services& services, const Picture& pict
                                          data::Dataset& loading, LoadedFor& loaded_for) {
   const std::string& id = loading.info().id;
   const auto view = resolve(picture, loading);
-  if (!view) return naming(view.error(), id);
+  if (!view) return with_dataset_name(view.error(), id);
   const auto setting = setting_of(services, *view, loading);
-  if (!setting) return naming(setting.error(), id);
+  if (!setting) return with_dataset_name(setting.error(), id);
   loaded_for = *setting;
   return load_picture(quality::at_setting(*view, *setting), loading,
                       encoding_at(picture.encoding, *setting));
@@ -180,7 +181,8 @@ Result<Response> draw(Services& services, const Picture& picture, data::Dataset&
                               *services.backend.pool, cancel, services.backend.frames);
   if (!drawn) return drawn.error();
   protocol::FrameInfo info = frame::frame_info(*drawn, drawn->view);
-  tell_error(*drawn, seen_in(*drawn, *setting), *setting, encoding, services.backend.quality, info);
+  report_error(*drawn, observed_in(*drawn, *setting), *setting, encoding, services.backend.quality,
+               info);
   services.metrics.stage_took(Metrics::Stage::queue, queue_us);
   services.metrics.stage_took(Metrics::Stage::render, drawn->render_us);
   services.metrics.stage_took(Metrics::Stage::encode, drawn->encode_us);
@@ -226,7 +228,7 @@ void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dat
   const auto loaded_for = std::make_shared<LoadedFor>();
   drawing.draw = [&services, picture, answer, cancel, loaded_for, id = request.id](
                      data::Dataset& resident, std::int64_t queue_us, bool after_load) {
-    auto response = attempt<Response>(
+    auto response = run_guarded<Response>(
         "a picture", cancel,
         [&] { return draw(services, *picture, resident, queue_us, *loaded_for, cancel); }, id);
     if (!after_load && !response && response.error().kind == ErrorKind::not_resident) return false;
@@ -234,7 +236,7 @@ void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dat
     return true;
   };
   drawing.load = [&services, picture, cancel, loaded_for, id = request.id](data::Dataset& loading) {
-    return attempt<std::shared_ptr<const void>>(
+    return run_guarded<std::shared_ptr<const void>>(
         "loading a picture's fields", cancel,
         [&] { return load(services, *picture, loading, *loaded_for); }, id);
   };

@@ -60,7 +60,8 @@ Result<std::shared_ptr<const data::Volume>> load(Catalogue& catalogue, const dat
                                                  const CancelToken& cancel) {
   auto volume = catalogue.load(
       dataset, [&](data::Dataset& loading) { return loading.volume(field, step); }, cancel);
-  if (!volume) return naming(dataset.with_need(volume.error(), {field}), dataset.info().id, field);
+  if (!volume)
+    return with_dataset_name(dataset.with_need(volume.error(), {field}), dataset.info().id, field);
   return volume;
 }
 
@@ -132,8 +133,8 @@ Result<std::optional<Response>> take_turn(Pass& pass) {
 // A turn after the other, so that others' loads come between. Only the first may be refused.
 void go_on(Services& services, const std::shared_ptr<Pass>& pass, bool admitted) {
   const auto run = [&services, pass] {
-    auto answer = attempt<std::optional<Response>>("a pass over all steps", pass->cancel,
-                                                   [&] { return take_turn(*pass); });
+    auto answer = run_guarded<std::optional<Response>>("a pass over all steps", pass->cancel,
+                                                       [&] { return take_turn(*pass); });
     if (!answer) return (*pass->reply)(problem_response(answer.error()));
     if (*answer) return (*pass->reply)(std::move(**answer));
     go_on(services, pass, true);

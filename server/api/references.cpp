@@ -4,7 +4,7 @@
 
 #include "protocol/codec.hpp"
 #include "server/api/resources.hpp"
-#include "server/base/kept.hpp"
+#include "server/base/trim_storage.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
 #include "server/work/reference_job.hpp"
@@ -27,8 +27,8 @@ Result<protocol::View> read_view(Services& services, const Request& request) {
   }
   const auto pixels =
       static_cast<std::size_t>(view.image.width) * static_cast<std::size_t>(view.image.height);
-  if (pixels > kept_pixels) {
-    std::string detail = "a reference has at most " + std::to_string(kept_pixels);
+  if (pixels > retained_pixels) {
+    std::string detail = "a reference has at most " + std::to_string(retained_pixels);
     detail += " pixels: draw larger ones with `windsplat render`";
     return make_error_at(ErrorKind::too_large, "/image", std::move(detail));
   }

@@ -63,7 +63,7 @@ Handler later(Services& services, void (*answer)(Services&, const Request&, Repl
 }
 
 // What is read and reckoned for an address whose pictures would be refused is refused as well.
-Handler of_who_owes_nothing(Services& services, Handler handler) {
+Handler require_quota(Services& services, Handler handler) {
   return [&services, handler = std::move(handler)](const Request& request, Reply reply) {
     auto refusal = services.admission.picture(request.address);
     refusal ? reply(std::move(*refusal)) : handler(request, std::move(reply));
@@ -120,8 +120,8 @@ std::optional<Resource> find_field(Services& services, const Segments& path) {
                                         [&](const Kind& known) { return known.last == path[5]; });
   if (kind == kinds.end()) return std::nullopt;
   Resource field{kind->name};
-  field.get = of_who_owes_nothing(services, [&services, get = kind->get, id = path[2],
-                                             name = path[4]](const Request& request, Reply reply) {
+  field.get = require_quota(services, [&services, get = kind->get, id = path[2], name = path[4]](
+                                          const Request& request, Reply reply) {
     get(services, id, name, request, std::move(reply));
   });
   field.takes_query = true;
@@ -136,10 +136,9 @@ std::optional<Resource> find_dataset(Services& services, const Segments& path) {
   resource.takes_query = true;
   if (path[3] == "probe") {
     resource.name = "/v1/datasets/{id}/probe";
-    resource.get =
-        of_who_owes_nothing(services, [&services, id](const Request& request, Reply reply) {
-          get_probe(services, id, request, std::move(reply));
-        });
+    resource.get = require_quota(services, [&services, id](const Request& request, Reply reply) {
+      get_probe(services, id, request, std::move(reply));
+    });
     return resource;
   }
   const auto format = format_of_suffix(path[3]);

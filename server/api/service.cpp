@@ -49,7 +49,7 @@ void run_later(LoadService& service, const Request& request, Reply reply, const 
   const auto answer = std::make_shared<const Reply>(std::move(reply));
   const CancelToken cancel = request.cancel;
   const auto run = [what, make = std::move(make), cancel, answer, id = request.id] {
-    auto response = attempt<Response>(what, cancel, make, id);
+    auto response = run_guarded<Response>(what, cancel, make, id);
     (*answer)(response ? std::move(*response) : problem_response(response.error()));
   };
   const auto queued = service.submit(
@@ -94,7 +94,7 @@ Response get_metrics(const Services& services) {
 Response get_service(const Services& services) {
   protocol::ServiceDescription service;
   service.version = WINDSPLAT_VERSION;
-  service.image_pixels_max = services.options.limits.pixels_told();
+  service.image_pixels_max = services.options.limits.pixels_max_reported();
   const std::string& base = services.options.base_path;
   service.links = {{"page", base},
                    {"datasets", base + "v1/datasets"},

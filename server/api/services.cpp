@@ -24,8 +24,8 @@ Services::Services(ServerOptions server_options, std::shared_ptr<data::Store> st
            [this](const std::string& address, std::int64_t us) { admission.rendered(address, us); },
            [this](const frame::Cost& cost) { return admission.check(cost); }}),
       locator(1, Backend::requests_waiting_max, "files to open"),
-      keeper(1, view_changes_waiting_max, "changes of saved views"),
-      watcher(1, 1, "looks at files") {
+      view_io(1, view_changes_waiting_max, "changes of saved views"),
+      file_watch(1, 1, "looks at files") {
   options.base_path = normal_base_path(options.base_path);
   if (options.views == nullptr) options.views = views::SavedViews::open({}).value();
 }
@@ -33,8 +33,8 @@ Services::Services(ServerOptions server_options, std::shared_ptr<data::Store> st
 void Services::end() {
   locator.end();  // it submits jobs
   backend.end();
-  watcher.end();
-  keeper.end();
+  file_watch.end();
+  view_io.end();
 }
 
 }  // namespace windsplat::net

@@ -29,9 +29,9 @@ struct Services {
   RequestIds request_ids;  // of the io thread alone
   std::atomic<bool> draining{false};
   Backend backend;
-  LoadService locator;  // looks up posted names: a slow disk keeps no one else waiting
-  LoadService keeper;   // changes saved views, on disk too
-  LoadService watcher;  // looks for files that changed, and opens them anew
+  LoadService locator;     // looks up posted names: a slow disk keeps no one else waiting
+  LoadService view_io;     // changes saved views, on disk too
+  LoadService file_watch;  // looks for files that changed, and opens them anew
 };
 
 }  // namespace windsplat::net

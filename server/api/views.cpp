@@ -65,7 +65,7 @@ Response changed_meanwhile() {
 
 void replace_later(Services& services, const std::string& id, const Request& request, Reply reply,
                    SavedViews::Change change) {
-  run_later(services.keeper, request, std::move(reply), "a change of a saved view", nullptr,
+  run_later(services.view_io, request, std::move(reply), "a change of a saved view", nullptr,
             [&services, id, may = Unchanged(services, request), change = std::move(change)] {
               const auto saved = services.options.views->replace(id, may, change);
               if (!saved) return problem_response(saved.error());
@@ -85,7 +85,7 @@ void post_saved_view(Services& services, const Request& request, Reply reply) {
     reply(problem_response(view.error()));
     return;
   }
-  run_later(services.keeper, request, std::move(reply), "saving a view", nullptr,
+  run_later(services.view_io, request, std::move(reply), "saving a view", nullptr,
             [&services, view = std::move(*view)] {
               const auto saved = services.options.views->add(view, utc_now());
               if (!saved) return problem_response(saved.error());
@@ -131,7 +131,7 @@ void patch_view(Services& services, const std::string& id, const Request& reques
 }
 
 void delete_view(Services& services, const std::string& id, const Request& request, Reply reply) {
-  run_later(services.keeper, request, std::move(reply), "removing a saved view", nullptr,
+  run_later(services.view_io, request, std::move(reply), "removing a saved view", nullptr,
             [&services, id, may = Unchanged(services, request)]() -> Response {
               const auto removed = services.options.views->remove(id, may);
               if (!removed) return problem_response(removed.error());

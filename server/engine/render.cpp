@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/base/kept.hpp"
+#include "server/base/trim_storage.hpp"
 #include "server/engine/bins.hpp"
 #include "server/engine/kernels/dispatch.hpp"
 #include "server/engine/plan.hpp"
@@ -42,7 +42,7 @@ void clear_image(const scene::Camera& camera, const CancelToken& cancel, Image& 
   constexpr std::size_t floats_between_looks = std::size_t{1} << 21;
 
   const std::size_t floats = 4 * static_cast<std::size_t>(camera.width) * camera.height;
-  give_back(image.rgba, floats, 4 * kept_pixels);
+  trim_storage(image.rgba, floats, 4 * retained_pixels);
   image.width = camera.width;
   image.height = camera.height;
   image.rgba.clear();

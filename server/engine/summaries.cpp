@@ -152,7 +152,7 @@ SummaryCache::Entry& SummaryCache::replaceable() {
 }
 
 // Until as many bytes more stay within the limit.
-void SummaryCache::give_back(std::size_t coming) {
+void SummaryCache::trim_storage(std::size_t coming) {
   while (bytes() + coming > bytes_max) {
     Entry* oldest = nullptr;
     for (const auto& entry : entries_) {
@@ -185,7 +185,7 @@ PassSummaries& SummaryCache::of(const PassPlan& pass, const kernels::Table& tabl
     entry.forget();
     entry.used = frame_;
   }
-  give_back(needed > entry.bytes() ? needed - entry.bytes() : 0);
+  trim_storage(needed > entry.bytes() ? needed - entry.bytes() : 0);
   entry.table = &table;
   entry.key = key_;
   entry.begin(pass);

@@ -74,7 +74,7 @@ class SummaryCache {
  private:
   struct Entry;
   Entry& replaceable();
-  void give_back(std::size_t coming);
+  void trim_storage(std::size_t coming);
 
   std::uint64_t frame_ = 0;
   std::vector<std::unique_ptr<Entry>> entries_;

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "server/base/check.hpp"
-#include "server/base/kept.hpp"
+#include "server/base/trim_storage.hpp"
 #include "server/engine/reference/reference.hpp"
 #include "server/frame/measure.hpp"
 #include "server/image/decode.hpp"
@@ -146,7 +146,7 @@ Result<engine::WorkReport> render_scene(const scene::Scene& scene, ThreadPool& p
 
 // Of pixels that nobody will encode nothing is kept: they may be half a gigabyte.
 Error given_up(Error error, Workspace& workspace) {
-  give_back(workspace.space.image().rgba, 0, 0);
+  trim_storage(workspace.space.image().rgba, 0, 0);
   return error;
 }
 
@@ -168,13 +168,13 @@ Result<image::Bytes> bytes_of(Workspace& workspace, ThreadPool& pool, const Canc
 
 std::uint64_t bytes_beyond_kept(int width, int height, Format format) {
   const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-  if (pixels <= kept_pixels) return 0;
+  if (pixels <= retained_pixels) return 0;
   constexpr std::uint64_t linear = 4 * sizeof(float);
   constexpr std::uint64_t codes = 4;  // 8 bits each, and as many of what is encoded
   const std::uint64_t bytes_a_pixel = format == Format::jpeg  ? 2 * codes
                                       : format == Format::png ? linear + 2 * codes
                                                               : 2 * linear;
-  return (pixels - kept_pixels) * bytes_a_pixel;
+  return (pixels - retained_pixels) * bytes_a_pixel;
 }
 
 Result<std::shared_ptr<const void>> load(const protocol::View& view, data::Dataset& dataset,
@@ -230,7 +230,7 @@ Result<Frame> encode(Workspace& workspace, ThreadPool& pool, const CancelToken& 
   // Nobody needs the pixels any more, and many of them are not kept; those of a JPEG, which only
   // its measurement needed, are not at all.
   const bool jpeg = workspace.encoding.format == Format::jpeg;
-  give_back(workspace.space.image().rgba, 0, jpeg ? 0 : 4 * kept_pixels);
+  trim_storage(workspace.space.image().rgba, 0, jpeg ? 0 : 4 * retained_pixels);
   if (!bytes) return bytes.error();
   Frame frame = std::move(workspace.drawn);
   frame.bytes = std::move(*bytes);

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/base/kept.hpp"
+#include "server/base/trim_storage.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -129,11 +129,11 @@ struct Truth {
   double error_of_quarter = 0;
 };
 
-class Survey {
+class CalibrationRun {
  public:
-  Survey(const protocol::View& view, data::Dataset& dataset, ThreadPool& pool,
-         const CancelToken& cancel, Workspace& workspace,
-         const std::function<void(const Surveyed&)>& report)
+  CalibrationRun(const protocol::View& view, data::Dataset& dataset, ThreadPool& pool,
+                 const CancelToken& cancel, Workspace& workspace,
+                 const std::function<void(const CalibrationSample&)>& report)
       : view_(view),
         dataset_(dataset),
         pool_(pool),
@@ -141,7 +141,7 @@ class Survey {
         workspace_(workspace),
         report_(report) {
     const double pixels = static_cast<double>(view_.image.width) * view_.image.height;
-    const double scale = std::sqrt(static_cast<double>(kept_pixels) / pixels);
+    const double scale = std::sqrt(static_cast<double>(retained_pixels) / pixels);
     if (scale < 1) {
       view_.image.width = std::max(1, static_cast<int>(view_.image.width * scale));
       view_.image.height = std::max(1, static_cast<int>(view_.image.height * scale));
@@ -159,7 +159,7 @@ class Survey {
       const auto measured = measure(setting);
       if (!measured && setting.coarser > 0 && is_absent(measured.error())) continue;
       if (!measured) return measured.error();
-      report_({i, sight_, *measured});
+      report_({i, viewpoint_, *measured});
     }
     return {};
   }
@@ -173,9 +173,9 @@ class Survey {
   Result<void> draw_truth() {
     auto completed = complete_at(view_, dataset_, {});
     if (!completed) return completed.error();
-    const auto sight = sight_of(*completed);
-    if (!sight) return sight.error();
-    sight_ = *sight;
+    const auto viewpoint = viewpoint_of(*completed);
+    if (!viewpoint) return viewpoint.error();
+    viewpoint_ = *viewpoint;
     const auto own = scene::build_scene(*completed, dataset_);
     if (!own) return own.error();
     const std::array<int, 3> own_level = own->level;
@@ -233,7 +233,7 @@ class Survey {
 
   void tell_run(const quality::Setting& setting, double error, double ms) {
     if (!quality::is_allowed(setting, view_)) return;
-    report_({quality::index_of(setting).value(), sight_, {error, ms}});
+    report_({quality::index_of(setting).value(), viewpoint_, {error, ms}});
   }
 
   Result<quality::Measured> measure(const quality::Setting& setting) {
@@ -296,8 +296,8 @@ class Survey {
   ThreadPool& pool_;
   const CancelToken& cancel_;
   Workspace& workspace_;
-  const std::function<void(const Surveyed&)>& report_;
-  quality::Sight sight_;
+  const std::function<void(const CalibrationSample&)>& report_;
+  quality::Viewpoint viewpoint_;
   Truth truth_;
   std::vector<double> ms_;
   bool told_ = false;  // the truth's two runs are pictures of settings too, and were reported
@@ -305,18 +305,18 @@ class Survey {
 
 }  // namespace
 
-Result<quality::Sight> sight_of(const scene::Completed& completed) {
-  quality::Sight sight = quality::sight_of(completed.view);
+Result<quality::Viewpoint> viewpoint_of(const scene::Completed& completed) {
+  quality::Viewpoint viewpoint = quality::viewpoint_of(completed.view);
   const auto detail = scene::detail_shown(completed);
   if (!detail) return detail.error();
-  sight.detail = *detail;
-  return sight;
+  viewpoint.detail = *detail;
+  return viewpoint;
 }
 
 bool is_measured(const scene::Scene& scene, const Encoding& encoding) {
   const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
   return encoding.measure && encoding.half_level == 0 && scene.method != scene::Method::reference &&
-         pixels <= static_cast<double>(kept_pixels);
+         pixels <= static_cast<double>(retained_pixels);
 }
 
 Result<std::optional<double>> measured_error(const scene::Completed& completed,
@@ -346,10 +346,10 @@ Result<std::optional<double>> measured_error(const scene::Completed& completed,
   return std::optional(rms(left) * (order_two ? 4.0 / 3 : 1.0));
 }
 
-Result<void> survey(const protocol::View& completed, data::Dataset& dataset, ThreadPool& pool,
-                    const CancelToken& cancel, Workspace& workspace,
-                    const std::function<void(const Surveyed&)>& report) {
-  return Survey(completed, dataset, pool, cancel, workspace, report).run();
+Result<void> calibrate(const protocol::View& completed, data::Dataset& dataset, ThreadPool& pool,
+                       const CancelToken& cancel, Workspace& workspace,
+                       const std::function<void(const CalibrationSample&)>& report) {
+  return CalibrationRun(completed, dataset, pool, cancel, workspace, report).run();
 }
 
 }  // namespace windsplat::frame

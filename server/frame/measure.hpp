@@ -7,7 +7,7 @@
 #include <functional>
 #include <optional>
 
-#include "server/base/kept.hpp"
+#include "server/base/trim_storage.hpp"
 #include "server/frame/frame.hpp"
 #include "server/quality/table.hpp"
 #include "server/scene/build.hpp"
@@ -24,7 +24,7 @@ Result<scene::Completed> complete_at(const protocol::View& view, data::Dataset& 
                                      const Encoding& encoding);
 
 // Where a completed view is seen from. Errors: invalid (its camera).
-Result<quality::Sight> sight_of(const scene::Completed& completed);
+Result<quality::Viewpoint> viewpoint_of(const scene::Completed& completed);
 
 // Whether the frame of this scene will be measured: pictures of full size alone, up to kept_pixels.
 bool is_measured(const scene::Scene& scene, const Encoding& encoding);
@@ -43,21 +43,21 @@ Result<std::optional<double>> measured_error(const scene::Completed& completed,
 // half and a quarter of the view's thickness, extrapolated. Reports each as it is known, the
 // settings in no certain order. Pictures of more than kept_pixels are surveyed smaller; `sight`
 // says how they are. Times are of drawing alone. Errors: cancelled; not_resident; those of scenes.
-struct Surveyed {
+struct CalibrationSample {
   std::size_t setting = 0;
-  quality::Sight sight;
+  quality::Viewpoint viewpoint;
   quality::Measured measured;
 };
 // Of the truth and of the picture that is compared with it.
-inline std::uint64_t survey_bytes(const protocol::ImageView& image) {
+inline std::uint64_t calibration_bytes(const protocol::ImageView& image) {
   const auto pixels = static_cast<std::uint64_t>(image.width) * image.height;
-  return std::min<std::uint64_t>(pixels, kept_pixels) * 2 * 4 * sizeof(float);
+  return std::min<std::uint64_t>(pixels, retained_pixels) * 2 * 4 * sizeof(float);
 }
-inline bool is_worth_a_survey(const protocol::View& view) {  // nobody looks at icons for long
+inline bool is_worth_calibrating(const protocol::View& view) {  // nobody looks at icons for long
   return std::min(view.image.width, view.image.height) >= 64;
 }
-Result<void> survey(const protocol::View& completed, data::Dataset& dataset, ThreadPool& pool,
-                    const CancelToken& cancel, Workspace& workspace,
-                    const std::function<void(const Surveyed&)>& report);
+Result<void> calibrate(const protocol::View& completed, data::Dataset& dataset, ThreadPool& pool,
+                       const CancelToken& cancel, Workspace& workspace,
+                       const std::function<void(const CalibrationSample&)>& report);
 
 }  // namespace windsplat::frame

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "server/base/check.hpp"
-#include "server/base/kept.hpp"
+#include "server/base/trim_storage.hpp"
 #include "server/frame/measure.hpp"
 #include "server/image/encode.hpp"
 
@@ -124,7 +124,7 @@ Result<Difference> ReferenceDrawing::compare(ThreadPool& pool, const CancelToken
   if (!work) return work.error();
   std::vector<float>& picture = workspace.space.image().rgba;
   const Difference difference = difference_of(picture, rgba_);
-  give_back(picture, 0, 0);
+  trim_storage(picture, 0, 0);
   return difference;
 }
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "server/base/check.hpp"
-#include "server/base/kept.hpp"
+#include "server/base/trim_storage.hpp"
 
 namespace windsplat::image {
 namespace {
@@ -57,7 +57,7 @@ void YccPicture::reset(int width, int height, Subsampling subsampling,
     planes_[p].width = columns * side;
     planes_[p].height = rows * side;
     const std::size_t samples = static_cast<std::size_t>(planes_[p].width) * planes_[p].height;
-    give_back(storage_[p], samples, kept_pixels);
+    trim_storage(storage_[p], samples, retained_pixels);
     storage_[p].assign(samples, codes[p]);
     planes_[p].samples = storage_[p].data();
   }

@@ -55,26 +55,27 @@ Law law_of_media(const Kind& kind, const Setting& setting, bool averaged) {
 
 }  // namespace
 
-bool is_averaged(const Setting& setting, const Sight& sight) {
-  return setting.half_level == 0 && setting.coarser == 0 && sight.detail > 0 && sight.detail < 1;
+bool is_averaged(const Setting& setting, const Viewpoint& viewpoint) {
+  return setting.half_level == 0 && setting.coarser == 0 && viewpoint.detail > 0 &&
+         viewpoint.detail < 1;
 }
 
-Expected expected_error(const Kind& kind, const Setting& setting, const Sight& sight) {
-  const bool averaged = is_averaged(setting, sight);
+Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
+  const bool averaged = is_averaged(setting, viewpoint);
   const Law law =
       kind.lines ? law_of_lines(kind, setting, averaged) : law_of_media(kind, setting, averaged);
-  double error = law.factor * std::pow(sight.pixels_high / pixels_high_of_laws, law.by_pixels);
+  double error = law.factor * std::pow(viewpoint.pixels_high / pixels_high_of_laws, law.by_pixels);
   if (kind.length > 0) {
-    error *= std::pow(sight.height / (height_of_laws * kind.length), law.by_height);
+    error *= std::pow(viewpoint.height / (height_of_laws * kind.length), law.by_height);
   }
   return {std::clamp(std::hypot(error, kind.rule / setting.thinner, kind.stop), error_least, 1.0),
           law.scatter};
 }
 
 // In proportion to pixels and, with an equal part, to samples.
-Expected expected_ms(const Kind&, const Setting& setting, const Sight& sight) {
+Expected expected_ms(const Kind&, const Setting& setting, const Viewpoint& viewpoint) {
   constexpr double us_per_pixel = 0.06;
-  const double pixels = static_cast<double>(sight.width) * sight.pixels_high;
+  const double pixels = static_cast<double>(viewpoint.width) * viewpoint.pixels_high;
   const double share = 0.35 + 0.65 * std::pow(2.0, -setting.half_level);
   double ms = 1e-3 * us_per_pixel * pixels * share * std::pow(3.0, -setting.coarser);
   if (setting.method == protocol::MethodName::slab) {

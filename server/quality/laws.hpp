@@ -9,9 +9,9 @@ namespace windsplat::quality {
 
 // Standard deviations of the logarithm of what is measured over what is expected.
 struct Scatter {
-  double style = 0;  // from style to style, the same at every sight
-  double sight = 0;  // from sight to sight within a style
-  double noise = 0;  // of one measurement
+  double signature = 0;  // between scene signatures, the same at every viewpoint
+  double viewpoint = 0;  // between viewpoints of one signature
+  double noise = 0;      // of one measurement
 };
 
 struct Expected {
@@ -24,10 +24,10 @@ struct Expected {
 inline constexpr double error_least = 1e-5;
 
 // Whether the setting's picture is of the view's own size and data, but the view itself averages.
-bool is_averaged(const Setting& setting, const Sight& sight);
+bool is_averaged(const Setting& setting, const Viewpoint& viewpoint);
 
 // Linear RMSE, and milliseconds of drawing on the machine that the laws were fitted on.
-Expected expected_error(const Kind& kind, const Setting& setting, const Sight& sight);
-Expected expected_ms(const Kind& kind, const Setting& setting, const Sight& sight);
+Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
+Expected expected_ms(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
 
 }  // namespace windsplat::quality

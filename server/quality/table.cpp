@@ -34,7 +34,7 @@ double quantised(int quality) {
 
 // The logarithm of a measured value over what was expected of it.
 struct Told {
-  const Sight* sight = nullptr;
+  const Viewpoint* viewpoint = nullptr;
   double log_ratio = 0;
   double apart = 0;  // from the sight that is asked for
 };
@@ -49,8 +49,8 @@ double squared(double x) { return x * x; }
 // C = style^2 + sight^2 exp(-distance) + noise^2 [the same measurement]; the mean is known to be 0.
 // Solves C w = c by Cholesky's factors, row by row, and the forward half of c along with it.
 Kriged krige(const std::vector<Told>& told, const Scatter& scatter) {
-  const double of_style = squared(scatter.style);
-  const double of_sight = squared(scatter.sight);
+  const double of_style = squared(scatter.signature);
+  const double of_sight = squared(scatter.viewpoint);
   std::array<std::array<double, nearest_max>, nearest_max> factor{};
   std::array<double, nearest_max> asked{};
   std::array<double, nearest_max> known{};
@@ -60,7 +60,7 @@ Kriged krige(const std::vector<Told>& told, const Scatter& scatter) {
     asked[i] = of_style + of_sight * std::exp(-told[i].apart);
     known[i] = told[i].log_ratio;
     for (std::size_t j = 0; j <= i; ++j) {
-      double c = of_style + of_sight * std::exp(-distance(*told[i].sight, *told[j].sight));
+      double c = of_style + of_sight * std::exp(-distance(*told[i].viewpoint, *told[j].viewpoint));
       if (i == j) c += squared(scatter.noise);
       for (std::size_t k = 0; k < j; ++k) c -= factor[i][k] * factor[j][k];
       factor[i][j] = i == j ? std::sqrt(c) : c / factor[j][j];
@@ -85,33 +85,33 @@ void keep_nearest(std::vector<Told>& told) {
 }
 
 // A picture is less to encode the farther away it is seen from.
-double encoded_detail(const Sight& sight) { return 1 / std::sqrt(sight.height); }
+double encoded_detail(const Viewpoint& viewpoint) { return 1 / std::sqrt(viewpoint.height); }
 
 }  // namespace
 
-Forecast prior(const Kind& kind, const Setting& setting, const Sight& sight) {
-  const Expected error = expected_error(kind, setting, sight);
+Forecast prior(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
+  const Expected error = expected_error(kind, setting, viewpoint);
   Forecast out;
   out.error = error.value;
-  out.spread = std::hypot(error.scatter.style, error.scatter.sight);
-  out.ms = expected_ms(kind, setting, sight).value;
+  out.spread = std::hypot(error.scatter.signature, error.scatter.viewpoint);
+  out.ms = expected_ms(kind, setting, viewpoint).value;
   return out;
 }
 
-void Table::add(std::size_t setting, const Sight& sight, const Measured& measured) {
+void Table::add(std::size_t setting, const Viewpoint& viewpoint, const Measured& measured) {
   const auto is_bad = [](const std::optional<double>& value) {
     return value && !std::isfinite(*value);
   };
   if (is_bad(measured.error) || is_bad(measured.ms)) return;
   const Setting& how = settings[setting];
-  Entry entry{sight, {}, {}, is_averaged(how, sight)};
+  Entry entry{viewpoint, {}, {}, is_averaged(how, viewpoint)};
   if (measured.error) {
     const double error = std::max(*measured.error, error_least);
-    entry.log_error = std::log(error / expected_error(kind_, how, sight).value);
+    entry.log_error = std::log(error / expected_error(kind_, how, viewpoint).value);
   }
   if (measured.ms) {
     entry.log_ms =
-        std::log(std::max(*measured.ms, ms_least) / expected_ms(kind_, how, sight).value);
+        std::log(std::max(*measured.ms, ms_least) / expected_ms(kind_, how, viewpoint).value);
   }
   std::deque<Entry>& entries = entries_[setting];
   entries.push_back(entry);
@@ -122,44 +122,44 @@ void Table::add(std::size_t setting, const Sight& sight, const Measured& measure
   entries.erase(oldest == entries.end() - 1 ? entries.begin() : oldest);
 }
 
-Forecast Table::forecast(std::size_t setting, const Sight& sight) const {
+Forecast Table::forecast(std::size_t setting, const Viewpoint& viewpoint) const {
   const Setting& how = settings[setting];
-  const bool averaged = is_averaged(how, sight);
-  Forecast out = prior(kind_, how, sight);
+  const bool averaged = is_averaged(how, viewpoint);
+  Forecast out = prior(kind_, how, viewpoint);
   std::vector<Told> errors;
   std::vector<Told> times;
   for (const Entry& entry : entries_[setting]) {
-    const double apart = distance(entry.sight, sight);
+    const double apart = distance(entry.viewpoint, viewpoint);
     // Averages err by another law than what is drawn of every sample.
     if (entry.log_error && entry.averaged == averaged) {
-      errors.push_back({&entry.sight, *entry.log_error, apart});
+      errors.push_back({&entry.viewpoint, *entry.log_error, apart});
     }
-    if (entry.log_ms) times.push_back({&entry.sight, *entry.log_ms, apart});
+    if (entry.log_ms) times.push_back({&entry.viewpoint, *entry.log_ms, apart});
   }
   if (!errors.empty()) {
     out.measured =
         std::any_of(errors.begin(), errors.end(), [](const Told& t) { return t.apart < near; });
     keep_nearest(errors);
-    const Kriged kriged = krige(errors, expected_error(kind_, how, sight).scatter);
+    const Kriged kriged = krige(errors, expected_error(kind_, how, viewpoint).scatter);
     out.error = std::max(error_least, out.error * std::exp(kriged.log_ratio));
     out.spread = std::sqrt(kriged.variance);
   }
   if (!times.empty()) {
     keep_nearest(times);
-    out.ms *= std::exp(krige(times, expected_ms(kind_, how, sight).scatter).log_ratio);
+    out.ms *= std::exp(krige(times, expected_ms(kind_, how, viewpoint).scatter).log_ratio);
     out.timed = true;
   }
   return out;
 }
 
-Forecasts Table::forecasts(const Sight& sight) const {
+Forecasts Table::forecasts(const Viewpoint& viewpoint) const {
   Forecasts out;
   double log_ratio = 0;
   int timed = 0;
   for (std::size_t i = 0; i < out.size(); ++i) {
-    out[i] = forecast(i, sight);
+    out[i] = forecast(i, viewpoint);
     if (!out[i].timed) continue;
-    log_ratio += std::log(out[i].ms / prior(kind_, settings[i], sight).ms);
+    log_ratio += std::log(out[i].ms / prior(kind_, settings[i], viewpoint).ms);
     ++timed;
   }
   if (timed == 0) return out;
@@ -169,15 +169,15 @@ Forecasts Table::forecasts(const Sight& sight) const {
   return out;
 }
 
-bool Table::wants_study(const Sight& sight) const {
-  return !studying_ && std::none_of(studied_.begin(), studied_.end(), [&](const Sight& known) {
-    return distance(known, sight) < near;
+bool Table::wants_study(const Viewpoint& viewpoint) const {
+  return !studying_ && std::none_of(studied_.begin(), studied_.end(), [&](const Viewpoint& known) {
+    return distance(known, viewpoint) < near;
   });
 }
 
-void Table::begin_study(const Sight& sight) {
+void Table::begin_study(const Viewpoint& viewpoint) {
   studying_ = true;
-  studied_.push_back(sight);
+  studied_.push_back(viewpoint);
   if (studied_.size() > studies_max) studied_.pop_front();
 }
 
@@ -186,15 +186,15 @@ void Table::end_study(bool complete) {
   if (!complete && !studied_.empty()) studied_.pop_back();
 }
 
-void Table::add_encoding(int quality, const Sight& sight, double error) {
-  const double known = error / (quantised(quality) * encoded_detail(sight));
+void Table::add_encoding(int quality, const Viewpoint& viewpoint, double error) {
+  const double known = error / (quantised(quality) * encoded_detail(viewpoint));
   if (!(known > 0) || !std::isfinite(known)) return;
   encoding_error_ = encoding_error_ ? std::sqrt(*encoding_error_ * known) : known;
 }
 
-double Table::encoding_error(int quality, bool full_chroma, const Sight& sight) const {
+double Table::encoding_error(int quality, bool full_chroma, const Viewpoint& viewpoint) const {
   const double prior = kind_.lines ? encoding_error_of_lines : encoding_error_of_media;
-  const double at_90 = encoding_error_ ? *encoding_error_ * encoded_detail(sight) : prior;
+  const double at_90 = encoding_error_ ? *encoding_error_ * encoded_detail(viewpoint) : prior;
   return at_90 * std::hypot(quantised(quality), full_chroma ? 0 : half_chroma);
 }
 

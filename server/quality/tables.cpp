@@ -5,18 +5,19 @@
 
 namespace windsplat::quality {
 
-Table& Tables::table_of(const Style& style) {
-  if (find(style) == nullptr) {
-    tables_.emplace_front(style, Table(style.kind));
+Table& Tables::table_of(const SceneSignature& signature) {
+  if (find(signature) == nullptr) {
+    tables_.emplace_front(signature, Table(signature.kind));
     if (tables_.size() > styles_max) tables_.pop_back();
   }
   return tables_.front().second;
 }
 
 // In front then.
-const Table* Tables::find(const Style& style) {
-  const auto known = std::find_if(tables_.begin(), tables_.end(),
-                                  [&](const auto& kept) { return kept.first.key == style.key; });
+const Table* Tables::find(const SceneSignature& signature) {
+  const auto known = std::find_if(tables_.begin(), tables_.end(), [&](const auto& kept) {
+    return kept.first.key == signature.key;
+  });
   if (known == tables_.end()) return nullptr;
   tables_.splice(tables_.begin(), tables_, known);
   return &known->second;
@@ -27,52 +28,55 @@ void Tables::forget(const std::string& dataset) {
   tables_.remove_if([&](const auto& kept) { return kept.first.dataset == dataset; });
 }
 
-Forecasts Tables::forecasts(const Style& style, const Sight& sight) {
+Forecasts Tables::forecasts(const SceneSignature& signature, const Viewpoint& viewpoint) {
   const std::lock_guard lock(mutex_);
-  const Table* const known = style.key.empty() ? nullptr : find(style);
-  return known != nullptr ? known->forecasts(sight) : Table(style.kind).forecasts(sight);
+  const Table* const known = signature.key.empty() ? nullptr : find(signature);
+  return known != nullptr ? known->forecasts(viewpoint)
+                          : Table(signature.kind).forecasts(viewpoint);
 }
 
-Forecast Tables::forecast(const Style& style, std::size_t setting, const Sight& sight) {
+Forecast Tables::forecast(const SceneSignature& signature, std::size_t setting,
+                          const Viewpoint& viewpoint) {
   const std::lock_guard lock(mutex_);
-  const Table* const known = style.key.empty() ? nullptr : find(style);
-  return known != nullptr ? known->forecast(setting, sight)
-                          : prior(style.kind, settings[setting], sight);
+  const Table* const known = signature.key.empty() ? nullptr : find(signature);
+  return known != nullptr ? known->forecast(setting, viewpoint)
+                          : prior(signature.kind, settings[setting], viewpoint);
 }
 
-void Tables::add(const Style& style, std::size_t setting, const Sight& sight,
+void Tables::add(const SceneSignature& signature, std::size_t setting, const Viewpoint& viewpoint,
                  const Measured& measured) {
-  if (style.key.empty()) return;
+  if (signature.key.empty()) return;
   const std::lock_guard lock(mutex_);
-  table_of(style).add(setting, sight, measured);
+  table_of(signature).add(setting, viewpoint, measured);
 }
 
-bool Tables::begin_study(const Style& style, const Sight& sight) {
-  if (style.key.empty()) return false;
+bool Tables::begin_study(const SceneSignature& signature, const Viewpoint& viewpoint) {
+  if (signature.key.empty()) return false;
   const std::lock_guard lock(mutex_);
-  Table& table = table_of(style);
-  if (!table.wants_study(sight)) return false;
-  table.begin_study(sight);
+  Table& table = table_of(signature);
+  if (!table.wants_study(viewpoint)) return false;
+  table.begin_study(viewpoint);
   return true;
 }
 
-void Tables::end_study(const Style& style, bool complete) {
+void Tables::end_study(const SceneSignature& signature, bool complete) {
   const std::lock_guard lock(mutex_);
-  if (find(style) != nullptr) table_of(style).end_study(complete);
+  if (find(signature) != nullptr) table_of(signature).end_study(complete);
 }
 
-void Tables::add_encoding(const Style& style, int quality, const Sight& sight, double error) {
-  if (style.key.empty()) return;
+void Tables::add_encoding(const SceneSignature& signature, int quality, const Viewpoint& viewpoint,
+                          double error) {
+  if (signature.key.empty()) return;
   const std::lock_guard lock(mutex_);
-  table_of(style).add_encoding(quality, sight, error);
+  table_of(signature).add_encoding(quality, viewpoint, error);
 }
 
-double Tables::encoding_error(const Style& style, int quality, bool full_chroma,
-                              const Sight& sight) {
+double Tables::encoding_error(const SceneSignature& signature, int quality, bool full_chroma,
+                              const Viewpoint& viewpoint) {
   const std::lock_guard lock(mutex_);
-  const Table* const known = style.key.empty() ? nullptr : find(style);
-  return known != nullptr ? known->encoding_error(quality, full_chroma, sight)
-                          : Table(style.kind).encoding_error(quality, full_chroma, sight);
+  const Table* const known = signature.key.empty() ? nullptr : find(signature);
+  return known != nullptr ? known->encoding_error(quality, full_chroma, viewpoint)
+                          : Table(signature.kind).encoding_error(quality, full_chroma, viewpoint);
 }
 
 }  // namespace windsplat::quality

@@ -30,25 +30,26 @@ double depth_of(const protocol::View& view) {
 
 }  // namespace
 
-Sight sight_of(const protocol::View& view, const Sight& otherwise) {
-  Sight sight = otherwise;
-  sight.width = view.image.width;
-  sight.pixels_high = view.image.height;
-  sight.detail *= static_cast<double>(sight.pixels_high) / otherwise.pixels_high;
-  if (!view.camera.eye || !view.camera.target) return sight;
+Viewpoint viewpoint_of(const protocol::View& view, const Viewpoint& otherwise) {
+  Viewpoint viewpoint = otherwise;
+  viewpoint.width = view.image.width;
+  viewpoint.pixels_high = view.image.height;
+  viewpoint.detail *= static_cast<double>(viewpoint.pixels_high) / otherwise.pixels_high;
+  if (!view.camera.eye || !view.camera.target) return viewpoint;
   protocol::Vec3 way{};
   double length = 0;
   for (std::size_t a = 0; a < 3; ++a) {
     way[a] = (*view.camera.target)[a] - (*view.camera.eye)[a];
     length = std::hypot(length, way[a]);
   }
-  if (!(length > 0)) return sight;
-  for (std::size_t a = 0; a < 3; ++a) sight.direction[a] = way[a] / length;
-  sight.height = view.camera.projection == protocol::Projection::orthographic && view.camera.height
-                     ? *view.camera.height
-                     : 2 * length * std::tan(0.5 * radians_per_degree * view.camera.fov_y);
-  sight.detail *= otherwise.height / sight.height;
-  return sight;
+  if (!(length > 0)) return viewpoint;
+  for (std::size_t a = 0; a < 3; ++a) viewpoint.direction[a] = way[a] / length;
+  viewpoint.height =
+      view.camera.projection == protocol::Projection::orthographic && view.camera.height
+          ? *view.camera.height
+          : 2 * length * std::tan(0.5 * radians_per_degree * view.camera.fov_y);
+  viewpoint.detail *= otherwise.height / viewpoint.height;
+  return viewpoint;
 }
 
 namespace {
@@ -78,18 +79,18 @@ double error_of_stop(double transmittance) {
 
 }  // namespace
 
-Style style_of(const protocol::View& completed) {
-  Style style;
-  style.kind.lines = completed.vector.field.kind != protocol::FieldChoice::Kind::none;
-  style.kind.medium = !completed.scalars || !completed.scalars->empty();
-  style.kind.length = completed.vector.length.value_or(0);
-  style.kind.radius = completed.vector.r2;
-  style.kind.thickness = completed.method.slab_thickness;
-  if (style.kind.medium) {
-    style.kind.rule = error_of_rule(completed.method.compositing);
-    style.kind.stop = error_of_stop(completed.method.stop_transmittance);
+SceneSignature signature_of(const protocol::View& completed) {
+  SceneSignature signature;
+  signature.kind.lines = completed.vector.field.kind != protocol::FieldChoice::Kind::none;
+  signature.kind.medium = !completed.scalars || !completed.scalars->empty();
+  signature.kind.length = completed.vector.length.value_or(0);
+  signature.kind.radius = completed.vector.r2;
+  signature.kind.thickness = completed.method.slab_thickness;
+  if (signature.kind.medium) {
+    signature.kind.rule = error_of_rule(completed.method.compositing);
+    signature.kind.stop = error_of_stop(completed.method.stop_transmittance);
   }
-  if (const double depth = depth_of(completed); depth > 0) style.kind.depth = depth;
+  if (const double depth = depth_of(completed); depth > 0) signature.kind.depth = depth;
   protocol::View view = completed;
   view.step = 0;
   view.camera = {};
@@ -97,12 +98,12 @@ Style style_of(const protocol::View& completed) {
   view.quality = {};
   view.vector.motion_time = 0;
   view.method.name = protocol::MethodName::slab;
-  style.key = protocol::encode_view(view);
-  style.dataset = completed.dataset;
-  return style;
+  signature.key = protocol::encode_view(view);
+  signature.dataset = completed.dataset;
+  return signature;
 }
 
-double distance(const Sight& a, const Sight& b) {
+double distance(const Viewpoint& a, const Viewpoint& b) {
   const double height = std::log(a.height / b.height) / height_scale;
   const double pixels = std::log(static_cast<double>(a.pixels_high) / b.pixels_high) / pixels_scale;
   double along = 0;

@@ -7,7 +7,7 @@
 
 namespace windsplat::quality {
 
-struct Sight {
+struct Viewpoint {
   double height = 1;                  // of the picture at the volume's middle, world units
   protocol::Vec3 direction{0, 1, 0};  // from the eye, unit
   int width = 1;                      // of the view's picture, pixels
@@ -19,7 +19,7 @@ struct Sight {
 
 // Of a view whose camera says where it is; what it leaves to its default is taken from `otherwise`.
 // Its detail is scaled from that one's by how large the volume is in the picture.
-Sight sight_of(const protocol::View& view, const Sight& otherwise = {});
+Viewpoint viewpoint_of(const protocol::View& view, const Viewpoint& otherwise = {});
 
 // Truths are drawn until no more light than this gets through: nothing is left that 8 bits show.
 inline constexpr double stop_of_the_truth = 1.5e-4;
@@ -38,14 +38,14 @@ struct Kind {
 
 // What a completed view's errors depend on but for where it is looked at from and at which step:
 // equal keys for views of one style. An empty key is of no style.
-struct Style {
+struct SceneSignature {
   std::string key;
   std::string dataset;  // its id
   Kind kind;
 };
-Style style_of(const protocol::View& completed);
+SceneSignature signature_of(const protocol::View& completed);
 
 // How far two sights are apart: about 1 where what was measured at one says little of the other.
-double distance(const Sight& a, const Sight& b);
+double distance(const Viewpoint& a, const Viewpoint& b);
 
 }  // namespace windsplat::quality

@@ -26,7 +26,7 @@ constexpr double value_max = 1e38;   // a view's numbers end here
 struct Kind {
   std::vector<std::string_view> words;
   std::vector<std::string_view> names;
-  ScalarStyle style;
+  ScalarStyle signature;
 };
 
 const std::vector<Kind>& kinds() {
@@ -250,7 +250,7 @@ protocol::Range default_magnitude_colors(const protocol::VectorView& vector) {
 ScalarStyle scalar_style(const data::FieldInfo& field) {
   if (is_body(field)) return body_style;
   const std::size_t kind = kind_of(field);
-  return kind < kinds().size() ? kinds()[kind].style : other_style;
+  return kind < kinds().size() ? kinds()[kind].signature : other_style;
 }
 
 std::vector<std::string> default_scalars(const data::DatasetInfo& info) {
@@ -278,10 +278,10 @@ std::vector<std::string> default_scalars(const data::DatasetInfo& info) {
 }
 
 protocol::Range default_scalar_range(const data::FieldInfo& field, const data::Volume& volume) {
-  const ScalarStyle style = scalar_style(field);
+  const ScalarStyle signature = scalar_style(field);
   const auto least = static_cast<double>(volume.range[0]);
   const auto most = static_cast<double>(volume.range[1]);
-  if (style.fraction && least >= -1e-6) {
+  if (signature.fraction && least >= -1e-6) {
     if (field.units == "%" && most <= 100.5) return {0, 100};
     if (field.units == "1" && most <= 1.0001) return {0, 1};
   }
@@ -302,15 +302,15 @@ std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& fie
                                                       const protocol::Range& range,
                                                       const Lattice& lattice,
                                                       const std::optional<Slice>& slice) {
-  const ScalarStyle style = scalar_style(field);
+  const ScalarStyle signature = scalar_style(field);
   double shortest = std::numeric_limits<double>::infinity();
   for (std::size_t a = 0; a < 3; ++a) {
     const bool across = slice && slice->axis == static_cast<int>(a);
     shortest = std::min(shortest, cell_size(lattice, a) * (across ? 1 : lattice.dims[a]));
   }
-  const double top = nice_above(style.opacity / shortest);
-  const double clear = range[0] + style.clear_below * (range[1] - range[0]);
-  if (style.clear_below <= 0) return {{range[0], 0}, {range[1], top}};
+  const double top = nice_above(signature.opacity / shortest);
+  const double clear = range[0] + signature.clear_below * (range[1] - range[0]);
+  if (signature.clear_below <= 0) return {{range[0], 0}, {range[1], top}};
   return {{range[0], 0}, {clear, 0}, {range[1], top}};
 }
 

@@ -64,7 +64,7 @@ struct Prefetch {
 };
 // The view rests: time to learn what each setting costs and errs for it. Not answered, and given up
 // as soon as anything is to be drawn.
-struct Survey {
+struct Calibrate {
   protocol::View view;  // not completed; names its dataset
 };
 // The last effect of a session.
@@ -73,16 +73,16 @@ struct Close {
   std::string reason;
 };
 using Effect = std::variant<SendText, Describe, StartRender, CancelRender, Ping, SendFrame,
-                            Prefetch, Survey, Close>;
+                            Prefetch, Calibrate, Close>;
 using Effects = std::vector<Effect>;
 
 // A frame as it was drawn.
 struct Drawn {
   Payload payload;
   protocol::FrameInfo info;
-  std::string view_json;  // the completed view, canonical
-  quality::Style style;   // of the view that was asked for, and where it is seen from
-  quality::Sight sight;
+  std::string view_json;              // the completed view, canonical
+  quality::SceneSignature signature;  // of the view that was asked for, and where it is seen from
+  quality::Viewpoint viewpoint;
   std::int64_t queue_us = 0;
   std::int64_t render_us = 0;
   std::int64_t measure_us = 0;  // the finer run

@@ -140,9 +140,9 @@ std::vector<int> Session::wanted_steps() const {
   if (closed_ || hidden_ || !openings_.empty() || view_.dataset.empty()) return {};
   if (player_.running()) return player_.upcoming(ahead_max);
   const bool rests = shown() && drawn_final_;
-  const bool same = wished_.view.dataset == view_.dataset && wished_.view.step == view_.step &&
-                    wished_fields_ == fields_of(view_);
-  if (!rests) return same && wished_for_rest_ ? wished_.steps : std::vector<int>{};
+  const bool same = requested_.view.dataset == view_.dataset &&
+                    requested_.view.step == view_.step && requested_fields_ == fields_of(view_);
+  if (!rests) return same && requested_at_rest_ ? requested_.steps : std::vector<int>{};
   const auto count = surroundings_.check(view_);
   std::vector<int> steps;
   if (count && view_.step + 1 < *count) steps.push_back(view_.step + 1);
@@ -150,20 +150,20 @@ std::vector<int> Session::wanted_steps() const {
   return steps;
 }
 
-void Session::wish() {
+void Session::request_prefetch() {
   std::vector<int> steps = wanted_steps();
   std::string fields = fields_of(view_);
-  const bool none = steps.empty() && wished_.steps.empty();
-  wished_for_rest_ = !player_.running();
+  const bool none = steps.empty() && requested_.steps.empty();
+  requested_at_rest_ = !player_.running();
   // While steps run they are drawn as the last one was.
   const quality::Setting setting = player_.running() && !steps.empty()
                                        ? moving_setting_
                                        : quality::settings[quality::own_setting(view_)];
-  const bool same = steps == wished_.steps && fields == wished_fields_;
-  if (none || (same && (steps.empty() || setting == wished_.setting))) return;
-  wished_ = {steps.empty() ? protocol::View{} : view_, std::move(steps), setting};
-  wished_fields_ = std::move(fields);
-  effects_.emplace_back(wished_);
+  const bool same = steps == requested_.steps && fields == requested_fields_;
+  if (none || (same && (steps.empty() || setting == requested_.setting))) return;
+  requested_ = {steps.empty() ? protocol::View{} : view_, std::move(steps), setting};
+  requested_fields_ = std::move(fields);
+  effects_.emplace_back(requested_);
 }
 
 // Of a description 0, of a frame its ticket.
@@ -196,17 +196,17 @@ Micros Session::final_cost(const quality::Forecasts& known, Micros now) const {
 
 // A view's style is known once it was completed, which drawing does: until then its kind alone is.
 quality::Forecasts Session::forecasts() const {
-  quality::Style style = quality::style_of(view_);
-  if (style.key == drawn_style_) {
-    style = style_;
+  quality::SceneSignature signature = quality::signature_of(view_);
+  if (signature.key == drawn_style_) {
+    signature = signature_;
   } else {
-    style.key.clear();
+    signature.key.clear();
   }
-  const quality::Sight sight = quality::sight_of(view_, sight_);
-  if (surroundings_.forecasts) return surroundings_.forecasts(style, sight);
+  const quality::Viewpoint viewpoint = quality::viewpoint_of(view_, viewpoint_);
+  if (surroundings_.forecasts) return surroundings_.forecasts(signature, viewpoint);
   quality::Forecasts out;
   for (std::size_t i = 0; i < out.size(); ++i) {
-    out[i] = quality::prior(style.kind, quality::settings[i], sight);
+    out[i] = quality::prior(signature.kind, quality::settings[i], viewpoint);
   }
   return out;
 }
@@ -216,10 +216,10 @@ quality::Forecasts Session::forecasts() const {
 void Session::learn(const Render& render, const Drawn& drawn, Micros now) {
   if (drawn.info.method == "reference" || render.purpose == Purpose::still) return;
   if (render.dataset != view_.dataset) return;
-  if (!drawn.style.key.empty() && render.version == version_) {
-    drawn_style_ = quality::style_of(view_).key;
-    style_ = drawn.style;
-    sight_ = drawn.sight;
+  if (!drawn.signature.key.empty() && render.version == version_) {
+    drawn_style_ = quality::signature_of(view_).key;
+    signature_ = drawn.signature;
+    viewpoint_ = drawn.viewpoint;
   }
   if (drawn.loaded) return;
   if (render.purpose == Purpose::moving) {
@@ -370,7 +370,7 @@ void Session::stand() {
 }
 
 // Unless something else is on its way, which the viewer would see last.
-void Session::stand_if_same() {
+void Session::confirm_unchanged() {
   if (shown() || !standing_) return;
   if (render_ && !render_->unwanted && render_->purpose != Purpose::still) return;
   if (protocol::encode_view(view_) == standing_->view) stand();
@@ -478,7 +478,7 @@ void Session::send_frame(const Render& render, Drawn drawn, Micros now) {
   }
   if (!drawn_final_) return;
   effects_.emplace_back(SendText{stats_});
-  if (!player_.running() && stills_.empty()) effects_.emplace_back(Survey{view_});
+  if (!player_.running() && stills_.empty()) effects_.emplace_back(Calibrate{view_});
 }
 
 std::optional<Micros> Session::wake_at() const {

@@ -98,7 +98,7 @@ Effects Session::on_changed(const std::string& dataset, Micros now) {
   if (closed_ || view_.dataset != dataset) return {};
   standing_.reset();
   show(document_, now);
-  wished_ = {};
+  requested_ = {};
   protocol::View bare;
   bare.dataset = dataset;
   const auto steps = surroundings_.check(bare);
@@ -397,7 +397,7 @@ void Session::close(int code, std::string reason) {
   abandon_render();
   if (render_ && !render_->unwanted) effects_.emplace_back(CancelRender{render_->ticket});
   closed_ = true;
-  wish();
+  request_prefetch();
   effects_.emplace_back(Close{code, std::move(reason)});
 }
 
@@ -413,9 +413,9 @@ Effects Session::finish(Micros now) {
   }
   if (!closed_) {
     advance_step(now);
-    stand_if_same();
+    confirm_unchanged();
     start_next(now);
-    wish();
+    request_prefetch();
     tell_reading(now);
   }
   return std::exchange(effects_, {});

@@ -78,7 +78,8 @@ struct Reading {
 using WhatIsRead = std::function<std::optional<Reading>(const std::string& dataset)>;
 
 // What is known of the settings' errors and times.
-using Forecaster = std::function<quality::Forecasts(const quality::Style&, const quality::Sight&)>;
+using Forecaster =
+    std::function<quality::Forecasts(const quality::SceneSignature&, const quality::Viewpoint&)>;
 
 // What a session asks of its surroundings while it decides. None of it may wait.
 struct Surroundings {
@@ -173,7 +174,7 @@ class Session {
   [[nodiscard]] bool errs_too_much(const Render& render, const Drawn& drawn);
   [[nodiscard]] quality::Forecasts forecasts() const;
   void learn(const Render& render, const Drawn& drawn, Micros now);
-  void wish();  // which steps to have ready
+  void request_prefetch();  // which steps to have ready
   [[nodiscard]] std::vector<int> wanted_steps() const;
   void count_played(const Render& render, bool loaded, Micros now);
   void start_still(Micros now);
@@ -194,7 +195,7 @@ class Session {
   void undo(std::uint64_t version, Micros now);  // that change was refused after all
   void render_failed(const Render& render, const Error& error, Micros now);
   void stand();  // for the present view
-  void stand_if_same();
+  void confirm_unchanged();
   void withhold(const Render& render);  // its frame looks as the standing one, as far as it shows
   [[nodiscard]] bool looks_standing(const Render& render, const Drawn& drawn) const;
   void send_frame(const Render& render, Drawn drawn,
@@ -252,9 +253,9 @@ class Session {
     int steps = 0;
   };
   std::optional<Pace> pace_;  // from the first step shown
-  Prefetch wished_;
-  std::string wished_fields_;
-  bool wished_for_rest_ = false;  // not while steps ran
+  Prefetch requested_;
+  std::string requested_fields_;
+  bool requested_at_rest_ = false;  // not while steps ran
 
   std::optional<Standing> standing_;
   std::optional<std::uint64_t> unanswered_;  // version of the newest patch, until it is answered
@@ -275,8 +276,8 @@ class Session {
   double thicker_error_ = 0;  // measured before the last halving
   double shown_error_ = 1;    // of the frame sent last, as far as it is known
   std::string drawn_style_;   // of the view that was drawn last, before it was completed
-  quality::Style style_;      // and after
-  quality::Sight sight_;
+  quality::SceneSignature signature_;  // and after
+  quality::Viewpoint viewpoint_;
   Link link_;
   JpegRate jpeg_;
   double final_bytes_ = 0;  // of the last one, on the wire

@@ -68,8 +68,8 @@ class Calibrator {
 
  private:
   Result<void> calibrate_look(const protocol::View& view) {
-    const quality::Style style = quality::style_of(view);
-    quality::Table table(style.kind);
+    const quality::SceneSignature signature = quality::signature_of(view);
+    quality::Table table(signature.kind);
     for (int n = 0; n < out_.plan.surveyed + out_.plan.held_out; ++n) {
       if (cancel_.cancelled()) return make_error(ErrorKind::cancelled, "interrupted");
       auto seen = seen_from(view, *subject_.dataset,
@@ -80,31 +80,31 @@ class Calibrator {
       held.image.height = out_.plan.height;
       const auto done =
           n < out_.plan.surveyed
-              ? survey(held, n == 0, table)
-              : compare(held, static_cast<std::size_t>(n - out_.plan.surveyed), style, table);
+              ? calibrate(held, n == 0, table)
+              : compare(held, static_cast<std::size_t>(n - out_.plan.surveyed), signature, table);
       if (!done) return done.error();
       if (progress_) progress_(++views_);
     }
     return {};
   }
 
-  Result<void> survey(const protocol::View& view, bool first, quality::Table& table) {
-    auto done = frame::survey(view, *subject_.dataset, pool_, cancel_, workspace_,
-                              [&](const frame::Surveyed& found) {
-                                table.add(found.setting, found.sight, found.measured);
-                              });
+  Result<void> calibrate(const protocol::View& view, bool first, quality::Table& table) {
+    auto done = frame::calibrate(view, *subject_.dataset, pool_, cancel_, workspace_,
+                                 [&](const frame::CalibrationSample& found) {
+                                   table.add(found.setting, found.viewpoint, found.measured);
+                                 });
     if (!done || !first) return done;
     if (auto drawn = draw_measured(view); !drawn) return drawn.error();
     const auto jpeg = encoded(view, learnt_quality, image::Subsampling::s444);
     if (!jpeg) return jpeg.error();
     const auto error = image::encoding_error(workspace_.planes, *jpeg);
     if (!error) return error.error();
-    table.add_encoding(learnt_quality, quality::sight_of(view), *error);
+    table.add_encoding(learnt_quality, quality::viewpoint_of(view), *error);
     return {};
   }
 
-  Result<void> compare(const protocol::View& view, std::size_t n, const quality::Style& style,
-                       const quality::Table& table) {
+  Result<void> compare(const protocol::View& view, std::size_t n,
+                       const quality::SceneSignature& signature, const quality::Table& table) {
     Subject seen = subject_;
     seen.view = view;
     const auto truth = extrapolate(seen, pool_, cancel_);
@@ -113,14 +113,14 @@ class Calibrator {
     if (!errors) return errors.error();
     const auto completed = frame::complete_at(view, *subject_.dataset, {});
     if (!completed) return completed.error();
-    const auto seen_at = frame::sight_of(*completed);
+    const auto seen_at = frame::viewpoint_of(*completed);
     if (!seen_at) return seen_at.error();
-    const quality::Sight sight = *seen_at;
-    const quality::Forecasts forecasts = table.forecasts(sight);
+    const quality::Viewpoint viewpoint = *seen_at;
+    const quality::Forecasts forecasts = table.forecasts(viewpoint);
     for (std::size_t i = 0; i < errors->size(); ++i) {
       if (std::isnan((*errors)[i])) continue;
       out_.compared.push_back({look_, n, i, (*errors)[i], forecasts[i],
-                               quality::prior(style.kind, quality::settings[i], sight)});
+                               quality::prior(signature.kind, quality::settings[i], viewpoint)});
     }
     aim(view, forecasts, *errors);
     for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
@@ -133,7 +133,7 @@ class Calibrator {
       out_.measured.push_back(
           {look_, method == protocol::MethodName::slab, error, *workspace_.drawn.error});
     }
-    if (auto done = compare_encodings(view, style, table); !done) return done.error();
+    if (auto done = compare_encodings(view, signature, table); !done) return done.error();
     return n == 0 && truth_ ? check_truth(view) : Result<void>();
   }
 
@@ -201,12 +201,13 @@ class Calibrator {
     return bytes;
   }
 
-  Result<void> compare_encodings(const protocol::View& view, const quality::Style& style,
+  Result<void> compare_encodings(const protocol::View& view,
+                                 const quality::SceneSignature& signature,
                                  const quality::Table& table) {
     const auto& [width, height, rgba] = workspace_.space.image();
     const auto rgb = displayed(rgba, width, height, workspace_.background);
-    const quality::Table untaught(style.kind);
-    const quality::Sight sight = quality::sight_of(view);
+    const quality::Table untaught(signature.kind);
+    const quality::Viewpoint viewpoint = quality::viewpoint_of(view);
     for (const auto subsampling : {image::Subsampling::s444, image::Subsampling::s420}) {
       for (const int quality : qualities) {
         const auto jpeg = encoded(view, quality, subsampling);
@@ -215,8 +216,8 @@ class Calibrator {
         if (!decoded) return decoded.error();
         const bool full = subsampling == image::Subsampling::s444;
         out_.encodings.push_back({look_, quality, full, linear_rmse(rgb, *decoded),
-                                  table.encoding_error(quality, full, sight),
-                                  untaught.encoding_error(quality, full, sight)});
+                                  table.encoding_error(quality, full, viewpoint),
+                                  untaught.encoding_error(quality, full, viewpoint)});
       }
     }
     return {};

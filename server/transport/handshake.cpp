@@ -99,7 +99,7 @@ class TlsTask final : public HandshakeTask {
     if (outcome_ || is_abandoned()) go_back();
   }
   void go_back() {
-    post_surely(io_, [this, task = shared_from_this()] {
+    post_or_retry(io_, [this, task = shared_from_this()] {
       charge();
       done_(outcome_.value_or(asio::error::operation_aborted));
     });

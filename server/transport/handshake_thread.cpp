@@ -102,7 +102,7 @@ void HandshakeThread::run() {
       if (step == nullptr) return;
       step->run();
     } catch (const std::exception& fault) {
-      tell_fault("a TLS handshake was lost", fault);  // its deadline closes the connection
+      log_fault("a TLS handshake was lost", fault);  // its deadline closes the connection
     }
   }
 }

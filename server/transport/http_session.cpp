@@ -353,7 +353,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     template <class Body>
     void tell(Body body) {
       const bool posted =
-          post_surely(executor_, [weak = session_, body = std::move(body)]() mutable {
+          post_or_retry(executor_, [weak = session_, body = std::move(body)]() mutable {
             if (const auto session = weak.lock()) body(*session);
           });
       if (!posted) *lost_ = true;
@@ -404,7 +404,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     response.close = true;
     idle_ = false;
     // What was refused before it was understood is charged all the same.
-    if (!charged_) quiet_ = !services_.admission.spoiled(visitor_, request_);
+    if (!charged_) quiet_ = !services_.admission.count_malformed(visitor_, request_);
     send(std::move(response));
   }
 

@@ -27,8 +27,8 @@ constexpr std::chrono::milliseconds post_patience{5000};
 // which alone may give some back, the handler is called at once instead. What the handler holds is
 // let go by the thread that runs it. False: it was given up, and let go by this thread.
 template <class Executor, class Handler>
-bool post_surely(const Executor& executor, Handler handler,
-                 std::chrono::milliseconds patience = post_patience) {
+bool post_or_retry(const Executor& executor, Handler handler,
+                   std::chrono::milliseconds patience = post_patience) {
   const auto until = std::chrono::steady_clock::now() + patience;
   std::shared_ptr<Handler> held;
   while (true) {

@@ -61,7 +61,7 @@ struct Server::State {
         io.poll();
         break;
       } catch (const std::exception& fault) {
-        tell_fault("a fault reached the io loop", fault);
+        log_fault("a fault reached the io loop", fault);
       }
     }
   }
@@ -104,7 +104,7 @@ struct Server::State {
       if (!fault) services.admission.log_refused_handshakes();
       if (fault || services.draining) return;
       const auto look = [this] {
-        auto found = attempt<std::vector<std::string>>("a look at the files", never, [this] {
+        auto found = run_guarded<std::vector<std::string>>("a look at the files", never, [this] {
           return services.backend.catalogue.look_after();
         });
         std::vector<std::string> changed;
@@ -114,10 +114,10 @@ struct Server::State {
           tell_changes(changed);
           look_after_data();
         };
-        while (!post_surely(io.get_executor(), go_on_looking) && !services.draining) {
+        while (!post_or_retry(io.get_executor(), go_on_looking) && !services.draining) {
         }
       };
-      if (!services.watcher.submit({never, look, true})) return look_after_data();
+      if (!services.file_watch.submit({never, look, true})) return look_after_data();
       looking = true;
     });
     looking = true;
@@ -171,7 +171,7 @@ struct Server::State {
         try {
           services.backend.catalogue.end();
         } catch (const std::exception& failure) {
-          tell_fault("what is read could not be ended", failure);
+          log_fault("what is read could not be ended", failure);
         }
       });
     });
@@ -258,7 +258,7 @@ void Server::run() {
       state_->go_on();
       state_->io.run();
     } catch (const std::exception& fault) {
-      tell_fault("a fault reached the io loop", fault);
+      log_fault("a fault reached the io loop", fault);
       std::this_thread::sleep_for(after_a_fault);
     }
   }
@@ -267,7 +267,7 @@ void Server::run() {
 void Server::drain() {
   // Whoever asks for the end gets it, however long there is no memory for it.
   while (
-      !post_surely(state_->io.get_executor(), [state = state_.get()] { state->begin_drain(); })) {
+      !post_or_retry(state_->io.get_executor(), [state = state_.get()] { state->begin_drain(); })) {
   }
 }
 

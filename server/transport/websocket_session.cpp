@@ -84,7 +84,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     return [weak = weak_from_this(), executor = socket_.get_executor(), lost = answer_lost_, body](
                auto number, auto result) {
       const bool posted =
-          post_surely(executor, [weak, body, number, result = std::move(result)]() mutable {
+          post_or_retry(executor, [weak, body, number, result = std::move(result)]() mutable {
             const auto self = weak.lock();
             if (!self || self->ended_) return;
             guarded(self, [&] { body(*self, number, std::move(result)); })();
@@ -117,8 +117,9 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
                     return checked->steps;
                   },
                   [&services](const std::string& id) { return what_is_read(services, id); },
-                  [&services](const quality::Style& style, const quality::Sight& sight) {
-                    return services.backend.quality.forecasts(style, sight);
+                  [&services](const quality::SceneSignature& signature,
+                              const quality::Viewpoint& viewpoint) {
+                    return services.backend.quality.forecasts(signature, viewpoint);
                   }},
                  now_us()) {}
   ~WebSocketSession() override {
@@ -210,7 +211,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     const auto datasets = services_.backend.catalogue.list();
     if (!datasets) return close(close_fault, "the datasets cannot be listed");
     send(protocol::HelloMessage{WINDSPLAT_VERSION, "session-" + std::to_string(id_), *datasets,
-                                services_.options.limits.pixels_told()});
+                                services_.options.limits.pixels_max_reported()});
     counted_ = true;
     services_.metrics.session_opened();
     log::info("viewer came", {{"session", id_}, {"request", request_id_}});
@@ -246,7 +247,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   // Whoever sends more than its address may is read no more until that is paid.
   void charge_message(std::size_t bytes) {
-    const std::chrono::microseconds wait(services_.admission.heard(guest_.address, bytes));
+    const std::chrono::microseconds wait(
+        services_.admission.message_received(guest_.address, bytes));
     if (wait.count() == 0 || !open_) return;
     owes_reading_ = true;
     read_timer_.expires_after(wait);
@@ -358,11 +360,11 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   void carry_out(session::Prefetch& effect) { viewer_.start(effect); }
 
-  void carry_out(session::Survey& effect) { viewer_.start(effect); }
+  void carry_out(session::Calibrate& effect) { viewer_.start(effect); }
 
   // An address that owes time or bytes gets its frames later, and none where that is long.
   void carry_out(session::StartRender& effect) {
-    const std::chrono::microseconds wait(services_.admission.until_paid(guest_.address));
+    const std::chrono::microseconds wait(services_.admission.throttle_delay(guest_.address));
     if (wait.count() == 0) return begin(effect);
     if (wait > owing_max) {
       return close(close_full, "this address has had more than it may have; try again in " +

@@ -14,10 +14,10 @@ namespace {
 // A study that was begun in the tables, and ends there however it ends.
 class Study {
  public:
-  Study(Backend& backend, protocol::View completed, quality::Style style)
-      : backend_(backend), completed_(std::move(completed)), style_(std::move(style)) {}
+  Study(Backend& backend, protocol::View completed, quality::SceneSignature signature)
+      : backend_(backend), completed_(std::move(completed)), signature_(std::move(signature)) {}
   ~Study() {
-    backend_.quality.end_study(style_, complete_);
+    backend_.quality.end_study(signature_, complete_);
     backend_.metrics.background_done(!complete_);
   }
   Study(const Study&) = delete;
@@ -37,46 +37,46 @@ class Study {
   }
 
   void draw(data::Dataset& dataset, const CancelToken& stop, const CancelToken& unwanted) {
-    const auto keep = [&](const frame::Surveyed& found) {
+    const auto keep = [&](const frame::CalibrationSample& found) {
       if (unwanted.cancelled()) stop.cancel();
-      backend_.quality.add(style_, found.setting, found.sight, found.measured);
+      backend_.quality.add(signature_, found.setting, found.viewpoint, found.measured);
     };
-    complete_ = static_cast<bool>(attempt<void>("a survey", stop, [&]() -> Result<void> {
-      const auto room = backend_.catalogue.reserve(frame::survey_bytes(completed_.image));
+    complete_ = static_cast<bool>(run_guarded<void>("a survey", stop, [&]() -> Result<void> {
+      const auto room = backend_.catalogue.reserve(frame::calibration_bytes(completed_.image));
       if (!room) return room.error();  // others need it more
-      return frame::survey(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
+      return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
     }));
   }
 
  private:
   Backend& backend_;
   protocol::View completed_;
-  quality::Style style_;
+  quality::SceneSignature signature_;
   bool complete_ = false;
 };
 
 std::shared_ptr<Study> begin(Backend& backend, const protocol::View& view, data::Dataset& dataset) {
   auto completed = scene::complete_and_place(view, dataset);
-  if (!completed || !frame::is_worth_a_survey(completed->view)) return nullptr;
-  const auto sight = frame::sight_of(*completed);
-  quality::Style style = quality::style_of(completed->view);
-  if (!sight || !backend.quality.begin_study(style, *sight)) return nullptr;
-  return std::make_shared<Study>(backend, std::move(completed->view), std::move(style));
+  if (!completed || !frame::is_worth_calibrating(completed->view)) return nullptr;
+  const auto viewpoint = frame::viewpoint_of(*completed);
+  quality::SceneSignature signature = quality::signature_of(completed->view);
+  if (!viewpoint || !backend.quality.begin_study(signature, *viewpoint)) return nullptr;
+  return std::make_shared<Study>(backend, std::move(completed->view), std::move(signature));
 }
 
 }  // namespace
 
-void submit_survey(Backend& backend, std::uint64_t owner, const protocol::View& view,
-                   const CancelToken& unwanted) {
+void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::View& view,
+                        const CancelToken& unwanted) {
   const auto found = backend.catalogue.find(view.dataset);
   if (!found) return;
   const auto run = [&backend, owner, view, unwanted, dataset = *found] {
     std::shared_ptr<Study> study;
-    const auto loaded = attempt<void>("data for a survey", unwanted, [&]() -> Result<void> {
-      data::Dataset ahead = dataset->ahead();
-      study = begin(backend, view, ahead);
+    const auto loaded = run_guarded<void>("data for a survey", unwanted, [&]() -> Result<void> {
+      data::Dataset prefetching = dataset->prefetching();
+      study = begin(backend, view, prefetching);
       if (!study) return make_error(ErrorKind::not_found, "there is nothing to learn");
-      return study->load(ahead, unwanted);
+      return study->load(prefetching, unwanted);
     });
     if (!loaded) return;
     RenderJob job;

@@ -13,7 +13,7 @@ namespace windsplat::net {
 // then every setting is drawn, while the renderer has nothing else to do. Nothing happens where the
 // tables know the view's style from about there, the picture is small, or `unwanted` is raised.
 // What others wish for is not evicted for it.
-void submit_survey(Backend& backend, std::uint64_t owner, const protocol::View& view,
-                   const CancelToken& unwanted);
+void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::View& view,
+                        const CancelToken& unwanted);
 
 }  // namespace windsplat::net

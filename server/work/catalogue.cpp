@@ -68,7 +68,7 @@ Result<protocol::DatasetDescription> Catalogue::describe(const std::string& id,
       cancel);
   if (!description) {
     const auto fields = scene::fields_of({}, (*dataset)->info());
-    return naming((*dataset)->with_need(description.error(), fields), id);
+    return with_dataset_name((*dataset)->with_need(description.error(), fields), id);
   }
   {
     protocol::DatasetDescription brief = scene::describe_briefly(**dataset);
@@ -170,7 +170,7 @@ Result<Catalogue::Checked> Catalogue::check(const protocol::View& view) const {
   return Checked{static_cast<int>((*dataset)->info().steps.size()), std::move(*cost)};
 }
 
-Error naming(Error error, const std::string& dataset, const std::string& field) {
+Error with_dataset_name(Error error, const std::string& dataset, const std::string& field) {
   if (error.kind != ErrorKind::out_of_memory) return error;
   std::string message = "dataset '";
   message += printable(dataset);

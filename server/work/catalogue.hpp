@@ -39,8 +39,8 @@ class Catalogue {
   // it takes.
   Result<std::string> open(const data::Location& location, const CancelToken& cancel);
   // What a session will want; see data::Store::wish.
-  void wish(std::uint64_t owner, std::vector<data::Wish> wishes) {
-    store_->wish(owner, std::move(wishes));
+  void request_prefetch(std::uint64_t owner, std::vector<data::PrefetchRequest> requests) {
+    store_->request_prefetch(owner, std::move(requests));
   }
   // Opens anew what changed on disk and lets go of what is not read; the ids of what changed. Not
   // for the io thread.
@@ -115,6 +115,6 @@ class Catalogue {
 };
 
 // Where memory is the reason: the same, naming what was to be loaded. Others as they are.
-Error naming(Error error, const std::string& dataset, const std::string& field = "");
+Error with_dataset_name(Error error, const std::string& dataset, const std::string& field = "");
 
 }  // namespace windsplat::net

@@ -71,7 +71,7 @@ Result<Held> reserve_picture(const data::Dataset& dataset, const protocol::Image
 Result<Held> load_picture(const protocol::View& view, data::Dataset& loading,
                           const frame::Encoding& encoding) {
   auto fields = frame::load(view, loading, encoding);
-  if (!fields) return naming(fields.error(), loading.info().id);
+  if (!fields) return with_dataset_name(fields.error(), loading.info().id);
   // After them, so that it is known at once where the two do not fit together.
   auto room = room_for(loading, view.image, encoding);
   if (!room) return room.error();

@@ -8,16 +8,16 @@
 namespace windsplat::net {
 
 // Style and sight of a frame that was drawn of a view at a setting.
-struct Seen {
-  quality::Style style;
-  quality::Sight sight;
+struct Observation {
+  quality::SceneSignature signature;
+  quality::Viewpoint viewpoint;
 };
-Seen seen_in(const frame::Frame& drawn, const quality::Setting& setting);
+Observation observed_in(const frame::Frame& drawn, const quality::Setting& setting);
 
 // Sets error and jpegError of the frame's report. What was measured goes into the tables. `quality`
 // and chroma are the JPEG's; of another format nothing is said.
-void tell_error(const frame::Frame& drawn, const Seen& seen, const quality::Setting& setting,
-                const frame::Encoding& encoding, quality::Tables& tables,
-                protocol::FrameInfo& info);
+void report_error(const frame::Frame& drawn, const Observation& observed,
+                  const quality::Setting& setting, const frame::Encoding& encoding,
+                  quality::Tables& tables, protocol::FrameInfo& info);
 
 }  // namespace windsplat::net

@@ -71,8 +71,8 @@ protocol::JobDescription describe(const Job& job) {
 }
 
 // Throws nothing.
-Result<protocol::JobResult> run_guarded(const Jobs::Work& work, const std::shared_ptr<Job>& job) {
-  return attempt<protocol::JobResult>("of a client", job->cancel, [&] {
+Result<protocol::JobResult> run_work(const Jobs::Work& work, const std::shared_ptr<Job>& job) {
+  return run_guarded<protocol::JobResult>("of a client", job->cancel, [&] {
     return work({job->cancel, [job](double done) { job->progress = std::clamp(done, 0.0, 1.0); }});
   });
 }
@@ -93,7 +93,7 @@ struct Jobs::State {
       job->since = Clock::now();
       Work task = std::exchange(job->work, nullptr);
       lock.unlock();
-      auto outcome = run_guarded(task, job);
+      auto outcome = run_work(task, job);
       task = nullptr;  // what it holds goes before the lock is taken
       lock.lock();
       finish(*job, std::move(outcome));

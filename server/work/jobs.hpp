@@ -21,7 +21,7 @@ class Jobs {
   // What a job is given: whether it is still wanted, and a way to tell how much is done, 0 to 1.
   struct Handle {
     CancelToken cancel;
-    std::function<void(double done)> tell_progress;
+    std::function<void(double done)> report_progress;
   };
   // Where it was cancelled it leaves nothing behind and says `cancelled`.
   using Work = std::function<Result<protocol::JobResult>(const Handle&)>;

@@ -41,7 +41,7 @@ struct LoadService::State {
       try {
         job->run();
       } catch (const std::exception& fault) {
-        tell_fault("a load job failed", fault);
+        log_fault("a load job failed", fault);
       }
       job.reset();  // what it holds goes before the lock is taken
       lock.lock();

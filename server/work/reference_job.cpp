@@ -31,7 +31,7 @@ struct Strip {
 };
 
 // Who draws, and who pays for it.
-struct Artist {
+struct DrawingOwner {
   std::uint64_t owner = 0;
   std::string payer;
 };
@@ -39,17 +39,17 @@ struct Artist {
 // Runs `draw` on the renderer's thread while nobody else needs it, again where others came between,
 // until it says something else than `cancelled`, or the job is. Takes a copy of `draw`, which may
 // outlive the call by a moment.
-Result<void> in_background(Backend& backend, const Artist& artist, const CancelToken& unwanted,
+Result<void> in_background(Backend& backend, const DrawingOwner& owner, const CancelToken& unwanted,
                            const std::function<Result<void>(const CancelToken&)>& draw) {
   while (!unwanted.cancelled()) {
     const auto strip = std::make_shared<Strip>();
     RenderJob job;
     job.kind = RenderKind::background;
-    job.owner = artist.owner;
-    job.payer = artist.payer;
+    job.owner = owner.owner;
+    job.payer = owner.payer;
     const CancelToken stop = job.cancel;
     job.run = [strip, draw, stop](std::int64_t /*queue_us*/) {
-      auto outcome = attempt<void>("a reference", stop, [&] { return draw(stop); });
+      auto outcome = run_guarded<void>("a reference", stop, [&] { return draw(stop); });
       const std::lock_guard lock(strip->mutex);
       strip->outcome = std::move(outcome);
       strip->changed.notify_one();
@@ -94,9 +94,9 @@ Result<protocol::JobResult> draw_reference(Backend& backend, const protocol::Vie
                                               handle.cancel, memory);
   if (!begun) return begun.error();
   const std::shared_ptr<frame::ReferenceDrawing> drawing = std::move(*begun);
-  const Artist artist{backend.references.next_owner(), payer};
+  const DrawingOwner owner{backend.references.next_owner(), payer};
   while (drawing->done() < 1) {
-    const auto drawn = in_background(backend, artist, handle.cancel,
+    const auto drawn = in_background(backend, owner, handle.cancel,
                                      [&backend, drawing](const CancelToken& stop) -> Result<void> {
                                        const auto until = Clock::now() + strip_time;
                                        drawing->draw(*backend.pool, stop,
@@ -104,11 +104,11 @@ Result<protocol::JobResult> draw_reference(Backend& backend, const protocol::Vie
                                        return {};
                                      });
     if (!drawn) return drawn.error();
-    handle.tell_progress(drawing->done());
+    handle.report_progress(drawing->done());
   }
   const auto difference = std::make_shared<frame::Difference>();
   const auto compared =
-      in_background(backend, artist, handle.cancel,
+      in_background(backend, owner, handle.cancel,
                     [&backend, drawing, difference](const CancelToken& stop) -> Result<void> {
                       const auto found = drawing->compare(*backend.pool, stop, backend.frames);
                       if (!found) return found.error();

@@ -71,13 +71,13 @@ struct RenderService::State {
     try {
       next.job.run(began_us - next.since_us);
     } catch (const std::exception& fault) {
-      tell_fault("a render job failed", fault);
+      log_fault("a render job failed", fault);
     }
     const std::int64_t took_us = options.now_us() - began_us;
     try {
       if (options.charge && !next.job.payer.empty()) options.charge(next.job.payer, took_us);
     } catch (const std::exception& fault) {
-      tell_fault("a render job could not be charged", fault);
+      log_fault("a render job could not be charged", fault);
     }
     return took_us;
   }

@@ -13,8 +13,8 @@
 namespace windsplat::net {
 
 // Where memory is short there may be none for the words.
-inline void tell_fault(const char* message, const std::exception& fault, const char* job = "",
-                       const std::string& request_id = {}) noexcept {
+inline void log_fault(const char* message, const std::exception& fault, const char* job = "",
+                      const std::string& request_id = {}) noexcept {
   try {
     log::error(message, {{"job", job}, {"request", request_id}, {"fault", fault.what()}});
   } catch (const std::exception&) {
@@ -26,15 +26,15 @@ inline void tell_fault(const char* message, const std::exception& fault, const c
 // without its words. Throws nothing, and its errors need no memory: their words are short enough to
 // lie within a string (15 bytes).
 template <class T, class Make>
-Result<T> attempt(const char* what, const CancelToken& cancel, const Make& make,
-                  const std::string& request_id = {}) {
+Result<T> run_guarded(const char* what, const CancelToken& cancel, const Make& make,
+                      const std::string& request_id = {}) {
   try {
     if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "nobody waits for the answer");
     return make();
   } catch (const std::bad_alloc&) {
     return make_error(ErrorKind::out_of_memory, "no memory left");
   } catch (const std::exception& fault) {
-    tell_fault("a job failed", fault, what, request_id);
+    log_fault("a job failed", fault, what, request_id);
     return make_error(ErrorKind::internal, "the job failed");
   }
 }

@@ -41,10 +41,10 @@ Result<session::Drawn> draw(Backend& backend, const session::StartRender& wanted
   if (!drawn) return drawn.error();
   session::Drawn out;
   out.info = frame::frame_info(*drawn, drawn->view);
-  Seen seen = seen_in(*drawn, wanted.setting);
-  tell_error(*drawn, seen, wanted.setting, encoding, backend.quality, out.info);
-  out.style = std::move(seen.style);
-  out.sight = seen.sight;
+  Observation observed = observed_in(*drawn, wanted.setting);
+  report_error(*drawn, observed, wanted.setting, encoding, backend.quality, out.info);
+  out.signature = std::move(observed.signature);
+  out.viewpoint = observed.viewpoint;
   out.view_json = protocol::encode_view(drawn->view);
   out.payload = std::make_shared<const std::vector<std::uint8_t>>(std::move(drawn->bytes));
   out.queue_us = queue_us;
@@ -69,28 +69,28 @@ Result<protocol::DatasetDescription> encoded(Result<protocol::DatasetDescription
 
 constexpr int describing_max = 4;  // of a session at a time
 
-Result<std::vector<data::Wish>> wishes_of(const data::Dataset& dataset,
-                                          const session::Prefetch& wanted) {
-  data::Dataset ahead = dataset.ahead();
-  const auto completed = frame::complete_at(quality::at_setting(wanted.view, wanted.setting), ahead,
-                                            frame_encoding({}, wanted.setting));
+Result<std::vector<data::PrefetchRequest>> prefetch_requests_of(const data::Dataset& dataset,
+                                                                const session::Prefetch& wanted) {
+  data::Dataset prefetching = dataset.prefetching();
+  const auto completed = frame::complete_at(quality::at_setting(wanted.view, wanted.setting),
+                                            prefetching, frame_encoding({}, wanted.setting));
   if (!completed) return completed.error();
   const auto shown = scene::shown_by(*completed);
   if (!shown) return shown.error();
-  std::vector<data::Wish> wishes;
+  std::vector<data::PrefetchRequest> requests;
   for (const int step : wanted.steps) {
     for (const std::string& field : shown->fields) {
-      wishes.push_back({dataset, field, static_cast<std::size_t>(step), shown->coarsening});
+      requests.push_back({dataset, field, static_cast<std::size_t>(step), shown->coarsening});
     }
   }
-  return wishes;
+  return requests;
 }
 
 }  // namespace
 
 // What is wished for next. A dataset has one job waiting at most, however often a viewer changes
 // its mind; the job works out what is wished for when its turn has come.
-struct Viewer::Wishes {
+struct Viewer::PrefetchState {
   struct Newest {
     data::Dataset dataset;
     session::Prefetch effect;
@@ -106,10 +106,10 @@ Viewer::Viewer(Backend& backend, std::uint64_t owner, std::string payer)
     : backend_(backend),
       owner_(owner),
       payer_(std::move(payer)),
-      wishes_(std::make_shared<Wishes>()) {}
+      requests_(std::make_shared<PrefetchState>()) {}
 
 void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
-  survey_.cancel();  // the view rests no more
+  calibration_.cancel();  // the view rests no more
   const CancelToken cancel;
   running_.emplace(effect.ticket, cancel);
   auto dataset = backend_.catalogue.find(effect.view.dataset);
@@ -123,7 +123,7 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
       RenderService::Kind::stream, owner_, cancel, std::move(*dataset), {}, {}, {}, 0, payer_};
   drawing.draw = [&backend = backend_, effect, cancel, shared](
                      data::Dataset& resident, std::int64_t queue_us, bool after_load) {
-    auto drawn = attempt<session::Drawn>("a frame", cancel, [&] {
+    auto drawn = run_guarded<session::Drawn>("a frame", cancel, [&] {
       return draw(backend, effect, resident, queue_us, after_load, cancel);
     });
     if (!after_load && !drawn && drawn.error().kind == ErrorKind::not_resident) return false;
@@ -132,7 +132,7 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
     return true;
   };
   drawing.load = [effect, cancel](data::Dataset& loading) {
-    return attempt<std::shared_ptr<const void>>("loading a frame's fields", cancel, [&] {
+    return run_guarded<std::shared_ptr<const void>>("loading a frame's fields", cancel, [&] {
       return load_picture(quality::at_setting(effect.view, effect.setting), loading,
                           frame_encoding(effect.encoding, effect.setting));
     });
@@ -154,7 +154,8 @@ void Viewer::start(const session::Describe& effect, DescribedReply reply) {
   const auto queued = backend_.loads.submit(
       {gone_,
        [&backend = backend_, effect, cancel = gone_, shared, one = describing_] {
-         (*shared)(effect.id, attempt<protocol::DatasetDescription>("a description", cancel, [&] {
+         (*shared)(effect.id,
+                   run_guarded<protocol::DatasetDescription>("a description", cancel, [&] {
                      return encoded(backend.catalogue.describe(effect.dataset, cancel));
                    }));
        },
@@ -165,53 +166,54 @@ void Viewer::start(const session::Describe& effect, DescribedReply reply) {
 void Viewer::start(const session::Prefetch& effect) {
   const auto found = backend_.catalogue.find(effect.view.dataset);
   if (effect.steps.empty() || !found) {
-    wish_no_more();
+    cancel_prefetch();
     return;
   }
   const auto of = (*found)->shared_info();
   {
-    const std::lock_guard lock(wishes_->mutex);
-    if (wishes_->of != of.get()) ++wishes_->epoch;
-    wishes_->of = of.get();
-    wishes_->newest.emplace(Wishes::Newest{**found, effect});
-    if (!wishes_->queued.insert(of.get()).second) return;
+    const std::lock_guard lock(requests_->mutex);
+    if (requests_->of != of.get()) ++requests_->epoch;
+    requests_->of = of.get();
+    requests_->newest.emplace(PrefetchState::Newest{**found, effect});
+    if (!requests_->queued.insert(of.get()).second) return;
   }
   // To know which fields at which detail, the view has to be completed: not here.
-  const auto run = [&backend = backend_, owner = owner_, wishes = wishes_, key = of.get()] {
-    work_out(backend, owner, *wishes, key);
+  const auto run = [&backend = backend_, owner = owner_, requests = requests_, key = of.get()] {
+    resolve_prefetch(backend, owner, *requests, key);
   };
   (void)backend_.loads.submit({gone_, run, true, of});
 }
 
-void Viewer::work_out(Backend& backend, std::uint64_t owner, Wishes& wishes,
-                      const data::DatasetInfo* of) {
-  std::optional<Wishes::Newest> newest;
+void Viewer::resolve_prefetch(Backend& backend, std::uint64_t owner, PrefetchState& requests,
+                              const data::DatasetInfo* of) {
+  std::optional<PrefetchState::Newest> newest;
   std::uint64_t epoch = 0;
   {
-    const std::lock_guard lock(wishes.mutex);
-    wishes.queued.erase(of);
-    if (!wishes.newest || wishes.of != of) return;
-    newest = std::exchange(wishes.newest, std::nullopt);
-    epoch = wishes.epoch;
+    const std::lock_guard lock(requests.mutex);
+    requests.queued.erase(of);
+    if (!requests.newest || requests.of != of) return;
+    newest = std::exchange(requests.newest, std::nullopt);
+    epoch = requests.epoch;
   }
-  auto found = attempt<std::vector<data::Wish>>(
-      "what comes next", {}, [&] { return wishes_of(newest->dataset, newest->effect); });
-  const std::lock_guard lock(wishes.mutex);
-  if (found && wishes.epoch == epoch) backend.catalogue.wish(owner, std::move(*found));
+  auto found = run_guarded<std::vector<data::PrefetchRequest>>(
+      "what comes next", {}, [&] { return prefetch_requests_of(newest->dataset, newest->effect); });
+  const std::lock_guard lock(requests.mutex);
+  if (found && requests.epoch == epoch)
+    backend.catalogue.request_prefetch(owner, std::move(*found));
 }
 
-void Viewer::wish_no_more() {
-  const std::lock_guard lock(wishes_->mutex);
-  wishes_->newest.reset();
-  wishes_->of = nullptr;
-  ++wishes_->epoch;
-  backend_.catalogue.wish(owner_, {});
+void Viewer::cancel_prefetch() {
+  const std::lock_guard lock(requests_->mutex);
+  requests_->newest.reset();
+  requests_->of = nullptr;
+  ++requests_->epoch;
+  backend_.catalogue.request_prefetch(owner_, {});
 }
 
-void Viewer::start(const session::Survey& effect) {
-  survey_.cancel();
-  survey_ = CancelToken();
-  submit_survey(backend_, owner_, effect.view, survey_);
+void Viewer::start(const session::Calibrate& effect) {
+  calibration_.cancel();
+  calibration_ = CancelToken();
+  submit_calibration(backend_, owner_, effect.view, calibration_);
 }
 
 void Viewer::cancel(std::uint64_t ticket) {
@@ -220,8 +222,8 @@ void Viewer::cancel(std::uint64_t ticket) {
 
 void Viewer::cancel_all() {
   gone_.cancel();
-  survey_.cancel();
-  wish_no_more();
+  calibration_.cancel();
+  cancel_prefetch();
   for (const auto& [ticket, token] : running_) token.cancel();
 }
 

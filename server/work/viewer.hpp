@@ -30,25 +30,25 @@ class Viewer {
   // Has the steps that may come next made resident, as far as memory goes.
   void start(const session::Prefetch& effect);
   // Learns what settings cost and err for a view, while the renderer has nothing else to do.
-  void start(const session::Survey& effect);
+  void start(const session::Calibrate& effect);
   void cancel(std::uint64_t ticket);
   void done(std::uint64_t ticket) { running_.erase(ticket); }
   void cancel_all();
 
  private:
-  struct Wishes;
-  static void work_out(Backend& backend, std::uint64_t owner, Wishes& wishes,
-                       const data::DatasetInfo* of);
-  void wish_no_more();
+  struct PrefetchState;
+  static void resolve_prefetch(Backend& backend, std::uint64_t owner, PrefetchState& requests,
+                               const data::DatasetInfo* of);
+  void cancel_prefetch();
 
   Backend& backend_;
   const std::uint64_t owner_;
   const std::string payer_;
   std::map<std::uint64_t, CancelToken> running_;  // by ticket
-  std::shared_ptr<Wishes> wishes_;                // shared with the jobs that work them out
+  std::shared_ptr<PrefetchState> requests_;       // shared with the jobs that work them out
   CancelToken gone_;                              // for descriptions
   std::shared_ptr<const char> describing_ = std::make_shared<const char>();  // held by each
-  CancelToken survey_;  // the last one that was asked for
+  CancelToken calibration_;  // the last one that was asked for
 };
 
 }  // namespace windsplat::net

@@ -58,13 +58,14 @@ std::string text_of(const Encoding& encoding) {
 class Transcript {
  public:
   Transcript()
-      : session_({},
-                 {check,
-                  {},
-                  [](const quality::Style& style, const quality::Sight& sight) {
-                    return quality::Table(style.kind).forecasts(sight);
-                  }},
-                 now_) {}
+      : session_(
+            {},
+            {check,
+             {},
+             [](const quality::SceneSignature& signature, const quality::Viewpoint& viewpoint) {
+               return quality::Table(signature.kind).forecasts(viewpoint);
+             }},
+            now_) {}
 
   void play(const Json& line) {
     advance(line.at("at").get<Micros>() * 1000);
@@ -121,7 +122,7 @@ class Transcript {
     out.payload = std::make_shared<const std::vector<std::uint8_t>>(1000);
     out.info.method = render_->setting.method == protocol::MethodName::kernel ? "kernel" : "slab";
     out.info.tiles = 1;
-    out.style.key = "style";
+    out.signature.key = "style";
     out.view_json = "{}";
     out.render_us = render_us;
     out.info.width = quality::edge_at(render_->view.image.width, render_->setting.half_level);
@@ -184,7 +185,7 @@ class Transcript {
     std::cout << "prefetch";
     for (const int step : wanted.steps) std::cout << ' ' << step;
   }
-  void print(const Survey&, bool&) { std::cout << "survey"; }
+  void print(const Calibrate&, bool&) { std::cout << "survey"; }
   void print(const Close& close, bool&) {
     std::cout << "close " << close.code << ' ' << close.reason;
   }

@@ -155,14 +155,14 @@ TEST(TlsHandshakes, beyond_an_addresses_time_are_not_begun) {
   Limits limits;
   limits.handshake_ms_per_address = 2;
   TestServer server(over_tls(limits));
-  Client watcher(server.port(), nullptr, nullptr, "127.0.0.2");
-  ASSERT_TRUE(watcher.shaken());
+  Client file_watch(server.port(), nullptr, nullptr, "127.0.0.2");
+  ASSERT_TRUE(file_watch.shaken());
   int shaken = 0;
   // The thread's clock may be coarse, so that some handshakes seem to take nothing.
   while (shaken < 5000 && Client(server.port()).shaken()) ++shaken;
   EXPECT_GT(shaken, 0) << "ten seconds' worth at once";
   EXPECT_LT(shaken, 5000);
-  const std::string metrics = watcher.get("/metrics");
+  const std::string metrics = file_watch.get("/metrics");
   EXPECT_THAT(metrics, HasSubstr("windsplat_refused_total{limit=\"handshakes\"} 1\n"));
   EXPECT_THAT(metrics, testing::Not(HasSubstr("windsplat_tls_handshake_seconds_total 0\n")));
   EXPECT_TRUE(Client(server.port(), nullptr, nullptr, "127.0.0.2").shaken());

@@ -101,7 +101,7 @@ TEST(Jobs, NoMoreRunThanMayAndTheOthersWait) {
   std::vector<std::string> ids;
   for (int i = 0; i < 5; ++i) {
     ids.push_back(submitted(jobs, [&](const Jobs::Handle& handle) {
-      handle.tell_progress(0.5);
+      handle.report_progress(0.5);
       gate.pass();
       return Result<std::string>("x");
     }));

@@ -10,7 +10,7 @@
 
 #include "cli_program.hpp"
 #include "net_server.hpp"
-#include "server/base/kept.hpp"
+#include "server/base/trim_storage.hpp"
 #include "server/work/references.hpp"
 
 namespace net_test {
@@ -178,7 +178,7 @@ TEST(References, WhatCannotBeDrawnIsRefusedByItsPlace) {
     return std::pair<int, std::string>(answer.status, at);
   };
   using Told = std::pair<int, std::string>;
-  static_assert(1921 * 1088 > windsplat::kept_pixels);
+  static_assert(1921 * 1088 > windsplat::retained_pixels);
   EXPECT_EQ(refused(R"({"dataset":"small","image":{"width":1921,"height":1088}})"),
             Told(413, "/image"));
   EXPECT_EQ(refused(R"({"dataset":"small","method":{"name":"reference"}})"),

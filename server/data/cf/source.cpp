@@ -84,7 +84,7 @@ class ArraySource final : public FileSource {
     WINDSPLAT_CHECK(field < plans_.size() && step < info_.steps.size());
     const Plan& plan = plans_[field];
     const std::size_t samples = info_.grid.samples();
-    const auto tell = [&](double done) { tell_progress(done); };
+    const auto tell = [&](double done) { report_progress(done); };
     if (plan.derived >= 0) {
       const DerivedField& rule = derived_[static_cast<std::size_t>(plan.derived)];
       if (auto done = fill_derived(*file_, placement_, pressures_, rule, step, out, tell); !done) {

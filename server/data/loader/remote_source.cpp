@@ -336,7 +336,7 @@ struct RemoteSource::State {
     constexpr std::uint64_t share = 8;
     if (bytes > Transfer::kept_bytes_max) return false;
     if (limits.budget && bytes > limits.budget->bytes_max() / share) return false;
-    return static_cast<bool>(transfer_memory.resize(bytes, Urgency::ahead));
+    return static_cast<bool>(transfer_memory.resize(bytes, Urgency::prefetch));
   }
 
   Result<Volume> read(std::size_t field, std::size_t step) {

@@ -34,7 +34,7 @@ class Source {
   virtual void on_progress(Progress progress) { progress_ = std::move(progress); }
 
  protected:
-  void tell_progress(double done) const {
+  void report_progress(double done) const {
     if (progress_) progress_(done);
   }
 

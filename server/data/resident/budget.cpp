@@ -115,17 +115,17 @@ bool Budget::has(const ResidentKey& key) const {
   return found != entries_.end() && found->second->listed;
 }
 
-void Budget::wish(std::uint64_t owner, const std::vector<ResidentKey>& keys) {
+void Budget::request_prefetch(std::uint64_t owner, const std::vector<ResidentKey>& keys) {
   const std::lock_guard lock(mutex_);
   // Taking wishes back needs no memory: destructors do it.
-  if (const auto before = wishes_.find(owner); before != wishes_.end()) {
-    for (const ResidentKey& key : before->second) wished_.erase(wished_.find(key));
-    wishes_.erase(before);
+  if (const auto before = requests_.find(owner); before != requests_.end()) {
+    for (const ResidentKey& key : before->second) requested_.erase(requested_.find(key));
+    requests_.erase(before);
   }
   if (keys.empty()) return;
-  std::multiset<ResidentKey> wished(keys.begin(), keys.end());
-  wishes_.emplace(owner, keys);
-  wished_.merge(wished);  // both or none, should memory fail
+  std::multiset<ResidentKey> requested(keys.begin(), keys.end());
+  requests_.emplace(owner, keys);
+  requested_.merge(requested);  // both or none, should memory fail
 }
 
 std::uint64_t Budget::bytes_of(std::uint64_t owner) const {
@@ -236,7 +236,7 @@ bool Budget::is_derived(const ResidentKey& key) const {
 }
 
 bool Budget::may_go(const ResidentKey& key, Urgency urgency) const {
-  return !is_held(*entries_.at(key)) && (urgency == Urgency::demand || !is_wished(key));
+  return !is_held(*entries_.at(key)) && (urgency == Urgency::demand || !is_requested(key));
 }
 
 std::uint64_t Budget::evictable_for(Urgency urgency) const {
@@ -320,7 +320,7 @@ void Budget::list_again() {
 bool Budget::make_room_beside_turn(std::uint64_t bytes, Urgency urgency) {
   if (!in_turn_waits_) return make_room(bytes, urgency);
   const bool fits = turn_needs_ <= bytes_max_ && bytes <= bytes_max_ - turn_needs_;
-  if (!fits || urgency == Urgency::ahead || !make_room(bytes, urgency)) return false;
+  if (!fits || urgency == Urgency::prefetch || !make_room(bytes, urgency)) return false;
   turn_needs_ += bytes;
   return true;
 }
@@ -377,9 +377,9 @@ bool Budget::make_room(std::uint64_t bytes, Urgency urgency) {
   using Rule = bool (*)(const Budget&, const ResidentKey&);
   constexpr std::array<Rule, 3> rules{
       [](const Budget& self, const ResidentKey& key) {
-        return self.is_derived(key) && !self.is_wished(key);
+        return self.is_derived(key) && !self.is_requested(key);
       },
-      [](const Budget& self, const ResidentKey& key) { return !self.is_wished(key); },
+      [](const Budget& self, const ResidentKey& key) { return !self.is_requested(key); },
       [](const Budget&, const ResidentKey&) { return true; }};
   for (const Rule rule : rules) {
     for (auto at = recent_.end(); at != recent_.begin() && used_ > bytes_max_ - bytes;) {
@@ -434,7 +434,7 @@ Result<void> Reservation::resize(std::uint64_t bytes, Urgency urgency) {
   std::unique_lock lock(budget_->mutex_);
   // What is only asked for ahead of need is done without.
   const bool in_turn =
-      urgency != Urgency::ahead && budget_->turn_.thread == std::this_thread::get_id();
+      urgency != Urgency::prefetch && budget_->turn_.thread == std::this_thread::get_id();
   if (bytes > bytes_ && !budget_->make_room(bytes - bytes_, urgency) &&
       !(in_turn &&
         budget_->wait_for_room(bytes - bytes_, budget_->turn_.own, budget_->turn_.cancel, lock))) {

@@ -29,9 +29,9 @@ using ResidentKey = std::tuple<std::uint64_t, std::size_t, std::size_t, std::str
 using Resident = std::shared_ptr<const void>;
 
 enum class Urgency {
-  in_turn,  // the only one of its kind at a time: waits for what others hold, see Budget::get()
-  demand,   // somebody waits: whatever nobody holds may go for it
-  ahead,    // may be wanted soon: what is wished for stays
+  in_turn,   // the only one of its kind at a time: waits for what others hold, see Budget::get()
+  demand,    // somebody waits: whatever nobody holds may go for it
+  prefetch,  // may be wanted soon: what is wished for stays
 };
 
 // What the caller of get() holds itself, and so cannot wait for.
@@ -85,7 +85,7 @@ class Budget {
   [[nodiscard]] bool has(const ResidentKey& key) const;
 
   // What `owner` wishes to have soon, in place of its earlier wishes.
-  void wish(std::uint64_t owner, const std::vector<ResidentKey>& keys);
+  void request_prefetch(std::uint64_t owner, const std::vector<ResidentKey>& keys);
 
   [[nodiscard]] std::uint64_t bytes_of(std::uint64_t owner) const;
   // Drops what nobody holds of a dataset.
@@ -134,7 +134,9 @@ class Budget {
   [[nodiscard]] static bool is_held(const Entry& entry) {
     return entry.answer->value().use_count() > 1;
   }
-  [[nodiscard]] bool is_wished(const ResidentKey& key) const { return wished_.count(key) > 0; }
+  [[nodiscard]] bool is_requested(const ResidentKey& key) const {
+    return requested_.count(key) > 0;
+  }
   void drop_all(std::uint64_t owner, bool held_too);
   // A volume whose packed form is kept too, or an average of a volume that is: had again at little
   // cost.
@@ -159,8 +161,8 @@ class Budget {
   std::uint64_t owners_ = 0;
   std::map<ResidentKey, std::shared_ptr<Entry>> entries_;
   std::list<ResidentKey> recent_;  // what was made, the most recently used first
-  std::map<std::uint64_t, std::vector<ResidentKey>> wishes_;
-  std::multiset<ResidentKey> wished_;  // of all owners
+  std::map<std::uint64_t, std::vector<ResidentKey>> requests_;
+  std::multiset<ResidentKey> requested_;  // of all owners
   std::list<Leaving> leaving_;
   std::uint64_t used_ = 0;            // all of it: listed, being made, leaving and reserved
   std::uint64_t reserved_ = 0;        // of this by Reservations

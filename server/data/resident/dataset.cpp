@@ -48,7 +48,7 @@ class Turnstile {
  public:
   void enter(Urgency urgency) {
     std::unique_lock lock(mutex_);
-    const bool somebody_waits = urgency != Urgency::ahead;
+    const bool somebody_waits = urgency != Urgency::prefetch;
     waiting_ += somebody_waits ? 1 : 0;
     free_.wait(lock, [&] { return !taken_ && (somebody_waits || waiting_ == 0); });
     waiting_ -= somebody_waits ? 1 : 0;
@@ -167,7 +167,7 @@ struct Dataset::State {
     auto volume = read(field, step, urgency);
     if (volume && storage == Storage::packed16) {
       // Where there is no room for it the volume itself is all that is kept.
-      (void)budget->get(twin, values(field) * sizeof(std::uint16_t), Urgency::ahead,
+      (void)budget->get(twin, values(field) * sizeof(std::uint16_t), Urgency::prefetch,
                         [&] { return pack_volume(field, *volume); });
     }
     return volume;
@@ -182,7 +182,7 @@ struct Dataset::State {
         return why_cancelled();
       }
       ++counts.loads;
-      counts.ahead += urgency == Urgency::ahead ? 1 : 0;
+      counts.prefetched += urgency == Urgency::prefetch ? 1 : 0;
       loading = Loading{info.fields[field].name, step, 0};
     }
     auto volume = guarded(field, [&] { return source->read(field, step); });
@@ -285,7 +285,7 @@ std::shared_ptr<const DatasetInfo> Dataset::shared_info() const { return {state_
 
 Dataset Dataset::resident_only() const { return {state_, Manner::resident_only}; }
 
-Dataset Dataset::ahead() const { return {state_, Manner::ahead}; }
+Dataset Dataset::prefetching() const { return {state_, Manner::prefetch}; }
 
 Dataset Dataset::held() const { return {state_, Manner::held}; }
 
@@ -302,7 +302,7 @@ Dataset Dataset::in_turn(const CancelToken& cancel) const {
 
 Urgency Dataset::urgency() const {
   if (manner_ == Manner::in_turn) return Urgency::in_turn;
-  return manner_ == Manner::ahead ? Urgency::ahead : Urgency::demand;
+  return manner_ == Manner::prefetch ? Urgency::prefetch : Urgency::demand;
 }
 
 Result<VolumePtr> Dataset::get(const ResidentKey& key, std::uint64_t bytes,

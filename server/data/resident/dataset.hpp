@@ -58,7 +58,7 @@ class Dataset {
   [[nodiscard]] Dataset in_turn(const CancelToken& cancel = {}) const;
   // A handle for what is not needed yet: it gives way to loads that somebody waits for, and evicts
   // nothing that is wished for.
-  [[nodiscard]] Dataset ahead() const;
+  [[nodiscard]] Dataset prefetching() const;
   // So many bytes of work beside the volumes count in the limit for as long as the answer is held.
   // A handle in_turn() waits for room; others get what is there beside one that waits. Errors:
   // out_of_memory, cancelled.
@@ -99,11 +99,11 @@ class Dataset {
   [[nodiscard]] std::optional<Seen> seen(const std::string& field, std::size_t step) const;
 
   struct Counts {
-    std::uint64_t loads = 0;     // volumes read from the source
-    std::uint64_t ahead = 0;     // of these before somebody asked
-    std::uint64_t averages = 0;  // levels averaged
-    std::uint64_t unpacked = 0;  // volumes had from their packed form
-    std::uint64_t failures = 0;  // reads that failed
+    std::uint64_t loads = 0;       // volumes read from the source
+    std::uint64_t prefetched = 0;  // of these, before anyone asked
+    std::uint64_t averages = 0;    // levels averaged
+    std::uint64_t unpacked = 0;    // volumes had from their packed form
+    std::uint64_t failures = 0;    // reads that failed
   };
   [[nodiscard]] Counts counts() const;
   [[nodiscard]] std::uint64_t resident_bytes() const;
@@ -137,7 +137,7 @@ class Dataset {
   [[nodiscard]] float storage_error(const std::string& field) const;
 
  private:
-  enum class Manner { in_turn, demand, held, resident_only, ahead };
+  enum class Manner { in_turn, demand, held, resident_only, prefetch };
   struct State;
   Dataset(std::shared_ptr<State> state, Manner manner)
       : state_(std::move(state)), manner_(manner) {}

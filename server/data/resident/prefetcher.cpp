@@ -15,7 +15,7 @@
 
 namespace windsplat::data {
 
-struct Ahead::State {
+struct Prefetcher::State {
   explicit State(std::shared_ptr<Budget> shared)
       : budget(std::move(shared)), thread([this] { work(); }) {}
 
@@ -27,12 +27,12 @@ struct Ahead::State {
       const std::uint64_t owner = next_owner();
       Queue& queue = queues[owner];
       const std::uint64_t said = queue.said;
-      std::optional<Wish> wish = std::move(queue.wishes.front());
-      queue.wishes.pop_front();
-      if (queue.wishes.empty()) queues.erase(owner);
+      std::optional<PrefetchRequest> request = std::move(queue.requests.front());
+      queue.requests.pop_front();
+      if (queue.requests.empty()) queues.erase(owner);
       lock.unlock();
-      const bool full = !load(*wish);
-      wish.reset();
+      const bool full = !load(*request);
+      request.reset();
       lock.lock();
       // No room for this one: there is none for the later ones either, until others are said.
       const auto rest = queues.find(owner);
@@ -49,25 +49,26 @@ struct Ahead::State {
   }
 
   // False: there is no memory for it.
-  static bool load(const Wish& wish) noexcept {
+  static bool load(const PrefetchRequest& request) noexcept {
     try {
-      return try_to_load(wish);
+      return try_to_load(request);
     } catch (const std::exception&) {
       log::error("loading ahead failed");  // without its words: there may be no memory for them
       return false;
     }
   }
-  static bool try_to_load(const Wish& wish) {
-    const auto loaded = wish.dataset.ahead().level(wish.field, wish.step, wish.how);
+  static bool try_to_load(const PrefetchRequest& request) {
+    const auto loaded =
+        request.dataset.prefetching().level(request.field, request.step, request.how);
     if (loaded) return true;
     const Error& error = loaded.error();
     if (error.kind == ErrorKind::out_of_memory) return false;
     const bool given_up = error.kind == ErrorKind::not_resident ||
                           error.kind == ErrorKind::not_found || error.kind == ErrorKind::draining;
     if (!given_up) {
-      log::debug("loading ahead failed", {{"dataset", wish.dataset.info().id},
-                                          {"field", wish.field},
-                                          {"step", wish.step},
+      log::debug("loading ahead failed", {{"dataset", request.dataset.info().id},
+                                          {"field", request.field},
+                                          {"step", request.step},
                                           {"error", error.message}});
     }
     return true;
@@ -77,8 +78,8 @@ struct Ahead::State {
   std::mutex mutex;
   std::condition_variable wake;
   struct Queue {
-    std::deque<Wish> wishes;  // not yet loaded; never empty
-    std::uint64_t said = 0;   // tells it from later ones of the owner
+    std::deque<PrefetchRequest> requests;  // not yet loaded; never empty
+    std::uint64_t said = 0;                // tells it from later ones of the owner
   };
   std::map<std::uint64_t, Queue> queues;  // by owner
   std::uint64_t said = 0;
@@ -87,9 +88,10 @@ struct Ahead::State {
   std::thread thread;  // last: it uses all of the above
 };
 
-Ahead::Ahead(std::shared_ptr<Budget> budget) : state_(std::make_unique<State>(std::move(budget))) {}
+Prefetcher::Prefetcher(std::shared_ptr<Budget> budget)
+    : state_(std::make_unique<State>(std::move(budget))) {}
 
-Ahead::~Ahead() {
+Prefetcher::~Prefetcher() {
   {
     const std::lock_guard lock(state_->mutex);
     state_->stopping = true;
@@ -98,23 +100,23 @@ Ahead::~Ahead() {
   state_->thread.join();
 }
 
-void Ahead::wish(std::uint64_t owner, std::vector<Wish> wishes) {
-  if (wishes.empty()) {  // as destructors say it: without memory, which an empty deque has
-    state_->budget->wish(owner, {});
+void Prefetcher::request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests) {
+  if (requests.empty()) {  // as destructors say it: without memory, which an empty deque has
+    state_->budget->request_prefetch(owner, {});
     const std::lock_guard lock(state_->mutex);
     state_->queues.erase(owner);
     return;
   }
   std::vector<ResidentKey> keys;
-  std::deque<Wish> absent;
-  for (Wish& wish : wishes) {
-    const auto own = wish.dataset.keys_of(wish.field, wish.step, wish.how);
+  std::deque<PrefetchRequest> absent;
+  for (PrefetchRequest& request : requests) {
+    const auto own = request.dataset.keys_of(request.field, request.step, request.how);
     keys.insert(keys.end(), own.begin(), own.end());
     const bool there = std::all_of(
         own.begin(), own.end(), [&](const ResidentKey& key) { return state_->budget->has(key); });
-    if (!there) absent.push_back(std::move(wish));
+    if (!there) absent.push_back(std::move(request));
   }
-  state_->budget->wish(owner, keys);
+  state_->budget->request_prefetch(owner, keys);
   {
     const std::lock_guard lock(state_->mutex);
     if (absent.empty()) {
@@ -126,11 +128,12 @@ void Ahead::wish(std::uint64_t owner, std::vector<Wish> wishes) {
   state_->wake.notify_one();
 }
 
-void Ahead::forget(const DatasetInfo& info) {
+void Prefetcher::forget(const DatasetInfo& info) {
   const std::lock_guard lock(state_->mutex);
   for (auto at = state_->queues.begin(); at != state_->queues.end();) {
-    auto& queue = at->second.wishes;
-    std::erase_if(queue, [&](const Wish& wish) { return &wish.dataset.info() == &info; });
+    auto& queue = at->second.requests;
+    std::erase_if(queue,
+                  [&](const PrefetchRequest& request) { return &request.dataset.info() == &info; });
     at = queue.empty() ? state_->queues.erase(at) : std::next(at);
   }
 }

@@ -9,15 +9,15 @@
 
 namespace windsplat::data {
 
-class Ahead {
+class Prefetcher {
  public:
-  explicit Ahead(std::shared_ptr<Budget> budget);
-  ~Ahead();  // ends after the load in work
-  Ahead(const Ahead&) = delete;
-  Ahead& operator=(const Ahead&) = delete;
+  explicit Prefetcher(std::shared_ptr<Budget> budget);
+  ~Prefetcher();  // ends after the load in work
+  Prefetcher(const Prefetcher&) = delete;
+  Prefetcher& operator=(const Prefetcher&) = delete;
 
   // See Store::wish.
-  void wish(std::uint64_t owner, std::vector<Wish> wishes);
+  void request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests);
   // Nothing of a dataset is loaded any more.
   void forget(const DatasetInfo& info);
 

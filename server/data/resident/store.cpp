@@ -96,7 +96,7 @@ struct Store::State {
   explicit State(StoreOptions given)
       : options(std::move(given)),
         budget(options.budget ? options.budget : std::make_shared<Budget>(options.bytes_max)),
-        ahead(budget) {
+        prefetcher(budget) {
     if (!options.open) options.open = open_here;
   }
 
@@ -310,7 +310,7 @@ struct Store::State {
   std::vector<Entry> entries;
   std::vector<FailedEntry> failed;
   bool ended = false;
-  Ahead ahead;  // last: its thread uses datasets
+  Prefetcher prefetcher;  // last: its thread uses datasets
 };
 
 Store::Store(StoreOptions options) : state_(std::make_unique<State>(std::move(options))) {}
@@ -362,7 +362,7 @@ Result<void> Store::remove(const std::string& id) {
     gone = found->dataset;
     state_->entries.erase(state_->entries.begin() + (found - state_->entries.data()));
   }
-  state_->ahead.forget(gone->info());
+  state_->prefetcher.forget(gone->info());
   gone->forget();
   return {};
 }
@@ -417,8 +417,8 @@ std::vector<DatasetPtr> Store::all() const {
   return out;
 }
 
-void Store::wish(std::uint64_t owner, std::vector<Wish> wishes) {
-  state_->ahead.wish(owner, std::move(wishes));
+void Store::request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests) {
+  state_->prefetcher.request_prefetch(owner, std::move(requests));
 }
 
 std::vector<std::string> Store::look_for_changes(double rest_s) {
@@ -464,7 +464,7 @@ std::vector<std::string> Store::look_for_changes(double rest_s) {
                 {{"dataset", id}, {"error", usable.error().message}});
     }
     state_->put(std::move(entry), old);
-    if (usable) state_->ahead.forget(old->info());
+    if (usable) state_->prefetcher.forget(old->info());
   }
   return changed;
 }

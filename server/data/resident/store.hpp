@@ -21,7 +21,7 @@
 namespace windsplat::data {
 
 // Something that may be wanted soon.
-struct Wish {
+struct PrefetchRequest {
   Dataset dataset;
   std::string field;
   std::size_t step = 0;
@@ -82,7 +82,7 @@ class Store {
   // What `owner` will want, the soonest first, in place of what it wished before: loaded by a
   // thread of the store's own as far as memory goes, and not evicted for what is less urgent.
   // Empty: no more. Owners take turns.
-  void wish(std::uint64_t owner, std::vector<Wish> wishes);
+  void request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests);
 
   // Looks once whether files of a dataset changed since they were opened, and opens those anew that
   // did and have rested for `rest_s`: under the same id, what was resident of the old goes. One

@@ -470,7 +470,7 @@ struct Compositor {
   int both_exponentials;
 };
 
-inline int style_of(const LineStyle& line) {
+inline int signature_of(const LineStyle& line) {
   if (line.moving != 0) return style_moving;
   return line.head_desaturation > 0 ? style_head : style_plain;
 }
@@ -500,7 +500,7 @@ inline Compositor compositor_with(int style) {
 
 template <bool Perspective>
 inline Compositor compositor_of(const Pass& pass) {
-  const int style = style_of(pass.line);
+  const int style = signature_of(pass.line);
   switch (pass.compositing) {
     case compositing_simple:
       return compositor_with<Perspective, compositing_simple>(style);

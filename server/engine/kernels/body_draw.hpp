@@ -334,7 +334,7 @@ inline int order_stops(const Brick& brick, const Pass& pass, std::uint64_t kept,
 template <bool Perspective>
 void draw_in_order(const Brick& brick, const Prepared& p, Tile& tile) {
   const Pass& pass = *p.pass;
-  const int style = style_of(pass.line);
+  const int style = signature_of(pass.line);
   std::uint8_t order[brick_stops + brick_side];
   const int count = order_stops(brick, pass, p.stops.lines | p.stops.splats, order);
   const Compositor with = compositor_of<Perspective>(pass);
@@ -374,7 +374,7 @@ void prefetch_brick(const Pass& pass, const Brick& brick) {
 }
 
 void draw_prepared(const Camera& camera, const Prepared& p, int stop, Tile& tile) {
-  const int style = style_of(p.pass->line);
+  const int style = signature_of(p.pass->line);
   if (camera.perspective != 0) {
     draw_stop<true>(p, compositor_of<true>(*p.pass), style, stop, tile);
   } else {

@@ -263,10 +263,10 @@ TEST(WithoutMemory, WishesAreTakenBackAndAStoreEnds) {
   const auto dataset = store.add("climate:16x16x8").value();
   const std::string field = dataset->info().fields.front().name;
   ASSERT_TRUE(dataset->volume(field, 0)) << "so that no thread has anything to do for a wish";
-  store.wish(1, {{*dataset, field, 0, {}}});
+  store.request_prefetch(1, {{*dataset, field, 0, {}}});
   const Spent spent = spent_by([&] {
-    store.wish(2, {});
-    store.wish(1, {});
+    store.request_prefetch(2, {});
+    store.request_prefetch(1, {});
     store.end();
   });
   EXPECT_EQ(spent.blocks, 0);

@@ -144,9 +144,9 @@ TEST(NoMemory, an_attempt_that_fails_is_told_without_any) {
   ErrorKind second{};
   ErrorKind third{};
   EXPECT_TRUE(with_allocations(0, [&] {
-    first = std::move(attempt<int>("a test", cancel, out_of_memory)).error().kind;
-    second = std::move(attempt<int>("a test", cancel, broken)).error().kind;
-    third = std::move(attempt<int>("a test", raised, broken)).error().kind;
+    first = std::move(run_guarded<int>("a test", cancel, out_of_memory)).error().kind;
+    second = std::move(run_guarded<int>("a test", cancel, broken)).error().kind;
+    third = std::move(run_guarded<int>("a test", raised, broken)).error().kind;
   }));
   EXPECT_EQ(first, ErrorKind::out_of_memory);
   EXPECT_EQ(second, ErrorKind::internal);
@@ -209,14 +209,14 @@ TEST(NoMemory, what_cannot_be_posted_is_called_at_home_and_given_up_elsewhere) {
   const std::chrono::milliseconds patience(30);
   bool posted = true;
   EXPECT_TRUE(
-      with_allocations(0, [&] { posted = post_surely(io.get_executor(), call, patience); }));
+      with_allocations(0, [&] { posted = post_or_retry(io.get_executor(), call, patience); }));
   EXPECT_FALSE(posted);
   boost::asio::post(io, [&] {
     const boost::asio::any_io_executor executor = io.get_executor();
-    EXPECT_TRUE(with_allocations(0, [&] { posted = post_surely(executor, call, patience); }));
+    EXPECT_TRUE(with_allocations(0, [&] { posted = post_or_retry(executor, call, patience); }));
     EXPECT_TRUE(posted);
     EXPECT_EQ(called, 1);
-    EXPECT_TRUE(post_surely(executor, call));
+    EXPECT_TRUE(post_or_retry(executor, call));
     EXPECT_EQ(called, 1) << "not before its turn";
   });
   io.run();

@@ -30,19 +30,19 @@ TEST(Quota, an_address_may_not_have_the_connections_of_all) {
   limits.connections = 3;
   limits.connections_per_address = 2;
   Quota quota(limits);
-  EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Place::ordinary);
-  EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Place::ordinary);
+  EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
+  EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
   const auto third = quota.connect(here, false, 0);
-  EXPECT_EQ(third.place, Quota::Place::reserve);
+  EXPECT_EQ(third.place, Quota::Slot::reserve);
   ASSERT_TRUE(third.reason);
   EXPECT_EQ(third.reason->kind, LimitKind::address_connections);
   EXPECT_EQ(third.reason->limit, 2);
-  EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Place::ordinary);
+  EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Slot::ordinary);
   const auto full = quota.connect("192.0.2.3", false, 0);
-  EXPECT_EQ(full.place, Quota::Place::reserve);
+  EXPECT_EQ(full.place, Quota::Slot::reserve);
   EXPECT_EQ(full.reason->kind, LimitKind::connections);
-  quota.disconnect(here, Quota::Place::ordinary);
-  EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Place::ordinary);
+  quota.disconnect(here, Quota::Slot::ordinary);
+  EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
 }
 
 TEST(Quota, the_reserve_has_an_end_and_no_address_has_all_of_it) {
@@ -51,17 +51,17 @@ TEST(Quota, the_reserve_has_an_end_and_no_address_has_all_of_it) {
   Quota quota(limits);
   quota.connect(here, false, 0);
   std::size_t taken = 0;
-  while (quota.connect(here, false, 0).place == Quota::Place::reserve) ++taken;
+  while (quota.connect(here, false, 0).place == Quota::Slot::reserve) ++taken;
   EXPECT_EQ(taken, Quota::reserve_per_address);
   for (std::size_t n = taken; n < Quota::reserve_max; ++n) {
     const std::string other = "198.51.100." + std::to_string(n);
-    EXPECT_EQ(quota.connect(other, false, 0).place, Quota::Place::reserve) << n;
+    EXPECT_EQ(quota.connect(other, false, 0).place, Quota::Slot::reserve) << n;
   }
-  EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Place::none);
+  EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Slot::none);
   EXPECT_TRUE(quota.is_kept_out_by_others(there, false, 0));
   EXPECT_FALSE(quota.is_kept_out_by_others(here, false, 0)) << "by itself";
-  quota.disconnect(here, Quota::Place::reserve);
-  EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Place::reserve);
+  quota.disconnect(here, Quota::Slot::reserve);
+  EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Slot::reserve);
 }
 
 TEST(Quota, a_proxy_counts_in_total_alone) {
@@ -70,9 +70,9 @@ TEST(Quota, a_proxy_counts_in_total_alone) {
   limits.connections_per_address = 1;
   Quota quota(limits);
   for (int n = 0; n < 8; ++n) {
-    EXPECT_EQ(quota.connect(here, true, 0).place, Quota::Place::ordinary);
+    EXPECT_EQ(quota.connect(here, true, 0).place, Quota::Slot::ordinary);
   }
-  EXPECT_EQ(quota.connect(here, true, 0).place, Quota::Place::reserve);
+  EXPECT_EQ(quota.connect(here, true, 0).place, Quota::Slot::reserve);
 }
 
 TEST(Quota, sessions_are_counted_by_address) {
@@ -120,7 +120,7 @@ TEST(Quota, one_picture_may_go_into_debt_and_the_next_waits_until_it_is_paid) {
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->kind, LimitKind::render);
   EXPECT_EQ(refused->retry_after_s, 30) << "3 s at 6 s a minute";
-  EXPECT_EQ(quota.until_paid(here, 0), 30 * second);
+  EXPECT_EQ(quota.throttle_delay(here, 0), 30 * second);
   EXPECT_FALSE(quota.picture(there, 0));
   EXPECT_TRUE(quota.picture(here, 30 * second - 1));
   EXPECT_FALSE(quota.picture(here, 30 * second));
@@ -202,8 +202,8 @@ TEST(Quota, an_address_that_used_up_its_handshake_time_waits_for_it) {
   Limits limits = none();
   limits.handshake_ms_per_address = 100;
   Quota quota(limits);
-  ASSERT_EQ(quota.connect(here, false, 0).place, Quota::Place::ordinary);
-  ASSERT_EQ(quota.connect(there, false, 0).place, Quota::Place::ordinary);
+  ASSERT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
+  ASSERT_EQ(quota.connect(there, false, 0).place, Quota::Slot::ordinary);
   quota.handshake_took(here, false, second, 0);
   EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "ten seconds' worth at once";
   quota.handshake_took(here, false, second / 10, 0);
@@ -246,13 +246,13 @@ TEST(Quota, strangers_use_up_no_handshake_time_of_the_machine_itself) {
   Quota quota(limits);
   quota.authenticated(here, 0);
   for (const std::string& address : {there, here}) {
-    ASSERT_EQ(quota.connect(address, false, 0).place, Quota::Place::ordinary);
+    ASSERT_EQ(quota.connect(address, false, 0).place, Quota::Slot::ordinary);
     quota.handshake_took(address, false, 2 * second, 0);
     ASSERT_TRUE(quota.arrive(address, false, true, 0)) << address;
   }
   EXPECT_TRUE(quota.arrive("127.0.0.2", false, true, 0)) << "a stranger like others";
   for (const std::string own : {"127.0.0.1", "::/64"}) {
-    ASSERT_EQ(quota.connect(own, false, 0).place, Quota::Place::ordinary);
+    ASSERT_EQ(quota.connect(own, false, 0).place, Quota::Slot::ordinary);
     EXPECT_FALSE(quota.arrive(own, false, true, 0)) << own;
     quota.handshake_took(own, false, second, 0);
     const auto refused = quota.arrive(own, false, true, 0);
@@ -263,7 +263,7 @@ TEST(Quota, strangers_use_up_no_handshake_time_of_the_machine_itself) {
 
   limits.handshake_ms_per_address = 0;
   Quota without(limits);
-  ASSERT_EQ(without.connect("127.0.0.1", false, 0).place, Quota::Place::ordinary);
+  ASSERT_EQ(without.connect("127.0.0.1", false, 0).place, Quota::Slot::ordinary);
   without.handshake_took("127.0.0.1", false, 2 * second, 0);
   EXPECT_TRUE(without.arrive("127.0.0.1", false, true, 0)) << "it is bounded all the same";
 }
@@ -273,23 +273,23 @@ TEST(Quota, messages_are_paid_before_more_is_read) {
   limits.messages_per_address = 10;
   limits.received_per_address = 1000;
   Quota quota(limits);
-  for (int n = 0; n < 20; ++n) EXPECT_EQ(quota.heard(here, 1, 0), 0) << n;
-  EXPECT_EQ(quota.heard(here, 1, 0), second / 10);
-  EXPECT_EQ(quota.heard(there, 2000, 0), 0);
-  EXPECT_EQ(quota.heard(there, 500, 0), second / 2);
-  EXPECT_EQ(quota.heard(there, 0, 2 * second), 0);
+  for (int n = 0; n < 20; ++n) EXPECT_EQ(quota.message_received(here, 1, 0), 0) << n;
+  EXPECT_EQ(quota.message_received(here, 1, 0), second / 10);
+  EXPECT_EQ(quota.message_received(there, 2000, 0), 0);
+  EXPECT_EQ(quota.message_received(there, 500, 0), second / 2);
+  EXPECT_EQ(quota.message_received(there, 0, 2 * second), 0);
 }
 
 TEST(Quota, nought_is_no_limit) {
   Quota quota(none());
   for (int n = 0; n < 10'000; ++n) {
-    ASSERT_EQ(quota.connect(here, false, 0).place, Quota::Place::ordinary);
+    ASSERT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
     ASSERT_FALSE(quota.open_session(here, 0));
     ASSERT_FALSE(quota.request(here, false, 0));
     ASSERT_FALSE(quota.failed_login(here, 0));
     ASSERT_FALSE(quota.may_try_login(here, 0));
     ASSERT_FALSE(quota.arrive(here, false, true, 0));
-    ASSERT_EQ(quota.heard(here, 1U << 20, 0), 0);
+    ASSERT_EQ(quota.message_received(here, 1U << 20, 0), 0);
     quota.sent(here, 1U << 30, 0);
     quota.rendered(here, 60 * second, 0);
     quota.handshake_took(here, false, 60 * second, 0);
@@ -320,7 +320,7 @@ TEST(Quota, no_number_of_addresses_makes_it_larger_than_it_may_be) {
     quota.request("2001:db8:0:" + std::to_string(n) + "::/64", false, 1);
   }
   EXPECT_EQ(quota.known(), Quota::addresses_max);
-  EXPECT_EQ(quota.connect(here, false, 2).place, Quota::Place::reserve) << "its one is known";
+  EXPECT_EQ(quota.connect(here, false, 2).place, Quota::Slot::reserve) << "its one is known";
 }
 
 TEST(Quota, strangers_make_no_room_of_those_that_showed_the_token) {
@@ -409,8 +409,8 @@ TEST(Admission, charges_what_was_refused_unread) {
   Metrics metrics;
   Admission admission(limits, metrics, [] { return 0; });
   const auto visitor = admission.connect(here);
-  EXPECT_TRUE(admission.spoiled(*visitor, {}));
-  EXPECT_FALSE(admission.spoiled(*visitor, {})) << "not worth a line";
+  EXPECT_TRUE(admission.count_malformed(*visitor, {}));
+  EXPECT_FALSE(admission.count_malformed(*visitor, {})) << "not worth a line";
   Request request;
   EXPECT_TRUE(admission.request(*visitor, request, false)) << "the same allowance";
 }

@@ -132,19 +132,19 @@ TEST_F(Curve, TheChosenPointIsThePickedSetting) {
 // Of one style: near the sight that was measured, and as far from it as sights get.
 TEST(Measured, IsSaidOfErrorsFromNearByAlone) {
   Table table{Kind{}};
-  const Sight sight{1, {0, 1, 0}, 640, 480};
-  Sight beside = sight;
+  const Viewpoint viewpoint{1, {0, 1, 0}, 640, 480};
+  Viewpoint beside = viewpoint;
   beside.direction = {std::sin(0.02), std::cos(0.02), 0};
-  Sight behind = sight;
+  Viewpoint behind = viewpoint;
   behind.direction = {0, -1, 0};
-  EXPECT_FALSE(table.forecast(0, sight).measured);
-  table.add(0, sight, {{}, 3.0});
-  EXPECT_FALSE(table.forecast(0, sight).measured) << "only its time was";
-  table.add(0, sight, {0.01, {}});
-  EXPECT_TRUE(table.forecast(0, sight).measured);
+  EXPECT_FALSE(table.forecast(0, viewpoint).measured);
+  table.add(0, viewpoint, {{}, 3.0});
+  EXPECT_FALSE(table.forecast(0, viewpoint).measured) << "only its time was";
+  table.add(0, viewpoint, {0.01, {}});
+  EXPECT_TRUE(table.forecast(0, viewpoint).measured);
   EXPECT_TRUE(table.forecast(0, beside).measured);
   EXPECT_FALSE(table.forecast(0, behind).measured);
-  EXPECT_FALSE(table.forecast(1, sight).measured) << "another setting";
+  EXPECT_FALSE(table.forecast(1, viewpoint).measured) << "another setting";
 }
 
 }  // namespace

@@ -15,8 +15,9 @@ using protocol::MethodName;
 const Kind both{true, true, 0.16, 1.4, 1, 1};
 const Kind media{false, true, 0.16, 1.4, 1, 1};
 
-double error_of(const Kind& kind, const Setting& setting, const Sight& sight = {2, {}, 640, 480}) {
-  return expected_error(kind, setting, sight).value;
+double error_of(const Kind& kind, const Setting& setting,
+                const Viewpoint& viewpoint = {2, {}, 640, 480}) {
+  return expected_error(kind, setting, viewpoint).value;
 }
 
 // Method slab is of order 2 in the thickness of its slabs.
@@ -58,20 +59,23 @@ TEST(Laws, LinesAloneAreExactUnderSlabs) {
 
 TEST(Laws, OfAViewThatIsNotCompletedTooEveryErrorIsPositiveAndFinite) {
   for (const Kind& kind : {Kind{}, both, media, Kind{true, true, 1e-9, 50, 1e35, 32}}) {
-    for (const Sight& sight : {Sight{}, Sight{1e12, {0, 0, 1}, 8192, 8192}, Sight{1e-12}}) {
+    for (const Viewpoint& viewpoint :
+         {Viewpoint{}, Viewpoint{1e12, {0, 0, 1}, 8192, 8192}, Viewpoint{1e-12}}) {
       for (const Setting& setting : settings) {
-        const Expected error = expected_error(kind, setting, sight);
+        const Expected error = expected_error(kind, setting, viewpoint);
         EXPECT_GT(error.value, 0);
         EXPECT_LE(error.value, 1);
-        EXPECT_GT(expected_ms(kind, setting, sight).value, 0);
+        EXPECT_GT(expected_ms(kind, setting, viewpoint).value, 0);
       }
     }
   }
 }
 
 TEST(Laws, FewerPixelsTakeLessTime) {
-  const Sight sight{2, {}, 640, 480};
-  const auto ms = [&](const Setting& setting) { return expected_ms(both, setting, sight).value; };
+  const Viewpoint viewpoint{2, {}, 640, 480};
+  const auto ms = [&](const Setting& setting) {
+    return expected_ms(both, setting, viewpoint).value;
+  };
   EXPECT_LT(ms({MethodName::kernel, 2, 0}), ms({MethodName::kernel, 0, 0}));
   EXPECT_LT(ms({MethodName::kernel, 0, 1}), ms({MethodName::kernel, 0, 0}));
   EXPECT_GT(ms({MethodName::slab, 0, 0}), ms({MethodName::kernel, 0, 0}));
@@ -79,12 +83,12 @@ TEST(Laws, FewerPixelsTakeLessTime) {
 }
 
 TEST(Prior, IsTheLawsAndAsUncertainAsStylesAndSightsTogether) {
-  const Sight sight{2, {}, 640, 480};
+  const Viewpoint viewpoint{2, {}, 640, 480};
   for (const Setting& setting : settings) {
-    const Forecast told = prior(both, setting, sight);
-    const Expected error = expected_error(both, setting, sight);
+    const Forecast told = prior(both, setting, viewpoint);
+    const Expected error = expected_error(both, setting, viewpoint);
     EXPECT_EQ(told.error, error.value);
-    EXPECT_NEAR(told.spread, std::hypot(error.scatter.style, error.scatter.sight), 1e-12);
+    EXPECT_NEAR(told.spread, std::hypot(error.scatter.signature, error.scatter.viewpoint), 1e-12);
     EXPECT_FALSE(told.timed);
   }
 }

@@ -36,10 +36,11 @@ class Measure : public testing::Test {
 
   std::map<std::size_t, quality::Measured> surveyed() {
     std::map<std::size_t, quality::Measured> found;
-    const auto done = survey(view, *dataset, pool, cancel, workspace, [&](const Surveyed& one) {
-      EXPECT_TRUE(found.emplace(one.setting, one.measured).second) << one.setting;
-      EXPECT_EQ(one.sight.pixels_high, 96);
-    });
+    const auto done =
+        calibrate(view, *dataset, pool, cancel, workspace, [&](const CalibrationSample& one) {
+          EXPECT_TRUE(found.emplace(one.setting, one.measured).second) << one.setting;
+          EXPECT_EQ(one.viewpoint.pixels_high, 96);
+        });
     EXPECT_TRUE(done) << done.error().message;
     return found;
   }
@@ -111,8 +112,8 @@ TEST_F(Measure, OtherRulesAndEarlyStopsAreMeasuredAgainstTheIntegralToo) {
     };
     EXPECT_NEAR(error_of(1) / truth, 1, 0.4) << truth;
     const double promised =
-        quality::prior(quality::style_of(view).kind, quality::settings[quality::own_setting(view)],
-                       quality::sight_of(view))
+        quality::prior(quality::signature_of(view).kind,
+                       quality::settings[quality::own_setting(view)], quality::viewpoint_of(view))
             .error;
     EXPECT_GT(promised, 0.2 * truth) << "before anything was measured";
     view.method.slab_thickness /= 4;
@@ -180,7 +181,7 @@ TEST_F(Measure, ASurveyOfAveragesDrawsThemAsFramesDo) {
   auto placed = scene::complete_and_place(view, *dataset);
   scene::orbit(view, placed.value().placed->lattice, 20, 30, 0.05);
   placed = scene::complete_and_place(view, *dataset);
-  EXPECT_LT(sight_of(placed.value()).value().detail, 1);
+  EXPECT_LT(viewpoint_of(placed.value()).value().detail, 1);
   auto found = surveyed();
   const auto error_of = [&](int thinner) {
     return found.at(quality::index_of({protocol::MethodName::slab, 0, 0, thinner}).value())
@@ -213,7 +214,7 @@ TEST_F(Measure, AViewAveragesWhereItsDetailIsBelowOne) {
 TEST_F(Measure, ACancelledSurveyEnds) {
   int told = 0;
   const CancelToken stop;
-  const auto done = survey(view, *dataset, pool, stop, workspace, [&](const Surveyed&) {
+  const auto done = calibrate(view, *dataset, pool, stop, workspace, [&](const CalibrationSample&) {
     if (++told == 2) stop.cancel();
   });
   ASSERT_FALSE(done);

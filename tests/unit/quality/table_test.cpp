@@ -18,13 +18,13 @@ constexpr std::size_t half = 2;  // half the width
 const Kind kind{true, true, 0.16, 1.4, 1, 1};
 
 // A sight at that distance of every other with another number: heights apart alone.
-Sight sight_at(double steps) {
-  Sight sight{std::exp(0.5 * steps), {0, 1, 0}, 640, 480};
-  return sight;
+Viewpoint sight_at(double steps) {
+  Viewpoint viewpoint{std::exp(0.5 * steps), {0, 1, 0}, 640, 480};
+  return viewpoint;
 }
 
-double prior_of(std::size_t setting, const Sight& sight) {
-  return prior(kind, settings[setting], sight).error;
+double prior_of(std::size_t setting, const Viewpoint& viewpoint) {
+  return prior(kind, settings[setting], viewpoint).error;
 }
 
 TEST(Table, NothingMeasuredIsThePrior) {
@@ -77,16 +77,17 @@ TEST(Table, WhatIsNoNumberIsNotKept) {
 // correlated variance at that distance.
 TEST(Table, OneMeasurementCountsByItsShareOfTheVariance) {
   const Scatter scatter = expected_error(kind, settings[half], sight_at(0)).scatter;
-  const double style = scatter.style * scatter.style;
-  const double near = scatter.sight * scatter.sight;
-  const double own = style + near + scatter.noise * scatter.noise;
+  const double signature = scatter.signature * scatter.signature;
+  const double near = scatter.viewpoint * scatter.viewpoint;
+  const double own = signature + near + scatter.noise * scatter.noise;
   Table table(kind);
   table.add(half, sight_at(0), {3 * prior_of(half, sight_at(0)), {}});
   for (const double steps : {0.0, 0.3, 1.0, 2.0, 5.0, 30.0}) {
-    const Sight sight = sight_at(steps);
-    const double shared = style + near * std::exp(-distance(sight, sight_at(0)));
-    const Forecast told = table.forecast(half, sight);
-    EXPECT_NEAR(std::log(told.error / prior_of(half, sight)), shared / own * std::log(3.0), 1e-9);
+    const Viewpoint viewpoint = sight_at(steps);
+    const double shared = signature + near * std::exp(-distance(viewpoint, sight_at(0)));
+    const Forecast told = table.forecast(half, viewpoint);
+    EXPECT_NEAR(std::log(told.error / prior_of(half, viewpoint)), shared / own * std::log(3.0),
+                1e-9);
     EXPECT_NEAR(told.spread, std::sqrt(own - shared * shared / own), 1e-9);
   }
 }
@@ -180,9 +181,9 @@ TEST(Table, AMachineOfAnotherSpeedIsOfThatSpeedInEverySetting) {
 // what was measured on one side says nothing of the other.
 TEST(Table, AveragesAreKnownApartFromWhatIsDrawnOfEverySample) {
   Table table(kind);
-  Sight near = sight_at(0);
+  Viewpoint near = sight_at(0);
   near.detail = 1.1;
-  Sight far = near;
+  Viewpoint far = near;
   far.detail = 0.9;
   const std::size_t slab = own_setting({});
   table.add(slab, near, {3 * prior_of(slab, near), {}});

@@ -22,42 +22,42 @@ protocol::View completed() {
   return view;
 }
 
-TEST(Sight, IsTheHeightAtTheMiddleAndTheWay) {
+TEST(Viewpoint, IsTheHeightAtTheMiddleAndTheWay) {
   protocol::View view = completed();
-  const Sight sight = sight_of(view);
-  EXPECT_NEAR(sight.height, 4 * std::tan(view.camera.fov_y * std::acos(-1) / 360), 1e-12);
-  EXPECT_EQ(sight.direction, (protocol::Vec3{0, 1, 0}));
-  EXPECT_EQ(sight.pixels_high, view.image.height);
+  const Viewpoint viewpoint = viewpoint_of(view);
+  EXPECT_NEAR(viewpoint.height, 4 * std::tan(view.camera.fov_y * std::acos(-1) / 360), 1e-12);
+  EXPECT_EQ(viewpoint.direction, (protocol::Vec3{0, 1, 0}));
+  EXPECT_EQ(viewpoint.pixels_high, view.image.height);
   view.camera.projection = protocol::Projection::orthographic;
   view.camera.height = 3;
-  EXPECT_EQ(sight_of(view).height, 3);
+  EXPECT_EQ(viewpoint_of(view).height, 3);
 }
 
-TEST(Sight, WithoutACameraItIsTheOtherOnesButForThePixels) {
+TEST(Viewpoint, WithoutACameraItIsTheOtherOnesButForThePixels) {
   protocol::View view = completed();
   view.camera.eye = {};
   view.image.height = 111;
-  const Sight sight = sight_of(view, {7, {1, 0, 0}, 5, 6});
-  EXPECT_EQ(sight.height, 7);
-  EXPECT_EQ(sight.direction, (protocol::Vec3{1, 0, 0}));
-  EXPECT_EQ(sight.pixels_high, 111);
+  const Viewpoint viewpoint = viewpoint_of(view, {7, {1, 0, 0}, 5, 6});
+  EXPECT_EQ(viewpoint.height, 7);
+  EXPECT_EQ(viewpoint.direction, (protocol::Vec3{1, 0, 0}));
+  EXPECT_EQ(viewpoint.pixels_high, 111);
 }
 
 // As large as the volume is in the picture, so large are its cells.
-TEST(Sight, DetailIsScaledFromTheOtherOnes) {
+TEST(Viewpoint, DetailIsScaledFromTheOtherOnes) {
   protocol::View view = completed();
   view.image.height = 480;
-  Sight known = sight_of(view);
+  Viewpoint known = viewpoint_of(view);
   known.detail = 2;
   view.camera.eye = {0, -4, 0};
-  EXPECT_NEAR(sight_of(view, known).detail, 1, 1e-12);
+  EXPECT_NEAR(viewpoint_of(view, known).detail, 1, 1e-12);
   view.image.height = 960;
-  EXPECT_NEAR(sight_of(view, known).detail, 2, 1e-12);
-  EXPECT_EQ(sight_of(view).detail, 0) << "not known";
+  EXPECT_NEAR(viewpoint_of(view, known).detail, 2, 1e-12);
+  EXPECT_EQ(viewpoint_of(view).detail, 0) << "not known";
 }
 
-TEST(Style, DoesNotDependOnWhereAndWhenOneLooks) {
-  const std::string key = style_of(completed()).key;
+TEST(SceneSignature, DoesNotDependOnWhereAndWhenOneLooks) {
+  const std::string key = signature_of(completed()).key;
   protocol::View view = completed();
   view.step = 3;
   view.camera.eye = {5, 5, 5};
@@ -65,15 +65,15 @@ TEST(Style, DoesNotDependOnWhereAndWhenOneLooks) {
   view.quality.max_error = 0.01;
   view.vector.motion_time = 0.5;
   view.method.name = protocol::MethodName::kernel;
-  EXPECT_EQ(style_of(view).key, key);
+  EXPECT_EQ(signature_of(view).key, key);
 }
 
-TEST(Style, DependsOnWhatIsShown) {
-  const std::string key = style_of(completed()).key;
+TEST(SceneSignature, DependsOnWhatIsShown) {
+  const std::string key = signature_of(completed()).key;
   const auto other = [&](auto change) {
     protocol::View view = completed();
     change(view);
-    return style_of(view).key != key;
+    return signature_of(view).key != key;
   };
   EXPECT_TRUE(other([](auto& view) { view.dataset = "b"; }));
   EXPECT_TRUE(other([](auto& view) { view.scalars->clear(); }));
@@ -81,37 +81,37 @@ TEST(Style, DependsOnWhatIsShown) {
   EXPECT_TRUE(other([](auto& view) { view.method.slab_thickness = 2; }));
 }
 
-TEST(Style, KnowsItsLinesAndItsMedium) {
-  const Kind kind = style_of(completed()).kind;
+TEST(SceneSignature, KnowsItsLinesAndItsMedium) {
+  const Kind kind = signature_of(completed()).kind;
   EXPECT_TRUE(kind.lines && kind.medium);
   EXPECT_EQ(kind.length, 0.5);
   EXPECT_NEAR(kind.depth, 0.5 * (3 + 3), 1e-12) << "the densest of each layer, along a line";
   protocol::View view = completed();
   view.scalars->clear();
-  EXPECT_FALSE(style_of(view).kind.medium);
+  EXPECT_FALSE(signature_of(view).kind.medium);
   view = completed();
   view.vector.field.kind = protocol::FieldChoice::Kind::none;
-  EXPECT_FALSE(style_of(view).kind.lines);
+  EXPECT_FALSE(signature_of(view).kind.lines);
 }
 
 // A view that nobody completed yet may show anything.
-TEST(Style, OfAViewThatIsNotCompletedIsOfLinesInAMedium) {
-  const Kind kind = style_of(protocol::View()).kind;
+TEST(SceneSignature, OfAViewThatIsNotCompletedIsOfLinesInAMedium) {
+  const Kind kind = signature_of(protocol::View()).kind;
   EXPECT_TRUE(kind.lines && kind.medium);
   EXPECT_EQ(kind.length, 0);
   EXPECT_GT(kind.depth, 0);
 }
 
 TEST(Distance, IsNoneToItselfAndAlikeBothWays) {
-  const Sight a{1, {0, 1, 0}, 640, 480};
-  const Sight b{2, {0.6, 0.8, 0}, 1280, 960};
+  const Viewpoint a{1, {0, 1, 0}, 640, 480};
+  const Viewpoint b{2, {0.6, 0.8, 0}, 1280, 960};
   EXPECT_EQ(distance(a, a), 0);
   EXPECT_EQ(distance(a, b), distance(b, a));
   EXPECT_GT(distance(a, b), 0);
 }
 
 TEST(Distance, GrowsWithZoomTurnAndPixels) {
-  const Sight from{1, {0, 1, 0}, 640, 480};
+  const Viewpoint from{1, {0, 1, 0}, 640, 480};
   double last = 0;
   for (const double zoom : {1.1, 1.5, 2.0, 4.0}) {
     const double apart = distance(from, {1 / zoom, {0, 1, 0}, 640, 480});

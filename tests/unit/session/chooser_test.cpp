@@ -16,11 +16,11 @@ using quality::settings;
 
 constexpr double no_limit = std::numeric_limits<double>::infinity();
 constexpr Micros frame_us = 33'000;
-const quality::Sight sight{1, {0, 1, 0}, 1280, 720};
+const quality::Viewpoint viewpoint{1, {0, 1, 0}, 1280, 720};
 
 // Pixels decide the time, the prior the error.
 Forecasts surveyed(double full_ms) {
-  Forecasts out = quality::Table(quality::Kind{}).forecasts(sight);
+  Forecasts out = quality::Table(quality::Kind{}).forecasts(viewpoint);
   for (std::size_t i = 0; i < out.size(); ++i) {
     const double slabs = settings[i].method == protocol::MethodName::slab ? 4 : 1;
     out[i].ms = full_ms * slabs * settings[i].thinner *
@@ -103,7 +103,7 @@ TEST(Chooser, AnErrorIsKeptByTheFastestSettingThatDoes) {
 // Nothing is surveyed: what finer pictures take is only guessed, and each is tried in its turn.
 TEST(Chooser, WithoutASurveyFinerPicturesAreTriedOneAfterTheOther) {
   Drag drag;
-  const Forecasts guessed = quality::Table(quality::Kind{}).forecasts(sight);
+  const Forecasts guessed = quality::Table(quality::Kind{}).forecasts(viewpoint);
   const quality::Aim aim{30.0, std::nullopt};
   // Ten times as slow as guessed, and then a tenth of that.
   const auto slow = drag.run(guessed, aim, 20, [](int) { return 10.0; });

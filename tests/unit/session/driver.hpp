@@ -38,15 +38,16 @@ inline std::string azimuth(int n) {
 class Driver {
  public:
   explicit Driver(Options options = {})
-      : session_(options,
-                 {[this](const View& view) { return check(view, step_count); },
-                  [this](const std::string& dataset) {
-                    return dataset == "wind" ? reading : std::nullopt;
-                  },
-                  [this](const quality::Style& style, const quality::Sight& sight) {
-                    return surveyed.value_or(quality::Table(style.kind).forecasts(sight));
-                  }},
-                 now_) {}
+      : session_(
+            options,
+            {[this](const View& view) { return check(view, step_count); },
+             [this](const std::string& dataset) {
+               return dataset == "wind" ? reading : std::nullopt;
+             },
+             [this](const quality::SceneSignature& signature, const quality::Viewpoint& viewpoint) {
+               return surveyed.value_or(quality::Table(signature.kind).forecasts(viewpoint));
+             }},
+            now_) {}
 
   // --- inputs -----------------------------------------------------------------------------------
 
@@ -136,7 +137,7 @@ class Driver {
   std::vector<protocol::ServerMessage> texts;
   std::vector<SendFrame> frames;
   std::vector<Describe> describes;
-  std::vector<Prefetch> wishes;
+  std::vector<Prefetch> requests;
   std::optional<StartRender> render;  // being drawn
   bool cancelled = false;             // it was given up
   int renders = 0;
@@ -145,7 +146,7 @@ class Driver {
   int step_count = steps;
   Micros queue = 0;                // that a frame waits for the renderer, as told
   std::optional<Reading> reading;  // of the dataset "wind"
-  std::vector<Survey> surveys;
+  std::vector<Calibrate> calibrations;
   std::optional<quality::Forecasts> surveyed;  // what is known; empty: the prior
   bool averaged = false;  // data: what final frames err does not come from their slabs
   std::optional<double> measured_error;  // of final frames drawn by the view's own slabs
@@ -166,7 +167,7 @@ class Driver {
     out.payload = std::make_shared<const std::vector<std::uint8_t>>(100);
     const bool kernel = done.setting.method == protocol::MethodName::kernel;
     out.info.method = kernel ? "kernel" : "slab";
-    out.style.key = "its style";
+    out.signature.key = "its style";
     if (done.encoding.measure && measured_error) {
       const int by = averaged ? 1 : done.setting.thinner * done.setting.thinner;
       out.info.error_value = *measured_error / by;
@@ -216,8 +217,8 @@ class Driver {
         frames.push_back(*frame);
         unwritten_ = true;
       }
-      if (auto* wish = std::get_if<Prefetch>(&effect)) wishes.push_back(*wish);
-      if (auto* survey = std::get_if<Survey>(&effect)) surveys.push_back(*survey);
+      if (auto* request = std::get_if<Prefetch>(&effect)) requests.push_back(*request);
+      if (auto* calibration = std::get_if<Calibrate>(&effect)) calibrations.push_back(*calibration);
       if (auto* close = std::get_if<Close>(&effect)) closed = *close;
     }
   }

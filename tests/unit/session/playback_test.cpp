@@ -18,7 +18,7 @@ void rest_at(Driver& driver, int step) {
   driver.settle();
   driver.frames.clear();
   driver.texts.clear();
-  driver.wishes.clear();
+  driver.requests.clear();
 }
 
 // Draws each frame in `cost` and acknowledges it, for `duration`.
@@ -262,102 +262,102 @@ std::vector<int> iota(int first, int count) {
   return out;
 }
 
-TEST(Wish, at_rest_is_for_the_neighbours) {
+TEST(PrefetchRequest, at_rest_is_for_the_neighbours) {
   for (const auto& [step, wanted] : std::vector<std::pair<int, std::vector<int>>>{
            {0, {1}}, {4, {5, 3}}, {steps - 1, {steps - 2}}}) {
     Driver driver;
     driver.patch(1, R"({"dataset":"wind","step":)" + std::to_string(step) + "}");
     driver.finish_render();
-    EXPECT_THAT(driver.wishes, IsEmpty()) << "not before the final frame";
+    EXPECT_THAT(driver.requests, IsEmpty()) << "not before the final frame";
     driver.settle();
-    ASSERT_EQ(driver.wishes.size(), 1U) << "once, however often the session is woken";
-    EXPECT_EQ(driver.wishes[0].steps, wanted);
-    EXPECT_EQ(driver.wishes[0].view.dataset, "wind");
-    EXPECT_EQ(driver.wishes[0].view.step, step);
+    ASSERT_EQ(driver.requests.size(), 1U) << "once, however often the session is woken";
+    EXPECT_EQ(driver.requests[0].steps, wanted);
+    EXPECT_EQ(driver.requests[0].view.dataset, "wind");
+    EXPECT_EQ(driver.requests[0].view.step, step);
   }
 }
 
-TEST(Wish, outlives_a_turn_of_the_camera_but_not_another_step) {
+TEST(PrefetchRequest, outlives_a_turn_of_the_camera_but_not_another_step) {
   Driver driver;
   rest_at(driver, 4);
   driver.patch(2, R"({"camera":{"fovY":20}})");
   driver.settle();
-  EXPECT_THAT(driver.wishes, IsEmpty());
+  EXPECT_THAT(driver.requests, IsEmpty());
   driver.patch(3, R"({"step":7})");
-  ASSERT_EQ(driver.wishes.size(), 1U);
-  EXPECT_THAT(driver.wishes[0].steps, IsEmpty());
+  ASSERT_EQ(driver.requests.size(), 1U);
+  EXPECT_THAT(driver.requests[0].steps, IsEmpty());
   driver.settle();
-  ASSERT_EQ(driver.wishes.size(), 2U);
-  EXPECT_THAT(driver.wishes[1].steps, ElementsAre(8, 6));
+  ASSERT_EQ(driver.requests.size(), 2U);
+  EXPECT_THAT(driver.requests[1].steps, ElementsAre(8, 6));
 }
 
-TEST(Wish, is_said_anew_for_other_fields) {
+TEST(PrefetchRequest, is_said_anew_for_other_fields) {
   Driver driver;
   rest_at(driver, 4);
   driver.patch(2, R"({"scalars":[{"field":"salt"}]})");
   driver.settle();
-  ASSERT_EQ(driver.wishes.size(), 2U);
-  EXPECT_THAT(driver.wishes[0].steps, IsEmpty());
-  EXPECT_THAT(driver.wishes[1].steps, ElementsAre(5, 3));
-  ASSERT_TRUE(driver.wishes[1].view.scalars);
-  EXPECT_EQ(driver.wishes[1].view.scalars->at(0).field, "salt");
+  ASSERT_EQ(driver.requests.size(), 2U);
+  EXPECT_THAT(driver.requests[0].steps, IsEmpty());
+  EXPECT_THAT(driver.requests[1].steps, ElementsAre(5, 3));
+  ASSERT_TRUE(driver.requests[1].view.scalars);
+  EXPECT_EQ(driver.requests[1].view.scalars->at(0).field, "salt");
 }
 
-TEST(Wish, while_steps_run_is_for_those_ahead_in_their_order) {
+TEST(PrefetchRequest, while_steps_run_is_for_those_ahead_in_their_order) {
   Driver driver;
   rest_at(driver, 6);
   driver.say(play(0, 9, 10, true, true));
-  ASSERT_EQ(driver.wishes.size(), 1U);
-  EXPECT_THAT(driver.wishes[0].steps, ElementsAre(7, 8, 9, 0, 1, 2, 3, 4, 5)) << "each once";
+  ASSERT_EQ(driver.requests.size(), 1U);
+  EXPECT_THAT(driver.requests[0].steps, ElementsAre(7, 8, 9, 0, 1, 2, 3, 4, 5)) << "each once";
   run_and_acknowledge(driver, 105 * ms, 5 * ms);
-  ASSERT_EQ(driver.wishes.size(), 2U);
-  EXPECT_THAT(driver.wishes[1].steps, ElementsAre(8, 9, 0, 1, 2, 3, 4, 5, 6));
-  EXPECT_EQ(driver.wishes[1].view.step, 7);
+  ASSERT_EQ(driver.requests.size(), 2U);
+  EXPECT_THAT(driver.requests[1].steps, ElementsAre(8, 9, 0, 1, 2, 3, 4, 5, 6));
+  EXPECT_EQ(driver.requests[1].view.step, 7);
   driver.say(play(9, 0, 10, false, true));
-  ASSERT_EQ(driver.wishes.size(), 3U);
-  EXPECT_THAT(driver.wishes[2].steps, ElementsAre(6, 5, 4, 3, 2, 1, 0)) << "no loop: no further";
+  ASSERT_EQ(driver.requests.size(), 3U);
+  EXPECT_THAT(driver.requests[2].steps, ElementsAre(6, 5, 4, 3, 2, 1, 0)) << "no loop: no further";
 }
 
-TEST(Wish, ends_with_the_run_and_comes_back_at_rest) {
+TEST(PrefetchRequest, ends_with_the_run_and_comes_back_at_rest) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 10, true, true));
   run_and_acknowledge(driver, 305 * ms, 5 * ms);
   driver.say(protocol::PauseMessage{});
-  EXPECT_THAT(driver.wishes.back().steps, IsEmpty());
+  EXPECT_THAT(driver.requests.back().steps, IsEmpty());
   driver.settle();
-  EXPECT_THAT(driver.wishes.back().steps, ElementsAre(4, 2));
+  EXPECT_THAT(driver.requests.back().steps, ElementsAre(4, 2));
 }
 
-TEST(Wish, is_for_nothing_while_nobody_looks_and_after_the_end) {
+TEST(PrefetchRequest, is_for_nothing_while_nobody_looks_and_after_the_end) {
   Driver driver;
   rest_at(driver, 4);
   driver.say(protocol::VisibilityMessage{true});
-  ASSERT_EQ(driver.wishes.size(), 1U);
-  EXPECT_THAT(driver.wishes[0].steps, IsEmpty());
+  ASSERT_EQ(driver.requests.size(), 1U);
+  EXPECT_THAT(driver.requests[0].steps, IsEmpty());
   driver.say(protocol::VisibilityMessage{false});
-  ASSERT_EQ(driver.wishes.size(), 2U);
-  EXPECT_THAT(driver.wishes[1].steps, ElementsAre(5, 3));
+  ASSERT_EQ(driver.requests.size(), 2U);
+  EXPECT_THAT(driver.requests[1].steps, ElementsAre(5, 3));
   driver.drain();
-  ASSERT_EQ(driver.wishes.size(), 3U);
-  EXPECT_THAT(driver.wishes[2].steps, IsEmpty());
+  ASSERT_EQ(driver.requests.size(), 3U);
+  EXPECT_THAT(driver.requests[2].steps, IsEmpty());
   EXPECT_TRUE(driver.closed);
 }
 
-TEST(Wish, goes_with_the_dataset) {
+TEST(PrefetchRequest, goes_with_the_dataset) {
   Driver driver;
   rest_at(driver, 4);
   driver.say(protocol::OpenMessage{3, "sea"});
-  ASSERT_EQ(driver.wishes.size(), 1U);
-  EXPECT_THAT(driver.wishes[0].steps, IsEmpty());
+  ASSERT_EQ(driver.requests.size(), 1U);
+  EXPECT_THAT(driver.requests[0].steps, IsEmpty());
   driver.described(3, protocol::DatasetDescription{});
   driver.settle();
-  EXPECT_THAT(driver.wishes.back().steps, ElementsAre(1));
-  EXPECT_EQ(driver.wishes.back().view.dataset, "sea");
+  EXPECT_THAT(driver.requests.back().steps, ElementsAre(1));
+  EXPECT_EQ(driver.requests.back().view.dataset, "sea");
 }
 
 // Sixteen at most: asked of the player itself, with more steps than the driver's datasets have.
-TEST(Wish, reaches_sixteen_steps_ahead) {
+TEST(PrefetchRequest, reaches_sixteen_steps_ahead) {
   Player player;
   player.start(play(0, 239, 24, true, true), 230, 0);
   auto wanted = iota(231, 9);

@@ -275,17 +275,17 @@ TEST(Refining, a_lossless_final_frame_is_a_png) {
 TEST(Refining, a_view_that_rests_is_surveyed_once) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
-  EXPECT_TRUE(driver.surveys.empty());
+  EXPECT_TRUE(driver.calibrations.empty());
   driver.settle();
   driver.wait(5000 * ms);
-  EXPECT_EQ(driver.surveys.size(), 1U);
+  EXPECT_EQ(driver.calibrations.size(), 1U);
   driver.say(play(0, 9, 20, true, true));
   for (int n = 0; n < 40; ++n) {
     if (driver.render) driver.finish_render(10 * ms);
     driver.ack(driver.frames.back().header.seq);
     driver.wait(10 * ms);
   }
-  EXPECT_EQ(driver.surveys.size(), 1U) << "not while steps run";
+  EXPECT_EQ(driver.calibrations.size(), 1U) << "not while steps run";
 }
 
 }  // namespace

@@ -127,11 +127,11 @@ TEST(Changed, a_step_that_is_gone_becomes_the_last_and_neighbours_are_wished_for
   EXPECT_EQ(driver.render->view.step, 3);
   driver.settle();
   EXPECT_TRUE(driver.errors().empty());
-  driver.wishes.clear();
+  driver.requests.clear();
   driver.changed("wind");
   driver.settle();
-  ASSERT_FALSE(driver.wishes.empty());
-  EXPECT_THAT(driver.wishes.back().steps, ElementsAre(2));
+  ASSERT_FALSE(driver.requests.empty());
+  EXPECT_THAT(driver.requests.back().steps, ElementsAre(2));
 }
 
 TEST(Open, an_unknown_dataset_is_an_error_and_the_view_stays) {

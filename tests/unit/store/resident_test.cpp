@@ -55,7 +55,7 @@ class Series : public Source {
   void cancel() override { ++log_->cancelled; }
   void release() override { ++log_->released; }
   Result<Volume> read(std::size_t /*field*/, std::size_t step) override {
-    tell_progress(0.25);
+    report_progress(0.25);
     while (log_->hold) std::this_thread::yield();
     if (log_->heeds_cancel && log_->cancelled > 0) {
       return make_error(ErrorKind::cancelled, "reading was cancelled");
@@ -101,10 +101,10 @@ struct Fixture {
     return location;
   }
 
-  void wish(const std::vector<std::size_t>& steps, std::uint64_t owner = 1) {
-    std::vector<Wish> wishes;
-    for (const std::size_t step : steps) wishes.push_back({*dataset, "f", step, {}});
-    store.wish(owner, wishes);
+  void request_prefetch(const std::vector<std::size_t>& steps, std::uint64_t owner = 1) {
+    std::vector<PrefetchRequest> requests;
+    for (const std::size_t step : steps) requests.push_back({*dataset, "f", step, {}});
+    store.request_prefetch(owner, requests);
   }
   [[nodiscard]] bool is_resident(std::size_t step) const {
     return dataset->resident_only().volume("f", step).has_value();
@@ -154,12 +154,12 @@ TEST(Resident, AHandleForWhatIsThereNeverLoads) {
 
 TEST(Resident, WhatIsWishedForIsLoadedSoonestFirst) {
   Fixture f(10);
-  f.wish({7, 8, 9, 10});
+  f.request_prefetch({7, 8, 9, 10});
   f.wait_until_resident(10);
   EXPECT_EQ(f.log->read(), (std::vector<std::size_t>{7, 8, 9, 10}));
   for (const std::size_t step : {7, 8, 9, 10}) EXPECT_TRUE(f.is_resident(step)) << step;
-  EXPECT_EQ(f.dataset->counts().ahead, 4U);
-  f.wish({8, 9, 10, 11});
+  EXPECT_EQ(f.dataset->counts().prefetched, 4U);
+  f.request_prefetch({8, 9, 10, 11});
   f.wait_for_reads(5);
   f.settle();
   EXPECT_EQ(f.log->read().size(), 5U) << "what is there is not read again";
@@ -168,9 +168,9 @@ TEST(Resident, WhatIsWishedForIsLoadedSoonestFirst) {
 TEST(Resident, ANewWishReplacesWhatWasNotYetLoaded) {
   Fixture f(10);
   f.log->hold = true;
-  f.wish({1, 2, 3, 4});
+  f.request_prefetch({1, 2, 3, 4});
   f.settle();  // 1 is being read
-  f.wish({50});
+  f.request_prefetch({50});
   f.log->hold = false;
   f.wait_for_reads(2);
   f.settle();
@@ -180,7 +180,7 @@ TEST(Resident, ANewWishReplacesWhatWasNotYetLoaded) {
 TEST(Resident, LoadingAheadStaysWithinTheLimitAndKeepsWhatIsWishedFor) {
   Fixture f(4);
   const auto held = f.dataset->volume("f", 0);
-  f.wish({1, 2, 3, 4, 5, 6});
+  f.request_prefetch({1, 2, 3, 4, 5, 6});
   f.wait_for_reads(4);
   f.settle();
   EXPECT_EQ(f.log->read(), (std::vector<std::size_t>{0, 1, 2, 3})) << "no room for a fourth";
@@ -188,7 +188,7 @@ TEST(Resident, LoadingAheadStaysWithinTheLimitAndKeepsWhatIsWishedFor) {
   EXPECT_LE(f.store.counts().bytes, 4 * volume_bytes);
   for (const std::size_t step : {1, 2, 3}) EXPECT_TRUE(f.is_resident(step)) << step;
   // A demand takes the place of what is not wished for, or else of the least recently used.
-  f.wish({2, 3});
+  f.request_prefetch({2, 3});
   ASSERT_TRUE(f.dataset->volume("f", 20));
   EXPECT_FALSE(f.is_resident(1));
   EXPECT_TRUE(f.is_resident(2));
@@ -199,7 +199,7 @@ TEST(Resident, LoadingAheadStaysWithinTheLimitAndKeepsWhatIsWishedFor) {
 TEST(Resident, WhatNobodyWishesForGoesBeforeOlderWishes) {
   Fixture f(3);
   for (const std::size_t step : {1, 2, 3}) ASSERT_TRUE(f.dataset->volume("f", step));
-  f.wish({1, 2});
+  f.request_prefetch({1, 2});
   ASSERT_TRUE(f.dataset->volume("f", 20));
   EXPECT_TRUE(f.is_resident(1));
   EXPECT_TRUE(f.is_resident(2));
@@ -213,7 +213,7 @@ TEST(Resident, AnAverageThatIsWishedForStaysThoughItCouldBeMadeAgain) {
   half.widths.fill(std::vector<double>(edge, 1));
   ASSERT_TRUE(f.dataset->level("f", 0, half));
   for (const std::size_t step : {1, 2}) ASSERT_TRUE(f.dataset->volume("f", step));
-  f.store.wish(1, {{*f.dataset, "f", 0, half}});
+  f.store.request_prefetch(1, {{*f.dataset, "f", 0, half}});
   ASSERT_TRUE(f.dataset->volume("f", 3));
   EXPECT_TRUE(f.dataset->resident_only().level("f", 0, half));
   EXPECT_FALSE(f.is_resident(0)) << "the oldest that nobody wishes for";
@@ -222,9 +222,9 @@ TEST(Resident, AnAverageThatIsWishedForStaysThoughItCouldBeMadeAgain) {
 TEST(Resident, OwnersOfWishesTakeTurns) {
   Fixture f(10);
   f.log->hold = true;
-  f.wish({1, 2, 3}, 1);
+  f.request_prefetch({1, 2, 3}, 1);
   f.wait_until_reading();
-  f.wish({11, 12, 13}, 2);
+  f.request_prefetch({11, 12, 13}, 2);
   f.log->hold = false;
   f.wait_for_reads(6);
   EXPECT_EQ(f.log->read(), (std::vector<std::size_t>{1, 11, 2, 12, 3, 13}));
@@ -233,7 +233,7 @@ TEST(Resident, OwnersOfWishesTakeTurns) {
 TEST(Resident, WhatWasRemovedIsNotLoadedAnyMore) {
   Fixture f(10);
   f.log->hold = true;
-  f.wish({1, 2, 3});
+  f.request_prefetch({1, 2, 3});
   f.wait_until_reading();
   ASSERT_TRUE(f.store.remove("series"));
   f.log->hold = false;
@@ -252,7 +252,7 @@ TEST(Resident, ASeriesLargerThanMemoryPlaysWithEveryStepThere) {
     const std::size_t step = n % steps;
     std::vector<std::size_t> next;
     for (std::size_t k = 0; k < 5; ++k) next.push_back((step + k) % steps);
-    f.wish(next);
+    f.request_prefetch(next);
     for (int i = 0; i < 5000 && !f.is_resident((step + 1) % steps); ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
@@ -266,7 +266,7 @@ TEST(Resident, ASeriesLargerThanMemoryPlaysWithEveryStepThere) {
 TEST(Resident, WhoWaitsComesBeforeWhatIsAhead) {
   Fixture f(50);
   f.log->hold = true;
-  f.wish({1, 2, 3, 4, 5, 6, 7, 8});
+  f.request_prefetch({1, 2, 3, 4, 5, 6, 7, 8});
   f.settle();
   std::thread waiting([&] { ASSERT_TRUE(f.dataset->volume("f", 60)); });
   f.settle();
@@ -418,7 +418,7 @@ TEST(Resident, TheErrorOfPackedStorageIsTheLargestOfAllSteps) {
 // Limit: three volumes. Two that are wished for, with their packed forms, fill it.
 TEST(Resident, APackedFormTakesNoWishsPlace) {
   Fixture f(3, Storage::packed16);
-  f.wish({1, 2});
+  f.request_prefetch({1, 2});
   for (int i = 0; i < 10000 && !f.is_resident(2); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }

@@ -351,7 +351,7 @@ class VtkSource final : public FileSource {
       if (auto read = reader->read(block.data(), count * components); !read) return read;
       take(block.data(), count);
       done += count;
-      tell_progress(static_cast<double>(done) / static_cast<double>(array.tuples));
+      report_progress(static_cast<double>(done) / static_cast<double>(array.tuples));
     }
     return {};
   }

@@ -9,11 +9,11 @@ namespace windsplat {
 
 // A picture as large as this one, in whole MCUs, is kept; what a larger one needed is given back by
 // the next smaller one.
-inline constexpr std::size_t kept_pixels = std::size_t{1920} * 1088;
+inline constexpr std::size_t retained_pixels = std::size_t{1920} * 1088;
 
 // Gives storage back that is larger than both, and with it what it holds.
 template <class T>
-void give_back(std::vector<T>& storage, std::size_t needed, std::size_t kept) {
+void trim_storage(std::vector<T>& storage, std::size_t needed, std::size_t kept) {
   // Of `= {}` the capacity would stay.
   if (storage.capacity() > std::max(needed, kept)) storage = std::vector<T>();
 }
