@@ -1,9 +1,11 @@
-// 8-bit RGB -> PNG by libspng; the only file that knows it. Compression is set for speed.
-#include <spng.h>
+// 8-bit RGB -> PNG by libpng; the only file that knows it. Compression is set for speed.
+#include <png.h>
 
-#include <cstdlib>
-#include <memory>
+#include <array>
+#include <csetjmp>
+#include <new>
 #include <string>
+#include <utility>
 
 #include "server/base/check.hpp"
 #include "server/image/encode.hpp"
@@ -11,39 +13,92 @@
 namespace windsplat::image {
 namespace {
 
-constexpr int compression_level = 1;          // zlib's
-constexpr std::uint8_t color_type_rgb = 2;    // PNG 11.2.2
-constexpr std::uint8_t rendering_intent = 1;  // relative colorimetric
+constexpr int compression_level = 1;                        // zlib's
+constexpr std::size_t chunk_bytes = std::size_t{64} << 10;  // of an IDAT, at most
 
-struct FreePng {
-  void operator()(spng_ctx* context) const { spng_ctx_free(context); }
-  void operator()(void* bytes) const { std::free(bytes); }
+enum class Fate { done, cancelled, failed };
+
+// libpng reports an error by longjmp, which runs no destructors. Whatever it may leave, from
+// write() on, has no object with one; the PNG so far and the reason are kept here.
+class PngWriter {
+ public:
+  PngWriter()
+      : png_(png_create_write_struct_2(PNG_LIBPNG_VER_STRING, this, &on_error, &on_warning, this,
+                                       &allocate, &release)),
+        info_(png_ == nullptr ? nullptr : png_create_info_struct(png_)) {}
+  ~PngWriter() { png_destroy_write_struct(&png_, &info_); }
+  PngWriter(const PngWriter&) = delete;
+  PngWriter& operator=(const PngWriter&) = delete;
+
+  Fate write(const std::uint8_t* rgb, int width, int height, const CancelToken& cancel) {
+    if (info_ == nullptr) return Fate::failed;
+    if (setjmp(png_jmpbuf(png_)) != 0) return Fate::failed;  // NOLINT(cert-err52-cpp)
+    return write_chunks(rgb, width, height, cancel);
+  }
+  [[nodiscard]] Error error() const {
+    return make_error(out_of_memory_ ? ErrorKind::out_of_memory : ErrorKind::internal,
+                      std::string("PNG: ") + message_.data());
+  }
+  [[nodiscard]] Bytes take() { return std::move(bytes_); }
+
+ private:
+  Fate write_chunks(const std::uint8_t* rgb, int width, int height, const CancelToken& cancel) {
+    png_set_write_fn(png_, this, &append, nullptr);
+    png_set_compression_level(png_, compression_level);
+    png_set_compression_buffer_size(png_, chunk_bytes);
+    // Thin lines on an even ground: subtracting the left or upper pixel gains most of what trying
+    // every filter on every row would.
+    png_set_filter(png_, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB | PNG_FILTER_UP);
+    png_set_IHDR(png_, info_, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 8,
+                 PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_BASE,
+                 PNG_FILTER_TYPE_BASE);
+    png_set_sRGB(png_, info_, PNG_sRGB_INTENT_RELATIVE);
+    png_write_info(png_, info_);
+    const std::size_t row_bytes = 3 * static_cast<std::size_t>(width);
+    for (int row = 0; row < height; ++row, rgb += row_bytes) {
+      if (cancel.cancelled()) return Fate::cancelled;
+      png_write_row(png_, rgb);
+    }
+    png_write_end(png_, nullptr);
+    return Fate::done;
+  }
+
+  // Memory of libpng and zlib; null is an error that libpng reports.
+  static void* allocate(png_structp png, png_alloc_size_t bytes) {
+    void* const block = ::operator new(bytes, std::nothrow);
+    if (block == nullptr) static_cast<PngWriter*>(png_get_mem_ptr(png))->out_of_memory_ = true;
+    return block;
+  }
+  static void release(png_structp /*png*/, void* block) { ::operator delete(block); }
+
+  static void append(png_structp png, std::uint8_t* from, std::size_t bytes) {
+    if (!static_cast<PngWriter*>(png_get_io_ptr(png))->has_appended(from, bytes)) {
+      png_error(png, "out of memory");
+    }
+  }
+  bool has_appended(const std::uint8_t* from, std::size_t bytes) noexcept {
+    try {
+      bytes_.insert(bytes_.end(), from, from + bytes);
+      return true;
+    } catch (const std::bad_alloc&) {
+      out_of_memory_ = true;
+      return false;
+    }
+  }
+
+  [[noreturn]] static void on_error(png_structp png, const char* message) {
+    auto& kept = static_cast<PngWriter*>(png_get_error_ptr(png))->message_;
+    kept[std::string_view(message).copy(kept.data(), kept.size() - 1)] = '\0';
+    png_longjmp(png, 1);
+  }
+  static void on_warning(png_structp /*png*/, const char* /*message*/) {}
+
+  Bytes bytes_;
+  std::array<char, 128> message_{"out of memory"};  // of what fails without a message
+  bool out_of_memory_ = false;
+  png_structp png_;
+  png_infop info_;
 };
-
-Error png_error(int code) {
-  const ErrorKind kind = code == SPNG_EMEM ? ErrorKind::out_of_memory : ErrorKind::internal;
-  return make_error(kind, std::string("PNG: ") + spng_strerror(code));
-}
-
-int configure(spng_ctx* context, int width, int height) {
-  spng_ihdr header{};
-  header.width = static_cast<std::uint32_t>(width);
-  header.height = static_cast<std::uint32_t>(height);
-  header.bit_depth = 8;
-  header.color_type = color_type_rgb;
-  if (const int code = spng_set_option(context, SPNG_ENCODE_TO_BUFFER, 1)) return code;
-  if (const int code = spng_set_option(context, SPNG_IMG_COMPRESSION_LEVEL, compression_level)) {
-    return code;
-  }
-  // Thin lines on an even ground: subtracting the left or upper pixel gains most of what trying
-  // every filter on every row would.
-  if (const int code = spng_set_option(context, SPNG_FILTER_CHOICE,
-                                       SPNG_FILTER_CHOICE_SUB | SPNG_FILTER_CHOICE_UP)) {
-    return code;
-  }
-  if (const int code = spng_set_ihdr(context, &header)) return code;
-  return spng_set_srgb(context, rendering_intent);
-}
 
 }  // namespace
 
@@ -56,27 +111,16 @@ Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int heigh
   }
   WINDSPLAT_CHECK(rgb.size() ==
                   3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-
-  const std::unique_ptr<spng_ctx, FreePng> context(spng_ctx_new(SPNG_CTX_ENCODER));
-  if (!context) return png_error(SPNG_EMEM);
-  if (const int code = configure(context.get(), width, height)) return png_error(code);
-  if (const int code = spng_encode_image(context.get(), nullptr, 0, SPNG_FMT_PNG,
-                                         SPNG_ENCODE_PROGRESSIVE | SPNG_ENCODE_FINALIZE)) {
-    return png_error(code);
+  PngWriter writer;
+  switch (writer.write(rgb.data(), width, height, cancel)) {
+    case Fate::cancelled:
+      return make_error(ErrorKind::cancelled, "nobody waits for the PNG");
+    case Fate::failed:
+      return writer.error();
+    case Fate::done:
+      break;
   }
-  const std::size_t row_bytes = 3 * static_cast<std::size_t>(width);
-  for (int row = 0; row < height; ++row) {
-    if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "nobody waits for the PNG");
-    const std::uint8_t* const at = rgb.data() + static_cast<std::size_t>(row) * row_bytes;
-    const int code = spng_encode_row(context.get(), at, row_bytes);
-    if (code != 0 && code != SPNG_EOI) return png_error(code);
-  }
-  std::size_t png_bytes = 0;
-  int code = 0;
-  const std::unique_ptr<void, FreePng> png(spng_get_png_buffer(context.get(), &png_bytes, &code));
-  if (!png) return png_error(code);
-  const auto* begin = static_cast<const std::uint8_t*>(png.get());
-  return Bytes(begin, begin + png_bytes);
+  return writer.take();
 }
 
 }  // namespace windsplat::image

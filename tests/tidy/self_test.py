@@ -64,7 +64,7 @@ class Planted(unittest.TestCase):
         for path, header in [("protocol/view.cpp", "nlohmann/json.hpp"),
                              ("server/scene/s.cpp", "netcdf.h"),
                              ("server/frame/f.cpp", "turbojpeg.h"),
-                             ("server/frame/f.cpp", "spng.h"),
+                             ("server/frame/f.cpp", "png.h"),
                              ("server/session/s.cpp", "boost/beast/core.hpp"),
                              ("server/cli/c.cpp", "boost/asio.hpp"),
                              ("server/api/n.cpp", "CLI/CLI.hpp")]:

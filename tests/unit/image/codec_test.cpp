@@ -1,6 +1,5 @@
 // Pictures encoded, then decoded again by the libraries' decoders; NPY parsed byte by byte.
 #include <gtest/gtest.h>
-#include <spng.h>
 #include <turbojpeg.h>
 
 #include <cmath>
@@ -9,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "decoded_png.hpp"
 #include "server/image/encode.hpp"
 
 namespace windsplat::image {
@@ -57,26 +57,6 @@ Picture decoded_jpeg(const Bytes& bytes) {
                           TJPF_RGB, TJFLAG_ACCURATEDCT),
             0);
   tjDestroy(decoder);
-  return picture;
-}
-
-Picture decoded_png(const Bytes& bytes) {
-  Picture picture;
-  spng_ctx* decoder = spng_ctx_new(0);
-  spng_ihdr header{};
-  EXPECT_EQ(spng_set_png_buffer(decoder, bytes.data(), bytes.size()), 0);
-  EXPECT_EQ(spng_get_ihdr(decoder, &header), 0);
-  EXPECT_EQ(header.bit_depth, 8);
-  EXPECT_EQ(header.color_type, SPNG_COLOR_TYPE_TRUECOLOR);
-  picture.width = static_cast<int>(header.width);
-  picture.height = static_cast<int>(header.height);
-  std::uint8_t intent = 0;
-  EXPECT_EQ(spng_get_srgb(decoder, &intent), 0) << "the picture does not say that it is sRGB";
-  std::size_t size = 0;
-  EXPECT_EQ(spng_decoded_image_size(decoder, SPNG_FMT_RGB8, &size), 0);
-  picture.rgb.resize(size);
-  EXPECT_EQ(spng_decode_image(decoder, picture.rgb.data(), size, SPNG_FMT_RGB8, 0), 0);
-  spng_ctx_free(decoder);
   return picture;
 }
 
@@ -129,12 +109,31 @@ TEST(Png, IsLossless) {
     for (const Picture& picture : {smooth_picture(width, height), busy_picture(width, height)}) {
       const auto bytes = encode_png(picture.rgb, width, height);
       ASSERT_TRUE(bytes) << bytes.error().message;
-      const Picture back = decoded_png(*bytes);
+      const test::DecodedPng back = test::decoded_png(*bytes);
       EXPECT_EQ(back.width, width);
       EXPECT_EQ(back.height, height);
       EXPECT_EQ(back.rgb, picture.rgb);
     }
   }
+}
+
+// Whoever shows the picture is told that it is sRGB, to be mapped by relative colorimetry.
+TEST(Png, HasTheChunksThatAreMeant) {
+  const auto bytes = encode_png(busy_picture(200, 200).rgb, 200, 200);
+  ASSERT_TRUE(bytes) << bytes.error().message;
+  std::vector<std::string> names;
+  for (std::size_t at = 8; at + 12 <= bytes->size();) {
+    const std::uint8_t* chunk = bytes->data() + at;
+    const std::size_t size =
+        std::size_t{chunk[0]} << 24 | std::size_t{chunk[1]} << 16 | chunk[2] << 8 | chunk[3];
+    const std::string name(chunk + 4, chunk + 8);
+    if (name == "sRGB") {
+      EXPECT_EQ(chunk[8], 1);
+    }
+    if (names.empty() || names.back() != name) names.push_back(name);
+    at += size + 12;
+  }
+  EXPECT_EQ(names, (std::vector<std::string>{"IHDR", "sRGB", "IDAT", "IEND"}));
 }
 
 TEST(Png, CompressesAnEvenPicture) {
@@ -146,6 +145,24 @@ TEST(Png, CompressesAnEvenPicture) {
 
 TEST(Png, RefusesAnEmptyPicture) {
   EXPECT_EQ(encode_png({}, 0, 4).error().kind, ErrorKind::invalid);
+}
+
+TEST(Png, WhatTheLibraryRefusesIsAnError) {
+  constexpr int over_its_limit = 1000001;
+  const std::vector<std::uint8_t> row(std::size_t{3} * over_its_limit);
+  const auto refused = encode_png(row, over_its_limit, 1);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::internal);
+  EXPECT_EQ(refused.error().message, "PNG: Invalid IHDR data");
+}
+
+TEST(Png, StopsWhenCancelled) {
+  const Picture picture = busy_picture(64, 64);
+  const CancelToken cancel;
+  cancel.cancel();
+  const auto stopped = encode_png(picture.rgb, 64, 64, cancel);
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().kind, ErrorKind::cancelled);
 }
 
 // NPY 1.0: "\x93NUMPY", 1, 0, u16 header length, a Python dict ending with a line feed, values from

@@ -2,7 +2,6 @@
 #include "server/frame/frame.hpp"
 
 #include <gtest/gtest.h>
-#include <spng.h>
 
 #include <cstring>
 #include <memory>
@@ -10,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "decoded_png.hpp"
 #include "server/data/resident/dataset.hpp"
 #include "server/data/samples/samples.hpp"
 #include "server/frame/frame_info.hpp"
@@ -128,11 +128,8 @@ TEST_F(Produce, BackgroundIsOfThePictureButNotOfTheArray) {
   const auto png = produce_as(Format::png);
   const auto npy = produce_as(Format::npy);
   ASSERT_TRUE(png && npy);
-  spng_ctx* decoder = spng_ctx_new(0);
-  std::vector<std::uint8_t> rgb(std::size_t{3} * 96 * 64);
-  ASSERT_EQ(spng_set_png_buffer(decoder, png->bytes.data(), png->bytes.size()), 0);
-  ASSERT_EQ(spng_decode_image(decoder, rgb.data(), rgb.size(), SPNG_FMT_RGB8, 0), 0);
-  spng_ctx_free(decoder);
+  const std::vector<std::uint8_t> rgb = test::decoded_png(png->bytes).rgb;
+  ASSERT_EQ(rgb.size(), std::size_t{3} * 96 * 64);
   for (std::size_t i = 0; i < rgb.size(); i += 3) {
     ASSERT_EQ(rgb[i], 0x20);
     ASSERT_EQ(rgb[i + 1], 0x40);
@@ -165,11 +162,8 @@ TEST_F(Produce, JpegShowsWhatPngShows) {
       const auto jpeg = produce(view, *dataset, near, pool, cancel);
       ASSERT_TRUE(png && jpeg);
       const std::size_t size = std::size_t{3} * width * height;
-      std::vector<std::uint8_t> truth(size);
-      spng_ctx* decoder = spng_ctx_new(0);
-      ASSERT_EQ(spng_set_png_buffer(decoder, png->bytes.data(), png->bytes.size()), 0);
-      ASSERT_EQ(spng_decode_image(decoder, truth.data(), size, SPNG_FMT_RGB8, 0), 0);
-      spng_ctx_free(decoder);
+      const std::vector<std::uint8_t> truth = test::decoded_png(png->bytes).rgb;
+      ASSERT_EQ(truth.size(), size);
       const auto found = image::decode_jpeg(jpeg->bytes, width, height);
       ASSERT_TRUE(found) << found.error().message;
       for (std::size_t i = 0; i < size; ++i) ASSERT_NEAR((*found)[i], truth[i], 5) << i;

@@ -15,6 +15,7 @@
 #include "server/data/samples/samples.hpp"
 #include "server/engine/render.hpp"
 #include "server/frame/frame.hpp"
+#include "server/image/encode.hpp"
 #include "server/scene/build.hpp"
 
 namespace {
@@ -22,6 +23,11 @@ namespace {
 std::atomic<std::int64_t> blocks{0};
 std::atomic<std::int64_t> bytes{0};
 std::atomic<std::int64_t> held{0};  // bytes not yet given back
+thread_local int good_left = -1;    // allocations before one that fails; -1: none does
+
+void fail_if_due() {
+  if (good_left >= 0 && good_left-- == 0) throw std::bad_alloc();
+}
 
 void* hold(void* at) {
   held.fetch_add(static_cast<std::int64_t>(malloc_usable_size(at)), std::memory_order_relaxed);
@@ -35,6 +41,7 @@ void give_up(void* at) {
 }
 
 void* counted(std::size_t size) {
+  fail_if_due();
   blocks.fetch_add(1, std::memory_order_relaxed);
   bytes.fetch_add(static_cast<std::int64_t>(size), std::memory_order_relaxed);
   if (void* at = std::malloc(size == 0 ? 1 : size)) return hold(at);
@@ -51,11 +58,18 @@ void* counted(std::size_t size, std::align_val_t alignment) {
 
 }  // namespace
 
-// The forms that do not throw go through these; so do arrays, but not under every sanitizer.
+// Arrays and the form that does not throw would go through these, but not under every sanitizer.
 void* operator new[](std::size_t size) { return counted(size); }
 void operator delete[](void* at) noexcept { give_up(at); }
 void operator delete[](void* at, std::size_t /*size*/) noexcept { give_up(at); }
 void* operator new(std::size_t size) { return counted(size); }
+void* operator new(std::size_t size, const std::nothrow_t& /*tag*/) noexcept {
+  try {
+    return counted(size);
+  } catch (const std::bad_alloc&) {
+    return nullptr;
+  }
+}
 void* operator new(std::size_t size, std::align_val_t alignment) {
   return counted(size, alignment);
 }
@@ -270,6 +284,34 @@ TEST(WithoutMemory, WishesAreTakenBackAndAStoreEnds) {
     store.end();
   });
   EXPECT_EQ(spent.blocks, 0);
+}
+
+// Whichever allocation fails, of libpng, of zlib or of the bytes: an error, and nothing is leaked.
+TEST(WithoutMemory, APngIsAnError) {
+  constexpr int edge = 200;
+  std::vector<std::uint8_t> noise(std::size_t{3} * edge * edge);
+  std::uint32_t state = 1;
+  for (std::uint8_t& sample : noise) {
+    state = state * 1664525U + 1013904223U;
+    sample = static_cast<std::uint8_t>(state >> 24U);
+  }
+  const CancelToken cancel;
+  int failures = 0;
+  for (bool done = false; !done; ++failures) {
+    const std::int64_t before = held;
+    {
+      good_left = failures;
+      const auto png = image::encode_png(noise, edge, edge, cancel);
+      good_left = -1;
+      done = png.has_value();
+      if (!done) {
+        EXPECT_EQ(png.error().kind, ErrorKind::out_of_memory) << failures;
+        EXPECT_TRUE(png.error().message.starts_with("PNG: ")) << png.error().message;
+      }
+    }
+    EXPECT_EQ(held, before) << failures;
+  }
+  EXPECT_GE(failures, 8) << "two structures, five blocks of zlib's, some of the bytes";
 }
 
 // The counter counts: a vector as large as a picture would be seen.
