@@ -30,6 +30,7 @@ CONFINED = [
     ("ecCodes", r"eccodes\.h", r"server/data/formats/grib/.*|tests/.*"),
     ("a compressor", r"(blosc|lz4|zlib|zstd)\.h", r"server/data/.*|tests/.*"),
     ("netCDF", r"netcdf(_\w+)?\.h", r"server/data/.*|tests/.*"),
+    ("libseccomp", r"seccomp\.h", r"server/data/loader/.*|tests/.*"),
     ("an image library", r"(turbojpeg|jpeglib|png)\.h", r"server/image/.*|tests/.*"),
     ("Highway", r"hwy/", r"server/engine/kernels/.*|server/image/ycc_rows\.cpp|tests/.*"),
     ("Beast or Asio", r"boost/(beast|asio)[/.]",

@@ -63,6 +63,7 @@ class Planted(unittest.TestCase):
     def test_outside_header_out_of_its_folder(self):
         for path, header in [("protocol/view.cpp", "nlohmann/json.hpp"),
                              ("server/scene/s.cpp", "netcdf.h"),
+                             ("server/data/d.cpp", "seccomp.h"),
                              ("server/frame/f.cpp", "turbojpeg.h"),
                              ("server/frame/f.cpp", "png.h"),
                              ("server/session/s.cpp", "boost/beast/core.hpp"),

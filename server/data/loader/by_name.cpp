@@ -3,6 +3,7 @@
 #include "server/data/loader/by_name.hpp"
 
 #include <fcntl.h>
+#include <seccomp.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <ucontext.h>
@@ -116,26 +117,24 @@ long answer(int call, const Arguments& given) {
     return reinterpret_cast<struct stat*>(given.at(i));  // NOLINT: as above
   };
   switch (call) {
-    case SYS_openat:
+    case SCMP_SYS(openat):
       return open_named(name_at(given, 1), number(2));
-    case SYS_newfstatat:
+    case SCMP_SYS(newfstatat):
       if (const char* name = name_at(given, 1);
           (number(3) & AT_EMPTY_PATH) != 0 && (name == nullptr || *name == '\0')) {
         return ::syscall(SYS_fstat, number(0), status_at(2)) == 0 ? 0 : -errno;
       }
       return look_at(name_at(given, 1), status_at(2));
-    case SYS_faccessat:
-    case SYS_faccessat2:
+    case SCMP_SYS(faccessat):
+    case SCMP_SYS(faccessat2):
       return may_read(name_at(given, 1), number(2));
-#ifdef __x86_64__
-    case SYS_open:
+    case SCMP_SYS(open):
       return open_named(name_at(given, 0), number(1));
-    case SYS_stat:
-    case SYS_lstat:
+    case SCMP_SYS(stat):
+    case SCMP_SYS(lstat):
       return look_at(name_at(given, 0), status_at(1));
-    case SYS_access:
+    case SCMP_SYS(access):
       return may_read(name_at(given, 0), number(1));
-#endif
     default:
       return -EACCES;
   }
@@ -160,13 +159,10 @@ void on_call(int /*signal*/, siginfo_t* about, void* context) {
 }  // namespace
 
 const std::vector<int>& calls_by_name() {
-  static const std::vector<int> all{SYS_openat,     SYS_openat2,    SYS_newfstatat, SYS_faccessat,
-                                    SYS_faccessat2, SYS_readlinkat, SYS_statx,
-#ifdef __x86_64__
-                                    SYS_open,       SYS_stat,       SYS_lstat,      SYS_access,
-                                    SYS_readlink
-#endif
-  };
+  static const std::vector<int> all{SCMP_SYS(openat),    SCMP_SYS(openat2),    SCMP_SYS(newfstatat),
+                                    SCMP_SYS(faccessat), SCMP_SYS(faccessat2), SCMP_SYS(readlinkat),
+                                    SCMP_SYS(statx),     SCMP_SYS(open),       SCMP_SYS(stat),
+                                    SCMP_SYS(lstat),     SCMP_SYS(access),     SCMP_SYS(readlink)};
   return all;
 }
 

@@ -8,7 +8,8 @@
 
 namespace windsplat::data::loader {
 
-// The calls that the filter hands to the handler instead of the kernel.
+// The calls that the filter hands to the handler instead of the kernel, as libseccomp numbers them:
+// negative where this machine has no such call.
 const std::vector<int>& calls_by_name();
 
 // Sets the handler of SIGSYS; see confine(). socket -1: no library's file is asked for.

@@ -3,11 +3,9 @@
 #include "server/data/loader/confine.hpp"
 
 #include <fcntl.h>
-#include <linux/audit.h>
 #include <linux/capability.h>
-#include <linux/filter.h>
 #include <linux/landlock.h>
-#include <linux/seccomp.h>
+#include <seccomp.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -18,7 +16,8 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
-#include <cstddef>
+#include <initializer_list>
+#include <memory>
 #include <system_error>
 #include <utility>
 
@@ -27,12 +26,6 @@
 namespace windsplat::data::loader {
 
 namespace {
-
-#if defined(__x86_64__)
-constexpr std::uint32_t this_machine = AUDIT_ARCH_X86_64;
-#elif defined(__aarch64__)
-constexpr std::uint32_t this_machine = AUDIT_ARCH_AARCH64;
-#endif
 
 #ifdef WINDSPLAT_SANITIZED
 constexpr bool memory_is_shadowed = true;  // terabytes of it, which count as taken
@@ -106,113 +99,79 @@ void forbid_paths() {
 #endif
 }
 
-// The filter, instruction by instruction. The number of the call is in the accumulator until a rule
-// for that call loads something else; every such rule ends in returns.
-class Filter {
- public:
-  Filter() {
-    load(offsetof(seccomp_data, arch));
-    code_.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, this_machine, 1, 0));
-    answer(SECCOMP_RET_KILL_PROCESS);
-    load(offsetof(seccomp_data, nr));
-  }
-
-  void allow(int call) { on(call, SECCOMP_RET_ALLOW); }
-  void refuse(int call, int with) { on(call, SECCOMP_RET_ERRNO | static_cast<unsigned>(with)); }
-  void hand_over(int call) { on(call, SECCOMP_RET_TRAP); }
-
-  // Unless all bits of `mask` that an argument has make up `value`.
-  void allow_unless_masked(int call, unsigned argument, std::uint32_t mask, std::uint32_t value) {
-    skip_unless(call, 5);
-    load(offset_of(argument));
-    code_.push_back(BPF_STMT(BPF_ALU | BPF_AND | BPF_K, mask));
-    code_.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, value, 0, 1));
-    answer(SECCOMP_RET_ERRNO | EPERM);
-    answer(SECCOMP_RET_ALLOW);
-  }
-
-  // A mapping: never code, and no memory that no limit counts: what is shared without a file, and
-  // what grows by itself.
-  void allow_mappings() {
-    skip_unless(SYS_mmap, 8);
-    load(offset_of(2));
-    code_.push_back(BPF_JUMP(BPF_JMP | BPF_JSET | BPF_K, PROT_EXEC, 5, 0));
-    load(offset_of(3));
-    code_.push_back(BPF_JUMP(BPF_JMP | BPF_JSET | BPF_K, MAP_GROWSDOWN, 3, 0));
-    code_.push_back(BPF_STMT(BPF_ALU | BPF_AND | BPF_K, MAP_SHARED | MAP_ANONYMOUS));
-    code_.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, MAP_SHARED | MAP_ANONYMOUS, 1, 0));
-    answer(SECCOMP_RET_ALLOW);
-    answer(SECCOMP_RET_ERRNO | EPERM);
-  }
-
-  void allow_if_any(int call, unsigned argument, const std::vector<std::uint32_t>& values) {
-    skip_unless(call, static_cast<unsigned>(2 + 2 * values.size()));
-    load(offset_of(argument));
-    for (const std::uint32_t value : values) {
-      code_.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, value, 0, 1));
-      answer(SECCOMP_RET_ALLOW);
-    }
-    answer(SECCOMP_RET_ERRNO | EPERM);
-  }
-
-  bool install() {
-    answer(SECCOMP_RET_ERRNO | EPERM);
-    const sock_fprog program{static_cast<unsigned short>(code_.size()), code_.data()};
-    return ::syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_TSYNC, &program) ==
-           0;
-  }
-
- private:
-  static unsigned offset_of(unsigned argument) {  // its lower half, on a little-endian machine
-    return static_cast<unsigned>(offsetof(seccomp_data, args) + argument * sizeof(std::uint64_t));
-  }
-  void load(std::size_t offset) {
-    code_.push_back(BPF_STMT(BPF_LD | BPF_W | BPF_ABS, static_cast<unsigned>(offset)));
-  }
-  void answer(unsigned what) { code_.push_back(BPF_STMT(BPF_RET | BPF_K, what)); }
-  void skip_unless(int call, unsigned instructions) {
-    code_.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, static_cast<unsigned>(call), 0,
-                             static_cast<unsigned char>(instructions)));
-  }
-  void on(int call, unsigned what) {
-    skip_unless(call, 1);
-    answer(what);
-  }
-
-  std::vector<sock_filter> code_;
+struct ReleaseFilter {
+  void operator()(void* filter) const { seccomp_release(filter); }
 };
 
-bool forbid_calls() {
+// Rules of a filter until one of them fails.
+class Filter {
+ public:
+  Filter() : filter_(seccomp_init(SCMP_ACT_ERRNO(EPERM))), fault_(filter_ ? 0 : -ENOMEM) {
+    set(SCMP_FLTATR_ACT_BADARCH, SCMP_ACT_KILL_PROCESS);
+    set(SCMP_FLTATR_CTL_TSYNC, 1);
+  }
+
+  // Where all conditions hold. A call that this machine does not have is a number no kernel knows.
+  void add(std::uint32_t action, int call, std::initializer_list<scmp_arg_cmp> conditions = {}) {
+    if (fault_ != 0) return;
+    fault_ = seccomp_rule_add_array(filter_.get(), action, call,
+                                    static_cast<unsigned>(conditions.size()), conditions.begin());
+  }
+  // 0 or a negative errno.
+  int install() { return fault_ != 0 ? fault_ : seccomp_load(filter_.get()); }
+
+ private:
+  void set(scmp_filter_attr which, std::uint32_t value) {
+    if (fault_ == 0) fault_ = seccomp_attr_set(filter_.get(), which, value);
+  }
+
+  std::unique_ptr<void, ReleaseFilter> filter_;
+  int fault_;
+};
+
+scmp_arg_cmp equals(unsigned argument, scmp_datum_t value) {
+  return {argument, SCMP_CMP_EQ, value, 0};
+}
+scmp_arg_cmp has_bits(unsigned argument, scmp_datum_t mask, scmp_datum_t value) {
+  return {argument, SCMP_CMP_MASKED_EQ, mask, value};
+}
+
+// 0 or a negative errno.
+int forbid_calls() {
   Filter filter;
   for (const int call :
-       {SYS_read, SYS_pread64, SYS_readv, SYS_preadv, SYS_lseek, SYS_fstat, SYS_munmap, SYS_mremap,
-        SYS_brk, SYS_madvise, SYS_futex, SYS_clock_gettime, SYS_clock_nanosleep, SYS_nanosleep,
-        SYS_gettimeofday, SYS_getrandom, SYS_rt_sigaction, SYS_rt_sigprocmask, SYS_rt_sigreturn,
-        SYS_sigaltstack, SYS_restart_syscall, SYS_exit, SYS_exit_group,
+       {SCMP_SYS(read), SCMP_SYS(pread64), SCMP_SYS(readv), SCMP_SYS(preadv), SCMP_SYS(lseek),
+        SCMP_SYS(fstat), SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(brk), SCMP_SYS(madvise),
+        SCMP_SYS(futex), SCMP_SYS(clock_gettime), SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep),
+        SCMP_SYS(gettimeofday), SCMP_SYS(getrandom), SCMP_SYS(rt_sigaction),
+        SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
+        SCMP_SYS(restart_syscall), SCMP_SYS(exit), SCMP_SYS(exit_group),
 #ifdef WINDSPLAT_SANITIZED
         // By a pipe the sanitizers find out whether memory can be read.
-        SYS_pipe2,
-#ifdef SYS_pipe
-        SYS_pipe,
+        SCMP_SYS(pipe2), SCMP_SYS(pipe),
 #endif
-#endif
-        SYS_sendmsg, SYS_recvmsg, SYS_ppoll, SYS_write, SYS_writev, SYS_close, SYS_dup, SYS_getpid,
-        SYS_gettid, SYS_sched_yield, SYS_sched_getaffinity, SYS_sysinfo, SYS_getrusage,
-        SYS_fadvise64,
-#ifdef __x86_64__
-        SYS_poll, SYS_time
-#endif
-       }) {
-    filter.allow(call);
+        SCMP_SYS(sendmsg), SCMP_SYS(recvmsg), SCMP_SYS(ppoll), SCMP_SYS(poll), SCMP_SYS(write),
+        SCMP_SYS(writev), SCMP_SYS(close), SCMP_SYS(dup), SCMP_SYS(getpid), SCMP_SYS(gettid),
+        SCMP_SYS(sched_yield), SCMP_SYS(sched_getaffinity), SCMP_SYS(sysinfo), SCMP_SYS(getrusage),
+        SCMP_SYS(fadvise64), SCMP_SYS(time)}) {
+    filter.add(SCMP_ACT_ALLOW, call);
   }
-  for (const int call : calls_by_name()) filter.hand_over(call);
-  filter.allow_mappings();
-  filter.allow_unless_masked(SYS_mprotect, 2, PROT_EXEC, PROT_EXEC);
-  filter.allow_if_any(SYS_fcntl, 1, {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL});
+  for (const int call : calls_by_name()) filter.add(SCMP_ACT_TRAP, call);
+  // A mapping: never code, and no memory that no limit counts: what is shared without a file, and
+  // what grows by itself.
+  for (const int kind : {0, MAP_SHARED, MAP_ANONYMOUS}) {
+    filter.add(
+        SCMP_ACT_ALLOW, SCMP_SYS(mmap),
+        {has_bits(2, PROT_EXEC, 0), has_bits(3, MAP_SHARED | MAP_ANONYMOUS | MAP_GROWSDOWN, kind)});
+  }
+  filter.add(SCMP_ACT_ALLOW, SCMP_SYS(mprotect), {has_bits(2, PROT_EXEC, 0)});
+  for (const int command : {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL}) {
+    filter.add(SCMP_ACT_ALLOW, SCMP_SYS(fcntl), {equals(1, command)});
+  }
   // What abort() sends to itself.
-  filter.allow_if_any(SYS_tgkill, 0, {static_cast<std::uint32_t>(::getpid())});
-  filter.refuse(SYS_ioctl, ENOTTY);
-  filter.refuse(SYS_flock, ENOSYS);
+  filter.add(SCMP_ACT_ALLOW, SCMP_SYS(tgkill), {equals(0, ::getpid())});
+  filter.add(SCMP_ACT_ERRNO(ENOTTY), SCMP_SYS(ioctl));
+  filter.add(SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(flock));
   return filter.install();
 }
 
@@ -226,7 +185,10 @@ Result<void> confine(Confinement how) {
   if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) return not_confined("privileges");
   if (auto done = drop_capabilities(); !done) return done;
   forbid_paths();
-  if (!forbid_calls()) return not_confined("seccomp");
+  if (const int fault = forbid_calls(); fault != 0) {
+    errno = -fault;
+    return not_confined("seccomp");
+  }
   return {};
 }
 

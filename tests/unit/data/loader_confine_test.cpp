@@ -243,5 +243,26 @@ TEST(LoaderConfinement, nothing_but_reading_and_computing_is_left) {
   }
 }
 
+#ifdef __x86_64__
+// What x32 numbers its own way no rule speaks of.
+TEST(LoaderConfinement, a_call_of_another_abi_ends_the_process) {
+  constexpr long x32 = 0x40000000;
+  std::fflush(nullptr);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    Confinement how;
+    how.memory_bytes = std::uint64_t{256} << 20;
+    how.files = 64;
+    if (!confine(how)) ::_exit(2);
+    ::syscall(x32 | SYS_getpid);
+    ::_exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status)) << status;
+  EXPECT_EQ(WTERMSIG(status), SIGSYS);
+}
+#endif
+
 }  // namespace
 }  // namespace windsplat::data::loader
