@@ -5,11 +5,8 @@ import { mkdir, readdir, readFile, rm, writeFile } from "node:fs/promises";
 import { createHash } from "node:crypto";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
-import { gzipAsync } from "@gfx/zopfli";
+import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
-import { minify } from "terser";
-import { leanScript, leanStyle } from "./lean_gui.mjs";
-import { withMarkedPrivates } from "./private_names.mjs";
 import { generateTypes } from "./types.mjs";
 
 const web = join(dirname(fileURLToPath(import.meta.url)), "..");
@@ -20,28 +17,19 @@ function option(name, fallback) {
   return at < 0 ? fallback : process.argv[at + 1];
 }
 
-const leanGui = {
-  name: "lean-gui",
+// lil-gui's icon font is a data: address, which the content policy forbids, and browsers check that
+// address even where no text uses the font. src/panel.css draws the icons with the page's fonts.
+const withoutIconFont = {
+  name: "without-icon-font",
   setup(setup) {
-    const lean = (filter, loader, make) =>
-      setup.onLoad({ filter }, async ({ path }) => ({
-        contents: make(await readFile(path, "utf8"), path),
-        loader,
-      }));
-    lean(/lil-gui\.esm\.js$/, "js", leanScript);
-    lean(/lil-gui\.css$/, "css", leanStyle);
-  },
-};
-
-// The sources with private names marked, for the bundler to shorten.
-const shortPrivates = {
-  name: "short-privates",
-  setup(setup) {
-    let texts;
-    setup.onLoad({ filter: /\/src\/[^/]+\.ts$/ }, ({ path }) => {
-      texts ??= withMarkedPrivates(join(web, "src/main.ts"));
-      return { contents: texts.get(path), loader: "js" };
-    });
+    setup.onResolve({ filter: /^data:application\/font-woff2/ }, () => ({
+      path: "icon-font",
+      namespace: "empty",
+    }));
+    setup.onLoad({ filter: /^icon-font$/, namespace: "empty" }, () => ({
+      contents: "",
+      loader: "empty",
+    }));
   },
 };
 
@@ -56,32 +44,10 @@ async function bundle(entry) {
     legalComments: "none",
     logLevel: "warning",
     outdir: "out",
-    mangleProps: /^[_$][a-z]/i, // the names marked so, and what lil-gui calls its own parts
-    plugins: [leanGui, shortPrivates],
+    plugins: [withoutIconFont],
   });
   return Buffer.from(result.outputFiles[0].contents);
 }
-
-// The bundler's own minifier leaves some per cent that a second look finds. What that one would put
-// in another's place, or turn round, only looks shorter: packed it is longer.
-async function script(entry) {
-  const bundled = (await bundle(entry)).toString();
-  const { code } = await minify(bundled, {
-    module: true,
-    ecma: 2020,
-    compress: {
-      unsafe_arrows: true,
-      passes: 2,
-      inline: 1,
-      reduce_funcs: false,
-      lhs_constants: false,
-    },
-  });
-  return Buffer.from(code);
-}
-
-// Gzip as small as it gets; the same bytes for the same content.
-const pack = async (content) => Buffer.from(await gzipAsync(content, { numiterations: 60 }));
 
 function hashed(stem, extension, content) {
   const hash = createHash("sha256").update(content).digest("hex").slice(0, 10);
@@ -91,7 +57,7 @@ function hashed(stem, extension, content) {
 async function main() {
   const outdir = resolve(option("--outdir", join(web, "dist")));
   await generateTypes();
-  const program = await script("src/main.ts");
+  const program = await bundle("src/main.ts");
   const style = await bundle("src/bundle.css");
   const icon = await readFile(join(web, "src/icon.svg"));
   const names = {
@@ -113,7 +79,7 @@ async function main() {
   let total = 0;
   for (const [name, content] of files) {
     await writeFile(join(outdir, name), content);
-    const packed = await pack(content);
+    const packed = gzipSync(content, { level: 9 });
     await writeFile(join(outdir, `${name}.gz`), packed);
     total += packed.length;
     if (!process.argv.includes("--quiet")) {

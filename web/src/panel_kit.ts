@@ -97,7 +97,7 @@ class ColorBox extends Controller {
   private readonly input = make("input");
 
   constructor(folder: GUI, model: { value: string }, key: "value") {
-    super(folder, model, key, "lil-color");
+    super(folder, model, key, "color-box");
     this.input.type = "color";
     this.input.setAttribute("aria-labelledby", this.$name.id);
     this.input.addEventListener("input", () => this.setValue(this.input.value));

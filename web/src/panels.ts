@@ -57,7 +57,11 @@ export class Panels {
 
   build(): void {
     this.gui?.destroy();
-    const gui = new GUI({ container: this.container, title: "View" });
+    const gui = new GUI({
+      container: this.container,
+      title: "View",
+      injectStyles: false, // they are part of the style sheet
+    });
     const kit = new PanelKit(this.host, this.rangeModes);
     this.gui = gui;
     this.kit = kit;
