@@ -7,6 +7,7 @@ import unittest
 import check_includes
 import check_links
 import check_style
+import check_web_imports
 
 CLEAN = {
     "server/base/error.hpp": "#pragma once\n#include <string>\n",
@@ -21,6 +22,10 @@ CLEAN = {
     "protocol/codec_view.cpp": "#include <nlohmann/json.hpp>\n",
     "tests/CMakeLists.txt": "windsplat_test(unit_base unit/base unit windsplat_base)\n",
     "tests/unit/base/error_test.cpp": "TEST(Error, says_why) {\n}\n",
+    "web/src/base/text.ts": "export const text = 1;\n",
+    "web/src/wire/api.ts": 'import type { View } from "../../generated/view";\n',
+    "web/src/app/app.ts": 'import {\n  api,\n} from "../wire/api";\nimport "../base/text";\n',
+    "web/src/styles/base.css": "p {}\n",
     "README.md": "Reads /usr/share and /tmp; see https://example.org/home/here.\n",
 }
 
@@ -47,6 +52,29 @@ class Planted(unittest.TestCase):
     def test_clean_tree_passes(self):
         self.expect(check_includes)
         self.expect(check_style)
+        self.expect(check_web_imports)
+
+    def test_import_against_the_order_of_the_page_s_folders(self):
+        self.plant("web/src/base/dom.ts", '\nexport { api } from "../wire/api";\n')
+        self.expect(check_web_imports, "base/dom.ts:2: base may not import web/src/wire/api")
+
+    def test_circle_of_imports(self):
+        self.plant("web/src/view/a.ts", 'import type { B } from "./b";\n')
+        self.plant("web/src/view/b.ts", 'import { c } from "./c";\n')
+        self.plant("web/src/view/c.ts", 'const a = await import("./a");\n')
+        self.expect(check_web_imports, "view/a -> web/src/view/b -> web/src/view/c -> web/src/view")
+
+    def test_place_of_the_page_s_files(self):
+        self.plant("web/src/main.ts", "\n")
+        self.plant("web/src/extra/a.ts", "\n")
+        self.plant("web/src/save/a.ts", 'import { run } from "../../scripts/build";\n')
+        self.expect(check_web_imports, "main.ts: belongs in a folder", "extra/a.ts: no rule",
+                    "web/scripts/build is no file of the page")
+
+    def test_folder_of_the_page_with_many_files(self):
+        for n in range(check_web_imports.MAX_FILES):
+            self.plant(f"web/src/base/f{n}.ts", "\n")
+        self.expect(check_web_imports, "web/src/base: 31 files")
 
     def test_include_against_the_direction(self):
         self.plant("server/base/pool.hpp", '#include "server/scene/scene.hpp"\n')

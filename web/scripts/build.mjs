@@ -18,7 +18,7 @@ function option(name, fallback) {
 }
 
 // lil-gui's icon font is a data: address, which the content policy forbids, and browsers check that
-// address even where no text uses the font. src/panel.css draws the icons with the page's fonts.
+// address even if no text uses the font. src/styles/panel.css draws the icons in the page's fonts.
 const withoutIconFont = {
   name: "without-icon-font",
   setup(setup) {
@@ -57,9 +57,9 @@ function hashed(stem, extension, content) {
 async function main() {
   const outdir = resolve(option("--outdir", join(web, "dist")));
   await generateTypes();
-  const program = await bundle("src/main.ts");
-  const style = await bundle("src/bundle.css");
-  const icon = await readFile(join(web, "src/icon.svg"));
+  const program = await bundle("src/app/main.ts");
+  const style = await bundle("src/styles/bundle.css");
+  const icon = await readFile(join(web, "src/styles/icon.svg"));
   const names = {
     SCRIPT: hashed("app", "js", program),
     STYLE: hashed("app", "css", style),

@@ -2,10 +2,10 @@
 // keeps, and what Share copies. The server and the browser are played.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Address } from "../src/address";
-import { hashOfView } from "../src/link";
-import type { View } from "../src/protocol";
-import type { Status } from "../src/status";
+import { Address } from "../src/app/address";
+import { hashOfView } from "../src/view/link";
+import type { View } from "../src/wire/protocol";
+import type { Status } from "../src/app/status";
 
 class Visit {
   view: View = { image: { width: 8, height: 6 } };

@@ -6,7 +6,6 @@ import {
   cameraFrame,
   degree,
   distanceOf,
-  dot,
   frameBox,
   heightAtTarget,
   lookFrom,
@@ -14,14 +13,13 @@ import {
   orbitFrame,
   pan,
   scaledBox,
-  subtract,
   withProjection,
   zoom,
   type Box,
   type Camera,
-  type Vec3,
-} from "../src/camera";
-import { gizmoArms } from "../src/gizmo";
+} from "../src/view/camera";
+import { dot, subtract, type Vec3 } from "../src/base/vec3";
+import { gizmoArms } from "../src/viewport/gizmo";
 
 const near = (a: number, b: number, message = ""): void =>
   assert.ok(Math.abs(a - b) < 1e-9 * Math.max(1, Math.abs(b)), `${a} is not ${b} ${message}`);

@@ -10,8 +10,8 @@ import {
   type ConnectionState,
   type MessageLike,
   type SocketLike,
-} from "../src/connection";
-import type { Frame, HelloMessage, ServerMessage } from "../src/protocol";
+} from "../src/wire/connection";
+import type { Frame, HelloMessage, ServerMessage } from "../src/wire/protocol";
 
 class FakeSocket implements SocketLike {
   binaryType = "blob";

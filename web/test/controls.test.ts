@@ -15,11 +15,11 @@ import {
   sliceOptions,
   slicePatch,
   sliceText,
-} from "../src/controls";
-import { methodText, workLines } from "../src/frame_words";
-import { legendEntries, sampleHeights } from "../src/legend_entries";
-import type { ChosenMessage, Dataset, Field, View } from "../src/protocol";
-import { compassTicks } from "../src/ticks";
+} from "../src/panels/controls";
+import { methodText, workLines } from "../src/viewport/frame_text";
+import { legendEntries, sampleHeights } from "../src/view/legend_entries";
+import type { ChosenMessage, Dataset, Field, View } from "../src/wire/protocol";
+import { compassTicks } from "../src/base/ticks";
 
 const axis = (name: string, kind: Dataset["axes"]["x"]["kind"], coordinates: number[]) => ({
   name,

@@ -2,9 +2,9 @@
 // page says and shows for messages that are made up here.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { bestDataset, pickerEntries, withState } from "../src/dataset_list";
-import type { View } from "../src/protocol";
-import { mergeView } from "../src/view_state";
+import { bestDataset, pickerEntries, withState } from "../src/app/dataset_list";
+import type { View } from "../src/wire/protocol";
+import { mergeView } from "../src/view/view_state";
 import { described, Page, problem, summaryOf } from "./page";
 
 const tooBig =

@@ -9,7 +9,7 @@ import { join } from "node:path";
 import { getEventListeners } from "node:events";
 import { test } from "node:test";
 import { deflateSync } from "node:zlib";
-import { anglesOf, distanceOf, type Camera } from "../src/camera";
+import { anglesOf, distanceOf, type Camera } from "../src/view/camera";
 import {
   exportSize,
   frameCount,
@@ -17,17 +17,17 @@ import {
   pictureView,
   progressText,
   type Animation,
-} from "../src/export_views";
-import { drawFrame, inOrder, waitFor, type FetchLike } from "../src/frame_request";
-import { KeptViews, keptMax } from "../src/kept_views";
-import { placeCards } from "../src/legend_picture";
-import { hashOfView, viewOfHash } from "../src/link";
-import type { LegendEntry } from "../src/legend_entries";
-import { crc32, textOf, utf8, withTexts, type Bytes } from "../src/png_text";
-import type { View } from "../src/protocol";
-import { parseView } from "../src/saved_picture";
-import { linkMax, loadView, savedHash, savedId, saveView } from "../src/saved_link";
-import { Zip } from "../src/zip";
+} from "../src/save/export_views";
+import { drawFrame, inOrder, waitFor, type FetchLike } from "../src/wire/frame_request";
+import { KeptViews, keptMax } from "../src/save/saved_views";
+import { placeCards } from "../src/save/legend_picture";
+import { hashOfView, viewOfHash } from "../src/view/link";
+import type { LegendEntry } from "../src/view/legend_entries";
+import { crc32, textOf, utf8, withTexts, type Bytes } from "../src/save/png_text";
+import type { View } from "../src/wire/protocol";
+import { parseView } from "../src/save/saved_picture";
+import { linkMax, loadView, savedHash, savedId, saveView } from "../src/wire/short_link";
+import { Zip } from "../src/save/zip";
 
 // --- PNG ------------------------------------------------------------------------------------
 

@@ -2,8 +2,8 @@
 // `opened` and of an `error` that nobody asked for.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { fitView, shapeOf } from "../src/fit_view";
-import type { View } from "../src/protocol";
+import { fitView, shapeOf } from "../src/view/fit_view";
+import type { View } from "../src/wire/protocol";
 import { described, Page, problem } from "./page";
 
 const gone = 'dataset "storm" has steps 0 to 2';

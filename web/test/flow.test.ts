@@ -1,7 +1,7 @@
 // The flow of the lines: its pace, what it waits for, and what ends it.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Flow, flowFps, laterTime } from "../src/flow";
+import { Flow, flowFps, laterTime } from "../src/view/flow";
 
 // A page whose clock stands still until it is moved.
 class Page {

@@ -9,8 +9,8 @@ import {
   placeOn,
   pointText,
   valueOn,
-  type ForecastPoint,
-} from "../src/forecast";
+} from "../src/panels/forecast";
+import type { ForecastPoint } from "../src/wire/api";
 
 test("an axis holds what it shall, leaves out what has no logarithm, and is wide enough", () => {
   const axis = axisOver([0, Number.NaN, 5, 200], 30);

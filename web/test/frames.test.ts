@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { errorMetric, toggleErrorMetric } from "../src/error_text";
+import { errorMetric, toggleErrorMetric } from "../src/base/error_text";
 import {
   encodingWords,
   errorWords,
@@ -11,9 +11,9 @@ import {
   frameState,
   networkMs,
   scaleText,
-} from "../src/frame_words";
-import { parseFrameHeader, type FrameHeader } from "../src/protocol";
-import { placeOn } from "../src/viewport";
+} from "../src/viewport/frame_text";
+import { parseFrameHeader, type FrameHeader } from "../src/wire/protocol";
+import { placeOn } from "../src/viewport/viewport";
 
 interface Change {
   flags?: number;

@@ -2,7 +2,7 @@
 // that another hand ends, and what is asked about the value under the cursor, and when.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { Probe } from "../src/api";
+import type { Probe } from "../src/wire/api";
 import {
   anglesOf,
   between,
@@ -16,13 +16,13 @@ import {
   rollOf,
   withProjection,
   type Camera,
-  type Vec3,
-} from "../src/camera";
-import { Hover, type Place } from "../src/hover";
-import { MoveQueue, twist, wheelZoom } from "../src/input";
-import { hoverLines } from "../src/place";
-import type { Dataset, View } from "../src/protocol";
-import { Turn } from "../src/turn";
+} from "../src/view/camera";
+import type { Vec3 } from "../src/base/vec3";
+import { Hover, type Place } from "../src/viewport/hover";
+import { MoveQueue, twist, wheelZoom } from "../src/viewport/input";
+import { hoverLines } from "../src/view/sample_position";
+import type { Dataset, View } from "../src/wire/protocol";
+import { Turn } from "../src/viewport/camera_turn";
 
 const near = (a: number, b: number, slack = 1e-9): void =>
   assert.ok(Math.abs(a - b) <= slack * Math.max(1, Math.abs(b)), `${a} is not ${b}`);

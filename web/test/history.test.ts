@@ -1,9 +1,9 @@
 // Undo and redo: what is one entry, what is none, and that each way leads back.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { differences, ViewHistory } from "../src/history";
-import type { View } from "../src/protocol";
-import { mergeView } from "../src/view_state";
+import { differences, ViewHistory } from "../src/view/history";
+import type { View } from "../src/wire/protocol";
+import { mergeView } from "../src/view/view_state";
 
 // A user at a view, with a clock that is set by hand.
 class Desk {

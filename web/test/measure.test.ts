@@ -3,9 +3,10 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { Ajv2020 } from "ajv/dist/2020.js";
-import { Api, type Answer, type Histogram } from "../src/api";
-import { pointInPlane, project, type Camera, type Vec3 } from "../src/camera";
-import { barPath, clipRange, neat, quantile, RangeDrag, valueAt } from "../src/histogram";
+import { Api, type Answer, type Histogram } from "../src/wire/api";
+import { pointInPlane, project, type Camera } from "../src/view/camera";
+import type { Vec3 } from "../src/base/vec3";
+import { barPath, clipRange, neat, quantile, RangeDrag, valueAt } from "../src/panels/histogram";
 import {
   coordinatesOf,
   magnitude,
@@ -14,9 +15,9 @@ import {
   sampleAt,
   valueText,
   worldOf,
-} from "../src/place";
-import type { Dataset, View } from "../src/protocol";
-import { courseEnds, courseOf } from "../src/series_plot";
+} from "../src/view/sample_position";
+import type { Dataset, View } from "../src/wire/protocol";
+import { courseEnds, courseOf } from "../src/panels/series_plot";
 
 const histogram = (counts: number[], change: Partial<Histogram> = {}): Histogram => ({
   range: [0, counts.length],

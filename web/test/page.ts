@@ -1,11 +1,17 @@
 // The app with parts that keep what they are told, in a document of stand-ins: what it says to the
 // server and shows, for messages that a test makes up. No browser, no server.
-import { App, type AppParts } from "../src/app";
-import { DatasetList } from "../src/dataset_list";
-import type { ClientMessage, Dataset, DatasetSummary, ServerMessage, View } from "../src/protocol";
-import { Status } from "../src/status";
-import { TimeBar } from "../src/time_bar";
-import type { DrawnFrame } from "../src/viewport";
+import { App, type AppParts } from "../src/app/app";
+import { DatasetList } from "../src/app/dataset_list";
+import type {
+  ClientMessage,
+  Dataset,
+  DatasetSummary,
+  ServerMessage,
+  View,
+} from "../src/wire/protocol";
+import { Status } from "../src/app/status";
+import { TimeBar } from "../src/app/time_bar";
+import type { DrawnFrame } from "../src/viewport/viewport";
 
 class Element {
   dataset: Record<string, string> = {};

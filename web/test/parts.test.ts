@@ -2,9 +2,9 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { gesture, MoveQueue } from "../src/input";
-import { legendEntries, sampleHeights, unitText } from "../src/legend_entries";
-import { hashOfView, viewOfHash } from "../src/link";
+import { gesture, MoveQueue } from "../src/viewport/input";
+import { legendEntries, sampleHeights, unitText } from "../src/view/legend_entries";
+import { hashOfView, viewOfHash } from "../src/view/link";
 import {
   densityOf,
   followMedia,
@@ -14,14 +14,14 @@ import {
   withDensity,
   type Curve,
   type Layer,
-} from "../src/media";
-import { patchAt, valueAt } from "../src/panel_kit";
-import type { Dataset, View } from "../src/protocol";
-import { problemText } from "../src/status";
-import { axisTicks, formatBytes, formatNumber, linearTicks, niceTicks } from "../src/ticks";
-import { readableTime } from "../src/time_bar";
-import { pictureSize } from "../src/viewport";
-import type { Camera } from "../src/camera";
+} from "../src/panels/media";
+import { patchAt, valueAt } from "../src/panels/panel_kit";
+import type { Dataset, View } from "../src/wire/protocol";
+import { problemText } from "../src/wire/requests";
+import { axisTicks, formatBytes, formatNumber, linearTicks, niceTicks } from "../src/base/ticks";
+import { readableTime } from "../src/base/time_text";
+import { pictureSize } from "../src/viewport/viewport";
+import type { Camera } from "../src/view/camera";
 
 const dataset: Dataset = {
   id: "gcm",
@@ -493,7 +493,7 @@ test("the page keeps a strict policy for content and any base path", () => {
   for (const [, , address] of page.matchAll(/\b(src|href)="([^"]*)"/g)) {
     assert.match(address!, /^%[A-Z]+%$/, "relative, hashed names only");
   }
-  for (const sheet of ["base", "stage", "panel", "small"]) {
-    assert.doesNotMatch(readFileSync(`src/${sheet}.css`, "utf8"), /url\(|@import/);
+  for (const sheet of ["base", "stage", "panel", "responsive"]) {
+    assert.doesNotMatch(readFileSync(`src/styles/${sheet}.css`, "utf8"), /url\(|@import/);
   }
 });

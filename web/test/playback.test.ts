@@ -2,10 +2,10 @@
 // on their pace; and the media of a view completed by what was drawn.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { paceText, stepsText } from "../src/frame_words";
-import { Playback } from "../src/playback";
-import type { ClientMessage, StatsMessage } from "../src/protocol";
-import { completeView } from "../src/view_state";
+import { paceText, stepsText } from "../src/viewport/frame_text";
+import { Playback } from "../src/app/playback";
+import type { ClientMessage, StatsMessage } from "../src/wire/protocol";
+import { completeView } from "../src/view/view_state";
 
 class Page {
   sent: ClientMessage[] = [];

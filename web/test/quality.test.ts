@@ -2,9 +2,9 @@
 // the user's, and what the user takes back is gone at once.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { controlStates, hasErrorLimit, qualityHint } from "../src/controls";
-import { hashOfView, viewOfHash } from "../src/link";
-import type { View } from "../src/protocol";
+import { controlStates, hasErrorLimit, qualityHint } from "../src/panels/controls";
+import { hashOfView, viewOfHash } from "../src/view/link";
+import type { View } from "../src/wire/protocol";
 import { described, Page } from "./page";
 
 function shown(): Page {

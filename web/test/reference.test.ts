@@ -1,9 +1,9 @@
 // The reference's course: what is asked of the server and said, for answers that a test makes up.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { errorMetric } from "../src/error_text";
-import type { View } from "../src/protocol";
-import { progressText, Reference, referenceView, type Job } from "../src/reference";
+import { errorMetric } from "../src/base/error_text";
+import type { View } from "../src/wire/protocol";
+import { progressText, Reference, referenceView, type Job } from "../src/viewport/reference";
 
 const job = (change: Partial<Job>): Job => ({
   id: "7",

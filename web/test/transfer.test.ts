@@ -1,11 +1,11 @@
 // The opacity curve's editor and the colours' range, as numbers.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { Range } from "../src/api";
-import type { Curve } from "../src/media";
-import { RangeFollower, type RangeMode, type RangeSource } from "../src/range_choice";
-import type { View } from "../src/protocol";
-import { Undoing } from "../src/undoing";
+import type { Range } from "../src/wire/api";
+import type { Curve } from "../src/panels/media";
+import { RangeFollower, type RangeMode, type RangeSource } from "../src/panels/range_choice";
+import type { View } from "../src/wire/protocol";
+import { Undoing } from "../src/app/undo_control";
 import {
   addPoint,
   curvePath,
@@ -20,7 +20,7 @@ import {
   roomyTop,
   shareOf,
   shownPoint,
-} from "../src/transfer";
+} from "../src/panels/transfer";
 
 const ramp: Curve = [
   [0, 0],

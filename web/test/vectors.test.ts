@@ -12,7 +12,7 @@ import {
   parseServerMessage,
   WireError,
   type ClientMessage,
-} from "../src/protocol";
+} from "../src/wire/protocol";
 
 interface Case {
   kind: string;

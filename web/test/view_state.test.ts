@@ -1,8 +1,8 @@
 // Merge patches, and the fate of patches that are accepted, refused or replaced.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { View } from "../src/protocol";
-import { mergePatch, mergeView, ViewState, withDefaults, type Patch } from "../src/view_state";
+import type { View } from "../src/wire/protocol";
+import { mergePatch, mergeView, ViewState, withDefaults, type Patch } from "../src/view/view_state";
 
 test("merge patches do what RFC 7396 says", () => {
   const rows: [unknown, unknown, unknown][] = [

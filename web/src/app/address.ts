@@ -1,0 +1,122 @@
+// The page's address as the view's memory: view -> `#!{...}` a little later, and back. If a view is
+// too long for a link, the server keeps a copy and `#!view=ID` goes to the clipboard; the page's
+// address always holds the whole view, so that it outlives the server.
+import { failureText } from "../wire/api";
+import { debounced } from "../base/dom";
+import type { FetchLike } from "../wire/frame_request";
+import { hashOfView, viewOfHash, withoutSize } from "../view/link";
+import type { View } from "../wire/protocol";
+import { linkMax, loadView, savedHash, savedId, saveView } from "../wire/short_link";
+import type { Status } from "./status";
+
+export interface AddressHost {
+  document(): View; // as the user said it
+  runs(): boolean; // the view moves by itself: the address waits until it rests
+  restore(view: View): void; // the user has gone to another address
+}
+
+const delayMs = 400;
+const deadlineMs = 10_000; // of a kept view: then the page goes on without it
+const request: FetchLike = (url, options) => fetch(url, options);
+
+export class Address {
+  readonly save = debounced(() => this.write(), delayMs);
+  private reads = 0;
+  // The address stays as it is while its view is on the way, and after a failure too, so that a
+  // reload tries again, until the user changes something.
+  private link: "loading" | "lost" | "followed" = "loading";
+
+  constructor(
+    private readonly host: AddressHost,
+    private readonly status: Status,
+    private readonly baseUri: string,
+  ) {
+    window.addEventListener("hashchange", () =>
+      this.read((view) => {
+        if (view !== null) host.restore(view);
+      }),
+    );
+  }
+
+  // Tells the view of the link that the page was opened with, at once unless the server has to be
+  // asked for it; null: it holds none.
+  first(begin: (view: View | null) => void): void {
+    if (window.location.hash.length > 1) {
+      this.read(begin);
+    } else {
+      this.link = "followed";
+      begin(null);
+    }
+  }
+
+  // The user has changed the view.
+  edited(): void {
+    if (this.link === "lost") this.link = "followed";
+  }
+
+  async copy(): Promise<void> {
+    this.write();
+    const [link, words] = await this.linkOf(withoutSize(this.host.document()));
+    try {
+      await navigator.clipboard.writeText(link);
+      this.status.note(`link copied${words}`);
+    } catch {
+      window.history.replaceState(null, "", link);
+      this.status.note(`the address bar holds the link${words}`);
+    }
+  }
+
+  // The link, and what there is to say of it.
+  private async linkOf(view: View): Promise<[link: string, words: string]> {
+    const linkTo = (hash: string): string => new URL(hash, window.location.href).href;
+    const href = linkTo(hashOfView(view));
+    if (href.length <= linkMax) return [href, ""];
+    try {
+      const { id, kept } = await saveView(request, this.baseUri, view);
+      const words = kept === "memory" ? "; it lasts until the server ends" : "";
+      return [linkTo(savedHash(id)), words];
+    } catch (failure) {
+      return [href, `, a long one: ${failureText(failure)}`];
+    }
+  }
+
+  private read(tell: (view: View | null) => void): void {
+    const { hash } = window.location;
+    const id = savedId(hash);
+    this.reads += 1;
+    if (id !== null) {
+      this.link = "loading";
+      void this.load(id, tell, this.reads);
+      return;
+    }
+    this.link = "followed";
+    const view = viewOfHash(hash);
+    if (view === null) this.status.error("link", "This link holds no view that can be read.");
+    tell(view);
+  }
+
+  private async load(id: string, tell: (view: View | null) => void, read: number): Promise<void> {
+    const signal = AbortSignal.timeout(deadlineMs);
+    const within: FetchLike = (url, options) => fetch(url, { ...options, signal });
+    let view: View | null = null;
+    let why = "";
+    try {
+      view = withoutSize((await loadView(within, this.baseUri, id)).view);
+    } catch (failure) {
+      why = signal.aborted ? "The server did not answer in time." : failureText(failure);
+    }
+    if (read === this.reads) {
+      this.link = view === null ? "lost" : "followed";
+      if (view === null) this.status.error("link", `The link's view: ${why}`);
+    } else {
+      view = null; // the user has gone to another address meanwhile
+    }
+    tell(view);
+  }
+
+  private write(): void {
+    if (this.link !== "followed" || this.host.runs()) return;
+    const hash = hashOfView(this.host.document());
+    if (window.location.hash !== hash) window.history.replaceState(null, "", hash);
+  }
+}

@@ -1,0 +1,494 @@
+// The page's one mind: what the user does -> view document -> patches out; messages and frames in
+// -> picture, legend, panels, time bar and words. Parts do not know each other, only this does.
+import { Address } from "./address";
+import { Answers } from "./patch_answers";
+import { Api } from "../wire/api";
+import { anglesOf, distanceOf, rollOf } from "../view/camera";
+import { CameraControl } from "../view/camera_control";
+import type { Cards } from "./dataset_cards";
+import { ColorMaps } from "../wire/color_maps";
+import {
+  Connection,
+  streamUrl,
+  type Clock,
+  type ConnectionState,
+  type SocketLike,
+} from "../wire/connection";
+import type { DatasetList } from "./dataset_list";
+import { Flow } from "../view/flow";
+import { scaleText, type FrameState } from "../viewport/frame_text";
+import { loadHelpTexts } from "../panels/help_texts";
+import type { Gizmo } from "../viewport/gizmo";
+import type { HoverView } from "../viewport/hover_view";
+import type { Hud } from "../viewport/hud";
+import type { Legend } from "../viewport/legend";
+import { legendEntries } from "../view/legend_entries";
+import { Opening } from "./dataset_opener";
+import type { Panels } from "../panels/panels";
+import { Playback } from "./playback";
+import {
+  type Dataset,
+  type ErrorMessage,
+  type HelloMessage,
+  type ServerMessage,
+  type View,
+} from "../wire/protocol";
+import type { Probe } from "../viewport/probe";
+import { problemText } from "../wire/requests";
+import type { Status } from "./status";
+import type { TimeBar } from "./time_bar";
+import { Undoing } from "./undo_control";
+import { ViewModel } from "../view/view_model";
+import type { Outgoing, Patch } from "../view/view_state";
+import type { DrawnFrame, Viewport } from "../viewport/viewport";
+
+export interface AppParts {
+  viewport: Viewport;
+  hud: Hud;
+  legend: Legend;
+  gizmo: Gizmo;
+  panels: Panels;
+  timeBar: TimeBar;
+  status: Status;
+  picker: HTMLSelectElement;
+  probe: Probe;
+  hover: HoverView;
+  list: DatasetList;
+  cards: Pick<Cards, "show">;
+  facts: HTMLElement; // dims and steps of the dataset
+}
+
+const presenceMs = 60_000;
+
+export class App {
+  readonly maps = new ColorMaps();
+  readonly api: Api;
+  readonly cameras: CameraControl;
+  readonly playback: Playback;
+  readonly undoing: Undoing;
+  private readonly model = new ViewModel();
+  private readonly answers = new Answers(this.model.state);
+  private readonly connection: Connection;
+  private readonly flowing: Flow;
+  private parts!: AppParts;
+  private opening!: Opening;
+  private address!: Address;
+
+  constructor(
+    clock: Clock,
+    private readonly baseUri: string,
+  ) {
+    this.api = new Api(baseUri, (url, init) => fetch(url, init));
+    this.cameras = new CameraControl(this.model, {
+      change: (patch) => this.change(patch),
+      size: () => this.parts.viewport.size(),
+      ready: () => this.connection.ready,
+    });
+    this.connection = new Connection(
+      streamUrl(baseUri),
+      // A socket's handlers may ask for less than what the browser hands them.
+      (url, protocol) => new WebSocket(url, protocol) as unknown as SocketLike,
+      clock,
+      {
+        state: (state) => this.onState(state),
+        hello: (hello) => this.onHello(hello),
+        message: (message) => this.onMessage(message),
+        frame: (frame) => {
+          // A frame that cannot be shown still gives its credit back.
+          this.parts.viewport.show(frame).catch(() => this.onBroken(frame.header.seq));
+        },
+      },
+    );
+    this.undoing = new Undoing({
+      document: () => this.model.state.document,
+      busy: () => this.model.open === null || this.opening.waiting,
+      show: (view) => {
+        if (view.step !== this.model.state.document.step) this.playback.pause();
+        this.restore(view);
+      },
+      edited: () => this.address.edited(),
+      say: (text) => this.parts.status.note(text),
+    });
+    this.playback = new Playback({
+      send: (message) => this.connection.send(message),
+      settings: () => this.parts.timeBar,
+      seek: (step) => this.seek(step),
+      changed: () => {
+        this.showTime();
+        this.address.save();
+      },
+    });
+    this.flowing = new Flow({
+      now: () => performance.now(),
+      setTimeout: clock.setTimeout,
+      clearTimeout: clock.clearTimeout,
+      hidden: () => document.hidden,
+      wanted: () => this.linesMove(),
+      time: () => this.view().vector?.motion?.time ?? 0,
+      send: (time) => {
+        const outgoing = this.model.state.change({ vector: { motion: { time } } });
+        this.send(outgoing);
+        return outgoing.rev;
+      },
+      ended: () => {
+        this.address.save();
+        this.refresh();
+      },
+    });
+  }
+
+  start(parts: AppParts): void {
+    this.parts = parts;
+    this.address = new Address(
+      {
+        document: () => this.model.state.document,
+        runs: () => this.playback.running || this.flowing.running,
+        restore: (view) => this.undoing.edit(() => this.restore(view)),
+      },
+      parts.status,
+      this.baseUri,
+    );
+    this.opening = this.makeOpening(parts);
+    parts.picker.addEventListener("change", () => this.open(parts.picker.value));
+    this.loadMaps();
+    this.address.first((view) => {
+      this.model.state.change(this.firstView(view ?? {}) as Patch);
+      this.connection.start();
+    });
+    window.addEventListener("online", () => this.connection.retryNow());
+    document.addEventListener("visibilitychange", () => this.tellVisibility());
+    window.setInterval(() => {
+      if (!document.hidden) this.tellVisibility();
+    }, presenceMs);
+  }
+
+  private makeOpening({ status, list, cards }: AppParts): Opening {
+    return new Opening(
+      {
+        say: (message) => void this.connection.send(message),
+        send: (outgoing) => outgoing.forEach((one) => this.send(one)),
+        firstView: (said) => this.firstView(said),
+        halt: () => {
+          this.playback.halt();
+          this.flowing.stop();
+        },
+        describe: (dataset) => this.describe(dataset),
+        opened: (anew, changed) => this.onOpened(anew, changed),
+        refresh: () => this.refresh(),
+        mark: () => this.showMark(),
+        empty: () => cards.show(),
+      },
+      this.model,
+      status,
+      list,
+    );
+  }
+
+  // --- what the user does --------------------------------------------------------------
+
+  // The view with every default that is known.
+  view(): View {
+    return this.model.view();
+  }
+
+  // As the user said it.
+  said(): View {
+    return this.model.state.document;
+  }
+
+  // The view is of the dataset that is open.
+  isOpen(): boolean {
+    return this.model.open !== null && this.model.open.id === this.said().dataset;
+  }
+
+  dataset(): Dataset {
+    return this.model.dataset();
+  }
+
+  change(patch: Patch): void {
+    this.connection.wake();
+    this.undoing.edit(() => this.send(this.model.state.change(patch)));
+    this.refresh();
+  }
+
+  open(id: string): void {
+    this.undoing.edit(() => this.opening.choose(id));
+  }
+
+  // The view that was drawn last, instead of one that takes its time.
+  cancelLoading(): void {
+    const before = this.model.state.settled;
+    if (!this.opening.cancel(before)) this.replace(before);
+  }
+
+  connectNow(): void {
+    this.connection.retryNow();
+  }
+
+  resetAll(): void {
+    this.undoing.edit(() => this.replace(this.firstView({ dataset: this.dataset().id })));
+  }
+
+  resize(width: number, height: number): void {
+    const image = this.model.state.document.image;
+    if (image?.width === width && image.height === height) return;
+    this.change({ image: { width, height } });
+  }
+
+  seek(step: number): void {
+    this.playback.pause();
+    if (step >= 0 && step !== this.view().step) this.change({ step });
+  }
+
+  // Lets the lines flow or halts them where they are.
+  flow(on: boolean): void {
+    if (on) {
+      if (!this.linesMove()) this.change({ vector: { motion: { mode: "phase" } } });
+      this.flowing.start();
+    } else {
+      this.flowing.stop();
+      this.address.save();
+    }
+    this.refresh();
+  }
+
+  isFlowing(): boolean {
+    return this.flowing.running;
+  }
+
+  copyLink(): Promise<void> {
+    return this.address.copy();
+  }
+
+  // The view of a saved picture or a kept one; what it does not say of the viewer's wishes stays.
+  openView(view: View): void {
+    const { quality } = this.said();
+    this.undoing.edit(() => this.restore(quality === undefined ? view : { quality, ...view }));
+  }
+
+  // Another view in the place of this one.
+  restore(view: View): void {
+    this.parts.status.clearError();
+    const next = this.firstView(view);
+    if (!this.opening.follow(next)) this.replace({ ...next, dataset: this.model.open?.id });
+  }
+
+  // --- the server ----------------------------------------------------------------------
+
+  private firstView(said: View): View {
+    const [width, height] = this.parts.viewport.size();
+    return { ...said, image: { ...said.image, width, height } };
+  }
+
+  private linesMove(): boolean {
+    const { vector } = this.view();
+    return vector?.field !== null && vector?.motion?.mode === "phase";
+  }
+
+  private send({ rev, patch }: Outgoing): void {
+    this.connection.send({ type: "patch", rev, t: performance.now(), patch });
+    this.address.save();
+  }
+
+  private replace(view: View): void {
+    this.flowing.stop();
+    for (const outgoing of this.model.state.replace(view)) this.send(outgoing);
+    this.refresh();
+  }
+
+  private onState(state: ConnectionState): void {
+    this.parts.status.connection(state);
+    if (state.name !== "live") this.playback.halt();
+    this.showMark();
+    if (this.model.open !== null) this.showTime();
+  }
+
+  private onHello(hello: HelloMessage): void {
+    this.parts.viewport.newSession(hello.limits.imagePixelsMax);
+    this.answers.newSession();
+    if (!this.maps.loaded) this.loadMaps();
+    if (this.opening.begin(hello.datasets)) this.tellVisibility();
+  }
+
+  private onMessage(message: ServerMessage): void {
+    switch (message.type) {
+      case "opened":
+        this.opening.onOpened(message);
+        break;
+      case "progress":
+        if (!this.opening.awaits(message.id)) break;
+        this.parts.status.progress(message.phase, message.done, message.etaMs);
+        break;
+      case "chosen":
+        this.answers.tell(message);
+        break;
+      case "unchanged":
+        this.answers.stays(message);
+        this.settleUnchanged();
+        break;
+      case "stats":
+        this.parts.hud.steps(message);
+        break;
+      case "error":
+        this.onError(message);
+        break;
+      default:
+        break;
+    }
+  }
+
+  private onOpened(anew: boolean, changed: boolean): void {
+    if (changed) {
+      if (this.dataset().steps.count > 1) this.playback.again();
+      else this.playback.pause();
+    }
+    if (anew) {
+      this.parts.panels.build();
+      // Without them the panel is as usable as before: no word of a failure.
+      loadHelpTexts(this.baseUri).catch(() => undefined);
+    }
+    this.refresh();
+    this.showLegend();
+  }
+
+  private onError(message: ErrorMessage): void {
+    const { status } = this.parts;
+    const text = problemText(message.problem);
+    if (this.opening.onError(message, text)) return;
+    if (message.rev !== undefined) {
+      status.error("view", text);
+      this.answers.refuse(message.rev);
+      this.flowing.refused(message.rev);
+      this.opening.onRefused(message.rev);
+      this.refresh();
+    } else {
+      // Of a step that new files lack the next picture is the end.
+      const ofStep = message.problem.errors?.some(({ pointer }) => pointer === "/step");
+      status.error(ofStep ? "view" : "server", text);
+    }
+  }
+
+  onDrawn(frame: DrawnFrame): void {
+    const { header } = frame;
+    const { hud, status, viewport } = this.parts;
+    if (!this.opening.waiting) status.loaded(); // what it waited for
+    const chosen = this.answers.drawn(header);
+    this.flowing.answered(header.rev);
+    if (chosen !== null) this.model.drew(chosen, header.final);
+    // Nothing newer was asked for, or time runs by itself: the step is the server's.
+    if (this.playback.running || header.rev === this.model.state.rev) this.followStep(header.step);
+    hud.show(frame, chosen, viewport.canvas.width);
+    status.clearError("frame");
+    if (this.answers.mends(header.rev)) status.clearError("view");
+    this.settleUnchanged();
+    if (this.answers.isFirst(header)) status.responded(frame.drawnAt - header.t);
+    document.documentElement.classList.add("has-picture");
+    this.refresh();
+    this.showLegend();
+  }
+
+  private settleUnchanged(): void {
+    const rev = this.answers.settleUnchanged();
+    if (rev === null) return;
+    const { canvas } = this.parts.viewport;
+    this.flowing.answered(rev);
+    canvas.dataset.rev = String(Math.max(rev, Number(canvas.dataset.rev)));
+    if (this.answers.mends(rev)) this.parts.status.clearError("view");
+    this.refresh();
+  }
+
+  // As soon as it is decoded, whether it is shown or not: another frame may come meanwhile.
+  acknowledge(seq: number, decodeMs: number): void {
+    this.connection.send({ type: "ack", seq, decodeMs });
+  }
+
+  onBroken(seq: number): void {
+    this.acknowledge(seq, 0);
+    this.parts.status.error("frame", "A frame arrived that is no picture.");
+  }
+
+  // --- showing -------------------------------------------------------------------------
+
+  private describe({ title, source, format, dims, steps, axes }: Dataset): void {
+    const { timeBar, gizmo, facts } = this.parts;
+    timeBar.setDataset(this.dataset());
+    gizmo.setGeographic(axes.x.kind === "longitude");
+    const { count } = steps;
+    const { x, y, z } = dims;
+    facts.textContent = `${x} × ${y} × ${z} · ${count} step${count === 1 ? "" : "s"}`;
+    facts.title = `${title} — ${source} (${format})`;
+    document.title = `${title} · windsplat`;
+  }
+
+  private followStep(step: number): void {
+    const before = this.view().step ?? 0;
+    const { state } = this.model;
+    if (step !== state.document.step) state.follow(step);
+    this.playback.shown(step, before);
+  }
+
+  private refresh(): void {
+    this.showMark();
+    if (this.model.open === null) return;
+    this.parts.panels.refresh();
+    this.showTime();
+    this.parts.probe.show();
+    this.parts.hover.refresh();
+    const camera = this.model.camera();
+    if (camera !== null) {
+      this.parts.gizmo.show(camera);
+      const { azimuth, elevation } = anglesOf(camera);
+      const { dataset } = this.parts.viewport.canvas;
+      dataset.azimuth = azimuth.toFixed(1);
+      dataset.elevation = elevation.toFixed(1);
+      dataset.distance = distanceOf(camera).toFixed(4);
+      dataset.roll = rollOf(camera).toFixed(1);
+    }
+  }
+
+  // What is shown is the last word or on the way to it only while nothing newer is asked for.
+  private showMark(): void {
+    const { canvas } = this.parts.viewport;
+    const { dataset } = canvas;
+    dataset.wanted = String(this.model.state.rev);
+    const rests = dataset.rev === dataset.wanted && !this.playback.running;
+    const state = rests ? (dataset.state as FrameState | undefined) : undefined;
+    const scale = scaleText(Number(dataset.width ?? canvas.width), canvas.width);
+    if (dataset.seq !== undefined && !this.connection.live) {
+      this.parts.hud.mark("offline", "");
+      return;
+    }
+    this.parts.hud.mark(state ?? "moving", scale);
+  }
+
+  private showLegend(): void {
+    const view = this.model.drawnView();
+    if (view !== null) this.parts.legend.show(legendEntries(this.dataset(), view));
+  }
+
+  private showTime(): void {
+    this.parts.timeBar.show(this.view().step ?? 0, this.playback.direction);
+  }
+
+  private loadMaps(): void {
+    this.maps.load(this.baseUri).then(
+      () => {
+        this.parts.status.clearError("maps");
+        if (this.model.open === null) return;
+        this.parts.panels.build();
+        this.refresh();
+        this.showLegend();
+      },
+      () => this.parts.status.say("the colour maps could not be loaded yet"),
+    );
+  }
+
+  // Also said now and then while the page is seen: a viewer who only looks is not idle.
+  private tellVisibility(): void {
+    if (!document.hidden) {
+      this.connection.wake();
+      this.flowing.seen();
+    }
+    this.connection.send({ type: "visibility", hidden: document.hidden });
+  }
+}

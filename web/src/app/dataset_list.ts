@@ -1,0 +1,106 @@
+// What can be opened: the server's list, and what the page has learnt of it since -> the picker's
+// entries, and which dataset to begin with.
+import type { Dataset, DatasetSummary } from "../wire/protocol";
+
+export interface PickerEntry {
+  id: string;
+  text: string;
+  hint: string; // why it cannot be read
+}
+
+type Known = Pick<DatasetSummary, "id" | "state" | "notes">;
+
+const firstChoice = "climate"; // of the samples, the one that shows most
+
+// Where titles repeat, the ids tell the datasets apart.
+export function pickerEntries(datasets: DatasetSummary[]): PickerEntry[] {
+  const titleOf = ({ id, title }: DatasetSummary): string => title || id;
+  const counts = new Map<string, number>();
+  for (const one of datasets) counts.set(titleOf(one), (counts.get(titleOf(one)) ?? 0) + 1);
+  return datasets.map((one) => {
+    const title = titleOf(one);
+    const name = counts.get(title) === 1 ? title : `${title} (${one.id})`;
+    const failed = one.state === "failed";
+    return {
+      id: one.id,
+      text: failed ? `${name} — failed` : name,
+      hint: failed ? failureNote(one) : "",
+    };
+  });
+}
+
+// undefined: none that is worth a try.
+export function bestDataset(datasets: DatasetSummary[]): string | undefined {
+  const usable = datasets.filter((dataset) => dataset.state !== "failed");
+  return (usable.find((dataset) => dataset.id === firstChoice) ?? usable[0])?.id;
+}
+
+// The server tells last why a file cannot be read any more.
+export const failureNote = ({ notes }: Pick<Dataset, "notes">): string =>
+  notes.at(-1) ?? "The files of this dataset cannot be read any more.";
+
+// The list with what was learnt of one dataset; the same list if that is nothing new.
+export function withState(
+  datasets: DatasetSummary[],
+  { id, state, notes }: Known,
+): DatasetSummary[] {
+  const known = datasets.find((dataset) => dataset.id === id);
+  const told = JSON.stringify([state, notes]);
+  if (known === undefined || JSON.stringify([known.state, known.notes]) === told) return datasets;
+  return datasets.map((dataset) => (dataset === known ? { ...known, state, notes } : dataset));
+}
+
+export class DatasetList {
+  private datasets: DatasetSummary[] = [];
+
+  constructor(private readonly picker: HTMLSelectElement) {}
+
+  set(datasets: DatasetSummary[]): void {
+    this.datasets = datasets;
+    this.write();
+  }
+
+  get all(): DatasetSummary[] {
+    return this.datasets;
+  }
+
+  has(id: string): boolean {
+    return this.datasets.some((dataset) => dataset.id === id);
+  }
+
+  best(): string | undefined {
+    return bestDataset(this.datasets);
+  }
+
+  // One that the server calls failed may still be shown as it was.
+  first(): string | undefined {
+    return this.best() ?? this.datasets[0]?.id;
+  }
+
+  learn(dataset: Known): void {
+    const before = this.datasets;
+    this.datasets = withState(before, dataset);
+    if (this.datasets !== before) this.write();
+  }
+
+  failed(id: string, note: string): void {
+    this.learn({ id, state: "failed", notes: [note] });
+  }
+
+  show(id: string): void {
+    this.picker.value = id;
+  }
+
+  // A failed one may be chosen again: the server then says why, or has mended it.
+  private write(): void {
+    const chosen = this.picker.value;
+    this.picker.replaceChildren(
+      ...pickerEntries(this.datasets).map(({ id, text, hint }) => {
+        const option = new Option(text, id);
+        option.title = hint;
+        return option;
+      }),
+    );
+    this.show(chosen);
+  }
+}

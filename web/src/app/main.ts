@@ -1,0 +1,258 @@
+// Puts the page together: parts, keys, buttons; then lets the app run.
+import { drag, pan, roll, zoom, type Angles } from "../view/camera";
+import { App } from "./app";
+import { Cards } from "./dataset_cards";
+import { DatasetList } from "./dataset_list";
+import { byId, make } from "../base/dom";
+import { toggleErrorMetric } from "../base/error_text";
+import { Gizmo, looks } from "../viewport/gizmo";
+import { hoverOn } from "../view/hover_setting";
+import { HoverView } from "../viewport/hover_view";
+import { Hud } from "../viewport/hud";
+import { MoveQueue, PointerInput } from "../viewport/input";
+import { bindKeys, modText, type Binding } from "./keyboard";
+import { Legend } from "../viewport/legend";
+import { Panels } from "../panels/panels";
+import { Probe } from "../viewport/probe";
+import { makeReference } from "../viewport/reference_view";
+import { saveDialog } from "../save/save_dialog";
+import { takeDrops, type FileTarget } from "../save/saved_picture";
+import { Status } from "./status";
+import { TimeBar } from "./time_bar";
+import { Turn } from "../viewport/camera_turn";
+import { Viewport } from "../viewport/viewport";
+
+const app = new App(
+  {
+    setTimeout: (run, ms) => window.setTimeout(run, ms),
+    clearTimeout: (timer) => window.clearTimeout(timer),
+    random: () => Math.random(),
+  },
+  document.baseURI,
+);
+
+const canvas = byId("picture", HTMLCanvasElement);
+const moves = new MoveQueue(app.cameras, (run) => window.requestAnimationFrame(run));
+const turn = new Turn(moves, {
+  now: () => performance.now(),
+  requestFrame: (run) => window.requestAnimationFrame(run),
+  still: () => window.matchMedia("(prefers-reduced-motion: reduce)").matches,
+});
+const lookFrom = (angles: Angles) => turn.to(app.cameras.viewFrom(angles));
+new PointerInput(canvas, moves, (x, y, alt) => probe.pick([x, y], alt));
+
+const viewport = new Viewport(canvas, {
+  decoded: (header, decodeMs) => app.acknowledge(header.seq, decodeMs),
+  drawn: (frame) => app.onDrawn(frame),
+  broken: (header) => app.onBroken(header.seq),
+  resized: debouncedResize(),
+});
+const timeBar = new TimeBar({
+  seek: (step) => app.seek(step),
+  scrub: (step) => app.playback.scrub(step),
+  scrubbed: () => app.playback.scrubbed(),
+  play: (direction) => app.playback.play(direction),
+  pause: () => app.playback.pause(),
+  settings: () => app.playback.again(),
+});
+const hud = new Hud();
+const panelBox = byId("panel", HTMLElement);
+const host = {
+  view: () => app.view(),
+  change: (patch: Record<string, unknown>) => app.change(patch),
+  quietly: (run: () => void) => app.undoing.quietly(run),
+  dataset: () => app.dataset(),
+  maps: app.maps,
+  api: app.api,
+  playing: () => app.playback.running,
+  frame: () => viewport.frame,
+};
+const panels = new Panels(panelBox, host, {
+  reset: () => app.resetAll(),
+  camera: () => app.cameras.camera(),
+  setCamera: (camera) => app.cameras.setCamera(camera),
+  probed: () => probe.show(),
+  flowing: () => app.isFlowing(),
+  flow: (on) => app.flow(on),
+});
+
+const probe = new Probe(
+  {
+    camera: () => app.cameras.camera(),
+    view: () => app.view(),
+    dataset: () => app.dataset(),
+    aspect: () => canvas.clientWidth / canvas.clientHeight,
+    controls: () => panels.probe,
+  },
+  document.querySelector<SVGSVGElement>("#probe-mark")!,
+  byId("probe-button", HTMLButtonElement),
+);
+
+const reference = makeReference(canvas, () => app.view());
+const hover = new HoverView(canvas, byId("hover", HTMLElement), {
+  ...host,
+  find: (at) => probe.find(at),
+});
+const list = new DatasetList(byId("dataset", HTMLSelectElement));
+const cards = new Cards(byId("datasets", HTMLDialogElement), byId("cards", HTMLElement), {
+  api: app.api,
+  list,
+  open: (id) => app.open(id),
+});
+const help = byId("help", HTMLDialogElement);
+const status = new Status();
+const files: FileTarget = {
+  open: (view) => app.openView(view),
+  refuse: (text) => status.error("picture", text),
+};
+const openSaving = saveDialog(
+  {
+    isOpen: () => app.isOpen(),
+    said: () => app.said(),
+    view: () => app.view(),
+    camera: () => app.cameras.camera(),
+    dataset: () => app.dataset(),
+    maps: app.maps,
+    size: () => [canvas.clientWidth, canvas.clientHeight],
+    pixelsMax: () => viewport.pixelsMax,
+    files,
+  },
+  document.baseURI,
+);
+takeDrops(byId("drop-hint", HTMLElement), files);
+
+function togglePanel(): void {
+  const hidden = document.documentElement.classList.toggle("no-panel");
+  byId("panel-button", HTMLButtonElement).setAttribute("aria-expanded", String(!hidden));
+}
+
+const arrow = (right: number, down: number) => (event: KeyboardEvent) =>
+  moves.push((camera) =>
+    event.shiftKey ? pan(camera, 0.01 * right, 0.01 * down) : drag(camera, right, down),
+  );
+
+const bindings: Binding[] = [
+  { keys: ["ArrowLeft"], shown: "←", does: "turn (shift: move) left", run: arrow(-5, 0) },
+  { keys: ["ArrowRight"], shown: "→", does: "turn (shift: move) right", run: arrow(5, 0) },
+  { keys: ["ArrowUp"], shown: "↑", does: "tilt (shift: move) up", run: arrow(0, -5) },
+  { keys: ["ArrowDown"], shown: "↓", does: "tilt (shift: move) down", run: arrow(0, 5) },
+  { keys: ["+", "="], shown: "+", does: "nearer", run: () => moves.push((c) => zoom(c, 1.15)) },
+  {
+    keys: ["-", "_"],
+    shown: "−",
+    does: "farther",
+    run: () => moves.push((c) => zoom(c, 1 / 1.15)),
+  },
+  {
+    keys: ["Home", "0"],
+    shown: "0",
+    does: "whole volume, upright",
+    run: () => app.cameras.reset(),
+  },
+  ...looks.map(({ key, name, angles }) => ({
+    keys: [key],
+    shown: key,
+    does: `look ${name}`,
+    run: () => lookFrom(angles),
+  })),
+  { keys: [","], shown: ",", does: "roll to the left", run: () => moves.push((c) => roll(c, -5)) },
+  { keys: ["."], shown: ".", does: "roll to the right", run: () => moves.push((c) => roll(c, 5)) },
+  {
+    keys: ["o"],
+    shown: "o",
+    does: "perspective or orthographic",
+    run: () => app.cameras.toggleProjection(),
+  },
+  {
+    keys: [" "],
+    shown: "space",
+    does: "play (shift: backward) or pause",
+    run: (event) => timeBar.toggle(event.shiftKey ? -1 : 1),
+  },
+  { keys: ["["], shown: "[", does: "step back", run: () => app.seek(timeBar.neighbour(-1)) },
+  { keys: ["]"], shown: "]", does: "step on", run: () => app.seek(timeBar.neighbour(1)) },
+  { keys: ["{"], shown: "{", does: "first step", run: () => app.seek(0) },
+  { keys: ["}"], shown: "}", does: "last step", run: () => app.seek(timeBar.steps - 1) },
+  { keys: ["Mod+z"], shown: modText("z"), does: "undo", run: () => app.undoing.undo() },
+  {
+    keys: ["Mod+Shift+z", "Mod+y"],
+    shown: modText("y"),
+    does: "redo (or shift with undo)",
+    run: () => app.undoing.redo(),
+  },
+  { keys: ["i"], shown: "i", does: "probe: values at a place", run: () => probe.toggle() },
+  {
+    keys: ["r"],
+    shown: "r (hold)",
+    does: "the reference: this view without error",
+    run: () => reference.hold(),
+    ends: () => reference.release(),
+  },
+  { keys: ["Escape"], shown: "esc", does: "drop the reference", run: () => reference.drop() },
+  {
+    keys: ["I"],
+    shown: "shift i",
+    does: "values under the cursor",
+    run: () => {
+      hoverOn.set(!hoverOn.value);
+      panels.refresh();
+    },
+  },
+  { keys: ["\\"], shown: "\\", does: "times of the frames", run: () => hud.toggle() },
+  { keys: ["e"], shown: "e", does: "errors as RMSE or PSNR", run: toggleErrorMetric },
+  { keys: ["d"], shown: "d", does: "datasets", run: () => cards.show() },
+  { keys: ["p"], shown: "p", does: "panel", run: togglePanel },
+  { keys: ["s"], shown: "s", does: "save: pictures and views", run: openSaving },
+  { keys: ["?"], shown: "?", does: "this list", run: () => help.showModal() },
+];
+
+function fillHelp(): void {
+  const list = byId("help-keys", HTMLElement);
+  for (const binding of bindings) {
+    list.append(make("dt", "", binding.shown), make("dd", "", binding.does));
+  }
+}
+
+function debouncedResize(): () => void {
+  let timer: number | undefined;
+  return () => {
+    window.clearTimeout(timer);
+    timer = window.setTimeout(() => app.resize(...viewport.size()), 120);
+  };
+}
+
+function onClick(id: string, run: () => void): void {
+  byId(id, HTMLButtonElement).addEventListener("click", run);
+}
+
+app.undoing.bind(byId("undo-button", HTMLButtonElement), byId("redo-button", HTMLButtonElement));
+app.undoing.watch(document);
+bindKeys(bindings, document);
+fillHelp();
+onClick("datasets-button", () => cards.show());
+onClick("cancel-button", () => app.cancelLoading());
+onClick("retry-button", () => app.connectNow());
+onClick("share-button", () => void app.copyLink());
+onClick("save-button", openSaving);
+onClick("help-button", () => help.showModal());
+onClick("panel-button", togglePanel);
+onClick("hud-button", () => hud.toggle());
+onClick("reset-button", () => app.cameras.reset());
+onClick("isometric-button", () => lookFrom(looks.at(-1)!.angles));
+onClick("projection-button", () => app.cameras.toggleProjection());
+
+app.start({
+  viewport,
+  hud,
+  legend: new Legend(byId("legend", HTMLElement), app.maps),
+  gizmo: new Gizmo(byId("gizmo", HTMLElement), lookFrom),
+  probe,
+  hover,
+  panels,
+  timeBar,
+  list,
+  cards,
+  status,
+  picker: byId("dataset", HTMLSelectElement),
+  facts: byId("facts", HTMLElement),
+});

@@ -1,0 +1,180 @@
+// What the panel's controls mean: which of them count under a view, what a dataset lets them offer,
+// and the values that keep two of them in order. Pure: (dataset, view) -> options, words, patches.
+import { unitText } from "../view/legend_entries";
+import type { Dataset, Field, View } from "../wire/protocol";
+import { formatNumber } from "../base/ticks";
+import type { Patch } from "../view/view_state";
+
+export type Options = Record<string, string>; // text -> the wire's word
+export type SliceAxis = "x" | "y" | "z";
+
+// Of each compositing: what it does, for people.
+export const compositingHints: Readonly<Record<string, string>> = {
+  analytic: "Line and medium mixed exactly along their common piece.",
+  cd: "Colour times density added, corrected: no seams about lines.",
+  simple: "A line lies behind all of its piece of medium.",
+  "cd-naive": "Colour times density added as it is: seams about lines.",
+  "cd-euler": "Rates of cd in one explicit step: unstable where the medium is dense.",
+};
+
+export const compositingOptions: Options = {
+  analytic: "analytic",
+  "cd (corrected)": "cd",
+  simple: "simple",
+  "cd-naive (seamed)": "cd-naive",
+  "cd-euler (unstable)": "cd-euler",
+};
+
+export const methodHints: Readonly<Record<string, string>> = {
+  kernel: "One kernel after another, in the order of visibility.",
+  slab: "Slabs of constant depth gather the parts of the kernels within them.",
+};
+
+// `reference` is not offered: streams are refused it.
+export const methodOptions: Options = { kernel: "kernel", slab: "slab" };
+
+export const detailHints: Readonly<Record<string, string>> = {
+  auto: "Samples closer than a pixel are averaged.",
+  full: "Every sample is drawn.",
+};
+
+export const detailOptions: Options = { auto: "auto", full: "full" };
+
+// What a picker of fields offers.
+export function fieldOptions(dataset: Dataset, kind: Field["kind"]): Options {
+  return optionsOf(dataset.fields.filter((field) => field.kind === kind));
+}
+
+function optionsOf(fields: Field[]): Options {
+  return Object.fromEntries(
+    fields.map((field) => {
+      const unit = unitText(field.units);
+      return [unit === "" ? field.name : `${field.name} (${unit})`, field.name];
+    }),
+  );
+}
+
+const mappingLabels: Readonly<Record<Dataset["mappings"][number], string>> = {
+  flat: "flat",
+  sphere: "sphere (globe)",
+  curvilinear: "curvilinear map",
+};
+
+// Shapes that the grid can be bent to, as the dataset tells them.
+export function mappingOptions(dataset: Dataset): Options {
+  return Object.fromEntries(dataset.mappings.map((mapping) => [mappingLabels[mapping], mapping]));
+}
+
+export const ownHeight = ""; // the option that names no height field
+
+// Scalars that may tell the samples' height; those that measure one stand first.
+export function heightOptions(dataset: Dataset): Options {
+  const measuresHeight = (field: Field): boolean =>
+    /height|altitude/.test(field.standardName) || /^(k?m|d[ak]m|gpm|feet)$/.test(field.units);
+  const scalars = dataset.fields.filter((field) => field.kind === "scalar");
+  const sorted = [...scalars].sort((a, b) => Number(measuresHeight(b)) - Number(measuresHeight(a)));
+  return { "the vertical axis": ownHeight, ...optionsOf(sorted) };
+}
+
+export const wholeVolume = "all";
+
+const sliceAxes: readonly SliceAxis[] = ["x", "y", "z"];
+
+// A slice across an axis of one sample would be the whole volume.
+export function sliceOptions(dataset: Dataset): Options {
+  const options: Options = { "off: whole volume": wholeVolume };
+  for (const axis of sliceAxes) {
+    const { name } = dataset.axes[axis];
+    if (dataset.dims[axis] < 2) continue;
+    options[name === axis ? `across ${axis}` : `across ${axis}: ${name}`] = axis;
+  }
+  return options;
+}
+
+export const sliceIndexMax = (dataset: Dataset, axis: SliceAxis): number =>
+  Math.max(0, dataset.dims[axis] - 1);
+
+// Begins in the middle of the axis.
+export function slicePatch(dataset: Dataset, axis: string): Patch {
+  const known = sliceAxes.find((one) => one === axis);
+  if (known === undefined) return { geometry: { slice: null } };
+  const index = Math.floor(sliceIndexMax(dataset, known) / 2);
+  return { geometry: { slice: { axis: known, index } } };
+}
+
+// Where the layer lies, in the axis's own words.
+export function sliceText(dataset: Dataset, view: View): string {
+  const slice = view.geometry?.slice;
+  if (!slice) return "";
+  const axis = dataset.axes[slice.axis];
+  const value = axis.coordinates[slice.index];
+  const layer = `Layer ${slice.index} of 0 to ${sliceIndexMax(dataset, slice.axis)}`;
+  if (value === undefined) return `${layer}.`;
+  return `${layer}: ${axis.name} ${formatNumber(value)} ${unitText(axis.units)}`.trim() + ".";
+}
+
+// Colour by another quantity: the old range has another unit, and a scalar has to be named.
+export function colorByPatch(dataset: Dataset, view: View, by: string): Patch {
+  const color: Patch = { by, range: null };
+  if (by === "scalar" && !view.vector?.color?.field) {
+    color.field = dataset.fields.find((field) => field.kind === "scalar")?.name ?? null;
+  }
+  // North is one colour from either side; of what has two ends a cyclic map tells nothing.
+  if (by === "direction") color.map = "compass";
+  else if (view.vector?.color?.map === "compass") color.map = null;
+  return { vector: { color } };
+}
+
+// The field whose values the lines' colours tell, of a vector its magnitude; null: of none.
+export function colorField(view: View): string | null {
+  const { field = null, color } = view.vector ?? {};
+  if (field === null) return null;
+  if (color?.by === "magnitude") return field;
+  return color?.by === "scalar" ? (color.field ?? null) : null;
+}
+
+// near and far with at least `gap` between them: the one that moved takes the other along.
+export function depthCuePatch(view: View, end: "near" | "far", value: number): Patch {
+  const gap = 0.01;
+  const { near = 0, far = 1 } = view.depthCue ?? {};
+  const depthCue =
+    end === "near"
+      ? { near: value, far: Math.max(far, value + gap) }
+      : { near: Math.min(near, value - gap), far: value };
+  return { depthCue };
+}
+
+export const hasErrorLimit = (view: View): boolean => (view.quality?.maxError ?? null) !== null;
+
+// What moving frames are drawn for.
+export const qualityHint = (view: View): string =>
+  hasErrorLimit(view)
+    ? "Moving frames: the fastest that is expected to keep the error, within the budget."
+    : "Moving frames: the least error that the budget allows.";
+
+// Which controls count under a view; the others are hidden or out of use.
+export function controlStates(view: View) {
+  const vector = view.vector ?? {};
+  const by = vector.color?.by;
+  const jitter = vector.jitter ?? {};
+  const lines = vector.field !== null;
+  return {
+    lines,
+    ranged: by !== "constant", // colours along a range, by a map
+    counted: colorField(view) !== null,
+    constant: by === "constant",
+    rise: by === "rise",
+    colorField: by === "scalar",
+    span: lines && jitter.overlap !== false,
+    pattern: lines && (jitter.center !== 0 || jitter.stride !== 0),
+    motion: lines && vector.motion?.mode === "phase",
+    slab: view.method?.name === "slab",
+    vertical: (view.geometry?.heightField ?? null) === null,
+    slice: (view.geometry?.slice ?? null) !== null,
+    fovY: view.camera?.projection !== "orthographic",
+    errorLimit: hasErrorLimit(view),
+    depthCue: lines && view.depthCue?.strength !== 0,
+  };
+}
+
+export type ControlStates = ReturnType<typeof controlStates>;

@@ -1,0 +1,87 @@
+// Histograms as numbers: bars, shares of the samples, and what a drag over them chooses. Pure.
+import type { Histogram, Range } from "../wire/api";
+import { clamp } from "../base/values";
+
+// Outline of the bars, one unit wide each and at most 1 high, y downward: an SVG path.
+export function barPath(counts: number[], log: boolean): string {
+  const size = (count: number): number => (log ? Math.log1p(count) : count);
+  const most = size(counts.reduce((a, b) => Math.max(a, b), 0));
+  if (most <= 0) return "";
+  const bars = counts.map((count) => `V${(1 - size(count) / most).toFixed(4)}h1`);
+  return `M0 1${bars.join("")}V1Z`;
+}
+
+// The value with `share` of the unmasked samples below it; within a bin they are taken as even.
+export function quantile({ range, counts, below, above }: Histogram, share: number): number {
+  const width = (range[1] - range[0]) / counts.length;
+  const total = counts.reduce((sum, count) => sum + count, below + above);
+  let left = share * total - below;
+  if (left <= 0) return range[0];
+  for (let bin = 0; bin < counts.length; bin++) {
+    const count = counts[bin]!;
+    if (left <= count && count > 0) return range[0] + (bin + left / count) * width;
+    left -= count;
+  }
+  return range[1];
+}
+
+// The middle of the samples, without the share `tail` at either end; null where nothing is between.
+export function clipRange(histogram: Histogram, tail: number): Range | null {
+  const low = neat(quantile(histogram, tail), histogram.range);
+  const high = neat(quantile(histogram, 1 - tail), histogram.range);
+  return low < high ? [low, high] : null;
+}
+
+// As many digits as a range of this width needs: a thousandth of it.
+export function neat(value: number, range: Range): number {
+  const width = Math.abs(range[1] - range[0]);
+  if (!(width > 0) || !Number.isFinite(value)) return value;
+  const digits = Math.ceil(3 - Math.log10(width));
+  return digits > 0 ? Number(value.toFixed(Math.min(digits, 100))) : Math.round(value);
+}
+
+export const placeOf = (value: number, range: Range): number =>
+  range[1] === range[0] ? 0 : (value - range[0]) / (range[1] - range[0]);
+
+export const valueAt = (place: number, range: Range): number =>
+  neat(range[0] + clamp(place, 0, 1) * (range[1] - range[0]), range);
+
+// A drag over the bars, in places 0..1: it takes hold of an end of the chosen range that is near,
+// or else draws a new range; a click draws none and moves the nearer end there. An inverted range
+// (its first end the greater) stays inverted.
+export class RangeDrag {
+  private readonly fixed: number; // the end that stays
+  private readonly held: 0 | 1 | null; // the end taken hold of
+  private moved = false;
+
+  constructor(
+    private readonly start: number,
+    private readonly chosen: Range,
+    near: number,
+  ) {
+    const [a, b] = chosen.map((end) => Math.abs(end - start)) as Range;
+    const held = Math.min(a, b) > near ? null : a < b ? 0 : 1;
+    this.held = held;
+    this.fixed = held === null ? start : chosen[held === 0 ? 1 : 0];
+  }
+
+  to(place: number): Range | null {
+    if (!this.moved && Math.abs(place - this.start) < 0.005) return null;
+    this.moved = true;
+    return this.ordered(place, this.fixed);
+  }
+
+  // The drag is over: what a mere click chooses.
+  end(): Range | null {
+    if (this.moved || this.held !== null) return null;
+    const [a, b] = this.chosen;
+    const first = Math.abs(a - this.start) < Math.abs(b - this.start);
+    return this.ordered(this.start, first ? b : a);
+  }
+
+  private ordered(one: number, other: number): Range | null {
+    if (one === other) return null;
+    const [low, high] = [Math.min(one, other), Math.max(one, other)];
+    return this.chosen[0] > this.chosen[1] ? [high, low] : [low, high];
+  }
+}

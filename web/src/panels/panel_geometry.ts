@@ -1,0 +1,152 @@
+// The panels of space: how the grid stands (shape, heights, slice), and how it is looked at.
+import type GUI from "lil-gui";
+import { withProjection, type Camera } from "../view/camera";
+import {
+  depthCuePatch,
+  fieldOptions,
+  heightOptions,
+  mappingOptions,
+  ownHeight,
+  sliceIndexMax,
+  sliceOptions,
+  slicePatch,
+  sliceText,
+  wholeVolume,
+} from "./controls";
+import { keyAccess, type PanelKit } from "./panel_kit";
+
+export interface CameraSwitch {
+  camera(): Camera | null;
+  setCamera(camera: Camera): void;
+}
+
+export function addGeometry(gui: GUI, kit: PanelKit): void {
+  const folder = gui.addFolder("Geometry");
+  const dataset = kit.host.dataset();
+  addSlice(folder, kit);
+  const mappings = mappingOptions(dataset);
+  const mapping = kit.choice(folder, "shape", keyAccess("/geometry/mapping"), mappings);
+  if (Object.keys(mappings).length < 2) {
+    kit.showWhen(() => kit.host.view().geometry?.mapping !== "flat", mapping);
+  }
+  const vertical = kit.choice(folder, "vertical axis", keyAccess("/geometry/vertical"), {
+    automatic: "auto",
+    linear: "linear",
+    "log p": "logp",
+    index: "index",
+  });
+  kit.enableWhen((states) => states.vertical, vertical);
+  if (Object.keys(fieldOptions(dataset, "scalar")).length > 0) {
+    kit.choice(
+      folder,
+      "heights from",
+      {
+        pointer: "/geometry/heightField",
+        get: (view) => view.geometry?.heightField ?? ownHeight,
+        set: (name) => ({ geometry: { heightField: name === ownHeight ? null : name } }),
+      },
+      heightOptions(dataset),
+    );
+  }
+  addStretch(folder, kit);
+}
+
+function addStretch(folder: GUI, kit: PanelKit): void {
+  const edges = ["stretch in x", "stretch in y", "vertical stretch"] as const;
+  edges.forEach((label, axis) => {
+    kit.number(
+      folder,
+      label,
+      {
+        pointer: "/geometry/scale",
+        get: (view) => view.geometry?.scale?.[axis],
+        set: (factor) => {
+          const scale = [...(kit.host.view().geometry?.scale ?? [1, 1, 1])];
+          scale[axis] = factor;
+          return { geometry: { scale } };
+        },
+      },
+      { min: 0.1, max: 10 },
+    );
+  });
+}
+
+function addSlice(folder: GUI, kit: PanelKit): void {
+  const dataset = kit.host.dataset();
+  const options = sliceOptions(dataset);
+  const slice = () => kit.host.view().geometry?.slice ?? null;
+  const choice = kit.choice(
+    folder,
+    "slice",
+    {
+      pointer: "/geometry/slice",
+      get: () => slice()?.axis ?? wholeVolume,
+      set: (axis) => slicePatch(dataset, axis),
+    },
+    options,
+  );
+  const index = kit.number(
+    folder,
+    "layer",
+    {
+      pointer: "/geometry/slice/index",
+      get: () => slice()?.index,
+      set: (layer) => {
+        const axis = slice()?.axis;
+        return axis === undefined ? null : { geometry: { slice: { axis, index: layer } } };
+      },
+    },
+    { min: 0, max: sliceIndexMax(dataset, slice()?.axis ?? "z"), step: 1 },
+  );
+  let axis = slice()?.axis;
+  kit.onRefresh(() => {
+    const next = slice()?.axis;
+    if (next === undefined || next === axis) return;
+    axis = next;
+    index.max(sliceIndexMax(dataset, next));
+    index.updateDisplay();
+  });
+  kit.showWhen((states) => states.slice, index);
+  kit.note(folder, () => sliceText(dataset, kit.host.view()));
+  if (Object.keys(options).length < 2) kit.showWhen((states) => states.slice, choice);
+}
+
+export function addCamera(gui: GUI, kit: PanelKit, camera: CameraSwitch): void {
+  const folder = gui.addFolder("Camera and depth");
+  kit.choice(
+    folder,
+    "projection",
+    {
+      pointer: "/camera/projection",
+      get: (view) => view.camera?.projection,
+      set: (projection) => {
+        const now = camera.camera();
+        if (now === null) return { camera: { projection } };
+        camera.setCamera(withProjection(now, projection as Camera["projection"]));
+        return null;
+      },
+    },
+    { perspective: "perspective", orthographic: "orthographic" },
+  );
+  const fovY = kit.number(folder, "field of view (°)", keyAccess("/camera/fovY"), {
+    min: 5,
+    max: 120,
+  });
+  kit.showWhen((states) => states.fovY, fovY);
+  const strength = kit.number(folder, "depth cue", keyAccess("/depthCue/strength"));
+  const ends = (["near", "far"] as const).map((end) =>
+    kit.number(
+      folder,
+      end === "near" ? "darkens from" : "darkest at",
+      {
+        pointer: `/depthCue/${end}`,
+        get: (view) => view.depthCue?.[end],
+        set: (value) => depthCuePatch(kit.host.view(), end, value),
+      },
+      { min: -1, max: 2, step: 0.01 },
+    ),
+  );
+  kit.enableWhen((states) => states.lines, strength);
+  kit.enableWhen((states) => states.depthCue, ...ends);
+  kit.color(folder, "background", keyAccess("/image/background"));
+}

@@ -1,0 +1,345 @@
+// Controls of the panels: each shows one key of the view and changes it by a merge patch.
+// Labels are ours; the explanations (titles) and limits come from the view's schema.
+import GUI, { Controller, type NumberController } from "lil-gui";
+import { viewRanges } from "../../generated/view_ranges";
+import { explain } from "./help_texts";
+import type { Api, Range } from "../wire/api";
+import type { ColorMaps } from "../wire/color_maps";
+import { controlStates, type ControlStates, type Options } from "./controls";
+import { make } from "../base/dom";
+import { histogramBins, HistogramView } from "./histogram_view";
+import { unitText } from "../view/legend_entries";
+import type { RangeMode } from "./range_choice";
+import { formatNumber } from "../base/ticks";
+import type { CurveSource } from "./transfer_view";
+import type { Dataset, FrameHeader, View } from "../wire/protocol";
+import type { Patch } from "../view/view_state";
+import { clamp } from "../base/values";
+
+export interface PanelHost {
+  view(): View; // with every default that is known
+  change(patch: Patch): void;
+  quietly(run: () => void): void; // what it changes is no step of undo
+  dataset(): Dataset;
+  maps: ColorMaps;
+  api: Api;
+  playing(): boolean;
+  frame(): FrameHeader | null; // on the canvas
+}
+
+// A histogram of a field, and the range that it chooses.
+export interface HistogramLook {
+  key: string; // of the range, among those of the panel
+  folder?: string; // its title
+  field(): string | null; // null: of none now
+  title(): string;
+  range(): Range | null;
+  defaultRange(): Range | null; // null: not known
+  choose(range: Range | null): void; // null: the default
+  map?(): string | undefined; // of the colours that the range is of
+  curve?: CurveSource;
+}
+
+export interface NumberLook {
+  min?: number;
+  max?: number;
+  step?: number;
+  field?: boolean; // a number box without a slider
+}
+
+export function valueAt(view: unknown, pointer: string): unknown {
+  let value = view;
+  for (const key of pointer.split("/").slice(1)) {
+    if (typeof value !== "object" || value === null) return undefined;
+    value = (value as Record<string, unknown>)[key];
+  }
+  return value;
+}
+
+export function patchAt(pointer: string, value: unknown): Patch {
+  const keys = pointer.split("/").slice(1);
+  return keys.reduceRight<unknown>((inner, key) => ({ [key]: inner }), value) as Patch;
+}
+
+// A value's own read and write, where it is not simply a key.
+export interface Access<T> {
+  pointer: string; // whose explanation to show
+  get(view: View): T | null | undefined;
+  set(value: T): Patch | null;
+}
+
+export const keyAccess = <T>(pointer: string): Access<T> => ({
+  pointer,
+  get: (view) => valueAt(view, pointer) as T | null | undefined,
+  set: (value) => patchAt(pointer, value),
+});
+
+// As many digits as anyone turns by hand.
+const shownValue = <T>(value: T): T =>
+  typeof value === "number" ? (Number(value.toPrecision(6)) as T) : value;
+
+// A box has room for some six signs: 0.000001 would read 0.0000.
+function shortenSmall(controller: NumberController): void {
+  const update = controller.updateDisplay.bind(controller);
+  controller.updateDisplay = () => {
+    update();
+    const value = controller.getValue();
+    if (value !== 0 && Math.abs(value) < 1e-3 && !controller._inputFocused) {
+      controller.$input.value = formatNumber(value, 6);
+    }
+    return controller;
+  };
+  controller.updateDisplay();
+}
+
+// A colour, by the browser's own picker.
+class ColorBox extends Controller {
+  private readonly input = make("input");
+
+  constructor(folder: GUI, model: { value: string }, key: "value") {
+    super(folder, model, key, "color-box");
+    this.input.type = "color";
+    this.input.setAttribute("aria-labelledby", this.$name.id);
+    this.input.addEventListener("input", () => this.setValue(this.input.value));
+    this.$widget.append(this.input);
+    this.updateDisplay();
+  }
+
+  override updateDisplay(): this {
+    this.input.value = this.getValue() as string;
+    return this;
+  }
+}
+
+export class PanelKit {
+  private readonly refreshers: (() => void)[] = [];
+
+  // modes: what ranges go by, kept while panels are built anew.
+  constructor(
+    readonly host: PanelHost,
+    readonly modes: Map<string, RangeMode>,
+  ) {}
+
+  refresh(): void {
+    for (const refresh of this.refreshers) refresh();
+  }
+
+  onRefresh(run: () => void): void {
+    this.refreshers.push(run);
+  }
+
+  number(folder: GUI, label: string, access: Access<number>, look: NumberLook = {}): Controller {
+    const [least, most] = viewRanges[access.pointer] ?? [];
+    const min = look.min ?? least;
+    const max = look.max ?? most;
+    const model = { value: shownValue(access.get(this.host.view()) ?? min ?? 0) };
+    const controller = look.field
+      ? folder.add(model, "value")
+      : folder.add(model, "value", min, max);
+    if (look.step !== undefined) controller.step(look.step);
+    shortenSmall(controller as NumberController);
+    return this.bind(controller, label, model, access);
+  }
+
+  // A number of many magnitudes: a box, and a slider along its logarithm that gives two digits.
+  logarithmic(folder: GUI, label: string, access: Access<number>): Controller {
+    const [min = 1e-6, max = 1] = viewRanges[access.pointer] ?? [];
+    const within = (value: number): number => clamp(shownValue(value), min, max);
+    const controller = this.number(
+      folder,
+      label,
+      { ...access, set: (value) => (Number.isFinite(value) ? access.set(within(value)) : null) },
+      { field: true, step: min },
+    );
+    const slider = make("input", "log-slider");
+    slider.type = "range";
+    slider.min = String(Math.log10(min));
+    slider.max = String(Math.log10(max));
+    slider.step = "0.05";
+    slider.setAttribute("aria-label", label);
+    slider.addEventListener("input", () => {
+      const value = Number((10 ** Number(slider.value)).toPrecision(2));
+      const patch = access.set(within(value));
+      if (patch !== null) this.host.change(patch);
+    });
+    const follow = () => {
+      const value = access.get(this.host.view());
+      if (typeof value !== "number") return;
+      slider.value = String(Math.log10(value));
+      slider.setAttribute("aria-valuetext", String(shownValue(value)));
+    };
+    this.onRefresh(follow);
+    follow();
+    controller.domElement.querySelector(".lil-widget")?.prepend(slider);
+    return controller;
+  }
+
+  toggle(folder: GUI, label: string, access: Access<boolean>): Controller {
+    const model = { value: access.get(this.host.view()) ?? false };
+    return this.bind(folder.add(model, "value"), label, model, access);
+  }
+
+  // A value that is not offered is still shown while the view has it.
+  choice(folder: GUI, label: string, access: Access<string>, options: Options): Controller {
+    const withOwn = (value: string): Options =>
+      Object.values(options).includes(value) ? options : { ...options, [value]: value };
+    const model = { value: access.get(this.host.view()) ?? Object.values(options)[0] ?? "" };
+    const controller = folder.add(model, "value", withOwn(model.value));
+    let offered = model.value;
+    this.onRefresh(() => {
+      const value = access.get(this.host.view());
+      if (value === undefined || value === null || value === offered) return;
+      offered = value;
+      controller.options(withOwn(value));
+    });
+    return this.bind(controller, label, model, access);
+  }
+
+  color(folder: GUI, label: string, access: Access<string>): Controller {
+    const model = { value: access.get(this.host.view()) ?? "#000000" };
+    return this.bind(new ColorBox(folder, model, "value"), label, model, access);
+  }
+
+  // A colour map's picker, with the map itself in it.
+  map(folder: GUI, label: string, access: Access<string>): Controller {
+    const names = this.host.maps.names();
+    const controller = this.choice(
+      folder,
+      label,
+      access,
+      Object.fromEntries(names.map((name) => [name, name])),
+    );
+    const strip = make("span", "map-strip");
+    controller.domElement.querySelector(".lil-widget")?.append(strip);
+    const paint = () => {
+      strip.style.backgroundImage = this.host.maps.gradient(access.get(this.host.view()) ?? "");
+    };
+    this.onRefresh(paint);
+    paint();
+    return controller;
+  }
+
+  // Two boxes for the ends of a range; both are sent, as the wire takes arrays whole.
+  range(folder: GUI, label: string, access: Access<[number, number]>, units: string): Controller[] {
+    const ends = ["from", "to"] as const;
+    return ends.map((end, index) => {
+      const unit = units === "" ? "" : ` (${units})`;
+      return this.number(
+        folder,
+        `${label} ${end}${unit}`,
+        {
+          pointer: access.pointer,
+          get: (view) => access.get(view)?.[index],
+          set: (value) => {
+            const range = access.get(this.host.view());
+            if (!range) return null;
+            const next: [number, number] = [range[0], range[1]];
+            next[index] = value;
+            return next[0] === next[1] ? null : access.set(next);
+          },
+        },
+        { field: true },
+      );
+    });
+  }
+
+  // In a folder of its own, so that nothing is counted that nobody looks at.
+  histogram(parent: GUI, look: HistogramLook): GUI {
+    const folder = parent.addFolder(look.folder ?? "Histogram");
+    const { host } = this;
+    const dataset = host.dataset();
+    const step = () => (host.playing() ? null : (host.view().step ?? 0));
+    const view: HistogramView = new HistogramView({
+      ...look,
+      key: `${dataset.id} ${look.key}`,
+      modes: this.modes,
+      units: () => {
+        const named = dataset.fields.find((one) => one.name === look.field());
+        return unitText(named?.units);
+      },
+      steps: dataset.steps.count,
+      quietly: (run) => host.quietly(run),
+      step,
+      dataKey: () => {
+        const field = look.field();
+        return field === null || host.playing() ? null : `${host.view().step ?? 0} ${field}`;
+      },
+      load: () =>
+        host.api.histogram(dataset.id, look.field()!, host.view().step ?? 0, histogramBins),
+      of: () => (host.view().dataset === dataset.id ? look.field() : null),
+      read: async (at) => {
+        const { range } = await host.api.range(dataset.id, look.field()!, at);
+        return view.element.isConnected ? range : null; // else the panel was built anew
+      },
+      ...(look.map === undefined
+        ? {}
+        : { gradient: (from, to) => host.maps.gradient(look.map!() ?? "", from, to) }),
+    });
+    folder.$children.append(view.element);
+    this.onRefresh(() => view.refresh());
+    return folder;
+  }
+
+  action(folder: GUI, label: string, title: string, run: () => void): Controller {
+    const controller = folder.add({ run }, "run").name(label);
+    controller.domElement.title = title;
+    return controller;
+  }
+
+  // Words below the controls before them, of the view as it is.
+  note(folder: GUI, text: () => string): void {
+    const element = make("p", "panel-note");
+    folder.$children.append(element);
+    element.hidden = true;
+    const write = () => {
+      const words = text();
+      if (element.textContent === words) return;
+      element.textContent = words;
+      element.hidden = words === "";
+    };
+    this.onRefresh(write);
+    write();
+  }
+
+  // Shown only while they count.
+  showWhen(counts: (states: ControlStates) => boolean, ...parts: (Controller | GUI)[]): void {
+    this.follow(counts, (on) => parts.forEach((part) => part.show(on)));
+  }
+
+  // Out of use while they do not count.
+  enableWhen(counts: (states: ControlStates) => boolean, ...controllers: Controller[]): void {
+    this.follow(counts, (on) => controllers.forEach((controller) => controller.enable(on)));
+  }
+
+  private follow(counts: (states: ControlStates) => boolean, apply: (on: boolean) => void): void {
+    let last: boolean | null = null;
+    const run = () => {
+      const on = counts(controlStates(this.host.view()));
+      if (on !== last) apply(on);
+      last = on;
+    };
+    this.onRefresh(run);
+    run();
+  }
+
+  private bind<T>(
+    controller: Controller,
+    label: string,
+    model: { value: T },
+    access: Access<T>,
+  ): Controller {
+    controller.name(label);
+    explain(controller.domElement, access.pointer);
+    controller.onChange((value: T) => {
+      const patch = access.set(value);
+      if (patch !== null) this.host.change(patch);
+    });
+    this.onRefresh(() => {
+      const value = access.get(this.host.view());
+      if (value === undefined || value === null || shownValue(value) === model.value) return;
+      model.value = shownValue(value);
+      controller.updateDisplay();
+    });
+    return controller;
+  }
+}

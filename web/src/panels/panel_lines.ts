@@ -1,0 +1,265 @@
+// The panel of the lines: field, length and opacity; their colour, shape, kernels and motion.
+import type GUI from "lil-gui";
+import { colorByPatch, colorField, fieldOptions } from "./controls";
+import type { Range } from "../wire/api";
+import { unitText } from "../view/legend_entries";
+import { keyAccess, type PanelKit } from "./panel_kit";
+
+export interface FlowSwitch {
+  flowing(): boolean;
+  flow(on: boolean): void;
+}
+
+export function addLines(gui: GUI, kit: PanelKit, flow: FlowSwitch): void {
+  const dataset = kit.host.dataset();
+  const options = fieldOptions(dataset, "vector");
+  if (Object.keys(options).length === 0) return;
+  const folder = gui.addFolder("Lines");
+  let named = Object.values(options)[0]!;
+  kit.toggle(folder, "shown", {
+    pointer: "/vector/field",
+    get: (view) => view.vector?.field !== null,
+    set: (on) => ({ vector: { field: on ? named : null } }),
+  });
+  const start = folder.controllers.length;
+  kit.choice(
+    folder,
+    "field",
+    {
+      pointer: "/vector/field",
+      get: (view) => (named = view.vector?.field ?? named),
+      set: (field) => ({ vector: { field } }),
+    },
+    options,
+  );
+  const units = unitText(dataset.fields.find((field) => field.name === named)?.units);
+  const per = units === "" ? "" : ` (${units})`;
+  addMain(folder, kit, per);
+  kit.showWhen((states) => states.lines, ...folder.controllers.slice(start));
+  const parts = [
+    addLineColor(folder, kit, per),
+    addShape(folder, kit, per),
+    addKernels(folder, kit),
+    addMotion(folder, kit, flow),
+  ];
+  kit.showWhen((states) => states.lines, ...parts);
+}
+
+function addMain(folder: GUI, kit: PanelKit, per: string): void {
+  const { vector } = kit.host.view();
+  const top = vector?.magnitudeRange?.[1] ?? 1;
+  const length = vector?.length ?? 0.05;
+  kit.number(folder, "length", keyAccess("/vector/length"), {
+    min: 0,
+    max: Math.min(10, Number((5 * length).toPrecision(2))),
+  });
+  kit.number(folder, "opacity", keyAccess("/vector/opacity"));
+  kit.number(folder, `min |v|${per}`, keyAccess("/vector/minMagnitude"), { min: 0, max: top });
+  kit.number(folder, "every n-th sample", keyAccess("/vector/stride"), {
+    min: 1,
+    max: 16,
+    step: 1,
+  });
+}
+
+function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
+  const folder = parent.addFolder("Line colour");
+  const { host } = kit;
+  const scalars = fieldOptions(host.dataset(), "scalar");
+  const hasScalars = Object.keys(scalars).length > 0;
+  kit.choice(
+    folder,
+    "tells",
+    {
+      pointer: "/vector/color/by",
+      get: (view) => view.vector?.color?.by,
+      set: (by) => colorByPatch(host.dataset(), host.view(), by),
+    },
+    {
+      height: "worldZ",
+      "distance from the eye": "screenZ",
+      "height and rise": "rise",
+      [`magnitude${per}`]: "magnitude",
+      direction: "direction",
+      ...(hasScalars ? { "a scalar field": "scalar" } : {}),
+      "nothing: one colour": "constant",
+    },
+  );
+  if (hasScalars) {
+    const field = kit.choice(
+      folder,
+      "scalar",
+      {
+        pointer: "/vector/color/field",
+        get: (view) => view.vector?.color?.field,
+        // Another field, another unit: its own default range.
+        set: (name) => ({ vector: { color: { field: name, range: null } } }),
+      },
+      scalars,
+    );
+    kit.showWhen((states) => states.colorField, field);
+  }
+  const map = kit.map(folder, "map", keyAccess("/vector/color/map"));
+  const ends = kit.range(folder, "colours", keyAccess("/vector/color/range"), "");
+  const auto = kit.action(folder, "Default range", "Colour range back to the default", () =>
+    host.change({ vector: { color: { range: null } } }),
+  );
+  kit.showWhen((states) => states.ranged, map, ...ends, auto);
+  const counted = () => colorField(host.view());
+  const said = host.dataset().defaultView?.vector;
+  const histogram = kit.histogram(folder, {
+    key: "lines",
+    map: () => host.view().vector?.color?.map,
+    defaultRange: () =>
+      said?.color?.by === host.view().vector?.color?.by
+        ? ((said?.color?.range ?? null) as Range | null)
+        : null,
+    title: () => (host.view().vector?.color?.by === "magnitude" ? "|v|" : (counted() ?? "")),
+    field: counted,
+    range: () => (host.view().vector?.color?.range ?? null) as Range | null,
+    choose: (range) => host.change({ vector: { color: { range } } }),
+  });
+  kit.showWhen((states) => states.counted, histogram);
+  const weight = kit.number(folder, "share of rise", keyAccess("/vector/color/riseWeight"));
+  kit.showWhen((states) => states.rise, weight);
+  const constant = kit.color(folder, "colour", keyAccess("/vector/color/constant"));
+  kit.showWhen((states) => states.constant, constant);
+  return folder;
+}
+
+function addShape(parent: GUI, kit: PanelKit, per: string): GUI {
+  const folder = parent.addFolder("Line shape");
+  addWidth(folder, kit);
+  kit.number(folder, "white of the head", keyAccess("/vector/headDesaturation"));
+  kit.number(folder, "bright by |v|", keyAccess("/vector/magnitudeIntensity"));
+  addMagnitudes(folder, kit, per);
+  kit.choice(folder, "direction", keyAccess("/vector/space"), {
+    "by components": "components",
+    "in world space": "world",
+  });
+  (["x", "y", "z"] as const).forEach((axis, index) => {
+    kit.number(
+      folder,
+      `${axis} component ×`,
+      {
+        pointer: "/vector/scale",
+        get: (view) => view.vector?.scale?.[index],
+        set: (factor) => {
+          const scale = [...(kit.host.view().vector?.scale ?? [1, 1, 1])];
+          scale[index] = factor;
+          return { vector: { scale } };
+        },
+      },
+      { field: true },
+    );
+  });
+  return folder;
+}
+
+// r1 <= r2 always: moving one beyond the other takes it along.
+function addWidth(folder: GUI, kit: PanelKit): void {
+  const r = (key: "r1" | "r2") => kit.host.view().vector?.[key] ?? 1;
+  kit.number(
+    folder,
+    "core radius r1",
+    {
+      pointer: "/vector/r1",
+      get: (view) => view.vector?.r1,
+      set: (r1) => ({ vector: { r1, r2: Math.max(r1, r("r2")) } }),
+    },
+    { min: 0, max: 6 },
+  );
+  kit.number(
+    folder,
+    "edge radius r2",
+    {
+      pointer: "/vector/r2",
+      get: (view) => view.vector?.r2,
+      set: (r2) => ({ vector: { r1: Math.min(r("r1"), r2), r2 } }),
+    },
+    { min: 0, max: 8 },
+  );
+}
+
+function addMagnitudes(folder: GUI, kit: PanelKit, per: string): void {
+  const range = (): [number, number] =>
+    (kit.host.view().vector?.magnitudeRange ?? [0, 1]) as [number, number];
+  const [low, top] = range();
+  const limits = { min: Math.min(0, low), max: 2 * top };
+  const ascending = (next: [number, number]) =>
+    next[0] < next[1] ? { vector: { magnitudeRange: next } } : null;
+  kit.number(
+    folder,
+    `shortest at${per}`,
+    {
+      pointer: "/vector/magnitudeRange",
+      get: (view) => view.vector?.magnitudeRange?.[0],
+      set: (value) => ascending([value, range()[1]]),
+    },
+    limits,
+  );
+  kit.number(
+    folder,
+    `longest at${per}`,
+    {
+      pointer: "/vector/magnitudeRange",
+      get: (view) => view.vector?.magnitudeRange?.[1],
+      set: (value) => ascending([range()[0], value]),
+    },
+    limits,
+  );
+  kit.histogram(folder, {
+    key: "lengths",
+    defaultRange: () => null,
+    title: () => "|v|",
+    field: () => kit.host.view().vector?.field ?? null,
+    range,
+    choose: (next) => kit.host.change({ vector: { magnitudeRange: next } }),
+  });
+}
+
+function addKernels(parent: GUI, kit: PanelKit): GUI {
+  const folder = parent.addFolder("Kernels and jitter");
+  kit.toggle(folder, "kernels overlap", keyAccess("/vector/jitter/overlap"));
+  const span = kit.number(folder, "span (strides)", keyAccess("/vector/span"), {
+    min: 0.5,
+    max: 16,
+  });
+  kit.enableWhen((states) => states.span, span);
+  kit.number(folder, "jitter of centre", keyAccess("/vector/jitter/center"));
+  kit.number(folder, "jitter of stride", keyAccess("/vector/jitter/stride"));
+  const seed = kit.number(folder, "pattern", keyAccess("/vector/jitter/seed"), {
+    min: 0,
+    max: 99,
+    step: 1,
+  });
+  const perStep = kit.toggle(folder, "new each step", keyAccess("/vector/jitter/perStep"));
+  kit.enableWhen((states) => states.pattern, seed, perStep);
+  return folder;
+}
+
+function addMotion(parent: GUI, kit: PanelKit, flow: FlowSwitch): GUI {
+  const folder = parent.addFolder("Motion");
+  kit.choice(folder, "texture", keyAccess("/vector/motion/mode"), {
+    still: "still",
+    "moves along the lines": "phase",
+  });
+  const rate = kit.number(folder, "cycles a step", keyAccess("/vector/motion/rate"), {
+    min: -4,
+    max: 4,
+    step: 0.05,
+  });
+  const time = kit.number(folder, "time (steps)", keyAccess("/vector/motion/time"), {
+    field: true,
+  });
+  kit.showWhen((states) => states.motion, rate, time);
+  kit.toggle(folder, "let lines flow", {
+    pointer: "/vector/motion/time",
+    get: () => flow.flowing(),
+    set: (on) => {
+      flow.flow(on);
+      return null;
+    },
+  });
+  return folder;
+}

@@ -1,0 +1,226 @@
+// The probe's panel: a place by the axes' own coordinates -> values of every field there, and of
+// one field over time. Open means that the probe is on: its place is then marked on the picture.
+import type GUI from "lil-gui";
+import { failureText, type Series } from "../wire/api";
+import { checkLabel, debounced, make, makeSvg, numberBox } from "../base/dom";
+import { hoverOn } from "../view/hover_setting";
+import { unitText } from "../view/legend_entries";
+import type { PanelKit } from "./panel_kit";
+import {
+  axisNames,
+  axisUnit,
+  coordinatesOf,
+  magnitude,
+  nearestIndex,
+  valueText,
+  type Sample,
+} from "../view/sample_position";
+import { courseEnds, drawCourse } from "./series_plot";
+import { formatNumber } from "../base/ticks";
+
+const restMs = 150;
+export const probeTitle = "Probe";
+
+export class ProbePanel {
+  private readonly folder: GUI;
+  private sample: Sample;
+  private readonly box = make("div", "probe");
+  private readonly rows: { slider: HTMLInputElement; number: HTMLInputElement }[] = [];
+  private readonly words = make("p", "probe-words");
+  private readonly values = make("dl", "probe-values");
+  private readonly picker = make("select");
+  private readonly plot = makeSvg("svg", { class: "course", role: "img" });
+  private series: Series | null = null;
+  private wanted = ""; // what was asked for last
+  private readonly readSoon = debounced(() => void this.read(), restMs);
+
+  constructor(
+    gui: GUI,
+    private readonly kit: PanelKit,
+    private readonly changed: () => void, // the place, or whether the probe is on
+    place: Sample,
+  ) {
+    this.folder = gui.addFolder(probeTitle);
+    this.sample = place;
+    axisNames.forEach((_, axis) => this.addAxis(axis));
+    this.words.setAttribute("role", "status");
+    this.box.append(this.words, this.values);
+    this.addSeries();
+    this.addHover();
+    this.folder.$children.append(this.box);
+    this.folder.onOpenClose(() => {
+      this.refresh();
+      this.changed();
+    });
+    kit.onRefresh(() => this.refresh());
+    this.showPlace();
+  }
+
+  open(): void {
+    this.folder.open();
+    this.folder.domElement.scrollIntoView({ block: "nearest" });
+  }
+
+  close(): void {
+    this.folder.close();
+  }
+
+  get on(): boolean {
+    return !this.folder._closed;
+  }
+
+  get place(): Sample {
+    return this.sample;
+  }
+
+  moveTo(sample: Sample): void {
+    if (sample.every((index, axis) => index === this.sample[axis])) return;
+    this.sample = sample;
+    this.series = null;
+    this.showPlace();
+    this.refresh();
+    this.changed();
+  }
+
+  refresh(): void {
+    if (!this.on) return;
+    if (this.key() !== this.wanted && !this.kit.host.playing()) this.readSoon();
+    this.showSeries();
+  }
+
+  private key(): string {
+    return JSON.stringify([this.sample, this.kit.host.view().step ?? 0]);
+  }
+
+  private addAxis(axis: number): void {
+    const name = axisNames[axis]!;
+    const { coordinates, name: title, units } = this.kit.host.dataset().axes[name];
+    const unit = axisUnit(units);
+    const row = make("div", "probe-axis");
+    const label = make("label", "", unit === "" ? title || name : `${title || name} (${unit})`);
+    const number = numberBox();
+    number.id = `probe-${name}`;
+    label.htmlFor = number.id;
+    label.title = label.textContent;
+    const slider = make("input");
+    slider.type = "range";
+    slider.max = String(Math.max(0, coordinates.length - 1));
+    slider.disabled = number.disabled = coordinates.length < 2;
+    slider.setAttribute("aria-label", `${label.textContent}, by samples`);
+    const move = (index: number) => {
+      const next: Sample = [...this.sample];
+      next[axis] = index;
+      this.moveTo(next);
+    };
+    slider.addEventListener("input", () => move(Number(slider.value)));
+    number.addEventListener("change", () => {
+      if (Number.isFinite(number.valueAsNumber)) {
+        move(nearestIndex(coordinates, number.valueAsNumber));
+      }
+      this.showPlace(); // of the sample, not of what was typed
+    });
+    this.rows.push({ slider, number });
+    row.append(label, slider, number);
+    this.box.append(row);
+  }
+
+  private addHover(): void {
+    const box = make("input");
+    box.checked = hoverOn.value;
+    box.addEventListener("change", () => hoverOn.set(box.checked));
+    this.kit.onRefresh(() => (box.checked = hoverOn.value));
+    const title = "Beside the mouse on the picture (shift + i)";
+    this.box.append(checkLabel(box, "values under the cursor", title));
+  }
+
+  private addSeries(): void {
+    const dataset = this.kit.host.dataset();
+    if (dataset.steps.count < 2) return;
+    this.picker.append(...dataset.fields.map(({ name }) => new Option(name, name)));
+    this.picker.setAttribute("aria-label", "Field to show over time");
+    const button = make("button", "", "Over time");
+    button.title = "Read this place at every step";
+    button.addEventListener("click", () => {
+      button.disabled = true;
+      void this.readSeries().finally(() => (button.disabled = false));
+    });
+    this.picker.addEventListener("change", () => {
+      this.series = null;
+      this.showSeries();
+    });
+    const row = make("div", "histogram-row");
+    row.append(this.picker, button);
+    this.box.append(row);
+    this.plot.toggleAttribute("hidden", true);
+    this.box.append(this.plot);
+  }
+
+  private showPlace(): void {
+    const coordinates = coordinatesOf(this.kit.host.dataset(), this.sample);
+    this.rows.forEach(({ slider, number }, axis) => {
+      const text = formatNumber(coordinates[axis]!, 7);
+      slider.value = String(this.sample[axis]);
+      slider.setAttribute("aria-valuetext", text);
+      number.value = text;
+    });
+  }
+
+  private say(text: string, failed = false): void {
+    this.words.textContent = text;
+    this.words.hidden = text === "";
+    this.words.classList.toggle("failed", failed);
+  }
+
+  private async read(): Promise<void> {
+    const { host } = this.kit;
+    const key = this.key();
+    if (!this.on || !this.box.isConnected || key === this.wanted || host.playing()) return;
+    this.wanted = key;
+    const dataset = host.dataset();
+    try {
+      const at = coordinatesOf(dataset, this.sample);
+      const { values } = await host.api.probe(dataset.id, at, host.view().step ?? 0);
+      if (key !== this.wanted) return;
+      this.values.replaceChildren(
+        ...Object.entries(values).flatMap(([name, { value, units }]) => [
+          make("dt", "", name),
+          make("dd", "", valueText(value, units)),
+        ]),
+      );
+      this.say("");
+    } catch (failure) {
+      if (key !== this.wanted) return;
+      this.values.replaceChildren();
+      this.say(failureText(failure), true);
+    }
+  }
+
+  private async readSeries(): Promise<void> {
+    const { host } = this.kit;
+    const dataset = host.dataset();
+    const [sample, field] = [this.sample, this.picker.value];
+    this.say("reading every step…");
+    try {
+      const at = coordinatesOf(dataset, sample);
+      const series = await host.api.series(dataset.id, field, at);
+      if (sample === this.sample && field === this.picker.value) this.series = series;
+      this.say("");
+    } catch (failure) {
+      this.say(failureText(failure), true);
+    }
+    this.showSeries();
+  }
+
+  private showSeries(): void {
+    const { series, plot } = this;
+    plot.toggleAttribute("hidden", series === null);
+    if (series === null) return;
+    drawCourse(
+      plot,
+      series.values.map(magnitude),
+      unitText(series.units),
+      courseEnds(series.times),
+      this.kit.host.view().step ?? 0,
+    );
+  }
+}

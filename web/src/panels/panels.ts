@@ -1,0 +1,165 @@
+// The panels at the picture's side: lines, media, geometry, camera, method and quality. Built anew
+// for each dataset.
+import GUI from "lil-gui";
+import {
+  compositingHints,
+  compositingOptions,
+  detailHints,
+  detailOptions,
+  hasErrorLimit,
+  methodHints,
+  methodOptions,
+  qualityHint,
+} from "./controls";
+import { errorMetric } from "../base/error_text";
+import { ForecastPlot } from "./forecast_plot";
+import { addLines, type FlowSwitch } from "./panel_lines";
+import { addMedia } from "./panel_media";
+import { keyAccess, PanelKit, type PanelHost } from "./panel_kit";
+import { middleSample, sampleWithin, type Sample } from "../view/sample_position";
+import { ProbePanel, probeTitle } from "./panel_probe";
+import { addCamera, addGeometry, type CameraSwitch } from "./panel_geometry";
+import type { RangeMode } from "./range_choice";
+
+const streamBudgetMs = 33; // of a stream whose view names none
+const firstLimit = 0.01; // of the error, when one is switched on; linear RMSE
+
+export interface PanelActions extends CameraSwitch, FlowSwitch {
+  reset(): void; // back to the dataset's defaults
+  probed(): void; // the probe was moved, or went on or off
+}
+
+export class Panels {
+  private gui: GUI | null = null;
+  private kit: PanelKit | null = null;
+  probe: ProbePanel | null = null;
+  private readonly rangeModes = new Map<string, RangeMode>();
+  private of = ""; // the dataset that they were built for
+  private readonly closed = new Set<string>([
+    "Line shape",
+    "Kernels and jitter",
+    "Motion",
+    "Histogram",
+    probeTitle,
+    "Geometry",
+    "Camera and depth",
+    "Method",
+    "Quality",
+  ]);
+
+  constructor(
+    private readonly container: HTMLElement,
+    private readonly host: PanelHost,
+    private readonly actions: PanelActions,
+  ) {
+    errorMetric.watch(() => this.refresh());
+  }
+
+  build(): void {
+    this.gui?.destroy();
+    const gui = new GUI({
+      container: this.container,
+      title: "View",
+      injectStyles: false, // they are part of the style sheet
+    });
+    const kit = new PanelKit(this.host, this.rangeModes);
+    this.gui = gui;
+    this.kit = kit;
+    addLines(gui, kit, this.actions);
+    addMedia(gui, kit);
+    addGeometry(gui, kit);
+    addCamera(gui, kit, this.actions);
+    this.probe = new ProbePanel(gui, kit, () => this.actions.probed(), this.probePlace());
+    addMethod(gui, kit);
+    addQuality(gui, kit);
+    kit.action(gui, "All defaults", "Everything back to the dataset's defaults", () =>
+      this.actions.reset(),
+    );
+    gui.onOpenClose((folder) => {
+      if (folder._closed) this.closed.add(folder._title);
+      else this.closed.delete(folder._title);
+    });
+    for (const folder of gui.foldersRecursive()) {
+      if (this.closed.has(folder._title)) folder.close();
+    }
+  }
+
+  // The place of the dataset's last panels.
+  private probePlace(): Sample {
+    const dataset = this.host.dataset();
+    const before = this.of === dataset.id ? this.probe : null;
+    this.of = dataset.id;
+    return before === null ? middleSample(dataset) : sampleWithin(dataset, before.place);
+  }
+
+  refresh(): void {
+    this.kit?.refresh();
+  }
+}
+
+function addMethod(gui: GUI, kit: PanelKit): void {
+  const folder = gui.addFolder("Method");
+  const { host } = kit;
+  kit.choice(folder, "method", keyAccess("/method/name"), methodOptions);
+  kit.note(folder, () => methodHints[host.view().method?.name ?? ""] ?? "");
+  const thickness = kit.number(folder, "slab thickness", keyAccess("/method/slabThickness"), {
+    min: 0.05,
+    max: 8,
+    step: 0.05,
+  });
+  kit.showWhen((states) => states.slab, thickness);
+  kit.choice(folder, "compositing", keyAccess("/method/compositing"), compositingOptions);
+  kit.note(folder, () => compositingHints[host.view().method?.compositing ?? ""] ?? "");
+  kit.choice(folder, "detail", keyAccess("/method/detail"), detailOptions);
+  kit.note(folder, () => detailHints[host.view().method?.detail ?? ""] ?? "");
+  kit.number(folder, "stop transmittance", keyAccess("/method/stopTransmittance"), {
+    min: 0,
+    max: 0.05,
+    step: 0.0001,
+  });
+}
+
+function addQuality(gui: GUI, kit: PanelKit): void {
+  const folder = gui.addFolder("Quality");
+  const { host } = kit;
+  const budget = () => host.view().quality?.budgetMs ?? streamBudgetMs;
+  kit.number(
+    folder,
+    "moving budget (ms)",
+    {
+      pointer: "/quality/budgetMs",
+      get: budget,
+      set: (budgetMs) => ({ quality: { budgetMs } }),
+    },
+    { min: 1, max: 500, step: 1 },
+  );
+  const plot = new ForecastPlot({
+    view: () => host.view(),
+    playing: () => host.playing(),
+    frame: () => host.frame(),
+    load: (view) => host.api.forecast(view),
+    budget,
+    setBudget: (budgetMs) => host.change({ quality: { budgetMs } }),
+    maxError: () => host.view().quality?.maxError ?? null,
+    setMaxError: (maxError) => host.change({ quality: { maxError } }),
+  });
+  folder.$children.append(plot.element);
+  kit.onRefresh(() => plot.refresh());
+  let lastLimit = firstLimit;
+  kit.toggle(folder, "limit the error", {
+    pointer: "/quality/maxError",
+    get: hasErrorLimit,
+    set: (on) => ({ quality: { maxError: on ? lastLimit : null } }),
+  });
+  const limit = kit.logarithmic(folder, "max error (linear RMSE)", {
+    pointer: "/quality/maxError",
+    get: (view) => view.quality?.maxError,
+    set: (maxError) => {
+      lastLimit = maxError;
+      return { quality: { maxError } };
+    },
+  });
+  kit.showWhen((states) => states.errorLimit, limit);
+  kit.note(folder, () => qualityHint(host.view()));
+  kit.toggle(folder, "lossless final", keyAccess("/quality/lossless"));
+}

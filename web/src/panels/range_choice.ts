@@ -1,0 +1,155 @@
+// What the colours' range goes by: the dataset's default, the step that is shown, all steps, or
+// numbers of the user's own. A picker; what it reads becomes the view's range.
+import { failureText, type Range } from "../wire/api";
+import { make } from "../base/dom";
+
+export type RangeMode = "default" | "step" | "all" | "custom";
+
+export interface RangeSource {
+  range(): Range | null; // as the view has it
+  defaultRange(): Range | null; // null: not known
+  choose(range: Range | null): void; // null: the default
+  quietly(run: () => void): void; // what it chooses is no step of undo
+  of(): string | null; // what the range is of: of anything else an answer is too late
+  read(step: number | null): Promise<Range | null>; // of that step, or of all
+  step(): number | null; // that is shown; null: steps run
+  modes: Map<string, RangeMode>; // what was chosen before the panel was built anew
+  key: string; // of this range in there
+  steps: number;
+}
+
+const near = (a: number, b: number): boolean =>
+  Math.abs(a - b) <= 1e-5 * (Math.abs(a) + Math.abs(b));
+
+// Whichever end comes first.
+export function sameRange(a: Range | null, b: Range | null): boolean {
+  if (a === null || b === null) return a === b;
+  return near(Math.min(...a), Math.min(...b)) && near(Math.max(...a), Math.max(...b));
+}
+
+export const oriented = (range: Range, like: Range | null): Range =>
+  like !== null && like[0] > like[1] ? [range[1], range[0]] : range;
+
+// Keeps the mode true: a range that comes from elsewhere (a drag, a number, a link) is the user's
+// own, and of a step it is read again when another step is shown.
+export class RangeFollower {
+  mode: RangeMode;
+  private stands: Range | null; // the range that the mode has brought; null: not yet
+  private readFor: number | null = null; // the step that was asked for last
+  private asked = 0;
+  private byHand = false; // the mode was chosen, and its range is still to come
+  private readonly known = new Map<number | null, Range>(); // what the mode has brought so far
+
+  constructor(
+    private readonly source: RangeSource,
+    private readonly failed: (text: string) => void,
+  ) {
+    this.stands = null;
+    this.mode = source.modes.get(source.key) ?? "default";
+    if (this.mode === "all") void this.read(null); // it may have been on its way
+    this.follow();
+  }
+
+  set(mode: RangeMode): void {
+    const { source } = this;
+    this.asked += 1;
+    this.keep(mode);
+    this.byHand = true;
+    this.known.clear();
+    this.readFor = null;
+    this.stands = source.range();
+    if (mode === "default") source.choose(null);
+    if (mode === "all") void this.read(null);
+    this.follow();
+  }
+
+  follow(): void {
+    const { source, mode } = this;
+    const now = source.range();
+    if (now !== null && mode !== "custom" && !this.expects(now)) {
+      this.asked += 1;
+      this.keep(sameRange(now, source.defaultRange()) ? "default" : "custom");
+    }
+    if (this.mode !== "step") return;
+    const step = source.step();
+    if (step === null || step === this.readFor) return;
+    this.readFor = step;
+    void this.read(step);
+  }
+
+  private keep(mode: RangeMode): void {
+    this.mode = mode;
+    this.source.modes.set(this.source.key, mode);
+  }
+
+  // The default takes the old one's place when the server has told it.
+  private expects(now: Range): boolean {
+    if (sameRange(now, this.stands)) return true;
+    // Undo has brought an earlier step's back: the present one's is read again.
+    if ([...this.known.values()].some((range) => sameRange(now, range))) {
+      this.stands = now;
+      this.readFor = null;
+      return true;
+    }
+    const known = this.source.defaultRange();
+    if (this.mode === "default" && (known === null || sameRange(now, known))) {
+      this.stands = now;
+      return true;
+    }
+    if (this.stands !== null || this.mode === "default") return false;
+    this.stands = now; // built anew
+    return true;
+  }
+
+  private async read(step: number | null): Promise<void> {
+    const { source } = this;
+    const asked = ++this.asked;
+    const of = source.of();
+    const late = () => asked !== this.asked || of !== source.of();
+    if (of === null) return;
+    try {
+      const range = await source.read(step);
+      if (late() || range === null || range[0] === range[1]) return;
+      this.stands = range;
+      const now = source.range();
+      this.known.set(step, range);
+      const choose = () => source.choose(oriented(range, now));
+      const byHand = this.byHand;
+      this.byHand = false;
+      if (sameRange(range, now)) return;
+      if (byHand) choose();
+      else source.quietly(choose);
+    } catch (failure) {
+      if (!late()) this.failed(failureText(failure));
+    }
+  }
+}
+
+export class RangeChoice {
+  readonly element = make("label", "range-choice", "range");
+  private readonly picker = make("select");
+  private readonly follower: RangeFollower;
+
+  constructor(source: RangeSource, failed: (text: string) => void) {
+    this.follower = new RangeFollower(source, failed);
+    const modes: [RangeMode, string][] = [["default", "default"]];
+    if (source.steps > 1) modes.push(["step", "this step"], ["all", "all steps"]);
+    else modes.push(["step", "of the data"]);
+    modes.push(["custom", "custom"]);
+    this.picker.append(...modes.map(([mode, text]) => new Option(text, mode)));
+    this.element.title =
+      "What the map's ends stand for. This step: its least and greatest value, anew for each " +
+      "step that rests. All steps: of all, which reads them. Custom: numbers or a drag.";
+    this.element.append(this.picker);
+    this.picker.addEventListener("change", () => {
+      this.follower.set(this.picker.value as RangeMode);
+      this.refresh();
+    });
+    this.refresh();
+  }
+
+  refresh(): void {
+    this.follower.follow();
+    this.picker.value = this.follower.mode;
+  }
+}

@@ -1,0 +1,176 @@
+// The legend drawn into a saved picture, where and as large as the page shows it: what it says and
+// the canvas -> pixels. Lengths are CSS pixels until the context's scale makes them the picture's.
+import { curvePlaces, type LegendEntry } from "../view/legend_entries";
+
+export interface LegendPicture {
+  caption: string; // the dataset and the step's time
+  entries: LegendEntry[];
+  stops(map: string): [at: number, color: string][];
+  font: string; // family
+  cardWidth: number;
+}
+
+export interface Card {
+  x: number;
+  y: number;
+  width: number;
+  height: number;
+}
+
+const edge = 10; // to the picture's
+const gap = 8;
+const pad = 14;
+const captionHeight = 26;
+const stripTop = 28;
+const stripHeight = 14;
+const heightShare = 0.6; // more of a small picture is not covered
+
+const glass = "rgb(10 13 18 / 68%)";
+const covered = "rgb(10 13 18 / 72%)";
+const text = "#dde4ee";
+const quiet = "#a3afbf";
+
+const notesOf = (entry: LegendEntry): string[] =>
+  [entry.note, entry.leftOut].filter((note) => note !== "");
+
+const heightOf = (entry: LegendEntry): number =>
+  stripTop + stripHeight + (entry.range === null ? 0 : 21) + 18 * notesOf(entry).length + 6;
+
+// Cards in rows from the lower left, the caption above them (first of all). `shrink` is what they
+// are drawn smaller by; the places are before it.
+export function placeCards(
+  entries: LegendEntry[],
+  cardWidth: number,
+  width: number,
+  height: number,
+): { cards: Card[]; shrink: number } {
+  const wide = Math.min(cardWidth, width - 2 * edge);
+  const columns = Math.max(1, Math.floor((width - 2 * edge + gap) / (cardWidth + gap)));
+  const rows: number[] = []; // the highest card of each
+  entries.forEach((entry, n) => {
+    const row = Math.floor(n / columns);
+    rows[row] = Math.max(rows[row] ?? 0, heightOf(entry));
+  });
+  const total = rows.reduce((sum, row) => sum + row + gap, captionHeight + edge);
+  const shrink = Math.min(1, (heightShare * height) / total);
+  let bottom = height / shrink - total + captionHeight;
+  const cards = [{ x: edge, y: bottom - captionHeight, width: wide, height: captionHeight }];
+  entries.forEach((entry, n) => {
+    const column = n % columns;
+    if (column === 0) bottom += gap + rows[n / columns]!;
+    const high = heightOf(entry);
+    const x = edge + column * (wide + gap);
+    cards.push({ x, y: bottom - high, width: wide, height: high });
+  });
+  return { cards, shrink };
+}
+
+export function drawLegend(
+  context: CanvasRenderingContext2D,
+  { caption, entries, stops, font, cardWidth }: LegendPicture,
+  scale: number, // pixels a CSS pixel
+): void {
+  const { width, height } = context.canvas;
+  const { cards, shrink } = placeCards(entries, cardWidth, width / scale, height / scale);
+  const write = (
+    words: string,
+    x: number,
+    y: number,
+    style: string,
+    color: string,
+    max: number,
+  ) => {
+    context.font = `${style} ${font}`;
+    context.fillStyle = color;
+    context.fillText(words, x, y, max);
+  };
+  context.save();
+  context.scale(scale * shrink, scale * shrink);
+  context.font = `600 12px ${font}`;
+  cards[0]!.width = Math.min(
+    context.measureText(caption).width + 2 * pad,
+    width / scale / shrink - 2 * edge,
+  );
+  for (const card of cards) {
+    roundCard(context, card);
+    context.fillStyle = glass;
+    context.fill();
+  }
+  const [head, ...rest] = cards as [Card, ...Card[]];
+  write(caption, head.x + pad, head.y + 17, "600 12px", text, head.width - 2 * pad);
+  entries.forEach((entry, n) => {
+    const { x, y, width } = rest[n]!;
+    const left = x + pad;
+    const wide = width - 2 * pad;
+    context.font = `12px ${font}`;
+    const units = context.measureText(entry.units).width;
+    write(entry.title, left, y + 19, "600 12px", text, wide - (units > 0 ? units + 10 : 0));
+    context.textAlign = "right";
+    write(entry.units, left + wide, y + 19, "12px", quiet, wide);
+    drawStrip(context, entry, stops, left, y + stripTop, wide);
+    let line = y + stripTop + stripHeight;
+    context.textAlign = "center";
+    for (const tick of entry.ticks) {
+      const at = left + tick.at * wide;
+      context.fillStyle = text;
+      context.fillRect(at - 0.5, line + 1, 1, 5);
+      write(tick.text, at, line + 17, "11px", text, wide);
+    }
+    context.textAlign = "left";
+    if (entry.range !== null) line += 21;
+    for (const note of notesOf(entry)) {
+      write(note, left, line + 14, "11px", quiet, wide);
+      line += 18;
+    }
+  });
+  context.restore();
+}
+
+function roundCard(context: CanvasRenderingContext2D, { x, y, width, height }: Card): void {
+  const [right, bottom] = [x + width, y + height];
+  context.beginPath();
+  context.moveTo(x + 8, y);
+  context.arcTo(right, y, right, bottom, 8);
+  context.arcTo(right, bottom, x, bottom, 8);
+  context.arcTo(x, bottom, x, y, 8);
+  context.arcTo(x, y, right, y, 8);
+}
+
+function drawStrip(
+  context: CanvasRenderingContext2D,
+  entry: LegendEntry,
+  stops: LegendPicture["stops"],
+  x: number,
+  y: number,
+  width: number,
+): void {
+  const colors = context.createLinearGradient(x, 0, x + width, 0);
+  if (entry.map !== null) for (const stop of stops(entry.map)) colors.addColorStop(...stop);
+  context.save();
+  context.fillStyle = "rgb(255 255 255 / 22%)";
+  context.fillRect(x - 1, y - 1, width + 2, stripHeight + 2);
+  context.fillStyle = entry.map === null ? (entry.color ?? "") : colors;
+  context.fillRect(x, y, width, stripHeight);
+  if (entry.extinction.length > 0) {
+    const at = curvePlaces(entry.extinction).map(
+      ([u, v]) => [x + u * width, y + v * stripHeight] as const,
+    );
+    const curve = (): void => {
+      context.beginPath();
+      for (const place of at) context.lineTo(...place);
+    };
+    context.beginPath();
+    context.rect(x, y, width, stripHeight);
+    context.clip();
+    curve();
+    context.lineTo(at.at(-1)![0], y);
+    context.lineTo(at[0]![0], y);
+    context.fillStyle = covered;
+    context.fill();
+    curve();
+    context.strokeStyle = "#fff";
+    context.lineWidth = 1.2;
+    context.stroke();
+  }
+  context.restore();
+}

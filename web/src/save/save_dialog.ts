@@ -1,0 +1,133 @@
+// The dialog "Save": the choices there -> pictures, animations and kept views, by way of the server
+// and the browser's downloads. One job at a time; what it does and why it failed is told there.
+import { byId } from "../base/dom";
+import {
+  exportSize,
+  frameCount,
+  framesMax,
+  type Animation,
+  type Course,
+  type ExportSize,
+} from "./export_views";
+import { keptList } from "./saved_view_list";
+import { button, Jobs, words } from "./save_jobs";
+import { animationJob, pictureJob, type SaveHost, type SaveSetting } from "./save_work";
+import { openFile } from "./saved_picture";
+import { clamp } from "../base/values";
+import { canRecord } from "./video";
+
+const pictureScaleMax = 4;
+const animationScaleMax = 2;
+const about: Record<string, string> = {
+  zip: "Every frame lossless, with its view inside.",
+  webm: "One file for players, not lossless. Recorded in real time: keep this page in front.",
+};
+
+const input = (id: string) => byId(`save-${id}`, HTMLInputElement);
+const select = (id: string) => byId(`save-${id}`, HTMLSelectElement);
+const fields = (id: string) => byId(`save-${id}`, HTMLFieldSetElement);
+
+// What another dataset begins with.
+function fill(host: SaveHost, dialog: HTMLElement): void {
+  const { id, steps } = host.dataset();
+  const filled = `${id} ${steps.count}`;
+  if (dialog.dataset.of === filled) return;
+  dialog.dataset.of = filled;
+  const last = steps.count - 1;
+  for (const end of ["from", "to"]) input(end).max = String(last);
+  const first = { from: 0, to: last, every: 1, frames: 48, fps: last < 1 ? 12 : 5 };
+  for (const [name, value] of Object.entries(first)) input(name).value = String(value);
+  select("over").value = last < 1 ? "turn" : "steps";
+}
+
+const scaleChosen = (): string => select("scale").value;
+
+const sizeChosen = (host: SaveHost, scaleMax: number): ExportSize =>
+  exportSize(...host.size(), Math.min(Number(scaleChosen()), scaleMax), host.pixelsMax());
+
+function animationChosen(): Animation {
+  // Whatever is typed becomes a number that can be.
+  const number = (id: string): number => {
+    const { value, min, max } = input(id);
+    const most = max === "" ? framesMax : Number(max);
+    const right = clamp(Math.round(Number(value)), Number(min), most);
+    input(id).value = String(right);
+    return right;
+  };
+  const over = select("over").value as Course;
+  const [from, to, every] = [number("from"), number("to"), number("every")];
+  return { over, from, to, every, frames: number("frames"), fps: number("fps") };
+}
+
+function showChoices(host: SaveHost, dialog: HTMLElement, running: boolean): void {
+  const open = host.isOpen();
+  fields("choices").disabled = running || !open;
+  fields("views").disabled = running;
+  button("keep-button").disabled = !open;
+  if (!open) return;
+  const vector = host.view().vector;
+  const [steps, , flow] = select("over").options;
+  steps!.disabled = host.dataset().steps.count < 2;
+  flow!.disabled = !vector?.field || vector.motion?.mode !== "phase";
+  if (select("over").selectedOptions[0]?.disabled) select("over").value = "turn";
+  const chosen = animationChosen();
+  for (const part of dialog.querySelectorAll<HTMLElement>(".of-steps, .of-frames")) {
+    part.hidden = part.classList.contains("of-steps") !== (chosen.over === "steps");
+  }
+  const { width, height, scale } = sizeChosen(host, pictureScaleMax);
+  const limited = scale < Number(scaleChosen()) ? ", the server's limit" : "";
+  words("size").textContent = `${width} × ${height} pixels${limited}.`;
+  const count = frameCount(chosen);
+  const small = sizeChosen(host, animationScaleMax);
+  words("about").textContent =
+    `${count} frame${count === 1 ? "" : "s"} of ${small.width} × ${small.height} pixels, ` +
+    `${Number((count / chosen.fps).toFixed(1))} s. ${about[select("as").value]}`;
+}
+
+// What opens the dialog.
+export function saveDialog(host: SaveHost, baseUri: string): () => void {
+  const dialog = byId("save", HTMLDialogElement);
+  const jobs = new Jobs(dialog, () => show());
+  const show = (): void => showChoices(host, dialog, jobs.running);
+  const kept = keptList(host, baseUri, dialog, jobs);
+
+  const setting = (scaleMax: number): SaveSetting => ({
+    host,
+    baseUri,
+    pixels: sizeChosen(host, scaleMax),
+    legend: input("legend").checked
+      ? { dataset: host.dataset(), view: host.view(), maps: host.maps }
+      : null,
+  });
+
+  const savePicture = (): Promise<void> =>
+    jobs.run(pictureJob(setting(pictureScaleMax), scaleChosen()));
+
+  const saveAnimation = (): Promise<void> => {
+    const chosen = animationChosen();
+    return jobs.run(
+      animationJob(setting(animationScaleMax), chosen, select("as").value === "webm"),
+    );
+  };
+
+  select("as").options[1]!.hidden = !canRecord();
+  fields("choices").addEventListener("change", show);
+  button("save-picture").addEventListener("click", () => void savePicture());
+  button("save-animation").addEventListener("click", () => void saveAnimation());
+  const chooser = byId("picture-file", HTMLInputElement);
+  button("open-picture").addEventListener("click", () => chooser.click());
+  chooser.addEventListener("change", () => {
+    dialog.close();
+    void openFile(chooser.files?.[0], host.files);
+    chooser.value = ""; // the same file may be chosen again
+  });
+
+  return () => {
+    if (dialog.open) return;
+    if (host.isOpen()) fill(host, dialog);
+    jobs.clear();
+    show();
+    kept();
+    dialog.showModal();
+  };
+}

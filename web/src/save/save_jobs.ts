@@ -1,0 +1,85 @@
+// What runs in the dialog "Save": work -> its bar, its last words, and a file that is downloaded.
+import { failureText } from "../wire/api";
+import { byId, make, whenClosed } from "../base/dom";
+import { formatBytes } from "../base/ticks";
+
+export type Tell = (words: string, done?: number) => void; // a fraction, or nobody knows
+
+// What gives the file of this name.
+export interface Job {
+  name: string;
+  work(signal: AbortSignal, tell: Tell): Promise<Blob>;
+}
+
+export const button = (id: string) => byId(id, HTMLButtonElement);
+export const words = (id: string) => byId(`save-${id}`, HTMLElement);
+
+function download(file: Blob, name: string): void {
+  const link = make("a");
+  link.href = URL.createObjectURL(file);
+  link.download = name;
+  link.click();
+  window.setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+}
+
+// One job at a time, with its bar and its last words.
+export class Jobs {
+  private job: AbortController | null = null;
+
+  constructor(
+    private readonly dialog: HTMLDialogElement,
+    private readonly changed: () => void,
+  ) {
+    const stop = () => this.job?.abort();
+    button("save-cancel").addEventListener("click", stop);
+    whenClosed(dialog, stop);
+    dialog.addEventListener("cancel", (event) => {
+      if (this.running) event.preventDefault(); // Escape ends the job first
+      stop();
+    });
+  }
+
+  get running(): boolean {
+    return this.job !== null;
+  }
+
+  clear(): void {
+    words("error").hidden = true;
+    words("said").textContent = "";
+  }
+
+  fail(failure: unknown): void {
+    words("error").textContent = failureText(failure);
+    words("error").hidden = false;
+  }
+
+  async run({ name, work }: Job): Promise<void> {
+    const job = new AbortController();
+    const bar = byId("save-bar", HTMLProgressElement);
+    this.show(job);
+    this.clear();
+    button("save-cancel").focus();
+    try {
+      const file = await work(job.signal, (text, done) => {
+        words("progress").textContent = text;
+        if (done === undefined) bar.removeAttribute("value");
+        else bar.value = done;
+      });
+      job.signal.throwIfAborted();
+      download(file, name);
+      words("said").textContent = `Saved ${name}, ${formatBytes(file.size)}.`;
+    } catch (failure) {
+      if (job.signal.aborted) words("said").textContent = "Cancelled.";
+      else this.fail(failure);
+      job.abort(); // what else is under way
+    }
+    this.show(null);
+    if (this.dialog.open) button("save-close").focus();
+  }
+
+  private show(job: AbortController | null): void {
+    this.job = job;
+    words("job").hidden = job === null;
+    this.changed();
+  }
+}

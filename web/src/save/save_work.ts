@@ -1,0 +1,89 @@
+// The work that the dialog "Save" gives: the view and what was chosen -> a picture, or the frames
+// of an animation in one file, drawn by the server.
+import type { Camera } from "../view/camera";
+import type { ColorMaps } from "../wire/color_maps";
+import {
+  frameCount,
+  framesMax,
+  frameView,
+  pictureView,
+  progressText,
+  type Animation,
+  type ExportSize,
+} from "./export_views";
+import { drawFrame, inOrder } from "../wire/frame_request";
+import type { Dataset, View } from "../wire/protocol";
+import type { Job } from "./save_jobs";
+import { finishPicture, type FileTarget, type Shown } from "./saved_picture";
+import { recordVideo } from "./video";
+import { Zip } from "./zip";
+
+export interface SaveHost {
+  isOpen(): boolean; // there is a dataset, and the view is of it
+  said(): View;
+  view(): View; // with every default
+  camera(): Camera | null;
+  dataset(): Dataset;
+  maps: ColorMaps;
+  size(): [width: number, height: number]; // CSS pixels
+  pixelsMax(): number; // of a picture that the server draws
+  files: FileTarget;
+}
+
+const safeName = (name: string): string => name.replace(/[^\w.-]+/g, "_");
+
+export interface SaveSetting {
+  host: SaveHost;
+  baseUri: string;
+  pixels: ExportSize;
+  legend: Shown | null; // null: without one
+}
+
+const draw = (baseUri: string, view: View, signal: AbortSignal): Promise<Blob> =>
+  drawFrame((url, options) => fetch(url, options), baseUri, view, signal);
+
+// `scale`: as it was chosen, for the name.
+export function pictureJob({ host, baseUri, pixels, legend }: SaveSetting, scale: string): Job {
+  const view = pictureView(host.said(), pixels);
+  return {
+    name: `${safeName(view.dataset ?? "")}-${view.step}-${scale}x.png`,
+    work: async (signal, tell) => {
+      tell("drawing…");
+      const drawn = await draw(baseUri, view, signal);
+      return new Blob([await finishPicture(drawn, view, pixels, legend)], { type: "image/png" });
+    },
+  };
+}
+
+export function animationJob(setting: SaveSetting, chosen: Animation, video: boolean): Job {
+  const { host, baseUri, pixels, legend } = setting;
+  const whole = pictureView(host.said(), pixels);
+  const camera = host.camera()!;
+  const count = frameCount(chosen);
+  const zip = new Zip(new Date());
+  const frames: Blob[] = [];
+  const name = safeName(`${whole.dataset}-${chosen.over}`);
+  const viewOf = (n: number): View => frameView(whole, camera, chosen, n);
+  const work: Job["work"] = async (signal, tell) => {
+    if (count > framesMax) throw new Error(`At most ${framesMax} frames.`);
+    const start = performance.now();
+    const told = (n: number) => tell(progressText(n, count, performance.now() - start), n / count);
+    told(0);
+    await inOrder(
+      count,
+      (n) => draw(baseUri, viewOf(n), signal),
+      async (drawn, n) => {
+        const picture = await finishPicture(drawn, viewOf(n), pixels, legend);
+        signal.throwIfAborted();
+        if (video) frames.push(new Blob([picture], { type: "image/png" }));
+        else zip.add(`${name}-${String(n).padStart(4, "0")}.png`, picture);
+        told(n + 1);
+      },
+    );
+    if (!video) return zip.finish();
+    return recordVideo(frames, chosen.fps, signal, (n) =>
+      tell(`recording ${n} of ${count}`, n / count),
+    );
+  };
+  return { name: `${name}.${video ? "webm" : "zip"}`, work };
+}

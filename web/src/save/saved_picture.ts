@@ -1,0 +1,113 @@
+// Saved pictures: view -> the server's lossless picture, with the legend and the view in it; and a
+// picture that is dropped on the page or chosen -> its view.
+import type { ColorMaps } from "../wire/color_maps";
+import type { ExportSize } from "./export_views";
+import { legendEntries } from "../view/legend_entries";
+import { drawLegend } from "./legend_picture";
+import { textOf, withTexts, type Bytes } from "./png_text";
+import type { Dataset, View } from "../wire/protocol";
+import { readableTime } from "../base/time_text";
+import { isView } from "../wire/view_shape";
+import { completeView } from "../view/view_state";
+
+const keyword = "windsplat-view";
+const fileBytesMax = 400e6;
+const cardWidthMin = 228; // CSS pixels; a phone's legend is narrower than its words
+
+const bytesOf = async (blob: Blob): Promise<Bytes> => new Uint8Array(await blob.arrayBuffer());
+
+export interface Shown {
+  dataset: Dataset;
+  view: View; // with every default, for what the legend says
+  maps: ColorMaps;
+}
+
+// `drawn` is the server's picture of `view`.
+export async function finishPicture(
+  drawn: Blob,
+  view: View,
+  size: ExportSize,
+  legend: Shown | null,
+): Promise<Bytes> {
+  const picture = legend === null ? drawn : await withLegend(drawn, view, size, legend);
+  return withTexts(await bytesOf(picture), {
+    Software: "windsplat",
+    [keyword]: JSON.stringify(view),
+  });
+}
+
+async function withLegend(drawn: Blob, view: View, { scale }: ExportSize, shown: Shown) {
+  const bitmap = await createImageBitmap(drawn, { colorSpaceConversion: "none" });
+  const canvas = document.createElement("canvas");
+  canvas.width = bitmap.width;
+  canvas.height = bitmap.height;
+  const context = canvas.getContext("2d", { alpha: false })!;
+  context.drawImage(bitmap, 0, 0);
+  bitmap.close();
+  const { dataset, maps } = shown;
+  const time = readableTime(dataset.steps.times[view.step ?? 0]?.text ?? "");
+  const step = dataset.steps.count > 1 ? ` · step ${view.step}` : "";
+  drawLegend(
+    context,
+    {
+      caption: `${dataset.title}${step}${time === "" ? "" : ` · ${time}`}`,
+      entries: legendEntries(dataset, completeView(shown.view, view)),
+      stops: (map) => maps.stops(map),
+      font: getComputedStyle(document.body).fontFamily,
+      cardWidth: Math.max(cardWidthMin, document.querySelector(".legend-entry")?.clientWidth ?? 0),
+    },
+    scale,
+  );
+  const blob = await new Promise<Blob | null>((done) => canvas.toBlob(done, "image/png"));
+  if (blob === null) throw new Error("This browser cannot hold so large a picture.");
+  return blob;
+}
+
+// The view of a saved picture; fails with words.
+export async function viewOfFile(file: Blob): Promise<View> {
+  if (file.size > fileBytesMax) throw new Error("This file is too large for a saved picture.");
+  const text = textOf(await bytesOf(file), keyword);
+  if (text === null) throw new Error("This picture holds no view: it was not saved by this page.");
+  return parseView(text);
+}
+
+export function parseView(text: string): View {
+  try {
+    const view: unknown = JSON.parse(text);
+    if (isView(view)) return view;
+  } catch {
+    // told below
+  }
+  throw new Error("The view in this picture cannot be read.");
+}
+
+export interface FileTarget {
+  open(view: View): void;
+  refuse(text: string): void;
+}
+
+export async function openFile(file: Blob | undefined, target: FileTarget): Promise<void> {
+  if (file === undefined) return;
+  await viewOfFile(file).then(
+    (view) => target.open(view),
+    (failure: Error) => target.refuse(failure.message),
+  );
+}
+
+// Files may be dropped anywhere on the page; `hint` is shown while one is above it.
+export function takeDrops(hint: HTMLElement, target: FileTarget): void {
+  const handle = (type: "dragover" | "dragleave" | "drop", run: (event: DragEvent) => void) =>
+    window.addEventListener(type, (event) => {
+      if (!event.dataTransfer?.types.includes("Files")) return;
+      event.preventDefault();
+      // What a dialog does is not to be upset.
+      if (document.querySelector("dialog[open]") === null) run(event);
+      else event.dataTransfer.dropEffect = "none";
+    });
+  handle("dragover", () => (hint.hidden = false));
+  handle("dragleave", (event) => (hint.hidden = event.relatedTarget === null));
+  handle("drop", (event) => {
+    hint.hidden = true;
+    void openFile(event.dataTransfer?.files[0], target);
+  });
+}

@@ -1,0 +1,78 @@
+// The list of kept views in the dialog "Save": what is opened, renamed, deleted or added there.
+import { byId, make } from "../base/dom";
+import { KeptViews, nameMax, type KeptView } from "./saved_views";
+import { withoutSize } from "../view/link";
+import type { Jobs } from "./save_jobs";
+import type { SaveHost } from "./save_work";
+
+// What shows the list anew.
+export function keptList(
+  host: SaveHost,
+  baseUri: string,
+  dialog: HTMLDialogElement,
+  jobs: Jobs,
+): () => void {
+  const views = new KeptViews(
+    () => window.localStorage,
+    `windsplat-views:${new URL(baseUri).pathname}`,
+  );
+  const newName = byId("keep-name", HTMLInputElement);
+
+  function change(run: () => void): void {
+    jobs.clear();
+    try {
+      run();
+    } catch (failure) {
+      jobs.fail(failure);
+    }
+  }
+
+  function row({ id, name: oldName, date, view }: KeptView): HTMLElement {
+    const name = make("input");
+    name.value = oldName;
+    name.maxLength = nameMax;
+    name.ariaLabel = "Name";
+    const act = (text: string, run: () => void): HTMLElement => {
+      const one = make("button", "", text);
+      one.addEventListener("click", run);
+      return one;
+    };
+    const open = act("Open", () => {
+      dialog.close();
+      host.files.open(view);
+    });
+    const remove = act("×", () => {
+      change(() => views.remove(id));
+      show();
+      newName.focus();
+    });
+    const label = (): void => {
+      open.ariaLabel = `Open ${name.value}`;
+      remove.ariaLabel = `Delete ${name.value}`;
+    };
+    label();
+    // The row stays, with the focus and what the mouse is about to press.
+    name.addEventListener("change", () =>
+      change(() => {
+        views.rename(id, name.value);
+        label();
+      }),
+    );
+    const item = make("li");
+    item.append(name, make("time", "", new Date(date).toLocaleDateString()), open, remove);
+    return item;
+  }
+
+  function show(): void {
+    if (host.isOpen()) newName.value = `${host.dataset().id}, step ${host.said().step ?? 0}`;
+    byId("kept", HTMLElement).replaceChildren(...views.list().map(row));
+  }
+
+  byId("keep-form", HTMLFormElement).addEventListener("submit", (event) => {
+    event.preventDefault();
+    const view = withoutSize(host.said());
+    change(() => views.add(newName.value.trim(), view, Date.now()));
+    show();
+  });
+  return show;
+}

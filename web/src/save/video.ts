@@ -1,0 +1,60 @@
+// Pictures -> a WebM video, by the browser's own recorder, which knows no time but the clock's: the
+// frames go onto a canvas one by one as they would be seen.
+import { waitFor } from "../wire/frame_request";
+import { clamp } from "../base/values";
+
+const type = "video/webm";
+
+export const canRecord = (): boolean =>
+  typeof MediaRecorder === "function" &&
+  "captureStream" in HTMLCanvasElement.prototype &&
+  MediaRecorder.isTypeSupported(type);
+
+export async function recordVideo(
+  frames: Blob[],
+  fps: number,
+  signal: AbortSignal,
+  tell: (done: number) => void,
+): Promise<Blob> {
+  const canvas = document.createElement("canvas");
+  const context = canvas.getContext("2d", { alpha: false })!;
+  const paint = async (frame: Blob): Promise<void> => {
+    const bitmap = await createImageBitmap(frame);
+    if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) {
+      canvas.width = bitmap.width;
+      canvas.height = bitmap.height;
+    }
+    context.drawImage(bitmap, 0, 0);
+    bitmap.close();
+  };
+  await paint(frames[0]!); // the stream takes the canvas's size
+  const stream = canvas.captureStream(0);
+  const track = stream.getVideoTracks()[0] as CanvasCaptureMediaStreamTrack;
+  const bits = canvas.width * canvas.height * fps * 0.25;
+  const videoBitsPerSecond = clamp(bits, 2.5e6, 4e7);
+  const recorder = new MediaRecorder(stream, { mimeType: type, videoBitsPerSecond });
+  const parts: Blob[] = [];
+  recorder.ondataavailable = ({ data }) => parts.push(data);
+  const ended = new Promise<void>((resolve, reject) => {
+    recorder.onstop = () => resolve();
+    recorder.onerror = () => reject(new Error("The browser cannot record this video."));
+  });
+  ended.catch(() => {});
+  try {
+    recorder.start();
+    const start = performance.now();
+    // The last frame is told once more at its end, so that it is seen as long as the others.
+    for (let n = 0; n <= frames.length; n++) {
+      await waitFor(start + (1000 * n) / fps - performance.now(), signal);
+      if (n < frames.length) await paint(frames[n]!);
+      track.requestFrame();
+      tell(n);
+    }
+    recorder.stop();
+    await ended;
+  } finally {
+    if (recorder.state !== "inactive") recorder.stop();
+    track.stop();
+  }
+  return new Blob(parts, { type });
+}

@@ -1,0 +1,67 @@
+// The camera of the view: what the user wants to look at -> patches.
+import { frameBox, scaledBox, withProjection, type Angles, type Box } from "./camera";
+import type { Camera } from "./camera";
+import type { Vec3 } from "../base/vec3";
+import type { ViewModel } from "./view_model";
+import type { Patch } from "./view_state";
+
+const globe: Box = { min: [-1, -1, -1], max: [1, 1, 1] }; // of a grid that is bent to a sphere
+
+const round = (v: number): number => Number(v.toFixed(6));
+const roundAll = (v: Vec3): Vec3 => [round(v[0]), round(v[1]), round(v[2])];
+
+export interface CameraControlHost {
+  change(patch: Patch): void;
+  size(): [number, number]; // of the picture, pixels
+  ready(): boolean; // a patch would go out without waiting for earlier ones
+}
+
+export class CameraControl {
+  constructor(
+    private readonly model: ViewModel,
+    private readonly host: CameraControlHost,
+  ) {}
+
+  ready(): boolean {
+    return this.host.ready();
+  }
+
+  camera(): Camera | null {
+    return this.model.camera();
+  }
+
+  setCamera(camera: Camera): void {
+    const { eye, target, up, projection } = camera;
+    const patch: Patch = {
+      eye: roundAll(eye),
+      target: roundAll(target),
+      up: roundAll(up),
+      height: round(camera.height),
+    };
+    if (projection !== this.model.view().camera?.projection) patch.projection = projection;
+    this.host.change({ camera: patch });
+  }
+
+  // The server frames the whole box anew, whatever the window's shape.
+  reset(): void {
+    this.host.change({ camera: { eye: null, target: null, up: null, height: null } });
+  }
+
+  // All of the volume from there, upright; null: there is nothing to look at yet.
+  viewFrom(angles: Angles): Camera | null {
+    const camera = this.camera();
+    if (camera === null) return null;
+    const world = this.model.dataset().world as Box;
+    const { mapping, scale } = this.model.view().geometry ?? {};
+    const box = mapping === "sphere" ? globe : scaledBox(world, scale ?? [1, 1, 1]);
+    const [width, height] = this.host.size();
+    return frameBox(camera, box, angles, width / height);
+  }
+
+  toggleProjection(): void {
+    const camera = this.camera();
+    if (camera === null) return;
+    const other = camera.projection === "perspective" ? "orthographic" : "perspective";
+    this.setCamera(withProjection(camera, other));
+  }
+}

@@ -1,0 +1,99 @@
+// Lets the lines flow: moves /vector/motion/time on while it runs, at most `flowFps` times a second
+// and never before the frame that the last move asked for has come back. Time, timers and the
+// page's state are handed in.
+import { clamp } from "../base/values";
+
+export const flowFps = 15;
+const intervalMs = 1000 / flowFps;
+const gapMsMax = 250; // a stall does not make the lines jump
+const timeMax = 1e6; // the wire's limit, steps
+
+export interface FlowHost {
+  now(): number; // ms
+  setTimeout(run: () => void, ms: number): number;
+  clearTimeout(timer: number): void;
+  hidden(): boolean; // nobody looks
+  wanted(): boolean; // the view's lines are there and move
+  time(): number; // of the view, steps
+  send(time: number): number; // the rev that asks for it
+  ended(): void; // the flow stopped of itself, not because stop() was called
+}
+
+// The view's time `ms` later: one step a second, so that `rate` is cycles a second.
+export function laterTime(time: number, ms: number): number {
+  const next = time + clamp(ms, 0, gapMsMax) / 1000;
+  return next > timeMax ? 0 : Number(next.toFixed(3));
+}
+
+export class Flow {
+  private on = false;
+  private timer: number | null = null;
+  private movedAt: number | null = null; // null: begins anew
+  private sentRev = 0;
+  private answeredRev = 0;
+
+  constructor(private readonly host: FlowHost) {}
+
+  get running(): boolean {
+    return this.on;
+  }
+
+  start(): void {
+    if (this.on) return;
+    this.on = true;
+    this.movedAt = null;
+    this.sentRev = this.answeredRev; // what was asked for before is not waited for
+    this.plan();
+  }
+
+  stop(): void {
+    this.on = false;
+    if (this.timer !== null) this.host.clearTimeout(this.timer);
+    this.timer = null;
+  }
+
+  // A frame of this rev has been drawn.
+  answered(rev: number): void {
+    this.answeredRev = Math.max(this.answeredRev, rev);
+    this.plan();
+  }
+
+  // Someone looks again.
+  seen(): void {
+    this.plan();
+  }
+
+  // The server refused what this rev asked for: a flow that asked for it ends.
+  refused(rev: number): void {
+    if (this.on && rev === this.sentRev) this.end();
+  }
+
+  private end(): void {
+    this.stop();
+    this.host.ended();
+  }
+
+  private plan(): void {
+    if (!this.on || this.timer !== null || this.answeredRev < this.sentRev) return;
+    const waited = this.movedAt === null ? 0 : this.host.now() - this.movedAt;
+    this.timer = this.host.setTimeout(
+      () => {
+        this.timer = null;
+        this.move();
+      },
+      Math.max(0, intervalMs - waited),
+    );
+  }
+
+  private move(): void {
+    if (!this.on || this.host.hidden()) return; // seen() goes on
+    if (!this.host.wanted()) {
+      this.end();
+      return;
+    }
+    const now = this.host.now();
+    const ms = this.movedAt === null ? intervalMs : now - this.movedAt;
+    this.movedAt = now;
+    this.sentRev = this.host.send(laterTime(this.host.time(), ms));
+  }
+}

@@ -1,0 +1,146 @@
+// Undo and redo of the view document, bounded. Pure: documents, times and gestures in, documents
+// out. What belongs to the window (the picture's size) and what time does by itself (played steps,
+// flowing lines) is no part of it: of each entry only what the user's change touched is put back,
+// so undoing a turn of the camera leaves a step that was played to where it is.
+import { withoutSize } from "./link";
+import type { View } from "../wire/protocol";
+import { isObject } from "../base/values";
+
+type Node = Record<string, unknown>;
+
+interface Difference {
+  path: string[];
+  before: unknown; // undefined: was not said
+  after: unknown;
+}
+
+interface Entry {
+  before: View;
+  after: View;
+}
+
+export interface Undone {
+  view: View;
+  what: string; // in words: "camera", "lines and media"
+}
+
+const entriesMax = 200;
+const restMs = 600; // changes of the same things that follow closer are one
+
+const same = (a: unknown, b: unknown): boolean => JSON.stringify(a) === JSON.stringify(b);
+
+// Leaf by leaf; arrays are taken whole.
+export function differences(before: unknown, after: unknown, path: string[] = []): Difference[] {
+  if (!isObject(before) || !isObject(after)) {
+    return same(before, after) ? [] : [{ path, before, after }];
+  }
+  const keys = new Set([...Object.keys(before), ...Object.keys(after)]);
+  return [...keys].flatMap((key) => differences(before[key], after[key], [...path, key]));
+}
+
+function withValue(node: unknown, [key, ...rest]: string[], value: unknown): unknown {
+  if (key === undefined) return value;
+  const copy: Node = isObject(node) ? { ...node } : {};
+  const inner = withValue(copy[key], rest, value);
+  if (inner === undefined) delete copy[key];
+  else copy[key] = inner;
+  return copy;
+}
+
+const apply = (view: View, changes: Difference[], side: "before" | "after"): View =>
+  changes.reduce<unknown>((next, one) => withValue(next, one.path, one[side]), view) as View;
+
+// Paths of all that changed, to the leaves, also where a whole part came or went.
+function leavesOf({ path, before, after }: Difference): string[] {
+  const part = isObject(after) ? after : before;
+  if (!isObject(part)) return [path.join("/")];
+  return Object.keys(part).flatMap((key) =>
+    leavesOf({ path: [...path, key], before: undefined, after: part[key] }),
+  );
+}
+
+const changesOf = (entry: Entry): Difference[] => differences(entry.before, entry.after);
+
+const words: Record<string, string> = {
+  vector: "lines",
+  scalars: "media",
+  depthCue: "depth cue",
+  step: "time step",
+  image: "background",
+};
+
+function whatOf(changes: Difference[]): string {
+  const keys = [...new Set(changes.map(({ path }) => path[0] ?? ""))];
+  if (keys.includes("dataset")) return "dataset";
+  return keys.length > 3 ? "view" : keys.map((key) => words[key] ?? key).join(" and ");
+}
+
+export class ViewHistory {
+  private readonly past: Entry[] = [];
+  private future: Entry[] = [];
+  private open = new Set<string>(); // what the newest entry is of, while more may join it
+  private held = false; // a pointer is down: whatever it does is one entry
+  private lastAt = 0;
+
+  get canUndo(): boolean {
+    return this.past.length > 0;
+  }
+
+  get canRedo(): boolean {
+    return this.future.length > 0;
+  }
+
+  // A pointer went down, or another key: what comes now is an entry of its own.
+  begin(held: boolean): void {
+    this.open.clear();
+    this.held = held;
+  }
+
+  // The pointer is up; what it caused may still be on its way.
+  end(): void {
+    this.held = false;
+  }
+
+  // The user may have changed the view; true if so. now: ms.
+  note(before: View, after: View, now: number): boolean {
+    const changes = differences(withoutSize(before), withoutSize(after));
+    if (changes.length === 0) return false;
+    const leaves = changes.flatMap(leavesOf);
+    const again = now - this.lastAt < restMs && leaves.every((leaf) => this.open.has(leaf));
+    const joins = this.held ? this.open.size > 0 : again;
+    const entry = this.past.at(-1);
+    this.open = new Set(joins ? [...this.open, ...leaves] : leaves);
+    this.lastAt = now;
+    this.future = [];
+    if (joins && entry !== undefined) {
+      entry.after = apply(entry.after, changes, "after");
+      if (changesOf(entry).length === 0) this.past.pop(); // there and back
+      return true;
+    }
+    this.past.push({ before: withoutSize(before), after: withoutSize(after) });
+    if (this.past.length > entriesMax) this.past.shift();
+    return true;
+  }
+
+  // What takes the place of `view`; null: there is nothing to undo. An entry that makes no
+  // difference any more (the server refused it, say) is passed over.
+  undo(view: View): Undone | null {
+    return this.turn(view, this.past, this.future, "before");
+  }
+
+  redo(view: View): Undone | null {
+    return this.turn(view, this.future, this.past, "after");
+  }
+
+  private turn(view: View, from: Entry[], to: Entry[], side: "before" | "after"): Undone | null {
+    this.open.clear();
+    for (let entry = from.pop(); entry !== undefined; entry = from.pop()) {
+      const changes = changesOf(entry);
+      const next = apply(view, changes, side);
+      if (same(next, view)) continue;
+      to.push(entry);
+      return { view: next, what: whatOf(changes) };
+    }
+    return null;
+  }
+}

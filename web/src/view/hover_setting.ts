@@ -1,0 +1,16 @@
+// Whether the value under the cursor is shown, for the browser's session.
+import { Watched } from "../base/observable";
+
+const storageKey = "windsplat.hover";
+
+// A browser may refuse storage; then the setting lasts until a reload.
+function orNull<T>(run: () => T): T | null {
+  try {
+    return run();
+  } catch {
+    return null;
+  }
+}
+
+export const hoverOn = new Watched(orNull(() => sessionStorage.getItem(storageKey)) !== "off");
+hoverOn.watch((on) => orNull(() => sessionStorage.setItem(storageKey, on ? "on" : "off")));

@@ -1,0 +1,106 @@
+// Where samples stand in the world of a view, and the sample that stands at a place. Pure.
+import type { Probe, Value } from "../wire/api";
+import type { Vec3 } from "../base/vec3";
+import { unitText } from "./legend_entries";
+import type { Dataset, View } from "../wire/protocol";
+import { formatNumber } from "../base/ticks";
+
+export const axisNames = ["x", "y", "z"] as const;
+export type Sample = Vec3; // indexes along x, y, z
+
+export const middleSample = (dataset: Dataset): Sample =>
+  axisNames.map((axis) => Math.floor((dataset.dims[axis] - 1) / 2)) as Sample;
+
+export const sampleWithin = (dataset: Dataset, sample: Sample): Sample =>
+  axisNames.map((axis, n) => Math.min(sample[n]!, dataset.dims[axis] - 1)) as Sample;
+
+// Coordinates of a sample, each in its axis's own unit.
+export const coordinatesOf = (dataset: Dataset, sample: Sample): Vec3 =>
+  axisNames.map((axis, n) => dataset.axes[axis].coordinates[sample[n]!] ?? 0) as Vec3;
+
+export function nearestIndex(coordinates: number[], value: number): number {
+  let best = 0;
+  coordinates.forEach((coordinate, index) => {
+    if (Math.abs(coordinate - value) < Math.abs(coordinates[best]! - value)) best = index;
+  });
+  return best;
+}
+
+// What a world coordinate of the dataset is multiplied by under the view's geometry; null where the
+// grid is bent or its vertical axis is another one: the page does not know its places then.
+export function worldFactors(dataset: Dataset, view: View): Vec3 | null {
+  const { vertical = "auto", mapping = "flat", heightField = null, scale } = view.geometry ?? {};
+  if (vertical !== "auto" || mapping !== "flat" || heightField !== null) return null;
+  const edges = dataset.world.max.map((most, axis) => most - dataset.world.min[axis]!);
+  const stretch = scale ?? [1, 1, 1];
+  const longest = Math.max(...edges.map((edge, axis) => edge * stretch[axis]!));
+  return stretch.map((factor) => (factor * Math.max(...edges)) / longest) as Vec3;
+}
+
+export function worldOf(dataset: Dataset, view: View, sample: Sample): Vec3 | null {
+  const factors = worldFactors(dataset, view);
+  if (factors === null) return null;
+  return axisNames.map(
+    (axis, n) => (dataset.axes[axis].world[sample[n]!] ?? 0) * factors[n]!,
+  ) as Vec3;
+}
+
+// The sample nearest to a point of the world; null outside of the box.
+export function sampleAt(dataset: Dataset, view: View, point: Vec3): Sample | null {
+  const factors = worldFactors(dataset, view);
+  if (factors === null) return null;
+  const sample: number[] = [];
+  for (const [n, axis] of axisNames.entries()) {
+    const place = point[n]! / factors[n]!;
+    const slack = 1e-6;
+    const outside = place < dataset.world.min[n]! - slack || place > dataset.world.max[n]! + slack;
+    if (outside) return null;
+    sample.push(nearestIndex(dataset.axes[axis].world, place));
+  }
+  return sample as Sample;
+}
+
+export const magnitude = (value: Value): number | null => {
+  if (!Array.isArray(value)) return value;
+  return value.some((v) => v === null) ? null : Math.hypot(...(value as number[]));
+};
+
+export function valueText(value: Value, units: string): string {
+  const unit = unitText(units);
+  const size = magnitude(value);
+  if (size === null) return "masked";
+  const shown = Array.isArray(value)
+    ? `(${value.map((v) => formatNumber(v ?? NaN)).join(", ")}), |v| ${formatNumber(size)}`
+    : formatNumber(size);
+  return unit === "" ? shown : `${shown} ${unit}`;
+}
+
+export const axisUnit = (units: string): string =>
+  ({ degrees_east: "°E", degrees_north: "°N" })[units] ?? unitText(units);
+
+// A coordinate in words: "23.5 °W", "x 12 km".
+function coordinateText(dataset: Dataset, n: number, value: number, called?: string): string {
+  const { name, units } = dataset.axes[axisNames[n]!];
+  const unit = axisUnit(units);
+  const opposite = value < 0 ? { "°E": "°W", "°N": "°S" }[unit] : undefined;
+  const shown = opposite === undefined ? value : -value;
+  const text = `${formatNumber(shown)} ${opposite ?? unit}`.trim();
+  if (called !== undefined) return `${called} ${text}`;
+  return unit.startsWith("°") ? text : `${name} ${text}`;
+}
+
+// What a probe tells beside the cursor: the fields that are drawn, or else all, and where that is;
+// `axis` is the one across which the place was looked for.
+export function hoverLines(dataset: Dataset, view: View, probe: Probe, axis: number): string[] {
+  const drawn = [view.vector?.field, ...(view.scalars ?? []).map(({ field }) => field)];
+  const { values } = probe;
+  const wanted = drawn.filter((name, n) => name && values[name] && drawn.indexOf(name) === n);
+  const names = wanted.length > 0 ? (wanted as string[]) : Object.keys(values);
+  const told = names.map(
+    (name) => `${name} ${valueText(magnitude(values[name]!.value), values[name]!.units)}`,
+  );
+  const at = axisNames.map((name) => probe.position[name]);
+  const across = coordinateText(dataset, axis, at[axis]!, axis === 2 ? "level" : "section");
+  const along = at.flatMap((value, n) => (n === axis ? [] : [coordinateText(dataset, n, value)]));
+  return [told.join(" · "), `${along.join(", ")} · ${across}`];
+}

@@ -1,0 +1,58 @@
+// A camera's way to a preset: a short turn, or at once for those who want no movement. Whatever
+// else moves the camera on the way ends it there.
+import { between, type Camera } from "../view/camera";
+import { length, subtract } from "../base/vec3";
+import type { MoveQueue } from "./input";
+
+const turnMs = 250;
+const near = 1e-5; // what travels is rounded
+
+export interface TurnHost {
+  now(): number; // ms
+  requestFrame(run: () => void): void;
+  still(): boolean; // no movement is wanted
+}
+
+const isAt = (camera: Camera, place: Camera): boolean =>
+  camera.projection === place.projection &&
+  length(subtract(camera.eye, place.eye)) < near * (1 + length(place.eye)) &&
+  length(subtract(camera.up, place.up)) < near;
+
+// Slow, fast, slow.
+const eased = (t: number): number => t * t * (3 - 2 * t);
+
+export class Turn {
+  private turns = 0;
+
+  constructor(
+    private readonly moves: MoveQueue,
+    private readonly host: TurnHost,
+  ) {}
+
+  to(camera: Camera | null): void {
+    this.turns += 1;
+    if (camera === null) return;
+    if (this.host.still()) this.moves.push(() => camera);
+    else this.begin(camera, this.turns);
+  }
+
+  private begin(to: Camera, turn: number): void {
+    const start = this.host.now();
+    let from: Camera | null = null;
+    let last: Camera | null = null;
+    let left = false; // another hand has taken the camera
+    const step = () => {
+      if (turn !== this.turns || left) return;
+      const t = Math.min(1, (this.host.now() - start) / turnMs);
+      this.moves.push((camera) => {
+        left ||= turn !== this.turns || (last !== null && !isAt(camera, last));
+        if (left) return camera;
+        from ??= camera;
+        last = t < 1 ? between(from, to, eased(t)) : to;
+        return last;
+      });
+      if (t < 1) this.host.requestFrame(step);
+    };
+    step();
+  }
+}

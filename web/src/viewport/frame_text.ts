@@ -1,0 +1,135 @@
+// What a frame's header says, in words for the HUD: its state, its size against the full one, how
+// far it is from the exact picture, and how frames follow each other. Pure.
+import { errorName, errorText, type ErrorMetric } from "../base/error_text";
+import type { ChosenMessage, FrameHeader, StatsMessage } from "../wire/protocol";
+import { formatNumber } from "../base/ticks";
+
+export interface Words {
+  text: string;
+  title: string; // what it means
+}
+
+const meaning =
+  "How far this picture is from the exact one of this view: the root mean square of the " +
+  "difference over all pixels and colours, in linear light, where 1 is full brightness; " +
+  "or the PSNR that belongs to it, -20 log10 of that (key e changes between them).";
+const measured = `${meaning} Measured against a picture drawn with finer settings.`;
+const estimated =
+  `${meaning} Estimated: from what such settings erred in pictures of this dataset ` +
+  "that were measured, or, until some were, in pictures of other data.";
+const unknown = `${meaning} Of this frame it is not known.`;
+
+// The drawing's error, beside the limit that the view sets where it is above that; the encoding's
+// own is told apart by encodingWords.
+export function errorWords(
+  header: FrameHeader,
+  limit: number | null = null,
+  metric: ErrorMetric = "rmse",
+): Words {
+  const known = header.errorMeasured || header.errorEstimated;
+  if (!Number.isFinite(header.error) || !known) return { text: "error unknown", title: unknown };
+  // The header has single precision.
+  const above = limit !== null && header.error > limit * (1 + 1e-6);
+  const kind = header.errorMeasured ? "measured" : "est.";
+  // A greater error is a smaller PSNR.
+  const beyond = metric === "rmse" ? "above" : "below";
+  const allowed = above ? `, ${beyond} ${errorText(limit, metric)}` : "";
+  return {
+    text: `${errorName(metric)} ${errorText(header.error, metric)} ${kind}${allowed}`,
+    title:
+      (header.errorMeasured ? measured : estimated) +
+      (above ? " It is more than the view allows: nothing quick or fine enough keeps that." : ""),
+  };
+}
+
+// text empty: not known.
+export function encodingWords(
+  { codec, jpegError }: FrameHeader,
+  metric: ErrorMetric = "rmse",
+): Words {
+  if (codec === "png") {
+    return { text: "PNG lossless", title: "The picture came without any loss by its encoding." };
+  }
+  const title =
+    "What the encoding as JPEG adds, in the same measure; " +
+    "measured for a final frame, else estimated.";
+  if (!Number.isFinite(jpegError)) return { text: "", title };
+  return { text: `JPEG ${errorText(jpegError, metric)}`, title };
+}
+
+// A frame's width against that of the whole picture: "" full, else 1/2, 1/4 ... or a percentage.
+export function scaleText(width: number, full: number): string {
+  if (width >= full) return "";
+  for (let n = 2; n <= 32; n *= 2) if (Math.abs(width * n - full) < n) return `1/${n}`;
+  return `${Math.max(1, Math.round((100 * width) / full))} %`;
+}
+
+export type FrameState = "moving" | "refining" | "final";
+
+// A further frame of a view that was shown already and is not the last word: the server refines it
+// while the view rests.
+export function frameState(header: FrameHeader, before: FrameHeader | null): FrameState {
+  if (header.final) return "final";
+  const again = before !== null && before.rev === header.rev && before.step === header.step;
+  return again && !before.final ? "refining" : "moving";
+}
+
+// What the way took besides the server's own work, ms: from the patch's departure to the frame's
+// arrival. Only the first frame that echoes a patch tells it; later ones waited for other reasons.
+export function networkMs(header: FrameHeader, arrivedAt: number, lastT: number): number | null {
+  if (header.t === lastT || header.t <= 0) return null;
+  const serverMs = (header.queueUs + header.renderUs + header.encodeUs) / 1000;
+  return Math.max(0, arrivedAt - header.t - serverMs);
+}
+
+const windowMs = 1000;
+
+// Frames and bytes of the last second.
+export class FrameRate {
+  private frames: { at: number; bytes: number }[] = [];
+
+  add(now: number, bytes: number): void {
+    this.frames.push({ at: now, bytes });
+  }
+
+  value(now: number): { fps: number; bytes: number } {
+    this.frames = this.frames.filter(({ at }) => now - at < windowMs);
+    const bytes = this.frames.reduce((sum, frame) => sum + frame.bytes, 0);
+    return { fps: this.frames.length, bytes };
+  }
+}
+
+export const paceText = (fps: number): string => `${fps.toFixed(fps < 10 ? 1 : 0)} steps/s`;
+
+// Steps that did not come as they should; empty: all did.
+export function stepsText({ stepsDropped, stepsNotReady }: StatsMessage): string {
+  const dropped = stepsDropped === 0 ? [] : [`${many(stepsDropped)} left out`];
+  const late = stepsNotReady === 0 ? [] : [`${many(stepsNotReady)} read late`];
+  const parts = [...dropped, ...late];
+  return parts.length === 0 ? "" : `steps: ${parts.join(" · ")}`;
+}
+
+// The method, and what is particular to it.
+export function methodText({ method, compositing, slabThickness }: ChosenMessage): string {
+  const slabs = slabThickness === null ? "" : ` of ${formatNumber(slabThickness, 3)} cells`;
+  return method === "reference" ? method : `${method}${slabs} ${compositing}`;
+}
+
+const many = (n: number): string => {
+  if (n < 1000) return String(n);
+  if (n < 1e6) return `${(n / 1e3).toFixed(1)} k`;
+  return n < 1e9 ? `${(n / 1e6).toFixed(1)} M` : `${(n / 1e9).toFixed(1)} G`;
+};
+
+// What was drawn and what was left out, and what it cost.
+export function workLines(work: ChosenMessage["work"]): [string, string, string] {
+  const drawn = work.samples - work.culled - work.skippedBoth;
+  return [
+    `${many(drawn)} of ${many(work.samples)} samples · culled ${many(work.culled)}` +
+      ` · occluded ${many(work.occluded)}`,
+    `skipped ${many(work.skippedVector)} lines, ${many(work.skippedScalar)} splats,` +
+      ` ${many(work.skippedBoth)} both`,
+    `${many(work.pixelUpdates)} pixel updates · ${many(work.exponentials)} exponentials` +
+      ` · ${work.variant}`,
+  ];
+}

@@ -1,0 +1,116 @@
+// The small cross of axes that tells how the volume is turned. Its six ends are buttons that look
+// from there: east, north and up (or x, y, z), and what is opposite.
+import { cameraFrame, type Angles, type Camera } from "../view/camera";
+import { dot, type Vec3 } from "../base/vec3";
+import { make, makeSvg } from "../base/dom";
+
+const reach = 36; // of the longest arm, percent of the whole
+
+export interface Look {
+  name: string; // "from the south"
+  key: string;
+  sign: string; // on the gizmo; empty for what is behind
+  way: Vec3 | null; // where its end points to; null: is no end of an axis
+  angles: Angles;
+}
+
+type Named = [string, string, Look["key"], Vec3 | null, number, number];
+
+const geographic: Named[] = [
+  ["from the south", "", "1", [0, -1, 0], 0, 0],
+  ["from the north", "N", "2", [0, 1, 0], 180, 0],
+  ["from the east", "E", "3", [1, 0, 0], 90, 0],
+  ["from the west", "", "4", [-1, 0, 0], -90, 0],
+  ["from above", "Up", "5", [0, 0, 1], 0, 90],
+  ["from below", "", "6", [0, 0, -1], 0, -90],
+  ["isometrically", "", "7", null, 45, Math.atan(Math.SQRT1_2) / (Math.PI / 180)],
+];
+const plain: [string, string][] = [
+  ["from −y", ""],
+  ["from +y", "y"],
+  ["from +x", "x"],
+  ["from −x", ""],
+  ["from +z", "z"],
+  ["from −z", ""],
+];
+
+export const looks: Look[] = geographic.map(([name, sign, key, way, azimuth, elevation]) => ({
+  name,
+  sign,
+  key,
+  way,
+  angles: { azimuth, elevation },
+}));
+
+export interface GizmoArm {
+  axis: string;
+  x: number; // right and up on the screen, -1..1
+  y: number;
+  depth: number; // > 0: points away from the eye
+}
+
+const axisOf = (way: Vec3): string => ["x", "y", "z"][way.findIndex((value) => value !== 0)]!;
+
+function armOf(camera: Camera, way: Vec3): GizmoArm {
+  const { right, up, forward } = cameraFrame(camera);
+  return { axis: axisOf(way), x: dot(way, right), y: dot(way, up), depth: dot(way, forward) };
+}
+
+// The three axes, the farthest first.
+export const gizmoArms = (camera: Camera): GizmoArm[] =>
+  (
+    [
+      [1, 0, 0],
+      [0, 1, 0],
+      [0, 0, 1],
+    ] as Vec3[]
+  )
+    .map((way) => armOf(camera, way))
+    .sort((a, b) => b.depth - a.depth);
+
+export class Gizmo {
+  private readonly lines = makeSvg("svg", { viewBox: "-50 -50 100 100", "aria-hidden": "true" });
+  private readonly ends: { look: Look; button: HTMLButtonElement }[] = [];
+
+  constructor(element: HTMLElement, lookFrom: (angles: Angles) => void) {
+    element.append(this.lines);
+    for (const look of looks) {
+      if (look.way === null) continue;
+      const kind = `gizmo-end arm-${axisOf(look.way)}${look.sign === "" ? " opposite" : ""}`;
+      const button = make("button", kind);
+      button.append(make("span"));
+      button.addEventListener("click", () => lookFrom(look.angles));
+      element.append(button);
+      this.ends.push({ look, button });
+    }
+    this.setGeographic(true);
+  }
+
+  setGeographic(on: boolean): void {
+    this.ends.forEach(({ look, button }, n) => {
+      const [name, sign] = on ? [look.name, look.sign] : plain[n]!;
+      button.setAttribute("aria-label", `Look ${name}`);
+      button.title = `Look ${name} (${look.key})`;
+      button.firstElementChild!.textContent = sign;
+    });
+  }
+
+  show(camera: Camera): void {
+    this.lines.replaceChildren(
+      ...gizmoArms(camera).map(({ axis, x, y, depth }) =>
+        makeSvg("line", {
+          class: `arm-${axis}${depth > 0.02 ? " away" : ""}`,
+          x2: x * reach,
+          y2: -y * reach,
+        }),
+      ),
+    );
+    for (const { look, button } of this.ends) {
+      const { x, y, depth } = armOf(camera, look.way!);
+      button.style.left = `${(50 + x * reach).toFixed(2)}%`;
+      button.style.top = `${(50 - y * reach).toFixed(2)}%`;
+      button.style.zIndex = String(Math.round(10 - 9 * depth)); // the nearest lies on top
+      button.classList.toggle("away", depth > 0.02);
+    }
+  }
+}

@@ -1,0 +1,123 @@
+// Times, sizes and errors of the frames that are drawn: the table in the picture's corner (key \).
+// It is read when someone looks at it; nothing in it announces itself.
+import { byId } from "../base/dom";
+import { errorMetric } from "../base/error_text";
+import {
+  encodingWords,
+  errorWords,
+  FrameRate,
+  methodText,
+  networkMs,
+  paceText,
+  scaleText,
+  stepsText,
+  workLines,
+  type FrameState,
+  type Words,
+} from "./frame_text";
+import {
+  frameHeaderBytes,
+  type ChosenMessage,
+  type FrameHeader,
+  type StatsMessage,
+} from "../wire/protocol";
+import { formatBytes } from "../base/ticks";
+import type { DrawnFrame } from "./viewport";
+
+const rateEveryMs = 1000;
+
+const ms = (value: number): string => (value < 10 ? value.toFixed(1) : value.toFixed(0));
+
+function write(element: HTMLElement, { text, title }: Words, before = ""): void {
+  element.textContent = text === "" ? "" : before + text;
+  if (element.title !== title) element.title = title;
+}
+
+export class Hud {
+  private readonly element = byId("hud", HTMLElement);
+  private readonly rate = new FrameRate();
+  private readonly markElement = byId("mark", HTMLElement);
+  private readonly fps = byId("fps", HTMLElement);
+  private readonly bytes = byId("hud-bytes", HTMLElement);
+  private readonly headline = byId("hud-head", HTMLElement);
+  private readonly drawingError = byId("hud-error", HTMLElement);
+  private readonly encodingError = byId("hud-encoding", HTMLElement);
+  private readonly times = byId("hud-times", HTMLElement);
+  private readonly work = byId("hud-work", HTMLElement);
+  private readonly pace = byId("hud-pace", HTMLElement);
+  private readonly stepCounts = byId("hud-steps", HTMLElement);
+  private lastT = -1;
+  private network: number | null = null;
+  private latency: number | null = null;
+  private newest: { header: FrameHeader; limit: number | null } | null = null;
+
+  constructor() {
+    errorMetric.watch(() => this.showErrors());
+    window.setInterval(() => this.showRate(), rateEveryMs);
+  }
+
+  toggle(): boolean {
+    this.element.classList.toggle("folded");
+    return !this.element.classList.contains("folded");
+  }
+
+  // Whether the picture is the last word on what was asked for; else how large it was drawn, as
+  // scaleText tells it.
+  mark(state: FrameState | "offline", scale: string): void {
+    const text = state === "final" || scale === "" ? state : `${state} ${scale}`;
+    if (this.markElement.textContent === text) return;
+    this.markElement.textContent = text;
+    this.markElement.classList.toggle("is-offline", state === "offline");
+    this.markElement.classList.toggle("is-final", state === "final");
+    this.markElement.classList.toggle("is-refining", state === "refining");
+  }
+
+  // How steps run, or ran.
+  steps(stats: StatsMessage): void {
+    const { playFps } = stats;
+    this.pace.textContent = playFps === null ? "" : paceText(playFps);
+    this.stepCounts.textContent = stepsText(stats);
+  }
+
+  // fullWidth: of the whole picture, pixels.
+  show(frame: DrawnFrame, chosen: ChosenMessage | null, fullWidth: number): void {
+    const { header } = frame;
+    this.rate.add(frame.drawnAt, header.payloadBytes + frameHeaderBytes);
+    const network = networkMs(header, frame.arrivedAt, this.lastT);
+    if (network !== null) {
+      this.network = network;
+      this.latency = frame.drawnAt - header.t;
+    }
+    this.lastT = header.t;
+    const scale = scaleText(header.width, fullWidth);
+    const quality = header.codec === "jpeg" ? ` ${header.quality}` : "";
+    this.headline.textContent = [
+      chosen === null ? header.method : methodText(chosen),
+      `${header.width}×${header.height}${scale === "" ? "" : ` (${scale})`}`,
+      `${header.codec}${quality} ${formatBytes(header.payloadBytes)}`,
+      ...(header.cached ? ["cached"] : []),
+    ].join(" · ");
+    this.newest = { header, limit: chosen?.view.quality?.maxError ?? null };
+    this.showErrors();
+    const told = (value: number | null): string => (value === null ? "–" : ms(value));
+    this.times.textContent =
+      `queue ${ms(header.queueUs / 1e3)} · render ${ms(header.renderUs / 1e3)} · ` +
+      `encode ${ms(header.encodeUs / 1e3)} · net ${told(this.network)} · ` +
+      `decode ${ms(frame.decodeMs)} · latency ${told(this.latency)} ms`;
+    this.work.textContent = chosen === null ? "" : workLines(chosen.work).join("\n");
+    this.showRate();
+  }
+
+  private showErrors(): void {
+    if (this.newest === null) return;
+    const { header, limit } = this.newest;
+    write(this.drawingError, errorWords(header, limit, errorMetric.value));
+    write(this.encodingError, encodingWords(header, errorMetric.value), " · ");
+  }
+
+  private showRate(): void {
+    const { fps, bytes } = this.rate.value(performance.now());
+    this.fps.textContent = fps === 0 ? "– fps" : `${fps} fps`;
+    this.bytes.textContent = fps === 0 ? "" : `${formatBytes(bytes)}/s`;
+  }
+}

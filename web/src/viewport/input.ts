@@ -1,0 +1,176 @@
+// Mouse, wheel and touch on the picture -> camera moves, at most one patch a display frame.
+import { drag, pan, roll, zoom, type Camera } from "../view/camera";
+import { clamp } from "../base/values";
+
+export interface CameraHost {
+  camera(): Camera | null; // null: nothing to move yet
+  setCamera(camera: Camera): void;
+  ready(): boolean; // the last camera is not held up on its way
+}
+
+type Move = (camera: Camera) => Camera;
+
+const orbitDegrees = 240; // for a drag as long as the picture is high
+const clickPixels = 5; // what moves no farther is a click
+const twistDegrees = 5; // fingers that turn less only pinch
+const wheelFactor = 1.0015; // zoom a pixel of the wheel, whose notch is about 100
+const wheelPixelsMax = 400; // of one event: a torn-off swipe must not jump
+const pinchFactor = 1.01; // the same for a trackpad's pinch, which comes as a wheel with ctrl
+const pinchPixelsMax = 25;
+const linePixels = 30; // of a wheel that counts lines
+
+// Sends a move at once, and what comes until the next display frame together with that frame:
+// however fast the device reports, one patch a frame goes out, and the first without a wait. While
+// the link holds patches up, moves are gathered until it is free.
+export class MoveQueue {
+  private moves: Move[] = [];
+  private waits = false; // for the next display frame
+
+  constructor(
+    private readonly host: CameraHost,
+    private readonly requestFrame: (run: () => void) => void,
+  ) {}
+
+  push(move: Move): void {
+    this.moves.push(move);
+    if (!this.waits) this.flush();
+  }
+
+  private flush(): void {
+    this.waits = this.moves.length > 0;
+    if (!this.waits) return;
+    this.requestFrame(() => this.flush());
+    if (!this.host.ready()) return;
+    const moves = this.moves;
+    this.moves = [];
+    const camera = this.host.camera();
+    if (camera !== null) this.host.setCamera(moves.reduce((moved, move) => move(moved), camera));
+  }
+}
+
+interface Finger {
+  x: number;
+  y: number;
+}
+
+// Centre and spread (mean distance from the centre) of all fingers, pixels.
+export function gesture(fingers: Finger[]): { x: number; y: number; spread: number } {
+  const x = fingers.reduce((sum, f) => sum + f.x, 0) / fingers.length;
+  const y = fingers.reduce((sum, f) => sum + f.y, 0) / fingers.length;
+  const spread = fingers.reduce((sum, f) => sum + Math.hypot(f.x - x, f.y - y), 0) / fingers.length;
+  return { x, y, spread };
+}
+
+// Degrees by which fingers have turned about their centre, clockwise.
+export function twist(before: Finger[], after: Finger[]): number {
+  const [a, b] = [gesture(before), gesture(after)];
+  let along = 0;
+  let across = 0;
+  before.forEach((finger, n) => {
+    const [x0, y0] = [finger.x - a.x, finger.y - a.y];
+    const [x1, y1] = [after[n]!.x - b.x, after[n]!.y - b.y];
+    along += x0 * x1 + y0 * y1;
+    across += x0 * y1 - y0 * x1;
+  });
+  return (Math.atan2(across, along) * 180) / Math.PI;
+}
+
+// One finger (or the left button) orbits; two fingers, another button or shift pan, two also zoom
+// and turn the picture in its plane.
+export class PointerInput {
+  private readonly fingers = new Map<number, Finger>();
+  private panning = false;
+  private travelled = 0; // pixels since the first finger went down, at most
+  private twisted = 0; // degrees that were not followed yet
+  private twisting = false; // since a finger came or went
+
+  constructor(
+    private readonly element: HTMLElement,
+    private readonly moves: MoveQueue,
+    // A click or tap that moved nothing: fractions of the element's width and height.
+    private readonly clicked: (x: number, y: number, alt: boolean) => void,
+  ) {
+    element.addEventListener("pointerdown", (event) => this.down(event));
+    element.addEventListener("pointermove", (event) => this.move(event));
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"] as const) {
+      element.addEventListener(end, (event) => this.up(event));
+    }
+    element.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+    element.addEventListener("contextmenu", (event) => event.preventDefault());
+  }
+
+  private down(event: PointerEvent): void {
+    if (this.fingers.size === 0) {
+      this.panning = event.button !== 0 || event.shiftKey;
+      this.travelled = 0;
+    } else {
+      this.travelled = Infinity;
+    }
+    this.element.setPointerCapture(event.pointerId);
+    this.holdRoll();
+    this.fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    this.element.classList.add("dragging");
+  }
+
+  private up(event: PointerEvent): void {
+    const known = this.fingers.delete(event.pointerId);
+    this.holdRoll();
+    if (known && event.type === "pointerup" && !this.panning && this.travelled < clickPixels) {
+      const box = this.element.getBoundingClientRect();
+      const x = (event.clientX - box.left) / box.width;
+      this.clicked(x, (event.clientY - box.top) / box.height, event.altKey);
+    }
+    if (this.fingers.size === 0) this.element.classList.remove("dragging");
+  }
+
+  private holdRoll(): void {
+    this.twisted = 0;
+    this.twisting = false;
+  }
+
+  private turn(degrees: number): void {
+    this.twisted += degrees;
+    this.twisting ||= Math.abs(this.twisted) >= twistDegrees;
+    if (!this.twisting) return;
+    const due = this.twisted;
+    this.twisted = 0;
+    this.moves.push((camera) => roll(camera, due));
+  }
+
+  private move(event: PointerEvent): void {
+    const finger = this.fingers.get(event.pointerId);
+    if (finger === undefined) return;
+    const old = [...this.fingers.values()].map((one) => ({ ...one }));
+    const before = gesture(old);
+    this.travelled += Math.hypot(event.clientX - finger.x, event.clientY - finger.y);
+    finger.x = event.clientX;
+    finger.y = event.clientY;
+    const now = [...this.fingers.values()];
+    const after = gesture(now);
+    const height = this.element.clientHeight;
+    const dx = (after.x - before.x) / height;
+    const dy = (after.y - before.y) / height;
+    if (this.fingers.size === 1 && !this.panning) {
+      this.moves.push((camera) => drag(camera, dx * orbitDegrees, dy * orbitDegrees));
+      return;
+    }
+    this.moves.push((camera) => pan(camera, dx, dy));
+    if (before.spread > 1 && after.spread > 1) {
+      const factor = after.spread / before.spread;
+      this.moves.push((camera) => zoom(camera, factor));
+      this.turn(twist(old, now));
+    }
+  }
+
+  private wheel(event: WheelEvent): void {
+    event.preventDefault();
+    this.moves.push((camera) => zoom(camera, wheelZoom(event)));
+  }
+}
+
+// How much nearer a turn of the wheel brings the volume: the target stays where it is.
+export function wheelZoom({ deltaY, deltaMode, ctrlKey }: WheelEvent): number {
+  const [factor, most] = ctrlKey ? [pinchFactor, pinchPixelsMax] : [wheelFactor, wheelPixelsMax];
+  const pixels = deltaY * (deltaMode === 0 ? 1 : linePixels);
+  return factor ** -clamp(pixels, -most, most);
+}

@@ -1,0 +1,75 @@
+// Legend entries -> elements over the picture. Rebuilt only when what it says has changed.
+import { make, makeSvg } from "../base/dom";
+import { curvePlaces, type LegendEntry } from "../view/legend_entries";
+import type { ColorMaps } from "../wire/color_maps";
+
+const stripHeight = 10; // of the curve's own coordinates
+
+export class Legend {
+  private shown = "";
+
+  constructor(
+    private readonly element: HTMLElement,
+    private readonly maps: ColorMaps,
+  ) {}
+
+  show(entries: LegendEntry[]): void {
+    const key = JSON.stringify(entries) + this.maps.names().join();
+    if (key === this.shown) return;
+    this.shown = key;
+    this.element.replaceChildren(...entries.map((entry) => this.entry(entry)));
+    this.element.hidden = entries.length === 0;
+  }
+
+  private entry(entry: LegendEntry): HTMLElement {
+    const box = make("div", `legend-entry legend-${entry.kind}`);
+    const title = make("div", "legend-title");
+    title.append(make("span", "legend-name", entry.title));
+    if (entry.units !== "") title.append(make("span", "legend-units", entry.units));
+    const strip = make("div", "legend-strip");
+    strip.style.background =
+      entry.map === null ? (entry.color ?? "") : this.maps.gradient(entry.map);
+    if (entry.extinction.length > 0) strip.append(extinctionCurve(entry.extinction));
+    box.append(title, strip);
+    if (entry.range !== null) {
+      const ticks = make("div", "legend-ticks");
+      for (const tick of entry.ticks) {
+        const mark = make("span", "legend-tick", tick.text);
+        mark.style.left = `${(100 * tick.at).toFixed(2)}%`;
+        ticks.append(mark);
+      }
+      box.append(ticks);
+    }
+    if (entry.note !== "") box.append(make("div", "legend-note", entry.note));
+    if (entry.leftOut !== "") {
+      box.append(make("div", "legend-note legend-left-out", entry.leftOut));
+    }
+    const said = entry.ticks.map((tick) => tick.text).join(", ");
+    const leftOut = entry.leftOut === "" ? "" : `; ${entry.leftOut}`;
+    box.setAttribute("role", "img");
+    box.setAttribute(
+      "aria-label",
+      `Legend: ${entry.title} ${entry.units}; ticks ${said}${leftOut}`,
+    );
+    return box;
+  }
+}
+
+// How opaque the medium is along its strip: the colours show below the curve, what is above it is
+// covered.
+function extinctionCurve(points: [number, number][]): SVGElement {
+  const at = curvePlaces(points);
+  const path = at
+    .map(([x, y]) => `${(100 * x).toFixed(2)},${(stripHeight * y).toFixed(2)}`)
+    .join(" ");
+  const left = 100 * at[0]![0];
+  const right = 100 * at.at(-1)![0];
+  const svg = makeSvg("svg", {
+    viewBox: `0 0 100 ${stripHeight}`,
+    preserveAspectRatio: "none",
+    "aria-hidden": "true",
+  });
+  svg.append(makeSvg("polygon", { points: `${left},0 ${path} ${right},0`, class: "above" }));
+  svg.append(makeSvg("polyline", { points: path, class: "curve" }));
+  return svg;
+}

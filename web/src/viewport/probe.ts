@@ -1,0 +1,100 @@
+// The probe on the picture: clicks -> its place, its place -> a mark. It is on while its folder in
+// the panel is open.
+import { cameraFrame, degree, pointInPlane, project, type Camera } from "../view/camera";
+import { axisNames, sampleAt, worldOf, type Sample } from "../view/sample_position";
+import type { Dataset, View } from "../wire/protocol";
+
+const edgewiseMax = Math.sin(8 * degree); // a level that is seen flatter tells no places
+
+export interface Found {
+  sample: Sample;
+  axis: 0 | 1 | 2; // it was looked for in the plane across this one
+}
+
+// The probe's controls, which hold its position.
+export interface ProbeControls {
+  readonly on: boolean;
+  readonly place: Sample;
+  open(): void;
+  close(): void;
+  moveTo(sample: Sample): void;
+}
+
+export interface ProbeHost {
+  controls(): ProbeControls | null; // null: no dataset is open
+  camera(): Camera | null;
+  view(): View;
+  dataset(): Dataset;
+  aspect(): number; // of the picture, width over height
+}
+
+export class Probe {
+  constructor(
+    private readonly host: ProbeHost,
+    private readonly mark: SVGElement,
+    private readonly button: HTMLButtonElement,
+  ) {
+    button.addEventListener("click", () => this.toggle());
+  }
+
+  toggle(): void {
+    const controls = this.host.controls();
+    if (controls === null) return;
+    if (controls.on) {
+      controls.close();
+      return;
+    }
+    document.documentElement.classList.remove("no-panel");
+    controls.open();
+  }
+
+  // A place on the picture has no depth of its own: it means the slice, or else the probe's level;
+  // where that is seen from its edge, the upright section through the probe that faces the eye.
+  find(at: [number, number]): Found | null {
+    const controls = this.host.controls();
+    const camera = this.host.camera();
+    if (controls === null || camera === null) return null;
+    const [view, dataset] = [this.host.view(), this.host.dataset()];
+    const slice = view.geometry?.slice;
+    const sample: Sample = [...controls.place];
+    let axis: 0 | 1 | 2 = 2;
+    if (slice) {
+      axis = axisNames.indexOf(slice.axis) as typeof axis;
+      sample[axis] = slice.index;
+    } else {
+      const { forward } = cameraFrame(camera);
+      const edgewise = Math.abs(forward[2]) < edgewiseMax;
+      if (edgewise) axis = Math.abs(forward[0]) > Math.abs(forward[1]) ? 0 : 1;
+    }
+    const world = worldOf(dataset, view, sample);
+    if (world === null) return null;
+    const point = pointInPlane(camera, at, this.host.aspect(), axis, world[axis]);
+    const found = point === null ? null : sampleAt(dataset, view, point);
+    if (found === null) return null;
+    found[axis] = sample[axis];
+    return { sample: found, axis };
+  }
+
+  pick(at: [number, number], deliberate: boolean): void {
+    const controls = this.host.controls();
+    if (controls === null || !(controls.on || deliberate)) return;
+    const found = this.find(at);
+    if (found === null) return;
+    controls.moveTo(found.sample);
+    if (!controls.on) this.toggle();
+  }
+
+  show(): void {
+    const controls = this.host.controls();
+    const on = controls?.on ?? false;
+    this.button.setAttribute("aria-pressed", String(on));
+    const camera = on ? this.host.camera() : null;
+    const point =
+      camera === null ? null : worldOf(this.host.dataset(), this.host.view(), controls!.place);
+    const at = point === null ? null : project(camera!, point, this.host.aspect());
+    this.mark.toggleAttribute("hidden", at === null);
+    if (at === null) return;
+    this.mark.style.left = `${(100 * at[0]).toFixed(2)}%`;
+    this.mark.style.top = `${(100 * at[1]).toFixed(2)}%`;
+  }
+}

@@ -1,0 +1,63 @@
+// The reference on the page: its picture over the shown one, its words in the picture's corner, and
+// the button that is held like the key.
+import { byId } from "../base/dom";
+import type { View } from "../wire/protocol";
+import { Reference } from "./reference";
+import { posted, refusalText } from "../wire/requests";
+
+async function ask(method: string, path: string, body?: View): Promise<unknown> {
+  const response = await fetch(new URL(path, document.baseURI), {
+    ...(body === undefined ? { method } : posted(body)),
+    keepalive: method === "DELETE", // it may be the page's last word
+  });
+  if (!response.ok) throw new Error(await refusalText(response));
+  return response.json().catch(() => null);
+}
+
+function holdByButton(button: HTMLElement, reference: Reference): void {
+  const on = (types: string, run: (event: Event) => void): void =>
+    types.split(" ").forEach((type) => button.addEventListener(type, run));
+  on("pointerdown", (event) => {
+    button.setPointerCapture((event as PointerEvent).pointerId);
+    reference.hold();
+  });
+  on("keydown", (event) => {
+    const { key, repeat } = event as KeyboardEvent;
+    if (!repeat && (key === " " || key === "Enter")) reference.hold();
+  });
+  on("pointerup pointercancel keyup blur", () => reference.release());
+  on("contextmenu", (event) => event.preventDefault()); // of a long touch
+  on("click", () => reference.ask()); // of whoever cannot hold
+}
+
+export function makeReference(canvas: HTMLElement, view: () => View): Reference {
+  const picture = byId("reference-picture", HTMLImageElement);
+  const line = byId("reference", HTMLElement);
+  const reference = new Reference({
+    view,
+    ask,
+    sleep: (ms) => new Promise((done) => window.setTimeout(done, ms)),
+    load: (path) => {
+      picture.src = new URL(path, document.baseURI).href;
+      return picture.decode();
+    },
+    show: (on) => {
+      picture.hidden = !on;
+      byId("reference-mark", HTMLElement).hidden = !on;
+      byId("mark", HTMLElement).hidden = on;
+    },
+    tell: (words, progress) => {
+      line.hidden = words === "";
+      const said = byId("reference-words", HTMLElement);
+      if (said.textContent !== words) said.textContent = words;
+      byId("reference-progress", HTMLElement).textContent = progress;
+    },
+  });
+  holdByButton(byId("reference-button", HTMLButtonElement), reference);
+  // What the picture is of is told there.
+  new MutationObserver(() => reference.follow()).observe(canvas, {
+    attributeFilter: ["data-wanted", "data-step"],
+  });
+  window.addEventListener("pagehide", () => reference.abandon());
+  return reference;
+}

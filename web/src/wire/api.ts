@@ -1,0 +1,164 @@
+// What the page asks of the server besides the stream: GETs of a dataset's fields -> typed answers.
+// fetch is handed in, so that tests can play the server.
+import type { Dataset, DatasetSummary, View } from "./protocol";
+import { notUnderstood, posted, refusalText } from "./requests";
+import { isObject } from "../base/values";
+import type { Vec3 } from "../base/vec3";
+
+export type Range = [number, number];
+
+export interface Histogram {
+  range: Range; // ends of the first and the last bin
+  counts: number[];
+  masked: number; // samples without a value
+  below: number; // samples beyond the range
+  above: number;
+  log: boolean;
+}
+
+export interface FieldRange {
+  range: Range | null; // null: every sample is masked
+  masked: number;
+  rangeOf: "step" | "all";
+}
+
+export interface Position {
+  x: number;
+  y: number;
+  z: number;
+}
+
+export type Value = number | (number | null)[] | null; // null: masked
+
+export interface Probe {
+  position: Position; // of the sample that was read
+  values: Record<string, { value: Value; units: string }>;
+}
+
+export interface SeriesTime {
+  value: number; // in the dataset's timeUnits
+  text: string;
+}
+
+export interface Series {
+  position: Position;
+  times: SeriesTime[]; // one a step
+  values: Value[]; // one a step
+  units: string;
+}
+
+export interface ForecastPoint {
+  method: string;
+  slabThickness: number | null; // grid cells; null: no slabs
+  width: number; // pixels, as rendered
+  height: number;
+  coarser: number; // halvings of the data more than the picture asks for
+  ms: number;
+  error: number; // linear RMSE
+  errorLow: number; // 90 of 100 pictures err between these two
+  errorHigh: number;
+  kind: "measured" | "estimated";
+  pareto: boolean; // nothing as fast errs less
+}
+
+export interface Forecast {
+  points: ForecastPoint[];
+  chosen: number | null;
+}
+
+export interface Answer {
+  ok: boolean;
+  status: number;
+  json(): Promise<unknown>;
+  blob(): Promise<Blob>;
+}
+
+export type Fetch = (url: string, init?: RequestInit) => Promise<Answer>;
+
+const isTime = (value: unknown): boolean => isObject(value) && typeof value.text === "string";
+
+const areTimes = (value: unknown): boolean => Array.isArray(value) && value.every(isTime);
+
+const isRange = (value: unknown): boolean =>
+  Array.isArray(value) && value.length === 2 && value.every(Number.isFinite);
+
+export class Api {
+  constructor(
+    private readonly baseUri: string,
+    private readonly fetch: Fetch,
+  ) {}
+
+  async histogram(id: string, field: string, step: number, bins: number): Promise<Histogram> {
+    const path = `${this.field(id, field)}/histogram?step=${step}&bins=${bins}`;
+    return this.get<Histogram>(path, (a) => isRange(a.range) && Array.isArray(a.counts));
+  }
+
+  // Of one step, or (null) of all: that reads every step and may take long.
+  async range(id: string, field: string, step: number | null): Promise<FieldRange> {
+    const path = `${this.field(id, field)}/range?${step === null ? "of=all" : `step=${step}`}`;
+    return this.get<FieldRange>(path, (a) => a.range === null || isRange(a.range));
+  }
+
+  async probe(id: string, at: Vec3, step: number, signal?: AbortSignal): Promise<Probe> {
+    const path = `${this.dataset(id)}/probe?${place(at)}&step=${step}`;
+    return this.get<Probe>(path, (a) => isObject(a.position) && isObject(a.values), { signal });
+  }
+
+  // Reads every step: it may take long.
+  async series(id: string, field: string, at: Vec3): Promise<Series> {
+    const path = `${this.field(id, field)}/series?${place(at)}`;
+    return this.get<Series>(path, (a) => areTimes(a.times) && Array.isArray(a.values));
+  }
+
+  // What the server expects of the settings that it may choose for a view.
+  async forecast(view: View): Promise<Forecast> {
+    return this.get<Forecast>("v1/forecasts", (a) => Array.isArray(a.points), posted(view));
+  }
+
+  async datasets(): Promise<DatasetSummary[]> {
+    type List = { datasets: DatasetSummary[] };
+    return (await this.get<List>("v1/datasets", (a) => Array.isArray(a.datasets))).datasets;
+  }
+
+  async describe(id: string): Promise<Dataset> {
+    return this.get<Dataset>(this.dataset(id), (a) => isObject(a.dims));
+  }
+
+  // A small picture of it, by its default view.
+  async preview(id: string, width: number, height: number): Promise<Blob> {
+    const path = `${this.dataset(id)}/frame.jpg?width=${width}&height=${height}`;
+    return (await this.answer(path)).blob();
+  }
+
+  private dataset(id: string): string {
+    return `v1/datasets/${encodeURIComponent(id)}`;
+  }
+
+  private field(id: string, field: string): string {
+    return `${this.dataset(id)}/fields/${encodeURIComponent(field)}`;
+  }
+
+  private async get<T>(
+    path: string,
+    looksRight: (answer: Record<string, unknown>) => boolean,
+    init?: RequestInit,
+  ): Promise<T> {
+    const answer = await (await this.answer(path, init)).json().catch(() => null);
+    if (!isObject(answer) || !looksRight(answer)) {
+      throw new Error(notUnderstood);
+    }
+    return answer as T;
+  }
+
+  private async answer(path: string, init?: RequestInit): Promise<Answer> {
+    const response = await this.fetch(new URL(path, this.baseUri).href, init);
+    if (response.ok) return response;
+    throw new Error(await refusalText(response));
+  }
+}
+
+const place = ([x, y, z]: Vec3): string => `x=${x}&y=${y}&z=${z}`;
+
+// What a promise failed with, in words.
+export const failureText = (failure: unknown): string =>
+  failure instanceof Error ? failure.message : String(failure);

@@ -1,0 +1,68 @@
+// Views -> lossless pictures by POST v1/frames, one by one, in order, at most two under way. A
+// server that is busy is asked again when it says so.
+import type { View } from "./protocol";
+import { posted, refusalText } from "./requests";
+import { clamp } from "../base/values";
+
+export type FetchLike = (url: string, options: RequestInit) => Promise<Response>;
+export type Wait = (ms: number, signal: AbortSignal) => Promise<void>;
+
+const triesMax = 20;
+const waitMaxS = 60;
+const busyCodes = [409, 429, 503]; // loading, busy, draining
+
+export const waitFor: Wait = (ms, signal) =>
+  new Promise((resolve, reject) => {
+    const stop = () => {
+      clearTimeout(timer);
+      reject(signal.reason as Error);
+    };
+    const timer = setTimeout(() => {
+      signal.removeEventListener("abort", stop);
+      resolve();
+    }, ms);
+    if (signal.aborted) stop();
+    else signal.addEventListener("abort", stop, { once: true });
+  });
+
+export async function drawFrame(
+  fetch: FetchLike,
+  baseUri: string,
+  view: View,
+  signal: AbortSignal,
+  wait: Wait = waitFor,
+): Promise<Blob> {
+  for (let tries = 1; ; tries++) {
+    const response = await fetch(new URL("v1/frames", baseUri).href, {
+      ...posted(view, { Accept: "image/png" }),
+      signal,
+    }).catch((failure: unknown) => {
+      throw signal.aborted ? failure : new Error("The server cannot be reached.");
+    });
+    if (response.ok) return response.blob();
+    if (tries === triesMax || !busyCodes.includes(response.status)) {
+      throw new Error(await refusalText(response));
+    }
+    const after = Number(response.headers.get("Retry-After") ?? 1);
+    await wait(1000 * clamp(after || 1, 1, waitMaxS), signal);
+  }
+}
+
+// `start` is called for every n in order, but at most `ahead` are begun and not yet taken.
+export async function inOrder<T>(
+  count: number,
+  start: (n: number) => Promise<T>,
+  take: (value: T, n: number) => Promise<void> | void,
+  ahead = 2,
+): Promise<void> {
+  const begun: Promise<T>[] = [];
+  let next = 0;
+  for (let n = 0; n < count; n++) {
+    while (next < count && begun.length < ahead) {
+      const one = start(next++);
+      one.catch(() => {}); // told when its turn comes
+      begun.push(one);
+    }
+    await take(await begun.shift()!, n);
+  }
+}

@@ -1,0 +1,25 @@
+// Views that are posted to the server, and what it says when it refuses.
+import type { Problem, View } from "./protocol";
+
+export function problemText(problem: Problem): string {
+  const details = problem.errors?.map((e) =>
+    e.pointer === "" ? e.detail : `${e.pointer}: ${e.detail}`,
+  );
+  // The detail repeats the first value's text in many cases; the list says it better.
+  if (details !== undefined && details.length > 0) return details.join("; ");
+  return problem.detail === "" ? problem.title : problem.detail;
+}
+
+export const posted = (view: View, headers = {}): RequestInit => ({
+  method: "POST",
+  headers: { "Content-Type": "application/json", ...headers },
+  body: JSON.stringify(view),
+});
+
+// What a server that refused says, in its own words.
+export async function refusalText(response: Pick<Response, "status" | "json">): Promise<string> {
+  const problem = (await response.json().catch(() => null)) as Problem | null;
+  return (problem && problemText(problem)) || `The server answered with HTTP ${response.status}.`;
+}
+
+export const notUnderstood = "The server's answer could not be understood.";
