@@ -228,7 +228,7 @@ test("a lost connection: the mark says offline, the words why, and Now tries at 
       assert.equal(await page.locator("#offline").isVisible(), false);
       wire.close(4410);
       await page.locator("#offline").waitFor();
-      assert.match(await page.locator("#offline-text").textContent(), /nobody did anything/);
+      assert.match(await page.locator("#offline-text").textContent(), /long time without input/);
       assert.equal(await page.locator("#mark").textContent(), "offline");
       const { seq } = await state(page);
       await page.locator("#retry-button").click();

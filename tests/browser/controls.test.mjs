@@ -46,8 +46,8 @@ const numbers = [
   ["Lines", "every n-th sample", 2, "vector", "stride"],
   ["Line shape", "core radius r1", 0.9, "vector", "r1"],
   ["Line shape", "edge radius r2", 2.5, "vector", "r2"],
-  ["Line shape", "white of the head", 0.1, "vector", "headDesaturation"],
-  ["Line shape", "bright by \\|v\\|", 0, "vector", "magnitudeIntensity"],
+  ["Line shape", "head desaturation", 0.1, "vector", "headDesaturation"],
+  ["Line shape", "brightness by \\|v\\|", 0, "vector", "magnitudeIntensity"],
   ["Kernels and jitter", "span \\(strides\\)", 3, "vector", "span"],
   ["Kernels and jitter", "jitter of centre", 0.9, "vector", "jitter", "center"],
   ["Kernels and jitter", "jitter of stride", 0.8, "vector", "jitter", "stride"],
@@ -75,7 +75,7 @@ const visible = [
   ["Lines", "opacity", 0.2],
   ["Lines", "every n-th sample", 3],
   ["Line shape", "edge radius r2", 4],
-  ["Line shape", "white of the head", 0],
+  ["Line shape", "head desaturation", 0],
   ["Kernels and jitter", "jitter of centre", 0],
   ["Kernels and jitter", "pattern", 5],
   ["Camera and depth", "depth cue", 1],
@@ -124,10 +124,10 @@ test("lines that are off take their controls with them", () =>
     await shown.uncheck();
     await page.waitForFunction(() => document.querySelector(".legend-lines") === null);
     assert.equal(await isShown(page, "length", "input"), false);
-    assert.equal(await isShown(page, "tells"), false);
+    assert.equal(await isShown(page, "colour by"), false);
     await shown.check();
     assert.equal(await isShown(page, "length", "input"), true);
-    assert.equal(await isShown(page, "tells"), true);
+    assert.equal(await isShown(page, "colour by"), true);
   }));
 
 test("kernels that do not overlap have no span, no jitter no pattern", () =>
@@ -224,18 +224,18 @@ test("a globe is offered where there are longitudes, and the vertical axis yield
 test("colour tells a direction by the compass, and a scalar by its name", () =>
   withPage(async (page) => {
     assert.equal(await isShown(page, "scalar"), false);
-    await choose(page, "tells", /^direction$/);
+    await choose(page, "colour by", /^direction$/);
     assert.equal(await lastPatch(page, "vector", "color", "by"), "direction");
     assert.equal(await isShown(page, "scalar"), false);
-    await choose(page, "tells", /^a scalar field$/);
+    await choose(page, "colour by", /^a scalar field$/);
     assert.equal(await isShown(page, "scalar"), true);
     const { by, field, range } = await lastPatch(page, "vector", "color");
     assert.deepEqual([by, range], ["scalar", null]);
     const offered = await control(page, "scalar").locator("option").allTextContents();
     assert.ok(offered.some((text) => text.startsWith(field)));
-    await choose(page, "tells", /^height and rise$/);
+    await choose(page, "colour by", /^height and rise$/);
     assert.equal(await isShown(page, "share of rise", "input"), true);
-    await choose(page, "tells", /^nothing/);
+    await choose(page, "colour by", /^constant/);
     assert.equal(await isShown(page, "share of rise", "input"), false);
     assert.equal(await isShown(page, "map"), false, "one colour needs no map");
     await linkSays(page, "vector", "color", "by", "constant");
@@ -256,7 +256,7 @@ test("lines flow at the pace of the frames, and the link waits until they rest",
   withPage(async (page) => {
     await unfold(page, "Motion");
     assert.equal(await isShown(page, "cycles a step", "input"), false);
-    const flow = control(page, "let lines flow", "input");
+    const flow = control(page, "animate lines", "input");
     await flow.check();
     assert.equal(await lastPatch(page, "vector", "motion", "mode"), "phase");
     assert.equal(await isShown(page, "cycles a step", "input"), true);
@@ -280,7 +280,7 @@ test("lines flow at the pace of the frames, and the link waits until they rest",
 test("a hidden page does not let its lines flow; still lines do not", () =>
   withPage(async (page) => {
     await unfold(page, "Motion");
-    await control(page, "let lines flow", "input").check();
+    await control(page, "animate lines", "input").check();
     await page.waitForFunction(
       () => window.patches.filter(({ patch }) => patch.vector?.motion?.time > 0).length >= 3,
     );
@@ -305,7 +305,7 @@ test("a hidden page does not let its lines flow; still lines do not", () =>
       return last?.mode === "still";
     });
     await page.waitForTimeout(300);
-    assert.equal(await control(page, "let lines flow", "input").isChecked(), false);
+    assert.equal(await control(page, "animate lines", "input").isChecked(), false);
     assert.equal(await lastPatch(page, "vector", "motion", "mode"), "still");
   }));
 

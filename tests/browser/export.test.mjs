@@ -214,8 +214,8 @@ test("a file without a view is told in the alert, and the view stays", () =>
     async (page) => {
       const before = await pixels(page);
       for (const [bytes, words] of [
-        [await drawn({ ...turned, image: { width: 32, height: 32 } }), /holds no view/],
-        [Buffer.from("just a text of some length"), /no PNG/],
+        [await drawn({ ...turned, image: { width: 32, height: 32 } }), /contains no view/],
+        [Buffer.from("just a text of some length"), /not a PNG/],
       ]) {
         await drop(page, bytes);
         await page.locator("#alert-text").getByText(words).waitFor();
@@ -291,7 +291,7 @@ test("an animation over steps is a ZIP of the right frames, at most two asked fo
     assert.notEqual(difference(pictures[1], pictures[2]), null);
   }));
 
-test("a turn round the volume looks from all sides", () =>
+test("one orbit around the volume looks from all sides", () =>
   withPage(
     async (page) => {
       await setAnimation(page, { over: "turn", legend: false, frames: 4 });
@@ -468,7 +468,7 @@ test("a link with a view of another shape is told, and the page stays whole", ()
         await page.evaluate((hash) => (location.hash = hash), hashOf(view));
         await page
           .locator("#alert-text")
-          .getByText(/no view that can be read/)
+          .getByText(/no valid view/)
           .waitFor();
       }
       assert.equal((await pixels(page)).hash, before.hash);
@@ -524,7 +524,7 @@ test("where the server keeps no views the long link is copied, and that is said"
     await page.route("**/v1/views", (route) => route.fulfill({ status: 507, json: problem }));
     const link = await share(page);
     assert.deepEqual(JSON.parse(decodeURIComponent(link.split("#!")[1])).scalars, long.scalars);
-    assert.match(await page.locator("#status").textContent(), /long one: no room for views/);
+    assert.match(await page.locator("#status").textContent(), /long form: no room for views/);
     page.faults = page.faults.filter((fault) => !/507/.test(fault));
   }, linkTo(long)));
 

@@ -232,19 +232,19 @@ test("a probe that the server refuses is no alert", () =>
 
 test("each end of the axes looks from there, by a turn or at once", async () => {
   const ways = [
-    ["from the east", "90.0", "0.0"],
-    ["from the north", "180.0", "0.0"],
-    ["from above", "0.0", "90.0"],
-    ["isometrically", "45.0", "35.3"],
-    ["from the west", "-90.0", "0.0"],
-    ["from below", "0.0", "-90.0"],
-    ["from the south", "0.0", "0.0"],
+    ["View from the east", "90.0", "0.0"],
+    ["View from the north", "180.0", "0.0"],
+    ["View from above", "0.0", "90.0"],
+    ["Isometric view", "45.0", "35.3"],
+    ["View from the west", "-90.0", "0.0"],
+    ["View from below", "0.0", "-90.0"],
+    ["View from the south", "0.0", "0.0"],
   ];
   await withPage(async (page) => {
     for (const [name, azimuth, elevation] of ways) {
       const frames = await framesOf(page, async () => {
         await page.evaluate(() => (window.patches.length = 0));
-        await page.getByRole("button", { name: `Look ${name}` }).click();
+        await page.getByRole("button", { name }).click();
         await until(page, "elevation", elevation);
         await until(page, "azimuth", azimuth);
       });
@@ -257,7 +257,7 @@ test("each end of the axes looks from there, by a turn or at once", async () => 
       const { width, height } = await end.boundingBox();
       assert.ok(Math.min(width, height) >= 24);
     }
-    await page.getByRole("button", { name: "Look from the east" }).press("Enter");
+    await page.getByRole("button", { name: "View from the east" }).press("Enter");
     await until(page, "azimuth", "90.0");
     await page.keyboard.press("7");
     await until(page, "azimuth", "45.0");
@@ -265,7 +265,7 @@ test("each end of the axes looks from there, by a turn or at once", async () => 
   });
   await withPage(
     async (page) => {
-      await page.getByRole("button", { name: "Look from the east" }).press("Enter");
+      await page.getByRole("button", { name: "View from the east" }).press("Enter");
       await until(page, "azimuth", "90.0");
       await finalPicture(page);
       assert.equal((await cameras(page)).length, 1, "no movement is wanted");

@@ -171,7 +171,7 @@ test("another colour map changes the picture and the legend", () =>
     await finalPicture(page);
     assert.notEqual((await pixels(page)).hash, before.hash);
     assert.notEqual(await strip(), before.strip);
-    await control(page, "tells").selectOption({
+    await control(page, "colour by").selectOption({
       label: await page
         .locator("#panel option", {
           hasText: /^magnitude/,

@@ -105,16 +105,16 @@ test("a globe is about as high as wide", () =>
 
 test("lines tell their direction and a scalar by their colour", () =>
   withPage(async (page) => {
-    await choose(page, "tells", /^direction$/);
+    await choose(page, "colour by", /^direction$/);
     const direction = await picture(page, "direction");
     const ticks = page.locator(".legend-lines .legend-tick");
     assert.equal((await ticks.allTextContents()).join(""), "NESWN");
-    await choose(page, "tells", /^a scalar field$/);
+    await choose(page, "colour by", /^a scalar field$/);
     const scalar = await picture(page, "scalar");
     assert.notEqual(scalar.hash, direction.hash);
     const named = await page.locator(".legend-lines .legend-name").textContent();
     assert.match(named, /: /);
-    await choose(page, "tells", /^nothing/);
+    await choose(page, "colour by", /^constant/);
     assert.notEqual((await picture(page, "one-color")).hash, scalar.hash);
   }));
 
@@ -126,7 +126,7 @@ test("the texture moves with its time, flows while it is let, and rests when sti
     const begun = await picture(page, "phase-0");
     await type(page, "time \\(steps\\)", 0.4);
     assert.notEqual((await picture(page, "phase-0.4")).hash, begun.hash);
-    const flow = control(page, "let lines flow", "input");
+    const flow = control(page, "animate lines", "input");
     await flow.check();
     const hashes = new Set();
     for (let n = 0; n < 6; n++) {

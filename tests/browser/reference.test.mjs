@@ -143,7 +143,7 @@ test("another view drops it: what is there, and what is being drawn", () =>
 test("the button is held by mouse, finger or space", () =>
   withPage(
     async (page) => {
-      const button = page.getByRole("button", { name: "Reference: hold to see it" });
+      const button = page.getByRole("button", { name: "Reference: hold to show it" });
       const isShown = () => page.locator("#reference-picture").isVisible();
       await button.tap();
       await ready(page);

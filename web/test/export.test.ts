@@ -117,9 +117,9 @@ test("a long text without an end of its keyword is passed over", () => {
 });
 
 test("what is no PNG or is damaged is told, and a cut one ends", () => {
-  assert.throws(() => textOf(utf8("GIF89a and more than that"), "a"), /no PNG/);
-  assert.throws(() => textOf(new Uint8Array(0), "a"), /no PNG/);
-  assert.throws(() => withTexts(utf8("\x89PNG\r\n\x1a\n"), {}), /no PNG/);
+  assert.throws(() => textOf(utf8("GIF89a and more than that"), "a"), /not a PNG/);
+  assert.throws(() => textOf(new Uint8Array(0), "a"), /not a PNG/);
+  assert.throws(() => withTexts(utf8("\x89PNG\r\n\x1a\n"), {}), /not a PNG/);
   const png = withTexts(tinyPng(), { a: "value" });
   for (let length = 33; length < png.length; length++) {
     const found = textOf(png.slice(0, length), "a");
@@ -175,7 +175,7 @@ test("what has not the shape of a view is refused wherever it comes from", async
     '{"dataset":5}',
     '{"step":"3"}',
   ]) {
-    assert.throws(() => parseView(text), /cannot be read/, text);
+    assert.throws(() => parseView(text), /invalid view/, text);
     assert.equal(viewOfHash(`#!${encodeURIComponent(text)}`), null, text);
     const view: unknown = JSON.parse(text);
     const saved = server(() => new Response(JSON.stringify({ id: "k", view })));
@@ -291,7 +291,7 @@ test("a turn goes once round at one height, and its end meets its beginning", ()
   }
 });
 
-test("the flow of the lines runs one step of time a second", () => {
+test("the motion of the lines runs one step of time a second", () => {
   const view: View = { vector: { field: "wind", motion: { mode: "phase", time: 2 } } };
   const flow: Animation = { ...animation, over: "flow", fps: 8 };
   for (const n of [0, 1, 8, 11]) {
@@ -481,12 +481,12 @@ test("whatever the storage holds, the list is a list of views", () => {
   store.text = null;
   assert.throws(() => kept.add("long", { dataset: "x".repeat(1e6) }, 2), /too long/);
   store.full = true;
-  assert.throws(() => kept.add("b", {}, 2), /keeps nothing/);
+  assert.throws(() => kept.add("b", {}, 2), /allows this page no storage/);
   const forbidden = new KeptViews(() => {
     throw new Error("SecurityError");
   }, "key");
   assert.deepEqual(forbidden.list(), []);
-  assert.throws(() => forbidden.add("b", {}, 2), /keeps nothing/);
+  assert.throws(() => forbidden.add("b", {}, 2), /allows this page no storage/);
 });
 
 test("a short link names a view that the server keeps", async () => {

@@ -62,7 +62,7 @@ test("an error is told with its kind: bit 4 estimated, bit 2 measured", () => {
 test("an error above what the view allows says so", () => {
   const moving = header({ flags: 4, error: 0.045 });
   assert.equal(errorWords(moving, 0.01).text, "error 0.045 est., above 0.01");
-  assert.match(errorWords(moving, 0.01).title, /more than the view allows/);
+  assert.match(errorWords(moving, 0.01).title, /exceeds the limit of the view/);
   for (const limit of [0.045, 0.1, null]) {
     assert.equal(errorWords(moving, limit).text, "error 0.045 est.");
   }

@@ -133,7 +133,7 @@ test("the pace in words", () => {
   assert.equal(stepsText(stats({})), "");
   assert.equal(
     stepsText(stats({ stepsDropped: 7, stepsNotReady: 2 })),
-    "steps: 7 left out · 2 read late",
+    "steps: 7 dropped · 2 loaded late",
   );
 });
 

@@ -12,9 +12,9 @@ test("lesser news does not overwrite why the connection is lost", async () => {
   await new Promise((done) => setImmediate(done)); // the colour maps could not be loaded either
   assert.equal(
     page.element("status").textContent,
-    "connection lost: the server is full, all its places are taken",
+    "connection lost: the server has reached its session limit",
   );
-  assert.match(page.element("offline-text").textContent, /full.*Again in \d+ s/);
+  assert.match(page.element("offline-text").textContent, /session limit.*Retrying in \d+ s/);
   page.again();
   assert.notEqual(page.element("status").textContent.slice(0, 10), "connection");
   assert.equal(page.element("offline").hidden, true);

@@ -73,10 +73,10 @@ export class Address {
     if (href.length <= linkMax) return [href, ""];
     try {
       const { id, kept } = await saveView(request, this.baseUri, view);
-      const words = kept === "memory" ? "; it lasts until the server ends" : "";
+      const words = kept === "memory" ? "; valid until the server stops" : "";
       return [linkTo(savedHash(id)), words];
     } catch (failure) {
-      return [href, `, a long one: ${failureText(failure)}`];
+      return [href, ` (long form: ${failureText(failure)})`];
     }
   }
 
@@ -91,7 +91,7 @@ export class Address {
     }
     this.link = "followed";
     const view = viewOfHash(hash);
-    if (view === null) this.status.error("link", "This link holds no view that can be read.");
+    if (view === null) this.status.error("link", "This link contains no valid view.");
     tell(view);
   }
 

@@ -404,7 +404,7 @@ export class App {
 
   onBroken(seq: number): void {
     this.acknowledge(seq, 0);
-    this.parts.status.error("frame", "A frame arrived that is no picture.");
+    this.parts.status.error("frame", "A frame could not be decoded.");
   }
 
   // --- showing -------------------------------------------------------------------------

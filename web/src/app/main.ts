@@ -132,15 +132,15 @@ const arrow = (right: number, down: number) => (event: KeyboardEvent) =>
   );
 
 const bindings: Binding[] = [
-  { keys: ["ArrowLeft"], shown: "←", does: "turn (shift: move) left", run: arrow(-5, 0) },
-  { keys: ["ArrowRight"], shown: "→", does: "turn (shift: move) right", run: arrow(5, 0) },
-  { keys: ["ArrowUp"], shown: "↑", does: "tilt (shift: move) up", run: arrow(0, -5) },
-  { keys: ["ArrowDown"], shown: "↓", does: "tilt (shift: move) down", run: arrow(0, 5) },
-  { keys: ["+", "="], shown: "+", does: "nearer", run: () => moves.push((c) => zoom(c, 1.15)) },
+  { keys: ["ArrowLeft"], shown: "←", does: "rotate (shift: pan) left", run: arrow(-5, 0) },
+  { keys: ["ArrowRight"], shown: "→", does: "rotate (shift: pan) right", run: arrow(5, 0) },
+  { keys: ["ArrowUp"], shown: "↑", does: "tilt (shift: pan) up", run: arrow(0, -5) },
+  { keys: ["ArrowDown"], shown: "↓", does: "tilt (shift: pan) down", run: arrow(0, 5) },
+  { keys: ["+", "="], shown: "+", does: "zoom in", run: () => moves.push((c) => zoom(c, 1.15)) },
   {
     keys: ["-", "_"],
     shown: "−",
-    does: "farther",
+    does: "zoom out",
     run: () => moves.push((c) => zoom(c, 1 / 1.15)),
   },
   {
@@ -152,11 +152,11 @@ const bindings: Binding[] = [
   ...looks.map(({ key, name, angles }) => ({
     keys: [key],
     shown: key,
-    does: `look ${name}`,
+    does: `view ${name}`,
     run: () => lookFrom(angles),
   })),
-  { keys: [","], shown: ",", does: "roll to the left", run: () => moves.push((c) => roll(c, -5)) },
-  { keys: ["."], shown: ".", does: "roll to the right", run: () => moves.push((c) => roll(c, 5)) },
+  { keys: [","], shown: ",", does: "roll left", run: () => moves.push((c) => roll(c, -5)) },
+  { keys: ["."], shown: ".", does: "roll right", run: () => moves.push((c) => roll(c, 5)) },
   {
     keys: ["o"],
     shown: "o",
@@ -169,8 +169,8 @@ const bindings: Binding[] = [
     does: "play (shift: backward) or pause",
     run: (event) => timeBar.toggle(event.shiftKey ? -1 : 1),
   },
-  { keys: ["["], shown: "[", does: "step back", run: () => app.seek(timeBar.neighbour(-1)) },
-  { keys: ["]"], shown: "]", does: "step on", run: () => app.seek(timeBar.neighbour(1)) },
+  { keys: ["["], shown: "[", does: "previous step", run: () => app.seek(timeBar.neighbour(-1)) },
+  { keys: ["]"], shown: "]", does: "next step", run: () => app.seek(timeBar.neighbour(1)) },
   { keys: ["{"], shown: "{", does: "first step", run: () => app.seek(0) },
   { keys: ["}"], shown: "}", does: "last step", run: () => app.seek(timeBar.steps - 1) },
   { keys: ["Mod+z"], shown: modText("z"), does: "undo", run: () => app.undoing.undo() },
@@ -180,15 +180,15 @@ const bindings: Binding[] = [
     does: "redo (or shift with undo)",
     run: () => app.undoing.redo(),
   },
-  { keys: ["i"], shown: "i", does: "probe: values at a place", run: () => probe.toggle() },
+  { keys: ["i"], shown: "i", does: "probe: values at a point", run: () => probe.toggle() },
   {
     keys: ["r"],
     shown: "r (hold)",
-    does: "the reference: this view without error",
+    does: "reference: this view without error",
     run: () => reference.hold(),
     ends: () => reference.release(),
   },
-  { keys: ["Escape"], shown: "esc", does: "drop the reference", run: () => reference.drop() },
+  { keys: ["Escape"], shown: "esc", does: "discard the reference", run: () => reference.drop() },
   {
     keys: ["I"],
     shown: "shift i",
@@ -198,7 +198,7 @@ const bindings: Binding[] = [
       panels.refresh();
     },
   },
-  { keys: ["\\"], shown: "\\", does: "times of the frames", run: () => hud.toggle() },
+  { keys: ["\\"], shown: "\\", does: "frame times and errors", run: () => hud.toggle() },
   { keys: ["e"], shown: "e", does: "errors as RMSE or PSNR", run: toggleErrorMetric },
   { keys: ["d"], shown: "d", does: "datasets", run: () => cards.show() },
   { keys: ["p"], shown: "p", does: "panel", run: togglePanel },

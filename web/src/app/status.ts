@@ -57,17 +57,17 @@ export class Status {
     if (state.name === "live") {
       this.tell("live");
     } else if (state.name === "connecting") {
-      this.tell(state.attempt === 0 ? "connecting…" : `connecting again (${state.attempt})…`);
+      this.tell(state.attempt === 0 ? "connecting…" : `reconnecting (attempt ${state.attempt})…`);
     } else if (state.name === "asleep") {
       this.loaded();
-      this.tell("resting; move the volume to go on");
-      this.offlineText.textContent = `Resting: ${state.reason}.`;
+      this.tell("idle; move the volume to reconnect");
+      this.offlineText.textContent = `Idle: ${state.reason}.`;
     } else if (state.name === "waiting") {
       this.loaded();
       const until = performance.now() + state.delayMs;
       const tell = () => {
         const left = Math.max(0, Math.ceil((until - performance.now()) / 1000));
-        this.offlineText.textContent = `Offline: ${state.reason}. Again in ${left} s.`;
+        this.offlineText.textContent = `Offline: ${state.reason}. Retrying in ${left} s.`;
       };
       this.tell(`connection lost: ${state.reason}`);
       tell();

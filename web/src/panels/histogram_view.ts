@@ -44,9 +44,9 @@ export class HistogramView {
 
   constructor(private readonly source: HistogramSource) {
     this.svg.append(this.bars, ...this.shades, ...this.ends);
-    const logLabel = checkLabel(this.log, "log counts", "Small counts shown larger");
+    const logLabel = checkLabel(this.log, "log counts", "Logarithmic bar heights");
     this.log.checked = source.curve !== undefined; // most media are empty almost everywhere
-    this.clip.title = "From the value that 1 % of the samples stay below to that of 99 %";
+    this.clip.title = "From the 1st to the 99th percentile";
     this.choice = new RangeChoice(source, (text) => this.fail(text));
     const plot = make("div", "histogram-plot");
     plot.append(this.svg);
@@ -170,7 +170,7 @@ export class HistogramView {
     const label = `Histogram of ${source.title()}`;
     if (data === null) {
       this.svg.setAttribute("aria-label", `${label}: none yet`);
-      if (!this.caption.classList.contains("failed")) this.caption.textContent = "counting…";
+      if (!this.caption.classList.contains("failed")) this.caption.textContent = "computing…";
     } else {
       const [low, high] = data.range.map((end) => formatNumber(end));
       const masked = data.masked === 0 ? "" : ` · ${formatNumber(data.masked, 6)} masked`;

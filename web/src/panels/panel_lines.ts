@@ -69,7 +69,7 @@ function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
   const hasScalars = Object.keys(scalars).length > 0;
   kit.choice(
     folder,
-    "tells",
+    "colour by",
     {
       pointer: "/vector/color/by",
       get: (view) => view.vector?.color?.by,
@@ -82,7 +82,7 @@ function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
       [`magnitude${per}`]: "magnitude",
       direction: "direction",
       ...(hasScalars ? { "a scalar field": "scalar" } : {}),
-      "nothing: one colour": "constant",
+      constant: "constant",
     },
   );
   if (hasScalars) {
@@ -130,8 +130,8 @@ function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
 function addShape(parent: GUI, kit: PanelKit, per: string): GUI {
   const folder = parent.addFolder("Line shape");
   addWidth(folder, kit);
-  kit.number(folder, "white of the head", keyAccess("/vector/headDesaturation"));
-  kit.number(folder, "bright by |v|", keyAccess("/vector/magnitudeIntensity"));
+  kit.number(folder, "head desaturation", keyAccess("/vector/headDesaturation"));
+  kit.number(folder, "brightness by |v|", keyAccess("/vector/magnitudeIntensity"));
   addMagnitudes(folder, kit, per);
   kit.choice(folder, "direction", keyAccess("/vector/space"), {
     "by components": "components",
@@ -253,7 +253,7 @@ function addMotion(parent: GUI, kit: PanelKit, flow: FlowSwitch): GUI {
     field: true,
   });
   kit.showWhen((states) => states.motion, rate, time);
-  kit.toggle(folder, "let lines flow", {
+  kit.toggle(folder, "animate lines", {
     pointer: "/vector/motion/time",
     get: () => flow.flowing(),
     set: (on) => {

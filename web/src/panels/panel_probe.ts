@@ -129,7 +129,7 @@ export class ProbePanel {
     box.checked = hoverOn.value;
     box.addEventListener("change", () => hoverOn.set(box.checked));
     this.kit.onRefresh(() => (box.checked = hoverOn.value));
-    const title = "Beside the mouse on the picture (shift + i)";
+    const title = "Shown beside the mouse on the picture (shift + i)";
     this.box.append(checkLabel(box, "values under the cursor", title));
   }
 
@@ -139,7 +139,7 @@ export class ProbePanel {
     this.picker.append(...dataset.fields.map(({ name }) => new Option(name, name)));
     this.picker.setAttribute("aria-label", "Field to show over time");
     const button = make("button", "", "Over time");
-    button.title = "Read this place at every step";
+    button.title = "Read this position at every step";
     button.addEventListener("click", () => {
       button.disabled = true;
       void this.readSeries().finally(() => (button.disabled = false));

@@ -138,8 +138,8 @@ export class RangeChoice {
     modes.push(["custom", "custom"]);
     this.picker.append(...modes.map(([mode, text]) => new Option(text, mode)));
     this.element.title =
-      "What the map's ends stand for. This step: its least and greatest value, anew for each " +
-      "step that rests. All steps: of all, which reads them. Custom: numbers or a drag.";
+      "Values at the ends of the colour map. This step: its minimum and maximum, updated when " +
+      "playback stops. All steps: reads every step. Custom: typed or dragged.";
     this.element.append(this.picker);
     this.picker.addEventListener("change", () => {
       this.follower.set(this.picker.value as RangeMode);

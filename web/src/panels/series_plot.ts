@@ -65,7 +65,7 @@ export function drawCourse(
     now,
     line,
     svgText(2, top - 4, `${high}`, "start"),
-    svgText(width - 2, top - 4, `least ${low}`, "end"),
+    svgText(width - 2, top - 4, `min ${low}`, "end"),
     svgText(2, height - 3, ends[0], "start"),
     svgText(width - 2, height - 3, ends[1], "end"),
   );

@@ -44,7 +44,7 @@ function chunk(type: string, data: Uint8Array): Bytes {
 
 function check(png: Uint8Array): void {
   if (latin(png.subarray(0, 8)) !== signature || latin(png.subarray(12, 16)) !== "IHDR") {
-    throw new Error("This file is no PNG picture.");
+    throw new Error("This file is not a PNG picture.");
   }
 }
 

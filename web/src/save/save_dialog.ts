@@ -20,7 +20,7 @@ const pictureScaleMax = 4;
 const animationScaleMax = 2;
 const about: Record<string, string> = {
   zip: "Every frame lossless, with its view inside.",
-  webm: "One file for players, not lossless. Recorded in real time: keep this page in front.",
+  webm: "One file for players, not lossless. Recorded in real time: keep this page visible.",
 };
 
 const input = (id: string) => byId(`save-${id}`, HTMLInputElement);

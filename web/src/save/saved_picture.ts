@@ -59,7 +59,7 @@ async function withLegend(drawn: Blob, view: View, { scale }: ExportSize, shown:
     scale,
   );
   const blob = await new Promise<Blob | null>((done) => canvas.toBlob(done, "image/png"));
-  if (blob === null) throw new Error("This browser cannot hold so large a picture.");
+  if (blob === null) throw new Error("The picture is too large for this browser.");
   return blob;
 }
 
@@ -67,7 +67,8 @@ async function withLegend(drawn: Blob, view: View, { scale }: ExportSize, shown:
 export async function viewOfFile(file: Blob): Promise<View> {
   if (file.size > fileBytesMax) throw new Error("This file is too large for a saved picture.");
   const text = textOf(await bytesOf(file), keyword);
-  if (text === null) throw new Error("This picture holds no view: it was not saved by this page.");
+  if (text === null)
+    throw new Error("This picture contains no view: it was not saved by this page.");
   return parseView(text);
 }
 
@@ -78,7 +79,7 @@ export function parseView(text: string): View {
   } catch {
     // told below
   }
-  throw new Error("The view in this picture cannot be read.");
+  throw new Error("This picture contains an invalid view.");
 }
 
 export interface FileTarget {

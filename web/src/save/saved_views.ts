@@ -47,7 +47,7 @@ export class KeptViews {
   // Fails, with words, where the browser keeps nothing.
   add(name: string, view: View, date: number): void {
     const list = this.list();
-    if (list.length >= keptMax) throw new Error(`${keptMax} views are kept: delete one first.`);
+    if (list.length >= keptMax) throw new Error(`${keptMax} views are saved: delete one first.`);
     if (JSON.stringify(view).length > viewCharactersMax) throw new Error("This view is too long.");
     this.write([withId({ name: name.slice(0, nameMax), view, date }), ...list]);
   }
@@ -65,7 +65,7 @@ export class KeptViews {
     try {
       this.store().setItem(this.key, JSON.stringify(list));
     } catch {
-      throw new Error("This browser keeps nothing for this page.");
+      throw new Error("This browser allows this page no storage.");
     }
   }
 }

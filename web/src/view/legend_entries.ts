@@ -152,7 +152,7 @@ function mediumEntry(dataset: Dataset, layer: ScalarView): LegendEntry {
       (value - range[0]) / width,
       most > 0 ? extinction / most : 0,
     ]),
-    note: most > 0 ? `opacity up to ${formatNumber(most, 3)} a world unit` : "clear",
+    note: most > 0 ? `opacity up to ${formatNumber(most, 3)} per world unit` : "clear",
     leftOut: "",
   };
 }

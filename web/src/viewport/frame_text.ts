@@ -10,14 +10,14 @@ export interface Words {
 }
 
 const meaning =
-  "How far this picture is from the exact one of this view: the root mean square of the " +
+  "Deviation of this picture from the exact one of this view: the root mean square of the " +
   "difference over all pixels and colours, in linear light, where 1 is full brightness; " +
-  "or the PSNR that belongs to it, -20 log10 of that (key e changes between them).";
+  "or the corresponding PSNR, -20 log10 of that (key e switches).";
 const measured = `${meaning} Measured against a picture drawn with finer settings.`;
 const estimated =
-  `${meaning} Estimated: from what such settings erred in pictures of this dataset ` +
-  "that were measured, or, until some were, in pictures of other data.";
-const unknown = `${meaning} Of this frame it is not known.`;
+  `${meaning} Estimated from measured pictures of this dataset with similar settings, ` +
+  "or of other data while there are none.";
+const unknown = `${meaning} Unknown for this frame.`;
 
 // The drawing's error, beside the limit that the view sets where it is above that; the encoding's
 // own is told apart by encodingWords.
@@ -38,7 +38,7 @@ export function errorWords(
     text: `${errorName(metric)} ${errorText(header.error, metric)} ${kind}${allowed}`,
     title:
       (header.errorMeasured ? measured : estimated) +
-      (above ? " It is more than the view allows: nothing quick or fine enough keeps that." : ""),
+      (above ? " It exceeds the limit of the view: no available setting meets it." : ""),
   };
 }
 
@@ -48,11 +48,11 @@ export function encodingWords(
   metric: ErrorMetric = "rmse",
 ): Words {
   if (codec === "png") {
-    return { text: "PNG lossless", title: "The picture came without any loss by its encoding." };
+    return { text: "PNG lossless", title: "The picture was encoded without loss." };
   }
   const title =
-    "What the encoding as JPEG adds, in the same measure; " +
-    "measured for a final frame, else estimated.";
+    "Error that the JPEG encoding adds, in the same measure; " +
+    "measured for a final frame, otherwise estimated.";
   if (!Number.isFinite(jpegError)) return { text: "", title };
   return { text: `JPEG ${errorText(jpegError, metric)}`, title };
 }
@@ -103,8 +103,8 @@ export const paceText = (fps: number): string => `${fps.toFixed(fps < 10 ? 1 : 0
 
 // Steps that did not come as they should; empty: all did.
 export function stepsText({ stepsDropped, stepsNotReady }: StatsMessage): string {
-  const dropped = stepsDropped === 0 ? [] : [`${many(stepsDropped)} left out`];
-  const late = stepsNotReady === 0 ? [] : [`${many(stepsNotReady)} read late`];
+  const dropped = stepsDropped === 0 ? [] : [`${many(stepsDropped)} dropped`];
+  const late = stepsNotReady === 0 ? [] : [`${many(stepsNotReady)} loaded late`];
   const parts = [...dropped, ...late];
   return parts.length === 0 ? "" : `steps: ${parts.join(" · ")}`;
 }

@@ -23,7 +23,7 @@ const geographic: Named[] = [
   ["from the west", "", "4", [-1, 0, 0], -90, 0],
   ["from above", "Up", "5", [0, 0, 1], 0, 90],
   ["from below", "", "6", [0, 0, -1], 0, -90],
-  ["isometrically", "", "7", null, 45, Math.atan(Math.SQRT1_2) / (Math.PI / 180)],
+  ["isometric", "", "7", null, 45, Math.atan(Math.SQRT1_2) / (Math.PI / 180)],
 ];
 const plain: [string, string][] = [
   ["from −y", ""],
@@ -89,8 +89,8 @@ export class Gizmo {
   setGeographic(on: boolean): void {
     this.ends.forEach(({ look, button }, n) => {
       const [name, sign] = on ? [look.name, look.sign] : plain[n]!;
-      button.setAttribute("aria-label", `Look ${name}`);
-      button.title = `Look ${name} (${look.key})`;
+      button.setAttribute("aria-label", `View ${name}`);
+      button.title = `View ${name} (${look.key})`;
       button.firstElementChild!.textContent = sign;
     });
   }

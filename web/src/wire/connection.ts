@@ -70,11 +70,11 @@ const closeReasons: Record<number, string> = {
   1001: "the server is shutting down",
   1006: "no answer from the server",
   1008: "the server refused this page (origin or token)",
-  1009: "a message was too big for the server",
-  1013: "the server is full, all its places are taken",
-  4400: "the server did not understand a message",
-  4408: "the server did not say hello",
-  4410: "nobody did anything for long, so the server let this page go",
+  1009: "a message was too large for the server",
+  1013: "the server has reached its session limit",
+  4400: "the server rejected a malformed message",
+  4408: "the server sent no hello message",
+  4410: "closed by the server after a long time without input",
 };
 
 export function closeReason(code: number, reason: string): string {
@@ -148,7 +148,7 @@ export class Connection {
     this.socket = socket;
     socket.binaryType = "arraybuffer";
     this.helloTimer = this.clock.setTimeout(() => {
-      if (this.socket === socket) this.fail(4408, "the server did not say hello");
+      if (this.socket === socket) this.fail(4408, "the server sent no hello message");
     }, helloDeadlineMs);
     socket.onmessage = (event) => {
       if (this.socket === socket) this.receive(event.data);

@@ -149,7 +149,7 @@ export function parseServerMessage(text: string): ServerMessage {
   try {
     message = JSON.parse(text);
   } catch {
-    throw new WireError("a message that is no JSON");
+    throw new WireError("a message that is not JSON");
   }
   if (!isObject(message) || typeof message.type !== "string") {
     throw new WireError("a message without a type");
@@ -158,7 +158,7 @@ export function parseServerMessage(text: string): ServerMessage {
     throw new WireError(`a message of unknown type "${message.type.slice(0, 40)}"`);
   }
   const type = message.type as ServerMessage["type"];
-  if (!looksRight[type](message)) throw new WireError(`a broken "${type}" message`);
+  if (!looksRight[type](message)) throw new WireError(`a malformed "${type}" message`);
   return message as unknown as ServerMessage;
 }
 
