@@ -95,13 +95,13 @@ test("a dataset that cannot be opened leaves the shown one as it was", () => {
     page.draws();
     page.app.change({ camera, scalars: [{ field: "temperature", opacity: 0.3 }] });
     page.draws();
-    const before = page.app.said();
+    const before = page.app.explicitView();
     if (twice) page.choose("other");
     page.choose("big");
     const rev = page.rev;
     page.says({ type: "error", id: page.openId, problem: problem(tooBig, 507) });
     page.says({ type: "error", rev, problem: problem(tooBig, 507) });
-    assert.deepEqual(page.app.said(), before);
+    assert.deepEqual(page.app.explicitView(), before);
     assert.deepEqual(told(page), before);
     assert.equal(page.alert, tooBig);
   }
@@ -115,14 +115,14 @@ test("who chooses what is shown while another is being opened stays with it", ()
     page.draws();
     page.app.change({ camera });
     page.draws();
-    const before = page.app.said();
+    const before = page.app.explicitView();
     page.choose("big");
     if (back === "picker") page.choose("storm");
     else page.app.restore({ dataset: "storm", step: 2, camera } as View);
     const wanted = back === "picker" ? before : { ...before, step: 2 };
-    assert.deepEqual(page.app.said(), wanted);
+    assert.deepEqual(page.app.explicitView(), wanted);
     page.opened(big); // too late
-    assert.deepEqual(page.app.said(), wanted);
+    assert.deepEqual(page.app.explicitView(), wanted);
     assert.equal(page.app.dataset().id, "storm");
     assert.equal(page.element("dataset").value, "storm");
     assert.equal(page.element("loading").hidden, true);

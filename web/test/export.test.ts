@@ -19,14 +19,14 @@ import {
   type Animation,
 } from "../src/save/export_views";
 import { drawFrame, inOrder, waitFor, type FetchLike } from "../src/wire/frame_request";
-import { KeptViews, keptMax } from "../src/save/saved_views";
-import { placeCards } from "../src/save/legend_picture";
+import { SavedViews, savedViewsMax } from "../src/save/saved_views";
+import { layoutCards } from "../src/save/legend_picture";
 import { hashOfView, viewOfHash } from "../src/view/link";
 import type { LegendEntry } from "../src/view/legend_entries";
 import { crc32, textOf, utf8, withTexts, type Bytes } from "../src/save/png_text";
 import type { View } from "../src/wire/protocol";
 import { parseView } from "../src/save/saved_picture";
-import { linkMax, loadView, savedHash, savedId, saveView } from "../src/wire/short_link";
+import { linkMax, loadView, shortLinkHash, shortLinkId, storeView } from "../src/wire/short_link";
 import { Zip } from "../src/save/zip";
 
 // --- PNG ------------------------------------------------------------------------------------
@@ -182,7 +182,7 @@ test("what has not the shape of a view is refused wherever it comes from", async
     await assert.rejects(loadView(saved.fetch, "http://host/", "k"), /understood/, text);
     const store = new Store();
     store.text = JSON.stringify([{ name: "a", view, date: 1 }]);
-    assert.deepEqual(new KeptViews(() => store, "key").list(), [], text);
+    assert.deepEqual(new SavedViews(() => store, "key").list(), [], text);
   }
 });
 
@@ -425,7 +425,7 @@ class Store {
 
 test("views are kept, renamed and deleted, the newest first", () => {
   const store = new Store();
-  const kept = new KeptViews(() => store, "key");
+  const kept = new SavedViews(() => store, "key");
   kept.add("one", { step: 1 }, 10);
   kept.add("two", { step: 2 }, 20);
   kept.rename(kept.list()[1]!.id, "eins");
@@ -440,7 +440,7 @@ test("views are kept, renamed and deleted, the newest first", () => {
   assert.deepEqual(namesOf(kept), ["eins"]);
 });
 
-const namesOf = (kept: KeptViews): string[] => kept.list().map(({ name }) => name);
+const namesOf = (kept: SavedViews): string[] => kept.list().map(({ name }) => name);
 
 test("another tab's changes of the list are heeded, by entries of earlier releases too", () => {
   const store = new Store();
@@ -448,7 +448,7 @@ test("another tab's changes of the list are heeded, by entries of earlier releas
     { name: "b", view: {}, date: 2 },
     { name: "a", view: {}, date: 1 },
   ]);
-  const [here, there] = [new KeptViews(() => store, "key"), new KeptViews(() => store, "key")];
+  const [here, there] = [new SavedViews(() => store, "key"), new SavedViews(() => store, "key")];
   const [b, a] = here.list();
   there.add("c", {}, 3);
   there.rename(a!.id, "A");
@@ -462,7 +462,7 @@ test("another tab's changes of the list are heeded, by entries of earlier releas
 
 test("whatever the storage holds, the list is a list of views", () => {
   const store = new Store();
-  const kept = new KeptViews(() => store, "key");
+  const kept = new SavedViews(() => store, "key");
   const good = { name: "a", view: {}, date: 1 };
   for (const [text, count] of [
     ["", 0],
@@ -472,7 +472,7 @@ test("whatever the storage holds, the list is a list of views", () => {
     ['"x"', 0],
     [JSON.stringify([null, 3, "x", [], {}, good, { ...good, view: [] }, { ...good, name: 3 }]), 1],
     [JSON.stringify([{ ...good, date: "now" }, { ...good, name: "n".repeat(999) }, good]), 1],
-    [JSON.stringify(Array.from({ length: 999 }, () => good)), keptMax],
+    [JSON.stringify(Array.from({ length: 999 }, () => good)), savedViewsMax],
   ] as const) {
     store.text = text;
     assert.equal(kept.list().length, count, text.slice(0, 40));
@@ -482,7 +482,7 @@ test("whatever the storage holds, the list is a list of views", () => {
   assert.throws(() => kept.add("long", { dataset: "x".repeat(1e6) }, 2), /too long/);
   store.full = true;
   assert.throws(() => kept.add("b", {}, 2), /allows this page no storage/);
-  const forbidden = new KeptViews(() => {
+  const forbidden = new SavedViews(() => {
     throw new Error("SecurityError");
   }, "key");
   assert.deepEqual(forbidden.list(), []);
@@ -490,13 +490,13 @@ test("whatever the storage holds, the list is a list of views", () => {
 });
 
 test("a short link names a view that the server keeps", async () => {
-  assert.equal(savedId(savedHash("aZ09_-")), "aZ09_-");
+  assert.equal(shortLinkId(shortLinkHash("aZ09_-")), "aZ09_-");
   for (const hash of ["", "#!{}", "#!view=", "#!view=a/b", `#!view=${"x".repeat(200)}`]) {
-    assert.equal(savedId(hash), null);
+    assert.equal(shortLinkId(hash), null);
   }
   const saved = { id: "k7", view: { dataset: "gcm", step: 3 } };
   const { asked, fetch } = server(() => new Response(JSON.stringify(saved), { status: 201 }));
-  assert.deepEqual(await saveView(fetch, "http://host/a/", saved.view), saved);
+  assert.deepEqual(await storeView(fetch, "http://host/a/", saved.view), saved);
   assert.equal(asked[0]!.url, "http://host/a/v1/views");
   assert.equal(asked[0]!.options.method, "POST");
   assert.deepEqual(JSON.parse(asked[0]!.options.body as string), saved.view);
@@ -509,7 +509,7 @@ test("a short link names a view that the server keeps", async () => {
   await assert.rejects(loadView(odd.fetch, "http://host/", "k8"), /understood/);
   const none = server(() => Response.json({ id: "k8", view: null }));
   await assert.rejects(loadView(none.fetch, "http://host/", "k8"), /understood/);
-  assert.ok(savedHash("k7").length < linkMax);
+  assert.ok(shortLinkHash("k7").length < linkMax);
 });
 
 // --- the legend in the picture ------------------------------------------------------------------
@@ -539,7 +539,7 @@ test("legend cards never overlap or leave the picture, however small it is", () 
       const entries = Array.from({ length: count }, (_, n) =>
         entry(n % 3, n === 1 ? null : [0, 1]),
       );
-      const { cards, shrink } = placeCards(entries, 268, width, height);
+      const { cards, shrink } = layoutCards(entries, 268, width, height);
       assert.equal(cards.length, count + 1);
       cards.forEach((a, n) => {
         assert.ok(a.x >= 0 && (a.x + a.width) * shrink <= width, "within the width");

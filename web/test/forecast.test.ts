@@ -6,7 +6,7 @@ import {
   budgetAfter,
   limitAfter,
   logTicks,
-  placeOn,
+  positionOn,
   pointText,
   valueOn,
 } from "../src/panels/forecast";
@@ -23,9 +23,9 @@ test("an axis holds what it shall, leaves out what has no logarithm, and is wide
 
 test("places go by ratios and come back", () => {
   const axis = { low: 1, high: 10_000 };
-  assert.equal(placeOn(axis, 100), 0.5);
-  assert.equal(placeOn(axis, 0), 0);
-  assert.equal(placeOn(axis, 1e9), 1);
+  assert.equal(positionOn(axis, 100), 0.5);
+  assert.equal(positionOn(axis, 0), 0);
+  assert.equal(positionOn(axis, 1e9), 1);
   assert.ok(Math.abs(valueOn(axis, 0.25) - 10) < 1e-9);
   assert.equal(valueOn(axis, 7), 10_000);
 });

@@ -5,15 +5,15 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { errorMetric, toggleErrorMetric } from "../src/base/error_text";
 import {
-  encodingWords,
-  errorWords,
+  encodingLabel,
+  errorLabel,
   FrameRate,
   frameState,
   networkMs,
   scaleText,
 } from "../src/viewport/frame_text";
 import { parseFrameHeader, type FrameHeader } from "../src/wire/protocol";
-import { placeOn } from "../src/viewport/viewport";
+import { pictureRect } from "../src/viewport/viewport";
 
 interface Change {
   flags?: number;
@@ -44,16 +44,16 @@ function header(change: Change = {}): FrameHeader {
 }
 
 test("an error is told with its kind: bit 4 estimated, bit 2 measured", () => {
-  const text = (change: Change) => errorWords(header(change)).text;
+  const text = (change: Change) => errorLabel(header(change)).text;
   assert.equal(text({ flags: 4, error: 0.011 }), "error 0.011 est.");
   assert.equal(text({ flags: 2, error: 3.2e-4 }), "error 3.2e-4 measured");
   assert.equal(text({ flags: 3, error: 0.5 }), "error 0.5 measured", "a final frame's");
   assert.equal(text({ flags: 6, error: 0.5 }), "error 0.5 measured", "what is measured is known");
   assert.equal(text({ flags: 2, error: 0 }), "error 0 measured");
   const said = new Set([
-    errorWords(header({ flags: 4 })).title,
-    errorWords(header({ flags: 2 })).title,
-    errorWords(header({ flags: 0, error: NaN })).title,
+    errorLabel(header({ flags: 4 })).title,
+    errorLabel(header({ flags: 2 })).title,
+    errorLabel(header({ flags: 0, error: NaN })).title,
   ]);
   assert.equal(said.size, 3, "each kind is explained in its own words");
   for (const title of said) assert.match(title, /root mean square/);
@@ -61,23 +61,23 @@ test("an error is told with its kind: bit 4 estimated, bit 2 measured", () => {
 
 test("an error above what the view allows says so", () => {
   const moving = header({ flags: 4, error: 0.045 });
-  assert.equal(errorWords(moving, 0.01).text, "error 0.045 est., above 0.01");
-  assert.match(errorWords(moving, 0.01).title, /exceeds the limit of the view/);
+  assert.equal(errorLabel(moving, 0.01).text, "error 0.045 est., above 0.01");
+  assert.match(errorLabel(moving, 0.01).title, /exceeds the limit of the view/);
   for (const limit of [0.045, 0.1, null]) {
-    assert.equal(errorWords(moving, limit).text, "error 0.045 est.");
+    assert.equal(errorLabel(moving, limit).text, "error 0.045 est.");
   }
 });
 
 test("an error is told in dB as well: 20 for each power of ten, and a limit is then below", () => {
   const text = (change: Change, limit: number | null = null) =>
-    errorWords(header({ flags: 4, ...change }), limit, "psnr").text;
+    errorLabel(header({ flags: 4, ...change }), limit, "psnr").text;
   assert.equal(text({ error: 0.1 }), "PSNR 20.0 dB est.");
   assert.equal(text({ error: 1e-4 }), "PSNR 80.0 dB est.");
   assert.equal(text({ error: 0.5, flags: 2 }), "PSNR 6.0 dB measured");
   assert.equal(text({ error: 0, flags: 2 }), "PSNR ∞ dB measured");
   assert.equal(text({ error: 0.1 }, 0.01), "PSNR 20.0 dB est., below 40.0 dB");
   assert.equal(text({ error: NaN }), "error unknown");
-  assert.equal(encodingWords(header({ jpegError: 0.01 }), "psnr").text, "JPEG 40.0 dB");
+  assert.equal(encodingLabel(header({ jpegError: 0.01 }), "psnr").text, "JPEG 40.0 dB");
 });
 
 test("the choice of how errors are told is the page's one, and tells who shows them", () => {
@@ -97,18 +97,18 @@ test("an error that is no number, or of no kind, is unknown", () => {
     { flags: 0, error: NaN },
     { flags: 9, error: 0.25 },
   ]) {
-    assert.equal(errorWords(header(change)).text, "error unknown", JSON.stringify(change));
+    assert.equal(errorLabel(header(change)).text, "error unknown", JSON.stringify(change));
   }
 });
 
 test("the encoding's error stands apart, and a PNG has none", () => {
-  assert.equal(encodingWords(header({ jpegError: 4.1e-3 })).text, "JPEG 0.0041");
+  assert.equal(encodingLabel(header({ jpegError: 4.1e-3 })).text, "JPEG 0.0041");
   assert.equal(
-    encodingWords(header({ jpegError: NaN })).text,
+    encodingLabel(header({ jpegError: NaN })).text,
     "",
     "nothing is better than a guess",
   );
-  assert.equal(encodingWords(header({ codec: 2, jpegError: NaN })).text, "PNG lossless");
+  assert.equal(encodingLabel(header({ codec: 2, jpegError: NaN })).text, "PNG lossless");
 });
 
 test("a frame is as large as the whole picture, a half of it, or so many percent", () => {
@@ -139,11 +139,11 @@ test("pictures of any size fill a canvas of their shape, others keep theirs", ()
   for (const share of [1, 0.9, 0.77, 0.5, 0.31, 0.125, 0.03]) {
     const width = Math.max(1, Math.ceil(1280 * share));
     const height = Math.max(1, Math.ceil(720 * share));
-    assert.deepEqual(placeOn(canvas, { width, height }), all, `${width} x ${height}`);
+    assert.deepEqual(pictureRect(canvas, { width, height }), all, `${width} x ${height}`);
   }
-  assert.deepEqual(placeOn(canvas, { width: 20, height: 12 }), all, "rounding is no shape");
-  assert.deepEqual(placeOn(canvas, { width: 360, height: 360 }), [280, 0, 720, 720]);
-  assert.deepEqual(placeOn(canvas, { width: 1280, height: 360 }), [0, 180, 1280, 360]);
+  assert.deepEqual(pictureRect(canvas, { width: 20, height: 12 }), all, "rounding is no shape");
+  assert.deepEqual(pictureRect(canvas, { width: 360, height: 360 }), [280, 0, 720, 720]);
+  assert.deepEqual(pictureRect(canvas, { width: 1280, height: 360 }), [0, 180, 1280, 360]);
 });
 
 test("network time is what the server's own times do not explain, told once a patch", () => {

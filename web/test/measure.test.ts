@@ -17,7 +17,7 @@ import {
   worldOf,
 } from "../src/view/sample_position";
 import type { Dataset, View } from "../src/wire/protocol";
-import { courseEnds, courseOf } from "../src/panels/series_plot";
+import { timeEnds, seriesCurve } from "../src/panels/series_plot";
 
 const histogram = (counts: number[], change: Partial<Histogram> = {}): Histogram => ({
   range: [0, counts.length],
@@ -125,8 +125,8 @@ test("a series as the schema has it is understood, and its ends are told in word
   const ajv = new Ajv2020({ schemas, strict: false });
   assert.ok(ajv.validate("messages.schema.json#/$defs/series", series), ajv.errorsText());
   const { times } = await server(series).api.series("d", "t", [1, 2, 3]);
-  assert.deepEqual(courseEnds(times), ["2001-01-01 00:00Z", "2001-01-01 12:00Z"]);
-  assert.deepEqual(courseEnds([]), ["", ""]);
+  assert.deepEqual(timeEnds(times), ["2001-01-01 00:00Z", "2001-01-01 12:00Z"]);
+  assert.deepEqual(timeEnds([]), ["", ""]);
   const strings = server({ ...series, times: ["2001-01-01T00:00:00Z"] });
   await assert.rejects(strings.api.series("d", "t", [1, 2, 3]), /not be understood/);
 });
@@ -243,9 +243,9 @@ test("values in words", () => {
 });
 
 test("a course over time breaks where there is no value", () => {
-  const course = courseOf([1, 3, null, 2, null, 5, 5])!;
+  const course = seriesCurve([1, 3, null, 2, null, 5, 5])!;
   assert.deepEqual([course.low, course.high], [1, 5]);
   assert.equal(course.path, "M0 1.0000L1 0.5000M3 0.7500h0.25M5 0.0000L6 0.0000");
-  assert.equal(courseOf([null, null]), null);
-  assert.equal(courseOf([4, 4])!.path, "M0 0.5000L1 0.5000");
+  assert.equal(seriesCurve([null, null]), null);
+  assert.equal(seriesCurve([4, 4])!.path, "M0 0.5000L1 0.5000");
 });

@@ -36,7 +36,7 @@ function page(answers: unknown[]) {
     sleep: () => new Promise((resolve) => wakes.push(resolve)),
     load: async (path) => void calls.push(`load ${path}`),
     show: (on) => (state.shown = on),
-    tell: (words, progress) => said.push(words + progress),
+    report: (text, progress) => said.push(text + progress),
   });
   const wake = async () => {
     wakes.splice(0).forEach((run) => run());

@@ -5,13 +5,13 @@ import type { Range } from "../src/wire/api";
 import type { Curve } from "../src/panels/media";
 import { RangeFollower, type RangeMode, type RangeSource } from "../src/panels/range_choice";
 import type { View } from "../src/wire/protocol";
-import { Undoing } from "../src/app/undo_control";
+import { UndoControl } from "../src/app/undo_control";
 import {
   addPoint,
   curvePath,
   dragShareMax,
   extinctionAt,
-  freePlace,
+  freePosition,
   isRamp,
   movePoint,
   pointsMax,
@@ -51,8 +51,8 @@ test("points are added in order, up to as many as the wire takes, and the last o
 });
 
 test("a new point of the table stands in the middle of the widest gap, on the curve", () => {
-  assert.deepEqual(freePlace(ramp), [0.6, 4]);
-  assert.deepEqual(freePlace([[3, 1]]), [3, 1]);
+  assert.deepEqual(freePosition(ramp), [0.6, 4]);
+  assert.deepEqual(freePosition([[3, 1]]), [3, 1]);
 });
 
 test("both scales give back what they show", () => {
@@ -219,19 +219,19 @@ test("a late answer does not undo what was chosen since; ends stay turned", asyn
 async function undoable() {
   let view: View = { step: 0, scalars: [{ field: "u" }] };
   const said: string[] = [];
-  const undoing = new Undoing({
+  const undoControl = new UndoControl({
     document: () => view,
     edited: () => {},
     busy: () => false,
     show: (next) => (view = next),
-    say: (text) => said.push(text),
+    announce: (text) => said.push(text),
   });
   const page = new EventTarget();
-  undoing.watch(page);
+  undoControl.watch(page);
   // Each an act of its own.
   const edit = (change: View) => {
     page.dispatchEvent(new Event("pointerdown"));
-    undoing.edit(() => (view = { ...view, ...change }));
+    undoControl.edit(() => (view = { ...view, ...change }));
     page.dispatchEvent(new Event("pointerup"));
   };
   const medium = () => view.scalars![0]!;
@@ -240,7 +240,7 @@ async function undoable() {
   const { follower } = source({
     range,
     choose: (next) => setMedium({ color: { range: next } }),
-    quietly: (run) => undoing.quietly(run),
+    quietly: (run) => undoControl.quietly(run),
     step: () => view.step!,
   });
   const rest = async () => {
@@ -250,7 +250,7 @@ async function undoable() {
     return [view.step, ...range(), follower.mode];
   };
   return {
-    undoing,
+    undoControl,
     follower,
     said,
     rest,
@@ -261,28 +261,28 @@ async function undoable() {
 }
 
 test("a range that follows the step is no entry of undo, the choice of it is one", async () => {
-  const { undoing, follower, said, rest, seek } = await undoable();
+  const { undoControl, follower, said, rest, seek } = await undoable();
   follower.set("step");
   assert.deepEqual(await rest(), [0, 0, 10, "step"]);
   for (const step of [1, 2]) {
     seek(step);
     assert.deepEqual(await rest(), [step, step, step + 10, "step"]);
   }
-  undoing.undo();
+  undoControl.undo();
   assert.deepEqual(await rest(), [1, 1, 11, "step"]);
-  undoing.redo();
+  undoControl.redo();
   assert.deepEqual(await rest(), [2, 2, 12, "step"], "what was read meanwhile forgets no redo");
-  undoing.undo();
-  undoing.undo();
+  undoControl.undo();
+  undoControl.undo();
   assert.deepEqual(await rest(), [0, 0, 10, "step"]);
-  undoing.undo();
+  undoControl.undo();
   assert.deepEqual(await rest(), [0, 0, 1, "default"]);
-  undoing.undo();
+  undoControl.undo();
   assert.equal(said.at(-1), "nothing to undo");
 });
 
 test("undo that brings an earlier range back leaves the mode, and it is read again", async () => {
-  const { undoing, follower, rest, setMedium, medium, seek } = await undoable();
+  const { undoControl, follower, rest, setMedium, medium, seek } = await undoable();
   follower.set("step");
   await rest();
   setMedium({ stride: 2 });
@@ -291,11 +291,11 @@ test("undo that brings an earlier range back leaves the mode, and it is read aga
   setMedium({ stride: 4 });
   seek(5);
   await rest();
-  undoing.undo();
-  undoing.undo();
-  undoing.undo();
-  undoing.redo();
-  undoing.redo();
+  undoControl.undo();
+  undoControl.undo();
+  undoControl.undo();
+  undoControl.redo();
+  undoControl.redo();
   assert.deepEqual(await rest(), [3, 3, 13, "step"]);
   assert.equal(medium().stride, 4);
 });

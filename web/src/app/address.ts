@@ -1,22 +1,22 @@
-// The page's address as the view's memory: view -> `#!{...}` a little later, and back. If a view is
-// too long for a link, the server keeps a copy and `#!view=ID` goes to the clipboard; the page's
-// address always holds the whole view, so that it outlives the server.
+// The page's address holds the view: view -> `#!{...}`, debounced, and back. If a view is
+// too long for a link, the server stores a copy and `#!view=ID` goes to the clipboard; the page's
+// address always holds the whole view, so that it survives a restart of the server.
 import { failureText } from "../wire/api";
 import { debounced } from "../base/dom";
 import type { FetchLike } from "../wire/frame_request";
 import { hashOfView, viewOfHash, withoutSize } from "../view/link";
 import type { View } from "../wire/protocol";
-import { linkMax, loadView, savedHash, savedId, saveView } from "../wire/short_link";
+import { linkMax, loadView, shortLinkHash, shortLinkId, storeView } from "../wire/short_link";
 import type { Status } from "./status";
 
 export interface AddressHost {
-  document(): View; // as the user said it
+  document(): View; // explicit keys only
   runs(): boolean; // the view moves by itself: the address waits until it rests
   restore(view: View): void; // the user has gone to another address
 }
 
 const delayMs = 400;
-const deadlineMs = 10_000; // of a kept view: then the page goes on without it
+const deadlineMs = 10_000; // of a stored view: then the page starts without it
 const request: FetchLike = (url, options) => fetch(url, options);
 
 export class Address {
@@ -38,8 +38,8 @@ export class Address {
     );
   }
 
-  // Tells the view of the link that the page was opened with, at once unless the server has to be
-  // asked for it; null: it holds none.
+  // Passes on the view of the link that the page was opened with, at once unless the server has to
+  // be asked for it; null: the link has none.
   first(begin: (view: View | null) => void): void {
     if (window.location.hash.length > 1) {
       this.read(begin);
@@ -56,46 +56,46 @@ export class Address {
 
   async copy(): Promise<void> {
     this.write();
-    const [link, words] = await this.linkOf(withoutSize(this.host.document()));
+    const [link, remark] = await this.linkOf(withoutSize(this.host.document()));
     try {
       await navigator.clipboard.writeText(link);
-      this.status.note(`link copied${words}`);
+      this.status.note(`link copied${remark}`);
     } catch {
       window.history.replaceState(null, "", link);
-      this.status.note(`the address bar holds the link${words}`);
+      this.status.note(`the address bar holds the link${remark}`);
     }
   }
 
-  // The link, and what there is to say of it.
-  private async linkOf(view: View): Promise<[link: string, words: string]> {
+  // The link, and a remark for the status line.
+  private async linkOf(view: View): Promise<[link: string, remark: string]> {
     const linkTo = (hash: string): string => new URL(hash, window.location.href).href;
     const href = linkTo(hashOfView(view));
     if (href.length <= linkMax) return [href, ""];
     try {
-      const { id, kept } = await saveView(request, this.baseUri, view);
-      const words = kept === "memory" ? "; valid until the server stops" : "";
-      return [linkTo(savedHash(id)), words];
+      const { id, kept } = await storeView(request, this.baseUri, view);
+      const remark = kept === "memory" ? "; valid until the server stops" : "";
+      return [linkTo(shortLinkHash(id)), remark];
     } catch (failure) {
       return [href, ` (long form: ${failureText(failure)})`];
     }
   }
 
-  private read(tell: (view: View | null) => void): void {
+  private read(begin: (view: View | null) => void): void {
     const { hash } = window.location;
-    const id = savedId(hash);
+    const id = shortLinkId(hash);
     this.reads += 1;
     if (id !== null) {
       this.link = "loading";
-      void this.load(id, tell, this.reads);
+      void this.load(id, begin, this.reads);
       return;
     }
     this.link = "followed";
     const view = viewOfHash(hash);
     if (view === null) this.status.error("link", "This link contains no valid view.");
-    tell(view);
+    begin(view);
   }
 
-  private async load(id: string, tell: (view: View | null) => void, read: number): Promise<void> {
+  private async load(id: string, begin: (view: View | null) => void, read: number): Promise<void> {
     const signal = AbortSignal.timeout(deadlineMs);
     const within: FetchLike = (url, options) => fetch(url, { ...options, signal });
     let view: View | null = null;
@@ -111,7 +111,7 @@ export class Address {
     } else {
       view = null; // the user has gone to another address meanwhile
     }
-    tell(view);
+    begin(view);
   }
 
   private write(): void {

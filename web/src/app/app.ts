@@ -1,7 +1,7 @@
-// The page's one mind: what the user does -> view document -> patches out; messages and frames in
-// -> picture, legend, panels, time bar and words. Parts do not know each other, only this does.
+// Application controller: user input -> view document -> patches out; messages and frames in ->
+// picture, legend, panels, time bar and status text. The parts know only this, not each other.
 import { Address } from "./address";
-import { Answers } from "./patch_answers";
+import { PatchAnswers } from "./patch_answers";
 import { Api } from "../wire/api";
 import { anglesOf, distanceOf, rollOf } from "../view/camera";
 import { CameraControl } from "../view/camera_control";
@@ -23,7 +23,7 @@ import type { HoverView } from "../viewport/hover_view";
 import type { Hud } from "../viewport/hud";
 import type { Legend } from "../viewport/legend";
 import { legendEntries } from "../view/legend_entries";
-import { Opening } from "./dataset_opener";
+import { DatasetOpener } from "./dataset_opener";
 import type { Panels } from "../panels/panels";
 import { Playback } from "./playback";
 import {
@@ -37,7 +37,7 @@ import type { Probe } from "../viewport/probe";
 import { problemText } from "../wire/requests";
 import type { Status } from "./status";
 import type { TimeBar } from "./time_bar";
-import { Undoing } from "./undo_control";
+import { UndoControl } from "./undo_control";
 import { ViewModel } from "../view/view_model";
 import type { Outgoing, Patch } from "../view/view_state";
 import type { DrawnFrame, Viewport } from "../viewport/viewport";
@@ -65,13 +65,13 @@ export class App {
   readonly api: Api;
   readonly cameras: CameraControl;
   readonly playback: Playback;
-  readonly undoing: Undoing;
+  readonly undoControl: UndoControl;
   private readonly model = new ViewModel();
-  private readonly answers = new Answers(this.model.state);
+  private readonly answers = new PatchAnswers(this.model.state);
   private readonly connection: Connection;
   private readonly flowing: Flow;
   private parts!: AppParts;
-  private opening!: Opening;
+  private opener!: DatasetOpener;
   private address!: Address;
 
   constructor(
@@ -86,7 +86,7 @@ export class App {
     });
     this.connection = new Connection(
       streamUrl(baseUri),
-      // A socket's handlers may ask for less than what the browser hands them.
+      // SocketLike declares less than the browser's WebSocket.
       (url, protocol) => new WebSocket(url, protocol) as unknown as SocketLike,
       clock,
       {
@@ -99,15 +99,15 @@ export class App {
         },
       },
     );
-    this.undoing = new Undoing({
+    this.undoControl = new UndoControl({
       document: () => this.model.state.document,
-      busy: () => this.model.open === null || this.opening.waiting,
+      busy: () => this.model.open === null || this.opener.waiting,
       show: (view) => {
         if (view.step !== this.model.state.document.step) this.playback.pause();
         this.restore(view);
       },
       edited: () => this.address.edited(),
-      say: (text) => this.parts.status.note(text),
+      announce: (text) => this.parts.status.note(text),
     });
     this.playback = new Playback({
       send: (message) => this.connection.send(message),
@@ -143,12 +143,12 @@ export class App {
       {
         document: () => this.model.state.document,
         runs: () => this.playback.running || this.flowing.running,
-        restore: (view) => this.undoing.edit(() => this.restore(view)),
+        restore: (view) => this.undoControl.edit(() => this.restore(view)),
       },
       parts.status,
       this.baseUri,
     );
-    this.opening = this.makeOpening(parts);
+    this.opener = this.makeOpener(parts);
     parts.picker.addEventListener("change", () => this.open(parts.picker.value));
     this.loadMaps();
     this.address.first((view) => {
@@ -156,18 +156,18 @@ export class App {
       this.connection.start();
     });
     window.addEventListener("online", () => this.connection.retryNow());
-    document.addEventListener("visibilitychange", () => this.tellVisibility());
+    document.addEventListener("visibilitychange", () => this.sendVisibility());
     window.setInterval(() => {
-      if (!document.hidden) this.tellVisibility();
+      if (!document.hidden) this.sendVisibility();
     }, presenceMs);
   }
 
-  private makeOpening({ status, list, cards }: AppParts): Opening {
-    return new Opening(
+  private makeOpener({ status, list, cards }: AppParts): DatasetOpener {
+    return new DatasetOpener(
       {
-        say: (message) => void this.connection.send(message),
+        sendMessage: (message) => void this.connection.send(message),
         send: (outgoing) => outgoing.forEach((one) => this.send(one)),
-        firstView: (said) => this.firstView(said),
+        firstView: (explicit) => this.firstView(explicit),
         halt: () => {
           this.playback.halt();
           this.flowing.stop();
@@ -184,21 +184,21 @@ export class App {
     );
   }
 
-  // --- what the user does --------------------------------------------------------------
+  // --- user input --------------------------------------------------------------
 
   // The view with every default that is known.
   view(): View {
     return this.model.view();
   }
 
-  // As the user said it.
-  said(): View {
+  // With the explicit keys only.
+  explicitView(): View {
     return this.model.state.document;
   }
 
   // The view is of the dataset that is open.
   isOpen(): boolean {
-    return this.model.open !== null && this.model.open.id === this.said().dataset;
+    return this.model.open !== null && this.model.open.id === this.explicitView().dataset;
   }
 
   dataset(): Dataset {
@@ -207,18 +207,18 @@ export class App {
 
   change(patch: Patch): void {
     this.connection.wake();
-    this.undoing.edit(() => this.send(this.model.state.change(patch)));
+    this.undoControl.edit(() => this.send(this.model.state.change(patch)));
     this.refresh();
   }
 
   open(id: string): void {
-    this.undoing.edit(() => this.opening.choose(id));
+    this.undoControl.edit(() => this.opener.choose(id));
   }
 
   // The view that was drawn last, instead of one that takes its time.
   cancelLoading(): void {
     const before = this.model.state.settled;
-    if (!this.opening.cancel(before)) this.replace(before);
+    if (!this.opener.cancel(before)) this.replace(before);
   }
 
   connectNow(): void {
@@ -226,7 +226,7 @@ export class App {
   }
 
   resetAll(): void {
-    this.undoing.edit(() => this.replace(this.firstView({ dataset: this.dataset().id })));
+    this.undoControl.edit(() => this.replace(this.firstView({ dataset: this.dataset().id })));
   }
 
   resize(width: number, height: number): void {
@@ -260,24 +260,24 @@ export class App {
     return this.address.copy();
   }
 
-  // The view of a saved picture or a kept one; what it does not say of the viewer's wishes stays.
+  // The view of a saved picture or a saved view; `quality` stays unless it is part of that.
   openView(view: View): void {
-    const { quality } = this.said();
-    this.undoing.edit(() => this.restore(quality === undefined ? view : { quality, ...view }));
+    const { quality } = this.explicitView();
+    this.undoControl.edit(() => this.restore(quality === undefined ? view : { quality, ...view }));
   }
 
   // Another view in the place of this one.
   restore(view: View): void {
     this.parts.status.clearError();
     const next = this.firstView(view);
-    if (!this.opening.follow(next)) this.replace({ ...next, dataset: this.model.open?.id });
+    if (!this.opener.follow(next)) this.replace({ ...next, dataset: this.model.open?.id });
   }
 
   // --- the server ----------------------------------------------------------------------
 
-  private firstView(said: View): View {
+  private firstView(explicit: View): View {
     const [width, height] = this.parts.viewport.size();
-    return { ...said, image: { ...said.image, width, height } };
+    return { ...explicit, image: { ...explicit.image, width, height } };
   }
 
   private linesMove(): boolean {
@@ -307,23 +307,23 @@ export class App {
     this.parts.viewport.newSession(hello.limits.imagePixelsMax);
     this.answers.newSession();
     if (!this.maps.loaded) this.loadMaps();
-    if (this.opening.begin(hello.datasets)) this.tellVisibility();
+    if (this.opener.begin(hello.datasets)) this.sendVisibility();
   }
 
   private onMessage(message: ServerMessage): void {
     switch (message.type) {
       case "opened":
-        this.opening.onOpened(message);
+        this.opener.onOpened(message);
         break;
       case "progress":
-        if (!this.opening.awaits(message.id)) break;
+        if (!this.opener.awaits(message.id)) break;
         this.parts.status.progress(message.phase, message.done, message.etaMs);
         break;
       case "chosen":
-        this.answers.tell(message);
+        this.answers.onChosen(message);
         break;
       case "unchanged":
-        this.answers.stays(message);
+        this.answers.onUnchanged(message);
         this.settleUnchanged();
         break;
       case "stats":
@@ -344,7 +344,7 @@ export class App {
     }
     if (anew) {
       this.parts.panels.build();
-      // Without them the panel is as usable as before: no word of a failure.
+      // The panel is usable without them: a failure is not reported.
       loadHelpTexts(this.baseUri).catch(() => undefined);
     }
     this.refresh();
@@ -354,15 +354,15 @@ export class App {
   private onError(message: ErrorMessage): void {
     const { status } = this.parts;
     const text = problemText(message.problem);
-    if (this.opening.onError(message, text)) return;
+    if (this.opener.onError(message, text)) return;
     if (message.rev !== undefined) {
       status.error("view", text);
       this.answers.refuse(message.rev);
       this.flowing.refused(message.rev);
-      this.opening.onRefused(message.rev);
+      this.opener.onRefused(message.rev);
       this.refresh();
     } else {
-      // Of a step that new files lack the next picture is the end.
+      // An error about a step that new files lack ends with the next picture.
       const ofStep = message.problem.errors?.some(({ pointer }) => pointer === "/step");
       status.error(ofStep ? "view" : "server", text);
     }
@@ -371,7 +371,7 @@ export class App {
   onDrawn(frame: DrawnFrame): void {
     const { header } = frame;
     const { hud, status, viewport } = this.parts;
-    if (!this.opening.waiting) status.loaded(); // what it waited for
+    if (!this.opener.waiting) status.loaded(); // what it waited for
     const chosen = this.answers.drawn(header);
     this.flowing.answered(header.rev);
     if (chosen !== null) this.model.drew(chosen, header.final);
@@ -379,7 +379,7 @@ export class App {
     if (this.playback.running || header.rev === this.model.state.rev) this.followStep(header.step);
     hud.show(frame, chosen, viewport.canvas.width);
     status.clearError("frame");
-    if (this.answers.mends(header.rev)) status.clearError("view");
+    if (this.answers.isAfterRefusal(header.rev)) status.clearError("view");
     this.settleUnchanged();
     if (this.answers.isFirst(header)) status.responded(frame.drawnAt - header.t);
     document.documentElement.classList.add("has-picture");
@@ -393,7 +393,7 @@ export class App {
     const { canvas } = this.parts.viewport;
     this.flowing.answered(rev);
     canvas.dataset.rev = String(Math.max(rev, Number(canvas.dataset.rev)));
-    if (this.answers.mends(rev)) this.parts.status.clearError("view");
+    if (this.answers.isAfterRefusal(rev)) this.parts.status.clearError("view");
     this.refresh();
   }
 
@@ -446,7 +446,7 @@ export class App {
     }
   }
 
-  // What is shown is the last word or on the way to it only while nothing newer is asked for.
+  // The frame's state counts only while no newer view was requested.
   private showMark(): void {
     const { canvas } = this.parts.viewport;
     const { dataset } = canvas;
@@ -479,12 +479,12 @@ export class App {
         this.refresh();
         this.showLegend();
       },
-      () => this.parts.status.say("the colour maps could not be loaded yet"),
+      () => this.parts.status.announce("the colour maps could not be loaded yet"),
     );
   }
 
-  // Also said now and then while the page is seen: a viewer who only looks is not idle.
-  private tellVisibility(): void {
+  // Also sent periodically while the page is visible: a user who only watches is not idle.
+  private sendVisibility(): void {
     if (!document.hidden) {
       this.connection.wake();
       this.flowing.seen();

@@ -25,7 +25,7 @@ interface Card {
   element: HTMLButtonElement;
 }
 
-// All that a card shows of what the list says: other news (its size in memory, say) leave it alone.
+// What a card shows of a list entry: other changes (such as memory size) do not rebuild it.
 export const cardFace = (dataset: DatasetSummary): string =>
   JSON.stringify([
     dataset.title || dataset.id,
@@ -50,7 +50,7 @@ export class Cards {
     whenClosed(dialog, () => this.clear());
   }
 
-  // With what the server has now: files may have been added since it said hello.
+  // With what the server has now: files may have been added since the hello message.
   show(): void {
     if (this.dialog.open) return;
     const { api, list } = this.host;

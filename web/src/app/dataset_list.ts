@@ -1,4 +1,4 @@
-// What can be opened: the server's list, and what the page has learnt of it since -> the picker's
+// What can be opened: the server's list, and later reports on single datasets -> the picker's
 // entries, and which dataset to begin with.
 import type { Dataset, DatasetSummary } from "../wire/protocol";
 
@@ -12,7 +12,7 @@ type Known = Pick<DatasetSummary, "id" | "state" | "notes">;
 
 const firstChoice = "climate"; // of the samples, the one that shows most
 
-// Where titles repeat, the ids tell the datasets apart.
+// Datasets with the same title are distinguished by id.
 export function pickerEntries(datasets: DatasetSummary[]): PickerEntry[] {
   const titleOf = ({ id, title }: DatasetSummary): string => title || id;
   const counts = new Map<string, number>();
@@ -35,18 +35,19 @@ export function bestDataset(datasets: DatasetSummary[]): string | undefined {
   return (usable.find((dataset) => dataset.id === firstChoice) ?? usable[0])?.id;
 }
 
-// The server tells last why a file cannot be read any more.
+// The server's last note says why a file can no longer be read.
 export const failureNote = ({ notes }: Pick<Dataset, "notes">): string =>
   notes.at(-1) ?? "The files of this dataset cannot be read any more.";
 
-// The list with what was learnt of one dataset; the same list if that is nothing new.
+// The list with one dataset's new state; the same list if nothing changed.
 export function withState(
   datasets: DatasetSummary[],
   { id, state, notes }: Known,
 ): DatasetSummary[] {
   const known = datasets.find((dataset) => dataset.id === id);
-  const told = JSON.stringify([state, notes]);
-  if (known === undefined || JSON.stringify([known.state, known.notes]) === told) return datasets;
+  const reported = JSON.stringify([state, notes]);
+  if (known === undefined || JSON.stringify([known.state, known.notes]) === reported)
+    return datasets;
   return datasets.map((dataset) => (dataset === known ? { ...known, state, notes } : dataset));
 }
 
@@ -91,7 +92,7 @@ export class DatasetList {
     this.picker.value = id;
   }
 
-  // A failed one may be chosen again: the server then says why, or has mended it.
+  // A failed one may be chosen again: the server then says why, or can read it again.
   private write(): void {
     const chosen = this.picker.value;
     this.picker.replaceChildren(

@@ -14,32 +14,32 @@ import type { Status } from "./status";
 import type { ViewModel } from "../view/view_model";
 import type { Outgoing, Patch } from "../view/view_state";
 
-export interface OpeningHost {
-  say(message: ClientMessage): void;
+export interface DatasetOpenerHost {
+  sendMessage(message: ClientMessage): void;
   send(outgoing: Outgoing[]): void;
-  firstView(said: View): View; // in the window's size
-  halt(): void; // nothing moves by itself any more
+  firstView(explicit: View): View; // in the window's size
+  halt(): void; // stops playback and line motion
   describe(dataset: Dataset): void; // it is open, though the view may still be of another
   opened(anew: boolean, changed: boolean): void; // anew: of another shape; changed: its files
   refresh(): void;
-  mark(): void; // another view is wanted
-  empty(): void; // there is nothing to show: the user has to choose, or to add something
+  mark(): void; // another view was requested
+  empty(): void; // nothing to show: the user must choose or add a dataset
 }
 
-const busyCodes = [429, 503]; // of a server that asks for patience: they tell nothing of a dataset
+const busyCodes = [429, 503]; // the server is busy: says nothing about the dataset
 
-export class Opening {
+export class DatasetOpener {
   private openId = 0;
   private shownId = 0; // of the `open` whose dataset is shown
   private openingId = ""; // the dataset that it asks for
   private before: View | undefined; // of what was shown when another was asked for
-  private leftId = 0; // of the newest `open` that the user did not wait for
+  private abandonedId = 0; // of the newest `open` that was cancelled
   private waits = false; // `opened` has not come yet
-  private leftRev = 0; // the last rev of a view whose dataset could not be opened
+  private abandonedRev = 0; // the last rev of a view whose dataset could not be opened
   private restored = new Set<number>(); // revs of the view that took a refused one's place
 
   constructor(
-    private readonly host: OpeningHost,
+    private readonly host: DatasetOpenerHost,
     private readonly model: ViewModel,
     private readonly status: Status,
     readonly list: DatasetList,
@@ -64,21 +64,21 @@ export class Opening {
     const id = view.dataset ?? this.model.open?.id ?? this.list.best();
     if (id === undefined) return false;
     if (id === this.model.open?.id) {
-      if (this.awaitsOther()) this.leave();
+      if (this.awaitsOther()) this.abandon();
       return false;
     }
     this.request(id, this.model.state.replace({ ...view, dataset: id }));
     return true;
   }
 
-  // The user does not wait for what was asked for last: back to the view before. `settled` is the
+  // Cancels the last request: back to the view before. `settled` is the
   // newest that was drawn. False: it is of what is open already.
   cancel(settled: View): boolean {
     const { model, status } = this;
     status.loaded();
     const id = model.open?.id;
     if (this.waits) {
-      this.leave();
+      this.abandon();
       if (id !== undefined) {
         this.host.send(model.state.replace(this.viewBefore(id)));
         this.host.refresh();
@@ -96,15 +96,15 @@ export class Opening {
     return this.waits && this.openingId !== this.model.open?.id;
   }
 
-  // What is being opened is not waited for any more.
-  private leave(): void {
+  // The open request is abandoned.
+  private abandon(): void {
     const { model, status } = this;
     status.loaded();
     this.waits = false;
-    this.leftId = this.openId;
-    this.leftRev = model.state.rev;
+    this.abandonedId = this.openId;
+    this.abandonedRev = model.state.rev;
     this.list.show(model.open?.id ?? "");
-    status.say("live");
+    status.announce("live");
   }
 
   // Of what is shown, as it was when another was asked for.
@@ -112,12 +112,12 @@ export class Opening {
     return this.host.firstView(this.before ?? { dataset: id });
   }
 
-  // Whether progress of this request is worth telling.
+  // Whether to show progress of this request.
   awaits(id: number | null): boolean {
     return id === null || (this.waits && id === this.openId);
   }
 
-  // A new session: it knows nothing yet, so it is told the dataset and the whole view.
+  // A new session has no state: it is sent the dataset and the whole view.
   begin(datasets: DatasetSummary[]): boolean {
     const { model, list } = this;
     list.set(datasets);
@@ -127,7 +127,7 @@ export class Opening {
     const id = wanted ?? list.first();
     list.show(id ?? "");
     if (id === undefined) {
-      this.status.say("live, without a dataset");
+      this.status.announce("live, without a dataset");
       this.host.empty();
       return false;
     }
@@ -148,7 +148,7 @@ export class Opening {
     this.waits = false;
     status.clearError("open");
     status.loaded();
-    status.say("live");
+    status.announce("live");
     this.list.learn(dataset);
     this.list.show(dataset.id);
     this.host.describe(dataset);
@@ -161,11 +161,11 @@ export class Opening {
 
   // Whether the error was of a dataset; then all is done.
   onError(message: ErrorMessage, text: string): boolean {
-    if (message.id !== undefined && message.id === this.leftId) return true;
+    if (message.id !== undefined && message.id === this.abandonedId) return true;
     if (this.waits && message.id === this.openId) {
       this.failed(text, message.problem.status);
-    } else if (message.rev !== undefined && message.rev <= this.leftRev) {
-      this.model.state.refuse(message.rev); // told already: the dataset could not be opened
+    } else if (message.rev !== undefined && message.rev <= this.abandonedRev) {
+      this.model.state.refuse(message.rev); // reported already: the dataset could not be opened
     } else if (message.rev === undefined && this.asked(message.id)) {
       this.status.error("file", text); // its new files cannot be read; the old picture stays
       if (this.model.open !== null) this.list.failed(this.model.open.id, text);
@@ -213,7 +213,7 @@ export class Opening {
     this.host.halt();
     this.status.startLoading(`opening ${id}…`);
     this.host.send(outgoing);
-    this.host.say({ type: "open", id: this.openId, dataset: id });
+    this.host.sendMessage({ type: "open", id: this.openId, dataset: id });
     this.host.mark();
   }
 
@@ -221,9 +221,9 @@ export class Opening {
   private followFiles(dataset: Dataset): void {
     for (const topic of ["view", "server"]) this.status.clearError(topic);
     this.model.fitDrawn(dataset);
-    const said = this.model.state.document;
-    const fitted = fitView(said, dataset);
-    if (JSON.stringify(fitted) !== JSON.stringify(said)) {
+    const explicit = this.model.state.document;
+    const fitted = fitView(explicit, dataset);
+    if (JSON.stringify(fitted) !== JSON.stringify(explicit)) {
       this.host.send(this.model.state.replace(fitted));
     }
   }
@@ -234,7 +234,7 @@ export class Opening {
     status.loaded();
     status.error("dataset", text);
     const failed = this.openingId;
-    this.leftRev = model.state.rev;
+    this.abandonedRev = model.state.rev;
     if (!busyCodes.includes(code)) this.list.failed(failed, text);
     const fallback = model.open?.id ?? this.list.best();
     this.list.show(fallback ?? "");
@@ -243,7 +243,7 @@ export class Opening {
       return;
     }
     if (model.open !== null) {
-      status.say("live");
+      status.announce("live");
       this.takePlace(this.viewBefore(model.open.id));
     } else {
       this.request(fallback, model.state.replace(this.host.firstView({ dataset: fallback })));

@@ -60,7 +60,7 @@ const panelBox = byId("panel", HTMLElement);
 const host = {
   view: () => app.view(),
   change: (patch: Record<string, unknown>) => app.change(patch),
-  quietly: (run: () => void) => app.undoing.quietly(run),
+  quietly: (run: () => void) => app.undoControl.quietly(run),
   dataset: () => app.dataset(),
   maps: app.maps,
   api: app.api,
@@ -108,7 +108,7 @@ const files: FileTarget = {
 const openSaving = saveDialog(
   {
     isOpen: () => app.isOpen(),
-    said: () => app.said(),
+    explicitView: () => app.explicitView(),
     view: () => app.view(),
     camera: () => app.cameras.camera(),
     dataset: () => app.dataset(),
@@ -173,12 +173,12 @@ const bindings: Binding[] = [
   { keys: ["]"], shown: "]", does: "next step", run: () => app.seek(timeBar.neighbour(1)) },
   { keys: ["{"], shown: "{", does: "first step", run: () => app.seek(0) },
   { keys: ["}"], shown: "}", does: "last step", run: () => app.seek(timeBar.steps - 1) },
-  { keys: ["Mod+z"], shown: modText("z"), does: "undo", run: () => app.undoing.undo() },
+  { keys: ["Mod+z"], shown: modText("z"), does: "undo", run: () => app.undoControl.undo() },
   {
     keys: ["Mod+Shift+z", "Mod+y"],
     shown: modText("y"),
     does: "redo (or shift with undo)",
-    run: () => app.undoing.redo(),
+    run: () => app.undoControl.redo(),
   },
   { keys: ["i"], shown: "i", does: "probe: values at a point", run: () => probe.toggle() },
   {
@@ -225,8 +225,11 @@ function onClick(id: string, run: () => void): void {
   byId(id, HTMLButtonElement).addEventListener("click", run);
 }
 
-app.undoing.bind(byId("undo-button", HTMLButtonElement), byId("redo-button", HTMLButtonElement));
-app.undoing.watch(document);
+app.undoControl.bind(
+  byId("undo-button", HTMLButtonElement),
+  byId("redo-button", HTMLButtonElement),
+);
+app.undoControl.watch(document);
 bindKeys(bindings, document);
 fillHelp();
 onClick("datasets-button", () => cards.show());

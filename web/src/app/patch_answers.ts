@@ -1,11 +1,11 @@
-// What has become of the patches: frames drawn, `unchanged` and refusals -> which of the view's
-// changes stand, and of each frame what the server told of it.
+// Outcomes of patches: frames drawn, `unchanged` and refusals -> which changes of the view are
+// confirmed, and each frame's `chosen` message.
 import type { ChosenMessage, FrameHeader, UnchangedMessage } from "../wire/protocol";
 import type { ViewState } from "../view/view_state";
 
 const chosenKept = 8; // `chosen` messages whose frames may still come
 
-export class Answers {
+export class PatchAnswers {
   private readonly chosen = new Map<number, ChosenMessage>();
   private shownSeq = 0; // of the frame on the canvas
   private unchanged: UnchangedMessage | null = null; // its frame is not shown yet
@@ -20,25 +20,25 @@ export class Answers {
     this.shownSeq = 0;
   }
 
-  tell(chosen: ChosenMessage): void {
+  onChosen(chosen: ChosenMessage): void {
     this.chosen.set(chosen.seq, chosen);
     for (const seq of this.chosen.keys()) {
       if (this.chosen.size > chosenKept) this.chosen.delete(seq);
     }
   }
 
-  // What was refused is taken back, so that controls and link tell what is drawn.
+  // A refused patch is reverted, so that controls and link match the picture.
   refuse(rev: number): void {
     this.refusedRev = rev;
     this.state.refuse(rev);
   }
 
-  // A frame of this rev or an answer to it: all is well after what was refused.
-  mends(rev: number): boolean {
+  // Whether a frame or answer of this rev is newer than the last refusal.
+  isAfterRefusal(rev: number): boolean {
     return rev > this.refusedRev;
   }
 
-  // A frame is on the canvas; how it was drawn, if that was told.
+  // A frame is on the canvas: its `chosen` message, if one came.
   drawn({ seq, rev }: FrameHeader): ChosenMessage | null {
     this.shownSeq = seq;
     this.state.settle(rev);
@@ -47,14 +47,14 @@ export class Answers {
     return chosen;
   }
 
-  // Whether the frame is the first that answers its patch: later ones do not tell how fast.
+  // Whether the frame is the first that answers its patch: later ones do not measure the latency.
   isFirst({ t }: FrameHeader): boolean {
     const first = t > 0 && t !== this.answeredT;
     this.answeredT = t;
     return first;
   }
 
-  stays(message: UnchangedMessage): void {
+  onUnchanged(message: UnchangedMessage): void {
     this.unchanged = message;
   }
 

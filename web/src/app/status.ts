@@ -1,10 +1,10 @@
-// What the page says in words: connection, loading with a bar, and errors. An error stays until it
-// is dismissed or what caused it has succeeded; lesser news never overwrites it.
+// Status text: connection, loading with a bar, and errors. An error stays until it is dismissed or
+// its cause has succeeded; less important messages never overwrite it.
 import type { ConnectionState } from "../wire/connection";
 import { byId } from "../base/dom";
 
 const noteMs = 4000;
-const barDelayMs = 200; // what is faster than this needs no bar
+const barDelayMs = 200; // faster loads show no bar
 
 export class Status {
   private readonly line = byId("status", HTMLElement);
@@ -18,32 +18,32 @@ export class Status {
   private alertTopic = "";
   private barTimer: number | undefined;
   private noteTimer: number | undefined;
-  private noted: string | null = null; // what a note stands in front of
+  private noted: string | null = null; // the text that a note replaced
   private countdown: number | undefined;
   private readonly offline = byId("offline", HTMLElement);
   private readonly offlineText = byId("offline-text", HTMLElement);
-  private lost = false; // the line tells of the connection, and nothing less may take its place
+  private lost = false; // the line shows the lost connection; nothing else may replace it
 
   constructor() {
     byId("alert-close", HTMLButtonElement).addEventListener("click", () => this.clearError());
   }
 
-  // A word for screen readers and the status line.
-  say(text: string): void {
+  // Text for screen readers and the status line.
+  announce(text: string): void {
     window.clearTimeout(this.noteTimer);
     this.noted = null;
-    if (!this.lost) this.tell(text);
+    if (!this.lost) this.setLine(text);
   }
 
-  // The same for a while, of what was done; then what was said before it.
+  // The same for a few seconds; then the text before it.
   note(text: string): void {
     const before = this.noted ?? this.line.textContent ?? "";
-    this.say(text);
+    this.announce(text);
     this.noted = before;
-    this.noteTimer = window.setTimeout(() => this.say(before), noteMs);
+    this.noteTimer = window.setTimeout(() => this.announce(before), noteMs);
   }
 
-  private tell(text: string): void {
+  private setLine(text: string): void {
     if (this.line.textContent !== text) this.line.textContent = text;
   }
 
@@ -55,23 +55,25 @@ export class Status {
     this.offline.hidden = !this.lost;
     if (state.name !== "live") this.latency.textContent = "";
     if (state.name === "live") {
-      this.tell("live");
+      this.setLine("live");
     } else if (state.name === "connecting") {
-      this.tell(state.attempt === 0 ? "connecting…" : `reconnecting (attempt ${state.attempt})…`);
+      this.setLine(
+        state.attempt === 0 ? "connecting…" : `reconnecting (attempt ${state.attempt})…`,
+      );
     } else if (state.name === "asleep") {
       this.loaded();
-      this.tell("idle; move the volume to reconnect");
+      this.setLine("idle; move the volume to reconnect");
       this.offlineText.textContent = `Idle: ${state.reason}.`;
     } else if (state.name === "waiting") {
       this.loaded();
       const until = performance.now() + state.delayMs;
-      const tell = () => {
+      const showCountdown = () => {
         const left = Math.max(0, Math.ceil((until - performance.now()) / 1000));
         this.offlineText.textContent = `Offline: ${state.reason}. Retrying in ${left} s.`;
       };
-      this.tell(`connection lost: ${state.reason}`);
-      tell();
-      this.countdown = window.setInterval(tell, 1000);
+      this.setLine(`connection lost: ${state.reason}`);
+      showCountdown();
+      this.countdown = window.setInterval(showCountdown, 1000);
     }
   }
 
@@ -102,11 +104,11 @@ export class Status {
     this.loadingText.textContent = text;
     this.bar.removeAttribute("value"); // unknown how far
     this.barTimer = window.setTimeout(() => (this.loading.hidden = false), barDelayMs);
-    this.say(text);
+    this.announce(text);
   }
 
   progress(phase: string, done: number, etaMs: number | null): void {
-    if (phase.startsWith("loading ")) this.loading.hidden = false; // told of what is slow only
+    if (phase.startsWith("loading ")) this.loading.hidden = false; // reported for slow loads only
     this.bar.value = done;
     const left = etaMs === null ? "" : `, ${Math.ceil(etaMs / 1000)} s left`;
     this.loadingText.textContent = `${phase}: ${Math.round(100 * done)} %${left}`;

@@ -1,5 +1,5 @@
-// The bar below the picture: time step, play either way, speed. It shows what it is told and says
-// what the user wants; it holds no step of its own.
+// The bar below the picture: time step, play either way, speed. It shows the state it is given
+// and reports what the user asks for; it has no step of its own.
 import type { Dataset } from "../wire/protocol";
 import { byId } from "../base/dom";
 import { readableTime } from "../base/time_text";

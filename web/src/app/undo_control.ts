@@ -1,25 +1,25 @@
-// Undo and redo as the user meets them: keys, two buttons and a word of what was undone. Pointers
-// and keys all over the page tell where one gesture ends and the next begins.
+// User interface of undo and redo: keys, two buttons and status text. Pointer and key events of the
+// whole page delimit gestures.
 import { ViewHistory } from "../view/history";
 import type { View } from "../wire/protocol";
 
-export interface UndoingHost {
-  document(): View; // as the user said it
+export interface UndoControlHost {
+  document(): View; // explicit keys only
   busy(): boolean; // a dataset is being opened: its view is not there yet
   show(view: View): void; // in place of the present one
   edited(): void; // the user has changed the view
-  say(text: string): void;
+  announce(text: string): void;
 }
 
-export class Undoing {
+export class UndoControl {
   private readonly history = new ViewHistory();
   private lastKey = "";
   private quiet = false;
   private buttons: [HTMLButtonElement, HTMLButtonElement] | null = null;
 
-  constructor(private readonly host: UndoingHost) {}
+  constructor(private readonly host: UndoControlHost) {}
 
-  // Runs what the user asked for; what that does to the view can be undone.
+  // Runs a user action; its changes of the view can be undone.
   edit(run: () => void): void {
     const before = this.host.document();
     run();
@@ -28,7 +28,7 @@ export class Undoing {
     this.showButtons();
   }
 
-  // Runs what the page does by itself: no entry, and what was undone can still be redone.
+  // Runs a change of the page's own: no entry, and redo stays possible.
   quietly(run: () => void): void {
     this.quiet = true;
     try {
@@ -76,7 +76,7 @@ export class Undoing {
       this.host.show(found.view);
       this.host.edited();
     }
-    this.host.say(found === null ? nothing : `${done}: ${found.what}`);
+    this.host.announce(found === null ? nothing : `${done}: ${found.what}`);
     this.showButtons();
   }
 

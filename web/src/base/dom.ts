@@ -1,4 +1,4 @@
-// Small helpers round the document's own interface.
+// Helpers for the DOM.
 
 export function byId<T extends HTMLElement>(id: string, type: new () => T): T {
   const element = document.getElementById(id);
@@ -45,7 +45,7 @@ export function numberBox(): HTMLInputElement {
   return box;
 }
 
-// A label round a check box.
+// A label around a check box.
 export function checkLabel(box: HTMLInputElement, text: string, title = ""): HTMLLabelElement {
   const label = make("label", "histogram-check");
   box.type = "checkbox";
@@ -62,10 +62,10 @@ export function whenClosed(dialog: HTMLDialogElement, run: () => void): void {
   });
 }
 
-// Tells whether the element is in sight, whenever that changes.
-export function whileSeen(element: Element, tell: (seen: boolean) => void): void {
+// Reports whether the element is visible, whenever that changes.
+export function observeVisibility(element: Element, report: (visible: boolean) => void): void {
   // Several changes may come at once, in order.
-  new IntersectionObserver((entries) => tell(entries.at(-1)!.isIntersecting)).observe(element);
+  new IntersectionObserver((entries) => report(entries.at(-1)!.isIntersecting)).observe(element);
 }
 
 // Runs `run` once, `ms` after the last call.

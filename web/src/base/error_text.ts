@@ -1,7 +1,7 @@
-// How errors are told all over the page: as root mean square in linear light, or as the peak
+// Errors as text, on the whole page alike: as root mean square in linear light, or as the peak
 // signal-to-noise ratio in dB that belongs to it. Who shows errors follows `errorMetric`.
 import { formatNumber } from "./ticks";
-import { Watched } from "./observable";
+import { Observable } from "./observable";
 
 export type ErrorMetric = "rmse" | "psnr";
 
@@ -15,11 +15,11 @@ export function errorText(rmse: number, metric: ErrorMetric): string {
   return decibels === Infinity ? "∞ dB" : `${decibels.toFixed(1)} dB`;
 }
 
-// What is told, before its figure: "error 0.011", "PSNR 39.2 dB".
+// The quantity, before its figure: "error 0.011", "PSNR 39.2 dB".
 export const errorName = (metric: ErrorMetric): string => (metric === "rmse" ? "error" : "PSNR");
 
-// The one choice of the page.
-export const errorMetric = new Watched<ErrorMetric>("rmse");
+// Page-wide setting.
+export const errorMetric = new Observable<ErrorMetric>("rmse");
 
 export const toggleErrorMetric = (): void =>
   errorMetric.set(errorMetric.value === "rmse" ? "psnr" : "rmse");

@@ -1,5 +1,5 @@
-// A value of the whole page that tells when it changes.
-export class Watched<T> {
+// A page-wide value that notifies watchers of changes.
+export class Observable<T> {
   private readonly watchers: ((value: T) => void)[] = [];
 
   constructor(private current: T) {}

@@ -1,4 +1,4 @@
-// Numbers as people read them: round ticks of a range, and text of a value.
+// Numbers for display: round ticks of a range, and text of a value.
 
 // About `count` round values (1, 2 or 5 times a power of ten apart) within [low, high].
 export function niceTicks(low: number, high: number, count: number): number[] {

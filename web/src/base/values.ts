@@ -1,4 +1,4 @@
-// What any value may be asked or made to be.
+// Checks and limits of values.
 
 // Of JSON: neither a list nor null.
 export const isObject = (value: unknown): value is Record<string, unknown> =>

@@ -1,14 +1,14 @@
 // What the panel's controls mean: which of them count under a view, what a dataset lets them offer,
-// and the values that keep two of them in order. Pure: (dataset, view) -> options, words, patches.
+// and the values that keep two of them in order. Pure: (dataset, view) -> options, text, patches.
 import { unitText } from "../view/legend_entries";
 import type { Dataset, Field, View } from "../wire/protocol";
 import { formatNumber } from "../base/ticks";
 import type { Patch } from "../view/view_state";
 
-export type Options = Record<string, string>; // text -> the wire's word
+export type Options = Record<string, string>; // label -> value on the wire
 export type SliceAxis = "x" | "y" | "z";
 
-// Of each compositing: what it does, for people.
+// One-line explanations of the compositing methods.
 export const compositingHints: Readonly<Record<string, string>> = {
   analytic: "Line and medium mixed exactly along their common piece.",
   cd: "Colour times density added, corrected: no seams about lines.",
@@ -60,14 +60,14 @@ const mappingLabels: Readonly<Record<Dataset["mappings"][number], string>> = {
   curvilinear: "curvilinear map",
 };
 
-// Shapes that the grid can be bent to, as the dataset tells them.
+// Shapes that the grid can be bent to, as listed by the dataset.
 export function mappingOptions(dataset: Dataset): Options {
   return Object.fromEntries(dataset.mappings.map((mapping) => [mappingLabels[mapping], mapping]));
 }
 
 export const ownHeight = ""; // the option that names no height field
 
-// Scalars that may tell the samples' height; those that measure one stand first.
+// Scalars that can serve as height field; those measured in length units first.
 export function heightOptions(dataset: Dataset): Options {
   const measuresHeight = (field: Field): boolean =>
     /height|altitude/.test(field.standardName) || /^(k?m|d[ak]m|gpm|feet)$/.test(field.units);
@@ -102,7 +102,7 @@ export function slicePatch(dataset: Dataset, axis: string): Patch {
   return { geometry: { slice: { axis: known, index } } };
 }
 
-// Where the layer lies, in the axis's own words.
+// Position of the layer in its axis's coordinate.
 export function sliceText(dataset: Dataset, view: View): string {
   const slice = view.geometry?.slice;
   if (!slice) return "";
@@ -119,13 +119,13 @@ export function colorByPatch(dataset: Dataset, view: View, by: string): Patch {
   if (by === "scalar" && !view.vector?.color?.field) {
     color.field = dataset.fields.find((field) => field.kind === "scalar")?.name ?? null;
   }
-  // North is one colour from either side; of what has two ends a cyclic map tells nothing.
+  // North is one colour from either side; for a range with two ends a cyclic map is ambiguous.
   if (by === "direction") color.map = "compass";
   else if (view.vector?.color?.map === "compass") color.map = null;
   return { vector: { color } };
 }
 
-// The field whose values the lines' colours tell, of a vector its magnitude; null: of none.
+// The field that the lines' colour maps, of a vector its magnitude; null: none.
 export function colorField(view: View): string | null {
   const { field = null, color } = view.vector ?? {};
   if (field === null) return null;

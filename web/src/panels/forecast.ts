@@ -1,4 +1,4 @@
-// Error against time as a picture's numbers: logarithmic axes, their ticks, and points in words.
+// Error against time as a picture's numbers: logarithmic axes, their ticks, and text of points.
 // Pure.
 import { errorName, errorText, type ErrorMetric } from "../base/error_text";
 import { formatNumber } from "../base/ticks";
@@ -23,7 +23,7 @@ export function axisOver(values: number[], ratio: number): Axis {
 }
 
 // 0..1, what is beyond an end at that end.
-export function placeOn({ low, high }: Axis, value: number): number {
+export function positionOn({ low, high }: Axis, value: number): number {
   if (!(value > low)) return 0;
   return Math.min(1, Math.log(value / low) / Math.log(high / low));
 }

@@ -2,7 +2,7 @@
 // frame that is shown, and the budget and the greatest error as handles. Asked for while it is seen
 // and the view rests.
 import { failureText, type Forecast } from "../wire/api";
-import { debounced, make, makeSvg, setAttributes, svgText, whileSeen } from "../base/dom";
+import { debounced, make, makeSvg, setAttributes, svgText, observeVisibility } from "../base/dom";
 import { errorMetric, errorName, errorText } from "../base/error_text";
 import {
   axisOver,
@@ -10,7 +10,7 @@ import {
   limitAfter,
   logTicks,
   msText,
-  placeOn,
+  positionOn,
   pointText,
   spotText,
   valueOn,
@@ -32,7 +32,7 @@ export interface ForecastHost {
 }
 
 const restMs = 1000; // without a change, before it is asked for
-const againMs = 5000; // surveys go on while the view rests
+const againMs = 5000; // calibration continues while the view rests
 const [width, height, left, right, top, bottom] = [284, 176, 36, 8, 12, 30]; // drawing units
 const [inner, tall] = [width - left - right, height - top - bottom];
 
@@ -71,7 +71,7 @@ export class ForecastPlot {
     this.svg.setAttribute("class", "forecast");
     this.svg.append(this.back, this.limit.element, this.budget.element);
     this.element.append(this.svg, this.caption);
-    whileSeen(this.element, (seen) => {
+    observeVisibility(this.element, (seen) => {
       this.seen = seen;
       this.refresh();
     });
@@ -140,7 +140,7 @@ export class ForecastPlot {
   }
 
   private at(ms: number, error: number): [number, number] {
-    return [left + inner * placeOn(this.x, ms), top + tall * (1 - placeOn(this.y, error))];
+    return [left + inner * positionOn(this.x, ms), top + tall * (1 - positionOn(this.y, error))];
   }
 
   private draw(): void {
@@ -170,7 +170,7 @@ export class ForecastPlot {
       const circle = makeSvg("circle", { cx, cy, r: 3.5, class: `plot-${point.kind}${chosen}` });
       parts.push(this.titled(circle, pointText(point, metric)));
     });
-    const told = this.frames().map((frame) => {
+    const captions = this.frames().map((frame) => {
       const [x, y] = this.at(frame.renderUs / 1000, frame.error);
       const what = frame.final ? "final" : "now";
       const mark = makeSvg("path", { d: `M${x} ${y - 6}l6 6-6 6-6-6z`, class: `plot-${what}` });
@@ -184,7 +184,9 @@ export class ForecastPlot {
     const counts = `${points.length} settings, ${measured} measured`;
     this.svg.setAttribute("aria-label", `${errorName(metric)} against time: ${counts}`);
     if (!this.caption.classList.contains("failed")) {
-      this.caption.textContent = [this.data === null ? "estimating…" : counts, ...told].join(" · ");
+      this.caption.textContent = [this.data === null ? "estimating…" : counts, ...captions].join(
+        " · ",
+      );
     }
   }
 
@@ -201,16 +203,16 @@ export class ForecastPlot {
     const error = host.maxError();
     const [x] = this.at(budget, 1);
     this.budget.element.setAttribute("transform", `translate(${x} 0)`);
-    this.tell(this.budget, 1, budget, 10_000, msText(budget));
+    this.updateAria(this.budget, 1, budget, 10_000, msText(budget));
     this.limit.element.toggleAttribute("hidden", error === null);
     if (error === null) return;
     const [, y] = this.at(1, error);
     this.limit.element.setAttribute("transform", `translate(0 ${y})`);
-    this.tell(this.limit, 1e-6, error, 1, errorText(error, errorMetric.value));
+    this.updateAria(this.limit, 1e-6, error, 1, errorText(error, errorMetric.value));
   }
 
   // A slider must have a value, so it becomes one with its first.
-  private tell(handle: Handle, min: number, now: number, max: number, text: string): void {
+  private updateAria(handle: Handle, min: number, now: number, max: number, text: string): void {
     const { element, name } = handle;
     setAttributes(element, {
       role: "slider",
@@ -228,7 +230,7 @@ export class ForecastPlot {
       class: "plot-handle",
       "aria-orientation": across ? "horizontal" : "vertical",
     });
-    // Wide enough for a hand; the line is what is seen.
+    // Wide enough to grab; only the line is visible.
     const hold = across
       ? { x: -12, y: 0, width: 24, height: height - bottom }
       : { x: left, y: -12, width: inner, height: 24 };

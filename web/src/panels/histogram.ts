@@ -40,7 +40,7 @@ export function neat(value: number, range: Range): number {
   return digits > 0 ? Number(value.toFixed(Math.min(digits, 100))) : Math.round(value);
 }
 
-export const placeOf = (value: number, range: Range): number =>
+export const positionOf = (value: number, range: Range): number =>
   range[1] === range[0] ? 0 : (value - range[0]) / (range[1] - range[0]);
 
 export const valueAt = (place: number, range: Range): number =>

@@ -1,8 +1,15 @@
 // A histogram in the panel: fetched while it is seen and time rests. A drag over it, or over the
 // colours below it, chooses a range; above it a medium's opacity curve is edited.
 import { failureText, type Histogram, type Range } from "../wire/api";
-import { checkLabel, debounced, make, makeSvg, setAttributes, whileSeen } from "../base/dom";
-import { barPath, clipRange, placeOf, RangeDrag, valueAt } from "./histogram";
+import {
+  checkLabel,
+  debounced,
+  make,
+  makeSvg,
+  setAttributes,
+  observeVisibility,
+} from "../base/dom";
+import { barPath, clipRange, positionOf, RangeDrag, valueAt } from "./histogram";
 import { oriented, RangeChoice, type RangeSource } from "./range_choice";
 import { formatNumber } from "../base/ticks";
 import { TransferView, type CurveSource } from "./transfer_view";
@@ -69,7 +76,7 @@ export class HistogramView {
     });
     this.bindDrag(this.strip);
     if (this.transfer === null) this.bindDrag(this.svg);
-    whileSeen(this.element, (seen) => {
+    observeVisibility(this.element, (seen) => {
       this.seen = seen;
       this.refresh();
     });
@@ -123,7 +130,7 @@ export class HistogramView {
     on("pointerdown", (event) => {
       if (this.data === null || event.button !== 0) return;
       const near = holdPixels / surface.getBoundingClientRect().width;
-      const ends = (this.source.range() ?? this.data.range).map((end) => this.placeIn(end));
+      const ends = (this.source.range() ?? this.data.range).map((end) => this.positionIn(end));
       surface.setPointerCapture(event.pointerId);
       this.drag = new RangeDrag(place(event), ends as Range, near);
     });
@@ -144,11 +151,11 @@ export class HistogramView {
     this.chosen = null;
   }
 
-  private placeIn(value: number): number {
-    return clamp(placeOf(value, this.domain), 0, 1);
+  private positionIn(value: number): number {
+    return clamp(positionOf(value, this.domain), 0, 1);
   }
 
-  // All that is counted, the colours' range and the curve's points. It stays while a hand is on it.
+  // All that is counted, the colours' range and the curve's points. It stays during a drag.
   private fitDomain(): void {
     const { data, source } = this;
     if (this.drag !== null || this.transfer?.dragging) return;
@@ -181,12 +188,12 @@ export class HistogramView {
     }
     const range = data?.range ?? this.domain;
     const bins = data?.counts.length ?? 1;
-    const [left, right] = this.domain.map((end) => bins * placeOf(end, range)) as Range;
+    const [left, right] = this.domain.map((end) => bins * positionOf(end, range)) as Range;
     const width = right - left;
     this.svg.setAttribute("viewBox", `${left} 0 ${width} 1`);
     const ends = chosen ?? this.domain;
     const places = [Math.min(...ends), Math.max(...ends)].map(
-      (end) => left + width * this.placeIn(end),
+      (end) => left + width * this.positionIn(end),
     );
     this.ends.forEach((end, n) => {
       setAttributes(end, { x1: places[n]!, x2: places[n]!, y2: 1 });
@@ -195,7 +202,7 @@ export class HistogramView {
       const size = n === 0 ? places[0]! - left : right - places[1]!;
       setAttributes(shade, { x: n === 0 ? left : places[1]!, width: Math.max(0, size), height: 1 });
     });
-    const [from, to] = ends.map((end) => 100 * placeOf(end, this.domain)) as Range;
+    const [from, to] = ends.map((end) => 100 * positionOf(end, this.domain)) as Range;
     this.strip.style.backgroundImage = source.gradient?.(from, to) ?? "";
     this.transfer?.line.setAttribute("transform", `translate(${left} 0) scale(${width} 1)`);
     this.transfer?.draw(this.domain);

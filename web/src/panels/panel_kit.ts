@@ -19,7 +19,7 @@ import { clamp } from "../base/values";
 export interface PanelHost {
   view(): View; // with every default that is known
   change(patch: Patch): void;
-  quietly(run: () => void): void; // what it changes is no step of undo
+  quietly(run: () => void): void; // its changes are no undo step
   dataset(): Dataset;
   maps: ColorMaps;
   api: Api;
@@ -28,7 +28,7 @@ export interface PanelHost {
 }
 
 // A histogram of a field, and the range that it chooses.
-export interface HistogramLook {
+export interface HistogramOptions {
   key: string; // of the range, among those of the panel
   folder?: string; // its title
   field(): string | null; // null: of none now
@@ -40,7 +40,7 @@ export interface HistogramLook {
   curve?: CurveSource;
 }
 
-export interface NumberLook {
+export interface NumberOptions {
   min?: number;
   max?: number;
   step?: number;
@@ -74,7 +74,7 @@ export const keyAccess = <T>(pointer: string): Access<T> => ({
   set: (value) => patchAt(pointer, value),
 });
 
-// As many digits as anyone turns by hand.
+// Digits that a control shows.
 const shownValue = <T>(value: T): T =>
   typeof value === "number" ? (Number(value.toPrecision(6)) as T) : value;
 
@@ -128,15 +128,20 @@ export class PanelKit {
     this.refreshers.push(run);
   }
 
-  number(folder: GUI, label: string, access: Access<number>, look: NumberLook = {}): Controller {
+  number(
+    folder: GUI,
+    label: string,
+    access: Access<number>,
+    options: NumberOptions = {},
+  ): Controller {
     const [least, most] = viewRanges[access.pointer] ?? [];
-    const min = look.min ?? least;
-    const max = look.max ?? most;
+    const min = options.min ?? least;
+    const max = options.max ?? most;
     const model = { value: shownValue(access.get(this.host.view()) ?? min ?? 0) };
-    const controller = look.field
+    const controller = options.field
       ? folder.add(model, "value")
       : folder.add(model, "value", min, max);
-    if (look.step !== undefined) controller.step(look.step);
+    if (options.step !== undefined) controller.step(options.step);
     shortenSmall(controller as NumberController);
     return this.bind(controller, label, model, access);
   }
@@ -243,37 +248,37 @@ export class PanelKit {
     });
   }
 
-  // In a folder of its own, so that nothing is counted that nobody looks at.
-  histogram(parent: GUI, look: HistogramLook): GUI {
-    const folder = parent.addFolder(look.folder ?? "Histogram");
+  // In a folder of its own, so that a histogram is computed only where it is visible.
+  histogram(parent: GUI, options: HistogramOptions): GUI {
+    const folder = parent.addFolder(options.folder ?? "Histogram");
     const { host } = this;
     const dataset = host.dataset();
     const step = () => (host.playing() ? null : (host.view().step ?? 0));
     const view: HistogramView = new HistogramView({
-      ...look,
-      key: `${dataset.id} ${look.key}`,
+      ...options,
+      key: `${dataset.id} ${options.key}`,
       modes: this.modes,
       units: () => {
-        const named = dataset.fields.find((one) => one.name === look.field());
+        const named = dataset.fields.find((one) => one.name === options.field());
         return unitText(named?.units);
       },
       steps: dataset.steps.count,
       quietly: (run) => host.quietly(run),
       step,
       dataKey: () => {
-        const field = look.field();
+        const field = options.field();
         return field === null || host.playing() ? null : `${host.view().step ?? 0} ${field}`;
       },
       load: () =>
-        host.api.histogram(dataset.id, look.field()!, host.view().step ?? 0, histogramBins),
-      of: () => (host.view().dataset === dataset.id ? look.field() : null),
+        host.api.histogram(dataset.id, options.field()!, host.view().step ?? 0, histogramBins),
+      of: () => (host.view().dataset === dataset.id ? options.field() : null),
       read: async (at) => {
-        const { range } = await host.api.range(dataset.id, look.field()!, at);
+        const { range } = await host.api.range(dataset.id, options.field()!, at);
         return view.element.isConnected ? range : null; // else the panel was built anew
       },
-      ...(look.map === undefined
+      ...(options.map === undefined
         ? {}
-        : { gradient: (from, to) => host.maps.gradient(look.map!() ?? "", from, to) }),
+        : { gradient: (from, to) => host.maps.gradient(options.map!() ?? "", from, to) }),
     });
     folder.$children.append(view.element);
     this.onRefresh(() => view.refresh());
@@ -286,16 +291,16 @@ export class PanelKit {
     return controller;
   }
 
-  // Words below the controls before them, of the view as it is.
+  // A note below the preceding controls, updated with the view.
   note(folder: GUI, text: () => string): void {
     const element = make("p", "panel-note");
     folder.$children.append(element);
     element.hidden = true;
     const write = () => {
-      const words = text();
-      if (element.textContent === words) return;
-      element.textContent = words;
-      element.hidden = words === "";
+      const next = text();
+      if (element.textContent === next) return;
+      element.textContent = next;
+      element.hidden = next === "";
     };
     this.onRefresh(write);
     write();

@@ -106,13 +106,13 @@ function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
   );
   kit.showWhen((states) => states.ranged, map, ...ends, auto);
   const counted = () => colorField(host.view());
-  const said = host.dataset().defaultView?.vector;
+  const defaults = host.dataset().defaultView?.vector;
   const histogram = kit.histogram(folder, {
     key: "lines",
     map: () => host.view().vector?.color?.map,
     defaultRange: () =>
-      said?.color?.by === host.view().vector?.color?.by
-        ? ((said?.color?.range ?? null) as Range | null)
+      defaults?.color?.by === host.view().vector?.color?.by
+        ? ((defaults?.color?.range ?? null) as Range | null)
         : null,
     title: () => (host.view().vector?.color?.by === "magnitude" ? "|v|" : (counted() ?? "")),
     field: counted,

@@ -169,7 +169,7 @@ class MediaPanel {
       choose: (range) => this.update(index, { color: { ...color(), range: range ?? undefined } }),
       map: () => color()?.map ?? undefined,
       ...(this.viewOf(index).extinction == null
-        ? {} // the server has not told its default yet
+        ? {} // the server has not sent its default yet
         : {
             curve: {
               curve: () => curveOf(this.viewOf(index)),
@@ -212,7 +212,7 @@ class MediaPanel {
   }
 
   private addOpacity(folder: GUI, index: number, units: string): void {
-    if (this.viewOf(index).extinction == null) return; // the server has not told its default yet
+    if (this.viewOf(index).extinction == null) return; // the server has not sent its default yet
     const curve = () => curveOf(this.viewOf(index));
     const low = () => Math.min(curve()[0]![0], ...(this.viewOf(index).color?.range ?? []));
     const ends = (): Range => [low(), curve().at(-1)![0]];

@@ -1,4 +1,4 @@
-// The probe's panel: a place by the axes' own coordinates -> values of every field there, and of
+// The probe's panel: a position in the axes' own coordinates -> values of every field there, and of
 // one field over time. Open means that the probe is on: its place is then marked on the picture.
 import type GUI from "lil-gui";
 import { failureText, type Series } from "../wire/api";
@@ -15,7 +15,7 @@ import {
   valueText,
   type Sample,
 } from "../view/sample_position";
-import { courseEnds, drawCourse } from "./series_plot";
+import { timeEnds, drawSeries } from "./series_plot";
 import { formatNumber } from "../base/ticks";
 
 const restMs = 150;
@@ -26,7 +26,7 @@ export class ProbePanel {
   private sample: Sample;
   private readonly box = make("div", "probe");
   private readonly rows: { slider: HTMLInputElement; number: HTMLInputElement }[] = [];
-  private readonly words = make("p", "probe-words");
+  private readonly message = make("p", "probe-words");
   private readonly values = make("dl", "probe-values");
   private readonly picker = make("select");
   private readonly plot = makeSvg("svg", { class: "course", role: "img" });
@@ -43,8 +43,8 @@ export class ProbePanel {
     this.folder = gui.addFolder(probeTitle);
     this.sample = place;
     axisNames.forEach((_, axis) => this.addAxis(axis));
-    this.words.setAttribute("role", "status");
-    this.box.append(this.words, this.values);
+    this.message.setAttribute("role", "status");
+    this.box.append(this.message, this.values);
     this.addSeries();
     this.addHover();
     this.folder.$children.append(this.box);
@@ -165,10 +165,10 @@ export class ProbePanel {
     });
   }
 
-  private say(text: string, failed = false): void {
-    this.words.textContent = text;
-    this.words.hidden = text === "";
-    this.words.classList.toggle("failed", failed);
+  private showMessage(text: string, failed = false): void {
+    this.message.textContent = text;
+    this.message.hidden = text === "";
+    this.message.classList.toggle("failed", failed);
   }
 
   private async read(): Promise<void> {
@@ -187,11 +187,11 @@ export class ProbePanel {
           make("dd", "", valueText(value, units)),
         ]),
       );
-      this.say("");
+      this.showMessage("");
     } catch (failure) {
       if (key !== this.wanted) return;
       this.values.replaceChildren();
-      this.say(failureText(failure), true);
+      this.showMessage(failureText(failure), true);
     }
   }
 
@@ -199,14 +199,14 @@ export class ProbePanel {
     const { host } = this.kit;
     const dataset = host.dataset();
     const [sample, field] = [this.sample, this.picker.value];
-    this.say("reading every step…");
+    this.showMessage("reading every step…");
     try {
       const at = coordinatesOf(dataset, sample);
       const series = await host.api.series(dataset.id, field, at);
       if (sample === this.sample && field === this.picker.value) this.series = series;
-      this.say("");
+      this.showMessage("");
     } catch (failure) {
-      this.say(failureText(failure), true);
+      this.showMessage(failureText(failure), true);
     }
     this.showSeries();
   }
@@ -215,11 +215,11 @@ export class ProbePanel {
     const { series, plot } = this;
     plot.toggleAttribute("hidden", series === null);
     if (series === null) return;
-    drawCourse(
+    drawSeries(
       plot,
       series.values.map(magnitude),
       unitText(series.units),
-      courseEnds(series.times),
+      timeEnds(series.times),
       this.kit.host.view().step ?? 0,
     );
   }

@@ -30,14 +30,14 @@ export function sameRange(a: Range | null, b: Range | null): boolean {
 export const oriented = (range: Range, like: Range | null): Range =>
   like !== null && like[0] > like[1] ? [range[1], range[0]] : range;
 
-// Keeps the mode true: a range that comes from elsewhere (a drag, a number, a link) is the user's
-// own, and of a step it is read again when another step is shown.
+// Keeps the mode consistent: a range from elsewhere (a drag, a number, a link) is the user's own,
+// and of a step it is read again when another step is shown.
 export class RangeFollower {
   mode: RangeMode;
   private stands: Range | null; // the range that the mode has brought; null: not yet
   private readFor: number | null = null; // the step that was asked for last
   private asked = 0;
-  private byHand = false; // the mode was chosen, and its range is still to come
+  private byHand = false; // the user chose the mode, and its range is pending
   private readonly known = new Map<number | null, Range>(); // what the mode has brought so far
 
   constructor(
@@ -82,7 +82,7 @@ export class RangeFollower {
     this.source.modes.set(this.source.key, mode);
   }
 
-  // The default takes the old one's place when the server has told it.
+  // The default replaces the old range once the server has sent it.
   private expects(now: Range): boolean {
     if (sameRange(now, this.stands)) return true;
     // Undo has brought an earlier step's back: the present one's is read again.

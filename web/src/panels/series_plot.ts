@@ -1,17 +1,17 @@
-// The course of one value over the steps: numbers -> an SVG with gaps where there are none.
+// One value over the time steps: numbers -> an SVG with gaps where there are none.
 import type { SeriesTime } from "../wire/api";
 import { makeSvg, svgText } from "../base/dom";
 import { formatNumber } from "../base/ticks";
 import { readableTime } from "../base/time_text";
 
-export interface Course {
+export interface SeriesCurve {
   path: string; // x in steps, y 0 (greatest) to 1 (least)
   low: number;
   high: number;
 }
 
 // null: no value at any step. A value between gaps is a dash as long as a quarter of a step.
-export function courseOf(values: (number | null)[]): Course | null {
+export function seriesCurve(values: (number | null)[]): SeriesCurve | null {
   const known = values.filter((value) => value !== null);
   if (known.length === 0) return null;
   const low = known.reduce((a, b) => Math.min(a, b));
@@ -28,13 +28,13 @@ export function courseOf(values: (number | null)[]): Course | null {
   return { path: parts.join(""), low, high };
 }
 
-// The first and the last time, in words.
-export function courseEnds(times: SeriesTime[]): [string, string] {
+// The first and the last time as text.
+export function timeEnds(times: SeriesTime[]): [string, string] {
   return [readableTime(times[0]?.text ?? ""), readableTime(times.at(-1)?.text ?? "")];
 }
 
 // Fills `svg` with the course, its least and greatest value, its ends in time and the present step.
-export function drawCourse(
+export function drawSeries(
   svg: SVGElement,
   values: (number | null)[],
   units: string,
@@ -43,7 +43,7 @@ export function drawCourse(
 ): void {
   const [width, height, top, bottom] = [280, 96, 14, 14]; // the drawing's units
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  const course = courseOf(values);
+  const course = seriesCurve(values);
   const unit = units === "" ? "" : ` ${units}`;
   if (course === null) {
     svg.setAttribute("aria-label", "No value at any step");

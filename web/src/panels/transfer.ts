@@ -65,7 +65,7 @@ export const removePoint = (curve: Curve, index: number): Curve =>
   curve.length < 2 ? curve : curve.filter((_, n) => n !== index);
 
 // The middle of the widest gap, on the curve.
-export function freePlace(curve: Curve): [number, number] {
+export function freePosition(curve: Curve): [number, number] {
   let widest = 1;
   const gap = (n: number): number => curve[n]![0] - curve[n - 1]![0];
   for (let n = 2; n < curve.length; n++) if (gap(n) > gap(widest)) widest = n;

@@ -2,14 +2,14 @@
 // table of numbers. While a point is dragged at most one change a display frame goes out.
 import type { Range } from "../wire/api";
 import { checkLabel, make, makeSvg, numberBox, setAttributes } from "../base/dom";
-import { neat, placeOf } from "./histogram";
+import { neat, positionOf } from "./histogram";
 import type { Curve } from "./media";
 import {
   addPoint,
   curvePath,
   dragShareMax,
   extinctionAt,
-  freePlace,
+  freePosition,
   movePoint,
   pointText,
   removePoint,
@@ -38,7 +38,7 @@ export class TransferView {
   private readonly top = numberBox();
   private readonly add = make("button", "", "Add a point");
   private scale: Scale = { top: 1, log: false };
-  private ownTop = false; // as the user wants it
+  private ownTop = false; // entered by the user
   private held: number | null = null; // the point that is dragged
   private moving: Curve | null = null; // not sent yet
   private domain: Range = [0, 1];
@@ -74,7 +74,7 @@ export class TransferView {
     curve.forEach((point, n) => {
       const handle = points.children[n] as HTMLElement;
       const share = Math.min(shareOf(point[1], this.scale), 1);
-      handle.style.left = `${100 * placeOf(point[0], domain)}%`;
+      handle.style.left = `${100 * positionOf(point[0], domain)}%`;
       handle.style.top = `${100 * (1 - share)}%`;
       const text = pointText(point, this.units());
       setAttributes(handle, {
@@ -162,7 +162,7 @@ export class TransferView {
     points.addEventListener("pointerdown", ({ clientX, clientY }) => (from = [clientX, clientY]));
     points.addEventListener("pointermove", (event) => {
       if (this.held === null) return;
-      // A click is not to move a point by what the hand missed of it.
+      // A click that is slightly off a point does not move it.
       if (from[0] >= 0 && Math.hypot(event.clientX - from[0], event.clientY - from[1]) < 3) return;
       from = [-1, -1];
       this.setSoon(movePoint(this.curve(), this.held, ...this.under(event)));
@@ -236,7 +236,7 @@ export class TransferView {
     table.append(this.rows);
     this.add.addEventListener("click", () => {
       const curve = this.curve();
-      const added = addPoint(curve, ...freePlace(curve));
+      const added = addPoint(curve, ...freePosition(curve));
       if (added === null) return;
       this.set(added.curve);
       this.rows.children[added.index]!.querySelector("input")!.focus();

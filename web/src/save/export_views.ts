@@ -1,4 +1,4 @@
-// What is saved: (view as the user said it, choices) -> views to draw, their size, names and words.
+// Export: (explicit view, choices) -> views to render, their size and progress text.
 // Pure.
 import { orbit, type Camera } from "../view/camera";
 import type { View } from "../wire/protocol";
@@ -24,17 +24,17 @@ export function exportSize(
   return { width: pixels(w), height: pixels(h), scale };
 }
 
-// The view that a saved picture is of and carries: without `quality`, which is the viewer's wish
-// and not the picture's, so that nothing is left to the server's choice.
-export function pictureView(said: View, { width, height }: ExportSize): View {
-  const { quality: _quality, ...view } = said;
-  return { ...view, step: said.step ?? 0, image: { ...said.image, width, height } };
+// The view that a saved picture shows and contains: without `quality`, which is a preference of the
+// viewer and would leave settings to the server.
+export function pictureView(explicit: View, { width, height }: ExportSize): View {
+  const { quality: _quality, ...view } = explicit;
+  return { ...view, step: explicit.step ?? 0, image: { ...explicit.image, width, height } };
 }
 
-export type Course = "steps" | "turn" | "flow";
+export type AnimationKind = "steps" | "turn" | "flow";
 
 export interface Animation {
-  over: Course;
+  over: AnimationKind;
   from: number; // steps
   to: number;
   every: number;

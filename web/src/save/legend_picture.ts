@@ -1,6 +1,6 @@
 // The legend drawn into a saved picture, where and as large as the page shows it: what it says and
 // the canvas -> pixels. Lengths are CSS pixels until the context's scale makes them the picture's.
-import { curvePlaces, type LegendEntry } from "../view/legend_entries";
+import { curvePoints, type LegendEntry } from "../view/legend_entries";
 
 export interface LegendPicture {
   caption: string; // the dataset and the step's time
@@ -38,7 +38,7 @@ const heightOf = (entry: LegendEntry): number =>
 
 // Cards in rows from the lower left, the caption above them (first of all). `shrink` is what they
 // are drawn smaller by; the places are before it.
-export function placeCards(
+export function layoutCards(
   entries: LegendEntry[],
   cardWidth: number,
   width: number,
@@ -71,18 +71,11 @@ export function drawLegend(
   scale: number, // pixels a CSS pixel
 ): void {
   const { width, height } = context.canvas;
-  const { cards, shrink } = placeCards(entries, cardWidth, width / scale, height / scale);
-  const write = (
-    words: string,
-    x: number,
-    y: number,
-    style: string,
-    color: string,
-    max: number,
-  ) => {
+  const { cards, shrink } = layoutCards(entries, cardWidth, width / scale, height / scale);
+  const write = (line: string, x: number, y: number, style: string, color: string, max: number) => {
     context.font = `${style} ${font}`;
     context.fillStyle = color;
-    context.fillText(words, x, y, max);
+    context.fillText(line, x, y, max);
   };
   context.save();
   context.scale(scale * shrink, scale * shrink);
@@ -152,7 +145,7 @@ function drawStrip(
   context.fillStyle = entry.map === null ? (entry.color ?? "") : colors;
   context.fillRect(x, y, width, stripHeight);
   if (entry.extinction.length > 0) {
-    const at = curvePlaces(entry.extinction).map(
+    const at = curvePoints(entry.extinction).map(
       ([u, v]) => [x + u * width, y + v * stripHeight] as const,
     );
     const curve = (): void => {

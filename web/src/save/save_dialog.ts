@@ -1,16 +1,16 @@
-// The dialog "Save": the choices there -> pictures, animations and kept views, by way of the server
-// and the browser's downloads. One job at a time; what it does and why it failed is told there.
+// The Save dialog: choices -> pictures, animations and saved views, rendered by the server and
+// downloaded by the browser. One job at a time, with its progress and error.
 import { byId } from "../base/dom";
 import {
   exportSize,
   frameCount,
   framesMax,
   type Animation,
-  type Course,
+  type AnimationKind,
   type ExportSize,
 } from "./export_views";
-import { keptList } from "./saved_view_list";
-import { button, Jobs, words } from "./save_jobs";
+import { savedViewList } from "./saved_view_list";
+import { button, Jobs, part } from "./save_jobs";
 import { animationJob, pictureJob, type SaveHost, type SaveSetting } from "./save_work";
 import { openFile } from "./saved_picture";
 import { clamp } from "../base/values";
@@ -27,7 +27,7 @@ const input = (id: string) => byId(`save-${id}`, HTMLInputElement);
 const select = (id: string) => byId(`save-${id}`, HTMLSelectElement);
 const fields = (id: string) => byId(`save-${id}`, HTMLFieldSetElement);
 
-// What another dataset begins with.
+// Defaults for another dataset.
 function fill(host: SaveHost, dialog: HTMLElement): void {
   const { id, steps } = host.dataset();
   const filled = `${id} ${steps.count}`;
@@ -46,7 +46,7 @@ const sizeChosen = (host: SaveHost, scaleMax: number): ExportSize =>
   exportSize(...host.size(), Math.min(Number(scaleChosen()), scaleMax), host.pixelsMax());
 
 function animationChosen(): Animation {
-  // Whatever is typed becomes a number that can be.
+  // Typed values are rounded and clamped.
   const number = (id: string): number => {
     const { value, min, max } = input(id);
     const most = max === "" ? framesMax : Number(max);
@@ -54,7 +54,7 @@ function animationChosen(): Animation {
     input(id).value = String(right);
     return right;
   };
-  const over = select("over").value as Course;
+  const over = select("over").value as AnimationKind;
   const [from, to, every] = [number("from"), number("to"), number("every")];
   return { over, from, to, every, frames: number("frames"), fps: number("fps") };
 }
@@ -71,25 +71,25 @@ function showChoices(host: SaveHost, dialog: HTMLElement, running: boolean): voi
   flow!.disabled = !vector?.field || vector.motion?.mode !== "phase";
   if (select("over").selectedOptions[0]?.disabled) select("over").value = "turn";
   const chosen = animationChosen();
-  for (const part of dialog.querySelectorAll<HTMLElement>(".of-steps, .of-frames")) {
-    part.hidden = part.classList.contains("of-steps") !== (chosen.over === "steps");
+  for (const choice of dialog.querySelectorAll<HTMLElement>(".of-steps, .of-frames")) {
+    choice.hidden = choice.classList.contains("of-steps") !== (chosen.over === "steps");
   }
   const { width, height, scale } = sizeChosen(host, pictureScaleMax);
   const limited = scale < Number(scaleChosen()) ? ", the server's limit" : "";
-  words("size").textContent = `${width} × ${height} pixels${limited}.`;
+  part("size").textContent = `${width} × ${height} pixels${limited}.`;
   const count = frameCount(chosen);
   const small = sizeChosen(host, animationScaleMax);
-  words("about").textContent =
+  part("about").textContent =
     `${count} frame${count === 1 ? "" : "s"} of ${small.width} × ${small.height} pixels, ` +
     `${Number((count / chosen.fps).toFixed(1))} s. ${about[select("as").value]}`;
 }
 
-// What opens the dialog.
+// Returns the function that opens the dialog.
 export function saveDialog(host: SaveHost, baseUri: string): () => void {
   const dialog = byId("save", HTMLDialogElement);
   const jobs = new Jobs(dialog, () => show());
   const show = (): void => showChoices(host, dialog, jobs.running);
-  const kept = keptList(host, baseUri, dialog, jobs);
+  const showSavedViews = savedViewList(host, baseUri, dialog, jobs);
 
   const setting = (scaleMax: number): SaveSetting => ({
     host,
@@ -127,7 +127,7 @@ export function saveDialog(host: SaveHost, baseUri: string): () => void {
     if (host.isOpen()) fill(host, dialog);
     jobs.clear();
     show();
-    kept();
+    showSavedViews();
     dialog.showModal();
   };
 }

@@ -1,18 +1,18 @@
-// What runs in the dialog "Save": work -> its bar, its last words, and a file that is downloaded.
+// Jobs of the Save dialog: work -> progress bar, result text, and a file to download.
 import { failureText } from "../wire/api";
 import { byId, make, whenClosed } from "../base/dom";
 import { formatBytes } from "../base/ticks";
 
-export type Tell = (words: string, done?: number) => void; // a fraction, or nobody knows
+export type ReportProgress = (text: string, done?: number) => void; // done: 0 to 1, if known
 
-// What gives the file of this name.
+// Makes the file of this name.
 export interface Job {
   name: string;
-  work(signal: AbortSignal, tell: Tell): Promise<Blob>;
+  work(signal: AbortSignal, report: ReportProgress): Promise<Blob>;
 }
 
 export const button = (id: string) => byId(id, HTMLButtonElement);
-export const words = (id: string) => byId(`save-${id}`, HTMLElement);
+export const part = (id: string) => byId(`save-${id}`, HTMLElement);
 
 function download(file: Blob, name: string): void {
   const link = make("a");
@@ -22,7 +22,7 @@ function download(file: Blob, name: string): void {
   window.setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }
 
-// One job at a time, with its bar and its last words.
+// One job at a time, with its progress bar and result text.
 export class Jobs {
   private job: AbortController | null = null;
 
@@ -44,13 +44,13 @@ export class Jobs {
   }
 
   clear(): void {
-    words("error").hidden = true;
-    words("said").textContent = "";
+    part("error").hidden = true;
+    part("said").textContent = "";
   }
 
   fail(failure: unknown): void {
-    words("error").textContent = failureText(failure);
-    words("error").hidden = false;
+    part("error").textContent = failureText(failure);
+    part("error").hidden = false;
   }
 
   async run({ name, work }: Job): Promise<void> {
@@ -61,15 +61,15 @@ export class Jobs {
     button("save-cancel").focus();
     try {
       const file = await work(job.signal, (text, done) => {
-        words("progress").textContent = text;
+        part("progress").textContent = text;
         if (done === undefined) bar.removeAttribute("value");
         else bar.value = done;
       });
       job.signal.throwIfAborted();
       download(file, name);
-      words("said").textContent = `Saved ${name}, ${formatBytes(file.size)}.`;
+      part("said").textContent = `Saved ${name}, ${formatBytes(file.size)}.`;
     } catch (failure) {
-      if (job.signal.aborted) words("said").textContent = "Cancelled.";
+      if (job.signal.aborted) part("said").textContent = "Cancelled.";
       else this.fail(failure);
       job.abort(); // what else is under way
     }
@@ -79,7 +79,7 @@ export class Jobs {
 
   private show(job: AbortController | null): void {
     this.job = job;
-    words("job").hidden = job === null;
+    part("job").hidden = job === null;
     this.changed();
   }
 }

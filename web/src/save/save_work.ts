@@ -1,4 +1,4 @@
-// The work that the dialog "Save" gives: the view and what was chosen -> a picture, or the frames
+// The jobs of the Save dialog: the view and what was chosen -> a picture, or the frames
 // of an animation in one file, drawn by the server.
 import type { Camera } from "../view/camera";
 import type { ColorMaps } from "../wire/color_maps";
@@ -20,7 +20,7 @@ import { Zip } from "./zip";
 
 export interface SaveHost {
   isOpen(): boolean; // there is a dataset, and the view is of it
-  said(): View;
+  explicitView(): View;
   view(): View; // with every default
   camera(): Camera | null;
   dataset(): Dataset;
@@ -44,11 +44,11 @@ const draw = (baseUri: string, view: View, signal: AbortSignal): Promise<Blob> =
 
 // `scale`: as it was chosen, for the name.
 export function pictureJob({ host, baseUri, pixels, legend }: SaveSetting, scale: string): Job {
-  const view = pictureView(host.said(), pixels);
+  const view = pictureView(host.explicitView(), pixels);
   return {
     name: `${safeName(view.dataset ?? "")}-${view.step}-${scale}x.png`,
-    work: async (signal, tell) => {
-      tell("drawing…");
+    work: async (signal, report) => {
+      report("drawing…");
       const drawn = await draw(baseUri, view, signal);
       return new Blob([await finishPicture(drawn, view, pixels, legend)], { type: "image/png" });
     },
@@ -57,18 +57,19 @@ export function pictureJob({ host, baseUri, pixels, legend }: SaveSetting, scale
 
 export function animationJob(setting: SaveSetting, chosen: Animation, video: boolean): Job {
   const { host, baseUri, pixels, legend } = setting;
-  const whole = pictureView(host.said(), pixels);
+  const whole = pictureView(host.explicitView(), pixels);
   const camera = host.camera()!;
   const count = frameCount(chosen);
   const zip = new Zip(new Date());
   const frames: Blob[] = [];
   const name = safeName(`${whole.dataset}-${chosen.over}`);
   const viewOf = (n: number): View => frameView(whole, camera, chosen, n);
-  const work: Job["work"] = async (signal, tell) => {
+  const work: Job["work"] = async (signal, report) => {
     if (count > framesMax) throw new Error(`At most ${framesMax} frames.`);
     const start = performance.now();
-    const told = (n: number) => tell(progressText(n, count, performance.now() - start), n / count);
-    told(0);
+    const reportFrame = (n: number) =>
+      report(progressText(n, count, performance.now() - start), n / count);
+    reportFrame(0);
     await inOrder(
       count,
       (n) => draw(baseUri, viewOf(n), signal),
@@ -77,12 +78,12 @@ export function animationJob(setting: SaveSetting, chosen: Animation, video: boo
         signal.throwIfAborted();
         if (video) frames.push(new Blob([picture], { type: "image/png" }));
         else zip.add(`${name}-${String(n).padStart(4, "0")}.png`, picture);
-        told(n + 1);
+        reportFrame(n + 1);
       },
     );
     if (!video) return zip.finish();
     return recordVideo(frames, chosen.fps, signal, (n) =>
-      tell(`recording ${n} of ${count}`, n / count),
+      report(`recording ${n} of ${count}`, n / count),
     );
   };
   return { name: `${name}.${video ? "webm" : "zip"}`, work };

@@ -12,7 +12,7 @@ import { completeView } from "../view/view_state";
 
 const keyword = "windsplat-view";
 const fileBytesMax = 400e6;
-const cardWidthMin = 228; // CSS pixels; a phone's legend is narrower than its words
+const cardWidthMin = 228; // CSS pixels; a phone's legend is narrower than its text
 
 const bytesOf = async (blob: Blob): Promise<Bytes> => new Uint8Array(await blob.arrayBuffer());
 
@@ -63,7 +63,7 @@ async function withLegend(drawn: Blob, view: View, { scale }: ExportSize, shown:
   return blob;
 }
 
-// The view of a saved picture; fails with words.
+// The view of a saved picture; throws an Error with a message.
 export async function viewOfFile(file: Blob): Promise<View> {
   if (file.size > fileBytesMax) throw new Error("This file is too large for a saved picture.");
   const text = textOf(await bytesOf(file), keyword);
@@ -77,7 +77,7 @@ export function parseView(text: string): View {
     const view: unknown = JSON.parse(text);
     if (isView(view)) return view;
   } catch {
-    // told below
+    // reported below
   }
   throw new Error("This picture contains an invalid view.");
 }
@@ -101,7 +101,7 @@ export function takeDrops(hint: HTMLElement, target: FileTarget): void {
     window.addEventListener(type, (event) => {
       if (!event.dataTransfer?.types.includes("Files")) return;
       event.preventDefault();
-      // What a dialog does is not to be upset.
+      // Not while a dialog is open.
       if (document.querySelector("dialog[open]") === null) run(event);
       else event.dataTransfer.dropEffect = "none";
     });

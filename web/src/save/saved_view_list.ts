@@ -1,18 +1,18 @@
-// The list of kept views in the dialog "Save": what is opened, renamed, deleted or added there.
+// The list of saved views in the Save dialog: open, rename, delete, add.
 import { byId, make } from "../base/dom";
-import { KeptViews, nameMax, type KeptView } from "./saved_views";
+import { SavedViews, nameMax, type SavedView } from "./saved_views";
 import { withoutSize } from "../view/link";
 import type { Jobs } from "./save_jobs";
 import type { SaveHost } from "./save_work";
 
-// What shows the list anew.
-export function keptList(
+// Returns the function that refreshes the list.
+export function savedViewList(
   host: SaveHost,
   baseUri: string,
   dialog: HTMLDialogElement,
   jobs: Jobs,
 ): () => void {
-  const views = new KeptViews(
+  const views = new SavedViews(
     () => window.localStorage,
     `windsplat-views:${new URL(baseUri).pathname}`,
   );
@@ -27,7 +27,7 @@ export function keptList(
     }
   }
 
-  function row({ id, name: oldName, date, view }: KeptView): HTMLElement {
+  function row({ id, name: oldName, date, view }: SavedView): HTMLElement {
     const name = make("input");
     name.value = oldName;
     name.maxLength = nameMax;
@@ -64,13 +64,14 @@ export function keptList(
   }
 
   function show(): void {
-    if (host.isOpen()) newName.value = `${host.dataset().id}, step ${host.said().step ?? 0}`;
+    if (host.isOpen())
+      newName.value = `${host.dataset().id}, step ${host.explicitView().step ?? 0}`;
     byId("kept", HTMLElement).replaceChildren(...views.list().map(row));
   }
 
   byId("keep-form", HTMLFormElement).addEventListener("submit", (event) => {
     event.preventDefault();
-    const view = withoutSize(host.said());
+    const view = withoutSize(host.explicitView());
     change(() => views.add(newName.value.trim(), view, Date.now()));
     show();
   });

@@ -1,67 +1,70 @@
-// Views that the user keeps in this browser under names: a list in its storage, newest first. What
-// is found there may be anything, and is believed only as far as it looks right.
+// Named views saved in this browser's storage: a list, newest first. Stored content is untrusted
+// and checked.
 import type { View } from "../wire/protocol";
 import { isView } from "../wire/view_shape";
 
-export interface KeptView {
-  id: string; // its own for good: other tabs of the page change the same list
+export interface SavedView {
+  id: string; // permanent: other tabs of the page change the same list
   name: string;
   view: View;
   date: number; // ms since 1970
 }
 
-export const keptMax = 100;
+export const savedViewsMax = 100;
 export const nameMax = 80;
 const viewCharactersMax = 20_000;
 
 type Store = Pick<Storage, "getItem" | "setItem">;
 
-function looksRight(entry: unknown): entry is KeptView {
-  const { name, view, date } = (entry ?? {}) as Partial<KeptView>;
+function looksRight(entry: unknown): entry is SavedView {
+  const { name, view, date } = (entry ?? {}) as Partial<SavedView>;
   const named = typeof name === "string" && name.length <= nameMax;
   return named && isView(view) && Number.isFinite(date);
 }
 
 // Entries of earlier releases have none: theirs is made of what they began with.
-const withId = (entry: Omit<KeptView, "id">): KeptView => ({
+const withId = (entry: Omit<SavedView, "id">): SavedView => ({
   id: `${entry.date} ${entry.name}`,
   ...entry,
 });
 
-export class KeptViews {
+export class SavedViews {
   // The storage itself may be forbidden: it is asked for only when it is used.
   constructor(
     private readonly store: () => Store,
     private readonly key: string,
   ) {}
 
-  list(): KeptView[] {
+  list(): SavedView[] {
     try {
       const found: unknown = JSON.parse(this.store().getItem(this.key) ?? "[]");
-      return Array.isArray(found) ? found.filter(looksRight).slice(0, keptMax).map(withId) : [];
+      return Array.isArray(found)
+        ? found.filter(looksRight).slice(0, savedViewsMax).map(withId)
+        : [];
     } catch {
       return [];
     }
   }
 
-  // Fails, with words, where the browser keeps nothing.
+  // Throws an Error with a message where the browser refuses storage.
   add(name: string, view: View, date: number): void {
     const list = this.list();
-    if (list.length >= keptMax) throw new Error(`${keptMax} views are saved: delete one first.`);
+    if (list.length >= savedViewsMax)
+      throw new Error(`${savedViewsMax} views are saved: delete one first.`);
     if (JSON.stringify(view).length > viewCharactersMax) throw new Error("This view is too long.");
     this.write([withId({ name: name.slice(0, nameMax), view, date }), ...list]);
   }
 
   // One that another tab has deleted stays so.
   rename(id: string, name: string): void {
-    this.write(this.list().map((kept) => (kept.id === id ? { ...kept, name } : kept)));
+    this.write(this.list().map((saved) => (saved.id === id ? { ...saved, name } : saved)));
   }
 
   remove(id: string): void {
-    this.write(this.list().filter((kept) => kept.id !== id));
+    this.write(this.list().filter((saved) => saved.id !== id));
   }
 
-  private write(list: KeptView[]): void {
+  private write(list: SavedView[]): void {
     try {
       this.store().setItem(this.key, JSON.stringify(list));
     } catch {

@@ -1,5 +1,5 @@
-// Pictures -> a WebM video, by the browser's own recorder, which knows no time but the clock's: the
-// frames go onto a canvas one by one as they would be seen.
+// Pictures -> a WebM video, by the browser's recorder, which records in real time: the frames are
+// painted on a canvas one by one.
 import { waitFor } from "../wire/frame_request";
 import { clamp } from "../base/values";
 
@@ -14,7 +14,7 @@ export async function recordVideo(
   frames: Blob[],
   fps: number,
   signal: AbortSignal,
-  tell: (done: number) => void,
+  report: (done: number) => void,
 ): Promise<Blob> {
   const canvas = document.createElement("canvas");
   const context = canvas.getContext("2d", { alpha: false })!;
@@ -43,12 +43,12 @@ export async function recordVideo(
   try {
     recorder.start();
     const start = performance.now();
-    // The last frame is told once more at its end, so that it is seen as long as the others.
+    // The last frame is requested again at its end, so that it lasts as long as the others.
     for (let n = 0; n <= frames.length; n++) {
       await waitFor(start + (1000 * n) / fps - performance.now(), signal);
       if (n < frames.length) await paint(frames[n]!);
       track.requestFrame();
-      tell(n);
+      report(n);
     }
     recorder.stop();
     await ended;

@@ -60,7 +60,7 @@ export function anglesOf(camera: Camera): Angles {
   if (Math.abs(elevation) < uprightElevation) {
     return { azimuth: Math.atan2(x, -y) / degree, elevation };
   }
-  // Straight up or down the line of sight tells no azimuth; `up` does.
+  // Straight up or down the azimuth follows from `up` alone.
   const sign = elevation > 0 ? 1 : -1;
   return { azimuth: Math.atan2(-sign * camera.up[0], sign * camera.up[1]) / degree, elevation };
 }
@@ -100,7 +100,7 @@ export function orbit(camera: Camera, dAzimuth: number, dElevation: number): Cam
   return roll(lookFrom(camera, next), rollOf(camera));
 }
 
-// As if by hand: degrees by which what lies in front goes to the right and down on the screen.
+// A drag: degrees by which the near side moves right and down on the screen.
 export function drag(camera: Camera, right: number, down: number): Camera {
   const angle = rollOf(camera) * degree;
   const [c, s] = [Math.cos(angle), Math.sin(angle)];
@@ -133,7 +133,7 @@ export const heightAtTarget = (camera: Camera): number =>
     ? camera.height
     : 2 * distanceOf(camera) * Math.tan(0.5 * camera.fovY * degree);
 
-// Moves the picture by fractions of its height, to the right and down, as a finger would.
+// Moves the picture by fractions of its height, to the right and down, as in a drag.
 export function pan(camera: Camera, dx: number, dy: number): Camera {
   const frame = cameraFrame(camera);
   const scale = heightAtTarget(camera);

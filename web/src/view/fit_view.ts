@@ -5,7 +5,7 @@ import type { Dataset, View } from "../wire/protocol";
 type Vector = NonNullable<View["vector"]>;
 type Geometry = NonNullable<View["geometry"]>;
 
-// Keys whose sense is gone are left to their defaults; everything else stays as it was said.
+// Keys that no longer apply return to their defaults; all others stay.
 export function fitView(view: View, dataset: Dataset): View {
   const fitted: View = { ...view };
   const last = Math.max(0, dataset.steps.count - 1);

@@ -1,6 +1,6 @@
 // Lets the lines flow: moves /vector/motion/time on while it runs, at most `flowFps` times a second
 // and never before the frame that the last move asked for has come back. Time, timers and the
-// page's state are handed in.
+// page's state are injected.
 import { clamp } from "../base/values";
 
 export const flowFps = 15;
@@ -12,7 +12,7 @@ export interface FlowHost {
   now(): number; // ms
   setTimeout(run: () => void, ms: number): number;
   clearTimeout(timer: number): void;
-  hidden(): boolean; // nobody looks
+  hidden(): boolean; // the page is hidden
   wanted(): boolean; // the view's lines are there and move
   time(): number; // of the view, steps
   send(time: number): number; // the rev that asks for it
@@ -58,7 +58,7 @@ export class Flow {
     this.plan();
   }
 
-  // Someone looks again.
+  // The page is visible again.
   seen(): void {
     this.plan();
   }

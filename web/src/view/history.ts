@@ -10,7 +10,7 @@ type Node = Record<string, unknown>;
 
 interface Difference {
   path: string[];
-  before: unknown; // undefined: was not said
+  before: unknown; // undefined: was not set
   after: unknown;
 }
 
@@ -21,7 +21,7 @@ interface Entry {
 
 export interface Undone {
   view: View;
-  what: string; // in words: "camera", "lines and media"
+  what: string; // as text: "camera", "lines and media"
 }
 
 const entriesMax = 200;
@@ -61,7 +61,7 @@ function leavesOf({ path, before, after }: Difference): string[] {
 
 const changesOf = (entry: Entry): Difference[] => differences(entry.before, entry.after);
 
-const words: Record<string, string> = {
+const partNames: Record<string, string> = {
   vector: "lines",
   scalars: "media",
   depthCue: "depth cue",
@@ -72,7 +72,7 @@ const words: Record<string, string> = {
 function whatOf(changes: Difference[]): string {
   const keys = [...new Set(changes.map(({ path }) => path[0] ?? ""))];
   if (keys.includes("dataset")) return "dataset";
-  return keys.length > 3 ? "view" : keys.map((key) => words[key] ?? key).join(" and ");
+  return keys.length > 3 ? "view" : keys.map((key) => partNames[key] ?? key).join(" and ");
 }
 
 export class ViewHistory {

@@ -1,5 +1,5 @@
 // Whether the value under the cursor is shown, for the browser's session.
-import { Watched } from "../base/observable";
+import { Observable } from "../base/observable";
 
 const storageKey = "windsplat.hover";
 
@@ -12,5 +12,5 @@ function orNull<T>(run: () => T): T | null {
   }
 }
 
-export const hoverOn = new Watched(orNull(() => sessionStorage.getItem(storageKey)) !== "off");
+export const hoverOn = new Observable(orNull(() => sessionStorage.getItem(storageKey)) !== "off");
 hoverOn.watch((on) => orNull(() => sessionStorage.setItem(storageKey, on ? "on" : "off")));

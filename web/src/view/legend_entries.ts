@@ -1,4 +1,4 @@
-// What the legend says of a drawn view: title, unit, range and ticks of each colour strip.
+// Legend of a drawn view: title, unit, range and ticks of each colour strip.
 // Pure: (complete view, dataset) -> entries.
 import type { Dataset, Field, ScalarView, View } from "../wire/protocol";
 import { axisTicks, compassTicks, formatNumber, linearTicks, type LegendTick } from "../base/ticks";
@@ -79,7 +79,7 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
   const vector = view.vector;
   if (!vector?.field) return null;
   const field = fieldNamed(dataset, vector.field);
-  const name = vector.field.replaceAll("_", " "); // what its colour tells comes after it
+  const name = vector.field.replaceAll("_", " "); // the colour's quantity is appended
   const color = vector.color ?? {};
   const range = (color.range ?? [0, 1]) as [number, number];
   const units = unitText(field?.units);
@@ -95,7 +95,7 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
     color: null,
     ticks: linearTicks(range),
     extinction: [],
-    note: [longest, heads].filter((words) => words !== "").join(", "),
+    note: [longest, heads].filter((part) => part !== "").join(", "),
     leftOut: leftOutText(vector.minMagnitude ?? 0, units),
   };
   switch (color.by) {
@@ -159,7 +159,7 @@ function mediumEntry(dataset: Dataset, layer: ScalarView): LegendEntry {
 
 // The curve of a medium's extinction on its strip: fractions of the strip's width and, from above,
 // of its height.
-export function curvePlaces(points: [number, number][]): [x: number, y: number][] {
+export function curvePoints(points: [number, number][]): [x: number, y: number][] {
   const inside = points.map(([at, share]) => [clamp(at, -1, 2), share] as const);
   const first = inside[0]!;
   const last = inside[inside.length - 1]!;

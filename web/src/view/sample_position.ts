@@ -1,4 +1,4 @@
-// Where samples stand in the world of a view, and the sample that stands at a place. Pure.
+// World positions of samples in a view, and the sample nearest to a position. Pure.
 import type { Probe, Value } from "../wire/api";
 import type { Vec3 } from "../base/vec3";
 import { unitText } from "./legend_entries";
@@ -78,7 +78,7 @@ export function valueText(value: Value, units: string): string {
 export const axisUnit = (units: string): string =>
   ({ degrees_east: "°E", degrees_north: "°N" })[units] ?? unitText(units);
 
-// A coordinate in words: "23.5 °W", "x 12 km".
+// A coordinate as text: "23.5 °W", "x 12 km".
 function coordinateText(dataset: Dataset, n: number, value: number, called?: string): string {
   const { name, units } = dataset.axes[axisNames[n]!];
   const unit = axisUnit(units);
@@ -89,18 +89,18 @@ function coordinateText(dataset: Dataset, n: number, value: number, called?: str
   return unit.startsWith("°") ? text : `${name} ${text}`;
 }
 
-// What a probe tells beside the cursor: the fields that are drawn, or else all, and where that is;
+// Lines of a probe beside the cursor: the fields that are drawn, or else all, and where that is;
 // `axis` is the one across which the place was looked for.
 export function hoverLines(dataset: Dataset, view: View, probe: Probe, axis: number): string[] {
   const drawn = [view.vector?.field, ...(view.scalars ?? []).map(({ field }) => field)];
   const { values } = probe;
   const wanted = drawn.filter((name, n) => name && values[name] && drawn.indexOf(name) === n);
   const names = wanted.length > 0 ? (wanted as string[]) : Object.keys(values);
-  const told = names.map(
+  const parts = names.map(
     (name) => `${name} ${valueText(magnitude(values[name]!.value), values[name]!.units)}`,
   );
   const at = axisNames.map((name) => probe.position[name]);
   const across = coordinateText(dataset, axis, at[axis]!, axis === 2 ? "level" : "section");
   const along = at.flatMap((value, n) => (n === axis ? [] : [coordinateText(dataset, n, value)]));
-  return [told.join(" · "), `${along.join(", ")} · ${across}`];
+  return [parts.join(" · "), `${along.join(", ")} · ${across}`];
 }

@@ -1,4 +1,4 @@
-// What the page knows of its view: what the user said, the dataset that is open and what was drawn
+// The page's view: its explicit keys, the dataset that is open and what was drawn
 // last -> the view with every default that is known, and its camera.
 import type { Camera } from "./camera";
 import { fitView } from "./fit_view";
@@ -10,12 +10,12 @@ export class ViewModel {
   open: Dataset | null = null; // what is shown
   private drawn: View | null = null; // as the server completed it
 
-  // What the newest frame was drawn with, under what the user has said since.
+  // The view of the newest frame, under the explicit keys set since.
   view(): View {
-    const said = this.state.document;
-    const drawn = this.drawn?.dataset === said.dataset ? this.drawn : undefined;
-    const open = this.open?.id === said.dataset ? this.open?.defaultView : undefined;
-    return completeView(drawn ?? open ?? {}, said);
+    const explicit = this.state.document;
+    const drawn = this.drawn?.dataset === explicit.dataset ? this.drawn : undefined;
+    const open = this.open?.id === explicit.dataset ? this.open?.defaultView : undefined;
+    return completeView(drawn ?? open ?? {}, explicit);
   }
 
   dataset(): Dataset {
@@ -37,7 +37,7 @@ export class ViewModel {
   }
 
   // The method of a moving frame may be the server's own choice for its budget, and is not what
-  // the final one will be drawn with. Of `quality` the user's word is all there is: its defaults
+  // the final one will be drawn with. Of `quality` only explicit keys count: its defaults
   // are the wire's, and what was taken back is not to live on in an older frame.
   drew(chosen: ChosenMessage, final: boolean): void {
     const { quality: _quality, ...view } = chosen.view as View;

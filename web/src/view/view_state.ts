@@ -1,5 +1,5 @@
-// The one view document of the page: what the user said, and nothing that is a default.
-// Changes go in as merge patches, become pending until a frame or an error tells their fate, and
+// The page's view document: explicit keys only, no defaults.
+// Changes go in as merge patches, stay pending until a frame or an error settles them, and
 // come out as (rev, patch) to send.
 import type { View } from "../wire/protocol";
 import { isObject } from "../base/values";
@@ -24,20 +24,21 @@ export function mergePatch(target: unknown, patch: unknown, pointer = ""): unkno
 
 export const mergeView = (view: View, patch: unknown): View => mergePatch(view, patch) as View;
 
-// The view with its defaults beneath what was said. Arrays are taken whole.
-export function withDefaults(defaults: unknown, said: unknown): unknown {
-  if (said === undefined) return defaults;
-  if (!isObject(said) || !isObject(defaults)) return said;
+// Explicit values over defaults. Arrays are taken whole.
+export function withDefaults(defaults: unknown, explicit: unknown): unknown {
+  if (explicit === undefined) return defaults;
+  if (!isObject(explicit) || !isObject(defaults)) return explicit;
   const filled: Patch = { ...defaults };
-  for (const [key, value] of Object.entries(said)) filled[key] = withDefaults(defaults[key], value);
+  for (const [key, value] of Object.entries(explicit))
+    filled[key] = withDefaults(defaults[key], value);
   return filled;
 }
 
 // The same for a view, and for its media too: one that is of the same field in the same place.
-export function completeView(defaults: View, said: View): View {
-  const view = withDefaults(defaults, said) as View;
-  if (!said.scalars || !defaults.scalars) return view;
-  const scalars = said.scalars.map((medium, index) => {
+export function completeView(defaults: View, explicit: View): View {
+  const view = withDefaults(defaults, explicit) as View;
+  if (!explicit.scalars || !defaults.scalars) return view;
+  const scalars = explicit.scalars.map((medium, index) => {
     const known = defaults.scalars?.[index];
     return known?.field === medium.field ? (withDefaults(known, medium) as typeof medium) : medium;
   }) as View["scalars"];
@@ -71,13 +72,13 @@ const pendingMax = 64;
 export class ViewState {
   private confirmed: View = {};
   private pending: Pending[] = [];
-  private said: View = {};
+  private explicit: View = {};
   private lastRev = 0; // never used twice
   private confirmedRev = 0;
 
-  // The newest view as the user said it. Not to be changed in place.
+  // The newest view with its explicit keys. Not to be changed in place.
   get document(): View {
-    return this.said;
+    return this.explicit;
   }
 
   // The newest view that has been answered by a picture.
@@ -93,33 +94,33 @@ export class ViewState {
   change(patch: Patch): Outgoing {
     this.lastRev += 1;
     this.pending.push({ rev: this.lastRev, patch });
-    // Without news for long (a hidden page, a lost connection) the oldest count as accepted.
+    // Without an answer for long (a hidden page, a lost connection) the oldest count as accepted.
     while (this.pending.length > pendingMax) this.settle(this.pending[0]!.rev);
     this.recompute();
     return { rev: this.lastRev, patch };
   }
 
   // Replaces the whole document. A merge patch can do it all but one thing: null at /vector/field
-  // is a value, so a field that was said goes only with the whole of `vector`, by a patch before.
+  // is a value, so a field that was set goes only with the whole of `vector`, by a patch before.
   replace(next: View): Outgoing[] {
     const outgoing: Outgoing[] = [];
-    const old = this.said;
+    const old = this.explicit;
     if (old.vector?.field !== undefined && next.vector?.field === undefined) {
       outgoing.push(this.change({ vector: null }));
     }
-    outgoing.push(this.change(replacement(this.said as Patch, next as Patch)));
+    outgoing.push(this.change(replacement(this.explicit as Patch, next as Patch)));
     return outgoing;
   }
 
   // After a new session was opened the server knows nothing: the whole view is one patch.
   restate(): Outgoing {
-    const whole = this.said;
+    const whole = this.explicit;
     this.confirmed = {};
     this.pending = [];
     return this.change(whole as Patch);
   }
 
-  // A frame of this rev arrived: the patches up to it were followed.
+  // A frame of this rev arrived: the patches up to it are confirmed.
   settle(rev: number): void {
     const done = this.pending.filter((entry) => entry.rev <= rev);
     if (done.length === 0) return;
@@ -147,7 +148,7 @@ export class ViewState {
   }
 
   private recompute(): void {
-    this.said = this.pending.reduce<View>(
+    this.explicit = this.pending.reduce<View>(
       (view, entry) => mergeView(view, entry.patch),
       this.confirmed,
     );

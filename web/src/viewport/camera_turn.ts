@@ -1,16 +1,16 @@
-// A camera's way to a preset: a short turn, or at once for those who want no movement. Whatever
-// else moves the camera on the way ends it there.
+// Animates the camera to a preset, or jumps where reduced motion is preferred. Any other change of
+// the camera stops the animation.
 import { between, type Camera } from "../view/camera";
 import { length, subtract } from "../base/vec3";
 import type { MoveQueue } from "./input";
 
 const turnMs = 250;
-const near = 1e-5; // what travels is rounded
+const near = 1e-5; // coordinates on the wire are rounded
 
 export interface TurnHost {
   now(): number; // ms
   requestFrame(run: () => void): void;
-  still(): boolean; // no movement is wanted
+  still(): boolean; // reduced motion is preferred
 }
 
 const isAt = (camera: Camera, place: Camera): boolean =>
@@ -18,7 +18,7 @@ const isAt = (camera: Camera, place: Camera): boolean =>
   length(subtract(camera.eye, place.eye)) < near * (1 + length(place.eye)) &&
   length(subtract(camera.up, place.up)) < near;
 
-// Slow, fast, slow.
+// Ease in and out.
 const eased = (t: number): number => t * t * (3 - 2 * t);
 
 export class Turn {
@@ -40,7 +40,7 @@ export class Turn {
     const start = this.host.now();
     let from: Camera | null = null;
     let last: Camera | null = null;
-    let left = false; // another hand has taken the camera
+    let left = false; // something else moved the camera
     const step = () => {
       if (turn !== this.turns || left) return;
       const t = Math.min(1, (this.host.now() - start) / turnMs);

@@ -1,10 +1,10 @@
-// What a frame's header says, in words for the HUD: its state, its size against the full one, how
-// far it is from the exact picture, and how frames follow each other. Pure.
+// A frame's header as text for the HUD: state, size relative to the full picture, error, and frame
+// rate. Pure.
 import { errorName, errorText, type ErrorMetric } from "../base/error_text";
 import type { ChosenMessage, FrameHeader, StatsMessage } from "../wire/protocol";
 import { formatNumber } from "../base/ticks";
 
-export interface Words {
+export interface LabelText {
   text: string;
   title: string; // what it means
 }
@@ -20,12 +20,12 @@ const estimated =
 const unknown = `${meaning} Unknown for this frame.`;
 
 // The drawing's error, beside the limit that the view sets where it is above that; the encoding's
-// own is told apart by encodingWords.
-export function errorWords(
+// error is separate, in encodingLabel.
+export function errorLabel(
   header: FrameHeader,
   limit: number | null = null,
   metric: ErrorMetric = "rmse",
-): Words {
+): LabelText {
   const known = header.errorMeasured || header.errorEstimated;
   if (!Number.isFinite(header.error) || !known) return { text: "error unknown", title: unknown };
   // The header has single precision.
@@ -43,10 +43,10 @@ export function errorWords(
 }
 
 // text empty: not known.
-export function encodingWords(
+export function encodingLabel(
   { codec, jpegError }: FrameHeader,
   metric: ErrorMetric = "rmse",
-): Words {
+): LabelText {
   if (codec === "png") {
     return { text: "PNG lossless", title: "The picture was encoded without loss." };
   }
@@ -66,8 +66,8 @@ export function scaleText(width: number, full: number): string {
 
 export type FrameState = "moving" | "refining" | "final";
 
-// A further frame of a view that was shown already and is not the last word: the server refines it
-// while the view rests.
+// A further frame of a view that was shown already and is not final: the server refines it while
+// the view rests.
 export function frameState(header: FrameHeader, before: FrameHeader | null): FrameState {
   if (header.final) return "final";
   const again = before !== null && before.rev === header.rev && before.step === header.step;
@@ -75,7 +75,7 @@ export function frameState(header: FrameHeader, before: FrameHeader | null): Fra
 }
 
 // What the way took besides the server's own work, ms: from the patch's departure to the frame's
-// arrival. Only the first frame that echoes a patch tells it; later ones waited for other reasons.
+// arrival. Only the first frame that echoes a patch measures it: later ones waited longer.
 export function networkMs(header: FrameHeader, arrivedAt: number, lastT: number): number | null {
   if (header.t === lastT || header.t <= 0) return null;
   const serverMs = (header.queueUs + header.renderUs + header.encodeUs) / 1000;

@@ -1,5 +1,5 @@
-// The small cross of axes that tells how the volume is turned. Its six ends are buttons that look
-// from there: east, north and up (or x, y, z), and what is opposite.
+// The axis gizmo shows the orientation of the volume. Its six ends are buttons that view from
+// there: east, north and up (or x, y, z), and what is opposite.
 import { cameraFrame, type Angles, type Camera } from "../view/camera";
 import { dot, type Vec3 } from "../base/vec3";
 import { make, makeSvg } from "../base/dom";

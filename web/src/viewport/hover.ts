@@ -1,19 +1,19 @@
-// The value under the cursor: where the mouse is on the picture -> the sample there -> a question
-// to the server, at most one at a time and `everyMs` apart, of the newest place only -> words
-// beside the cursor. Nothing is asked while something moves; what fails is not told. Timers and
-// the server are handed in.
+// The value under the cursor: mouse position on the picture -> the sample there -> a request to
+// the server, at most one at a time and `everyMs` apart, for the newest position only -> text
+// beside the cursor. Nothing is requested while the view moves; failures are not shown. Timers and
+// the server are injected.
 
-export interface Place<S> {
+export interface HoverTarget<S> {
   sample: S;
-  key: string; // two places of one key have the same value
+  key: string; // targets with the same key have the same value
 }
 
 export interface HoverHost<S> {
   now(): number; // ms
   setTimeout(run: () => void, ms: number): number;
   clearTimeout(timer: number): void;
-  busy(): boolean; // the view moves, or nobody looks: poke() tells when that may have changed
-  find(at: [number, number]): Place<S> | null; // null: nothing is there
+  busy(): boolean; // the view moves or the page is hidden; poke() when that may have changed
+  find(at: [number, number]): HoverTarget<S> | null; // null: nothing is there
   ask(sample: S, signal: AbortSignal): Promise<string[]>; // lines to show
   show(lines: string[], at: [number, number]): void; // no lines: nothing to show
 }
@@ -78,30 +78,30 @@ export class Hover<S> {
   private ask(): void {
     const { at } = this;
     if (at === null) return;
-    const place = this.host.busy() ? null : this.host.find(at);
-    if (place === null) {
+    const target = this.host.busy() ? null : this.host.find(at);
+    if (target === null) {
       this.hide();
       return;
     }
-    if (place.key === this.shown) return;
+    if (target.key === this.shown) return;
     this.askedAt = this.host.now();
     const asking = new AbortController();
     this.asking = asking;
     void this.host
-      .ask(place.sample, asking.signal)
+      .ask(target.sample, asking.signal)
       .catch(() => [])
       .then((lines) => {
         if (this.asking !== asking) return; // the cursor has left
         this.asking = null;
-        this.tell(place, lines, at);
+        this.showAnswer(target, lines, at);
       });
   }
 
-  private tell(place: Place<S>, lines: string[], at: [number, number]): void {
+  private showAnswer(target: HoverTarget<S>, lines: string[], at: [number, number]): void {
     const here = this.at === null || this.host.busy() ? null : this.host.find(this.at);
-    if (here?.key === place.key) {
-      // An answer that failed counts as told: it is not asked for again and again.
-      this.shown = place.key;
+    if (here?.key === target.key) {
+      // A failed request counts as answered: it is not repeated.
+      this.shown = target.key;
       this.host.show(lines, at);
     } else if (here !== null) {
       this.plan();

@@ -1,5 +1,5 @@
-// The value under the cursor on the page: the mouse on the picture -> words beside it. On or off
-// for the session; fingers tap for the probe instead.
+// The value under the cursor on the page: the mouse on the picture -> text beside it. On or off
+// for the session; on touch screens a tap probes instead.
 import type { Api } from "../wire/api";
 import { make } from "../base/dom";
 import { Hover } from "./hover";

@@ -1,10 +1,10 @@
 // Times, sizes and errors of the frames that are drawn: the table in the picture's corner (key \).
-// It is read when someone looks at it; nothing in it announces itself.
+// Not announced to screen readers.
 import { byId } from "../base/dom";
 import { errorMetric } from "../base/error_text";
 import {
-  encodingWords,
-  errorWords,
+  encodingLabel,
+  errorLabel,
   FrameRate,
   methodText,
   networkMs,
@@ -13,7 +13,7 @@ import {
   stepsText,
   workLines,
   type FrameState,
-  type Words,
+  type LabelText,
 } from "./frame_text";
 import {
   frameHeaderBytes,
@@ -28,7 +28,7 @@ const rateEveryMs = 1000;
 
 const ms = (value: number): string => (value < 10 ? value.toFixed(1) : value.toFixed(0));
 
-function write(element: HTMLElement, { text, title }: Words, before = ""): void {
+function write(element: HTMLElement, { text, title }: LabelText, before = ""): void {
   element.textContent = text === "" ? "" : before + text;
   if (element.title !== title) element.title = title;
 }
@@ -61,8 +61,7 @@ export class Hud {
     return !this.element.classList.contains("folded");
   }
 
-  // Whether the picture is the last word on what was asked for; else how large it was drawn, as
-  // scaleText tells it.
+  // Whether the picture is final for the requested view; else its scale, as from scaleText.
   mark(state: FrameState | "offline", scale: string): void {
     const text = state === "final" || scale === "" ? state : `${state} ${scale}`;
     if (this.markElement.textContent === text) return;
@@ -99,11 +98,11 @@ export class Hud {
     ].join(" · ");
     this.newest = { header, limit: chosen?.view.quality?.maxError ?? null };
     this.showErrors();
-    const told = (value: number | null): string => (value === null ? "–" : ms(value));
+    const msOrDash = (value: number | null): string => (value === null ? "–" : ms(value));
     this.times.textContent =
       `queue ${ms(header.queueUs / 1e3)} · render ${ms(header.renderUs / 1e3)} · ` +
-      `encode ${ms(header.encodeUs / 1e3)} · net ${told(this.network)} · ` +
-      `decode ${ms(frame.decodeMs)} · latency ${told(this.latency)} ms`;
+      `encode ${ms(header.encodeUs / 1e3)} · net ${msOrDash(this.network)} · ` +
+      `decode ${ms(frame.decodeMs)} · latency ${msOrDash(this.latency)} ms`;
     this.work.textContent = chosen === null ? "" : workLines(chosen.work).join("\n");
     this.showRate();
   }
@@ -111,8 +110,8 @@ export class Hud {
   private showErrors(): void {
     if (this.newest === null) return;
     const { header, limit } = this.newest;
-    write(this.drawingError, errorWords(header, limit, errorMetric.value));
-    write(this.encodingError, encodingWords(header, errorMetric.value), " · ");
+    write(this.drawingError, errorLabel(header, limit, errorMetric.value));
+    write(this.encodingError, encodingLabel(header, errorMetric.value), " · ");
   }
 
   private showRate(): void {

@@ -1,6 +1,6 @@
 // Legend entries -> elements over the picture. Rebuilt only when what it says has changed.
 import { make, makeSvg } from "../base/dom";
-import { curvePlaces, type LegendEntry } from "../view/legend_entries";
+import { curvePoints, type LegendEntry } from "../view/legend_entries";
 import type { ColorMaps } from "../wire/color_maps";
 
 const stripHeight = 10; // of the curve's own coordinates
@@ -44,12 +44,12 @@ export class Legend {
     if (entry.leftOut !== "") {
       box.append(make("div", "legend-note legend-left-out", entry.leftOut));
     }
-    const said = entry.ticks.map((tick) => tick.text).join(", ");
+    const tickTexts = entry.ticks.map((tick) => tick.text).join(", ");
     const leftOut = entry.leftOut === "" ? "" : `; ${entry.leftOut}`;
     box.setAttribute("role", "img");
     box.setAttribute(
       "aria-label",
-      `Legend: ${entry.title} ${entry.units}; ticks ${said}${leftOut}`,
+      `Legend: ${entry.title} ${entry.units}; ticks ${tickTexts}${leftOut}`,
     );
     return box;
   }
@@ -58,7 +58,7 @@ export class Legend {
 // How opaque the medium is along its strip: the colours show below the curve, what is above it is
 // covered.
 function extinctionCurve(points: [number, number][]): SVGElement {
-  const at = curvePlaces(points);
+  const at = curvePoints(points);
   const path = at
     .map(([x, y]) => `${(100 * x).toFixed(2)},${(stripHeight * y).toFixed(2)}`)
     .join(" ");

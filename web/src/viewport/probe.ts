@@ -1,10 +1,10 @@
-// The probe on the picture: clicks -> its place, its place -> a mark. It is on while its folder in
-// the panel is open.
+// The probe on the picture: clicks -> its position, its position -> a mark. It is on while its
+// folder in the panel is open.
 import { cameraFrame, degree, pointInPlane, project, type Camera } from "../view/camera";
 import { axisNames, sampleAt, worldOf, type Sample } from "../view/sample_position";
 import type { Dataset, View } from "../wire/protocol";
 
-const edgewiseMax = Math.sin(8 * degree); // a level that is seen flatter tells no places
+const edgewiseMax = Math.sin(8 * degree); // below this angle a level has no usable positions
 
 export interface Found {
   sample: Sample;
@@ -48,8 +48,8 @@ export class Probe {
     controls.open();
   }
 
-  // A place on the picture has no depth of its own: it means the slice, or else the probe's level;
-  // where that is seen from its edge, the upright section through the probe that faces the eye.
+  // A position on the picture has no depth: it is taken in the slice, or else in the probe's level;
+  // where that is viewed edge-on, in the vertical section through the probe that faces the eye.
   find(at: [number, number]): Found | null {
     const controls = this.host.controls();
     const camera = this.host.camera();

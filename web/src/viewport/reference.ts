@@ -1,5 +1,5 @@
-// The truth of the view that is shown: asked for by the first hold, drawn by a job of the server,
-// looked at while it is held, dropped as soon as the view is another. Pure but for its host.
+// The reference picture of the view: requested by the first hold, rendered by a job of the server,
+// shown while held, discarded when the view changes. Pure but for its host.
 import { failureText } from "../wire/api";
 import { errorMetric, errorName, errorText } from "../base/error_text";
 import type { View } from "../wire/protocol";
@@ -15,13 +15,13 @@ export interface Job {
 
 export interface ReferenceHost {
   view(): View; // with every default
-  // Answers of the server, parsed; a failure is thrown in words.
+  // Parsed answers of the server; a failure throws an Error with a message.
   ask(method: "GET" | "POST" | "DELETE", path: string, body?: View): Promise<unknown>;
   sleep(ms: number): Promise<void>;
   load(path: string): Promise<void>; // until the picture can be shown at once
   show(on: boolean): void;
-  // What is said once, and what is only written beside it; empty: nothing.
-  tell(words: string, progress: string): void;
+  // Text for the status region, and progress outside of it; empty: nothing.
+  report(text: string, progress: string): void;
 }
 
 const pollMs = 500;
@@ -29,8 +29,8 @@ const pixelsMax = 1e6; // each takes some 50 microseconds
 
 // The view at the size that is asked for: its own, as long as that is not too much. Without
 // `quality`, which says how frames are drawn, not what they show.
-export function referenceView(said: View): View {
-  const { quality: _quality, ...view } = said;
+export function referenceView(explicit: View): View {
+  const { quality: _quality, ...view } = explicit;
   const { width = 0, height = 0 } = view.image ?? {};
   const scale = Math.min(1, Math.sqrt(pixelsMax / (width * height)));
   const image = {
@@ -50,14 +50,14 @@ export function progressText({ state, progress, etaMs }: Job): string {
 const isOpen = ({ state }: Job): boolean => state === "queued" || state === "running";
 
 export class Reference {
-  private asked: { view: string } | null = null; // what it is of; each asking is another
+  private asked: { view: string } | null = null; // what it is of; each request is a new object
   private ready: { name: string; error: number } | null = null;
   private held = false;
   private job: string | null = null; // that is under way
   private last = Promise.resolve(); // a server draws one at a time for a page
 
   constructor(private readonly host: ReferenceHost) {
-    errorMetric.watch(() => this.tellReady());
+    errorMetric.watch(() => this.reportReady());
   }
 
   hold(): void {
@@ -92,22 +92,22 @@ export class Reference {
     this.abandon();
     if (!wasAsked) return;
     this.host.show(false);
-    this.host.tell("", "");
+    this.host.report("", "");
   }
 
-  // Nobody waits for it any more.
+  // Cancels the job under way.
   abandon(): void {
     if (this.job === null) return;
     void this.host.ask("DELETE", `v1/jobs/${this.job}`).catch(() => {}); // gone by itself
     this.job = null;
   }
 
-  private tellReady(): void {
+  private reportReady(): void {
     if (this.ready === null) return;
     const { name, error } = this.ready;
     const metric = errorMetric.value;
-    const words = `${errorName(metric)} ${errorText(error, metric)} true`;
-    this.host.tell(`${name} ready: hold r · ${words}`, "");
+    const accuracy = `${errorName(metric)} ${errorText(error, metric)} true`;
+    this.host.report(`${name} ready: hold r · ${accuracy}`, "");
   }
 
   private async fetch(asked: object, view: View): Promise<void> {
@@ -115,11 +115,11 @@ export class Reference {
     if (!wanted()) return;
     const name = `reference ${view.image?.width}×${view.image?.height}`;
     try {
-      this.host.tell(name, "");
+      this.host.report(name, "");
       let job = (await this.host.ask("POST", "v1/references", view)) as Job;
       this.job = job.id;
       while (wanted() && isOpen(job)) {
-        this.host.tell(name, progressText(job));
+        this.host.report(name, progressText(job));
         await this.host.sleep(pollMs);
         if (wanted()) job = (await this.host.ask("GET", `v1/jobs/${job.id}`)) as Job;
       }
@@ -132,13 +132,13 @@ export class Reference {
       await this.host.load(`v1/references/${result.id}.png`);
       if (!wanted()) return;
       this.ready = { name, error: result.error.value };
-      this.tellReady();
+      this.reportReady();
       this.host.show(this.held);
     } catch (failure) {
       if (!wanted()) return;
       this.asked = null; // another hold tries again
       this.job = null;
-      this.host.tell(`${name}: ${failureText(failure)}`, "");
+      this.host.report(`${name}: ${failureText(failure)}`, "");
     }
   }
 }

@@ -1,4 +1,4 @@
-// The reference on the page: its picture over the shown one, its words in the picture's corner, and
+// The reference on the page: its picture over the shown one, its status in the corner, and
 // the button that is held like the key.
 import { byId } from "../base/dom";
 import type { View } from "../wire/protocol";
@@ -8,7 +8,7 @@ import { posted, refusalText } from "../wire/requests";
 async function ask(method: string, path: string, body?: View): Promise<unknown> {
   const response = await fetch(new URL(path, document.baseURI), {
     ...(body === undefined ? { method } : posted(body)),
-    keepalive: method === "DELETE", // it may be the page's last word
+    keepalive: method === "DELETE", // it may be sent while the page unloads
   });
   if (!response.ok) throw new Error(await refusalText(response));
   return response.json().catch(() => null);
@@ -27,7 +27,7 @@ function holdByButton(button: HTMLElement, reference: Reference): void {
   });
   on("pointerup pointercancel keyup blur", () => reference.release());
   on("contextmenu", (event) => event.preventDefault()); // of a long touch
-  on("click", () => reference.ask()); // of whoever cannot hold
+  on("click", () => reference.ask()); // assistive technology cannot hold
 }
 
 export function makeReference(canvas: HTMLElement, view: () => View): Reference {
@@ -46,15 +46,15 @@ export function makeReference(canvas: HTMLElement, view: () => View): Reference 
       byId("reference-mark", HTMLElement).hidden = !on;
       byId("mark", HTMLElement).hidden = on;
     },
-    tell: (words, progress) => {
-      line.hidden = words === "";
-      const said = byId("reference-words", HTMLElement);
-      if (said.textContent !== words) said.textContent = words;
+    report: (text, progress) => {
+      line.hidden = text === "";
+      const label = byId("reference-words", HTMLElement);
+      if (label.textContent !== text) label.textContent = text;
       byId("reference-progress", HTMLElement).textContent = progress;
     },
   });
   holdByButton(byId("reference-button", HTMLButtonElement), reference);
-  // What the picture is of is told there.
+  // These attributes identify the view on the canvas.
   new MutationObserver(() => reference.follow()).observe(canvas, {
     attributeFilter: ["data-wanted", "data-step"],
   });

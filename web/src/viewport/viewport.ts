@@ -1,8 +1,8 @@
 // Encoded frames -> canvas. Always the newest: a frame that is decoded after a newer one was drawn
 // is not shown, and one that a newer overtakes before its turn is not decoded, so that however fast
 // frames come no more than three are held. Frames of any size fill the canvas. What is shown is
-// also told by data attributes of the canvas (seq, rev, step, state, level, width, height), for
-// tests and style sheets alike.
+// also published as data attributes of the canvas (seq, rev, step, state, level, width, height),
+// for tests and style sheets.
 import { frameState } from "./frame_text";
 import type { Frame, FrameHeader } from "../wire/protocol";
 import { clamp } from "../base/values";
@@ -52,7 +52,7 @@ export interface Size {
 // Where a picture goes on the canvas: all over it if it is of the same shape, but for what rounding
 // to whole pixels does to a coarse one; otherwise in its own shape in the middle. x, y, width,
 // height.
-export function placeOn(canvas: Size, picture: Size): [number, number, number, number] {
+export function pictureRect(canvas: Size, picture: Size): [number, number, number, number] {
   const { width, height } = canvas;
   const expected = (picture.width * height) / width;
   if (Math.abs(expected - picture.height) <= Math.max(1, 0.03 * picture.height)) {
@@ -161,7 +161,7 @@ export class Viewport {
       canvas.width = width; // empties the canvas, which is not seen before the picture is on it
       canvas.height = height;
     }
-    const place = placeOn(canvas, bitmap);
+    const place = pictureRect(canvas, bitmap);
     if (place[2] < width || place[3] < height) context.clearRect(0, 0, width, height);
     context.imageSmoothingEnabled = true;
     // Without a GPU the better one takes as long as a display frame: only at rest.

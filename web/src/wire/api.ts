@@ -55,10 +55,10 @@ export interface ForecastPoint {
   coarser: number; // halvings of the data more than the picture asks for
   ms: number;
   error: number; // linear RMSE
-  errorLow: number; // 90 of 100 pictures err between these two
+  errorLow: number; // the 90 % interval of the error
   errorHigh: number;
   kind: "measured" | "estimated";
-  pareto: boolean; // nothing as fast errs less
+  pareto: boolean; // no setting as fast has less error
 }
 
 export interface Forecast {
@@ -159,6 +159,6 @@ export class Api {
 
 const place = ([x, y, z]: Vec3): string => `x=${x}&y=${y}&z=${z}`;
 
-// What a promise failed with, in words.
+// Message of a failed promise.
 export const failureText = (failure: unknown): string =>
   failure instanceof Error ? failure.message : String(failure);

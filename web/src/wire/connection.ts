@@ -1,6 +1,6 @@
 // One WebSocket to /v1/stream that is made again whenever it is lost.
 // Bytes in -> typed messages and frames out to `events`; messages in -> text out.
-// Sockets, timers and chance are handed in, so that tests can play the network.
+// Sockets, timers and random numbers are injected, so that tests can simulate the network.
 import {
   encodeClientMessage,
   parseFrame,
@@ -42,7 +42,7 @@ export type ConnectionState =
   | { name: "connecting"; attempt: number }
   | { name: "live" }
   | { name: "waiting"; attempt: number; delayMs: number; reason: string }
-  | { name: "asleep"; reason: string } // idle for long: wakes when someone looks or acts
+  | { name: "asleep"; reason: string } // closed as idle: input or showing the page reconnects
   | { name: "stopped" };
 
 export interface ConnectionEvents {
@@ -122,20 +122,20 @@ export class Connection {
     this.events.state({ name: "stopped" });
   }
 
-  // Whether the message went out; while the connection is lost nothing is kept, as the whole view
-  // is said anew after the next hello.
+  // Whether the message went out; while the connection is lost nothing is queued, as the whole
+  // view is sent again after the next hello.
   send(message: ClientMessage): boolean {
     if (!this.greeted || this.socket?.readyState !== socketOpen) return false;
     this.socket.send(encodeClientMessage(message));
     return true;
   }
 
-  // The network is back: do not sit out the delay.
+  // The network is back: skip the delay.
   retryNow(): void {
     if (this.retryTimer !== null || this.asleep) this.connect();
   }
 
-  // Someone is there again.
+  // Input, or the page is visible again.
   wake(): void {
     if (this.asleep) this.connect();
   }
@@ -189,7 +189,7 @@ export class Connection {
     this.events.message(message);
   }
 
-  // A peer that breaks the protocol is left at once; what it still sends is not looked at.
+  // Closes on a protocol error at once; later messages are ignored.
   private fail(code: number, reason: string): void {
     this.fault = reason;
     // A close reason has at most 123 bytes.
@@ -217,7 +217,7 @@ export class Connection {
       this.events.state({ name: "asleep", reason: closeReason(code, reason) });
       return;
     }
-    if (code === 1008) this.attempt = Math.max(this.attempt, 5); // asking again will hardly help
+    if (code === 1008) this.attempt = Math.max(this.attempt, 5); // a retry will hardly help
     const delayMs = reconnectDelayMs(this.attempt, this.clock.random());
     this.attempt += 1;
     const why = this.fault ?? closeReason(code, reason);

@@ -60,7 +60,7 @@ export async function inOrder<T>(
   for (let n = 0; n < count; n++) {
     while (next < count && begun.length < ahead) {
       const one = start(next++);
-      one.catch(() => {}); // told when its turn comes
+      one.catch(() => {}); // reported when its turn comes
       begun.push(one);
     }
     await take(await begun.shift()!, n);

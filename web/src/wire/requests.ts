@@ -1,4 +1,4 @@
-// Views that are posted to the server, and what it says when it refuses.
+// Requests that post a view, and the text of refusals.
 import type { Problem, View } from "./protocol";
 
 export function problemText(problem: Problem): string {
@@ -16,7 +16,7 @@ export const posted = (view: View, headers = {}): RequestInit => ({
   body: JSON.stringify(view),
 });
 
-// What a server that refused says, in its own words.
+// The server's own text of a refusal.
 export async function refusalText(response: Pick<Response, "status" | "json">): Promise<string> {
   const problem = (await response.json().catch(() => null)) as Problem | null;
   return (problem && problemText(problem)) || `The server answered with HTTP ${response.status}.`;

@@ -1,4 +1,4 @@
-// Links to views that the server keeps: a view too long for an address <-> `#!view=ID`.
+// Links to views that the server stores: a view too long for an address <-> `#!view=ID`.
 import type { FetchLike } from "./frame_request";
 import type { View } from "./protocol";
 import { notUnderstood, posted, refusalText } from "./requests";
@@ -6,29 +6,36 @@ import { isView } from "./view_shape";
 
 export const linkMax = 2000; // characters; mail and chat break or cut longer ones
 
-export const savedHash = (id: string): string => `#!view=${encodeURIComponent(id)}`;
+export const shortLinkHash = (id: string): string => `#!view=${encodeURIComponent(id)}`;
 
 // null: the link is none to a saved view.
-export function savedId(hash: string): string | null {
+export function shortLinkId(hash: string): string | null {
   const id = /^#!view=([\w.~-]{1,128})$/.exec(hash);
   return id === null ? null : id[1]!;
 }
 
-interface SavedView {
+interface StoredView {
   id: string;
   view: View;
   kept?: "memory" | "disk"; // memory: until the server ends
 }
 
-async function ask(response: Response): Promise<SavedView> {
+async function ask(response: Response): Promise<StoredView> {
   if (!response.ok) throw new Error(await refusalText(response));
-  const saved = (await response.json().catch(() => null)) as SavedView | null;
+  const saved = (await response.json().catch(() => null)) as StoredView | null;
   if (typeof saved?.id === "string" && isView(saved.view)) return saved;
   throw new Error(notUnderstood);
 }
 
-export const saveView = async (fetch: FetchLike, baseUri: string, view: View): Promise<SavedView> =>
-  ask(await fetch(new URL("v1/views", baseUri).href, posted(view)));
+export const storeView = async (
+  fetch: FetchLike,
+  baseUri: string,
+  view: View,
+): Promise<StoredView> => ask(await fetch(new URL("v1/views", baseUri).href, posted(view)));
 
-export const loadView = async (fetch: FetchLike, baseUri: string, id: string): Promise<SavedView> =>
+export const loadView = async (
+  fetch: FetchLike,
+  baseUri: string,
+  id: string,
+): Promise<StoredView> =>
   ask(await fetch(new URL(`v1/views/${encodeURIComponent(id)}`, baseUri).href, {}));

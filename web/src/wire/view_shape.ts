@@ -6,7 +6,7 @@ import { viewRanges } from "../../generated/view_ranges";
 import type { View } from "./protocol";
 import { isObject } from "../base/values";
 
-// Numbers and what they are in are told by their ranges.
+// Numeric keys and their parents come from the ranges.
 const samples = new Map<string, unknown>();
 for (const pointer of Object.keys(viewRanges)) {
   const [key, ...around] = pointer.split("/").reverse();

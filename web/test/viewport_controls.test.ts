@@ -18,7 +18,7 @@ import {
   type Camera,
 } from "../src/view/camera";
 import type { Vec3 } from "../src/base/vec3";
-import { Hover, type Place } from "../src/viewport/hover";
+import { Hover, type HoverTarget } from "../src/viewport/hover";
 import { MoveQueue, twist, wheelZoom } from "../src/viewport/input";
 import { hoverLines } from "../src/view/sample_position";
 import type { Dataset, View } from "../src/wire/protocol";
@@ -207,7 +207,7 @@ class Glass {
     setTimeout: (run, ms) => this.timers.push({ at: this.now + ms, run }),
     clearTimeout: (timer) => (this.timers[timer - 1]!.run = () => {}),
     busy: () => this.busy,
-    find: ([x]): Place<number> | null => {
+    find: ([x]): HoverTarget<number> | null => {
       const sample = Math.round(10 * x);
       return x > 1 ? null : { sample, key: `${sample} ${this.step}` };
     },
