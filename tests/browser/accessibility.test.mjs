@@ -80,7 +80,7 @@ for (const [name, options] of windows) {
     }, options));
 }
 
-// A busy browser tells late that a plot has come into sight; until then the plot is not drawn.
+// A busy browser reports late that a plot is visible; until then the plot is not drawn.
 test("axe finds nothing while plots wait to be seen", () =>
   withPage(
     async (page) => {
@@ -195,7 +195,7 @@ test("a visit by the keyboard alone: another dataset, a turn, longer lines, the 
     assert.equal(await page.evaluate(() => document.activeElement.id), "help-button");
   }));
 
-test("who asks for less motion gets none that nobody asked for", () =>
+test("with reduced motion nothing moves by itself", () =>
   withPage(
     async (page) => {
       const moving = await page.evaluate(() =>

@@ -1,4 +1,4 @@
-// The page's address with a link to a kept view, and the cards while their list is refreshed.
+// The page's address with a link to a stored view, and the cards while their list is refreshed.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { drag, finalPicture, sharedDaemon } from "./support.mjs";
@@ -17,7 +17,7 @@ const watchAddress = () => {
 };
 
 // The server never answers, and the deadline is near.
-test("a kept view that never comes: the default, the reason, and the link until a change", () => {
+test("a stored view that never comes: the default, the reason, and the link until a change", () => {
   const hurry = () => {
     const timeout = AbortSignal.timeout.bind(AbortSignal);
     AbortSignal.timeout = (ms) => timeout(ms / 20);

@@ -203,7 +203,7 @@ test("what was cancelled does not come back, whatever the server still says of i
     },
   ));
 
-test("a lost connection: the mark says offline, the words why, and Now tries at once", () =>
+test("a lost connection: the mark says offline, the text why, and the button retries at once", () =>
   withPage(
     async (page, wire) => {
       const before = await pixels(page);

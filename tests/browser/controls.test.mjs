@@ -1,4 +1,4 @@
-// The panel's controls in a real browser: what each sends, what the link keeps of it, what it
+// The panel's controls in a real browser: what each sends, what the link contains, what it
 // hides, and, for what every server draws, that the picture changes.
 import assert from "node:assert/strict";
 import { test } from "node:test";
@@ -69,7 +69,7 @@ test("every number goes out under its key and into the link", () =>
     for (const [, , value, ...path] of numbers) await linkSays(page, ...path, value);
   }));
 
-// Of these the picture tells, whatever method the server has.
+// These change the picture, whatever method the server has.
 const visible = [
   ["Lines", "length", 0.1],
   ["Lines", "opacity", 0.2],
@@ -221,7 +221,7 @@ test("a globe is offered where there are longitudes, and the vertical axis yield
     assert.equal(await isShown(page, "shape"), false);
   }));
 
-test("colour tells a direction by the compass, and a scalar by its name", () =>
+test("colour by direction has compass labels, by a scalar its name", () =>
   withPage(async (page) => {
     assert.equal(await isShown(page, "scalar"), false);
     await choose(page, "colour by", /^direction$/);

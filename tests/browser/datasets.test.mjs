@@ -119,7 +119,7 @@ test("the page follows files that change: their steps, and that they cannot be r
   assert.deepEqual(page.faults, []);
 });
 
-test("the legend tells what is too slow, and the probe's ends are times", async (t) => {
+test("the legend says what is too slow, and the probe's ends are times", async (t) => {
   const path = '#!{"dataset":"climate","vector":{"minMagnitude":3}}';
   const { page } = await ownPage(t, browser, { args: ["climate"], path, viewport });
   await finalPicture(page);

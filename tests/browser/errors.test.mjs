@@ -1,4 +1,4 @@
-// The daemon's errors in the page: every frame says one, what is asked for is kept, and a lossless
+// The daemon's errors in the page: every frame has one, a requested limit is met, and a lossless
 // final frame is what the daemon has drawn, pixel by pixel.
 import assert from "node:assert/strict";
 import { test } from "node:test";
@@ -33,7 +33,7 @@ test("moving frames say what they are estimated to err, the final one what was m
     assert.match(await page.locator("#hud-encoding").textContent(), /^ · JPEG [\d.e-]+$/);
   }));
 
-test("an error that is asked for is kept, by no more pixels than it takes", () =>
+test("a requested error is met, by no more pixels than it takes", () =>
   withPage(async (page) => {
     await type(page, "moving budget \\(ms\\)", 500);
     const moving = async () => movingOf(await framesOf(page, () => drag(page, 90, 20, 60)));

@@ -1,5 +1,5 @@
-// What the dialog "Save" gives out, read by other eyes: pictures by the browser's decoder and the
-// server's own frames, ZIP files by python, videos by a <video>; and how views come back from them.
+// Files of the Save dialog, read by other decoders: pictures by the browser and by the server's own
+// frames, ZIP files by python, videos by a <video>; and the views that they contain.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
@@ -209,7 +209,7 @@ test("a picture dropped on another page brings its view back, pixel for pixel", 
   });
 });
 
-test("a file without a view is told in the alert, and the view stays", () =>
+test("a file without a view is an alert, and the view stays", () =>
   withPage(
     async (page) => {
       const before = await pixels(page);
@@ -375,7 +375,7 @@ test("Cancel ends the requests, and nothing is saved", () =>
     page.faults = page.faults.filter((fault) => !/net::ERR_/.test(fault));
   }));
 
-test("what the server refuses is told in the dialog in its words", () =>
+test("a refusal of the server is shown in the dialog in its text", () =>
   withPage(async (page) => {
     let tries = 0;
     await page.route("**/v1/frames", (route) => {
@@ -394,50 +394,6 @@ test("what the server refuses is told in the dialog in its words", () =>
     page.faults = page.faults.filter((fault) => !/429|507/.test(fault));
   }));
 
-test("views are kept by name, and come back after a reload", () =>
-  withPage(async (page) => {
-    const before = await pixels(page);
-    await page.keyboard.press("s");
-    await page.locator("#keep-name").fill("from the east");
-    await page.keyboard.press("Enter");
-    const name = page.locator("#kept li input");
-    assert.equal(await name.inputValue(), "from the east");
-    await name.fill("east");
-    await name.press("Tab");
-    await page.locator("#save-close").click();
-    await page.goto(`${shared.daemon.url}?again`);
-    await finalPicture(page);
-    assert.notEqual((await state(page)).step, "3");
-    await page.keyboard.press("s");
-    await page.getByRole("button", { name: "Open east" }).click();
-    await page.waitForFunction(() => document.querySelector("#picture").dataset.step === "3");
-    await finalPicture(page);
-    assert.equal((await pixels(page)).hash, before.hash);
-    await page.keyboard.press("s");
-    await page.getByRole("button", { name: "Delete east" }).click();
-    assert.equal(await page.locator("#kept li").count(), 0);
-  }, linkTo(turned)));
-
-test("a renamed view's row stays, with the focus and the button under the mouse", () =>
-  withPage(async (page) => {
-    await page.keyboard.press("s");
-    for (const name of ["one", "two"]) {
-      await page.locator("#keep-name").fill(name);
-      await page.keyboard.press("Enter");
-      await page.getByRole("button", { name: `Open ${name}` }).waitFor();
-    }
-    const name = page.locator("#kept li input").last();
-    await name.fill("first");
-    await name.press("Tab");
-    const label = () => page.evaluate(() => document.activeElement.ariaLabel);
-    assert.equal(await label(), "Open first");
-    // One press of the mouse leaves the name, which renames, and deletes.
-    await name.fill("other");
-    await page.locator("#kept li button").last().click();
-    assert.equal(await page.locator("#kept li").count(), 1);
-    assert.equal(await page.locator("#kept li input").inputValue(), "two");
-  }));
-
 test("behind an open dialog the page's keys do nothing, wherever the focus is", () =>
   withPage(async (page) => {
     await page.keyboard.press("s");
@@ -453,90 +409,12 @@ test("behind an open dialog the page's keys do nothing, wherever the focus is", 
     await page.locator("#save").waitFor({ state: "hidden" });
     await page.keyboard.press("ArrowLeft");
     await finalPicture(page);
-    assert.notEqual((await state(page)).azimuth, before.azimuth, "and do again once it is closed");
-  }));
-
-test("a link with a view of another shape is told, and the page stays whole", () =>
-  withPage(
-    async (page) => {
-      const before = await pixels(page);
-      for (const view of [
-        { scalars: 5 },
-        { vector: { magnitudeRange: 3 } },
-        { camera: { eye: 5 } },
-      ]) {
-        await page.evaluate((hash) => (location.hash = hash), hashOf(view));
-        await page
-          .locator("#alert-text")
-          .getByText(/no valid view/)
-          .waitFor();
-      }
-      assert.equal((await pixels(page)).hash, before.hash);
-    },
-    { alert: true },
-  ));
-
-// A view whose link is longer than 2000 characters.
-const long = {
-  ...turned,
-  scalars: [
-    {
-      field: "cloud",
-      extinction: Array.from({ length: 64 }, (_, n) => [
-        Number((0.2 + n / 97).toFixed(15)),
-        Number((40 * Math.sin(n / 61) ** 2).toFixed(15)),
-      ]),
-    },
-  ],
-};
-
-const share = async (page) => {
-  await page.context().grantPermissions(["clipboard-read", "clipboard-write"]);
-  await page.locator("#share-button").click();
-  await page
-    .locator("#status")
-    .getByText(/link copied/)
-    .waitFor();
-  return page.evaluate(() => navigator.clipboard.readText());
-};
-
-test("Share copies the link; a long one becomes a short one that restores the same pixels", () =>
-  withPage(async (page) => {
-    assert.ok((await page.evaluate(() => location.href.length)) > 2000);
-    const before = await pixels(page);
-    const link = await share(page);
-    assert.match(link, /\/a\/b\/#!view=[\w.~-]+$/);
-    assert.ok(link.length < 200, link);
-    await withPage(
-      async (other) => {
-        assert.equal((await pixels(other)).hash, before.hash);
-        // Its own address is whole again, so that it outlives the server.
-        await other.waitForFunction(() => location.hash.startsWith("#!{"));
-        assert.deepEqual((await addressView(other)).scalars, long.scalars);
-      },
-      { path: link.slice(shared.daemon.url.length) },
+    assert.notEqual(
+      (await state(page)).azimuth,
+      before.azimuth,
+      "and work again once it is closed",
     );
-  }, linkTo(long)));
-
-test("where the server keeps no views the long link is copied, and that is said", () =>
-  withPage(async (page) => {
-    const problem = { type: "about:blank", title: "No", status: 507, detail: "no room for views" };
-    await page.route("**/v1/views", (route) => route.fulfill({ status: 507, json: problem }));
-    const link = await share(page);
-    assert.deepEqual(JSON.parse(decodeURIComponent(link.split("#!")[1])).scalars, long.scalars);
-    assert.match(await page.locator("#status").textContent(), /long form: no room for views/);
-    page.faults = page.faults.filter((fault) => !/507/.test(fault));
-  }, linkTo(long)));
-
-test("a short link that leads nowhere is told, and the default shown", () =>
-  withPage(
-    async (page) => {
-      assert.match(await page.locator("#alert-text").textContent(), /^The link's view: /);
-      assert.equal(await page.locator("#dataset").inputValue(), "climate");
-    },
-    // The browser itself reports the answer that there is no such view.
-    { path: "#!view=no-such-view", alert: true, faulty: true },
-  ));
+  }));
 
 test("the dialog fits a phone in either theme, by keyboard alone", async () => {
   for (const colorScheme of ["dark", "light"]) {

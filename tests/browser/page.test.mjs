@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
+  assertDrawn,
   control,
   drag,
   finalPicture,
@@ -21,12 +22,6 @@ const shared = sharedDaemon();
 const { withPage } = shared;
 
 const phone = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
-
-function assertDrawn(stats) {
-  assert.ok(stats.covered > 0.02, `only ${stats.covered} of the picture is drawn`);
-  assert.ok(stats.deviation > 3, `the picture is flat: deviation ${stats.deviation}`);
-  assert.ok(stats.colors > 100, `only ${stats.colors} colours`);
-}
 
 // The colour maps have come and the legend shows one.
 const mapsAreShown = (page) =>
@@ -241,7 +236,7 @@ test("a page that was here before comes back on reload and in a second tab", () 
     assertDrawn(await pixels(second));
   }));
 
-test("a link to nowhere is told and the default shown", () =>
+test("a link to an unknown dataset is an error, and the default is shown", () =>
   withPage(
     async (page) => {
       await page.locator("#alert").waitFor();
@@ -348,67 +343,6 @@ test("the picture keeps its size while a dataset opens", async () => {
     }, options);
   }
 });
-
-test("one finger turns, two fingers move and pinch", () =>
-  withPage(async (page) => {
-    const cdp = await page.context().newCDPSession(page);
-    const box = await pictureBox(page);
-    const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
-    const touch = async (path) => {
-      const points = (at) => at.map(([dx, dy], id) => ({ x: x + dx, y: y + dy, id }));
-      await cdp.send("Input.dispatchTouchEvent", {
-        type: "touchStart",
-        touchPoints: points(path[0]),
-      });
-      for (const at of path.slice(1)) {
-        await cdp.send("Input.dispatchTouchEvent", {
-          type: "touchMove",
-          touchPoints: points(at),
-        });
-        await page.waitForTimeout(20);
-      }
-      await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
-      await finalPicture(page);
-      return state(page);
-    };
-    const start = await state(page);
-    const turned = await touch([[[0, 0]], [[30, 0]], [[60, 0]]]);
-    assert.ok(Number(turned.azimuth) < Number(start.azimuth) - 5);
-    assert.equal(turned.distance, start.distance);
-    const pinched = await touch([
-      [
-        [-40, 0],
-        [40, 0],
-      ],
-      [
-        [-60, 0],
-        [60, 0],
-      ],
-      [
-        [-80, 0],
-        [80, 0],
-      ],
-    ]);
-    assert.ok(
-      Number(pinched.distance) < 0.7 * Number(turned.distance),
-      "twice as wide is half as far",
-    );
-    assert.equal(pinched.azimuth, turned.azimuth, "pinching does not turn");
-    const moved = await touch([
-      [
-        [-40, 0],
-        [40, 0],
-      ],
-      [
-        [-40, 30],
-        [40, 30],
-      ],
-    ]);
-    assert.equal(moved.distance, pinched.distance);
-    assert.equal(moved.azimuth, pinched.azimuth);
-    assert.notEqual(moved.rev, pinched.rev);
-    assertDrawn(await pixels(page));
-  }, phone));
 
 test("everything by the keyboard", () =>
   withPage(async (page) => {

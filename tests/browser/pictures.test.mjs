@@ -16,7 +16,7 @@ import {
 
 const { withPage } = sharedDaemon({ page: { initScript: watchPatches } });
 
-// The final picture after a change, kept for the eye under `name`.
+// The final picture after a change, saved as a screenshot under `name`.
 async function picture(page, name) {
   await finalPicture(page);
   await shot(page, `picture-${name}`);

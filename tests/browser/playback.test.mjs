@@ -15,7 +15,7 @@ import {
 
 const shared = sharedDaemon();
 
-// Keeps the steps that were shown, in order, each once.
+// Records the steps that were shown, in order, each once.
 const watchSteps = () => {
   window.steps = [];
   addEventListener("DOMContentLoaded", () => {
@@ -28,7 +28,7 @@ const watchSteps = () => {
 };
 
 // `answers` takes the server's place: for each pattern of addresses what it says. What was asked
-// for is kept in page.asked.
+// for is recorded in page.asked.
 function withPage(run, { answers = {}, ...options } = {}) {
   return shared.withPage(run, {
     viewport: { width: 1280, height: 800 },
@@ -96,7 +96,7 @@ test("every step forward, then backward without a jump, then a pause", async () 
   });
 });
 
-test("the pace reached is told while steps run", async () => {
+test("the pace reached is shown while steps run", async () => {
   await withPage(async (page) => {
     await page.locator("#time-fps").selectOption("5");
     await page.locator("#time-play").click();
@@ -246,7 +246,7 @@ test("a histogram is read when it is seen; a drag over its colours sets their ra
           /0 to 64/.test(p.textContent),
         ),
       );
-      assert.equal(page.asked.length, 1, "nothing is counted that nobody looks at");
+      assert.equal(page.asked.length, 1, "no histogram is computed while hidden");
       assert.match(page.asked[0], /^\/v1\/datasets\/climate\/fields\/.+step=0&bins=128$/);
       assert.match(await svg.getAttribute("aria-label"), /0 to 64.*12 masked/);
       await medium.getByRole("button", { name: "1–99 %" }).click();
@@ -344,7 +344,7 @@ test("alt + click asks for a place even while the probe is off", async () => {
   );
 });
 
-test("what the server cannot answer is said in its words", async () => {
+test("an answer that cannot be parsed is reported", async () => {
   await withPage(
     async (page) => {
       await page.route(/\/probe\?/, (route) =>

@@ -61,9 +61,9 @@ async function open(page) {
   await page.locator(".forecast circle").first().waitFor();
 }
 
-test("the plot is asked for when it is seen and the view rests, and tells each setting", () =>
+test("the plot is asked for when it is seen and the view rests, and describes each setting", () =>
   withPage(async (page) => {
-    assert.deepEqual(page.asked, [], "not while nobody looks");
+    assert.deepEqual(page.asked, [], "not while hidden");
     await open(page);
     assert.equal(page.asked.length, 1);
     assert.equal(page.asked[0].dataset, "climate");
@@ -136,7 +136,7 @@ test("the budget's handle is the moving budget: by hand, by keys, and in the fra
     assert.ok(least(quick) < least(slow), `${least(quick)} < ${least(slow)}`);
   }));
 
-test("a limit of the error is a line that is dragged, and told like every error", () =>
+test("a limit of the error is a line that is dragged, in the metric of every error", () =>
   withPage(async (page) => {
     await open(page);
     assert.equal(await handle(page, "max error").count(), 0);

@@ -90,7 +90,7 @@ test("r asks for the reference, shows it while it is held and no longer", () =>
     assert.equal((await pixels(page)).hash, before.hash);
   }));
 
-test("the error that is told is the true one of the picture", () =>
+test("the error shown is the true one of the picture", () =>
   withPage(async (page) => {
     await page.keyboard.press("r");
     await ready(page);

@@ -171,8 +171,8 @@ export const somePicture = (page, timeout = 15_000 * patience) =>
     polling: 20,
   });
 
-// The last word on what was asked for has been drawn. What the mouse or fingers did goes out with
-// the next display frame, so two of those pass before anything is believed.
+// The final frame of the requested view has been drawn. Input is sent with the next display frame,
+// so two of those pass first.
 export async function finalPicture(page) {
   await page.evaluate(
     () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))),
@@ -220,6 +220,13 @@ export const pixels = (page) =>
     };
   });
 
+// The picture is neither blank nor flat.
+export function assertDrawn(stats) {
+  assert.ok(stats.covered > 0.02, `only ${stats.covered} of the picture is drawn`);
+  assert.ok(stats.deviation > 3, `the picture is flat: deviation ${stats.deviation}`);
+  assert.ok(stats.colors > 100, `only ${stats.colors} colours`);
+}
+
 export const state = (page) =>
   page.evaluate(() => ({ ...document.querySelector("#picture").dataset }));
 
@@ -248,7 +255,7 @@ export const control = (page, label, tag = "select") =>
     .locator(tag)
     .first();
 
-// Runs in a page before its own scripts (initScript): keeps the patches that go out, with the time.
+// Runs in a page before its own scripts (initScript): records outgoing patches, with the time.
 export const watchPatches = () => {
   window.patches = [];
   const send = WebSocket.prototype.send;

@@ -177,7 +177,7 @@ test("the table of numbers and the picture are one curve", () =>
     assert.deepEqual((await drawnCurve(page))[1], [1, 7]);
     await box.fill("-3");
     await box.press("Enter");
-    assert.equal(await box.inputValue(), "0", "the box in focus tells what was made of it");
+    assert.equal(await box.inputValue(), "0", "the focused box shows the clamped value");
     await shot(page, "transfer-table");
   }));
 

@@ -1,5 +1,5 @@
-// The page's hands in a real browser: undo, the value under the cursor, axes that are clicked,
-// fingers, wheel, dense screens, keys, and a page that nobody sees.
+// Controls over the picture in a real browser: undo, the value under the cursor, dense screens,
+// keys, and a hidden page.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -25,8 +25,6 @@ const shared = sharedDaemon({
 const { withPage } = shared;
 
 const patches = (page) => page.evaluate(() => window.patches);
-const cameras = async (page) =>
-  (await patches(page)).map(({ patch }) => patch.camera).filter((camera) => camera?.eye);
 const hashOf = async (page) => {
   await finalPicture(page);
   return (await pixels(page)).hash;
@@ -37,19 +35,6 @@ const until = (page, key, value) =>
     ([k, v]) => document.querySelector("#picture").dataset[k] === v,
     [key, value],
   );
-const settled = (page) =>
-  page.waitForFunction(
-    () => {
-      const { elevation, azimuth, roll } = document.querySelector("#picture").dataset;
-      const now = `${elevation} ${azimuth} ${roll}`;
-      const stands = window.lastSeen === now;
-      window.lastSeen = now;
-      return stands;
-    },
-    null,
-    { polling: 400 },
-  );
-
 // --- undo and redo ---------------------------------------------------------------------------
 
 test("undo of a drag restores the very pixels, and redo what it undid", () =>
@@ -228,161 +213,6 @@ test("a probe that the server refuses is no alert", () =>
     assert.equal(await page.locator("#hover").isVisible(), false);
   }));
 
-// --- axes and roll ---------------------------------------------------------------------------
-
-test("each end of the axes looks from there, by a turn or at once", async () => {
-  const ways = [
-    ["View from the east", "90.0", "0.0"],
-    ["View from the north", "180.0", "0.0"],
-    ["View from above", "0.0", "90.0"],
-    ["Isometric view", "45.0", "35.3"],
-    ["View from the west", "-90.0", "0.0"],
-    ["View from below", "0.0", "-90.0"],
-    ["View from the south", "0.0", "0.0"],
-  ];
-  await withPage(async (page) => {
-    for (const [name, azimuth, elevation] of ways) {
-      const frames = await framesOf(page, async () => {
-        await page.evaluate(() => (window.patches.length = 0));
-        await page.getByRole("button", { name }).click();
-        await until(page, "elevation", elevation);
-        await until(page, "azimuth", azimuth);
-      });
-      assert.ok(frames.length >= 2);
-      assert.ok((await patches(page)).length >= 3, `${name}: a turn, not a jump`);
-    }
-    await page.keyboard.press("Control+z");
-    await until(page, "elevation", "-90.0");
-    for (const end of await page.locator(".gizmo-end").all()) {
-      const { width, height } = await end.boundingBox();
-      assert.ok(Math.min(width, height) >= 24);
-    }
-    await page.getByRole("button", { name: "View from the east" }).press("Enter");
-    await until(page, "azimuth", "90.0");
-    await page.keyboard.press("7");
-    await until(page, "azimuth", "45.0");
-    await shot(page, "gizmo");
-  });
-  await withPage(
-    async (page) => {
-      await page.getByRole("button", { name: "View from the east" }).press("Enter");
-      await until(page, "azimuth", "90.0");
-      await finalPicture(page);
-      assert.equal((await cameras(page)).length, 1, "no movement is wanted");
-    },
-    { reducedMotion: "reduce" },
-  );
-});
-
-test("a hand on the picture ends a turn", () =>
-  withPage(async (page) => {
-    await page.locator("#picture").focus();
-    await page.keyboard.press("2");
-    await page.keyboard.press("ArrowLeft");
-    await finalPicture(page);
-    await settled(page);
-    const sent = await cameras(page);
-    const { azimuth } = await state(page);
-    assert.notEqual(azimuth, "180.0");
-    assert.ok(sent.length < 30);
-  }));
-
-test("the picture rolls by keys, turns as before with the roll, and 0 puts it upright", () =>
-  withPage(async (page) => {
-    const start = await state(page);
-    const first = await hashOf(page);
-    for (let n = 0; n < 3; n++) await page.keyboard.press(".");
-    await until(page, "roll", "15.0");
-    assert.notEqual(await hashOf(page), first);
-    for (let n = 0; n < 4; n++) await page.keyboard.press("ArrowRight");
-    await settled(page);
-    const turned = await state(page);
-    assert.equal(turned.roll, "15.0", "a turn keeps the roll");
-    assert.notEqual(turned.azimuth, start.azimuth);
-    for (let n = 0; n < 2; n++) await page.keyboard.press(",");
-    await until(page, "roll", "5.0");
-    await page.keyboard.press("0");
-    await until(page, "roll", "0.0");
-    assert.equal(await hashOf(page), first);
-  }));
-
-// --- fingers and wheel -----------------------------------------------------------------------
-
-const upOf = async (page) => (await cameras(page)).at(-1).up;
-
-test("two fingers that twist roll the camera by their angle", () =>
-  withPage(
-    async (page) => {
-      await page.keyboard.press("1"); // from the south: up is z, right is x
-      await until(page, "elevation", "0.0");
-      const cdp = await page.context().newCDPSession(page);
-      const box = await pictureBox(page);
-      const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
-      const touch = async (type, ...degrees) => {
-        for (const angle of degrees) {
-          const [dx, dy] = [60 * Math.cos(angle / 57.29578), 60 * Math.sin(angle / 57.29578)];
-          await cdp.send("Input.dispatchTouchEvent", {
-            type,
-            touchPoints: [
-              { x: x + dx, y: y + dy, id: 0 },
-              { x: x - dx, y: y - dy, id: 1 },
-            ],
-          });
-        }
-      };
-      const { distance } = await state(page);
-      await touch("touchStart", 0);
-      await touch("touchMove", 2, 4);
-      await finalPicture(page);
-      assert.equal((await state(page)).roll, "0.0", "fingers that tremble do not twist");
-      await touch("touchMove", 10, 15, 20, 25, 30);
-      await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
-      await finalPicture(page);
-      // Clockwise by 30 degrees: what was 30 degrees to the left is up now.
-      const up = await upOf(page);
-      for (const [n, value] of [-0.5, 0, Math.sqrt(3) / 2].entries()) {
-        assert.ok(Math.abs(up[n] - value) < 0.01, `${up}`);
-      }
-      const turned = await state(page);
-      assert.ok(Math.abs(Number(turned.roll) - 30) < 0.5);
-      assert.ok(Math.abs(Number(turned.distance) / Number(distance) - 1) < 0.01);
-      assert.equal(await page.locator("#hover").isVisible(), false);
-    },
-    { hasTouch: true, viewport: { width: 390, height: 700 }, isMobile: true },
-  ));
-
-test("a burst of the wheel lands at the right zoom by a few patches, and nothing scrolls", () =>
-  withPage(async (page) => {
-    const start = Number((await state(page)).distance);
-    const before = (await cameras(page)).length;
-    const frames = await framesOf(page, () =>
-      page.evaluate(() => {
-        const picture = document.querySelector("#picture");
-        for (let n = 0; n < 200; n++) {
-          const event = new WheelEvent("wheel", { deltaY: 3, bubbles: true, cancelable: true });
-          if (picture.dispatchEvent(event)) throw new Error("the page would scroll");
-        }
-      }),
-    );
-    const { distance } = await state(page);
-    assert.ok(Math.abs(Number(distance) / (start * 1.0015 ** 600) - 1) < 2e-3);
-    assert.ok((await cameras(page)).length - before <= 3);
-    assert.ok(frames.length >= 1);
-    await page.keyboard.press("Control+z");
-    await until(page, "distance", start.toFixed(4));
-    // A trackpad's pinch comes as a wheel with ctrl, which would zoom the page.
-    await page.evaluate(() => {
-      const picture = document.querySelector("#picture");
-      for (let n = 0; n < 10; n++) {
-        const look = { deltaY: -7, ctrlKey: true, bubbles: true, cancelable: true };
-        if (picture.dispatchEvent(new WheelEvent("wheel", look))) throw new Error("zooms the page");
-      }
-    });
-    await finalPicture(page);
-    const pinched = Number((await state(page)).distance);
-    assert.ok(Math.abs(pinched / (start / 1.01 ** 70) - 1) < 2e-3, `${start} to ${pinched}`);
-  }));
-
 // --- dense screens ---------------------------------------------------------------------------
 
 const watchDensities = () => {
@@ -406,8 +236,8 @@ test("on a dense screen it is sharp at rest, and moves in frames that the budget
       assert.deepEqual([last.final, last.width, last.height], [true, ...full]);
       const stats = await pixels(page);
       assert.deepEqual([stats.width, stats.height], full);
-      // The server draws them smaller, of the picture that is wanted: what it tells of their error
-      // is told against that one.
+      // The server draws them smaller, of the picture that is wanted: the error it reports
+      // is relative to that one.
       const moving = movingOf(frames);
       assert.ok(moving.length >= 2);
       for (const { chosen } of moving) {
@@ -424,7 +254,7 @@ test("on a dense screen it is sharp at rest, and moves in frames that the budget
         deviceScaleFactor: 1.5,
         mobile: false,
       });
-      // What a browser tells when the window goes to another screen; emulation leaves it out.
+      // The event of a window that moves to another screen; emulation does not send it.
       await page.evaluate(() => window.densities.at(-1).dispatchEvent(new Event("change")));
       await page.waitForFunction(
         (width) => document.querySelector("#picture").width === width,
@@ -501,7 +331,7 @@ test("what is typed into a box is one entry", () =>
     assert.equal(await box.inputValue(), before);
   }));
 
-test("e tells errors in dB, and the help lists every key", () =>
+test("e shows errors in dB, and the help lists every key", () =>
   withPage(async (page) => {
     const error = page.locator("#hud-error");
     const [, rmse] = (await error.textContent()).match(/^error ([\d.e-]+) measured$/);
@@ -520,7 +350,7 @@ test("e tells errors in dB, and the help lists every key", () =>
 
 // --- hidden ----------------------------------------------------------------------------------
 
-test("a page that nobody sees gets no frames, and the newest when someone looks again", () =>
+test("a hidden page gets no frames, and the newest when it is shown again", () =>
   withPage(async (page) => {
     const hide = (hidden) =>
       page.evaluate((value) => {
@@ -537,7 +367,7 @@ test("a page that nobody sees gets no frames, and the newest when someone looks 
       }
       const before = await headers();
       await page.waitForTimeout(1000);
-      assert.equal(await headers(), before, "no frames for nobody");
+      assert.equal(await headers(), before, "no frames while hidden");
     };
     await page.keyboard.press("Space");
     await page.waitForFunction(() => Number(document.querySelector("#picture").dataset.step) >= 1);

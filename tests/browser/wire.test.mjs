@@ -64,7 +64,7 @@ test("page and frames that come a byte at a time are the same page and frames", 
     assert.deepEqual(await pixels(torn), await pixels(whole), "after a turn too");
   }));
 
-// Runs in a page first: keeps every message that comes in and what goes out between.
+// Runs in a page first: records every message that comes in and what goes out between.
 const record = () => {
   window.tape = [];
   const Native = window.WebSocket;
@@ -127,7 +127,7 @@ const replay = (tape) => {
     play() {
       for (; this.next < tape.length; this.next++) {
         const entry = tape[this.next];
-        // The page's first words are waited for; what it did later nobody does now.
+        // Only the page's first messages are awaited; later ones are not replayed.
         if (entry.sent !== undefined) {
           if (entry.first && played.sent < entry.first) return;
           continue;

@@ -75,7 +75,7 @@ class Visit {
 const short = "#!view=k7";
 const settled = () => new Promise((resolve) => setImmediate(resolve));
 
-test("a link to a kept view stands until that view is there", async () => {
+test("a link to a stored view stays until that view is loaded", async () => {
   const visit = new Visit(short);
   assert.equal(visit.rests({ image: { width: 9, height: 6 } }), short);
   visit.address.edited();
@@ -88,7 +88,7 @@ test("a link to a kept view stands until that view is there", async () => {
   assert.equal(visit.alert, "");
 });
 
-test("a kept view that does not come leaves the link until the user changes a thing", async () => {
+test("a stored view that does not come leaves the link until the view is edited", async () => {
   for (const later of [false, true]) {
     const visit = new Visit(later ? "" : short);
     if (later) visit.goTo(short);

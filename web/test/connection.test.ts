@@ -135,7 +135,7 @@ function setUp() {
   return { clock, sockets, seen, connection, last, state };
 }
 
-test("says the subprotocol, is live after hello, passes on messages and frames", () => {
+test("names the subprotocol, is live after hello, passes on messages and frames", () => {
   const { connection, last, seen, state } = setUp();
   connection.start();
   assert.equal(last().protocol, "windsplat.v1");
@@ -212,7 +212,7 @@ test("a server that greets and falls over is not asked ever faster", () => {
   }
 });
 
-test("garbage ends the connection, is told, and does not end the page", () => {
+test("garbage closes the connection, is reported, and does not break the page", () => {
   const garbage: unknown[] = [
     "",
     "{",
@@ -257,7 +257,7 @@ test("messages and frames before hello break the protocol", () => {
   }
 });
 
-test("a server that never says hello is left", () => {
+test("a server that never sends hello is disconnected", () => {
   const { clock, connection, last, sockets, state } = setUp();
   connection.start();
   clock.advance(9_999);

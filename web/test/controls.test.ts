@@ -60,12 +60,12 @@ const dataset = {
   ],
 } as unknown as Dataset;
 
-test("the shapes offered are those that the dataset tells, whatever its axes and default", () => {
-  const told = (mappings: Dataset["mappings"]) =>
+test("the shapes offered are those that the dataset lists, whatever its axes and default", () => {
+  const labels = (mappings: Dataset["mappings"]) =>
     mappingOptions({ ...dataset, mappings, defaultView: { geometry: { mapping: "flat" } } });
-  assert.deepEqual(Object.values(told(["flat"])), ["flat"]);
-  assert.deepEqual(Object.values(told(["flat", "sphere"])), ["flat", "sphere"]);
-  const curved = told(["flat", "sphere", "curvilinear"]);
+  assert.deepEqual(Object.values(labels(["flat"])), ["flat"]);
+  assert.deepEqual(Object.values(labels(["flat", "sphere"])), ["flat", "sphere"]);
+  const curved = labels(["flat", "sphere", "curvilinear"]);
   assert.deepEqual(Object.values(curved), ["flat", "sphere", "curvilinear"]);
   assert.equal(Object.keys(curved).length, 3);
 });
@@ -74,7 +74,7 @@ test("heights come from the axis or a scalar, those in metres first", () => {
   assert.deepEqual(Object.values(heightOptions(dataset)), ["", "zg", "cloud"]);
 });
 
-test("a slice begins in the middle of an axis that has layers, and tells where it lies", () => {
+test("a slice begins in the middle of an axis that has layers, and shows where it lies", () => {
   assert.deepEqual(Object.values(sliceOptions(dataset)), ["all", "x", "z"]);
   assert.equal(sliceIndexMax(dataset, "x"), 3);
   assert.deepEqual(slicePatch(dataset, "z"), { geometry: { slice: { axis: "z", index: 2 } } });
@@ -154,13 +154,13 @@ test("every method and compositing offered is explained; the reference is not of
   assert.match(compositingHints["cd-naive"]!, /seams/);
 });
 
-test("bearings are told by the compass, wherever the range begins", () => {
-  const told = (low: number, high: number) =>
+test("bearings are labelled by the compass, wherever the range begins", () => {
+  const labels = (low: number, high: number) =>
     compassTicks([low, high]).map(({ at, text }) => `${text}${at.toFixed(2)}`);
-  assert.deepEqual(told(0, 360), ["N0.00", "E0.25", "S0.50", "W0.75", "N1.00"]);
-  assert.deepEqual(told(360, 0), ["N1.00", "E0.75", "S0.50", "W0.25", "N0.00"]);
-  assert.deepEqual(told(-180, 180), ["S0.00", "W0.25", "N0.50", "E0.75", "S1.00"]);
-  assert.deepEqual(told(45, 225), ["E0.25", "S0.75"]);
+  assert.deepEqual(labels(0, 360), ["N0.00", "E0.25", "S0.50", "W0.75", "N1.00"]);
+  assert.deepEqual(labels(360, 0), ["N1.00", "E0.75", "S0.50", "W0.25", "N0.00"]);
+  assert.deepEqual(labels(-180, 180), ["S0.00", "W0.25", "N0.50", "E0.75", "S1.00"]);
+  assert.deepEqual(labels(45, 225), ["E0.25", "S0.75"]);
   for (const { text } of compassTicks([10, 60])) assert.match(text, /^\d+°$/);
 });
 
@@ -170,7 +170,7 @@ const colored = (color: object): View => ({
   scalars: [],
 });
 
-test("the legend tells direction by the compass and a scalar by its name and unit", () => {
+test("the legend labels direction by the compass and a scalar by its name and unit", () => {
   const [direction] = legendEntries(dataset, colored({ by: "direction", range: [0, 360] }));
   assert.equal(direction!.title, "wind: direction");
   assert.equal(direction!.ticks.map((tick) => tick.text).join(""), "NESWN");
@@ -189,7 +189,7 @@ test("levels stand where the axis says only while nothing bends the grid", () =>
   assert.equal(sampleHeights(dataset, { geometry: { heightField: "zg" } }), null);
 });
 
-test("the HUD names method and compositing, and says what was left out", () => {
+test("the HUD names method and compositing, and the samples that were skipped", () => {
   const chosen = { method: "kernel", compositing: "cd", slabThickness: null } as ChosenMessage;
   assert.equal(methodText(chosen), "kernel cd");
   assert.equal(

@@ -10,7 +10,7 @@ import { described, Page, problem, summaryOf } from "./page";
 const tooBig =
   "the field needs 27.5 MiB; the memory limit is 20.0 MiB, of which 0.4 MiB are in use";
 
-test("where titles repeat the ids tell them apart, and what failed is told", () => {
+test("where titles repeat the ids are shown, and failures are marked", () => {
   const titled = (id: string, title: string, more = {}) =>
     summaryOf(described(id, { title, ...more }));
   const notes = ["levels were turned", "'b.nc' is damaged"];
@@ -72,7 +72,7 @@ test("why a chosen dataset cannot be shown stays to be read", () => {
   }
 });
 
-test("when nothing can be read all are tried once, and the last word stays", () => {
+test("when nothing can be read all are tried once, and the last error stays", () => {
   const page = new Page([described("a"), described("b")]);
   page.says({ type: "error", id: page.openId, problem: problem("a is damaged") });
   assert.equal(page.sent("open").at(-1)!.dataset, "b");
@@ -84,7 +84,7 @@ test("when nothing can be read all are tried once, and the last word stays", () 
 const camera = { eye: [1, 2, 3], target: [0, 0, 0], up: [0, 0, 1], fovY: 20, height: 1 };
 
 // The view that the server holds after all that was said to it.
-const told = (page: Page): View =>
+const explicitView = (page: Page): View =>
   page.sent("patch").reduce<View>((view, { patch }) => mergeView(view, patch), {});
 
 test("a dataset that cannot be opened leaves the shown one as it was", () => {
@@ -102,7 +102,7 @@ test("a dataset that cannot be opened leaves the shown one as it was", () => {
     page.says({ type: "error", id: page.openId, problem: problem(tooBig, 507) });
     page.says({ type: "error", rev, problem: problem(tooBig, 507) });
     assert.deepEqual(page.app.explicitView(), before);
-    assert.deepEqual(told(page), before);
+    assert.deepEqual(explicitView(page), before);
     assert.equal(page.alert, tooBig);
   }
 });

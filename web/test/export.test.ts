@@ -1,6 +1,5 @@
-// What is saved: texts in PNG, ZIP files, sizes and views of pictures and animations, requests that
-// are repeated, kept views and short links. The formats are checked against their specifications
-// and by python's own readers.
+// Export: texts in PNG, ZIP files, sizes and views of pictures and animations, repeated requests.
+// The formats are checked against their specifications and by python's own readers.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
@@ -19,15 +18,13 @@ import {
   type Animation,
 } from "../src/save/export_views";
 import { drawFrame, inOrder, waitFor, type FetchLike } from "../src/wire/frame_request";
-import { SavedViews, savedViewsMax } from "../src/save/saved_views";
 import { layoutCards } from "../src/save/legend_picture";
-import { hashOfView, viewOfHash } from "../src/view/link";
 import type { LegendEntry } from "../src/view/legend_entries";
 import { crc32, textOf, utf8, withTexts, type Bytes } from "../src/save/png_text";
 import type { View } from "../src/wire/protocol";
 import { parseView } from "../src/save/saved_picture";
-import { linkMax, loadView, shortLinkHash, shortLinkId, storeView } from "../src/wire/short_link";
 import { Zip } from "../src/save/zip";
+import { problem, server } from "./server";
 
 // --- PNG ------------------------------------------------------------------------------------
 
@@ -116,7 +113,7 @@ test("a long text without an end of its keyword is passed over", () => {
   assert.equal(textOf(png, "a"), null);
 });
 
-test("what is no PNG or is damaged is told, and a cut one ends", () => {
+test("what is no PNG or is damaged is an error, and a truncated one ends", () => {
   assert.throws(() => textOf(utf8("GIF89a and more than that"), "a"), /not a PNG/);
   assert.throws(() => textOf(new Uint8Array(0), "a"), /not a PNG/);
   assert.throws(() => withTexts(utf8("\x89PNG\r\n\x1a\n"), {}), /not a PNG/);
@@ -132,58 +129,6 @@ test("what is no PNG or is damaged is told, and a cut one ends", () => {
 test("a view in a picture has to be an object", () => {
   assert.deepEqual(parseView('{"step":3}'), { step: 3 });
   for (const text of ["", "[]", "null", "3", "{"]) assert.throws(() => parseView(text), /view/);
-});
-
-test("what has not the shape of a view is refused wherever it comes from", async () => {
-  const whole = {
-    ...{ dataset: "gcm", step: 3, image: { background: "#000000" }, later: [null, { x: 1 }] },
-    camera: { projection: "perspective", eye: [0, -3, 1], target: null, fovY: 35 },
-    geometry: { scale: [1, 1, 2], slice: { axis: "z", index: 3 } },
-    vector: { field: null, magnitudeRange: [0, 9], motion: { mode: "phase", time: 0.5 } },
-    scalars: [
-      {
-        field: "cloud",
-        color: { range: [0, 1] },
-        extinction: [
-          [0, 0],
-          [1, 2],
-          [3, 4],
-        ],
-      },
-    ],
-  };
-  assert.deepEqual(parseView(JSON.stringify(whole)), whole);
-  assert.deepEqual(viewOfHash(hashOfView(whole as unknown as View)), whole);
-  for (const text of [
-    '{"scalars":5}',
-    '{"scalars":{}}',
-    '{"scalars":[null]}',
-    '{"scalars":[{}]}',
-    '{"scalars":[{"field":null}]}',
-    '{"scalars":[{"field":"a","color":3}]}',
-    '{"scalars":[{"field":"a","extinction":[3]}]}',
-    '{"scalars":[{"field":"a","extinction":[[0,1],[2]]}]}',
-    '{"vector":[]}',
-    '{"vector":{"magnitudeRange":3}}',
-    '{"vector":{"magnitudeRange":[0,null]}}',
-    '{"vector":{"length":"0.2"}}',
-    '{"vector":{"field":5}}',
-    '{"camera":{"eye":5}}',
-    '{"camera":{"eye":[0,1]}}',
-    '{"camera":{"eye":[0,1,1e999]}}',
-    '{"geometry":{"slice":"z"}}',
-    '{"dataset":5}',
-    '{"step":"3"}',
-  ]) {
-    assert.throws(() => parseView(text), /invalid view/, text);
-    assert.equal(viewOfHash(`#!${encodeURIComponent(text)}`), null, text);
-    const view: unknown = JSON.parse(text);
-    const saved = server(() => new Response(JSON.stringify({ id: "k", view })));
-    await assert.rejects(loadView(saved.fetch, "http://host/", "k"), /understood/, text);
-    const store = new Store();
-    store.text = JSON.stringify([{ name: "a", view, date: 1 }]);
-    assert.deepEqual(new SavedViews(() => store, "key").list(), [], text);
-  }
 });
 
 // --- ZIP ------------------------------------------------------------------------------------
@@ -211,7 +156,7 @@ test("python opens the ZIP file and finds every file as it was", async () => {
   );
 });
 
-test("a ZIP file of too many files is refused, not broken", () => {
+test("a ZIP file of too many files is refused, not corrupt", () => {
   const zip = new Zip(new Date());
   const empty = utf8("");
   assert.throws(() => {
@@ -302,29 +247,13 @@ test("the motion of the lines runs one step of time a second", () => {
   }
 });
 
-test("progress tells the time left by the frames that are done", () => {
+test("progress estimates the time left from the frames that are done", () => {
   assert.equal(progressText(0, 48, 900), "frame 0 of 48");
   assert.equal(progressText(12, 48, 6000), "frame 12 of 48, 18 s left");
   assert.equal(progressText(48, 48, 6000), "frame 48 of 48, 0 s left");
 });
 
 // --- requests ---------------------------------------------------------------------------------
-
-const problem = (status: number, detail: string, headers: Record<string, string> = {}) =>
-  new Response(JSON.stringify({ type: "about:blank", title: "No", status, detail }), {
-    status,
-    headers,
-  });
-
-// A server that gives these answers, one after the other.
-function server(...answers: (() => Response)[]) {
-  const asked: { url: string; options: RequestInit }[] = [];
-  const fetch: FetchLike = (url, options) => {
-    asked.push({ url, options });
-    return Promise.resolve(answers[Math.min(asked.length, answers.length) - 1]!());
-  };
-  return { asked, fetch };
-}
 
 const never = new AbortController().signal;
 
@@ -405,111 +334,6 @@ test("after a frame that fails no other is begun", async () => {
     /no/,
   );
   assert.deepEqual(begun, [0, 1, 2, 3]);
-});
-
-// --- kept views and links ---------------------------------------------------------------------
-
-class Store {
-  text: string | null = null;
-  full = false;
-
-  getItem(): string | null {
-    return this.text;
-  }
-
-  setItem(_key: string, text: string): void {
-    if (this.full) throw new Error("QuotaExceededError");
-    this.text = text;
-  }
-}
-
-test("views are kept, renamed and deleted, the newest first", () => {
-  const store = new Store();
-  const kept = new SavedViews(() => store, "key");
-  kept.add("one", { step: 1 }, 10);
-  kept.add("two", { step: 2 }, 20);
-  kept.rename(kept.list()[1]!.id, "eins");
-  assert.deepEqual(
-    kept.list().map(({ id: _id, ...rest }) => rest),
-    [
-      { name: "two", view: { step: 2 }, date: 20 },
-      { name: "eins", view: { step: 1 }, date: 10 },
-    ],
-  );
-  kept.remove(kept.list()[0]!.id);
-  assert.deepEqual(namesOf(kept), ["eins"]);
-});
-
-const namesOf = (kept: SavedViews): string[] => kept.list().map(({ name }) => name);
-
-test("another tab's changes of the list are heeded, by entries of earlier releases too", () => {
-  const store = new Store();
-  store.text = JSON.stringify([
-    { name: "b", view: {}, date: 2 },
-    { name: "a", view: {}, date: 1 },
-  ]);
-  const [here, there] = [new SavedViews(() => store, "key"), new SavedViews(() => store, "key")];
-  const [b, a] = here.list();
-  there.add("c", {}, 3);
-  there.rename(a!.id, "A");
-  here.remove(b!.id);
-  assert.deepEqual(namesOf(there), ["c", "A"]);
-  there.remove(b!.id);
-  here.rename(b!.id, "B");
-  here.rename(a!.id, "AA");
-  assert.deepEqual(namesOf(there), ["c", "AA"]);
-});
-
-test("whatever the storage holds, the list is a list of views", () => {
-  const store = new Store();
-  const kept = new SavedViews(() => store, "key");
-  const good = { name: "a", view: {}, date: 1 };
-  for (const [text, count] of [
-    ["", 0],
-    ["{", 0],
-    ["null", 0],
-    ["{}", 0],
-    ['"x"', 0],
-    [JSON.stringify([null, 3, "x", [], {}, good, { ...good, view: [] }, { ...good, name: 3 }]), 1],
-    [JSON.stringify([{ ...good, date: "now" }, { ...good, name: "n".repeat(999) }, good]), 1],
-    [JSON.stringify(Array.from({ length: 999 }, () => good)), savedViewsMax],
-  ] as const) {
-    store.text = text;
-    assert.equal(kept.list().length, count, text.slice(0, 40));
-  }
-  assert.throws(() => kept.add("b", {}, 2), /100 views/);
-  store.text = null;
-  assert.throws(() => kept.add("long", { dataset: "x".repeat(1e6) }, 2), /too long/);
-  store.full = true;
-  assert.throws(() => kept.add("b", {}, 2), /allows this page no storage/);
-  const forbidden = new SavedViews(() => {
-    throw new Error("SecurityError");
-  }, "key");
-  assert.deepEqual(forbidden.list(), []);
-  assert.throws(() => forbidden.add("b", {}, 2), /allows this page no storage/);
-});
-
-test("a short link names a view that the server keeps", async () => {
-  assert.equal(shortLinkId(shortLinkHash("aZ09_-")), "aZ09_-");
-  for (const hash of ["", "#!{}", "#!view=", "#!view=a/b", `#!view=${"x".repeat(200)}`]) {
-    assert.equal(shortLinkId(hash), null);
-  }
-  const saved = { id: "k7", view: { dataset: "gcm", step: 3 } };
-  const { asked, fetch } = server(() => new Response(JSON.stringify(saved), { status: 201 }));
-  assert.deepEqual(await storeView(fetch, "http://host/a/", saved.view), saved);
-  assert.equal(asked[0]!.url, "http://host/a/v1/views");
-  assert.equal(asked[0]!.options.method, "POST");
-  assert.deepEqual(JSON.parse(asked[0]!.options.body as string), saved.view);
-  assert.deepEqual(await loadView(fetch, "http://host/a/", "k7"), saved);
-  assert.equal(asked[1]!.url, "http://host/a/v1/views/k7");
-  assert.equal(asked[1]!.options.method ?? "GET", "GET");
-  const refused = server(() => problem(404, "there is no view k8"));
-  await assert.rejects(loadView(refused.fetch, "http://host/", "k8"), /no view k8/);
-  const odd = server(() => new Response("[]"));
-  await assert.rejects(loadView(odd.fetch, "http://host/", "k8"), /understood/);
-  const none = server(() => Response.json({ id: "k8", view: null }));
-  await assert.rejects(loadView(none.fetch, "http://host/", "k8"), /understood/);
-  assert.ok(shortLinkHash("k7").length < linkMax);
 });
 
 // --- the legend in the picture ------------------------------------------------------------------

@@ -1,5 +1,5 @@
 // Files that change, or become unreadable, while they are shown: what the page makes of a second
-// `opened` and of an `error` that nobody asked for.
+// `opened` and of an unsolicited `error`.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { fitView, shapeOf } from "../src/view/fit_view";
@@ -77,7 +77,7 @@ test("files with fewer steps: the last one is shown, all else as it was", () => 
   assert.equal(page.element("time-step").textContent, "step 2 of 3");
   assert.equal(page.element("time-label").textContent, "2001-01-01 02:00Z");
   assert.equal(page.built, built + 1);
-  // The server may still have tried the old step, for nobody's patch.
+  // The server may still have tried the old step, without a patch.
   page.says({ type: "error", problem: problem(gone, 422, "/step") });
   page.draws();
   assert.equal(page.alert, null);
@@ -126,7 +126,7 @@ test("a field that is gone is asked for no more, and the defaults are the new on
   assert.equal((page.sent("patch").at(-1)!.patch as View).scalars, null);
 });
 
-test("an answer to a request that nobody waits for any more changes nothing", () => {
+test("the answer to a cancelled request changes nothing", () => {
   const page = shown();
   page.choose("calm");
   page.says({ type: "opened", id: 1, dataset: described("storm", { steps: 2 }) });
@@ -137,7 +137,7 @@ test("an answer to a request that nobody waits for any more changes nothing", ()
   assert.equal(page.app.dataset().id, "calm");
 });
 
-test("new files that cannot be read: told until they can, and the old picture stays", () => {
+test("new files that cannot be read: an error until they can, and the old picture stays", () => {
   const page = shown();
   const patches = page.sent("patch").length;
   page.says({ type: "error", id: page.openId, problem: problem(damaged) });
@@ -155,7 +155,7 @@ test("new files that cannot be read: told until they can, and the old picture st
   assert.deepEqual(page.entries, ["The storm", "The calm"]);
 });
 
-test("files that could not be read before the page came are told by the server's note", () => {
+test("files that could not be read before the page came are reported by the server's note", () => {
   const failed = described("storm", { state: "failed", notes: ["levels were turned", damaged] });
   const page = new Page([failed, described("calm")]);
   assert.equal(page.sent("open").at(-1)!.dataset, "calm", "one that can be read goes first");
@@ -169,7 +169,7 @@ test("files that could not be read before the page came are told by the server's
   assert.equal(page.alert, null);
 });
 
-test("a failed dataset after another request that failed is told of the one that is shown", () => {
+test("a failed dataset after another failed request is reported for the one that is shown", () => {
   const page = shown();
   page.choose("calm");
   page.says({ type: "error", id: page.openId, problem: problem("no") });

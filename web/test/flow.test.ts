@@ -10,7 +10,7 @@ class Page {
   isWanted = true;
   at = 0;
   sent: number[] = []; // ms at which a move went out
-  ends: boolean[] = []; // of every end that was told: whether the flow still ran then
+  ends: boolean[] = []; // of every end that was reported: whether the flow still ran then
   rev = 0;
   private timers = new Map<number, { due: number; run: () => void }>();
   private lastTimer = 0;
@@ -102,7 +102,7 @@ test("a hidden page asks for nothing and goes on without a jump", () => {
   const [moves, at] = [page.sent.length, page.at];
   page.run(10_000, 5);
   assert.equal(page.sent.length, moves);
-  assert.equal(page.waiting, 0, "no timer runs for nobody");
+  assert.equal(page.waiting, 0, "no timer runs for a hidden page");
   page.isHidden = false;
   page.flow.seen();
   page.run(1000, 5);
@@ -135,7 +135,7 @@ test("a stop, a refusal and lines that stand still end the flow", () => {
 });
 
 test("the page hears of an end that it did not ask for, once, when the flow has stopped", () => {
-  const told = (end: (page: Page) => void): boolean[] => {
+  const ends = (end: (page: Page) => void): boolean[] => {
     const page = new Page();
     page.flow.start();
     page.run(500, 5);
@@ -146,15 +146,15 @@ test("the page hears of an end that it did not ask for, once, when the flow has 
     return page.ends;
   };
   assert.deepEqual(
-    told((page) => (page.isWanted = false)),
+    ends((page) => (page.isWanted = false)),
     [false],
   );
   assert.deepEqual(
-    told((page) => page.flow.refused(page.rev)),
+    ends((page) => page.flow.refused(page.rev)),
     [false],
   );
   assert.deepEqual(
-    told((page) => page.flow.stop()),
+    ends((page) => page.flow.stop()),
     [],
   );
 });

@@ -1,4 +1,4 @@
-// Error against time: axes, ticks, words, and the budget's steps.
+// Error against time: axes, ticks, text, and the budget's steps.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -51,7 +51,7 @@ const point: ForecastPoint = {
   pareto: true,
 };
 
-test("a setting in words, by either measure of error", () => {
+test("a setting as text, by either measure of error", () => {
   assert.equal(
     pointText(point, "rmse"),
     "slab of 2 cells, 568×409, data 1/2: 31.4 ms, error 0.011 (0.006 to 0.02), estimated",

@@ -43,7 +43,7 @@ function header(change: Change = {}): FrameHeader {
   return parseFrameHeader(bytes);
 }
 
-test("an error is told with its kind: bit 4 estimated, bit 2 measured", () => {
+test("an error is shown with its kind: bit 4 estimated, bit 2 measured", () => {
   const text = (change: Change) => errorLabel(header(change)).text;
   assert.equal(text({ flags: 4, error: 0.011 }), "error 0.011 est.");
   assert.equal(text({ flags: 2, error: 3.2e-4 }), "error 3.2e-4 measured");
@@ -55,7 +55,7 @@ test("an error is told with its kind: bit 4 estimated, bit 2 measured", () => {
     errorLabel(header({ flags: 2 })).title,
     errorLabel(header({ flags: 0, error: NaN })).title,
   ]);
-  assert.equal(said.size, 3, "each kind is explained in its own words");
+  assert.equal(said.size, 3, "each kind has its own explanation");
   for (const title of said) assert.match(title, /root mean square/);
 });
 
@@ -68,7 +68,7 @@ test("an error above what the view allows says so", () => {
   }
 });
 
-test("an error is told in dB as well: 20 for each power of ten, and a limit is then below", () => {
+test("an error is shown in dB as well: 20 for each power of ten, and a limit is then below", () => {
   const text = (change: Change, limit: number | null = null) =>
     errorLabel(header({ flags: 4, ...change }), limit, "psnr").text;
   assert.equal(text({ error: 0.1 }), "PSNR 20.0 dB est.");
@@ -80,13 +80,13 @@ test("an error is told in dB as well: 20 for each power of ten, and a limit is t
   assert.equal(encodingLabel(header({ jpegError: 0.01 }), "psnr").text, "JPEG 40.0 dB");
 });
 
-test("the choice of how errors are told is the page's one, and tells who shows them", () => {
-  const told: string[] = [];
-  errorMetric.watch((metric) => told.push(metric));
+test("the error metric is page-wide, and notifies its watchers", () => {
+  const metrics: string[] = [];
+  errorMetric.watch((metric) => metrics.push(metric));
   toggleErrorMetric();
   errorMetric.set("psnr"); // as it is already
   toggleErrorMetric();
-  assert.deepEqual(told, ["psnr", "rmse"]);
+  assert.deepEqual(metrics, ["psnr", "rmse"]);
 });
 
 test("an error that is no number, or of no kind, is unknown", () => {
@@ -120,7 +120,7 @@ test("a frame is as large as the whole picture, a half of it, or so many percent
   assert.equal(scaleText(1, 1280), "1 %", "never nothing");
 });
 
-test("a frame refines if it shows a view that was shown already, and is not the last word", () => {
+test("a frame refines if it shows a view that was shown already, and is not final", () => {
   const moving = header({ flags: 0, rev: 5, step: 3 });
   assert.equal(frameState(moving, null), "moving");
   assert.equal(frameState(moving, header({ flags: 0, rev: 4, step: 3 })), "moving");
@@ -146,7 +146,7 @@ test("pictures of any size fill a canvas of their shape, others keep theirs", ()
   assert.deepEqual(pictureRect(canvas, { width: 1280, height: 360 }), [0, 180, 1280, 360]);
 });
 
-test("network time is what the server's own times do not explain, told once a patch", () => {
+test("network time is what the server's own times do not explain, measured once a patch", () => {
   const sent = { t: 1000, queueUs: 1000, renderUs: 20_000, encodeUs: 4000 } as FrameHeader;
   assert.equal(networkMs(sent, 1040, 0), 15);
   assert.equal(networkMs(sent, 1040, 1000), null);

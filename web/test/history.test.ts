@@ -158,7 +158,7 @@ test("what makes no difference any more is passed over", () => {
   assert.equal(desk.undo(), "camera");
 });
 
-test("two hundred entries are kept", () => {
+test("the history holds two hundred entries", () => {
   const desk = new Desk({ step: 0 });
   for (let n = 1; n <= 250; n++) desk.change({ step: n }, 1000);
   let undone = 0;
@@ -166,7 +166,7 @@ test("two hundred entries are kept", () => {
   assert.deepEqual([undone, desk.view.step], [200, 50]);
 });
 
-test("differences are told leaf by leaf, arrays whole", () => {
+test("differences go leaf by leaf, arrays whole", () => {
   const a = { a: { b: 1, c: [1, 2] }, d: 1 };
   const b = { a: { b: 1, c: [1, 3] }, e: null };
   assert.deepEqual(differences(a, b), [

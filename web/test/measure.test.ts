@@ -118,7 +118,7 @@ const series = {
   units: "K",
 };
 
-test("a series as the schema has it is understood, and its ends are told in words", async () => {
+test("a series as the schema has it is understood, and its ends are shown as times", async () => {
   const schemas = ["view", "messages"].map((name): object =>
     JSON.parse(readFileSync(`../protocol/${name}.schema.json`, "utf8")),
   );
@@ -149,7 +149,7 @@ test("each question has its address, beneath where the page is mounted", async (
   assert.deepEqual(s.asked, ["http://host/base/v1/datasets/d/fields/t/series?x=1&y=2&z=3"]);
 });
 
-test("what goes wrong is told in the server's words, or in ours", async () => {
+test("failures are reported in the server's text, or in the page's", async () => {
   const refused = server(
     { title: "Not Found", status: 404, detail: "there is no such field" },
     404,
@@ -233,7 +233,7 @@ test("the target shows in the middle, what is behind the eye nowhere", () => {
   assert.ok(Math.abs(project(level, [0, 0, top], 1.6)![1]) < 1e-12);
 });
 
-test("values in words", () => {
+test("values as text", () => {
   assert.equal(valueText(0.4, "1"), "0.4");
   assert.equal(valueText(280.25, "K"), "280.3 K");
   assert.equal(valueText([3, 4, 0], "m s-1"), "(3, 4, 0), |v| 5 m s⁻¹");

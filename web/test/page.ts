@@ -1,4 +1,4 @@
-// The app with parts that keep what they are told, in a document of stand-ins: what it says to the
+// The app with parts that record their calls, in a document of stand-ins: what it sends to the
 // server and shows, for messages that a test makes up. No browser, no server.
 import { App, type AppParts } from "../src/app/app";
 import { DatasetList } from "../src/app/dataset_list";

@@ -161,7 +161,7 @@ test("numbers and bytes are short", () => {
   ]);
 });
 
-test("height is told by the vertical axis's own levels, where the samples stand", () => {
+test("height is labelled by the vertical axis's own levels, where the samples stand", () => {
   const [entry] = legendEntries(dataset, vector({ by: "worldZ", range: [-0.24, 0.15] }));
   assert.equal(entry!.units, "hPa");
   assert.match(entry!.title, /pressure/);
@@ -205,17 +205,17 @@ test("each way of colouring has its unit; one colour has no range", () => {
   assert.match(constant!.note, /60 m s⁻¹/);
 });
 
-test("the legend tells what is too slow to be drawn, in the field's unit", () => {
-  const told = (minMagnitude: number | undefined, units = "m s-1") => {
+test("the legend says what is too slow to be drawn, in the field's unit", () => {
+  const calls = (minMagnitude: number | undefined, units = "m s-1") => {
     const fields = dataset.fields.map((field) => ({ ...field, units }));
     const view: View = { vector: { field: "wind", minMagnitude }, scalars: [{ field: "cloud" }] };
     return legendEntries({ ...dataset, fields }, view).map((entry) => entry.leftOut);
   };
-  assert.deepEqual(told(3), ["slower than 3 m s⁻¹ not drawn", ""]);
-  assert.equal(told(12.5, "km/h")[0], "slower than 12.5 km/h not drawn");
-  assert.equal(told(0.5, "V m-1")[0], "weaker than 0.5 V m⁻¹ not drawn");
-  assert.equal(told(0.25, "1")[0], "weaker than 0.25 not drawn");
-  for (const all of [0, undefined]) assert.deepEqual(told(all), ["", ""]);
+  assert.deepEqual(calls(3), ["slower than 3 m s⁻¹ not drawn", ""]);
+  assert.equal(calls(12.5, "km/h")[0], "slower than 12.5 km/h not drawn");
+  assert.equal(calls(0.5, "V m-1")[0], "weaker than 0.5 V m⁻¹ not drawn");
+  assert.equal(calls(0.25, "1")[0], "weaker than 0.25 not drawn");
+  for (const all of [0, undefined]) assert.deepEqual(calls(all), ["", ""]);
 });
 
 test("powers in units are raised, anything else stays", () => {
@@ -381,7 +381,7 @@ test("two fingers have a centre and a spread", () => {
   );
 });
 
-// A camera that counts how often it is told, on a page whose display frames come when asked for.
+// A camera that counts how often it is set, on a page whose display frames come when asked for.
 class Desk {
   camera: Camera = {
     projection: "perspective",
@@ -391,7 +391,7 @@ class Desk {
     fovY: 35,
     height: 1,
   };
-  told = 0;
+  calls = 0;
   isReady = true;
   private frames: (() => void)[] = [];
   readonly queue = new MoveQueue(
@@ -399,7 +399,7 @@ class Desk {
       camera: () => this.camera,
       setCamera: (next) => {
         this.camera = next;
-        this.told += 1;
+        this.calls += 1;
       },
       ready: () => this.isReady,
     },
@@ -422,18 +422,18 @@ class Desk {
 test("the first move goes out at once, and what comes until the next display frame as one", () => {
   const desk = new Desk();
   desk.grow(50);
-  assert.deepEqual([desk.told, desk.camera.height], [1, 2], "the first does not wait");
+  assert.deepEqual([desk.calls, desk.camera.height], [1, 2], "the first does not wait");
   assert.equal(desk.asked, 1);
   desk.displayFrame();
-  assert.deepEqual([desk.told, desk.camera.height], [2, 51], "none of the others is lost");
+  assert.deepEqual([desk.calls, desk.camera.height], [2, 51], "none of the others is lost");
   desk.grow(1);
-  assert.equal(desk.told, 2, "one patch a display frame");
+  assert.equal(desk.calls, 2, "one patch a display frame");
   desk.displayFrame();
-  assert.equal(desk.told, 3);
+  assert.equal(desk.calls, 3);
   desk.displayFrame();
-  assert.deepEqual([desk.told, desk.asked], [3, 0], "at rest no display frames are asked for");
+  assert.deepEqual([desk.calls, desk.asked], [3, 0], "at rest no display frames are asked for");
   desk.grow(1);
-  assert.equal(desk.told, 4, "and the next one is a first one again");
+  assert.equal(desk.calls, 4, "and the next one is a first one again");
 });
 
 test("while the link holds patches up, moves are gathered and the newest wins", () => {
@@ -444,10 +444,10 @@ test("while the link holds patches up, moves are gathered and the newest wins", 
     desk.displayFrame();
     desk.grow(1);
   }
-  assert.equal(desk.told, 0);
+  assert.equal(desk.calls, 0);
   desk.isReady = true;
   desk.displayFrame();
-  assert.deepEqual([desk.told, desk.camera.height], [1, 14]);
+  assert.deepEqual([desk.calls, desk.camera.height], [1, 14]);
 });
 
 test("the picture is as sharp as the screen up to what is worth it", () => {
@@ -475,7 +475,7 @@ test("times are readable and unknown ones stay as they are", () => {
   assert.equal(readableTime("step 3"), "step 3");
 });
 
-test("a problem is told by its values at fault", () => {
+test("a problem is described by its values at fault", () => {
   const problem = { type: "about:blank", title: "Bad", status: 422, detail: "d" };
   assert.equal(problemText(problem), "d");
   assert.equal(problemText({ ...problem, detail: "" }), "Bad");

@@ -1,4 +1,4 @@
-// Steps that run, as the page sees them: what it says, when it takes itself for stopped; the words
+// Steps that run, as the page sees them: what it says, when it counts as stopped; the text
 // on their pace; and the media of a view completed by what was drawn.
 import assert from "node:assert/strict";
 import { test } from "node:test";
@@ -127,7 +127,7 @@ const stats = (change: Partial<StatsMessage>): StatsMessage => ({
   ...change,
 });
 
-test("the pace in words", () => {
+test("the pace as text", () => {
   assert.equal(paceText(23.96), "24 steps/s");
   assert.equal(paceText(0.5), "0.5 steps/s");
   assert.equal(stepsText(stats({})), "");

@@ -32,7 +32,7 @@ test("quality is what was said of it, whatever older frames were drawn for", () 
   page.draws({ view: { quality: { budgetMs: null, maxError: 0.01, lossless: true } } });
   assert.deepEqual(page.app.view().quality, { maxError: 0.01, lossless: true });
   page.app.change({ quality: { maxError: null } });
-  assert.equal(hasErrorLimit(page.app.view()), false, "before any frame tells");
+  assert.equal(hasErrorLimit(page.app.view()), false, "before any frame reports");
   const [patch] = page.sent("patch").slice(-1);
   assert.deepEqual(patch!.patch, { quality: { maxError: null } });
 });
@@ -55,7 +55,7 @@ test("a frame gives its credit back when it is decoded, before and whether it is
   assert.equal(page.sent("ack").length, before, "not once more when it is shown");
 });
 
-test("the server is told when nobody looks, and when someone does again", () => {
+test("the server is notified when the page is hidden, and when it is shown again", () => {
   const page = shown();
   page.hide(true);
   assert.deepEqual(page.sent("visibility").at(-1), { type: "visibility", hidden: true });
@@ -63,7 +63,7 @@ test("the server is told when nobody looks, and when someone does again", () => 
   assert.deepEqual(page.sent("visibility").at(-1), { type: "visibility", hidden: false });
 });
 
-test("a new session is told the whole view in one patch, and whether anyone looks", () => {
+test("a new session is sent the whole view in one patch, and the page's visibility", () => {
   const page = shown();
   page.app.change({ camera: { fovY: 50 }, quality: { maxError: 0.003 } });
   page.app.change({ vector: { length: 0.2 } });

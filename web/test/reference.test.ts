@@ -57,7 +57,7 @@ test("a reference is as large as the picture, up to a million pixels", () => {
   assert.ok(Math.abs(width! / height! - 16 / 9) < 0.005);
 });
 
-test("progress in words", () => {
+test("progress as text", () => {
   assert.equal(progressText(job({ state: "queued" })), ": waiting");
   assert.equal(progressText(job({ progress: 0.004 })), ": 0 %");
   assert.equal(progressText(job({ progress: 0.346, etaMs: 7100 })), ": 34 %, 8 s left");
@@ -101,7 +101,7 @@ test("asked for by the first hold, shown by the next, at once where it is still 
   }
 });
 
-test("another view drops it and its job; the same in other words does not", async () => {
+test("another view drops it and its job; the same view in another form does not", async () => {
   const { reference, calls, said, state, wake } = page([job({}), job({ id: "8" }), done, done]);
   reference.hold();
   await settled();
@@ -153,7 +153,7 @@ test("the same view asked for again after a drop is another asking", async () =>
   assert.match(said.at(-1)!, /ready/);
 });
 
-test("a failure is told, and the next hold asks again", async () => {
+test("a failure is reported, and the next hold requests again", async () => {
   const busy = new Error("4 references wait");
   const failed = job({ state: "failed", problem: { detail: "no room" } });
   const { reference, calls, said } = page([busy, failed, done]);

@@ -116,13 +116,13 @@ test("only a foot and a ramp are the form that has a foot to move", () => {
   assert.ok(!isRamp(movePoint(ramp, 1, 0.2, 1)));
 });
 
-test("the table tells values apart by the domain's width, not by their distance from zero", () => {
+test("the table rounds values by the domain's width, not by their distance from zero", () => {
   assert.deepEqual(shownPoint([101305.2, 0.1 + 0.2], [101300, 101310]), [101305.2, 0.3]);
   assert.deepEqual(shownPoint([Math.fround(0.3), 1e-9], [0, 1]), [0.3, 1e-9]);
   assert.deepEqual(shownPoint([123456.7, 5], [-1e9, 1e9]), [123457, 5]);
 });
 
-test("a point in words", () => {
+test("a point as text", () => {
   assert.equal(pointText([0.2, 4], ""), "0.2 → 4 per world unit");
   assert.equal(pointText([5e-8, 1e30], "J m⁻³"), "5e-8 J m⁻³ → 1e30 per world unit");
 });
@@ -322,7 +322,7 @@ test("an answer of what is no longer shown, or after a drag, changes nothing", a
   assert.deepEqual([state.range, follower.mode], [[2, 3], "custom"]);
 });
 
-test("the default is told later by the server where the dataset does not say it", () => {
+test("the default comes later from the server where the dataset has none", () => {
   const { state, follower } = source({ defaultRange: () => null });
   state.range = [7, 9]; // what a first frame was drawn with
   follower.follow();

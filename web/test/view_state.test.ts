@@ -92,7 +92,7 @@ test("revisions grow by one and are never used twice", () => {
   assert.equal(state.change({ step: 1 }).rev, refused.rev + 1);
 });
 
-test("a new session is told the whole view in one patch", () => {
+test("a new session is sent the whole view in one patch", () => {
   const state = new ViewState();
   state.change({ dataset: "climate", camera: { fovY: 20 } });
   state.settle(1);
@@ -136,7 +136,7 @@ function randomView(random: () => number): View {
   return view;
 }
 
-test("replacing leads from any view to any other, whatever the server has kept", () => {
+test("replacing leads from any view to any other, whatever the server has", () => {
   let seed = 7;
   const random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
   for (let n = 0; n < 500; n++) {

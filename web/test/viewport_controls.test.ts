@@ -102,7 +102,7 @@ test("a way between cameras begins and ends at them and goes the shorter way rou
 
 class Stage {
   camera: Camera = south;
-  told: Camera[] = [];
+  cameras: Camera[] = [];
   now = 0;
   private frames: (() => void)[] = [];
   readonly requestFrame = (run: () => void): void => void this.frames.push(run);
@@ -111,7 +111,7 @@ class Stage {
       camera: () => this.camera,
       setCamera: (next) => {
         this.camera = next;
-        this.told.push(next);
+        this.cameras.push(next);
       },
       ready: () => true,
     },
@@ -137,8 +137,11 @@ test("a preset is reached by a short turn, one camera a display frame", () => {
   stage.turn().to(east);
   stage.play(600);
   assert.deepEqual(stage.camera, east);
-  assert.ok(stage.told.length > 8 && stage.told.length <= 250 / 16 + 4, `${stage.told.length}`);
-  const ways = stage.told.map((camera) => anglesOf(camera).azimuth);
+  assert.ok(
+    stage.cameras.length > 8 && stage.cameras.length <= 250 / 16 + 4,
+    `${stage.cameras.length}`,
+  );
+  const ways = stage.cameras.map((camera) => anglesOf(camera).azimuth);
   for (let n = 1; n < ways.length; n++) assert.ok(ways[n]! >= ways[n - 1]! - 1e-9);
 });
 
@@ -146,7 +149,7 @@ test("who wants no movement is there at once", () => {
   const stage = new Stage();
   stage.turn(true).to(east);
   stage.play(600);
-  assert.deepEqual(stage.told, [east]);
+  assert.deepEqual(stage.cameras, [east]);
 });
 
 test("a hand on the picture, an undo or another preset ends a turn", () => {
@@ -192,7 +195,7 @@ test("a wheel zooms by what it turned, whatever unit it counts in, and never jum
 
 // --- the value under the cursor --------------------------------------------------------------
 
-// A picture whose samples are whole tenths of its width, and a server that answers when told to.
+// A picture whose samples are whole tenths of its width, and a server that answers when cameras to.
 class Glass {
   now = 1000;
   busy = false;
@@ -271,7 +274,7 @@ test("the cursor that leaves takes its question along", async () => {
   assert.deepEqual([glass.shown, glass.asked], [[], [1, 2]]);
 });
 
-test("while the view moves nothing is told or asked; then what is there now", async () => {
+test("while the view moves nothing is shown or requested; then what is there now", async () => {
   const glass = new Glass();
   glass.hover.move([0.1, 0]);
   await glass.answer();
@@ -290,7 +293,7 @@ test("while the view moves nothing is told or asked; then what is there now", as
   assert.deepEqual([glass.asked, glass.shown], [[1, 3], ["3 at 4"]]);
 });
 
-test("a question that failed is told to nobody and not asked again", async () => {
+test("a failed request is not shown and not repeated", async () => {
   const glass = new Glass();
   glass.hover.move([0.1, 0]);
   await glass.answer(true);
@@ -320,7 +323,7 @@ const probe: Probe = {
   },
 };
 
-test("the words beside the cursor: what is drawn, where, and in which level", () => {
+test("the text beside the cursor: what is drawn, where, and in which level", () => {
   const view = { vector: { field: "wind" }, scalars: [{ field: "cloud" }] } as View;
   assert.deepEqual(hoverLines(grid, view, probe, 2), [
     "wind 5 m s⁻¹ · cloud masked",
