@@ -116,7 +116,7 @@ export function sharedDaemon({ basePath = "/", args = [], page: usual = {} } = {
   const shared = { withPage };
   before(async () => {
     shared.browser = await launch();
-    shared.daemon = new Daemon(await freePort(), basePath);  // ended even where it does not start
+    shared.daemon = new Daemon(await freePort(), basePath); // ended even where it does not start
     await shared.daemon.start(...args);
   });
   after(async () => {

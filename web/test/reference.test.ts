@@ -25,7 +25,7 @@ function page(answers: unknown[]) {
   const state = { view: { step: 0, image: { width: 640, height: 480 } } as View, shown: false };
   const reference = new Reference({
     view: () => state.view,
-    ask: async (method, path, body) => {
+    request: async (method, path, body) => {
       calls.push(`${method} ${path}`);
       assert.equal(body?.quality, undefined, "how frames are drawn is nothing to a reference");
       if (method === "DELETE") return null;
@@ -74,7 +74,7 @@ test("asked for by the first hold, shown by the next, at once where it is still 
     if (!keeps) reference.release();
     await settled();
     await wake();
-    reference.ask(); // it is on its way
+    reference.prepare(); // it is on its way
     assert.equal(state.shown, false);
     await wake();
     assert.deepEqual(calls, [
@@ -129,11 +129,11 @@ test("a view that changes before the job is known leaves no job behind", async (
   let answer: (job: Job) => void = () => {};
   const posted = new Promise((resolve: (job: Job) => void) => (answer = resolve));
   const { reference, calls } = page([posted]);
-  reference.ask();
+  reference.prepare();
   reference.drop();
   await settled();
   assert.deepEqual(calls, [], "nothing was asked yet");
-  reference.ask();
+  reference.prepare();
   await settled();
   reference.drop();
   assert.deepEqual(calls, ["POST v1/references"], "its job has no name yet");
@@ -144,10 +144,10 @@ test("a view that changes before the job is known leaves no job behind", async (
 
 test("the same view asked for again after a drop is another asking", async () => {
   const { reference, calls, said, wake } = page([job({}), done]);
-  reference.ask();
+  reference.prepare();
   await settled();
   reference.drop();
-  reference.ask();
+  reference.prepare();
   await wake();
   assert.deepEqual(calls.slice(1, 3), ["DELETE v1/jobs/7", "POST v1/references"]);
   assert.match(said.at(-1)!, /ready/);

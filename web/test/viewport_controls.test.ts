@@ -214,7 +214,7 @@ class Glass {
       const sample = Math.round(10 * x);
       return x > 1 ? null : { sample, key: `${sample} ${this.step}` };
     },
-    ask: (sample, signal) =>
+    request: (sample, signal) =>
       new Promise((resolve, reject) => {
         this.asked.push(sample);
         signal.addEventListener("abort", () => (this.aborted += 1));

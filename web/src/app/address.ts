@@ -11,7 +11,7 @@ import type { Status } from "./status";
 
 export interface AddressHost {
   document(): View; // explicit keys only
-  runs(): boolean; // the view moves by itself: the address waits until it rests
+  runs(): boolean; // playback or line motion runs: the address waits until it stops
   restore(view: View): void; // the user has gone to another address
 }
 

@@ -31,7 +31,7 @@ const busyCodes = [429, 503]; // the server is busy: says nothing about the data
 export class DatasetOpener {
   private openId = 0;
   private shownId = 0; // of the `open` whose dataset is shown
-  private openingId = ""; // the dataset that it asks for
+  private openingId = ""; // the dataset of the newest `open`
   private before: View | undefined; // of what was shown when another was asked for
   private abandonedId = 0; // of the newest `open` that was cancelled
   private waits = false; // `opened` has not come yet
@@ -201,7 +201,7 @@ export class DatasetOpener {
     host.refresh();
   }
 
-  // The view goes first, so that the first picture is already the wanted one; `open` only asks what
+  // The view goes first, so that the first picture already shows it; `open` only requests what
   // the dataset holds.
   private request(id: string, outgoing: Outgoing[]): void {
     const { settled, document } = this.model.state;

@@ -1,4 +1,4 @@
-// Puts the page together: parts, keys, buttons; then lets the app run.
+// Assembles the page: parts, keys, buttons; then starts the app.
 import { drag, pan, roll, zoom, type Angles } from "../view/camera";
 import { App } from "./app";
 import { Cards } from "./dataset_cards";

@@ -1,5 +1,5 @@
-// Whether steps run by themselves, and which way. The server keeps the time; the page asks for it
-// by `play` and `pause` and follows the frames that come.
+// Playback state and direction. The server keeps the time; the page sends `play` and `pause` and
+// follows the frames that come.
 import type { ClientMessage } from "../wire/protocol";
 import type { Direction } from "./time_bar";
 
@@ -49,7 +49,7 @@ export class Playback {
     this.host.changed();
   }
 
-  // The server has stopped of its own, or is gone.
+  // The server stopped playback, or the connection is lost.
   halt(): void {
     this.way = 0;
     this.resume = 0;

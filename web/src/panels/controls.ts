@@ -1,4 +1,4 @@
-// What the panel's controls mean: which of them count under a view, what a dataset lets them offer,
+// Semantics of the panel's controls: which of them apply to a view, what a dataset offers,
 // and the values that keep two of them in order. Pure: (dataset, view) -> options, text, patches.
 import { unitText } from "../view/legend_entries";
 import type { Dataset, Field, View } from "../wire/protocol";

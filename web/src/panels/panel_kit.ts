@@ -114,7 +114,7 @@ class ColorBox extends Controller {
 export class PanelKit {
   private readonly refreshers: (() => void)[] = [];
 
-  // modes: what ranges go by, kept while panels are built anew.
+  // modes: range modes, preserved while panels are rebuilt.
   constructor(
     readonly host: PanelHost,
     readonly modes: Map<string, RangeMode>,

@@ -1,5 +1,5 @@
-// Lets the lines flow: moves /vector/motion/time on while it runs, at most `flowFps` times a second
-// and never before the frame that the last move asked for has come back. Time, timers and the
+// Animates the lines: advances /vector/motion/time while it runs, at most `flowFps` times a second
+// and never before the frame of the last patch has arrived. Time, timers and the
 // page's state are injected.
 import { clamp } from "../base/values";
 
@@ -15,7 +15,7 @@ export interface FlowHost {
   hidden(): boolean; // the page is hidden
   wanted(): boolean; // the view's lines are there and move
   time(): number; // of the view, steps
-  send(time: number): number; // the rev that asks for it
+  send(time: number): number; // the rev of the patch
   ended(): void; // the flow stopped of itself, not because stop() was called
 }
 

@@ -14,7 +14,7 @@ export interface HoverHost<S> {
   clearTimeout(timer: number): void;
   busy(): boolean; // the view moves or the page is hidden; poke() when that may have changed
   find(at: [number, number]): HoverTarget<S> | null; // null: nothing is there
-  ask(sample: S, signal: AbortSignal): Promise<string[]>; // lines to show
+  request(sample: S, signal: AbortSignal): Promise<string[]>; // lines to show
   show(lines: string[], at: [number, number]): void; // no lines: nothing to show
 }
 
@@ -66,7 +66,7 @@ export class Hover<S> {
     if (this.timer !== null || this.asking !== null) return;
     const due = Math.max(this.askedAt + everyMs, this.changedAt + restMs) - this.host.now();
     if (due <= 0) {
-      this.ask();
+      this.request();
       return;
     }
     this.timer = this.host.setTimeout(() => {
@@ -75,7 +75,7 @@ export class Hover<S> {
     }, due);
   }
 
-  private ask(): void {
+  private request(): void {
     const { at } = this;
     if (at === null) return;
     const target = this.host.busy() ? null : this.host.find(at);
@@ -88,7 +88,7 @@ export class Hover<S> {
     const asking = new AbortController();
     this.asking = asking;
     void this.host
-      .ask(target.sample, asking.signal)
+      .request(target.sample, asking.signal)
       .catch(() => [])
       .then((lines) => {
         if (this.asking !== asking) return; // the cursor has left

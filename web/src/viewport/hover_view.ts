@@ -36,7 +36,7 @@ export class HoverView {
         host.playing() ||
         canvas.classList.contains("dragging"),
       find: (at) => this.find(at),
-      ask: (found, signal) => this.ask(found, signal),
+      request: (found, signal) => this.request(found, signal),
       show: (lines, at) => this.show(lines, at),
     });
     for (const type of ["pointermove", "pointerdown", "pointerup"] as const) {
@@ -68,7 +68,7 @@ export class HoverView {
     return { sample: found, key: JSON.stringify([dataset, step, found, fields]) };
   }
 
-  private async ask({ sample, axis }: Found, signal: AbortSignal): Promise<string[]> {
+  private async request({ sample, axis }: Found, signal: AbortSignal): Promise<string[]> {
     const { api } = this.host;
     const [dataset, view] = [this.host.dataset(), this.host.view()];
     const at = coordinatesOf(dataset, sample);

@@ -16,7 +16,7 @@ export interface Job {
 export interface ReferenceHost {
   view(): View; // with every default
   // Parsed answers of the server; a failure throws an Error with a message.
-  ask(method: "GET" | "POST" | "DELETE", path: string, body?: View): Promise<unknown>;
+  request(method: "GET" | "POST" | "DELETE", path: string, body?: View): Promise<unknown>;
   sleep(ms: number): Promise<void>;
   load(path: string): Promise<void>; // until the picture can be shown at once
   show(on: boolean): void;
@@ -62,7 +62,7 @@ export class Reference {
 
   hold(): void {
     this.held = true;
-    this.ask();
+    this.prepare();
     this.host.show(this.ready !== null);
   }
 
@@ -71,15 +71,15 @@ export class Reference {
     this.host.show(false);
   }
 
-  // Unless it is there or on its way.
-  ask(): void {
+  // Requests the reference unless it is ready or under way.
+  prepare(): void {
     if (this.asked !== null) return;
     const view = referenceView(this.host.view());
     const asked = (this.asked = { view: JSON.stringify(view) });
     this.last = this.last.then(() => this.fetch(asked, view));
   }
 
-  // The view may be another now.
+  // The view may have changed.
   follow(): void {
     if (this.asked === null) return;
     if (JSON.stringify(referenceView(this.host.view())) !== this.asked.view) this.drop();
@@ -98,7 +98,7 @@ export class Reference {
   // Cancels the job under way.
   abandon(): void {
     if (this.job === null) return;
-    void this.host.ask("DELETE", `v1/jobs/${this.job}`).catch(() => {}); // gone by itself
+    void this.host.request("DELETE", `v1/jobs/${this.job}`).catch(() => {}); // it may be finished
     this.job = null;
   }
 
@@ -116,12 +116,12 @@ export class Reference {
     const name = `reference ${view.image?.width}×${view.image?.height}`;
     try {
       this.host.report(name, "");
-      let job = (await this.host.ask("POST", "v1/references", view)) as Job;
+      let job = (await this.host.request("POST", "v1/references", view)) as Job;
       this.job = job.id;
       while (wanted() && isOpen(job)) {
         this.host.report(name, progressText(job));
         await this.host.sleep(pollMs);
-        if (wanted()) job = (await this.host.ask("GET", `v1/jobs/${job.id}`)) as Job;
+        if (wanted()) job = (await this.host.request("GET", `v1/jobs/${job.id}`)) as Job;
       }
       if (!wanted()) return this.abandon();
       this.job = null;

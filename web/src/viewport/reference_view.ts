@@ -5,7 +5,7 @@ import type { View } from "../wire/protocol";
 import { Reference } from "./reference";
 import { posted, refusalText } from "../wire/requests";
 
-async function ask(method: string, path: string, body?: View): Promise<unknown> {
+async function request(method: string, path: string, body?: View): Promise<unknown> {
   const response = await fetch(new URL(path, document.baseURI), {
     ...(body === undefined ? { method } : posted(body)),
     keepalive: method === "DELETE", // it may be sent while the page unloads
@@ -27,7 +27,7 @@ function holdByButton(button: HTMLElement, reference: Reference): void {
   });
   on("pointerup pointercancel keyup blur", () => reference.release());
   on("contextmenu", (event) => event.preventDefault()); // of a long touch
-  on("click", () => reference.ask()); // assistive technology cannot hold
+  on("click", () => reference.prepare()); // assistive technology cannot hold
 }
 
 export function makeReference(canvas: HTMLElement, view: () => View): Reference {
@@ -35,7 +35,7 @@ export function makeReference(canvas: HTMLElement, view: () => View): Reference 
   const line = byId("reference", HTMLElement);
   const reference = new Reference({
     view,
-    ask,
+    request,
     sleep: (ms) => new Promise((done) => window.setTimeout(done, ms)),
     load: (path) => {
       picture.src = new URL(path, document.baseURI).href;

@@ -1,5 +1,5 @@
-// What the page asks of the server besides the stream: GETs of a dataset's fields -> typed answers.
-// fetch is handed in, so that tests can play the server.
+// HTTP requests besides the stream: datasets, fields, forecasts -> typed answers. fetch is
+// injected, so that tests can simulate the server.
 import type { Dataset, DatasetSummary, View } from "./protocol";
 import { notUnderstood, posted, refusalText } from "./requests";
 import { isObject } from "../base/values";
@@ -52,7 +52,7 @@ export interface ForecastPoint {
   slabThickness: number | null; // grid cells; null: no slabs
   width: number; // pixels, as rendered
   height: number;
-  coarser: number; // halvings of the data more than the picture asks for
+  coarser: number; // halvings of the data beyond what the picture needs
   ms: number;
   error: number; // linear RMSE
   errorLow: number; // the 90 % interval of the error

@@ -17,10 +17,10 @@ export function shortLinkId(hash: string): string | null {
 interface StoredView {
   id: string;
   view: View;
-  kept?: "memory" | "disk"; // memory: until the server ends
+  kept?: "memory" | "disk"; // memory: until the server stops
 }
 
-async function ask(response: Response): Promise<StoredView> {
+async function parseStoredView(response: Response): Promise<StoredView> {
   if (!response.ok) throw new Error(await refusalText(response));
   const saved = (await response.json().catch(() => null)) as StoredView | null;
   if (typeof saved?.id === "string" && isView(saved.view)) return saved;
@@ -31,11 +31,12 @@ export const storeView = async (
   fetch: FetchLike,
   baseUri: string,
   view: View,
-): Promise<StoredView> => ask(await fetch(new URL("v1/views", baseUri).href, posted(view)));
+): Promise<StoredView> =>
+  parseStoredView(await fetch(new URL("v1/views", baseUri).href, posted(view)));
 
 export const loadView = async (
   fetch: FetchLike,
   baseUri: string,
   id: string,
 ): Promise<StoredView> =>
-  ask(await fetch(new URL(`v1/views/${encodeURIComponent(id)}`, baseUri).href, {}));
+  parseStoredView(await fetch(new URL(`v1/views/${encodeURIComponent(id)}`, baseUri).href, {}));
