@@ -14,6 +14,12 @@ windsplat_tidy_test(style python3 tests/tidy/check_style.py)
 windsplat_tidy_test(self_test python3 tests/tidy/self_test.py)
 windsplat_tidy_test(format scripts/format --check)
 
+# Whether the kernels' flags keep what this compiler would remove.
+add_executable(dropped_call ${CMAKE_CURRENT_LIST_DIR}/toolchain/dropped_call.cpp)
+target_compile_options(dropped_call PRIVATE ${kernel_flags})
+add_test(NAME toolchain.dropped_call COMMAND dropped_call)
+set_tests_properties(toolchain.dropped_call PROPERTIES LABELS unit TIMEOUT 60)
+
 # Real files against independent readers, and spoiled ones against a daemon.
 function(windsplat_program_test name)
   add_test(NAME files.${name} COMMAND ${ARGN} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
