@@ -98,7 +98,7 @@ KERNEL_INLINE MaskOf<V> mask_of(std::uint32_t bits) {
   return hn::LoadMaskBits(TagOf<V>(), bytes);
 }
 
-// Masked samples are NaN, told by their bits: arithmetic is compiled as if there were none.
+// Masked samples are NaN, recognised by their bits: the same test as of one lane (body_math.hpp).
 template <class V>
 KERNEL_INLINE MaskOf<V> is_masked(V v) {
   const hn::RebindToSigned<TagOf<V>> integers;

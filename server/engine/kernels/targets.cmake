@@ -1,15 +1,15 @@
 # The kernels, one translation unit an instruction set, chosen at run time (kernels/dispatch.cpp).
 # Of Highway's vectors only the headers: the flags choose their target. Fused multiply-adds stand
 # where the source says so: no contraction, no reassociation. Neither errno nor floating-point traps
-# nor the sign of zero are read, and masked samples (NaN) are told by their bits before any
-# arithmetic: that lets minima, maxima, square roots and selections be vectorised.
+# nor the sign of zero are read: minima, maxima, square roots and selections can be vectorised. NaN
+# keep their meaning (no -ffinite-math-only): masked samples are NaN.
 set(kernel_dir ${CMAKE_CURRENT_LIST_DIR})
 set(kernel_speed -O3)
 if(WINDSPLAT_SANITIZE)
   set(kernel_speed -O1 -DWINDSPLAT_SANITIZED)
 endif()
 set(kernel_flags ${kernel_speed} -ffp-contract=off -fno-math-errno -fno-trapping-math
-    -fno-signed-zeros -ffinite-math-only)
+    -fno-signed-zeros)
 # GCC bug 110702 (tests/toolchain/dropped_call.cpp): an address computed from the base 0 is taken
 # for a null dereference, and calls of the function that has it are removed. With this flag they
 # stay.
