@@ -75,7 +75,9 @@ KERNEL_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons&
   store(s.columns.last, f.line_column_last + l);
   const std::uint32_t touching = bits & ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
   if (touching == 0) return 0;
-  most = hn::Max(most, hn::IfThenZeroElse(missing, tall));
+  // Lanes that are no lines may hold NaN, of which comparisons and clamping make anything.
+  const auto among = hn::RebindMask(StopIntegers(), mask_of<Stop>(touching));
+  most = hn::Max(most, hn::IfThenElseZero(among, tall));
   return touching;
 }
 
