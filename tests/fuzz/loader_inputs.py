@@ -1,5 +1,5 @@
 """What a loader may say to the daemon, honest and not: payloads, frames, and whole calls as turns
-(see fuzz_loader.cpp and fuzz_loader_call.cpp). Mirrors server/data/loader/{messages,channel}."""
+(see targets/fuzz_loader*.cpp). Mirrors server/data/loader/{messages,channel}."""
 
 import struct
 
