@@ -13,6 +13,7 @@ windsplat_tidy_test(web_imports python3 tests/tidy/check_web_imports.py)
 windsplat_tidy_test(style python3 tests/tidy/check_style.py)
 windsplat_tidy_test(self_test python3 tests/tidy/self_test.py)
 windsplat_tidy_test(format scripts/format --check)
+windsplat_tidy_test(spelling python3 tests/tidy/check_spelling.py)
 
 # Whether the kernels' flags keep what this compiler would remove.
 add_executable(dropped_call ${CMAKE_CURRENT_LIST_DIR}/toolchain/dropped_call.cpp)

@@ -6,6 +6,7 @@ import unittest
 
 import check_includes
 import check_links
+import check_spelling
 import check_style
 import check_web_imports
 
@@ -52,6 +53,7 @@ class Planted(unittest.TestCase):
     def test_clean_tree_passes(self):
         self.expect(check_includes)
         self.expect(check_style)
+        self.expect(check_spelling)
         self.expect(check_web_imports)
 
     def test_import_against_the_order_of_the_page_s_folders(self):
@@ -75,6 +77,11 @@ class Planted(unittest.TestCase):
         for n in range(check_web_imports.MAX_FILES):
             self.plant(f"web/src/base/f{n}.ts", "\n")
         self.expect(check_web_imports, "web/src/base: 31 files")
+
+    def test_misspelled_word(self):
+        wrong = "rec" + "ieved"
+        self.plant("server/base/queue.hpp", f"// What was {wrong}.\n")
+        self.expect(check_spelling, f"server/base/queue.hpp:1: {wrong} ==> received")
 
     def test_include_against_the_direction(self):
         self.plant("server/base/pool.hpp", '#include "server/scene/scene.hpp"\n')
@@ -143,6 +150,12 @@ class Planted(unittest.TestCase):
         body = "void f() {\n" + "  g();\n" * 40 + "}\n"
         self.plant("server/base/a.cpp", "namespace a {\n" + body * 10 + "}  // namespace a\n")
         self.expect(check_style)
+        self.expect(check_spelling)
+
+    def test_misspelled_word(self):
+        wrong = "rec" + "ieved"
+        self.plant("server/base/queue.hpp", f"// What was {wrong}.\n")
+        self.expect(check_spelling, f"server/base/queue.hpp:1: {wrong} ==> received")
 
     def test_wording(self):
         self.plant("server/base/a.cpp", "// TO" + "DO: later\n")
