@@ -1,7 +1,16 @@
 # The tests that are no C++: form, size and include directions of the tree; and the benchmarks.
 include(${CMAKE_CURRENT_LIST_DIR}/bench.cmake OPTIONAL)
 
+# Under the thread sanitizer the daemon is asked by integration_tests.
+if(sanitizer STREQUAL "TSAN")
+  return()
+endif()
+
+# A sanitizer sees nothing of them.
 function(windsplat_tidy_test name)
+  if(WINDSPLAT_SANITIZE)
+    return()
+  endif()
   add_test(NAME tidy.${name} COMMAND ${ARGN} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
   set_tests_properties(tidy.${name} PROPERTIES LABELS tidy TIMEOUT 120
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
@@ -14,6 +23,7 @@ windsplat_tidy_test(style python3 tests/tidy/check_style.py)
 windsplat_tidy_test(self_test python3 tests/tidy/self_test.py)
 windsplat_tidy_test(format scripts/format --check)
 windsplat_tidy_test(spelling python3 tests/tidy/check_spelling.py)
+windsplat_tidy_test(runner python3 tests/run/self_test.py)
 
 # Whether the kernels' flags keep what this compiler would remove.
 add_executable(dropped_call ${CMAKE_CURRENT_LIST_DIR}/toolchain/dropped_call.cpp)
@@ -32,7 +42,6 @@ endfunction()
 find_program(SYSTEM_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
 windsplat_program_test(real ${SYSTEM_PYTHON} tests/integration/real_files.py
   --program=$<TARGET_FILE:windsplat>)
-windsplat_program_test(scripts python3 tests/integration/scripts_test.py)
 # The fuzzers do the same to the readers themselves, under the sanitizers.
 set(spoiled_count 300)
 set(drawn_options --count=340)
@@ -46,6 +55,7 @@ windsplat_program_test(spoiled python3 tests/fuzz/mutate_files.py --program=$<TA
 windsplat_program_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py
   --program=$<TARGET_FILE:windsplat> ${drawn_options})
 if(NOT WINDSPLAT_SANITIZE)
+  windsplat_program_test(scripts python3 tests/integration/scripts_test.py)
   windsplat_program_test(sbom python3 tests/integration/sbom.py --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(hardening python3 tests/tidy/check_hardening.py $<TARGET_FILE:windsplat>)
 endif()
@@ -87,6 +97,19 @@ if(NOT WINDSPLAT_SANITIZE)
     --program=$<TARGET_FILE:windsplat> --slack=8 WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
   set_tests_properties(edge.handshakes PROPERTIES LABELS integration TIMEOUT 300
     SKIP_RETURN_CODE 77 ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+endif()
+
+# Longer rounds of what the tests above do in short.
+function(windsplat_long_test name)
+  add_test(NAME thorough.${name} COMMAND ${ARGN} --program=$<TARGET_FILE:windsplat>
+    WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+  set_tests_properties(thorough.${name} PROPERTIES LABELS thorough TIMEOUT 3600 COST 2000
+    ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+endfunction()
+
+if(NOT WINDSPLAT_SANITIZE)
+  windsplat_long_test(spoiled python3 tests/fuzz/mutate_files.py --count=10000)
+  windsplat_long_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py --count=3400)
 endif()
 
 # Every fault in short; calls of the system that fail, by a library that is preloaded. It stands in

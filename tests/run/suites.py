@@ -1,0 +1,131 @@
+#!/usr/bin/env python3
+"""Builds, and runs the suites of tests one after the other; called by scripts/test, which sets the
+machine up. Each suite's words are shown and kept in build/test-logs; the end is a table.
+
+The rule of what is repeated under which sanitizer is in tests/CMakeLists.txt."""
+import argparse
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import time
+
+import ctest_suite
+import node_suite
+from outcome import Outcome, summary
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BUILD = ROOT / "build"
+LOGS = BUILD / "test-logs"
+# More than cores: tests wait for clocks and sockets as long as they compute.
+JOBS = 2 * (os.cpu_count() or 2)
+# A browser and its daemon keep a core busy; node itself runs one file fewer than cores.
+BROWSERS = os.cpu_count() or 2
+SEARCH_SECONDS = 30  # a fuzzer
+SANITIZERS = {
+    "ASAN_OPTIONS": "detect_leaks=1:strict_string_checks=1:check_initialization_order=1",
+    "UBSAN_OPTIONS": "print_stacktrace=1",
+    "TSAN_OPTIONS": "halt_on_error=1:second_deadlock_stack=1"}
+# What commands say of their tests: passed, and failed.
+COUNTS = (re.compile(r"^tidy: (\d+) files clean.* (\d+) files$", re.M),
+          re.compile(r"^total: (\d+) targets, .* (\d+) crashed$", re.M))
+
+
+def fixed_addresses():
+    """GCC's thread sanitizer cannot start under the address randomisation of some kernels; where it
+    may be switched off for a process, it is."""
+    words = ["setarch", os.uname().machine, "-R"]
+    works = subprocess.run([*words, "true"], stderr=subprocess.DEVNULL, check=False)
+    return words if works.returncode == 0 else []
+
+
+def command(emit, *words):
+    """A suite that is one command."""
+    text = ""
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          errors="replace") as running:
+        for line in running.stdout:
+            emit(line)
+            text += line
+    outcome = Outcome()
+    for pattern in COUNTS:
+        if found := pattern.search(text):
+            outcome.passed = int(found[1])
+    if running.returncode != 0:
+        outcome.failed[" ".join(map(str, words[:2]))] = "\n".join(text.splitlines()[-30:])
+    return outcome
+
+
+class Run:
+    def __init__(self, options):
+        self.options = options
+        self.outcomes = {}
+        self.begin = time.monotonic()
+
+    def suite(self, name, run, *words, **named):
+        """Runs a suite and keeps its outcome; true if nothing failed for good."""
+        print(f"\n== {name}", flush=True)
+        begin = time.monotonic()
+        with (LOGS / (name.replace(" ", "-") + ".log")).open("w") as log:
+
+            def emit(text):
+                for stream in (sys.stdout, log):
+                    stream.write(text)
+                    stream.flush()
+
+            outcome = run(emit, *words, **named)
+        outcome.seconds = time.monotonic() - begin
+        self.outcomes[name] = outcome
+        return not outcome.failed
+
+    def ctest(self, name, preset, *selection, prefix=()):
+        def run(emit):
+            return ctest_suite.Suite(BUILD / preset, selection, JOBS, emit, prefix).run()
+        return self.suite(name, run)
+
+    def built(self, preset, *targets, prefix=()):
+        targets += ("all", "thorough_tests") if self.options.thorough else ()
+        return self.suite(f"build {preset}", command, *prefix, "scripts/build", preset, *targets)
+
+    def everything(self):
+        thorough = self.options.thorough
+        chosen = () if thorough else ("-LE", "thorough")
+        if self.built("release"):
+            self.ctest("release", "release", *chosen)
+            self.suite("clang-tidy", command, "scripts/tidy", *(() if thorough else ["--changed"]))
+        unit = {"web": ["npm", "--prefix", "web", "test", "--silent", "--", "--test-reporter=tap"]}
+        self.suite("page unit", node_suite.run, unit, 1)
+        browser = {path.name: ["tests/browser/run", "--test-reporter=tap", path.name]
+                   for path in sorted((ROOT / "tests/browser").glob("*.test.mjs"))}
+        self.suite("page browser", node_suite.run, browser, BROWSERS)
+        if self.built("dev"):
+            self.ctest("asan ubsan", "dev", *chosen)
+            self.suite("fuzz", command, "scripts/fuzz", "--no-build", "--seconds", "0")
+        plain = fixed_addresses()
+        if self.built("tsan", prefix=plain):
+            self.ctest("tsan", "tsan", *chosen, prefix=plain)
+        if thorough:
+            self.suite("fuzz search", command, "scripts/fuzz", "--seconds", str(SEARCH_SECONDS))
+
+    def quick(self):
+        if self.built("release"):
+            self.ctest("release", "release", "-L", "unit|protocol|tidy", "-LE", "thorough")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--thorough", action="store_true")
+    options = parser.parse_args()
+    os.chdir(ROOT)
+    os.environ.update(SANITIZERS)
+    LOGS.mkdir(parents=True, exist_ok=True)
+    run = Run(options)
+    run.quick() if options.quick else run.everything()
+    print(summary(run.outcomes, time.monotonic() - run.begin, 10 if options.thorough else 0))
+    return 1 if any(outcome.failed for outcome in run.outcomes.values()) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
