@@ -227,9 +227,9 @@ def chunk_by_layer(model, dice):
 
 
 def chunks_swapped(model, dice):
-    """Two chunks of each variable change places in the chunk table."""
+    """Two chunks of each variable change places in the chunk table, unless some are gone from it."""
     layers = list(np.ndindex(model.shape[:2]))
-    if len(layers) < 2 or not chunk_by_layer(model, dice):
+    if len(layers) < 2 or "tables" in model.options or not chunk_by_layer(model, dice):
         return False
     a, b = (layers[int(i)] for i in dice.choice(len(layers), 2, replace=False))
     for field in model.fields:

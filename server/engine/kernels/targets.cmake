@@ -10,12 +10,6 @@ if(WINDSPLAT_SANITIZE)
 endif()
 set(kernel_flags ${kernel_speed} -ffp-contract=off -fno-math-errno -fno-trapping-math
     -fno-signed-zeros)
-# GCC bug 110702 (tests/toolchain/dropped_call.cpp): an address computed from the base 0 is taken
-# for a null dereference, and calls of the function that has it are removed. With this flag they
-# stay.
-if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 14)
-  list(APPEND kernel_flags -fno-delete-null-pointer-checks)
-endif()
 target_sources(windsplat_engine PRIVATE ${kernel_dir}/dispatch.cpp ${kernel_dir}/portable.cpp)
 set_source_files_properties(${kernel_dir}/portable.cpp PROPERTIES
   COMPILE_OPTIONS "${kernel_flags}"
