@@ -227,7 +227,7 @@ def chunk_by_layer(model, dice):
 
 
 def chunks_swapped(model, dice):
-    """Two chunks of each variable change places in the chunk table, unless some are gone from it."""
+    """Two chunks of each variable change places in a chunk table that has all of them."""
     layers = list(np.ndindex(model.shape[:2]))
     if len(layers) < 2 or "tables" in model.options or not chunk_by_layer(model, dice):
         return False
