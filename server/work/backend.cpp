@@ -1,4 +1,4 @@
-// The members in the order in which they need each other.
+// Members are declared in order of dependency.
 #include "server/work/backend.hpp"
 
 #include <utility>
@@ -40,7 +40,7 @@ Result<Catalogue::Checked> Backend::check(const protocol::View& view) {
 }
 
 void Backend::end() {
-  jobs.end();  // they wait for the others
+  jobs.end();  // jobs wait for the renderer and the loads
   loads.end();
   renderer.end();
 }

@@ -1,5 +1,5 @@
-// What pictures and answers about data are made with: the datasets, the renderer, the threads that
-// load, and what is known of earlier frames. Knows nothing of HTTP or sockets.
+// Datasets, renderer, loading threads and history: all that makes pictures and answers about data.
+// Independent of HTTP and sockets.
 #pragma once
 
 #include <functional>
@@ -23,39 +23,38 @@ namespace windsplat::net {
 
 struct BackendOptions {
   double requests_waiting_ms_max = 30'000;  // see RenderService::Options
-  double wait_ms = 0;                       // of requests of other addresses
-  // Called on the renderer's thread: what a picture took, for the address that pays for it.
+  double wait_ms = 0;                       // delay by requests of other addresses
+  // Called on the renderer's thread with the time of a picture and the address charged.
   std::function<void(const std::string& payer, std::int64_t us)> charge;
-  // Whether a picture may cost that much.
+  // Limit on the cost of a picture.
   std::function<Result<void>(const frame::Cost& cost)> check_cost;
 };
 
-// Lives as long as the server.
+// Outlives all connections; owned by the server.
 struct Backend {
-  // Requests for pictures and descriptions that may wait at a time.
+  // Limit of waiting requests for pictures and descriptions.
   static constexpr std::size_t requests_waiting_max = 16;
 
   Backend(std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool> threads,
           Metrics& metrics_of_server, BackendOptions options);
 
-  // Whether the view can be drawn (Catalogue::check), and costs no more than a picture may. Loads
-  // nothing.
+  // Checks whether the view can be drawn (Catalogue::check) within the cost limit. Loads nothing.
   Result<Catalogue::Checked> check(const protocol::View& view);
 
-  // Ends the threads that answer: after it no reply is called any more.
+  // Ends the service threads: no reply is called after it returns.
   void end();
 
   Catalogue catalogue;
   Metrics& metrics;
   std::shared_ptr<ThreadPool> pool;
-  frame::Workspace frames;  // of the renderer's thread alone
+  frame::Workspace frames;  // used by the renderer's thread only
   quality::Tables quality;
   KnownRanges ranges;
   RenderCosts costs;
   References references;
-  Jobs jobs;               // their threads use the catalogue and the renderer: ended before it
-  RenderService renderer;  // its thread uses the others
-  LoadService loads;       // its threads use them too, the renderer among them: ended first
+  Jobs jobs;               // use the catalogue and the renderer: ended before them
+  RenderService renderer;  // uses the members above
+  LoadService loads;       // use the members above, including the renderer: ended first
 
  private:
   std::function<Result<void>(const frame::Cost& cost)> check_cost_;

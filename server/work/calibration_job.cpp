@@ -1,4 +1,4 @@
-// Loader -> renderer, in the background -> tables.
+// Loads data, renders every setting in the background, and stores the results in the tables.
 #include "server/work/calibration_job.hpp"
 
 #include <memory>
@@ -11,7 +11,7 @@
 namespace windsplat::net {
 namespace {
 
-// A study that was begun in the tables, and ends there however it ends.
+// A study that is started in the tables and ended there by its destructor.
 class Study {
  public:
   Study(Backend& backend, protocol::View completed, quality::SceneSignature signature)
@@ -23,11 +23,11 @@ class Study {
   Study(const Study&) = delete;
   Study& operator=(const Study&) = delete;
 
-  // The averages of coarser settings, as far as there is room for them. Nothing is held: until the
-  // renderer has nothing else to do, others may need the room.
+  // Prepares the averages of coarser settings as far as memory allows. Nothing is pinned: until the
+  // renderer is idle, others may need the memory.
   Result<void> load(data::Dataset& dataset, const CancelToken& unwanted) {
     for (const int coarser : {0, 1, 2}) {
-      if (unwanted.cancelled()) return make_error(ErrorKind::cancelled, "nobody looks any more");
+      if (unwanted.cancelled()) return make_error(ErrorKind::cancelled, "calibration cancelled");
       frame::Encoding encoding;
       encoding.coarser = coarser;
       const auto loaded = frame::load(completed_, dataset, encoding);
@@ -43,7 +43,7 @@ class Study {
     };
     complete_ = static_cast<bool>(run_guarded<void>("a survey", stop, [&]() -> Result<void> {
       const auto room = backend_.catalogue.reserve(frame::calibration_bytes(completed_.image));
-      if (!room) return room.error();  // others need it more
+      if (!room) return room.error();  // memory is in use by others
       return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
     }));
   }
@@ -72,10 +72,10 @@ void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::V
   if (!found) return;
   const auto run = [&backend, owner, view, unwanted, dataset = *found] {
     std::shared_ptr<Study> study;
-    const auto loaded = run_guarded<void>("data for a survey", unwanted, [&]() -> Result<void> {
+    const auto loaded = run_guarded<void>("calibration load", unwanted, [&]() -> Result<void> {
       data::Dataset prefetching = dataset->prefetching();
       study = begin(backend, view, prefetching);
-      if (!study) return make_error(ErrorKind::not_found, "there is nothing to learn");
+      if (!study) return make_error(ErrorKind::not_found, "no settings to calibrate");
       return study->load(prefetching, unwanted);
     });
     if (!loaded) return;

@@ -1,4 +1,4 @@
-// A view that rests -> what each setting costs and errs for it, in the tables.
+// Measures time and error of each setting for a view at rest and stores them in the tables.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,9 @@
 
 namespace windsplat::net {
 
-// First the averages of its data that coarser settings show, from a thread that may wait for them;
-// then every setting is drawn, while the renderer has nothing else to do. Nothing happens where the
-// tables know the view's style from about there, the picture is small, or `unwanted` is raised.
-// What others wish for is not evicted for it.
+// Prepares the averages that coarser settings show on a thread that may block, then draws every
+// setting while the renderer is idle. Does nothing if the tables cover the scene near this
+// viewpoint, the picture is small, or `unwanted` is raised. Never evicts data of prefetch requests.
 void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::View& view,
                         const CancelToken& unwanted);
 

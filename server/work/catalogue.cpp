@@ -1,4 +1,4 @@
-// Store -> descriptions, remembered once they were read.
+// Describes datasets of the store and caches the descriptions.
 #include "server/work/catalogue.hpp"
 
 #include <utility>
@@ -85,12 +85,12 @@ Result<std::string> Catalogue::open(const data::Location& location, const Cancel
   if (!opened) return opened.error();
   const auto& [dataset, openers] = *opened;
   std::string id = dataset->info().id;
-  // What cannot be described would spoil the list for everyone.
+  // A dataset that cannot be described must not invalidate the whole list.
   const auto description = scene::describe(*dataset, scene::RangesOf::none);
   if (description && !cancel.cancelled()) return id;
   no_longer_want(id, openers);
   if (!description) return description.error();
-  return make_error(ErrorKind::cancelled, "nobody wants the dataset any more");
+  return make_error(ErrorKind::cancelled, "request cancelled");
 }
 
 Result<std::pair<std::shared_ptr<data::Dataset>, Catalogue::OpenersPtr>> Catalogue::open_and_want(
@@ -100,7 +100,7 @@ Result<std::pair<std::shared_ptr<data::Dataset>, Catalogue::OpenersPtr>> Catalog
     if (!added) return added.error();
     const std::string& id = added->dataset->info().id;
     const std::lock_guard lock(mutex_);
-    // Whoever brought it may have taken it back before it was said here that it is wanted.
+    // The dataset may have been removed before this opener was registered.
     if (const auto listed = store_->find(id); !listed || *listed != added->dataset) continue;
     OpenersPtr& openers = openers_[id];
     if (!openers) openers = std::make_shared<Openers>();
@@ -114,7 +114,7 @@ void Catalogue::no_longer_want(const std::string& id, const OpenersPtr& openers)
   const std::lock_guard lock(mutex_);
   if (--openers->count > 0) return;
   const auto known = openers_.find(id);
-  if (known == openers_.end() || known->second != openers) return;  // forgotten meanwhile
+  if (known == openers_.end() || known->second != openers) return;  // removed meanwhile
   openers_.erase(known);
   if (openers->brought) remove(id);
 }
@@ -135,14 +135,14 @@ void Catalogue::forget(const std::string& id) {
 
 void Catalogue::remove(const std::string& id) {
   described_.erase(id);
-  (void)store_->remove(id);  // not found: gone already, as was wanted
+  (void)store_->remove(id);  // not_found: already removed
 }
 
 Result<Catalogue::Checked> Catalogue::check(const protocol::View& view) const {
   const auto dataset = find(view.dataset);
   if (!dataset) return dataset.error();
-  // A complete view is completed without loading: what would have to be read is filled in by
-  // anything that is in order.
+  // A complete view is completed without loading: fields to be read are replaced by any valid
+  // value.
   protocol::View full = view;
   if (!full.vector.magnitude_range) full.vector.magnitude_range = protocol::Range{0, 1};
   if (!full.vector.min_magnitude) full.vector.min_magnitude = 0;
@@ -157,7 +157,7 @@ Result<Catalogue::Checked> Catalogue::check(const protocol::View& view) const {
     if (!scalar.color.range) scalar.color.range = protocol::Range{0, 1};
     if (!scalar.extinction) scalar.extinction.emplace(1, std::array<double, 2>{0, 1});
   }
-  // Bending the grid takes a while and perhaps a field: nobody may wait for that here.
+  // Mapping the grid takes long and may read a field: do not do it here.
   if (auto ok = scene::check_geometry(full.geometry, (*dataset)->info()); !ok) return ok.error();
   const bool bent = full.geometry.mapping != protocol::GeometryMapping::flat ||
                     full.geometry.height_field.has_value();

@@ -1,4 +1,4 @@
-// The datasets as the edge sees them: by id, described, and views checked against them.
+// The datasets as the API sees them: lookup by id, descriptions, and checks of views.
 #pragma once
 
 #include <map>
@@ -26,32 +26,31 @@ class Catalogue {
 
   [[nodiscard]] Result<std::shared_ptr<data::Dataset>> find(const std::string& id) const;
 
-  // Every dataset, with ranges where they are known. Loads nothing.
+  // All datasets, with ranges where they are known. Loads nothing.
   [[nodiscard]] Result<std::vector<protocol::DatasetDescription>> list() const;
 
-  // The long form. Loads the fields of the default view, once: not for the io thread.
+  // The full description. Loads the fields of the default view once: do not call on the io thread.
   Result<protocol::DatasetDescription> describe(const std::string& id,
                                                 const CancelToken& cancel = {});
 
-  // Opens what was located and lists it, so that forget() may take it back; the value is its id.
-  // What is listed already is the same dataset, and whoever listed it keeps it. Errors: those of
-  // opening; cancelled, and then it is not listed unless somebody else wants it. Takes as long as
-  // it takes.
+  // Opens a located dataset and lists it, so that forget() can remove it; the value is its id. A
+  // dataset that is already listed is shared by all who opened it. Errors: those of opening;
+  // cancelled, and then it is listed only if another caller still holds it. May block for long.
   Result<std::string> open(const data::Location& location, const CancelToken& cancel);
-  // What a session will want; see data::Store::wish.
+  // Replaces the prefetch requests of a session; see data::Store::wish.
   void request_prefetch(std::uint64_t owner, std::vector<data::PrefetchRequest> requests) {
     store_->request_prefetch(owner, std::move(requests));
   }
-  // Opens anew what changed on disk and lets go of what is not read; the ids of what changed. Not
-  // for the io thread.
+  // Reopens datasets that changed on disk and closes files that are not being read; returns the ids
+  // of the changed ones. Do not call on the io thread.
   std::vector<std::string> look_after() {
     store_->release_idle();
     return store_->look_for_changes();
   }
   [[nodiscard]] data::BudgetCounts counts() const { return store_->counts(); }
-  // Calls load(data::Dataset&), and where there is no room for it once more when its turn has come,
-  // which waits until others let go of what they hold (data::Dataset::in_turn()). `cancel` ends
-  // that; the error is cancelled then.
+  // Calls load(data::Dataset&). If memory does not suffice, calls it once more after waiting for
+  // its turn, until others release memory (data::Dataset::in_turn()). `cancel` ends the wait with
+  // the error cancelled.
   template <class Load>
   auto load(const data::Dataset& dataset, const Load& load, const CancelToken& cancel = {}) {
     data::Dataset handle = dataset;
@@ -59,7 +58,7 @@ class Catalogue {
     if (loaded || loaded.error().kind != ErrorKind::out_of_memory) return loaded;
     const auto turn = store_->take_turn(dataset, cancel);
     if (!turn) {
-      loaded = make_error(ErrorKind::cancelled, "nobody waits for the answer");
+      loaded = make_error(ErrorKind::cancelled, "request cancelled");
       return loaded;
     }
     handle = dataset.in_turn(cancel);
@@ -72,13 +71,13 @@ class Catalogue {
   [[nodiscard]] std::uint64_t room() const { return store_->room(); }
   // See data::Store::end.
   void end() { store_->end(); }
-  // Whether open() brought it: it was not there when the server began.
+  // Whether open() added it after the start of the server.
   [[nodiscard]] bool is_opened_later(const std::string& id) const;
   void forget(const std::string& id);
-  // Takes what could not be opened off the list. False: nothing of that id is listed as failed.
+  // Removes a dataset that failed to open from the list. False: no failed dataset has that id.
   bool forget_failed(const std::string& id) { return store_->remove_failed(id); }
 
-  // Whether the view can be drawn, without loading anything. Errors: not_found (dataset), invalid
+  // Checks whether the view can be drawn, without loading. Errors: not_found (dataset), invalid
   // (with a pointer).
   struct Checked {
     int steps = 0;  // of the dataset
@@ -88,21 +87,21 @@ class Catalogue {
 
  private:
   struct Described {
-    std::weak_ptr<const data::DatasetInfo> of;  // a dataset opened anew has another one
+    std::weak_ptr<const data::DatasetInfo> of;  // a reopened dataset has another info
     protocol::DatasetDescription description;
-    protocol::DatasetDescription brief;  // without steps and axes, which may be millions
+    protocol::DatasetDescription brief;  // without steps and axes, of which there may be millions
   };
-  // Who opened a dataset by open() and still wants it.
+  // Requests that opened a dataset by open() and still hold it.
   struct Openers {
     int count = 0;
-    bool brought = false;  // by one of them, so that it may go with the last one
+    bool brought = false;  // added by one of them; removed with the last one
   };
-  using OpenersPtr = std::shared_ptr<Openers>;  // used under the mutex
+  using OpenersPtr = std::shared_ptr<Openers>;  // guarded by the mutex
   [[nodiscard]] Result<std::pair<std::shared_ptr<data::Dataset>, OpenersPtr>> open_and_want(
       const data::Location& location);
-  void remove(const std::string& id);  // under the mutex
+  void remove(const std::string& id);  // requires the mutex
   void no_longer_want(const std::string& id, const OpenersPtr& openers);
-  // What is remembered of a dataset; `brief`: for a list.
+  // The cached description of a dataset; `brief`: for a list.
   [[nodiscard]] std::optional<protocol::DatasetDescription> known(const data::Dataset& dataset,
                                                                   bool brief) const;
   [[nodiscard]] protocol::DatasetDescription refreshed(
@@ -114,7 +113,7 @@ class Catalogue {
   std::map<std::string, OpenersPtr> openers_;  // by dataset
 };
 
-// Where memory is the reason: the same, naming what was to be loaded. Others as they are.
+// An out-of-memory error with the name of what was being loaded; other errors unchanged.
 Error with_dataset_name(Error error, const std::string& dataset, const std::string& field = "");
 
 }  // namespace windsplat::net

@@ -1,4 +1,4 @@
-// A level of microseconds a kernel for each dataset and method, quick to rise and slow to fall.
+// Tracks microseconds per kernel for each dataset and method; rises fast, falls slowly.
 #include "server/work/cost_history.hpp"
 
 #include <algorithm>
@@ -7,7 +7,7 @@ namespace windsplat::net {
 
 namespace {
 
-// Where steps up are five times those down, about five in six of what is seen lie below.
+// With upward steps five times the downward ones, about five of six samples lie below the level.
 constexpr double weight_above = 0.5;
 constexpr double weight_below = 0.1;
 

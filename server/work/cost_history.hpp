@@ -1,5 +1,5 @@
-// What a picture will probably take, from what those of the same dataset and method did: work
-// (cost.hpp) and times in, an estimate out.
+// Estimates render times from earlier pictures of the same dataset and method: work (cost.hpp) and
+// times in, an estimate out.
 #pragma once
 
 #include <cstddef>
@@ -16,12 +16,13 @@ namespace windsplat::net {
 // Thread-safe.
 class RenderCosts {
  public:
-  // Where nothing is known: a thread's time, within what was measured (docs/user/configuration.md).
+  // Default without history: time of one thread, within the measured range
+  // (docs/user/configuration.md).
   static constexpr double us_a_kernel_unknown = 0.006;
-  // Several times what was ever measured. What took longer was kept from the processor, and must
-  // not have such pictures refused for good.
+  // Several times the largest measured value. Longer times are due to other load of the processor
+  // and must not cause such pictures to be refused permanently.
   static constexpr double us_a_kernel_max = 0.05;
-  static constexpr std::size_t known_max = 256;  // the one not drawn for longest is forgotten
+  static constexpr std::size_t known_max = 256;  // the least recently drawn one is removed
 
   explicit RenderCosts(unsigned threads) : threads_(threads) {}
 
@@ -33,7 +34,7 @@ class RenderCosts {
  private:
   using Key = std::pair<std::string, protocol::MethodName>;
   struct Known {
-    double us_a_kernel = 0;  // above most of what was seen: views of a dataset differ
+    double us_a_kernel = 0;  // upper estimate: views of a dataset differ
     std::uint64_t used = 0;
   };
 

@@ -1,4 +1,4 @@
-// Renderer -> loader -> renderer.
+// Passes a picture from the renderer to the loader and back.
 #include "server/work/drawing.hpp"
 
 #include <string>
@@ -16,7 +16,7 @@ Result<void> enqueue(Backend& backend, const DrawingPtr& drawing, Held loaded);
 void load(Backend& backend, const DrawingPtr& drawing) {
   const auto run = [&backend, drawing] {
     if (drawing->cancel.cancelled()) {
-      drawing->fail(make_error(ErrorKind::cancelled, "nobody waits for the answer"));
+      drawing->fail(make_error(ErrorKind::cancelled, "request cancelled"));
       return;
     }
     auto loaded = backend.catalogue.load(*drawing->dataset, drawing->load, drawing->cancel);
@@ -34,7 +34,7 @@ void load(Backend& backend, const DrawingPtr& drawing) {
 }
 
 Result<void> enqueue(Backend& backend, const DrawingPtr& drawing, Held loaded) {
-  const bool after_load = loaded != nullptr;  // and was let in before
+  const bool after_load = loaded != nullptr;  // and was admitted before
   return backend.renderer.submit(
       {drawing->kind, drawing->owner, drawing->cancel,
        [&backend, drawing, after_load, loaded = std::move(loaded)](std::int64_t queue_us) {
@@ -72,7 +72,7 @@ Result<Held> load_picture(const protocol::View& view, data::Dataset& loading,
                           const frame::Encoding& encoding) {
   auto fields = frame::load(view, loading, encoding);
   if (!fields) return with_dataset_name(fields.error(), loading.info().id);
-  // After them, so that it is known at once where the two do not fit together.
+  // Reserve last, so that a conflict of the two is found at once.
   auto room = room_for(loading, view.image, encoding);
   if (!room) return room.error();
   return Held(std::make_shared<const std::pair<Held, Held>>(std::move(*fields), std::move(*room)));

@@ -1,4 +1,4 @@
-// What is told of a frame's error: as measured, or estimated from what is known of its style.
+// The error report of a frame: measured, or estimated from the calibration tables.
 #pragma once
 
 #include "protocol/messages.hpp"
@@ -7,15 +7,15 @@
 
 namespace windsplat::net {
 
-// Style and sight of a frame that was drawn of a view at a setting.
+// Scene signature and viewpoint of a frame drawn at a setting.
 struct Observation {
   quality::SceneSignature signature;
   quality::Viewpoint viewpoint;
 };
 Observation observed_in(const frame::Frame& drawn, const quality::Setting& setting);
 
-// Sets error and jpegError of the frame's report. What was measured goes into the tables. `quality`
-// and chroma are the JPEG's; of another format nothing is said.
+// Sets error and jpegError of the frame's report. Measured errors are stored in the tables.
+// `quality` and chroma are those of the JPEG; other formats have no jpegError.
 void report_error(const frame::Frame& drawn, const Observation& observed,
                   const quality::Setting& setting, const frame::Encoding& encoding,
                   quality::Tables& tables, protocol::FrameInfo& info);

@@ -1,4 +1,4 @@
-// A list of jobs in order of arrival; each thread takes the first that waits.
+// Jobs in order of arrival; each thread takes the first waiting one.
 #include "server/work/jobs.hpp"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double progress_for_eta = 0.01;  // less says nothing about the rest
+constexpr double progress_for_eta = 0.01;  // below this the remaining time cannot be estimated
 
 enum class Stage { queued, running, done, failed, cancelled };
 
@@ -43,7 +43,7 @@ const char* name_of(Stage stage) {
 struct Job {
   std::string id;
   std::string kind;
-  Jobs::Work work;  // empty once it was taken or cancelled
+  Jobs::Work work;  // empty once started or cancelled
   CancelToken cancel;
   bool slow = false;
   Stage stage = Stage::queued;
@@ -72,7 +72,7 @@ protocol::JobDescription describe(const Job& job) {
 
 // Throws nothing.
 Result<protocol::JobResult> run_work(const Jobs::Work& work, const std::shared_ptr<Job>& job) {
-  return run_guarded<protocol::JobResult>("of a client", job->cancel, [&] {
+  return run_guarded<protocol::JobResult>("client job", job->cancel, [&] {
     return work({job->cancel, [job](double done) { job->progress = std::clamp(done, 0.0, 1.0); }});
   });
 }
@@ -94,14 +94,14 @@ struct Jobs::State {
       Work task = std::exchange(job->work, nullptr);
       lock.unlock();
       auto outcome = run_work(task, job);
-      task = nullptr;  // what it holds goes before the lock is taken
+      task = nullptr;  // release what the job holds before locking
       lock.lock();
       finish(*job, std::move(outcome));
       if (job->slow) --slow_running;
     }
   }
 
-  // Moves alone: no exception may leave the thread.
+  // Moves only: no exception may leave the thread.
   static void finish(Job& job, Result<protocol::JobResult> outcome) noexcept {
     if (outcome) {
       job.stage = Stage::done;
@@ -115,7 +115,7 @@ struct Jobs::State {
     if (!cancelled) job.error = std::move(error);
   }
 
-  // The rest under the mutex.
+  // The functions below require the mutex.
   [[nodiscard]] Shared first_queued() const {
     const bool slow_too = slow_running < slow_max;
     const auto at = std::find_if(jobs.begin(), jobs.end(), [&](const Shared& job) {
@@ -128,7 +128,7 @@ struct Jobs::State {
     const auto at =
         std::find_if(jobs.begin(), jobs.end(), [&](const Shared& job) { return job->id == id; });
     if (at == jobs.end()) {
-      return make_error(ErrorKind::not_found, "there is no job '" + printable(id, 40) + "'");
+      return make_error(ErrorKind::not_found, "unknown job '" + printable(id, 40) + "'");
     }
     return *at;
   }
@@ -150,7 +150,7 @@ struct Jobs::State {
   }
 
   std::size_t known_max = 1;
-  std::size_t slow_max = 1;  // that run at a time
+  std::size_t slow_max = 1;  // limit of running slow jobs
   std::size_t slow_running = 0;
   mutable std::mutex mutex;
   std::condition_variable wake;
@@ -192,9 +192,10 @@ Result<protocol::JobDescription> Jobs::submit(std::string kind, Work work, const
     const std::lock_guard lock(state_->mutex);
     if (state_->stopping) return make_error(ErrorKind::draining, "the server is shutting down");
     if (!state_->make_room()) {
-      return make_error(ErrorKind::busy, std::to_string(state_->known_max) +
-                                             " jobs wait or run, and more there may not be; try "
-                                             "again when one is done");
+      return make_error(ErrorKind::busy,
+                        std::to_string(state_->known_max) +
+                            " jobs are waiting or running, which is the limit; try "
+                            "again after one has finished");
     }
     job->id = std::to_string(state_->next_id++);
     state_->jobs.push_back(job);

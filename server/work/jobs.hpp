@@ -1,5 +1,5 @@
-// Work that a client asks for and does not wait for: submitted from any thread, run on threads of
-// its own, looked up by its id.
+// Asynchronous jobs of clients: submitted from any thread, run on threads of their own, looked up
+// by id.
 #pragma once
 
 #include <cstddef>
@@ -15,40 +15,40 @@
 
 namespace windsplat::net {
 
-// Thread-safe. A job that throws is a failed job.
+// Thread-safe. A job that throws ends as failed.
 class Jobs {
  public:
-  // What a job is given: whether it is still wanted, and a way to tell how much is done, 0 to 1.
+  // Passed to a job: its cancellation, and a callback for its progress, 0 to 1.
   struct Handle {
     CancelToken cancel;
     std::function<void(double done)> report_progress;
   };
-  // Where it was cancelled it leaves nothing behind and says `cancelled`.
+  // A cancelled job leaves no side effects and returns `cancelled`.
   using Work = std::function<Result<protocol::JobResult>(const Handle&)>;
   struct Terms {
-    CancelToken cancel = {};  // raised when nobody wants the job any more
-    bool slow = false;        // such jobs leave a thread to the others
+    CancelToken cancel = {};  // raised to cancel the job
+    bool slow = false;        // slow jobs leave one thread to the others
   };
 
-  // `known_max`: jobs that are remembered; the oldest finished one is forgotten for a new one.
+  // `known_max`: limit of listed jobs; a new one replaces the oldest finished one.
   Jobs(std::size_t known_max, std::size_t running_max);
-  ~Jobs();  // as end()
+  ~Jobs();  // calls end()
   Jobs(const Jobs&) = delete;
   Jobs& operator=(const Jobs&) = delete;
 
-  // Errors: busy where every job that is remembered is still unfinished.
+  // Errors: busy if every listed job is unfinished.
   Result<protocol::JobDescription> submit(std::string kind, Work work) {
     return submit(std::move(kind), std::move(work), Terms());
   }
   Result<protocol::JobDescription> submit(std::string kind, Work work, const Terms& terms);
-  [[nodiscard]] std::vector<protocol::JobDescription> list() const;  // the oldest first
+  [[nodiscard]] std::vector<protocol::JobDescription> list() const;  // oldest first
   // Errors: not_found.
   [[nodiscard]] Result<protocol::JobDescription> find(const std::string& id) const;
-  // One that waits is cancelled at once, one that runs when it notices; a finished one stays as it
-  // is. Errors: not_found.
+  // A waiting job is cancelled at once, a running one at its next check; a finished one is
+  // unchanged. Errors: not_found.
   Result<void> cancel(const std::string& id);
   void cancel_all();
-  // Cancels everything, waits for what runs, and runs nothing any more.
+  // Cancels all jobs, waits for the running ones, and starts no others.
   void end();
 
  private:

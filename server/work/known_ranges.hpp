@@ -1,5 +1,5 @@
-// Ranges over all steps, remembered by dataset and field as long as the dataset is there: reading
-// every step takes a while.
+// Cache of ranges over all steps by dataset and field, valid while the dataset is open: reading
+// every step is slow.
 #pragma once
 
 #include <map>
@@ -16,8 +16,8 @@ namespace windsplat::net {
 // Thread-safe.
 class KnownRanges {
  public:
-  // Of a dataset by Dataset::shared_info(): another one of the same name, or the same opened anew
-  // because its files changed, is none of it.
+  // Keyed by Dataset::shared_info(): a reopened dataset, or another of the same name, has other
+  // entries.
   using Of = std::shared_ptr<const data::DatasetInfo>;
 
   [[nodiscard]] std::optional<data::FieldRange> find(const Of& dataset,

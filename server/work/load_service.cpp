@@ -1,4 +1,4 @@
-// One queue, a few threads, each of which takes the first job whose dataset is free.
+// One queue and a few threads, each of which takes the first job whose dataset is not in use.
 #include "server/work/load_service.hpp"
 
 #include <algorithm>
@@ -22,7 +22,7 @@ struct LoadService::State {
   State(std::size_t at_a_time, std::size_t most, const char* name, std::function<void()> told)
       : places(at_a_time), jobs_max(most), what(name), refused(std::move(told)) {}
 
-  // No exception leaves it: what it keeps track of was given memory before.
+  // Cannot throw: its bookkeeping was allocated before.
 
   void work() {
     std::unique_lock lock(mutex);
@@ -31,7 +31,7 @@ struct LoadService::State {
       if (next == jobs.end()) return;
       std::optional<Job> job(std::move(*next));
       jobs.erase(next);
-      // One that is cancelled waits for nothing, and so keeps nobody waiting.
+      // A cancelled job needs no free dataset.
       const std::shared_ptr<const void> dataset =
           job->cancel.cancelled() ? nullptr : std::move(job->dataset);
       if (dataset) busy.push_back(dataset);
@@ -43,7 +43,7 @@ struct LoadService::State {
       } catch (const std::exception& fault) {
         log_fault("a load job failed", fault);
       }
-      job.reset();  // what it holds goes before the lock is taken
+      job.reset();  // release what the job holds before locking
       lock.lock();
       if (dataset) busy.erase(std::find(busy.begin(), busy.end(), dataset));
       running.erase(std::find(running.begin(), running.end(), begun));
@@ -51,7 +51,7 @@ struct LoadService::State {
     }
   }
 
-  // Waits for a job that may begin; at the end for none.
+  // Waits for a job that may start; none at shutdown.
   std::deque<Job>::iterator next_job(std::unique_lock<std::mutex>& lock) {
     for (;;) {
       const auto next = first_free();
@@ -61,7 +61,8 @@ struct LoadService::State {
       } else if (running.size() < places) {
         return next;
       } else {
-        // Of those that began last there are as many as places: until one has run for long.
+        // The most recent jobs are limited to the number of places until one has run for
+        // `long_run`.
         const Clock::time_point at = running[running.size() - places] + long_run;
         if (at <= Clock::now()) return next;
         wake.wait_until(lock, at);
@@ -69,7 +70,7 @@ struct LoadService::State {
     }
   }
 
-  // Under the mutex.
+  // Requires the mutex.
   [[nodiscard]] std::deque<Job>::iterator first_free() {
     return std::find_if(jobs.begin(), jobs.end(), [this](const Job& job) {
       return !job.dataset || job.cancel.cancelled() ||
@@ -77,7 +78,7 @@ struct LoadService::State {
     });
   }
 
-  // Under the mutex.
+  // Requires the mutex.
   [[nodiscard]] bool has_room(const Job& job) const {
     if (job.admitted) return true;
     Count all;
@@ -93,7 +94,7 @@ struct LoadService::State {
 
   struct Count {
     std::size_t jobs = 0;
-    std::size_t own = 0;  // of the payer that asks for one more
+    std::size_t own = 0;  // waiting jobs of this payer
     void add(bool is_own) {
       ++jobs;
       own += is_own ? 1U : 0U;
@@ -110,9 +111,9 @@ struct LoadService::State {
   std::mutex mutex;
   std::condition_variable wake;
   std::deque<Job> jobs;
-  // Room for one a thread:
+  // Reserved for one entry per thread:
   std::vector<std::shared_ptr<const void>> busy;
-  std::vector<Clock::time_point> running;  // since when, the oldest first
+  std::vector<Clock::time_point> running;  // start times, oldest first
   bool ending = false;
   std::vector<std::thread> threads;
 };
@@ -135,12 +136,13 @@ Result<void> LoadService::submit(Job job) {
     if (state_->ending) return make_error(ErrorKind::draining, "the server is shutting down");
     if (!state_->has_room(job)) {
       if (state_->refused) state_->refused();
-      return make_error(ErrorKind::busy, std::string("too many ") + state_->what +
-                                             " are waiting, of this address or in all; try again");
+      return make_error(ErrorKind::busy,
+                        std::string("too many ") + state_->what +
+                            " are waiting, for this address or in total; try again");
     }
     state_->jobs.push_back(std::move(job));
   }
-  state_->wake.notify_all();  // each may have to look when there is a place
+  state_->wake.notify_all();  // every waiting thread checks for a free place
   return {};
 }
 

@@ -1,4 +1,5 @@
-// Strips -> the renderer's queue, one after the other; the picture and its error -> what is kept.
+// Strips are submitted to the renderer's queue one after the other; the picture and its error are
+// then stored.
 #include "server/work/reference_job.hpp"
 
 #include <chrono>
@@ -23,22 +24,22 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds strip_time{100};
 constexpr std::chrono::milliseconds notice_time{20};
 
-// What a job's thread waits for at the renderer; it lives until both are done with it.
+// State shared by the job's thread and the renderer; lives until both are done.
 struct Strip {
   std::mutex mutex;
   std::condition_variable changed;
   std::optional<Result<void>> outcome;
 };
 
-// Who draws, and who pays for it.
+// Owner of the render jobs and the address charged.
 struct DrawingOwner {
   std::uint64_t owner = 0;
   std::string payer;
 };
 
-// Runs `draw` on the renderer's thread while nobody else needs it, again where others came between,
-// until it says something else than `cancelled`, or the job is. Takes a copy of `draw`, which may
-// outlive the call by a moment.
+// Runs `draw` on the renderer's thread as a background job, again after each interruption, until
+// its result is not `cancelled` or the job is cancelled. Copies `draw`, which may outlive the call
+// briefly.
 Result<void> in_background(Backend& backend, const DrawingOwner& owner, const CancelToken& unwanted,
                            const std::function<Result<void>(const CancelToken&)>& draw) {
   while (!unwanted.cancelled()) {
@@ -60,15 +61,15 @@ Result<void> in_background(Backend& backend, const DrawingOwner& owner, const Ca
         !strip->changed.wait_for(lock, notice_time, [&] { return strip->outcome.has_value(); })) {
       if (!unwanted.cancelled()) continue;
       stop.cancel();
-      return make_error(ErrorKind::cancelled, "nobody wants the reference any more");
+      return make_error(ErrorKind::cancelled, "reference cancelled");
     }
     Result<void> outcome = *strip->outcome;
     if (outcome || outcome.error().kind != ErrorKind::cancelled) return outcome;
   }
-  return make_error(ErrorKind::cancelled, "nobody wants the reference any more");
+  return make_error(ErrorKind::cancelled, "reference cancelled");
 }
 
-// Everything that the picture and its error follow from.
+// All inputs that determine the picture and its error.
 std::string id_of(const protocol::View& completed, const data::Dataset& dataset) {
   const std::string text =
       protocol::encode_view(completed) + '\n' + dataset.info().digest + '\n' + WINDSPLAT_VERSION;
@@ -83,7 +84,7 @@ Result<protocol::JobResult> draw_reference(Backend& backend, const protocol::Vie
                                            const std::string& payer, const std::string& base_path) {
   auto completed = scene::complete_view(view, dataset);
   if (!completed) return completed.error();
-  completed->quality = {};  // says how a stream is to draw it, not what it shows
+  completed->quality = {};  // affects how a stream renders, not the content
   protocol::ReferenceDescription description;
   description.id = id_of(*completed, dataset);
   if (const auto kept = backend.references.find(description.id)) return kept->description;

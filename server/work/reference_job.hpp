@@ -1,5 +1,5 @@
-// A view -> its truth among those that are kept: loaded and listed by the job's thread, drawn by
-// the renderer's in strips between other work.
+// Draws the reference of a view: loaded by the job's thread, drawn by the renderer in strips
+// between other work, then cached.
 #pragma once
 
 #include <memory>
@@ -11,9 +11,9 @@
 
 namespace windsplat::net {
 
-// Unless it is kept already. Takes as long as it takes; cancelled within about a tenth of a second,
-// but while it loads; drawing is charged to the address `payer`. Errors: cancelled; those of
-// frame::ReferenceDrawing.
+// Returns at once if the reference is cached, otherwise blocks until it is drawn. Cancellation
+// takes effect within about a tenth of a second, except while loading. Drawing is charged to the
+// address `payer`. Errors: cancelled; those of frame::ReferenceDrawing.
 Result<protocol::JobResult> draw_reference(Backend& backend, const protocol::View& view,
                                            data::Dataset& dataset, const Jobs::Handle& handle,
                                            const std::string& payer, const std::string& base_path);

@@ -1,4 +1,4 @@
-// A short list, used from the front.
+// A short list, most recently used first.
 #include "server/work/references.hpp"
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 namespace windsplat::net {
 namespace {
 
-// Nobody knows how long one takes that is not begun.
+// Retry time for a reference that has not been started, whose duration is unknown.
 constexpr int retry_after_s = 5;
 
 Error too_many(std::string detail) {
@@ -51,7 +51,7 @@ Result<References::Ticket> References::admit(const std::string& address,
   }
   if (wanted_.size() >= wanted_max) {
     std::string detail = std::to_string(wanted_max);
-    detail += " references wait or are drawn, and more there may not be; try again later";
+    detail += " references are waiting or being drawn, which is the limit; try again later";
     return too_many(std::move(detail));
   }
   auto ticket = std::make_shared<const char>();

@@ -1,5 +1,4 @@
-// The truths that were drawn of late, and who has one drawn: pictures in, pictures out, the least
-// recently asked for forgotten.
+// Cache of recently drawn references and admission of new ones; the least recently used is evicted.
 #pragma once
 
 #include <atomic>
@@ -23,22 +22,22 @@ namespace windsplat::net {
 class References {
  public:
   static constexpr std::size_t bytes_max = std::size_t{32} << 20;  // of encoded pictures
-  static constexpr std::size_t wanted_max = 4;                     // that wait or are drawn
+  static constexpr std::size_t wanted_max = 4;                     // waiting or being drawn
 
   struct Kept {
     protocol::ReferenceDescription description;
     std::shared_ptr<const image::Bytes> png;
   };
 
-  // One is kept, however large.
+  // At least one picture is kept, however large.
   void keep(Kept kept);
   std::optional<Kept> find(const std::string& id);
 
-  // Leave to have one drawn, as long as the answer is held and `cancel` is not raised; an address
-  // has one at a time. Errors: busy.
+  // Admits one drawing, valid while the value is held and `cancel` is not raised; one at a time per
+  // address. Errors: busy.
   using Ticket = std::shared_ptr<const void>;
   Result<Ticket> admit(const std::string& address, const CancelToken& cancel);
-  // Of jobs of the renderer: no connection's number.
+  // Owner id of render jobs; distinct from all connection ids.
   std::uint64_t next_owner() { return ~owners_++; }
 
  private:
@@ -50,7 +49,7 @@ class References {
 
   std::atomic<std::uint64_t> owners_{0};
   std::mutex mutex_;
-  std::list<Kept> kept_;  // the most recently asked for first
+  std::list<Kept> kept_;  // most recently used first
   std::vector<Wanted> wanted_;
 };
 

@@ -1,4 +1,4 @@
-// Times used -> turns.
+// Chooses the next job from the usage of each owner.
 #include "server/work/render_queue.hpp"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ void Shares::come(std::uint64_t party) {
 
 void Shares::rest(std::uint64_t party) {
   parties_[party].active = false;
-  // Who is not ahead of the present needs no memory, and with nobody left the present moves up.
+  // A party that is not ahead needs no entry; without active parties the virtual time advances.
   const bool all_rest = std::none_of(parties_.begin(), parties_.end(),
                                      [](const auto& known) { return known.second.active; });
   if (all_rest) {
@@ -52,7 +52,7 @@ void RenderQueue::push(RenderJob job, std::int64_t now_us) {
   const RenderKind kind = job.kind;
   const std::uint64_t owner = job.owner;
   Line& line = line_of(kind);
-  // All that needs memory comes first; a party that rests and has used nothing weighs nothing.
+  // Allocate first; an idle party without usage has no effect on the shares.
   std::map<std::uint64_t, Jobs> fresh;
   Jobs& one = fresh[owner];
   one.push_back({{std::move(job), now_us}, arrivals_});
@@ -105,8 +105,8 @@ std::optional<RenderQueue::Next> RenderQueue::pop(std::int64_t now_us) {
   return kind ? take(*kind) : std::nullopt;
 }
 
-// They use nobody's turn. Waiting for one of their own, they would hold what they refer to for as
-// long as owners who come anew keep the renderer busy.
+// Cancelled jobs use no turn. Waiting for one, they would hold their resources while new owners
+// keep the renderer busy.
 std::optional<RenderQueue::Next> RenderQueue::take_cancelled() {
   for (Line& line : lines_) {
     for (auto owner = line.owners.begin(); owner != line.owners.end(); ++owner) {

@@ -1,5 +1,5 @@
-// Whose job the renderer runs next, as a pure state machine: jobs and the times they took in, the
-// next job out. It owns no thread, lock or clock.
+// Scheduling of the renderer as a pure state machine: jobs and their run times in, the next job
+// out. Owns no thread, lock or clock.
 #pragma once
 
 #include <array>
@@ -17,29 +17,30 @@ namespace windsplat::net {
 
 enum class RenderKind {
   stream,      // frames of sessions
-  request,     // pictures that were asked for by HTTP
-  background,  // what nobody waits for: runs while there is nothing else to do
+  request,     // pictures requested by HTTP
+  background,  // work without a waiting client: runs while the renderer is otherwise idle
 };
 
 struct RenderJob {
   RenderKind kind = RenderKind::request;
   std::uint64_t owner = 0;  // session or connection; jobs of one owner run in order
-  CancelToken cancel;       // raised from outside, by cancel_all(), or for a job that goes first
-  // Runs once, cancelled or not, on the renderer's thread. Must not throw.
+  CancelToken
+      cancel;  // raised by the submitter, by cancel_all(), or when another job takes precedence
+  // Called exactly once, cancelled or not, on the renderer's thread. Must not throw.
   std::function<void(std::int64_t queue_us)> run;
-  bool admitted = false;   // the rest of a request that was let in before: never refused
-  double cost_ms = 0;      // as far as it can be told before; 0: unknown
-  std::string payer = {};  // the address that its time is charged to; empty: nobody's
+  bool admitted = false;   // continues a request that was admitted before: never refused
+  double cost_ms = 0;      // estimate; 0: unknown
+  std::string payer = {};  // address charged with the time; empty: none
 };
 
-// How much each of several parties has used of something they share. One that comes back starts
-// with what the one served at present had used when its turn came: its rest gives it nothing to
-// take all later with (start-time fair queueing: Goyal, Vin, Cheng 1997).
+// Usage of a shared resource by several parties. A party that becomes active again starts at the
+// virtual time of the party served at present, so that idle time earns no credit (start-time fair
+// queueing: Goyal, Vin, Cheng 1997).
 class Shares {
  public:
-  void come(std::uint64_t party);  // it has something to do; after expect() it cannot fail
-  void expect(std::uint64_t party) { parties_[party]; }  // memory for it to come
-  void rest(std::uint64_t party);                        // it has nothing to do any more
+  void come(std::uint64_t party);  // becomes active; cannot fail after expect()
+  void expect(std::uint64_t party) { parties_[party]; }  // allocates ahead for come()
+  void rest(std::uint64_t party);                        // becomes idle
   void begin(std::uint64_t party);
   void charge(std::uint64_t party, std::int64_t us) { parties_[party].used_us += us; }
   [[nodiscard]] std::int64_t used_us(std::uint64_t party) const;
@@ -50,15 +51,16 @@ class Shares {
     std::int64_t used_us = 0;
     bool active = false;
   };
-  std::map<std::uint64_t, Party> parties_;  // those that are idle only while they are ahead
+  std::map<std::uint64_t, Party> parties_;  // idle parties are kept only while they are ahead
   std::int64_t present_us_ = 0;
 };
 
-// Streams and requests share the renderer's time equally while both have something to do, and so do
-// the owners within a kind: next is whoever used least, then whoever came first. Background jobs
-// run when nothing of the others waits; one that runs is cancelled when such a job comes, and an
-// owner has one of them waiting at most: a newer one takes its place, and the older one, cancelled,
-// runs before all others so that whoever gave it is told. So does the next job of an owner once it
+// Streams and requests share the renderer's time equally while both have jobs, and so do the owners
+// within a kind: the next job belongs to the one with the least usage, then to the earliest.
+// Background jobs run when no other job waits. A running one is cancelled when another job arrives.
+// An owner has at most one waiting background job: a newer one replaces it, and the cancelled one
+// runs before all others so that its submitter is notified. The next job of an owner also runs
+// first once it is cancelled, since it costs almost nothing.
 // is cancelled: it costs next to nothing.
 class RenderQueue {
  public:
@@ -67,34 +69,34 @@ class RenderQueue {
     std::int64_t since_us = 0;
   };
 
-  // Where memory fails for it, nothing has changed.
+  // Strong exception guarantee if an allocation fails.
   void push(RenderJob job, std::int64_t now_us);
-  // The job to run now, at the time that rest_ms() counts from; done() before the next. None:
-  // nothing waits.
+  // The job to run now, at the time from which rest_ms() counts. Call done() before the next. None:
+  // the queue is empty.
   std::optional<Next> pop(std::int64_t now_us = 0);
   void done(std::int64_t took_us);
 
   [[nodiscard]] bool empty() const { return waiting_ == 0; }
-  // Requests whose answer somebody still waits for; the others cost next to nothing.
+  // Waiting requests that are not cancelled; cancelled ones cost almost nothing.
   struct Load {
     std::size_t count = 0;
     double cost_ms = 0;
   };
   [[nodiscard]] Load requests_waiting() const;
   [[nodiscard]] Load requests_of(const std::string& payer) const;
-  // Those that come before a new one of the payer's: one of each other payer, since they take
-  // turns; one of unknown cost is taken for `unknown_ms`.
+  // Jobs that run before a new one of the payer: one of each other payer, since payers take turns.
+  // A job of unknown cost counts as `unknown_ms`.
   [[nodiscard]] Load requests_before(const std::string& payer, double unknown_ms) const;
-  // Of the job that runs, as far as its cost was known.
+  // Remaining estimated time of the running job.
   [[nodiscard]] double rest_ms(std::int64_t now_us) const;
-  void cancel_all() const;  // what waits and what runs
+  void cancel_all() const;  // waiting and running jobs
 
  private:
   struct Waiting {
     Next next;
     std::uint64_t arrival = 0;
   };
-  using Jobs = std::list<Waiting>;  // which moves from one to another without memory
+  using Jobs = std::list<Waiting>;  // jobs move between lists without allocation
   using Owners = std::map<std::uint64_t, Jobs>;
   struct Line {
     Owners owners;  // none of them empty
@@ -123,7 +125,7 @@ class RenderQueue {
   Jobs replaced_;
   std::optional<Running> running_;
   std::uint64_t arrivals_ = 0;
-  std::int64_t now_us_ = 0;  // when a job was last given out
+  std::int64_t now_us_ = 0;  // when the last job was started
   std::size_t waiting_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// A thread that takes from the queue, and who may add to it.
+// Render thread and admission of jobs.
 #include "server/work/render_service.hpp"
 
 #include <algorithm>
@@ -24,10 +24,10 @@ std::int64_t steady_us() {
   return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
 }
 
-// Of a request's own time: what may come before it, so that one as long as itself does not.
+// Share of a request's own time that earlier requests may take.
 constexpr double patient_share = 0.75;
-// While more are refused than this in a second, another is soon there when the renderer is free:
-// one is let in only where what runs is nearly done.
+// Above this rate of refusals per second the renderer is soon used again: admit a job only when the
+// running one is nearly done.
 constexpr double refusals_of_overload = 8;
 constexpr double hurried_share = 0.5;
 
@@ -35,7 +35,7 @@ Error too_busy(const RenderQueue::Load& waiting) {
   const double seconds = std::ceil(waiting.cost_ms / 1000);
   const int after_s = static_cast<int>(std::clamp(seconds, 1.0, double{retry_after_s_max}));
   std::string detail = std::to_string(waiting.count);
-  detail += " pictures wait to be drawn, and more there may not be; try again in ";
+  detail += " pictures are waiting to be drawn, which is the limit; try again in ";
   detail += std::to_string(after_s);
   detail += " s";
   Error error = make_error(ErrorKind::busy, std::move(detail));
@@ -59,13 +59,13 @@ struct RenderService::State {
       if (!next) return;
       lock.unlock();
       const std::int64_t took_us = run(*next);
-      next.reset();  // what the job holds goes before the lock is taken
+      next.reset();  // release what the job holds before locking
       lock.lock();
       queue.done(took_us);
     }
   }
 
-  // How long it took. No exception leaves it.
+  // Returns the run time. Catches all exceptions.
   std::int64_t run(const RenderQueue::Next& next) noexcept {
     const std::int64_t began_us = options.now_us();
     try {
@@ -82,7 +82,7 @@ struct RenderService::State {
     return took_us;
   }
 
-  // Under the mutex.
+  // Requires the mutex.
   [[nodiscard]] bool has_room(const Job& job, const RenderQueue::Load& waiting) const {
     if (job.kind != Kind::request || job.admitted) return true;
     const double rest_ms = queue.rest_ms(options.now_us());
@@ -95,7 +95,7 @@ struct RenderService::State {
         waiting.cost_ms + job.cost_ms > options.requests_ms_max) {
       return false;
     }
-    // Nobody has all the places.
+    // One payer cannot occupy all places.
     const std::size_t own_max = std::max<std::size_t>(options.requests_max / 2, 1);
     if (!job.payer.empty() && queue.requests_of(job.payer).count >= own_max) return false;
     if (options.others_ms_max <= 0) return true;
@@ -104,7 +104,7 @@ struct RenderService::State {
            rest_ms + others.cost_ms <= std::max(options.others_ms_max, patient_share * job.cost_ms);
   }
 
-  // Refusals of late, each counting for less as time goes by.
+  // Recent refusals, with exponentially decaying weight.
   [[nodiscard]] double pressure_now() const {
     const double since_s = static_cast<double>(options.now_us() - pressure_at_us) / 1e6;
     return pressure * std::exp(-std::max(since_s, 0.0));

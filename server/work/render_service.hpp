@@ -1,5 +1,5 @@
-// The one thread that draws. Jobs in from any thread; each runs to its end before the next: a frame
-// has the whole thread pool to itself. Whose turn it is: render_queue.hpp.
+// The render thread. Jobs in from any thread; each runs to completion before the next, so that a
+// frame has the whole thread pool. Scheduling: render_queue.hpp.
 #pragma once
 
 #include <cstddef>
@@ -19,32 +19,32 @@ class RenderService {
   using Job = RenderJob;
 
   struct Options {
-    // What may wait of kind request, cancelled ones not counted; of one payer half as many.
-    // Streams' jobs are bounded by their sessions, each of which asks for one at a time, background
-    // jobs by their owners.
+    // Limit of waiting jobs of kind request, cancelled ones not counted; half as many per payer.
+    // Sessions bound the jobs of streams (one at a time each), owners those of the background.
     std::size_t requests_max = 16;
-    double requests_ms_max = 30'000;  // by the jobs' own estimates; one alone is always let in
+    double requests_ms_max = 30'000;  // sum of the jobs' estimates; a single job is always admitted
     std::function<std::int64_t()> now_us = {};  // empty: a steady clock
-    // How long requests of other payers, where some wait, may keep one waiting that takes less
-    // itself; 0: as long as those above allow.
+    // Limit on how long requests of other payers may delay a request that is itself shorter; 0: no
+    // limit beyond those above.
     double others_ms_max = 0;
-    // Told what each job took that has a payer, on the renderer's thread, and each refusal.
+    // Called on the renderer's thread with the time of each job that has a payer, and on each
+    // refusal.
     std::function<void(const std::string& payer, std::int64_t us)> charge = {};
     std::function<void()> refused = {};
   };
 
   explicit RenderService(Options options);
-  ~RenderService();  // as end()
+  ~RenderService();  // calls end()
   RenderService(const RenderService&) = delete;
   RenderService& operator=(const RenderService&) = delete;
 
-  // Errors: busy, with the time after which what waits now will be done, where requests alone are
-  // refused; draining after end().
+  // Errors: busy, with the time until the waiting jobs are done, for requests only; draining after
+  // end().
   Result<void> submit(Job job);
 
-  // Raises the token of every job that waits or runs.
+  // Raises the token of every waiting or running job.
   void cancel_all();
-  // Cancels everything, runs what waits, joins; refuses whatever comes after.
+  // Cancels all jobs, runs the waiting ones, joins the thread; later jobs are refused.
   void end();
 
  private:

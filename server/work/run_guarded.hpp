@@ -1,5 +1,4 @@
-// What a service's thread does for somebody: no exception leaves it, and nothing is begun that
-// nobody waits for.
+// Runs the work of a service thread: catches all exceptions and skips cancelled work.
 #pragma once
 
 #include <exception>
@@ -12,7 +11,7 @@
 
 namespace windsplat::net {
 
-// Where memory is short there may be none for the words.
+// Ignore a failure to log when memory is exhausted.
 inline void log_fault(const char* message, const std::exception& fault, const char* job = "",
                       const std::string& request_id = {}) noexcept {
   try {
@@ -22,14 +21,14 @@ inline void log_fault(const char* message, const std::exception& fault, const ch
   }
 }
 
-// `what` names the work in the log, and `request_id` whose it is. A fault of ours becomes an error
-// without its words. Throws nothing, and its errors need no memory: their words are short enough to
-// lie within a string (15 bytes).
+// `what` names the work in the log, `request_id` its request. An exception becomes an error without
+// its message. Does not throw; messages of errors after an exception fit into the small string
+// buffer (15 bytes) and need no allocation.
 template <class T, class Make>
 Result<T> run_guarded(const char* what, const CancelToken& cancel, const Make& make,
                       const std::string& request_id = {}) {
   try {
-    if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "nobody waits for the answer");
+    if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "request cancelled");
     return make();
   } catch (const std::bad_alloc&) {
     return make_error(ErrorKind::out_of_memory, "no memory left");

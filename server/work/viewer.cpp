@@ -1,4 +1,4 @@
-// Effects of a session -> render jobs; what they bring -> the session's own words.
+// Effects of a session become render and load jobs; their results become events of the session.
 #include "server/work/viewer.hpp"
 
 #include <mutex>
@@ -57,7 +57,7 @@ Result<session::Drawn> draw(Backend& backend, const session::StartRender& wanted
   return out;
 }
 
-// Made into text here, and what may be long left out: the io thread has others to serve.
+// Serialised here, with long lists left out, to keep the io thread free.
 Result<protocol::DatasetDescription> encoded(Result<protocol::DatasetDescription> description) {
   if (!description) return description;
   description->encoded =
@@ -67,7 +67,7 @@ Result<protocol::DatasetDescription> encoded(Result<protocol::DatasetDescription
   return description;
 }
 
-constexpr int describing_max = 4;  // of a session at a time
+constexpr int describing_max = 4;  // limit per session
 
 Result<std::vector<data::PrefetchRequest>> prefetch_requests_of(const data::Dataset& dataset,
                                                                 const session::Prefetch& wanted) {
@@ -88,17 +88,18 @@ Result<std::vector<data::PrefetchRequest>> prefetch_requests_of(const data::Data
 
 }  // namespace
 
-// What is wished for next. A dataset has one job waiting at most, however often a viewer changes
-// its mind; the job works out what is wished for when its turn has come.
+// Pending prefetch requests. A dataset has at most one waiting job, however often the view changes;
+// the job evaluates the newest request when it runs.
 struct Viewer::PrefetchState {
   struct Newest {
     data::Dataset dataset;
     session::Prefetch effect;
   };
-  std::mutex mutex;  // held while a wish is said, so that none is said after it was taken back
-  std::optional<Newest> newest;           // until it is worked out
-  const data::DatasetInfo* of = nullptr;  // which dataset the newest was about; told apart only
-  std::uint64_t epoch = 0;                // counts wishes taken back and datasets left
+  std::mutex
+      mutex;  // held while a request is submitted, so that none is submitted after its withdrawal
+  std::optional<Newest> newest;           // until it is evaluated
+  const data::DatasetInfo* of = nullptr;  // dataset of the newest request; compared only
+  std::uint64_t epoch = 0;                // counts withdrawals and changes of dataset
   std::set<const data::DatasetInfo*> queued;
 };
 
@@ -109,12 +110,12 @@ Viewer::Viewer(Backend& backend, std::uint64_t owner, std::string payer)
       requests_(std::make_shared<PrefetchState>()) {}
 
 void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
-  calibration_.cancel();  // the view rests no more
+  calibration_.cancel();  // the view is changing again
   const CancelToken cancel;
   running_.emplace(effect.ticket, cancel);
   auto dataset = backend_.catalogue.find(effect.view.dataset);
   if (!dataset) return reply(effect.ticket, dataset.error());
-  // A still may be larger than the view that was checked when it came.
+  // A still may be larger than the view that was checked before.
   if (const auto fits = backend_.check(effect.view); !fits) {
     return reply(effect.ticket, fits.error());
   }
@@ -138,7 +139,7 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
     });
   };
   drawing.fail = [ticket = effect.ticket, shared](const Error& error) { (*shared)(ticket, error); };
-  // Jobs of streams are refused at the server's end alone.
+  // Jobs of streams are refused at shutdown only.
   if (const auto queued = submit(backend_, std::move(drawing)); !queued) {
     (*shared)(effect.ticket, queued.error());
   }
@@ -147,7 +148,7 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
 void Viewer::start(const session::Describe& effect, DescribedReply reply) {
   const auto shared = std::make_shared<const DescribedReply>(std::move(reply));
   if (describing_.use_count() > describing_max) {
-    const auto busy = make_error(ErrorKind::busy, "earlier datasets are not opened yet");
+    const auto busy = make_error(ErrorKind::busy, "earlier requests to open datasets are pending");
     return (*shared)(effect.id, busy);
   }
   const auto dataset = backend_.catalogue.find(effect.dataset);
@@ -177,7 +178,7 @@ void Viewer::start(const session::Prefetch& effect) {
     requests_->newest.emplace(PrefetchState::Newest{**found, effect});
     if (!requests_->queued.insert(of.get()).second) return;
   }
-  // To know which fields at which detail, the view has to be completed: not here.
+  // Completing the view, to find its fields and levels, may block: not here.
   const auto run = [&backend = backend_, owner = owner_, requests = requests_, key = of.get()] {
     resolve_prefetch(backend, owner, *requests, key);
   };
@@ -196,7 +197,7 @@ void Viewer::resolve_prefetch(Backend& backend, std::uint64_t owner, PrefetchSta
     epoch = requests.epoch;
   }
   auto found = run_guarded<std::vector<data::PrefetchRequest>>(
-      "what comes next", {}, [&] { return prefetch_requests_of(newest->dataset, newest->effect); });
+      "prefetch", {}, [&] { return prefetch_requests_of(newest->dataset, newest->effect); });
   const std::lock_guard lock(requests.mutex);
   if (found && requests.epoch == epoch)
     backend.catalogue.request_prefetch(owner, std::move(*found));

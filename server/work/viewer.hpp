@@ -1,4 +1,4 @@
-// What a viewer's session asks of the renderer: jobs out, answers back by callback.
+// Requests of a session to the renderer and the loader; results return by callback.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,14 @@
 
 namespace windsplat::net {
 
-// Called on a thread of the renderer's or the loader's, or at once.
+// Called on a thread of the renderer or the loader, or synchronously.
 using DrawnReply = std::function<void(std::uint64_t ticket, Result<session::Drawn>)>;
 using DescribedReply = std::function<void(std::uint32_t id, Result<protocol::DatasetDescription>)>;
 
-// The jobs of one session. Used by the io thread alone.
+// The jobs of one session. Used by the io thread only.
 class Viewer {
  public:
-  // `payer`: the address that drawing is charged to.
+  // `payer`: the address charged with render time.
   Viewer(Backend& backend, std::uint64_t owner, std::string payer);
   ~Viewer() { cancel_all(); }
   Viewer(const Viewer&) = delete;
@@ -27,9 +27,9 @@ class Viewer {
 
   void start(const session::StartRender& effect, DrawnReply reply);
   void start(const session::Describe& effect, DescribedReply reply);
-  // Has the steps that may come next made resident, as far as memory goes.
+  // Prefetches the steps that may be needed next, as far as memory allows.
   void start(const session::Prefetch& effect);
-  // Learns what settings cost and err for a view, while the renderer has nothing else to do.
+  // Measures time and error of the settings for a view while the renderer is idle.
   void start(const session::Calibrate& effect);
   void cancel(std::uint64_t ticket);
   void done(std::uint64_t ticket) { running_.erase(ticket); }
@@ -45,10 +45,11 @@ class Viewer {
   const std::uint64_t owner_;
   const std::string payer_;
   std::map<std::uint64_t, CancelToken> running_;  // by ticket
-  std::shared_ptr<PrefetchState> requests_;       // shared with the jobs that work them out
-  CancelToken gone_;                              // for descriptions
-  std::shared_ptr<const char> describing_ = std::make_shared<const char>();  // held by each
-  CancelToken calibration_;  // the last one that was asked for
+  std::shared_ptr<PrefetchState> requests_;       // shared with the jobs that evaluate them
+  CancelToken gone_;                              // cancels descriptions
+  std::shared_ptr<const char> describing_ =
+      std::make_shared<const char>();  // held by each description job
+  CancelToken calibration_;            // of the latest calibration
 };
 
 }  // namespace windsplat::net
