@@ -1,4 +1,4 @@
-// Every connection that lives, so that a drain reaches them all. Used by the io thread alone.
+// Registry of open connections, so that a drain reaches all. Used by the io thread only.
 #pragma once
 
 #include <algorithm>
@@ -18,30 +18,30 @@ namespace windsplat::net {
 class Connection {
  public:
   virtual ~Connection() = default;
-  virtual void drain() = 0;  // end as soon as what is being answered is answered
+  virtual void drain() = 0;  // close after the current response
   virtual void abort() = 0;  // end now
-  // A dataset's files have changed, and it was opened anew.
+  // A dataset was reopened because its files changed.
   virtual void on_changed(const std::string& /*dataset*/) {}
-  // Another token is asked for from now on.
+  // The access token has changed.
   virtual void on_new_token() {}
 
-  // What a newcomer may take its place from; times of its present state, none where it is in
-  // another or has given its place up.
+  // For admission of a new connection in place of this one: since when it is in a state; none in
+  // other states or after its place was freed.
   using Since = std::optional<std::chrono::steady_clock::time_point>;
-  virtual Since idle_since() const { return {}; }         // waits for a request's first byte
-  virtual Since unasked_since() const { return {}; }      // of the reserve, without a whole request
-  virtual Since handshaking_since() const { return {}; }  // of TLS; with what follows:
-  virtual std::string_view address() const { return {}; }  // as it is counted
+  virtual Since idle_since() const { return {}; }     // waiting for the first byte of a request
+  virtual Since unasked_since() const { return {}; }  // in the reserve, without a complete request
+  virtual Since handshaking_since() const { return {}; }  // in the TLS handshake; uses the next two
+  virtual std::string_view address() const { return {}; }  // as counted by quotas
   virtual bool is_known() const { return false; }  // a proxy, or the address has shown the token
 };
 
 class Connections {
  public:
-  // Told whenever the last one that is waited for has gone.
+  // Called when the last connection that a drain waits for has closed.
   void on_empty(std::function<void()> call) { empty_ = std::move(call); }
 
   std::uint64_t next_id() { return ++ids_; }
-  // `late`: it came while the others are waited for, and is not.
+  // `late`: accepted during a drain, which does not wait for it.
   void add(std::uint64_t id, std::weak_ptr<Connection> connection, bool stream, bool late = false) {
     live_[id] = {std::move(connection), stream, late};
     streams_ += stream ? 1U : 0U;
@@ -60,7 +60,7 @@ class Connections {
   [[nodiscard]] std::size_t size() const { return waited_for_; }
   [[nodiscard]] std::size_t streams() const { return streams_; }
 
-  // Calls for each of them, any of which may go while it is told. Needs no memory.
+  // Calls the function for each; any of them may close during its call. Does not allocate.
   template <class Call>
   void each(const Call& call) const {
     for (auto at = live_.begin(); at != live_.end();) {
@@ -70,8 +70,8 @@ class Connections {
     }
   }
 
-  // Where more than `most` are in a state, ends the one that is in it for longest, so that its
-  // place is free at once. False: nothing was ended. `since`: of a const Connection&, its Since.
+  // If more than `most` are in a state, closes the one that is in it longest, which frees its place
+  // at once. False: none was closed. `since`: takes a const Connection&, returns its Since.
   template <class Since>
   bool end_longest(const Since& since, std::size_t most = 0) const {
     std::size_t count = 0;
@@ -88,8 +88,8 @@ class Connections {
     return true;
   }
 
-  // Where more than `most` handshakes are under way, ends one: of strangers where there are any, of
-  // the address that has most of them the oldest.
+  // If more than `most` handshakes are in progress, closes one: of unknown addresses if any, the
+  // oldest of the address with most of them.
   bool end_handshake(std::size_t most) const {
     struct Held {
       std::size_t count = 0;

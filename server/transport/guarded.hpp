@@ -1,4 +1,4 @@
-// What a connection waits for, so that no fault in it reaches others, and none leaves it waiting.
+// Completion handlers of connections: an exception ends one connection and never leaves it hanging.
 #pragma once
 
 #include <exception>
@@ -9,24 +9,24 @@
 
 namespace windsplat::net {
 
-// Ends it, and then says so: where memory is short there may be none for the words.
+// End the session first: logging may fail when memory is exhausted.
 template <class Session>
 void end_failed(Session& session, const char* fault) noexcept {
   try {
     session.abort();
   } catch (const std::exception&) {
-    log::error("a connection could not be ended");
+    log::error("cannot close a connection");
   }
   try {
-    log::error("a connection failed", {{"request", session.request_id()}, {"fault", fault}});
+    log::error("connection failed", {{"request", session.request_id()}, {"fault", fault}});
   } catch (const std::exception&) {
-    log::error("a connection failed, and there is no memory to say which");
+    log::error("connection failed; no memory to log which one");
   }
 }
 
-// A completion handler of a session: keeps it alive, and ends it alone when something throws. Also
-// where an operation's own steps throw, which take the handler with them uncalled: what it was to
-// go on with would never come.
+// A completion handler that keeps its session alive and ends only that session when something
+// throws, also when an operation throws internally and destroys the handler uncalled: the session
+// would then wait forever.
 template <class Session, class Body>
 class Guarded {
  public:
@@ -38,7 +38,7 @@ class Guarded {
   Guarded& operator=(Guarded&&) = delete;
   ~Guarded() {
     if (session_ == nullptr || std::uncaught_exceptions() == 0) return;
-    end_failed(*session_, "its next step was lost");
+    end_failed(*session_, "completion handler destroyed uncalled");
   }
 
   template <class... Results>

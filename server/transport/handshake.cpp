@@ -1,8 +1,7 @@
-// A TLS handshake in two halves. `Handshake` is used by the io thread alone: it holds the
-// connection's place and deadline. `TlsTask` holds the socket, and is used by the handshake thread
-// alone until that posts it back; the other half ends it by shutdown(2), which any thread may call,
-// and takes away the step that waits: so what gave back its place holds a descriptor no longer than
-// a step takes that runs, however busy that thread is.
+// TLS handshakes in two halves. `Handshake` belongs to the io thread and holds the connection's
+// place and deadline. `TlsTask` holds the socket and belongs to the handshake thread until it is
+// posted back. `Handshake` ends it by shutdown(2), which is safe from any thread, and removes its
+// waiting step: the descriptor is held no longer than the running step.
 #include "server/transport/handshake.hpp"
 
 #include <sys/socket.h>
@@ -33,14 +32,14 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds tls_timeout{5};
-constexpr std::chrono::seconds tls_reserve_timeout{2};  // of a connection of the reserve
-// At a time; for one more another ends.
+constexpr std::chrono::seconds tls_reserve_timeout{2};  // for connections of the reserve
+// Limit of concurrent handshakes; above it another one is ended.
 constexpr std::size_t tls_handshakes_max = 256;
 constexpr std::size_t handshakes_per_address_max = 64;
-// After which no more is read. A ClientHello has some 500 bytes, 2 KB with a post-quantum key
-// share; OpenSSL would take 131 kB.
+// Limit of bytes read. A ClientHello has some 500 bytes, 2 KB with a post-quantum key share;
+// OpenSSL would accept 131 kB.
 constexpr std::size_t handshake_bytes_max = std::size_t{16} * 1024;
-// One read of Asio's: the client's last message may come with the data that follow it.
+// Size of one read of Asio: the client's last message may arrive with following data.
 constexpr std::size_t last_read_bytes = std::size_t{17} * 1024;
 
 class TlsTask final : public HandshakeTask {
@@ -53,13 +52,12 @@ class TlsTask final : public HandshakeTask {
         io_(wire_.get_executor()),
         admission_(admission),
         trusted_(visitor.trusted) {}
-  // What is left to charge where memory failed for the way back.
+  // Processor time still to be charged if an allocation failed on the way back.
   ~TlsTask() override { charge(); }
   TlsTask(const TlsTask&) = delete;
   TlsTask& operator=(const TlsTask&) = delete;
 
-  // On the io thread. `done` is called there, with the fault; if it was abandoned any number of
-  // times.
+  // On the io thread. `done` is called there with the error; after abandoning, any number of times.
   void start(std::function<void(ErrorCode)> done) {
     done_ = std::move(done);
     submit([this] {
@@ -69,7 +67,7 @@ class TlsTask final : public HandshakeTask {
     });
   }
 
-  // On the io thread. The handshake fails.
+  // On the io thread. Fails the handshake.
   void abandon() {
     drop();
     ::shutdown(handle_, SHUT_RDWR);
@@ -78,7 +76,7 @@ class TlsTask final : public HandshakeTask {
 
   [[nodiscard]] bool is_abandoned() const { return is_dropped(); }
 
-  // When it is done.
+  // On the io thread, after completion.
   Wire take_wire() { return std::move(wire_); }
 
  private:
@@ -86,14 +84,13 @@ class TlsTask final : public HandshakeTask {
     if (is_abandoned()) return false;
     const std::size_t bytes = wire_.next_layer().rate_policy().bytes_read();
     if (bytes <= handshake_bytes_max + last_read_bytes) return true;
-    // Nothing more is read: a shutdown alone would leave what has arrived to be read.
+    // Stops reading: shutdown alone would leave received data readable.
     begin_no_more();
     go_back();
     return false;
   }
-  // The io thread charges it, which must not wait for a lock that this thread holds: before the
-  // next step, when the handshake is done or abandoned, and for a step that ran meanwhile by
-  // go_back().
+  // Charged by the io thread, which must not wait for a lock that this thread holds: before the
+  // next step, on completion or abandonment, and in go_back() for a step that ran meanwhile.
   void step_took(std::int64_t cpu_us) override {
     unpaid_us_ += cpu_us;
     if (outcome_ || is_abandoned()) go_back();
@@ -110,7 +107,7 @@ class TlsTask final : public HandshakeTask {
     if (us > 0) admission_.handshake_took(address(), trusted_, us);
   }
 
-  const int handle_;  // open as long as this lives, or wire_ after it was taken
+  const int handle_;  // open while this lives, or wire_ after the move
   Wire wire_;
   const asio::any_io_executor io_;
   Admission& admission_;
@@ -151,14 +148,14 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
           handshakes_per_address_max);
     }
     (void)connections_.end_handshake(tls_handshakes_max);
-    if (!task_) return;  // it was itself that ended
+    if (!task_) return;  // already completed
     task_->start([weak = weak_from_this()](ErrorCode fault) {
       const auto self = weak.lock();
       if (self) guarded(self, [&] { self->on_done(fault); })();
     });
   }
 
-  void drain() override {}  // it is waited for
+  void drain() override {}  // drains wait for the handshake
   void abort() override {
     if (task_) task_->abandon();
     end();
@@ -177,8 +174,8 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
  private:
   void on_done(ErrorCode fault) {
     if (!task_) return;
-    if (task_->is_abandoned()) return abort();  // a step that was dropped may still hold its wire
-    // From here on its descriptor is the wire's, which may close it.
+    if (task_->is_abandoned()) return abort();  // a dropped step may still hold its wire
+    // From here on the wire owns the descriptor and may close it.
     Wire wire = std::exchange(task_, nullptr)->take_wire();
     if (!fault) {
       start_http_session(std::move(wire), services_, connections_, std::move(visitor_), late_);
@@ -186,15 +183,15 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
       wire.forgo_tls();
       refuse_plain_http(std::move(wire), services_, connections_, std::move(visitor_), late_);
     } else {
-      log::debug("a TLS handshake failed", {{"fault", fault.message()}});
+      log::debug("TLS handshake failed", {{"fault", fault.message()}});
     }
     end();
   }
 
   void end() {
     task_.reset();
-    deadline_.cancel();      // whose handler holds the last reference
-    visitor_.place.reset();  // now, and not when that has gone
+    deadline_.cancel();      // its handler holds the last reference
+    visitor_.place.reset();  // free the place at once
   }
 
   Services& services_;
@@ -204,8 +201,8 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
   const std::string address_;
   const Clock::time_point came_ = Clock::now();
   asio::steady_timer deadline_;
-  std::shared_ptr<TlsTask> task_;  // null: it is done
-  bool late_ = false;              // it came while a drain waits for the others
+  std::shared_ptr<TlsTask> task_;  // null: done
+  bool late_ = false;              // accepted during a drain
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// A connection that was accepted -> an HTTP session, by way of a TLS handshake where there is TLS.
+// Turns an accepted connection into an HTTP session, after a TLS handshake if TLS is enabled.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -9,7 +9,7 @@
 
 namespace windsplat::net {
 
-// `handshakes` null: plain TCP. It must be stopped before the socket's io_context ends.
+// `handshakes` null: plain TCP. Stop it before the socket's io_context ends.
 void start_connection(boost::asio::ip::tcp::socket socket, Services& services,
                       Connections& connections, HandshakeThread* handshakes, Visitor visitor);
 

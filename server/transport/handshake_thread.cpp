@@ -15,10 +15,9 @@
 namespace windsplat::net {
 namespace {
 
-// Of setpriority(2): rendering and streams get ten times this thread's share where all want the
-// same core.
+// For setpriority(2): rendering and streams get ten times this thread's share of a contended core.
 constexpr int handshake_nice = 10;
-constexpr std::size_t address_chars_max = 64;  // of one as it is counted
+constexpr std::size_t address_chars_max = 64;  // of the address key
 
 }  // namespace
 
@@ -56,7 +55,7 @@ void HandshakeThread::add(const std::string& address, const void* owner,
   {
     const std::lock_guard lock(mutex_);
     if (ended_) return;
-    lanes_.merge(fresh);  // unless there is one
+    lanes_.merge(fresh);  // no effect if the lane exists
     Lane& lane = lanes_.find(address)->second;
     lane.splice(lane.end(), added);
   }
@@ -93,7 +92,7 @@ std::unique_ptr<HandshakeThread::Step> HandshakeThread::next() {
 void HandshakeThread::run() {
   ::pthread_setname_np(::pthread_self(), "handshakes");
   if (::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), handshake_nice) != 0) {
-    log::warn("TLS handshakes run at the priority of everything else",
+    log::warn("cannot lower the priority of the TLS handshake thread",
               {{"fault", std::generic_category().message(errno)}});
   }
   while (true) {
@@ -102,7 +101,7 @@ void HandshakeThread::run() {
       if (step == nullptr) return;
       step->run();
     } catch (const std::exception& fault) {
-      log_fault("a TLS handshake was lost", fault);  // its deadline closes the connection
+      log_fault("TLS handshake step failed", fault);  // its deadline closes the connection
     }
   }
 }

@@ -1,5 +1,5 @@
-// The thread that computes TLS handshakes: addresses take turns there, so that neither the
-// network's thread nor another address waits for what one asks for.
+// Thread that computes TLS handshakes, round robin over client addresses, so that handshakes block
+// neither the io thread nor other addresses.
 #pragma once
 
 #include <atomic>
@@ -18,7 +18,7 @@
 
 namespace windsplat::net {
 
-// Thread-safe. One step at a time; those of an address in their order, addresses in turn.
+// Thread-safe. Runs one step at a time: steps of an address in order, addresses in turn.
 class HandshakeThread {
  public:
   HandshakeThread();
@@ -26,14 +26,15 @@ class HandshakeThread {
   HandshakeThread(const HandshakeThread&) = delete;
   HandshakeThread& operator=(const HandshakeThread&) = delete;
 
-  // Where memory fails nothing has changed. What a step throws is logged. `owner`: for drop().
+  // Strong exception guarantee if an allocation fails. Exceptions of a step are logged. `owner`:
+  // for drop().
   template <class Body>
   void submit(const std::string& address, Body body, const void* owner = nullptr) {
     add(address, owner, std::make_unique<Holds<Body>>(std::move(body)));
   }
-  // Lets go of the owner's steps that wait, on the calling thread. Needs no memory.
+  // Removes the owner's waiting steps on the calling thread. Does not allocate.
   void drop(const std::string& address, const void* owner);
-  // Returns when the step under way is done; those that wait are dropped, as are further ones.
+  // Returns when the current step is done; waiting and later steps are dropped.
   void stop();
 
  private:
@@ -51,19 +52,19 @@ class HandshakeThread {
     const void* owner = nullptr;
     std::unique_ptr<Step> step;
   };
-  // What goes in or out of them is made before the lock and freed after it: this thread's low
-  // priority must not keep the io thread waiting.
+  // Entries are allocated before locking and freed after it: the io thread must not wait for this
+  // thread, which has low priority.
   using Lane = std::list<Waiting>;
   using Lanes = std::map<std::string, Lane>;  // none is empty
 
   void add(const std::string& address, const void* owner, std::unique_ptr<Step> step);
-  std::unique_ptr<Step> next();  // waits for it; null: the end
+  std::unique_ptr<Step> next();  // blocks; null: shutdown
   void run();
 
   std::mutex mutex_;
   std::condition_variable changed_;
   Lanes lanes_;
-  std::string last_;  // address that had its turn
+  std::string last_;  // last address served
   bool ended_ = false;
   std::thread thread_;
 };
@@ -71,7 +72,7 @@ class HandshakeThread {
 // Processor time of the calling thread, microseconds.
 std::int64_t thread_cpu_us();
 
-// One handshake, as the steps of its operation see it.
+// One handshake as seen by the steps of its operation.
 class HandshakeTask : public std::enable_shared_from_this<HandshakeTask> {
  public:
   HandshakeTask(HandshakeThread& thread, std::string address)
@@ -80,8 +81,8 @@ class HandshakeTask : public std::enable_shared_from_this<HandshakeTask> {
   HandshakeTask(const HandshakeTask&) = delete;
   HandshakeTask& operator=(const HandshakeTask&) = delete;
 
-  // On the io thread. Keeps this alive until the step is done. After drop() the step goes at once,
-  // and with it what it holds.
+  // On the io thread. Keeps this alive until the step is done. After drop() the step and its
+  // resources are released at once.
   template <class Step>
   void submit(Step step) {
     pay();
@@ -97,8 +98,8 @@ class HandshakeTask : public std::enable_shared_from_this<HandshakeTask> {
   }
 
  protected:
-  // On the io thread. Nothing is begun any more, and nothing waits for its turn: what this holds
-  // goes with its last reference, for which only a step that runs now is waited.
+  // On the io thread. Starts no further steps and removes waiting ones; the resources are released
+  // with the last reference, after a running step at the latest.
   void drop() {
     dropped_ = true;
     thread_.drop(address_, this);
@@ -108,7 +109,7 @@ class HandshakeTask : public std::enable_shared_from_this<HandshakeTask> {
   [[nodiscard]] const std::string& address() const { return address_; }
 
  private:
-  class Timed {  // a step that throws took its time, too
+  class Timed {  // charges the time of a step that throws, too
    public:
     explicit Timed(HandshakeTask& task) : task_(task) {}
     ~Timed() { task_.step_took(thread_cpu_us() - begin_); }
@@ -120,10 +121,10 @@ class HandshakeTask : public std::enable_shared_from_this<HandshakeTask> {
     const std::int64_t begin_ = thread_cpu_us();
   };
 
-  // On the handshake thread: before each step (false: the operation is dropped), and after it.
+  // On the handshake thread: before each step (false: the operation is dropped) and after it.
   virtual bool may_go_on() = 0;
   virtual void step_took(std::int64_t cpu_us) = 0;
-  // On the io thread: charges what the steps took that are done.
+  // On the io thread: charges the time of completed steps.
   virtual void pay() = 0;
 
   HandshakeThread& thread_;
@@ -131,7 +132,7 @@ class HandshakeTask : public std::enable_shared_from_this<HandshakeTask> {
   std::atomic<bool> dropped_{false};
 };
 
-// Of Asio: where the handlers of one handshake run, which keep its task alive.
+// Asio executor that runs the handlers of one handshake and keeps its task alive.
 class HandshakeExecutor {
  public:
   HandshakeExecutor(HandshakeTask& task, boost::asio::execution_context& context) noexcept

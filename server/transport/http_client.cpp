@@ -1,5 +1,5 @@
-// A GET for a health check: connects, speaks TLS where told, asks, reads the status line, all
-// within one deadline.
+// A GET for health checks: connect, TLS handshake, request and status line, all within one
+// deadline.
 #include "server/transport/http_client.hpp"
 
 #include <openssl/ssl.h>
@@ -29,7 +29,7 @@ using ErrorCode = boost::system::error_code;
 
 constexpr std::size_t status_line_bytes_max = 1024;
 
-// What is asked, and of whom.
+// The parsed URL and the request.
 struct Question {
   std::string host;
   std::string port;
@@ -37,7 +37,7 @@ struct Question {
   bool secure = false;
 };
 
-// The certificates that a server's is checked against. Errors: invalid.
+// The root certificates for verification. Errors: invalid.
 Result<void> trust(asio::ssl::context& context, const std::string& ca) {
   ErrorCode fault;
   context.set_verify_mode(asio::ssl::verify_peer);
@@ -46,16 +46,16 @@ Result<void> trust(asio::ssl::context& context, const std::string& ca) {
     context.set_default_verify_paths(fault);
   } else {
     context.add_certificate_authority(asio::buffer(ca), fault);
-    // One that is trusted by name needs no root behind it.
+    // A certificate that is trusted explicitly needs no issuer.
     X509_VERIFY_PARAM_set_flags(SSL_CTX_get0_param(context.native_handle()),
                                 X509_V_FLAG_PARTIAL_CHAIN);
   }
   if (!fault) return {};
   return make_error(ErrorKind::invalid,
-                    "the trusted certificates cannot be read: " + printable(fault.message()));
+                    "cannot read the trusted certificates: " + printable(fault.message()));
 }
 
-// One exchange after the other; the first fault ends it.
+// Runs one operation after the other; the first error ends the exchange.
 struct Exchange {
   Exchange(Question asked, asio::ssl::context& context)
       : question(std::move(asked)), stream(io, context) {
@@ -73,14 +73,14 @@ struct Exchange {
   }
 
   void handshake() {
-    ErrorCode is_name;  // an address is no name that a server could choose by
+    ErrorCode is_name;  // SNI allows names only, no addresses
     (void)asio::ip::make_address(question.host, is_name);
     if (is_name) SSL_set_tlsext_host_name(stream.native_handle(), question.host.c_str());
     SSL* ssl = stream.native_handle();
     const int named =
         is_name ? SSL_set1_host(ssl, question.host.c_str())
                 : X509_VERIFY_PARAM_set1_ip_asc(SSL_get0_param(ssl), question.host.c_str());
-    if (named != 1) {  // nobody is believed unchecked
+    if (named != 1) {  // never proceed unverified
       fault = asio::error::invalid_argument;
       return;
     }
@@ -98,14 +98,14 @@ struct Exchange {
     });
   }
 
-  // Why it ended; of a certificate that was not believed also what is wrong with it.
+  // Describes the error; for a rejected certificate also the reason.
   [[nodiscard]] std::string reason(bool trusts_given) {
     std::string out = fault.message();
     if (!question.secure || fault.category() != asio::error::get_ssl_category()) return out;
     const long result = SSL_get_verify_result(stream.native_handle());
     if (result == X509_V_OK) return out;
     out += std::string(" (") + X509_verify_cert_error_string(result) + ")";
-    return trusts_given ? out : out + "; --ca names certificates to trust";
+    return trusts_given ? out : out + "; use --ca to name certificates to trust";
   }
 
   bool failed(ErrorCode ec) {
@@ -143,7 +143,7 @@ Result<int> http_status(const std::string& url, int timeout_s, const std::string
   const bool secure = parts && parts->scheme() == "https";
   if (!parts || (!secure && parts->scheme() != "http") || parts->host().empty()) {
     return make_error(ErrorKind::malformed,
-                      "'" + printable(url) + "' is no http:// or https:// URL");
+                      "'" + printable(url) + "' is not an http:// or https:// URL");
   }
   asio::ssl::context context(asio::ssl::context::tls_client);
   if (secure) {
@@ -166,10 +166,10 @@ Result<int> http_status(const std::string& url, int timeout_s, const std::string
   }
   if (!exchange.done) {
     return make_error(ErrorKind::internal,
-                      where + ": no answer within " + std::to_string(timeout_s) + " s");
+                      where + ": no response within " + std::to_string(timeout_s) + " s");
   }
   const auto status = status_of(exchange.answer);
-  if (!status) return make_error(ErrorKind::internal, where + ": the answer is no HTTP");
+  if (!status) return make_error(ErrorKind::internal, where + ": the response is not HTTP");
   return *status;
 }
 

@@ -1,5 +1,5 @@
-// The HTTP edge, in TLS or not. A request's header is read to its end, looked at as bytes, parsed,
-// and refused before any of its body is read. Bodies come by Content-Length alone.
+// HTTP over TCP or TLS. The header of a request is read completely, checked as bytes, parsed, and
+// refused if necessary before any of the body is read. Bodies need a Content-Length.
 #include "server/transport/http_session.hpp"
 
 #include <atomic>
@@ -37,14 +37,14 @@ namespace http = beast::http;
 namespace limits = protocol::limits;
 using Clock = std::chrono::steady_clock;
 
-constexpr const char* hsts = "max-age=15552000";  // 180 days; said in TLS alone
+constexpr const char* hsts = "max-age=15552000";  // 180 days; sent over TLS only
 constexpr std::size_t buffer_bytes_max = std::size_t{16} * 1024;
 constexpr std::chrono::seconds first_timeout{5};  // for a connection's first byte
 constexpr std::chrono::seconds idle_timeout{60};  // for the next request of a connection
 constexpr std::chrono::seconds drain_idle_timeout{2};
 constexpr std::chrono::milliseconds leave_look{40};
-constexpr std::chrono::seconds reserve_timeout{2};  // for each part of a connection of the reserve
-constexpr std::chrono::seconds linger_timeout{2};   // for a refused body to be thrown away
+constexpr std::chrono::seconds reserve_timeout{2};  // for each phase of a connection of the reserve
+constexpr std::chrono::seconds linger_timeout{2};   // for discarding a refused body
 
 std::int64_t micros_since(Clock::time_point since) {
   return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - since).count();
@@ -69,7 +69,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   HttpSession(const HttpSession&) = delete;
   HttpSession& operator=(const HttpSession&) = delete;
 
-  // The drain waits for those that it found: clients that ask again and again would put it off.
+  // The drain waits only for requests already in progress: otherwise a busy client could delay it.
   void start(bool late) {
     add(late);
     next_request();
@@ -77,7 +77,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
   void refuse_plain(bool late) {
     add(late);
-    refuse(problem_response(400, "Bad Request", "this port speaks TLS: say https://"));
+    refuse(problem_response(400, "Bad Request", "this port requires TLS: use https://"));
   }
 
   void drain() override {
@@ -107,8 +107,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     return guarded(shared_from_this(), std::move(body));
   }
 
-  // What is under way, or comes next, must be done within this time: else the connection ends.
-  // Until the next such call, or the one below.
+  // Sets the deadline of the current operation, after which the connection is closed, until the
+  // next call or the one below.
   void within(std::chrono::milliseconds time) {
     if (visitor_.reserve) time = std::min<std::chrono::milliseconds>(time, reserve_timeout);
     deadline_.expires_after(time);
@@ -124,7 +124,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     request_ = blank_request();
   }
 
-  // Charged to the peer until it is known who asks.
+  // Charged to the peer until the client address is known.
   [[nodiscard]] Request blank_request() const {
     Request request;
     request.peer = id_;
@@ -160,8 +160,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     find_header_end();
   }
 
-  // One read at a time. It may be under way since a picture was drawn (watch_for_leaving); then
-  // buffer_ is empty, and stays so until it ends.
+  // One read at a time. A read may be pending since a picture was started (watch_for_leaving);
+  // buffer_ then stays empty until it completes.
   void read_some() {
     if (reading_) return;
     reading_ = true;
@@ -172,17 +172,17 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
           if (lingering_) return fault ? close() : throw_away();
           if (fault) return on_end();
           buffer_.commit(bytes);
-          if (answering_ || sending_) return;  // its next request, which waits
+          if (answering_ || sending_) return;  // the client's next request stays in the buffer
           if (idle_) return begin_header();
           find_header_end();
         }));
   }
 
-  // The peer has closed its side, or the connection is broken.
+  // End of stream or a connection error.
   void on_end() {
     if (answering_) return on_left();
     if (!sending_) return close();
-    peer_ended_ = true;  // it may still take the answer
+    peer_ended_ = true;  // half-closed: it may still read the response
   }
 
   void find_header_end() {
@@ -215,7 +215,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
       return refuse(problem_response(505, "HTTP Version Not Supported",
                                      "this server speaks HTTP/1.1 and HTTP/1.0"));
     }
-    refuse(problem_response(400, "Bad Request", "the request is no HTTP: " + fault.message()));
+    refuse(problem_response(400, "Bad Request", "malformed HTTP request: " + fault.message()));
   }
 
   void on_header() {
@@ -233,9 +233,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     if (auto fault = check_request(request_, message.version())) return refuse(std::move(*fault));
     if (!is_known_host()) {
       return refuse(problem_response(421, "Misdirected Request",
-                                     "this server does not answer for the host " +
-                                         printable(request_.header("Host"), 80) +
-                                         "; --allow-host names further ones"));
+                                     "unknown host " + printable(request_.header("Host"), 80) +
+                                         "; use --allow-host to allow it"));
     }
     if (const auto ok = parse_target(message.target(), services_.options.base_path, request_);
         !ok) {
@@ -276,7 +275,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void read_body() {
     if (parser_->is_done()) return dispatch();
     within(std::chrono::seconds(limits::http_body_timeout_s));
-    // An expectation in HTTP/1.0 is to be ignored (RFC 9110, 10.1.1).
+    // Ignored in HTTP/1.0 (RFC 9110, 10.1.1).
     const bool expects = parser_->get().version() == 11 &&
                          equal_without_case(request_.header("Expect"), "100-continue");
     if (!expects) return read_rest();
@@ -290,7 +289,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void read_rest() {
     http::async_read(wire_, buffer_, *parser_, handler([this](ErrorCode fault, std::size_t) {
                        if (fault == http::error::body_limit) return refuse(body_too_large());
-                       // What is no fault of the text is one of the connection, or its deadline.
+                       // Other errors are those of the connection, or its deadline.
                        if (fault && !is_fault_of_text(fault)) return close();
                        if (fault) return refuse_unparsed(fault);
                        dispatch();
@@ -321,9 +320,10 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
                    [awaited](Response response) { awaited->answer(std::move(response)); });
   }
 
-  // Knows the session weakly: it must not end on the renderer's thread, and lives while it answers
-  // by its timer (look_for_leaving). Where the work was lost on its way, and no answer comes, the
-  // connection ends; where there is no memory to say so, that timer finds it.
+  // Holds the session weakly: it must not be destroyed on the renderer's thread; its timer
+  // (look_for_leaving) keeps it alive while a response is pending. If the work is lost and no
+  // response arrives, the connection is closed; if memory is too short to post that, the timer
+  // detects it.
   class Awaited {
    public:
     explicit Awaited(HttpSession& session)
@@ -365,15 +365,15 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     bool answered_ = false;
   };
 
-  // While a picture is drawn: a peer that closes its side wants it no more. The read goes on when
-  // the answer is there, since none may be given up within a TLS record; what it brings is the next
-  // request. It is left out where that is here already.
+  // While a picture is drawn, detect a peer that disconnects. The read continues after the
+  // response, since a TLS record must not be abandoned; the data is the next request. Skipped if
+  // the next request is already buffered.
   void watch_for_leaving() {
     if (buffer_.size() == 0) read_some();
     look_for_leaving();
   }
 
-  // What it sent already, such as its next request, hides from a read whether it leaves.
+  // Unread data, such as a pipelined request, hides the end of stream from a read.
   void look_for_leaving() {
     leave_timer_.expires_after(leave_look);
     leave_timer_.async_wait(handler([this](ErrorCode fault) {
@@ -399,11 +399,11 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     send(std::move(response));
   }
 
-  // An answer after which the connection is of no use: what follows it was not understood.
+  // A response after which the connection is closed: the rest of the stream cannot be parsed.
   void refuse(Response response) {
     response.close = true;
     idle_ = false;
-    // What was refused before it was understood is charged all the same.
+    // Requests refused before parsing are charged as well.
     if (!charged_) quiet_ = !services_.admission.count_malformed(visitor_, request_);
     send(std::move(response));
   }
@@ -411,9 +411,9 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void send(Response response) {
     keep_alive_ =
         keep_alive_ && !response.close && !draining_ && !services_.draining && !visitor_.reserve;
-    if (request_.id.empty()) request_.id = services_.request_ids.next();  // refused unread
+    if (request_.id.empty()) request_.id = services_.request_ids.next();  // refused before parsing
     name_request(response, request_.id);
-    // It holds for every port of a host, and other programs listen on this machine's loopback.
+    // Applies to every port of the host, and other programs listen on this machine's loopback.
     if (const std::string host = request_.header("Host");
         wire_.secure() && !host.empty() && !names_loopback(host)) {
       response.headers.emplace_back("Strict-Transport-Security", hsts);
@@ -433,7 +433,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
           on_sent(bytes, written_since);
           if (fault) return close();
           response_ = Response{};
-          if (peer_ended_) return close();  // an end is told once: a further read would wait
+          if (peer_ended_)
+            return close();  // end of stream is reported once: another read would hang
           keep_alive_ && !draining_ ? next_request() : linger();
         }));
   }
@@ -447,7 +448,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     log_access(response_.status, bytes);
   }
 
-  // Neither the path nor the query: they may tell what is nobody else's business.
+  // Log neither path nor query: they may contain private data.
   void log_access(int status, std::size_t bytes) const {
     if (quiet_) return;
     const std::string_view route = route_;
@@ -462,7 +463,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
                 {"ms", static_cast<double>(micros_since(began_)) / 1000}});
   }
 
-  // Closing with unread bytes resets the connection, and the peer might never see the answer.
+  // Closing with unread bytes resets the connection, and the peer might lose the response.
   void linger() {
     lingering_ = true;
     within(linger_timeout);
@@ -476,7 +477,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     throw_away();
   }
 
-  // Of TCP: what TLS makes of it is of no interest any more.
+  // Reads from TCP directly: TLS errors no longer matter.
   void throw_away() {
     if (reading_) return;
     reading_ = true;
@@ -505,7 +506,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     deadline_.cancel();
     UpgradeRequest message;
     static_cast<http::request_header<>&>(message) = std::move(parser_->get().base());
-    // Of lists the library looks at the first line alone.
+    // The library parses only the first line of a list header.
     message.set(http::field::connection, "Upgrade");
     message.set(http::field::upgrade, "websocket");
     start_websocket_session(std::move(wire_), std::move(message), request_.id, services_,
@@ -518,7 +519,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     deadline_.cancel();
     leave_timer_.cancel();
     wire_.close();
-    visitor_.place.reset();  // now, and not when the last handler has gone
+    visitor_.place.reset();  // free the place at once
   }
 
   Wire wire_;
@@ -529,27 +530,27 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   Visitor visitor_;
   asio::steady_timer leave_timer_;
   beast::flat_buffer buffer_{buffer_bytes_max};
-  std::size_t searched_ = 0;  // bytes of buffer_ known not to begin the header's end
+  std::size_t searched_ = 0;  // bytes of buffer_ already searched for the end of the header
   std::optional<Parser> parser_;
   Request request_;
   const char* route_ = route_other;
-  Clock::time_point began_;  // the request's first byte
+  Clock::time_point began_;  // first byte of the request
   Clock::time_point came_;
-  Clock::time_point waiting_since_;  // where idle_
+  Clock::time_point waiting_since_;  // valid if idle_
   Response response_;
-  // Its answer could not be handed over.
+  // A response could not be posted to the io thread.
   const std::shared_ptr<std::atomic<bool>> answer_lost_ =
       std::make_shared<std::atomic<bool>>(false);
   std::string head_;
-  bool idle_ = false;        // waits for a request's first byte
-  bool asked_ = false;       // a whole request came
-  bool charged_ = false;     // the request, to its address
-  bool quiet_ = false;       // it is not worth a line in the log
+  bool idle_ = false;        // waiting for the first byte of a request
+  bool asked_ = false;       // a complete request has arrived
+  bool charged_ = false;     // the request was charged to its address
+  bool quiet_ = false;       // do not log the request
   bool reading_ = false;     // a read is under way
-  bool answering_ = false;   // waits for a reply
-  bool sending_ = false;     // an answer is written
-  bool peer_ended_ = false;  // nothing comes any more
-  bool lingering_ = false;   // everything was said
+  bool answering_ = false;   // waiting for a reply
+  bool sending_ = false;     // writing a response
+  bool peer_ended_ = false;  // end of stream received
+  bool lingering_ = false;   // discarding input before closing
   bool is_head_ = false;
   bool keep_alive_ = false;
   bool draining_ = false;

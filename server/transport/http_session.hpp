@@ -1,5 +1,5 @@
-// One HTTP connection: bytes -> checked Request -> router -> response bytes, one at a time, until
-// it is closed or becomes a stream.
+// One HTTP connection: bytes -> checked Request -> router -> response bytes, one request at a time,
+// until it is closed or upgraded to a stream.
 #pragma once
 
 #include "server/api/router.hpp"
@@ -9,10 +9,10 @@ namespace windsplat::net {
 
 class Wire;
 
-// `late`: a drain does not wait for it.
+// `late`: accepted during a drain, which does not wait for it.
 void start_http_session(Wire wire, Services& services, Connections& connections, Visitor visitor,
                         bool late);
-// Answers a request in plain HTTP that came where TLS is spoken.
+// Responds to a plain HTTP request on a TLS port.
 void refuse_plain_http(Wire wire, Services& services, Connections& connections, Visitor visitor,
                        bool late);
 

@@ -1,4 +1,4 @@
-// Binds, then accepts one connection after the other.
+// Binds, then accepts connections one at a time.
 #include "server/transport/listener.hpp"
 
 #include <netinet/in.h>
@@ -19,14 +19,14 @@ using Tcp = asio::ip::tcp;
 using ErrorCode = boost::system::error_code;
 
 constexpr std::chrono::milliseconds retry_delay{100};
-// What the kernel may hold of frames that the peer has not taken; it doubles this.
+// Send buffer of the kernel; it doubles this value.
 constexpr int send_buffer_bytes = 128 * 1024;
 
-// What it may hold that has not even been sent: with more, a frame counts as written long before it
-// has left, and what is sent next comes late.
+// Limit of unsent bytes in the kernel (TCP_NOTSENT_LOWAT): with more, writes complete long before
+// the data is sent, and later data is delayed.
 constexpr int unsent_bytes = 16 * 1024;
 
-// Best effort: without them frames come later, no more.
+// Best effort: failure only increases latency.
 void hasten(Tcp::socket& socket) {
   ErrorCode ignored;
   socket.set_option(Tcp::no_delay(true), ignored);
@@ -70,7 +70,7 @@ Result<void> Listener::listen(const std::string& address, std::uint16_t port) {
   if (fault) {
     const bool taken = fault == boost::system::errc::address_in_use;
     return make_error(ErrorKind::internal, "cannot listen on " + where + ": " + fault.message() +
-                                               (taken ? "; port 0 is any that is free" : ""));
+                                               (taken ? "; use port 0 for any free port" : ""));
   }
   endpoint_ = acceptor_.local_endpoint(fault);
   return {};
@@ -94,13 +94,13 @@ void Listener::accept() {
       try {
         accepted_(std::move(socket));
       } catch (const std::exception& failure) {
-        // That connection is lost; the next one is not.
-        log::error("a connection could not be served", {{"fault", failure.what()}});
+        // Drops this connection and continues accepting.
+        log::error("cannot serve a connection", {{"fault", failure.what()}});
       }
       return accept();
     }
     if (fault == asio::error::connection_aborted) return accept();
-    // No file descriptor or memory left: others will give theirs back.
+    // Out of descriptors or memory: retry when others have released some.
     log::warn("cannot accept", {{"fault", fault.message()}});
     failed_();
     spare_.turn_away(acceptor_.native_handle());

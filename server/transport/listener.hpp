@@ -1,4 +1,4 @@
-// The listening socket: accepts until it is closed, whatever the system runs out of.
+// The listening socket: keeps accepting when descriptors or memory run out.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -19,16 +19,16 @@ class Listener {
   using Accepted = std::function<void(boost::asio::ip::tcp::socket)>;
   using Failed = std::function<void()>;
 
-  // `failed`: the system could not hand over a connection.
+  // `failed`: accepting a connection failed.
   Listener(boost::asio::io_context& io, Accepted accepted, Failed failed);
 
-  // `address` is an IP address or a name of this machine. Errors: internal, naming address and
+  // `address` is an IP address or host name of this machine. Errors: internal, naming address and
   // port.
   Result<void> listen(const std::string& address, std::uint16_t port);
   [[nodiscard]] boost::asio::ip::tcp::endpoint endpoint() const { return endpoint_; }
 
-  // Accepts from now on. Called again, and not by what was accepted, it goes on where memory failed
-  // before the next connection could be waited for or handed over; else it changes nothing.
+  // Starts accepting. A further call resumes after an allocation failure stopped the accept loop,
+  // and otherwise has no effect; do not call it from the accept handler.
   void start();
   void close();
 
@@ -41,8 +41,8 @@ class Listener {
   boost::asio::steady_timer retry_;
   SpareDescriptor spare_;
   boost::asio::ip::tcp::endpoint endpoint_;
-  // Shared by what waits for a connection, or for the time to try again: where memory fails for a
-  // connection that has come, that goes uncalled.
+  // Held by the pending accept or retry timer: expires when an allocation failure destroys its
+  // handler.
   std::shared_ptr<const char> waiting_ = std::make_shared<const char>();
 };
 

@@ -1,10 +1,10 @@
-// What the system knows of the other end of a socket.
+// State of the remote end of a socket.
 #pragma once
 
 namespace windsplat::net {
 
-// Whether the peer has closed its side, or the connection is broken, also where unread bytes lie
-// before that end. `handle`: a TCP socket's descriptor.
+// Whether the peer has closed its side or the connection is broken, even behind unread data.
+// `handle`: descriptor of a TCP socket.
 bool peer_has_left(int handle);
 
 }  // namespace windsplat::net

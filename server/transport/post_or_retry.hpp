@@ -1,4 +1,4 @@
-// Work handed to the io thread by another, which should arrive: somebody waits for it.
+// Posts a handler to the io thread from another thread; retries when memory is short.
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
@@ -23,9 +23,9 @@ inline bool runs_here(const boost::asio::any_io_executor& executor) {
 constexpr std::chrono::milliseconds post_retry{10};
 constexpr std::chrono::milliseconds post_patience{5000};
 
-// Where there is no memory for it now it waits until there is, so long at most; on the io thread,
-// which alone may give some back, the handler is called at once instead. What the handler holds is
-// let go by the thread that runs it. False: it was given up, and let go by this thread.
+// If allocation fails, blocks and retries up to this limit. On the io thread, which alone can free
+// memory, the handler is called at once instead. The handler is destroyed by the thread that runs
+// it. False: given up and destroyed on this thread.
 template <class Executor, class Handler>
 bool post_or_retry(const Executor& executor, Handler handler,
                    std::chrono::milliseconds patience = post_patience) {

@@ -1,4 +1,4 @@
-// Puts the network side together: one io thread, one renderer, and an orderly end.
+// Assembles the network side: one io thread, one renderer, and an orderly shutdown.
 #include "server/transport/server.hpp"
 
 #include <atomic>
@@ -27,7 +27,7 @@ namespace {
 namespace asio = boost::asio;
 
 constexpr std::chrono::seconds look_every{1};
-// Where memory is short, for others to give theirs back.
+// Delay before a retry after an allocation failure.
 constexpr std::chrono::milliseconds after_a_fault{10};
 
 }  // namespace
@@ -51,10 +51,10 @@ struct Server::State {
     connections.each([](Connection& connection) { connection.abort(); });
     services.backend.renderer.cancel_all();
     if (ending.joinable()) ending.join();
-    services.backend.catalogue.end();  // so that no thread of the services' is found in a read
-    services.end();                    // and none answers any more
+    services.backend.catalogue.end();  // ends reads, so that no service thread blocks in one
+    services.end();                    // ends the service threads
     if (handshakes) handshakes->stop();
-    // What was on its way when the loop was stopped.
+    // Releases handlers that were pending when the loop stopped.
     io.restart();
     while (true) {
       try {
@@ -76,8 +76,8 @@ struct Server::State {
                      std::move(*visitor));
   }
 
-  // Who waits for nothing makes room: of all connections the one that is idle for longest, of the
-  // reserve the one without a request.
+  // Frees a place by closing the connection that is idle longest, or in the reserve the longest one
+  // without a request.
   std::optional<Visitor> admit(const std::string& address) {
     Admission& admission = services.admission;
     if (!admission.arrive(address, services.options.tls != nullptr)) return std::nullopt;
@@ -95,7 +95,7 @@ struct Server::State {
     return visitor;
   }
 
-  // Every second, one look at a time: a slow disk makes them fewer.
+  // Checks files every second, one check at a time; slow disks lower the rate.
   void look_after_data() {
     looking = false;
     look_timer.expires_after(look_every);
@@ -104,9 +104,8 @@ struct Server::State {
       if (!fault) services.admission.log_refused_handshakes();
       if (fault || services.draining) return;
       const auto look = [this] {
-        auto found = run_guarded<std::vector<std::string>>("a look at the files", never, [this] {
-          return services.backend.catalogue.look_after();
-        });
+        auto found = run_guarded<std::vector<std::string>>(
+            "file check", never, [this] { return services.backend.catalogue.look_after(); });
         std::vector<std::string> changed;
         if (found) changed = std::move(*found);
         const auto go_on_looking = [this, changed = std::move(changed)] {
@@ -130,8 +129,8 @@ struct Server::State {
     }
   }
 
-  // What goes on by itself, each step asking for the next; a step that found no memory to ask is
-  // asked for again here.
+  // Periodic operations that schedule themselves; one that failed to allocate its next step is
+  // restarted here.
   void go_on() {
     if (services.draining && !end_is_near) begin_drain();
     if (services.draining) return;
@@ -154,7 +153,7 @@ struct Server::State {
       try {
         connection.on_new_token();
       } catch (const std::exception&) {
-        connection.abort();  // it must not go on under the old one
+        connection.abort();  // authorised by the previous token
       }
     });
   }
@@ -171,7 +170,7 @@ struct Server::State {
         try {
           services.backend.catalogue.end();
         } catch (const std::exception& failure) {
-          log_fault("what is read could not be ended", failure);
+          log_fault("pending reads could not be ended", failure);
         }
       });
     });
@@ -195,7 +194,8 @@ struct Server::State {
 
   void end() {
     listener.close();
-    connections.each([](Connection& connection) { connection.abort(); });  // those that came late
+    connections.each(
+        [](Connection& connection) { connection.abort(); });  // accepted during the drain
     look_timer.cancel();
     cancel_timer.cancel();
     abort_timer.cancel();
@@ -206,12 +206,12 @@ struct Server::State {
     }
   }
 
-  // Both before io: sessions that are still in it when it goes take their leave of them. Threads of
-  // the services post to io: they end before it does, in ~State.
+  // Declared before io: sessions left in its queue deregister when it is destroyed. Service threads
+  // post to io and end before it, in ~State.
   Connections connections;
   Services services;
   asio::io_context io{1};
-  // The loop ends when it is told to, not where memory failed for all that it waited for.
+  // The loop ends by stop() only, not when all pending operations failed to allocate.
   asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
   // Null: plain TCP. Its thread posts to io, too.
   const std::unique_ptr<HandshakeThread> handshakes{
@@ -220,10 +220,10 @@ struct Server::State {
   asio::steady_timer look_timer;
   asio::steady_timer cancel_timer;
   asio::steady_timer abort_timer;
-  const CancelToken never;   // of what nobody gives up
-  bool looking = false;      // waits for the next look, or for what the present one finds
-  bool end_is_near = false;  // a drain's timers run
-  std::thread ending;        // of what is read, when a drain takes long
+  const CancelToken never;   // for work that is never cancelled
+  bool looking = false;      // a file check is scheduled or running
+  bool end_is_near = false;  // the timers of a drain run
+  std::thread ending;        // ends pending reads when a drain takes long
 };
 
 Server::Server(ServerOptions options, std::shared_ptr<data::Store> store,
@@ -243,7 +243,7 @@ std::string Server::url() const {
   auto address = state_->listener.endpoint().address();
   std::string host = address.to_string();
   if (address.is_unspecified()) {
-    host = "127.0.0.1";  // every address of this machine, so this one too
+    host = "127.0.0.1";  // the wildcard address includes this one
   } else if (address.is_v6()) {
     host = '[' + host + ']';
   }
@@ -265,7 +265,7 @@ void Server::run() {
 }
 
 void Server::drain() {
-  // Whoever asks for the end gets it, however long there is no memory for it.
+  // A request to stop must succeed, however long memory is exhausted.
   while (
       !post_or_retry(state_->io.get_executor(), [state = state_.get()] { state->begin_drain(); })) {
   }

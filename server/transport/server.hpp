@@ -15,11 +15,11 @@
 
 namespace windsplat::net {
 
-// What can be changed while the server runs.
+// Settings that can change while the server runs.
 struct Access {
   std::vector<std::string> allow_origins;
   std::shared_ptr<const Token> token;
-  std::shared_ptr<TlsContext> tls;  // of connections that come; null only where it was before
+  std::shared_ptr<TlsContext> tls;  // for new connections; null only if it was null before
   bool known_hosts_only = false;
   std::vector<std::string> allow_hosts;
 };
@@ -35,10 +35,10 @@ class Server {
   [[nodiscard]] std::string url() const;  // to open in a browser, with the base path
 
   void run();  // serves until drained; blocks
-  // Any thread: /readyz fails, streams close with 1001, frames in work end or are given up, and
+  // Any thread. /readyz fails, streams close with 1001, current frames end or are cancelled, and
   // run() returns within 10 s.
   void drain();
-  // Any thread. Another token ends the streams that were opened before.
+  // Any thread. Streams authorised by the previous token are closed.
   void change(Access access);
 
  private:

@@ -1,4 +1,4 @@
-// Given back, used for one accept, and taken again.
+// Releases the descriptor for one accept and reopens it.
 #include "server/transport/spare_descriptor.hpp"
 
 #include <fcntl.h>
@@ -20,7 +20,7 @@ SpareDescriptor::~SpareDescriptor() {
 
 bool SpareDescriptor::turn_away(int listening) {
   if (spare_ >= 0) ::close(spare_);
-  // The listening socket does not block: asio's does not.
+  // The listening socket is non-blocking, as Asio sets it.
   const int taken = ::accept4(listening, nullptr, nullptr, SOCK_CLOEXEC);
   if (taken >= 0) ::close(taken);
   spare_ = take();

@@ -1,5 +1,5 @@
-// A file descriptor kept for when there is no other left: with it the next connection is taken and
-// closed, where it would otherwise wait, and its client with it, until others have gone.
+// A reserved file descriptor: when all others are in use, it serves to accept and close the next
+// connection instead of leaving the client waiting.
 #pragma once
 
 namespace windsplat::net {
@@ -11,7 +11,7 @@ class SpareDescriptor {
   SpareDescriptor(const SpareDescriptor&) = delete;
   SpareDescriptor& operator=(const SpareDescriptor&) = delete;
 
-  // Takes what waits at the listening socket and closes it; whether there was anything.
+  // Accepts and closes a pending connection; returns whether there was one.
   bool turn_away(int listening);
 
  private:

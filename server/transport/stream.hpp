@@ -1,5 +1,5 @@
-// The TCP stream of HTTP and WebSocket sessions: deadlines by Beast, received bytes counted. Only
-// the files of those two sessions may include this: it brings all of Beast with it.
+// The TCP stream of HTTP and WebSocket sessions: deadlines by Beast, received bytes counted.
+// Include in session sources only: it includes all of Beast.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -19,8 +19,8 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 using ErrorCode = boost::system::error_code;
 
-// Limits nothing; tells how many bytes came since it was last asked to forget. A message that never
-// ends shows here, where the WebSocket layer reports nothing.
+// Beast rate policy without limits that counts received bytes since the last forget(). Detects
+// messages that never end, which the WebSocket layer does not report.
 class WireMeter {
  public:
   [[nodiscard]] std::size_t bytes_read() const { return bytes_read_; }
@@ -42,7 +42,7 @@ class WireMeter {
 using TcpStream = beast::basic_stream<asio::ip::tcp, asio::any_io_executor, WireMeter>;
 using UpgradeRequest = beast::http::request<beast::http::empty_body>;
 
-// Time for a peer to take `bytes`: a fixed part and 64 KiB/s.
+// Timeout for a peer to receive `bytes`: a fixed part and 64 KiB/s.
 inline std::chrono::milliseconds write_deadline(std::size_t bytes, int fixed_s) {
   return std::chrono::seconds(fixed_s) + std::chrono::milliseconds(bytes / 64);
 }

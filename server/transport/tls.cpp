@@ -1,4 +1,4 @@
-// PEM texts -> an OpenSSL context with what this server is willing to speak.
+// Builds an OpenSSL context with the accepted protocol versions and ciphers from PEM texts.
 #include "server/transport/tls.hpp"
 
 #include <openssl/ssl.h>
@@ -17,22 +17,22 @@ namespace {
 namespace asio = boost::asio;
 using ErrorCode = boost::system::error_code;
 
-// Of TLS 1.2; those of 1.3 are all of this kind.
+// For TLS 1.2; all ciphers of 1.3 have forward secrecy.
 constexpr const char* ciphers = "ECDHE+AESGCM:ECDHE+CHACHA20";
 
-// Finite-field groups cost a server up to 7 ms of computing for a few bytes, P-384 twenty times
-// what these do. P-256 is the one that every client of TLS 1.3 has (RFC 8446, 9.1).
+// Finite-field groups cost up to 7 ms of processor time for a few bytes sent by the client, P-384
+// twenty times as much as these. P-256 is mandatory in TLS 1.3 (RFC 8446, 9.1).
 constexpr const char* groups = "X25519:P-256";
 
-// Beyond these handshakes are expensive. An RSA signature takes eight times as long at twice the
-// bits.
+// Above these limits handshakes are expensive. Doubling the bits of an RSA key makes a signature
+// eight times slower.
 constexpr int rsa_bits_usual_max = 4096;
 constexpr int chain_bytes_usual_max = 16 * 1024;
 
-// In the form of ALPN (RFC 7301): a length and the name.
+// ALPN wire format (RFC 7301): length and name.
 constexpr std::array<unsigned char, 9> http_1_1{8, 'h', 't', 't', 'p', '/', '1', '.', '1'};
 
-// A client that offers protocols, and not this one, is told so by an alert.
+// Rejects with an alert a client whose protocols do not include this one.
 int choose_protocol(SSL* /*ssl*/, const unsigned char** chosen, unsigned char* chosen_bytes,
                     const unsigned char* offered, unsigned int offered_bytes, void* /*data*/) {
   unsigned char* found = nullptr;
@@ -44,7 +44,7 @@ int choose_protocol(SSL* /*ssl*/, const unsigned char** chosen, unsigned char* c
   return SSL_TLSEXT_ERR_OK;
 }
 
-// Nobody is at a terminal to be asked.
+// Refuses a passphrase: there is no terminal to ask at.
 int no_passphrase(char* /*text*/, int /*size*/, int /*writing*/, void* /*data*/) { return -1; }
 
 Error pem_error(const char* what, const ErrorCode& fault) {
@@ -59,20 +59,20 @@ Result<std::shared_ptr<TlsContext>> make_tls(const std::string& chain, const std
   SSL_CTX_set_min_proto_version(handle, TLS1_2_VERSION);
   SSL_CTX_set_options(handle, SSL_OP_NO_COMPRESSION | SSL_OP_NO_RENEGOTIATION |
                                   SSL_OP_CIPHER_SERVER_PREFERENCE | SSL_OP_PRIORITIZE_CHACHA);
-  // Sessions are resumed by tickets, which the clients keep; a cache would be memory of ours. They
-  // save the signature, the most expensive part of a handshake, and not the key exchange.
+  // Sessions are resumed by tickets kept by the clients, which need no memory here. Resumption
+  // saves the signature, the most expensive part of a handshake, but not the key exchange.
   SSL_CTX_set_session_cache_mode(handle, SSL_SESS_CACHE_OFF);
-  // Requests of early data (0-RTT) could be replayed by whoever recorded them.
+  // Early data (0-RTT) can be replayed by an attacker.
   SSL_CTX_set_max_early_data(handle, 0);
   // Most connections are idle most of the time.
   SSL_CTX_set_mode(handle, SSL_MODE_RELEASE_BUFFERS);
   SSL_CTX_set_default_passwd_cb(handle, no_passphrase);
   SSL_CTX_set_alpn_select_cb(handle, choose_protocol, nullptr);
   if (SSL_CTX_set_cipher_list(handle, ciphers) != 1) {
-    return make_error(ErrorKind::internal, "OpenSSL has none of the ciphers that TLS needs");
+    return make_error(ErrorKind::internal, "OpenSSL supports none of the required TLS ciphers");
   }
   if (SSL_CTX_set1_groups_list(handle, groups) != 1) {
-    return make_error(ErrorKind::internal, "OpenSSL lacks the groups X25519 and P-256");
+    return make_error(ErrorKind::internal, "OpenSSL does not support the groups X25519 and P-256");
   }
   ErrorCode fault;
   tls->context.use_certificate_chain(asio::buffer(chain), fault);
@@ -80,10 +80,10 @@ Result<std::shared_ptr<TlsContext>> make_tls(const std::string& chain, const std
     return make_error(ErrorKind::invalid,
                       "the certificate's file holds a private key; are the two swapped?");
   }
-  if (fault) return pem_error("is no certificate in PEM", fault);
-  // Checked against the certificate, too.
+  if (fault) return pem_error("is not a PEM certificate", fault);
+  // Also checks that the key matches the certificate.
   tls->context.use_private_key(asio::buffer(key), asio::ssl::context::pem, fault);
-  if (fault) return pem_error("is no private key of that certificate", fault);
+  if (fault) return pem_error("is not the private key of that certificate", fault);
   return tls;
 }
 

@@ -1,4 +1,4 @@
-// The certificate and key of the daemon -> what TLS handshakes are made with.
+// Builds the TLS context from the certificate and key of the daemon.
 #pragma once
 
 #include <cstdint>
@@ -9,21 +9,20 @@
 
 namespace windsplat::net {
 
-// Opaque: only the files of the network see OpenSSL (tls_context.hpp).
+// Opaque: only the network sources see OpenSSL (tls_context.hpp).
 struct TlsContext;
 
 inline constexpr std::size_t pem_bytes_max = std::size_t{1} << 20;
 
-// `chain` is the server's own certificate and then those that lead to a root, `key` its private key
-// without a passphrase, both as PEM. TLS 1.2 and 1.3, ciphers with forward secrecy alone.
-// Errors: invalid, saying which of the two is at fault and why.
+// `chain` holds the server's certificate followed by the intermediates, `key` its private key
+// without passphrase, both as PEM. TLS 1.2 and 1.3, only ciphers with forward secrecy. Errors:
+// invalid, naming the certificate or the key and the reason.
 Result<std::shared_ptr<TlsContext>> make_tls(const std::string& chain, const std::string& key);
 
-// Seconds since 1970 after which clients refuse the server's own certificate.
+// Expiry of the server's certificate, in seconds since 1970.
 std::int64_t certificate_ends(const TlsContext& tls);
 
-// Why each handshake costs more than it needs to: a large RSA key, a long chain. Empty: it does
-// not.
+// Reason why handshakes are expensive: a large RSA key or a long chain. Empty: they are not.
 std::string expensive_handshakes(const TlsContext& tls);
 
 }  // namespace windsplat::net

@@ -1,4 +1,4 @@
-// TLS as OpenSSL has it. For the files of the network alone.
+// The OpenSSL context behind TlsContext, for the network sources only.
 #pragma once
 
 #include <boost/asio/ssl/context.hpp>
@@ -10,7 +10,7 @@ struct TlsContext {
   boost::asio::ssl::context context{boost::asio::ssl::context::tls_server};
 };
 
-// Whether a handshake failed because the peer began with a request in plain HTTP.
+// Whether a handshake failed because the client sent plain HTTP.
 bool is_plain_http(const boost::system::error_code& fault);
 
 }  // namespace windsplat::net

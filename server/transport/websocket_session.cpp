@@ -1,5 +1,5 @@
-// The WebSocket edge: limits of what a peer may send and how long it may take; effects of the
-// session carried out. All on the io thread.
+// The WebSocket transport: limits on size, rate and time of messages; carries out the effects of
+// the session. All on the io thread.
 #include "server/transport/websocket_session.hpp"
 
 #include <sys/socket.h>
@@ -38,15 +38,15 @@ constexpr int close_too_big = 1009;
 constexpr int close_full = 1013;
 constexpr int close_fault = 1011;
 constexpr std::chrono::seconds handshake_timeout{5};
-constexpr std::chrono::seconds silence_timeout{60};  // a ping at half of it asks whether it lives
+constexpr std::chrono::seconds silence_timeout{60};  // a ping is sent after half of it
 constexpr std::chrono::seconds close_timeout{2};
-constexpr std::chrono::seconds owing_max{10};
-// Text waiting for a slow peer; beyond it nothing more is read from it.
+constexpr std::chrono::seconds throttle_max{10};
+// Limit of queued text for a slow peer; above it reading pauses.
 constexpr std::size_t waiting_text_bytes_max = std::size_t{256} * 1024;
-// Bytes on the wire for one message: its text, its frames' headers.
+// Bytes on the wire for one message: text and frame headers.
 constexpr std::size_t wire_bytes_max = 2 * limits::message_bytes_max;
 constexpr int controls_a_second_max = 10000;         // pings and pongs
-constexpr std::chrono::seconds message_timeout{10};  // from its first byte
+constexpr std::chrono::seconds message_timeout{10};  // from the first byte
 
 session::Micros now_us() {
   return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now().time_since_epoch())
@@ -77,8 +77,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     return guarded(shared_from_this(), std::move(body));
   }
 
-  // A callback that may come on any thread, and after the session has gone. The renderer must not
-  // be the last to hold the session: it knows it weakly and the io thread looks whether it lives.
+  // A callback that may run on any thread and after the session ended. Holds the session weakly,
+  // since the renderer must not destroy it; the io thread checks whether it still exists.
   template <class Body>
   auto back(Body body) {
     return [weak = weak_from_this(), executor = socket_.get_executor(), lost = answer_lost_, body](
@@ -149,7 +149,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
           }
         }));
     socket_.read_message_max(limits::message_bytes_max);
-    socket_.auto_fragment(false);  // a frame is one WebSocket frame, its payload sent where it lies
+    socket_.auto_fragment(false);  // one WebSocket frame per picture, without copying the payload
     socket_.control_callback([this](websocket::frame_type kind, beast::string_view payload) {
       heard_control(payload.size());
       count_control();
@@ -209,12 +209,12 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     }
     if (services_.draining) return drain();
     const auto datasets = services_.backend.catalogue.list();
-    if (!datasets) return close(close_fault, "the datasets cannot be listed");
+    if (!datasets) return close(close_fault, "cannot list the datasets");
     send(protocol::HelloMessage{WINDSPLAT_VERSION, "session-" + std::to_string(id_), *datasets,
                                 services_.options.limits.pixels_max_reported()});
     counted_ = true;
     services_.metrics.session_opened();
-    log::info("viewer came", {{"session", id_}, {"request", request_id_}});
+    log::info("session opened", {{"session", id_}, {"request", request_id_}});
     heard_whole();
     read();
     schedule();
@@ -232,9 +232,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
                          on_text();
                          charge_message(buffer_.size());
                          buffer_.consume(buffer_.size());
-                         // Once closing, the closing itself reads on for the peer's close: a
-                         // further read that finds it would wait for the closing, which waits for
-                         // the read.
+                         // While closing, the close operation itself reads until the peer's close:
+                         // a further read would deadlock with it.
                          read_on();
                        }));
     watch_message();
@@ -245,7 +244,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     read();
   }
 
-  // Whoever sends more than its address may is read no more until that is paid.
+  // Pauses reading from an address above its rate until it is within the limit.
   void charge_message(std::size_t bytes) {
     const std::chrono::microseconds wait(
         services_.admission.message_received(guest_.address, bytes));
@@ -258,7 +257,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     }));
   }
 
-  // Pings are read within a read, which cannot be held up: too many of them are the end.
+  // Pings are handled within a read, which cannot be paused: too many close the connection.
   void count_control() {
     if (++controls_ != controls_a_second_max) return;
     asio::post(socket_.get_executor(), handler([this] { close(close_policy, "too many pings"); }));
@@ -273,7 +272,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     apply(session_.on_refused(message.error(), protocol::message_tag(text), now_us()));
   }
 
-  // Pongs to other pings, or to none, say nothing of a frame.
+  // Ignore pongs that do not acknowledge a frame.
   void on_pong(beast::string_view payload) {
     std::uint32_t seq = 0;
     const char* const end = payload.data() + payload.size();
@@ -287,16 +286,16 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     message_since_.reset();
   }
 
-  // It may have come between the fragments of a message, which goes on. Some of it may have been
-  // read with the message before, and is forgotten already.
+  // The control frame may have arrived between fragments of a message. Some of its bytes may have
+  // been read, and discounted, with the previous message.
   void heard_control(std::size_t payload_bytes) {
-    constexpr std::size_t head_bytes = 6;  // with the mask
+    constexpr std::size_t head_bytes = 6;  // header with mask
     control_bytes_ =
         std::min(control_bytes_ + head_bytes + payload_bytes, socket_.next_layer().bytes_read());
   }
 
-  // The layer above tells nothing of a message that never ends, in fragments of no length or byte
-  // by byte: look at what came over the wire since the last whole one, less pings and the like.
+  // The WebSocket layer reports nothing of a message that never ends, sent as empty fragments or
+  // byte by byte: count the bytes since the last complete message, less control frames.
   void watch_message() {
     if (watching_) return;
     watching_ = true;
@@ -305,12 +304,12 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       watching_ = false;
       controls_ = 0;
       if (fault || ended_) return;
-      if (*answer_lost_) return end_failed(*this, "an answer for it was lost");
+      if (*answer_lost_) return end_failed(*this, "a reply was lost");
       const std::size_t bytes = socket_.next_layer().bytes_read() - control_bytes_;
       if (bytes == 0) message_since_.reset();
       if (bytes > 0 && !message_since_) message_since_ = Clock::now();
       if (message_since_ && Clock::now() - *message_since_ > message_timeout) return abort();
-      if (bytes > wire_bytes_max) return close(close_too_big, "a message has no end");
+      if (bytes > wire_bytes_max) return close(close_too_big, "the message is too long");
       watch_message();
     }));
   }
@@ -342,7 +341,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     hold(frame_bytes());
   }
 
-  // The layer below sends it before what is written next.
+  // Sent by the layer below before the next write.
   void carry_out(session::Ping& effect) {
     if (pinging_ || !open_) return;
     pinging_ = true;
@@ -354,7 +353,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   void carry_out(session::Close& effect) { close(effect.code, effect.reason); }
 
   void carry_out(session::CancelRender& effect) {
-    if (owing_ && owing_->ticket == effect.ticket) begin_owing();  // to be answered
+    if (throttled_ && throttled_->ticket == effect.ticket) begin_throttled();  // to be answered
     viewer_.cancel(effect.ticket);
   }
 
@@ -362,23 +361,23 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   void carry_out(session::Calibrate& effect) { viewer_.start(effect); }
 
-  // An address that owes time or bytes gets its frames later, and none where that is long.
+  // A throttled address gets its frames later; a long delay closes the session.
   void carry_out(session::StartRender& effect) {
     const std::chrono::microseconds wait(services_.admission.throttle_delay(guest_.address));
     if (wait.count() == 0) return begin(effect);
-    if (wait > owing_max) {
-      return close(close_full, "this address has had more than it may have; try again in " +
+    if (wait > throttle_max) {
+      return close(close_full, "this address exceeded its quota; try again in " +
                                    std::to_string(wait / std::chrono::seconds(1)) + " s");
     }
-    owing_ = effect;
+    throttled_ = effect;
     pay_timer_.expires_after(wait);
     pay_timer_.async_wait(handler([this](ErrorCode fault) {
-      if (!fault && owing_) begin_owing();
+      if (!fault && throttled_) begin_throttled();
     }));
   }
 
-  void begin_owing() {
-    const auto effect = std::exchange(owing_, std::nullopt);
+  void begin_throttled() {
+    const auto effect = std::exchange(throttled_, std::nullopt);
     if (open_) begin(*effect);
   }
 
@@ -435,9 +434,9 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     written_since_ = now_us();
     write_timer_.expires_after(write_deadline(bytes, limits::write_timeout_s));
     write_timer_.async_wait(handler([this](ErrorCode fault) {
-      // One that came due as the last write ended is not this one's.
+      // The timer may expire just as the last write ends.
       if (fault || !writing_ || write_timer_.expiry() > Clock::now()) return;
-      log::info("viewer too slow", {{"session", id_}, {"request", request_id_}});
+      log::info("closing session: client too slow", {{"session", id_}, {"request", request_id_}});
       abort();
     }));
     socket_.text(is_text);
@@ -479,7 +478,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   // --- ends -------------------------------------------------------------------------------------
 
-  // Says goodbye, within a limit of time; texts that wait are not sent any more.
+  // Closes with a time limit; queued texts are dropped.
   void close(int code, const std::string& reason) {
     if (!open_) return;
     open_ = false;
@@ -489,14 +488,14 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     session_timer_.async_wait(handler([this](ErrorCode fault) {
       if (!fault) abort();
     }));
-    log::info("viewer is sent away",
+    log::info("closing session",
               {{"session", id_}, {"request", request_id_}, {"code", code}, {"reason", reason}});
     const websocket::close_reason goodbye(static_cast<websocket::close_code>(code), reason);
     socket_.async_close(goodbye, handler([this](ErrorCode) { abort(); }));
   }
 
   void end() {
-    if (open_) log::info("viewer went", {{"session", id_}, {"request", request_id_}});
+    if (open_) log::info("session disconnected", {{"session", id_}, {"request", request_id_}});
     abort();
   }
 
@@ -507,34 +506,34 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   Connections& connections_;
   const std::uint64_t id_;
   const Guest guest_;
-  const std::shared_ptr<const Token> token_;  // which it was let in by
+  const std::shared_ptr<const Token> token_;  // token that authorised it
   asio::steady_timer pay_timer_;
   asio::steady_timer session_timer_;
   asio::steady_timer write_timer_;
   asio::steady_timer message_timer_;
-  asio::steady_timer read_timer_;  // until what was read is paid
+  asio::steady_timer read_timer_;  // until the message quota allows reading
   Viewer viewer_;
   session::Session session_;
   beast::flat_buffer buffer_{limits::message_bytes_max + 1024};
-  std::size_t control_bytes_ = 0;                   // of control frames, since the last message
-  std::optional<Clock::time_point> message_since_;  // bytes came of a message not yet whole
+  std::size_t control_bytes_ = 0;                   // control frames since the last message
+  std::optional<Clock::time_point> message_since_;  // first bytes of an incomplete message
   std::deque<std::string> texts_;
   std::size_t waiting_text_bytes_ = 0;
-  std::optional<session::StartRender> owing_;  // begins when pay_timer_ says so
-  std::optional<Frame> frame_;  // the session gives the next one when this is written
+  std::optional<session::StartRender> throttled_;  // starts when pay_timer_ expires
+  std::optional<Frame> frame_;  // the session provides the next one after the write
   session::Micros written_since_ = 0;
   std::int64_t held_bytes_ = 0;  // of texts_ and frame_
   std::uint64_t counted_dropped_ = 0;
   std::uint64_t counted_cancelled_ = 0;
-  bool counted_ = false;  // as a session
-  // One could not be handed over.
+  bool counted_ = false;  // counted as a session
+  // A reply could not be posted to the io thread.
   const std::shared_ptr<std::atomic<bool>> answer_lost_ =
       std::make_shared<std::atomic<bool>>(false);
   bool owes_reading_ = false;
-  int controls_ = 0;  // since watch_message() looked
+  int controls_ = 0;  // since the last watch_message()
   bool full_ = false;
   bool open_ = false;   // accepted, and not closing
-  bool ended_ = false;  // the connection is gone
+  bool ended_ = false;  // disconnected
   bool reading_ = false;
   bool writing_ = false;
   bool pinging_ = false;

@@ -1,5 +1,5 @@
-// One viewer's WebSocket: messages -> session -> text and frames. Control messages go first; one
-// frame is under way at a time.
+// The WebSocket of one session: messages in, text and frames out. Control messages have priority;
+// one frame is written at a time.
 #pragma once
 
 #include <string>
@@ -10,16 +10,14 @@
 
 namespace windsplat::net {
 
-// Whose session it is: the address that it is charged to, and its places among connections and
-// sessions.
+// Client of the session: the address charged, and its places among connections and sessions.
 struct Guest {
   std::string address;
   Ticket connection;
   Ticket session;
 };
 
-// `request` is an upgrade that was let in (auth.hpp); `request_id` names it in the answer and the
-// log.
+// `request` is an authorised upgrade (auth.hpp); `request_id` names it in the response and the log.
 void start_websocket_session(Wire wire, UpgradeRequest request, std::string request_id,
                              Services& services, Connections& connections, Guest guest);
 

@@ -1,4 +1,4 @@
-// The TLS half of a connection: Asio's stream over the TCP stream that lies beside it.
+// Connection over TCP or TLS: Asio's TLS stream on top of the TCP stream.
 #include "server/transport/wire.hpp"
 
 #include <openssl/ssl.h>
@@ -16,12 +16,13 @@ struct Wire::Tls {
   Tls(TcpStream& tcp, std::shared_ptr<TlsContext> with)
       : context(std::move(with)), stream(tcp, context->context) {}
 
-  std::shared_ptr<TlsContext> context;  // outlived by no connection that was made with it
+  std::shared_ptr<TlsContext> context;  // must outlive all its connections
   asio::ssl::stream<TcpStream&> stream;
   std::unique_ptr<Record> record;
   std::size_t bytes_read = 0;
-  // An operation may wait for another's bytes by a timer of Asio's that closing the socket does not
-  // end: where that other one is lost for want of memory, it would wait, and keep its session.
+  // Asio makes an operation wait for another one by a timer that closing the socket does not end:
+  // if the other one is lost by an allocation failure, the waiting one would keep its session
+  // alive.
   asio::cancellation_signal stop_reading;
   asio::cancellation_signal stop_writing;
 };
@@ -41,7 +42,7 @@ void Wire::handshake(const HandshakeExecutor& executor, IoHandler done) {
 void Wire::forgo_tls() { tls_.reset(); }
 
 void Wire::say_goodbye(IoHandler done) {
-  // As if the peer had said the same already: else Asio waits for it to do so.
+  // Act as if the peer had sent close_notify: otherwise Asio waits for it.
   SSL_set_shutdown(tls_->stream.native_handle(), SSL_RECEIVED_SHUTDOWN);
   tls_->stream.async_shutdown(
       asio::bind_cancellation_slot(tls_->stop_writing.slot(), std::move(done)));

@@ -1,6 +1,5 @@
-// One connection's bytes, in plain TCP or in TLS: a single type, so that what is built on it (all
-// of Beast's HTTP and WebSocket) is compiled once. Only the files of those sessions may include
-// this.
+// The byte stream of one connection, over TCP or TLS. A single type, so that Beast's HTTP and
+// WebSocket templates are compiled once. Include in session sources only.
 #pragma once
 
 #include <array>
@@ -19,8 +18,7 @@
 
 namespace windsplat::net {
 
-// A completion handler whose type is forgotten, so that the TLS layer is compiled once for all of
-// them. Called once.
+// A type-erased completion handler, so that the TLS layer is compiled once. Called once.
 class IoHandler {
  public:
   template <class Handler, class = std::enable_if_t<!std::is_same_v<Handler, IoHandler>>>
@@ -43,7 +41,7 @@ class IoHandler {
     explicit Held(Handler given) : handler(std::move(given)) {}
     void call(std::unique_ptr<Anything> self, ErrorCode fault, std::size_t bytes) override {
       Handler own(std::move(handler));
-      self.reset();  // memory goes back before the call, as Asio has it
+      self.reset();  // release memory before the call, as Asio does
       own(fault, bytes);
     }
     Handler handler;
@@ -52,14 +50,14 @@ class IoHandler {
   std::unique_ptr<Anything> held_;
 };
 
-// An AsyncReadStream and AsyncWriteStream of Asio's, for completion handlers alone. One read and
-// one write may be under way at a time. What is pending lives on when it is moved.
+// An AsyncReadStream and AsyncWriteStream of Asio, for completion handlers only. One read and one
+// write may be pending at a time; they survive a move.
 class Wire {
  public:
   using executor_type = TcpStream::executor_type;
   using next_layer_type = TcpStream;
 
-  // `tls` null: plain TCP. Otherwise handshake() comes first.
+  // `tls` null: plain TCP. Otherwise call handshake() first.
   Wire(asio::ip::tcp::socket socket, std::shared_ptr<TlsContext> tls);
   ~Wire();
   Wire(Wire&&) noexcept;
@@ -70,17 +68,17 @@ class Wire {
   [[nodiscard]] const next_layer_type& next_layer() const { return *tcp_; }
   [[nodiscard]] bool secure() const { return tls_ != nullptr; }
 
-  // Its steps run by `executor`, and so must everything else that uses this until `done` is called;
-  // what makes it fail from another thread is shutdown() of the socket's descriptor.
+  // The handshake runs on `executor`; until `done` is called use this object there only. Another
+  // thread can abort it by shutdown() of the descriptor.
   void handshake(const HandshakeExecutor& executor, IoHandler done);
-  // Plain TCP from here on, after a handshake that failed.
+  // Falls back to plain TCP after a failed handshake.
   void forgo_tls();
-  // Tells the peer that nothing follows (close_notify). Done when that has been written, whatever
-  // the peer says to it; nothing may be written afterwards.
+  // Sends close_notify. Completes when it is written, without waiting for the peer's; write nothing
+  // afterwards.
   void say_goodbye(IoHandler done);
-  void close();  // everything under way ends with a fault
+  void close();  // pending operations end with an error
 
-  // What came of HTTP or WebSocket, without TLS's own bytes, since forget() was called last.
+  // HTTP or WebSocket bytes received since the last forget(), without TLS overhead.
   [[nodiscard]] std::size_t bytes_read() const;
   void forget();
 
@@ -105,8 +103,8 @@ class Wire {
   struct Tls;
 
   TcpStream& tcp() { return *tcp_; }
-  using Record = std::array<std::uint8_t, 16384>;  // what one of TLS holds
-  Record& record();                                // made when first wanted
+  using Record = std::array<std::uint8_t, 16384>;  // capacity of one TLS record
+  Record& record();                                // allocated on first use
   void read_tls(asio::mutable_buffer into, IoHandler done);
   void write_tls(asio::const_buffer from, IoHandler done);
 
@@ -118,7 +116,7 @@ class Wire {
     }
     return {};
   }
-  // Small pieces go into one record, and so into one packet: a frame's head with its picture.
+  // Gathers small buffers into one record, and so one packet: a frame's header with its picture.
   template <class Buffers>
   asio::const_buffer gathered(const Buffers& buffers) {
     const auto begin = asio::buffer_sequence_begin(buffers);
@@ -129,11 +127,11 @@ class Wire {
     return asio::buffer(record().data(), asio::buffer_copy(asio::buffer(record()), buffers));
   }
 
-  std::unique_ptr<TcpStream> tcp_;  // where it lies does not change: what is under way knows it
+  std::unique_ptr<TcpStream> tcp_;  // stable address: pending operations refer to it
   std::unique_ptr<Tls> tls_;
 };
 
-// Beast's end of a WebSocket's connection.
+// Teardown of a WebSocket connection, called by Beast.
 template <class Handler>
 void async_teardown(beast::role_type role, Wire& wire, Handler&& handler) {
   using beast::websocket::async_teardown;

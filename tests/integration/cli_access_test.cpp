@@ -157,7 +157,7 @@ TEST_F(CliAccess, HealthIsCheckedOverTlsByWhomItTrusts) {
       "https://localhost" + url.substr(std::string("https://127.0.0.1").size());
   const Outcome untrusted = run({"healthcheck", url});
   EXPECT_EQ(untrusted.code, 1) << "signed by nobody";
-  EXPECT_THAT(untrusted.err, HasSubstr("--ca names certificates to trust"));
+  EXPECT_THAT(untrusted.err, HasSubstr("use --ca to name certificates to trust"));
   EXPECT_EQ(run({"healthcheck", url, "--ca", folder.file("cert.pem")}).code, 0);
   EXPECT_EQ(run({"healthcheck", by_name}, {"WINDSPLAT_CA=" + folder.file("cert.pem")}).code, 0);
   write_file(folder.file("other.pem"), net_test::make_certificate("mine").chain);

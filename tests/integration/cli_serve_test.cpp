@@ -254,7 +254,7 @@ TEST_F(CliServe, ATakenPortIsAnErrorThatNamesIt) {
   EXPECT_EQ(outcome.code, 1);
   EXPECT_EQ(outcome.out, "");
   EXPECT_THAT(outcome.err, HasSubstr(port.text()));
-  EXPECT_THAT(outcome.err, HasSubstr("port 0 is any that is free"));
+  EXPECT_THAT(outcome.err, HasSubstr("use port 0 for any free port"));
 }
 
 TEST_F(CliServe, ADatasetThatCannotBeOpenedIsListedAsFailedAmongTheOthers) {

@@ -123,7 +123,7 @@ TEST_F(Logged, a_viewer_is_known_by_its_upgrade) {
   }
   std::vector<std::string> messages;
   for (const Json& line : lines_of("viewer-7")) messages.push_back(line["message"]);
-  EXPECT_THAT(messages, testing::ElementsAre("viewer came", "viewer went"));
+  EXPECT_THAT(messages, testing::ElementsAre("session opened", "session disconnected"));
 }
 
 TEST_F(Logged, says_neither_paths_nor_queries_nor_headers) {
