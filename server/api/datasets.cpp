@@ -1,4 +1,4 @@
-// Datasets that come and go: a posted path -> a job that opens it; eviction; the jobs themselves.
+// Opening datasets by a posted path in a job, removing them, and the jobs resource.
 #include <memory>
 #include <string>
 #include <utility>
@@ -28,7 +28,7 @@ Response open_in_job(Services& services, data::Location location) {
   return job_response(services, job);
 }
 
-// Names are looked up here; nothing is read yet.
+// Only resolves the name; reads nothing.
 Response locate_and_open(Services& services, const std::string& path) {
   const auto located = data::locate_beneath(services.options.data_root, path);
   if (located) return open_in_job(services, *located);
@@ -51,13 +51,13 @@ Response job_response(Services& services, const Result<protocol::JobDescription>
 void post_dataset(Services& services, const Request& request, Reply reply) {
   if (services.options.data_root.empty()) {
     reply(problem_response(403, "Forbidden",
-                           "this server opens no further files: it was started without "
+                           "opening files is disabled: start the server with "
                            "--data-root"));
     return;
   }
   if (!is_json(request.header("Content-Type"))) {
     reply(problem_response(415, "Unsupported Media Type",
-                           "a dataset is asked for by application/json: {\"path\": ...}"));
+                           "Content-Type must be application/json: {\"path\": ...}"));
     return;
   }
   auto path = protocol::parse_dataset_request(request.body);
@@ -79,12 +79,11 @@ Response delete_dataset(Services& services, const std::string& id, const Request
     return problem_response(make_error(ErrorKind::not_found, dataset.error().message));
   }
   if (forget && !services.backend.catalogue.is_opened_later(id)) {
-    return problem_response(403, "Forbidden",
-                            "only datasets that were opened by POST can be forgotten");
+    return problem_response(403, "Forbidden", "only datasets opened by POST can be deleted");
   }
   if (forget) {
     services.backend.catalogue.forget(
-        id);  // first, so that reads in work end with the right reason
+        id);  // first, so that reads in progress end with the right error
   } else {
     (*dataset)->evict();
   }

@@ -1,5 +1,5 @@
-// A posted view -> error against time of the settings that the server may choose for it. Nothing is
-// drawn or loaded.
+// Forecasts: error and time of the settings that the server may choose for a posted view. Draws and
+// loads nothing.
 #include <memory>
 #include <string>
 #include <utility>
@@ -24,13 +24,13 @@ Result<protocol::View> read_view(Services& services, const std::string& body) {
   }
   if (view.method.name == protocol::MethodName::reference) {
     return make_error_at(ErrorKind::invalid, "/method/name",
-                         "reference is drawn one way alone: there is nothing to choose from");
+                         "reference has a single setting; forecasts apply to kernel and slab");
   }
   if (const auto drawable = services.backend.check(view); !drawable) return drawable.error();
   return view;
 }
 
-// A view's defaults may hang on its fields' ranges.
+// Defaults of a view may depend on the ranges of its fields.
 Error naming_the_way_out(Error error) {
   if (error.kind == ErrorKind::not_resident) error.message += "; POST /v1/frames loads it";
   return error;
@@ -50,7 +50,7 @@ Result<protocol::ForecastDescription> forecast(quality::Tables& tables, const pr
 
 void post_forecast(Services& services, const Request& request, Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
-    reply(problem_response(415, "Unsupported Media Type", "a view is application/json"));
+    reply(problem_response(415, "Unsupported Media Type", "Content-Type must be application/json"));
     return;
   }
   auto view = read_view(services, request.body);
@@ -63,7 +63,7 @@ void post_forecast(Services& services, const Request& request, Reply reply) {
     reply(problem_response(dataset.error()));
     return;
   }
-  // Of no dataset: it reads none, and waits only where every thread that loads is busy.
+  // No dataset id: the job reads none, so it waits only while all loading threads are busy.
   run_later(services.backend.loads, request, std::move(reply), "a forecast", nullptr,
             [&services, view = std::move(*view), dataset = *dataset]() -> Response {
               const auto made = forecast(services.backend.quality, view, dataset->resident_only());

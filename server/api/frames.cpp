@@ -1,4 +1,5 @@
-// Pictures: a query or a posted view -> a job of the renderer -> encoded bytes with their report.
+// Pictures: a query or a posted view becomes a render job; the response has the encoded picture and
+// its report.
 #include <array>
 #include <functional>
 #include <utility>
@@ -32,14 +33,14 @@ struct Orbit {
   double zoom = 1;
 };
 
-// What is to be drawn, checked as far as that goes without loading.
+// The request, validated as far as possible without loading data.
 struct Picture {
   protocol::View view;
   frame::Encoding encoding;
   std::string preset;  // empty: none
   std::optional<Orbit> orbit;
   std::string if_none_match;
-  frame::Cost cost;  // of the view before preset and orbit, which move the camera alone
+  frame::Cost cost;  // of the view before preset and orbit, which change only the camera
 };
 
 std::string_view media_type(frame::Format format) {
@@ -60,7 +61,7 @@ std::string milliseconds(std::int64_t us) {
   return text.data();
 }
 
-// Headers are ASCII: other characters become the escapes that JSON has for them.
+// Headers are ASCII: other characters are escaped as in JSON.
 std::string ascii_json(std::string_view json) {
   std::string out;
   for (std::size_t i = 0; i < json.size();) {
@@ -88,7 +89,7 @@ std::string ascii_json(std::string_view json) {
   return out;
 }
 
-// Everything that the bytes of a picture follow from.
+// All inputs that determine the bytes of a picture.
 std::string picture_etag(const protocol::View& view, const data::Dataset& dataset,
                          const frame::Encoding& encoding) {
   return etag_of(protocol::encode_view(view) + '\n' + dataset.info().digest + '\n' +
@@ -114,7 +115,8 @@ Result<protocol::View> resolve(const Picture& picture, data::Dataset& dataset) {
   return scene::complete_view(*view, dataset);
 }
 
-// Within a budget or an error the server may choose, and the picture is not the view's alone.
+// With a budget or an error limit the server chooses settings, and the picture depends on more than
+// the view.
 bool is_chosen(const protocol::View& view) {
   return view.quality.budget_ms || view.quality.max_error;
 }
@@ -140,7 +142,7 @@ frame::Encoding encoding_at(frame::Encoding encoding, const quality::Setting& se
   return encoding;
 }
 
-// What a picture is loaded for, so that it is drawn as that even where more is known by then.
+// The view used for loading is also used for drawing, even if more data is known by then.
 using LoadedFor = std::optional<quality::Setting>;
 
 Result<std::shared_ptr<const void>> load(Services& services, const Picture& picture,
@@ -186,7 +188,7 @@ Result<Response> draw(Services& services, const Picture& picture, data::Dataset&
   services.metrics.stage_took(Metrics::Stage::queue, queue_us);
   services.metrics.stage_took(Metrics::Stage::render, drawn->render_us);
   services.metrics.stage_took(Metrics::Stage::encode, drawn->encode_us);
-  // What the server chooses is drawn at less work than was reckoned.
+  // Settings chosen by the server reduce the work below the estimate.
   if (!is_chosen(*view)) {
     services.backend.costs.learn(view->dataset, view->method.name, picture.cost.kernels,
                                  drawn->render_us + drawn->encode_us);
@@ -198,7 +200,7 @@ Result<Response> draw(Services& services, const Picture& picture, data::Dataset&
                                     ", encode;dur=" + milliseconds(drawn->encode_us));
   response.headers.emplace_back("Windsplat-Frame", ascii_json(protocol::encode_frame_info(info)));
   response.headers.emplace_back("Vary", "Accept");
-  // A picture is meant for any page's <img>; its pixels stay out of that page's reach.
+  // Other sites may embed a picture by <img>, but not read its pixels.
   response.headers.emplace_back("Cross-Origin-Resource-Policy", "cross-origin");
   response.body = Body::of(std::move(drawn->bytes));
   return response;
@@ -220,7 +222,7 @@ void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dat
   const auto picture = std::make_shared<const Picture>(std::move(asked));
   const auto answer = std::make_shared<const Reply>(std::move(reply));
   const CancelToken cancel = request.cancel;
-  // Pictures of one address take turns with those of others, however many connections it has.
+  // Addresses take turns, however many connections each has.
   const std::uint64_t owner =
       request.address.empty() ? request.peer : std::hash<std::string>{}(request.address);
   Drawing drawing{
@@ -250,7 +252,7 @@ void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dat
 
 // --- GET /v1/datasets/{id}/frame.* --------------------------------------------------------------
 
-// Numbers go into the view as they were written, so that its reader names what is out of range.
+// Numbers are copied as text, so that errors of the view parser quote them.
 std::string view_json(const std::optional<std::string>& step,
                       const std::optional<std::string>& width,
                       const std::optional<std::string>& height) {
@@ -345,13 +347,13 @@ void post_frame(Services& services, const Request& request, Reply reply) {
                                                  frame::Format::npy};
   constexpr std::array<std::string_view, 3> types{"image/jpeg", "image/png", "application/x-npy"};
   if (!is_json(request.header("Content-Type"))) {
-    reply(problem_response(415, "Unsupported Media Type", "a view is application/json"));
+    reply(problem_response(415, "Unsupported Media Type", "Content-Type must be application/json"));
     return;
   }
   const auto type = choose_type(request.header("Accept"), types);
   if (!type) {
     reply(problem_response(406, "Not Acceptable",
-                           "pictures are image/jpeg, image/png or application/x-npy"));
+                           "Accept must allow image/jpeg, image/png or application/x-npy"));
     return;
   }
   auto picture = read_view(request, formats[*type]);

@@ -1,5 +1,5 @@
-// Questions about a dataset's values: a query -> a job of the loads -> JSON. What
-// goes over all steps is cut into short jobs, so that pictures are drawn in between.
+// Queries of a dataset's values run as load jobs and return JSON. A pass over all steps is split
+// into short jobs, so that pictures are drawn in between.
 #include "protocol/measurements.hpp"
 
 #include <array>
@@ -27,9 +27,10 @@ using Clock = std::chrono::steady_clock;
 using DatasetPtr = std::shared_ptr<data::Dataset>;
 
 constexpr int histogram_bins = 64;
-constexpr std::chrono::milliseconds turn_budget{30};  // of steps read before others have their turn
+constexpr std::chrono::milliseconds turn_budget{
+    30};  // for reading steps before yielding to other jobs
 
-// What a question is about, found before anything is loaded.
+// Dataset and field of a query, resolved before loading.
 struct Subject {
   Catalogue* catalogue = nullptr;
   DatasetPtr dataset;
@@ -97,19 +98,19 @@ protocol::ProbedField describe(const data::FieldInfo& field) {
 
 // --- over all steps -----------------------------------------------------------------------------
 
-// One pass over the steps of a field, some of them a turn.
+// One pass over the steps of a field, several per job.
 struct Pass {
   Subject subject;
   CancelToken cancel;
   std::string payer;
   std::shared_ptr<Reply> reply;
-  std::function<Result<void>()> begin;            // before the first step; may be empty
-  std::function<void(const data::Volume&)> take;  // one step after the other
+  std::function<Result<void>()> begin;            // called before the first step; may be empty
+  std::function<void(const data::Volume&)> take;  // called for each step
   std::function<Response()> finish;
   std::size_t next_step = 0;
 };
 
-// The answer, or none when there are steps left after this turn.
+// The response, or none if steps remain.
 Result<std::optional<Response>> take_turn(Pass& pass) {
   const std::size_t steps = pass.subject.dataset->info().steps.size();
   const auto until = Clock::now() + turn_budget;
@@ -118,7 +119,7 @@ Result<std::optional<Response>> take_turn(Pass& pass) {
   }
   while (pass.next_step < steps) {
     if (pass.cancel.cancelled()) {
-      return make_error(ErrorKind::cancelled, "nobody waits for the answer");
+      return make_error(ErrorKind::cancelled, "request cancelled");
     }
     const auto volume = load(pass.subject, pass.next_step);
     if (!volume) return volume.error();
@@ -130,7 +131,7 @@ Result<std::optional<Response>> take_turn(Pass& pass) {
   return std::optional(pass.finish());
 }
 
-// A turn after the other, so that others' loads come between. Only the first may be refused.
+// Resubmits itself, so that other loads run in between. Only the first job may be refused.
 void go_on(Services& services, const std::shared_ptr<Pass>& pass, bool admitted) {
   const auto run = [&services, pass] {
     auto answer = run_guarded<std::optional<Response>>("a pass over all steps", pass->cancel,
@@ -178,7 +179,7 @@ Result<HistogramQuery> read_histogram(const Request& request, const data::Datase
   if (const auto ok = query.finish(); !ok) return ok.error();
   out.request.clip = clip.value_or(0);
   if (out.request.range && clip) {
-    return make_error(ErrorKind::invalid, "the query says either 'range' or 'clip'");
+    return make_error(ErrorKind::invalid, "query parameters 'range' and 'clip' exclude each other");
   }
   return out;
 }
@@ -213,7 +214,7 @@ Response probe_response(Catalogue& catalogue, data::Dataset& dataset,
   out.step = step;
   for (const data::FieldInfo& field : info.fields) {
     if (cancel.cancelled()) {
-      return problem_response(make_error(ErrorKind::cancelled, "nobody waits for the answer"));
+      return problem_response(make_error(ErrorKind::cancelled, "request cancelled"));
     }
     const auto volume =
         load(catalogue, dataset, field.name, static_cast<std::size_t>(step), cancel);
@@ -309,7 +310,7 @@ void get_series(Services& services, const std::string& id, const std::string& fi
   for (const data::TimeStep& step : info.steps) series->times.push_back({step.value, step.text});
   const auto pass = pass_over(std::move(*subject), request, std::move(reply));
   const auto place = std::make_shared<std::optional<data::Place>>();
-  // The place is looked for on a loading thread: among many columns that takes a while.
+  // Locating the position is slow among many columns, so it runs on a loading thread.
   pass->begin = [at, series, place, grid = &info.grid]() -> Result<void> {
     const auto found = data::nearest_sample(*grid, at);
     if (!found) return found.error();
@@ -335,7 +336,7 @@ void get_range(Services& services, const std::string& id, const std::string& fie
   if (const auto ok = query.finish(); !ok) return refuse(ok.error());
   if (of != "step" && of != "all") {
     return refuse(make_error(ErrorKind::invalid,
-                             "the query's 'of' is step or all, not " + printable(of, 40)));
+                             "query parameter 'of' must be step or all, not " + printable(of, 40)));
   }
   if (of == "step") {
     run_later(services.backend.loads, request, std::move(reply), "a range", subject->dataset.get(),
@@ -344,7 +345,8 @@ void get_range(Services& services, const std::string& id, const std::string& fie
               });
     return;
   }
-  if (step) return refuse(make_error(ErrorKind::invalid, "a range of all steps has no 'step'"));
+  if (step)
+    return refuse(make_error(ErrorKind::invalid, "query parameter 'step' requires of=step"));
   if (const auto ok = check_steps(subject->dataset->info()); !ok) return refuse(ok.error());
   answer_range_of_all(services, std::move(*subject), request, std::move(reply));
 }

@@ -1,4 +1,4 @@
-// The embedded page: gzip as it lies in the binary, or inflated for clients that do not take gzip.
+// Serves the embedded page: gzip as embedded, or inflated for clients that do not accept gzip.
 #include <boost/beast/core/buffers_range.hpp>
 #include <boost/beast/zlib/inflate_stream.hpp>
 #include <map>
@@ -22,7 +22,7 @@ std::string_view as_text(std::span<const std::uint8_t> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-// Where the deflated data begins (RFC 1952, 2.3).
+// Offset of the deflated data (RFC 1952, 2.3).
 std::size_t gzip_header_bytes(std::span<const std::uint8_t> gzip) {
   constexpr std::size_t fixed = 10;
   WINDSPLAT_CHECK(gzip.size() > fixed && gzip[0] == 0x1f && gzip[1] == 0x8b);
@@ -62,7 +62,7 @@ std::string inflated(std::span<const std::uint8_t> gzip) {
   return out;
 }
 
-// Made once for each file: of a binary there are a few hundred kilobytes.
+// Cached for each file: a few hundred kilobytes in total.
 Body inflated_once(const WebAsset& asset) {
   static std::mutex mutex;
   static std::map<std::string, Body, std::less<>> made;
@@ -88,13 +88,13 @@ Response get_page(const Request& request, const std::string& path) {
   WINDSPLAT_CHECK(asset != nullptr);
   const bool gzip = accepts_gzip(request.header("Accept-Encoding"));
   std::string etag = etag_of(as_text(asset->gzip));
-  // One tag a representation (RFC 9110, 8.8.3.3).
+  // One tag per representation (RFC 9110, 8.8.3.3).
   if (gzip) etag.insert(etag.size() - 1, "-gzip");
   Response response;
   response.headers = {{"Cache-Control", asset->immutable ? immutable_policy : "no-cache"},
                       {"ETag", etag},
                       {"Vary", "Accept-Encoding"},
-                      // With a 304 too: its headers take the place of those the browser kept.
+                      // Also sent with a 304, where they replace the cached headers.
                       {"Content-Security-Policy", page_policy},
                       {"Cross-Origin-Opener-Policy", "same-origin"}};
   if (matches_etag(request.header("If-None-Match"), etag)) {

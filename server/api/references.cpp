@@ -1,4 +1,4 @@
-// References: a posted view -> a job that draws it; the pictures that are kept -> PNG.
+// References: a posted view becomes a job that draws it; cached pictures are served as PNG.
 #include <string>
 #include <utility>
 
@@ -23,13 +23,13 @@ Result<protocol::View> read_view(Services& services, const Request& request) {
   }
   if (view.method.name == protocol::MethodName::reference) {
     return make_error_at(ErrorKind::invalid, "/method/name",
-                         "is the method that the reference is compared with: kernel or slab");
+                         "must be the method to compare with the reference: kernel or slab");
   }
   const auto pixels =
       static_cast<std::size_t>(view.image.width) * static_cast<std::size_t>(view.image.height);
   if (pixels > retained_pixels) {
     std::string detail = "a reference has at most " + std::to_string(retained_pixels);
-    detail += " pixels: draw larger ones with `windsplat render`";
+    detail += " pixels: use `windsplat render`";
     return make_error_at(ErrorKind::too_large, "/image", std::move(detail));
   }
   if (const auto drawable = services.backend.check(view); !drawable) return drawable.error();
@@ -41,7 +41,8 @@ Result<protocol::View> read_view(Services& services, const Request& request) {
 void post_reference(Services& services, const Request& request, Reply reply) {
   const Reply answer = std::move(reply);
   if (!is_json(request.header("Content-Type"))) {
-    answer(problem_response(415, "Unsupported Media Type", "a view is application/json"));
+    answer(
+        problem_response(415, "Unsupported Media Type", "Content-Type must be application/json"));
     return;
   }
   auto view = read_view(services, request);
@@ -62,15 +63,14 @@ void post_reference(Services& services, const Request& request, Reply reply) {
   answer(job_response(services, services.backend.jobs.submit("reference", work, terms)));
 }
 
-// What the id names never changes.
+// The content of an id never changes.
 Response get_reference(Services& services, const std::string& name, const Request& request) {
   const bool is_png = name.size() > suffix.size() && name.ends_with(suffix);
   const std::string id = is_png ? name.substr(0, name.size() - suffix.size()) : "";
   const auto kept = services.backend.references.find(id);
   if (!kept) {
     return problem_response(
-        make_error(ErrorKind::not_found,
-                   "there is no such reference, or it is no longer kept: post its view"));
+        make_error(ErrorKind::not_found, "unknown or expired reference: post its view again"));
   }
   Response response;
   const std::string etag = '"' + id + '"';

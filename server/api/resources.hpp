@@ -1,5 +1,4 @@
-// The resources behind the router: what a GET, POST or DELETE of each answers. Paths and methods
-// are checked before.
+// Handlers of the API resources. The router has checked path and method.
 #pragma once
 
 #include <functional>
@@ -21,8 +20,8 @@ Response get_livez();
 Response get_readyz(const Services& services);
 Response get_metrics(const Services& services);
 
-// Runs `make` on a thread of the service's and answers with what it makes, or with why it could
-// not. `what` names the work in the log; `of`: the dataset it reads, if any.
+// Runs `make` on a thread of the service and replies with its value or error. `what` names the work
+// in the log; `of`: the dataset that it reads, if any.
 void run_later(LoadService& service, const Request& request, Reply reply, const char* what,
                const data::Dataset* of, std::function<Response()> make);
 bool is_json(std::string_view content_type);
@@ -31,10 +30,10 @@ bool is_merge_patch(std::string_view content_type);
 Response get_datasets(const Services& services);
 void get_dataset(Services& services, const std::string& id, const Request& request, Reply reply);
 
-// Below a path that --data-root names; opened by a job.
+// Opens a file below a root given by --data-root, in a job.
 void post_dataset(Services& services, const Request& request, Reply reply);
 Response delete_dataset(Services& services, const std::string& id, const Request& request);
-// 202 and where it is, or why there is none.
+// 202 with the location of the job, or the error.
 Response job_response(Services& services, const Result<protocol::JobDescription>& job);
 Response get_jobs(const Services& services);
 Response get_job(const Services& services, const std::string& id);
@@ -53,10 +52,10 @@ void get_frame(Services& services, const std::string& id, frame::Format format,
                const Request& request, Reply reply);
 void post_frame(Services& services, const Request& request, Reply reply);
 
-// The truth of a view: drawn by a job, kept for a while.
+// The reference of a view: drawn by a job, then cached.
 void post_reference(Services& services, const Request& request, Reply reply);
 Response get_reference(Services& services, const std::string& name, const Request& request);
-// What a picture of a posted view is expected to take and to err.
+// Estimated time and error of a picture of a posted view.
 void post_forecast(Services& services, const Request& request, Reply reply);
 
 void post_saved_view(Services& services, const Request& request, Reply reply);
@@ -69,12 +68,12 @@ void delete_view(Services& services, const std::string& id, const Request& reque
 bool has_page(const std::string& path);
 Response get_page(const Request& request, const std::string& path);
 
-// A JSON document.
+// A JSON response.
 Response json_response(std::string json);
-// The same with a strong ETag of its content; 304 where the client has it.
+// The same with a strong ETag of its content; 304 if the client has it.
 Response tagged_response(const Request& request, std::string_view content_type,
                          std::string_view content);
-// 128 bits of digest, quoted.
+// Digest of 128 bits, in quotes.
 std::string etag_of(std::string_view text);
 
 }  // namespace windsplat::net

@@ -1,4 +1,4 @@
-// Decoded path and method -> resource; what fits no resource is answered here.
+// Dispatches by path segments and method; replies to unknown paths and methods.
 #include "server/api/router.hpp"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 
 using Handler = std::function<void(const Request&, Reply)>;
 
-// A resource that was found: how it answers each method, where it does.
+// A matched resource with its handlers by method.
 struct Resource {
   const char* name = route_other;  // one of route_names
   Handler get = nullptr;           // HEAD too
@@ -62,7 +62,7 @@ Handler later(Services& services, void (*answer)(Services&, const Request&, Repl
   };
 }
 
-// What is read and reckoned for an address whose pictures would be refused is refused as well.
+// Cheap queries are refused to the same addresses as pictures.
 Handler require_quota(Services& services, Handler handler) {
   return [&services, handler = std::move(handler)](const Request& request, Reply reply) {
     auto refusal = services.admission.picture(request.address);
@@ -185,8 +185,7 @@ Resource view_resource(Services& services, const std::string& id) {
   return view;
 }
 
-// What a view is posted to. Those that are kept are not listed: whoever knows an id may change its
-// view.
+// Saved views are not listed: knowledge of an id grants write access.
 std::optional<Resource> find_posted(Services& services, const std::string& name) {
   struct Kind {
     std::string_view last;
@@ -228,8 +227,8 @@ std::optional<Resource> find_api(Services& services, const Segments& path) {
   }
   if (name == "stream") {
     return at_once(route_stream, [](const Request&) {
-      Response response =
-          problem_response(426, "Upgrade Required", "this is a WebSocket: connect to it as one");
+      Response response = problem_response(426, "Upgrade Required",
+                                           "this resource is a WebSocket: send an upgrade request");
       response.headers.emplace_back("Upgrade", "websocket");
       return response;
     });
@@ -241,7 +240,7 @@ std::optional<Resource> find_page(const Segments& path) {
   std::string name;
   for (const std::string& segment : path) name += (name.empty() ? "" : "/") + segment;
   if (!has_page(name)) return std::nullopt;
-  // A link to the page may bear a query that is none of ours.
+  // Links to the page may have query parameters added by other sites.
   Resource page{route_page};
   page.get = now([name](const Request& request) { return get_page(request, name); });
   page.takes_query = true;
@@ -262,12 +261,12 @@ std::optional<Resource> find_resource(Services& services, const Request& request
 
 Response method_not_allowed(const std::string& method, const std::string& allow) {
   Response response = problem_response(405, "Method Not Allowed",
-                                       method + " does nothing here; what does is " + allow);
+                                       method + " is not allowed here; allowed methods: " + allow);
   response.headers.emplace_back("Allow", allow);
   return response;
 }
 
-// "/a" for a page at "/a/": its relative links need the slash.
+// Redirects "/a" to "/a/": relative links of the page need the slash.
 bool lacks_slash(const Services& services, const Request& request) {
   return request.below_base && request.path.empty() && !request.ends_in_slash &&
          services.options.base_path != "/";
@@ -280,7 +279,7 @@ void answer(Services& services, const Request& request, const std::optional<Reso
     return;
   }
   if (!resource) {
-    reply(problem_response(make_error(ErrorKind::not_found, "there is nothing at this path")));
+    reply(problem_response(make_error(ErrorKind::not_found, "unknown path")));
     return;
   }
   const std::string allow = resource->allow();

@@ -1,5 +1,4 @@
-// Request -> the resource it names. Resources answer at once or, after a job of the renderer,
-// later.
+// Maps requests to resources. Resources reply at once or, after a render job, later.
 #pragma once
 
 #include "server/api/services.hpp"
@@ -7,13 +6,13 @@
 
 namespace windsplat::net {
 
-// Whether the path is one that is answered however much there is to do: /livez, /readyz, /metrics.
+// Whether the path is answered under any load: /livez, /readyz, /metrics.
 bool names_health(const Request& request);
-// Whether the path is the stream's.
+// Whether the path is that of the stream.
 bool names_stream(const Request& request);
 
-// Calls `reply` once: now, or later from the renderer's thread. Never throws past a reply. The
-// value is the resource's name (routes.hpp).
+// Calls `reply` once: now, or later from the renderer's thread. Does not throw after the reply.
+// Returns the route name (routes.hpp).
 const char* route(Services& services, const Request& request, const Reply& reply);
 
 }  // namespace windsplat::net

@@ -1,12 +1,11 @@
-// The names that log lines and metrics have for the resources: a bounded set, whatever is asked
-// for.
+// Names of the routes in log lines and metrics: a bounded set.
 #pragma once
 
 #include <array>
 
 namespace windsplat::net {
 
-inline constexpr const char* route_other = "other";  // nothing is there, or it was not understood
+inline constexpr const char* route_other = "other";  // unknown or unparsed path
 inline constexpr const char* route_page = "page";
 inline constexpr const char* route_login = "/login";
 inline constexpr const char* route_stream = "/v1/stream";

@@ -1,4 +1,4 @@
-// What the daemon's network side is started with.
+// Options of the daemon's network side.
 #pragma once
 
 #include <chrono>
@@ -17,26 +17,26 @@ struct TlsContext;
 
 struct ServerOptions {
   std::string address = "127.0.0.1";
-  std::uint16_t port = 8080;  // 0: any free port; port() tells which
+  std::uint16_t port = 8080;  // 0: any free port, returned by port()
   std::string base_path = "/";
-  // Answer only requests whose Host is a loopback name or the host of an allowed origin: a web page
-  // whose name was made to resolve to this machine then gets nothing.
+  // Answer only requests whose Host is a loopback name or the host of an allowed origin, as a
+  // protection against DNS rebinding.
   bool local_hosts_only = false;
-  // The same where others reach the server, by its addresses, too.
+  // Allow IP addresses as Host, too, when other machines reach the server.
   bool known_hosts_only = false;
-  std::vector<std::string> allow_hosts;  // further names for both, without a port
+  std::vector<std::string> allow_hosts;  // further names for both, without port
   // The folder below which POST /v1/datasets opens files, absolute; empty: none.
   std::string data_root;
-  std::shared_ptr<views::SavedViews> views;  // null: kept in memory alone
+  std::shared_ptr<views::SavedViews> views;  // null: in memory only
   int sessions_max = 64;
   Limits limits;
   int idle_timeout_s = 300;
-  // Further requests for pictures are refused while those that wait will take longer than this.
+  // Limit on the waiting time of requests for pictures, milliseconds; further ones are refused.
   double requests_waiting_ms_max = 30'000;
-  std::vector<std::string> allow_origins;  // beyond the server's own
-  std::shared_ptr<const Token> token;      // null: nobody is asked for one
+  std::vector<std::string> allow_origins;  // besides the server's own
+  std::shared_ptr<const Token> token;      // null: no authentication
   std::shared_ptr<TlsContext> tls;         // null: plain TCP
-  // Of a drain: when what is still drawn is given up, and when connections are ended.
+  // Phases of a drain: when rendering is cancelled, and when connections are closed.
   std::chrono::milliseconds drain_cancel_after{6000};
   std::chrono::milliseconds drain_abort_after{8000};
 };

@@ -1,4 +1,4 @@
-// The service itself: what it is, whether it lives, and what it offers by name.
+// Service index, health, metrics, colormaps and presets.
 #include <memory>
 #include <utility>
 
@@ -59,7 +59,7 @@ void run_later(LoadService& service, const Request& request, Reply reply, const 
 
 std::string etag_of(std::string_view text) {
   const std::string first = data::digest_of(text);
-  // The second half goes on from the first, so that the two do not fail together.
+  // The second half is computed from the first, so that both do not collide together.
   return '"' + first + data::digest_of(first + std::string(text)) + '"';
 }
 

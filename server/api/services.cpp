@@ -1,4 +1,4 @@
-// The members in the order in which they need each other.
+// Members are declared in order of dependency.
 #include "server/api/services.hpp"
 
 #include <utility>
@@ -9,7 +9,7 @@
 namespace windsplat::net {
 namespace {
 
-constexpr std::size_t view_changes_waiting_max = 64;  // each takes the time of a disk's sync
+constexpr std::size_t view_changes_waiting_max = 64;  // each may take one disk sync
 
 }  // namespace
 
@@ -25,13 +25,13 @@ Services::Services(ServerOptions server_options, std::shared_ptr<data::Store> st
            [this](const frame::Cost& cost) { return admission.check(cost); }}),
       locator(1, Backend::requests_waiting_max, "files to open"),
       view_io(1, view_changes_waiting_max, "changes of saved views"),
-      file_watch(1, 1, "looks at files") {
+      file_watch(1, 1, "file checks") {
   options.base_path = normal_base_path(options.base_path);
   if (options.views == nullptr) options.views = views::SavedViews::open({}).value();
 }
 
 void Services::end() {
-  locator.end();  // it submits jobs
+  locator.end();  // submits jobs
   backend.end();
   file_watch.end();
   view_io.end();

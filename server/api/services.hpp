@@ -1,4 +1,4 @@
-// What the resources of the API work with.
+// Shared services of the API resources.
 #pragma once
 
 #include <atomic>
@@ -12,7 +12,7 @@
 
 namespace windsplat::net {
 
-// Lives as long as the server.
+// Outlives all connections; owned by the server.
 struct Services {
   Services(ServerOptions server_options, std::shared_ptr<data::Store> store,
            std::shared_ptr<ThreadPool> threads);
@@ -20,18 +20,18 @@ struct Services {
   Services(const Services&) = delete;
   Services& operator=(const Services&) = delete;
 
-  // Ends the threads that answer: after it no reply is called any more.
+  // Ends the service threads: no reply is called after it returns.
   void end();
 
-  ServerOptions options;  // base_path normal
-  Metrics metrics;        // before whatever counts
+  ServerOptions options;  // base_path normalised
+  Metrics metrics;        // before the members that count
   Admission admission;
-  RequestIds request_ids;  // of the io thread alone
+  RequestIds request_ids;  // used by the io thread only
   std::atomic<bool> draining{false};
   Backend backend;
-  LoadService locator;     // looks up posted names: a slow disk keeps no one else waiting
-  LoadService view_io;     // changes saved views, on disk too
-  LoadService file_watch;  // looks for files that changed, and opens them anew
+  LoadService locator;     // resolves posted names: a slow disk delays no other service
+  LoadService view_io;     // changes saved views, also on disk
+  LoadService file_watch;  // checks files for changes and reopens them
 };
 
 }  // namespace windsplat::net

@@ -1,5 +1,5 @@
-// Saved views: a posted view -> a short id; its document back, changed or removed. What changes
-// views runs on a thread of its own, for it may wait for a disk.
+// Saved views: create, read, change and delete. Changes run on a thread of their own, since they
+// may wait for a disk.
 #include <array>
 #include <ctime>
 #include <functional>
@@ -40,8 +40,7 @@ Response saved_response(const Services& services, const SavedView& saved) {
   return response;
 }
 
-// Whether a view is the one that a request's If-Match names, where it has one, and none of those of
-// its If-None-Match (RFC 9110, 13.1).
+// Whether the saved view satisfies If-Match and If-None-Match (RFC 9110, 13.1).
 struct Unchanged {
   Unchanged(const Services& of, const Request& request)
       : services(of),
@@ -59,8 +58,9 @@ struct Unchanged {
 };
 
 Response changed_meanwhile() {
-  return problem_response(412, "Precondition Failed",
-                          "the view is not the one that If-Match or If-None-Match asks for");
+  return problem_response(
+      412, "Precondition Failed",
+      "the saved view does not satisfy If-Match or If-None-Match; read it again");
 }
 
 void replace_later(Services& services, const std::string& id, const Request& request, Reply reply,
@@ -77,7 +77,7 @@ void replace_later(Services& services, const std::string& id, const Request& req
 
 void post_saved_view(Services& services, const Request& request, Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
-    reply(problem_response(415, "Unsupported Media Type", "a view is application/json"));
+    reply(problem_response(415, "Unsupported Media Type", "Content-Type must be application/json"));
     return;
   }
   auto view = ViewDocument::parse(request.body);
@@ -105,7 +105,7 @@ Response get_view(const Services& services, const std::string& id, const Request
 
 void put_view(Services& services, const std::string& id, const Request& request, Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
-    reply(problem_response(415, "Unsupported Media Type", "a view is application/json"));
+    reply(problem_response(415, "Unsupported Media Type", "Content-Type must be application/json"));
     return;
   }
   auto view = ViewDocument::parse(request.body);
@@ -121,7 +121,7 @@ void patch_view(Services& services, const std::string& id, const Request& reques
   const std::string type = request.header("Content-Type");
   if (!is_json(type) && !is_merge_patch(type)) {
     Response response = problem_response(415, "Unsupported Media Type",
-                                         "a change of a view is application/merge-patch+json");
+                                         "Content-Type must be application/merge-patch+json");
     response.headers.emplace_back("Accept-Patch", "application/merge-patch+json, application/json");
     reply(std::move(response));
     return;

@@ -1,4 +1,4 @@
-// Header lookups of a request; a response's status line and headers as text.
+// Header lookup of requests; serialisation of status line and headers.
 #include "server/http/exchange.hpp"
 
 #include <array>
@@ -79,7 +79,7 @@ std::string_view reason(int status) {
   }
 }
 
-// IMF-fixdate; names are spelled here so that no locale changes them.
+// IMF-fixdate; names are literal so that the locale does not matter.
 std::string http_date(std::time_t time) {
   constexpr std::array<const char*, 7> days{"Sun", "Mon", "Tue", "Wed", "Thu", "Fri", "Sat"};
   constexpr std::array<const char*, 12> months{"Jan", "Feb", "Mar", "Apr", "May", "Jun",
@@ -168,7 +168,7 @@ std::string response_head(const Response& response, bool keep_alive) {
   add("Date", http_date(std::time(nullptr)));
   for (const auto& [name, value] : response.headers) add(name, value);
   if (!response.content_type.empty()) add("Content-Type", response.content_type);
-  // RFC 9110, 8.6: neither of these has a length.
+  // RFC 9110, 8.6: neither has a Content-Length.
   if (response.status != 204 && response.status != 304) {
     add("Content-Length", std::to_string(response.body.bytes.size()));
   }

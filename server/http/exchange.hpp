@@ -1,5 +1,5 @@
-// One HTTP exchange as plain values: what the edge has parsed and checked, and what is to be
-// answered. Nothing here knows the HTTP library.
+// One HTTP exchange as plain values: the parsed and checked request, and the response. Independent
+// of the HTTP library.
 #pragma once
 
 #include <cstdint>
@@ -21,21 +21,21 @@ using Parameters = std::vector<std::pair<std::string, std::string>>;
 struct Request {
   std::string method;             // "GET"
   std::vector<std::string> path;  // decoded segments below the base path; a last "" is left out
-  bool below_base = true;         // false: the path is not below the base path, `path` is all of it
+  bool below_base = true;         // false: `path` is the whole path
   bool ends_in_slash = false;
   Parameters query;  // decoded, in order
-  Headers headers;   // in order, as received
+  Headers headers;   // in order received
   std::string body;
-  CancelToken cancel;      // raised when the client has gone
-  std::uint64_t peer = 0;  // number of the connection
-  std::string address;     // of its other end, without the port; empty: unknown
-  std::string id;          // in the answer and in the log (request_id.hpp)
+  CancelToken cancel;      // raised when the client disconnects
+  std::uint64_t peer = 0;  // connection id
+  std::string address;     // of the client, without port; empty: unknown
+  std::string id;          // sent with the response and logged (request_id.hpp)
 
-  // The header's values, in order, joined by ", "; names are compared without case.
+  // All values of the header in order, joined by ", "; names are case-insensitive.
   [[nodiscard]] std::string header(std::string_view name) const;
 };
 
-// Bytes to send with whatever keeps them alive.
+// Bytes to send with their owner.
 struct Body {
   std::shared_ptr<const void> owner;
   std::span<const std::uint8_t> bytes;
@@ -50,18 +50,18 @@ struct Response {
   std::string content_type;  // empty: no body
   Headers headers;
   Body body;
-  bool close = false;  // the connection is of no further use
+  bool close = false;  // close the connection after the response
 };
 
-// Answers a request, once, from any thread.
+// Answers a request; call once, from any thread.
 using Reply = std::function<void(Response)>;
 
 bool equal_without_case(std::string_view a, std::string_view b);
-std::string_view trimmed(std::string_view text);  // of spaces and tabs
+std::string_view trimmed(std::string_view text);  // without leading and trailing spaces and tabs
 std::vector<std::string_view> split_list(std::string_view text, char separator);  // trimmed parts
 
 // Status line and headers up to the empty line: the response's own, those of the connection, and
-// those that every answer bears for safety.
+// the security headers of every response.
 std::string response_head(const Response& response, bool keep_alive);
 
 }  // namespace windsplat::net

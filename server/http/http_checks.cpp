@@ -1,5 +1,5 @@
-// Refusals that keep requests unambiguous (RFC 9112): one Host, one length, no other framing; and
-// upgrades as RFC 6455 wants them.
+// Rejects ambiguous requests (RFC 9112: exactly one Host, one length, no other framing) and invalid
+// upgrades (RFC 6455).
 #include "server/http/http_checks.hpp"
 
 #include <algorithm>
@@ -28,11 +28,11 @@ std::size_t count(const Request& request, std::string_view name) {
 }
 
 std::optional<Response> check_length(const Request& request) {
-  if (count(request, "Content-Length") > 1) return bad_request("there are two Content-Lengths");
+  if (count(request, "Content-Length") > 1) return bad_request("duplicate Content-Length");
   const std::string text = request.header("Content-Length");
   if (text.empty()) {
     if (request.method == "POST" || request.method == "PUT" || request.method == "PATCH") {
-      return problem_response(411, "Length Required", "a body needs its Content-Length");
+      return problem_response(411, "Length Required", "a body requires Content-Length");
     }
     return std::nullopt;
   }
@@ -51,8 +51,7 @@ bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 
-// "GET /path HTTP/1.1": the library takes what it does not understand of the last word for a
-// version that it does not speak.
+// The library reports an invalid version token as an unsupported version.
 bool is_request_line(std::string_view line) {
   const std::size_t target = line.find(' ') + 1;
   const std::size_t version = line.rfind(' ') + 1;
@@ -68,7 +67,7 @@ bool is_port(std::string_view text) {
          (text.size() < 5 || text <= "65535");
 }
 
-// uri-host [ ":" port ] (RFC 9110, 7.2); an address in brackets is looked at by its letters alone.
+// uri-host [ ":" port ] (RFC 9110, 7.2); of a bracketed address only the characters are checked.
 bool is_host(std::string_view host) {
   std::size_t end = 0;
   if (host.starts_with('[')) {
@@ -76,7 +75,7 @@ bool is_host(std::string_view host) {
     if (end == std::string_view::npos || end == 1 || host[end] != ']') return false;
     ++end;
   } else {
-    constexpr std::string_view others = "-._~!$&'()*+;=%";  // no comma: it would be a list
+    constexpr std::string_view others = "-._~!$&'()*+;=%";  // no comma: it would separate a list
     while (end < host.size() && (is_letter(host[end]) || is_digit(host[end]) ||
                                  others.find(host[end]) != std::string_view::npos)) {
       ++end;
@@ -104,21 +103,21 @@ bool is_websocket_key(std::string_view key) {
 
 Response body_too_large() {
   return problem_response(make_error(
-      ErrorKind::too_large,
-      "a body may have " + std::to_string(protocol::limits::http_body_bytes_max) + " bytes"));
+      ErrorKind::too_large, "a request body may have at most " +
+                                std::to_string(protocol::limits::http_body_bytes_max) + " bytes"));
 }
 
 std::optional<Response> check_header_bytes(std::string_view header) {
   for (std::size_t i = 0; i < header.size(); ++i) {
     if (header[i] != '\n' && header[i] != '\r') continue;
     const bool pair = header[i] == '\r' && i + 1 < header.size() && header[i + 1] == '\n';
-    if (!pair) return bad_request("a line of the header ends with a bare CR or LF");
+    if (!pair) return bad_request("a header line ends with a bare CR or LF");
     const char next = i + 2 < header.size() ? header[i + 2] : 'x';
-    if (next == ' ' || next == '\t') return bad_request("a line of the header is folded");
+    if (next == ' ' || next == '\t') return bad_request("folded header lines are not supported");
     ++i;
   }
   if (!is_request_line(header.substr(0, header.find('\r')))) {
-    return bad_request("the first line is not a method, a target and HTTP/ with a version");
+    return bad_request("the request line must be a method, a target and HTTP/ with a version");
   }
   return std::nullopt;
 }
@@ -130,20 +129,22 @@ std::optional<Response> check_request(const Request& request, unsigned version) 
   }
   if (count(request, "Transfer-Encoding") > 0) {
     return problem_response(501, "Not Implemented",
-                            "a body is sent by Content-Length, not by Transfer-Encoding");
+                            "Transfer-Encoding is not supported: use Content-Length");
   }
-  if (count(request, "Host") != 1) return bad_request("a request has exactly one Host");
+  if (count(request, "Host") != 1) return bad_request("a request must have exactly one Host");
   if (const std::string host = request.header("Host"); !is_host(host)) {
-    return bad_request("the Host " + printable(host, 80) + " is no name with or without a port");
+    return bad_request("the Host " + printable(host, 80) +
+                       " is not a host name with optional port");
   }
   if (std::find(known_methods.begin(), known_methods.end(), request.method) ==
       known_methods.end()) {
     return problem_response(501, "Not Implemented",
-                            "the method " + printable(request.method, 20) + " is unknown");
+                            "unknown method " + printable(request.method, 20));
   }
   if (const std::string expect = request.header("Expect");
       !expect.empty() && !equal_without_case(expect, "100-continue")) {
-    return problem_response(417, "Expectation Failed", "only 100-continue can be expected");
+    return problem_response(417, "Expectation Failed",
+                            "the only supported expectation is 100-continue");
   }
   return check_length(request);
 }
@@ -156,14 +157,14 @@ bool asks_for_websocket(const Request& request, unsigned version) {
 
 std::optional<Response> check_upgrade(const Request& request) {
   if (request.header("Sec-WebSocket-Version") != "13") {
-    Response response = problem_response(426, "Upgrade Required",
-                                         "the one version of WebSocket that is spoken here is 13");
+    Response response =
+        problem_response(426, "Upgrade Required", "unsupported WebSocket version; use 13");
     response.headers.emplace_back("Sec-WebSocket-Version", "13");
     response.headers.emplace_back("Upgrade", "websocket");
     return response;
   }
   if (!is_websocket_key(request.header("Sec-WebSocket-Key"))) {
-    return bad_request("a WebSocket needs one Sec-WebSocket-Key: 16 bytes in base64");
+    return bad_request("a WebSocket request must have one Sec-WebSocket-Key: 16 bytes in base64");
   }
   return std::nullopt;
 }

@@ -1,4 +1,4 @@
-// What HTTP allows and this server does not, told before a body is read.
+// Rejects requests that HTTP allows and this server does not support, before a body is read.
 #pragma once
 
 #include <optional>
@@ -8,18 +8,18 @@
 
 namespace windsplat::net {
 
-// The header as received, with its final empty line: folded lines, bare line ends and a request
-// line that is not three words are refused.
+// Checks the header as received, with its final empty line: rejects folded lines, bare line ends
+// and malformed request lines.
 std::optional<Response> check_header_bytes(std::string_view header);
 
 // Method, Host, Transfer-Encoding, Content-Length and Expect of a parsed header. `version` is 11
 // for HTTP/1.1.
 std::optional<Response> check_request(const Request& request, unsigned version);
 
-// Whether a client asks for a WebSocket (RFC 6455, 4.2.1), its lists in however many lines.
+// Whether a client requests a WebSocket (RFC 6455, 4.2.1); list headers may span several lines.
 bool asks_for_websocket(const Request& request, unsigned version);
 
-// Key and version of a request that asks for a WebSocket.
+// Checks key and version of a WebSocket request.
 std::optional<Response> check_upgrade(const Request& request);
 
 Response body_too_large();

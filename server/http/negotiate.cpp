@@ -1,4 +1,4 @@
-// Lists of header values, each with its weight, against what there is to offer.
+// Matches weighted lists of header values against the offers.
 #include "server/http/negotiate.hpp"
 
 #include <arpa/inet.h>
@@ -18,7 +18,7 @@ struct Weighted {
   double weight = 1;
 };
 
-// "a;q=0.5, b" -> names with weights. A weight that is none counts as 0.
+// "a;q=0.5, b" -> names with weights. An invalid weight counts as 0.
 std::vector<Weighted> weighted_list(std::string_view header) {
   std::vector<Weighted> out;
   for (const std::string_view entry : split_list(header, ',')) {
@@ -38,7 +38,7 @@ std::vector<Weighted> weighted_list(std::string_view header) {
   return out;
 }
 
-// How closely a media range names a type: 3 itself, 2 "image/*", 1 "*/*", 0 not at all.
+// Specificity of a media range for a type: 3 exact, 2 "image/*", 1 "*/*", 0 no match.
 int closeness(std::string_view range, std::string_view type) {
   if (equal_without_case(range, type)) return 3;
   if (range == "*/*") return 1;
@@ -101,14 +101,14 @@ bool accepts_gzip(std::string_view accept_encoding) {
 bool matches_etag(std::string_view if_none_match, std::string_view etag) {
   const auto names = split_list(if_none_match, ',');
   return std::any_of(names.begin(), names.end(), [&](std::string_view name) {
-    if (name.substr(0, 2) == "W/") name.remove_prefix(2);  // compared weakly (RFC 9110, 13.1.2)
+    if (name.substr(0, 2) == "W/") name.remove_prefix(2);  // weak comparison (RFC 9110, 13.1.2)
     return name == "*" || name == etag;
   });
 }
 
 bool allows_change(std::string_view if_match, std::string_view etag) {
   if (if_match.empty()) return true;
-  const auto names = split_list(if_match, ',');  // compared strongly (RFC 9110, 13.1.1)
+  const auto names = split_list(if_match, ',');  // strong comparison (RFC 9110, 13.1.1)
   return std::any_of(names.begin(), names.end(),
                      [&](std::string_view name) { return name == "*" || name == etag; });
 }
@@ -118,7 +118,7 @@ bool origin_allowed(std::string_view origin, std::string_view host,
   for (const auto& [scheme, port] :
        {std::pair<std::string_view, std::string_view>{"http://", ":80"}, {"https://", ":443"}}) {
     if (origin.substr(0, scheme.size()) != scheme || (tls && scheme == "http://")) continue;
-    // The scheme's own port may be said or not, on either side.
+    // The default port of the scheme may be present or absent on either side.
     const std::string_view authority = without_suffix(origin.substr(scheme.size()), port);
     if (!authority.empty() && equal_without_case(authority, without_suffix(host, port)))
       return true;

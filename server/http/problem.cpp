@@ -1,4 +1,4 @@
-// Problem -> response; answers that may be tried again later say when.
+// Builds problem responses; sets Retry-After on retryable ones.
 #include "server/http/problem.hpp"
 
 #include <algorithm>
@@ -42,7 +42,7 @@ Response problem_response(int status, std::string title, std::string detail, int
 void name_request(Response& response, const std::string& request_id) {
   response.headers.emplace_back(request_id_header, request_id);
   if (response.content_type != problem_type) return;
-  // The id has nothing to escape, and a problem has other members.
+  // The id needs no escaping, and a problem has other members.
   std::string json = "{\"requestId\":\"";
   json += request_id;
   json += "\",";

@@ -1,4 +1,4 @@
-// Errors -> problem+json answers (RFC 9457), for the HTTP edge and the resources alike.
+// Converts errors to application/problem+json (RFC 9457).
 #pragma once
 
 #include <string>
@@ -10,11 +10,11 @@ namespace windsplat::net {
 
 Response problem_response(const Error& error);
 
-// What has no ErrorKind: refusals of HTTP itself. `title` is the status in words.
-// `retry_after_s` goes with 409, 429 and 503; at least 1.
+// For refusals of HTTP itself, which have no ErrorKind. `title` is the reason phrase.
+// `retry_after_s` is sent with 409, 429 and 503; at least 1.
 Response problem_response(int status, std::string title, std::string detail, int retry_after_s = 0);
 
-// The answer names its request: in a header, and in a problem as its member requestId.
+// Adds the request id: as a header, and as requestId in a problem.
 void name_request(Response& response, const std::string& request_id);
 
 }  // namespace windsplat::net

@@ -1,4 +1,4 @@
-// A permutation of a counter that starts anywhere.
+// A permutation of a counter with a random start.
 #include "server/http/request_id.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// The name of a request in its answer and in the log: the client's own where it is fit for that.
+// Request id for the response and the log: the client's if it is valid, otherwise a new one.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ inline constexpr std::size_t request_id_bytes_max = 64;
 // 1 to 64 of A-Z a-z 0-9 . _ -
 bool is_request_id(std::string_view text);
 
-// Used by one thread. Ids of one server differ, and those of two hardly ever meet.
+// Used by one thread. Ids are unique within a server, and very probably between servers.
 class RequestIds {
  public:
   RequestIds();

@@ -1,4 +1,4 @@
-// Percent-decoding by Boost.URL; numbers by from_chars, whole text or nothing.
+// Percent-decoding by Boost.URL; numbers by from_chars, whole text only.
 #include "server/http/request_target.hpp"
 
 #include <algorithm>
@@ -20,8 +20,8 @@ std::vector<std::string> segments_of(std::string_view path) {
   return segments;
 }
 
-// "http://host/path" is as good as "/path" where the host is the one that was asked for, as
-// clients must send it (RFC 9112, 3.2.2); nothing where it is another.
+// An absolute-form target (RFC 9112, 3.2.2) is accepted if its host equals the Host header;
+// otherwise nothing is returned.
 std::optional<std::string> origin_form(std::string_view target, std::string_view host) {
   for (const std::string_view scheme : {"http://", "https://"}) {
     if (!equal_without_case(target.substr(0, scheme.size()), scheme)) continue;
@@ -34,7 +34,7 @@ std::optional<std::string> origin_form(std::string_view target, std::string_view
   return std::string(target);
 }
 
-// Whole text or nothing.
+// Parses the whole text or fails.
 std::optional<double> parse_number(std::string_view text) {
   double value = 0;
   const char* end = text.data() + text.size();
@@ -60,12 +60,12 @@ Result<void> parse_target(std::string_view target, std::string_view base_path, R
   const auto origin = origin_form(target, request.header("Host"));
   if (!origin) {
     return make_error(ErrorKind::malformed, "the request target '" + printable(target) +
-                                                "' names another host than the Host");
+                                                "' does not match the Host header");
   }
   const auto url = boost::urls::parse_origin_form(*origin);
   if (!url) {
     return make_error(ErrorKind::malformed,
-                      "the request target '" + printable(target) + "' is no path");
+                      "the request target '" + printable(target) + "' is not a path");
   }
   for (const auto& segment : url->segments()) request.path.emplace_back(segment);
   request.ends_in_slash = !request.path.empty() && request.path.back().empty();
@@ -95,7 +95,7 @@ const std::string* QueryReader::find(std::string_view key) {
   const std::string* value = nullptr;
   for (const auto& [name, text] : query_) {
     if (name != key) continue;
-    if (value != nullptr) fail(ErrorKind::malformed, "the query says '" + name + "' twice");
+    if (value != nullptr) fail(ErrorKind::malformed, "query parameter '" + name + "' is repeated");
     value = &text;
   }
   return value;
@@ -105,7 +105,7 @@ void QueryReader::fail_range(std::string_view key, double min, double max, std::
   std::array<char, 100> limits{};
   std::snprintf(limits.data(), limits.size(), "' must be %g to %g, not ", min, max);
   fail(ErrorKind::invalid,
-       "the query's '" + std::string(key) + limits.data() + printable(text, 40));
+       "query parameter '" + std::string(key) + limits.data() + printable(text, 40));
 }
 
 std::optional<std::string> QueryReader::text(std::string_view key) {
@@ -119,7 +119,7 @@ std::optional<double> QueryReader::number(std::string_view key, double min, doub
   const auto value = parse_number(*text);
   if (!value) {
     fail(ErrorKind::malformed,
-         "the query's '" + std::string(key) + "' is not a number: " + printable(*text, 40));
+         "query parameter '" + std::string(key) + "' is not a number: " + printable(*text, 40));
     return std::nullopt;
   }
   if (*value < min || *value > max) {
@@ -137,12 +137,12 @@ std::optional<std::string> QueryReader::integer(std::string_view key) {
                       text->find_first_not_of("0123456789", sign) == std::string::npos;
   if (!digits) {
     fail(ErrorKind::malformed,
-         "the query's '" + std::string(key) + "' is not a whole number: " + printable(*text, 40));
+         "query parameter '" + std::string(key) + "' is not an integer: " + printable(*text, 40));
     return std::nullopt;
   }
   std::int64_t value = 0;
   std::from_chars(text->data(), text->data() + text->size(), value);
-  return std::to_string(value);  // without the zeros in front that JSON does not allow
+  return std::to_string(value);  // drops leading zeros, which JSON does not allow
 }
 
 std::optional<int> QueryReader::integer(std::string_view key, int min, int max) {
@@ -150,8 +150,9 @@ std::optional<int> QueryReader::integer(std::string_view key, int min, int max) 
   if (!text) return std::nullopt;
   const long long value = std::stoll(*text);  // at most 18 characters
   if (value >= min && value <= max) return static_cast<int>(value);
-  fail(ErrorKind::invalid, "the query's '" + std::string(key) + "' must be " + std::to_string(min) +
-                               " to " + std::to_string(max) + ", not " + *text);
+  fail(ErrorKind::invalid, "query parameter '" + std::string(key) + "' must be " +
+                               std::to_string(min) + " to " + std::to_string(max) + ", not " +
+                               *text);
   return std::nullopt;
 }
 
@@ -160,8 +161,8 @@ std::optional<bool> QueryReader::boolean(std::string_view key) {
   if (text == nullptr) return std::nullopt;
   if (*text == "true" || *text == "1") return true;
   if (*text == "false" || *text == "0") return false;
-  fail(ErrorKind::malformed,
-       "the query's '" + std::string(key) + "' is true or false, not " + printable(*text, 40));
+  fail(ErrorKind::malformed, "query parameter '" + std::string(key) +
+                                 "' must be true or false, not " + printable(*text, 40));
   return std::nullopt;
 }
 
@@ -174,8 +175,9 @@ std::optional<std::array<double, 2>> QueryReader::pair(std::string_view key, dou
   for (std::size_t i = 0; i < 2; ++i) {
     const auto value = parts.size() == 2 ? parse_number(parts[i]) : std::nullopt;
     if (!value) {
-      fail(ErrorKind::malformed, "the query's '" + std::string(key) +
-                                     "' is two numbers with a comma, not " + printable(*text, 80));
+      fail(ErrorKind::malformed, "query parameter '" + std::string(key) +
+                                     "' must be two numbers with a comma, not " +
+                                     printable(*text, 80));
       return std::nullopt;
     }
     if (*value < min || *value > max) {
@@ -188,8 +190,8 @@ std::optional<std::array<double, 2>> QueryReader::pair(std::string_view key, dou
 }
 
 std::string QueryReader::known() const {
-  if (asked_.empty()) return "nothing may be asked";
-  std::string list = "what may be asked: ";
+  if (asked_.empty()) return "this resource has no query parameters";
+  std::string list = "known parameters: ";
   for (std::size_t i = 0; i < asked_.size(); ++i) {
     if (i > 0) list += ", ";
     list += asked_[i];
@@ -202,7 +204,7 @@ Result<void> QueryReader::finish() const {
   for (const auto& [name, value] : query_) {
     if (std::find(asked_.begin(), asked_.end(), name) == asked_.end()) {
       return make_error(ErrorKind::malformed,
-                        "the query's '" + printable(name, 40) + "' is unknown here; " + known());
+                        "unknown query parameter '" + printable(name, 40) + "'; " + known());
     }
   }
   return {};

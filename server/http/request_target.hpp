@@ -1,4 +1,4 @@
-// A request target or its query -> decoded parts and checked values.
+// Decodes a request target and validates its query parameters.
 #pragma once
 
 #include <array>
@@ -12,15 +12,14 @@
 
 namespace windsplat::net {
 
-// "/" or "/a/b/" from any spelling of it.
+// Normalises to "/" or "/a/b/".
 std::string normal_base_path(std::string_view path);
 
 // Fills path, below_base, ends_in_slash and query. Accepts origin form, and absolute form that
 // names the request's Host. Errors: malformed.
 Result<void> parse_target(std::string_view target, std::string_view base_path, Request& request);
 
-// Reads parameters one by one; finish() refuses those nobody asked for, saying which are known,
-// and those said twice.
+// Reads parameters one by one; finish() rejects unknown ones, listing the known, and repeated ones.
 class QueryReader {
  public:
   explicit QueryReader(const Parameters& query) : query_(query) {}
@@ -29,7 +28,7 @@ class QueryReader {
   std::optional<double> number(std::string_view key, double min, double max);
   std::optional<bool> boolean(std::string_view key);  // true, 1, false or 0
   std::optional<std::array<double, 2>> pair(std::string_view key, double min, double max);  // "a,b"
-  // A whole number as it was written; its range is for the reader of the view to check.
+  // An integer as text; the parser of the view checks its range.
   std::optional<std::string> integer(std::string_view key);
   std::optional<int> integer(std::string_view key, int min, int max);
 

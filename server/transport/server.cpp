@@ -96,11 +96,11 @@ struct Server::State {
   }
 
   // Checks files every second, one check at a time; slow disks lower the rate.
-  void look_after_data() {
-    looking = false;
+  void check_data_files() {
+    checking_files = false;
     look_timer.expires_after(look_every);
     look_timer.async_wait([this](boost::system::error_code fault) {
-      looking = false;
+      checking_files = false;
       if (!fault) services.admission.log_refused_handshakes();
       if (fault || services.draining) return;
       const auto look = [this] {
@@ -109,17 +109,17 @@ struct Server::State {
         std::vector<std::string> changed;
         if (found) changed = std::move(*found);
         const auto go_on_looking = [this, changed = std::move(changed)] {
-          looking = false;
+          checking_files = false;
           tell_changes(changed);
-          look_after_data();
+          check_data_files();
         };
         while (!post_or_retry(io.get_executor(), go_on_looking) && !services.draining) {
         }
       };
-      if (!services.file_watch.submit({never, look, true})) return look_after_data();
-      looking = true;
+      if (!services.file_watch.submit({never, look, true})) return check_data_files();
+      checking_files = true;
     });
-    looking = true;
+    checking_files = true;
   }
 
   void tell_changes(const std::vector<std::string>& datasets) {
@@ -132,10 +132,10 @@ struct Server::State {
   // Periodic operations that schedule themselves; one that failed to allocate its next step is
   // restarted here.
   void go_on() {
-    if (services.draining && !end_is_near) begin_drain();
+    if (services.draining && !drain_timers_set) begin_drain();
     if (services.draining) return;
     listener.start();
-    if (!looking) look_after_data();
+    if (!checking_files) check_data_files();
   }
 
   // On the io thread.
@@ -161,7 +161,7 @@ struct Server::State {
   // On the io thread.
   void begin_drain() {
     services.draining = true;
-    if (end_is_near) return;
+    if (drain_timers_set) return;
     cancel_timer.expires_after(services.options.drain_cancel_after);
     cancel_timer.async_wait([this](boost::system::error_code fault) {
       if (fault) return;
@@ -180,7 +180,7 @@ struct Server::State {
       connections.each([](Connection& connection) { connection.abort(); });
       end();
     });
-    end_is_near = true;
+    drain_timers_set = true;
     services.backend.jobs.cancel_all();
     connections.each([](Connection& connection) {
       try {
@@ -220,10 +220,10 @@ struct Server::State {
   asio::steady_timer look_timer;
   asio::steady_timer cancel_timer;
   asio::steady_timer abort_timer;
-  const CancelToken never;   // for work that is never cancelled
-  bool looking = false;      // a file check is scheduled or running
-  bool end_is_near = false;  // the timers of a drain run
-  std::thread ending;        // ends pending reads when a drain takes long
+  const CancelToken never;        // for work that is never cancelled
+  bool checking_files = false;    // a file check is scheduled or running
+  bool drain_timers_set = false;  // the timers of a drain run
+  std::thread ending;             // ends pending reads when a drain takes long
 };
 
 Server::Server(ServerOptions options, std::shared_ptr<data::Store> store,
