@@ -1,4 +1,4 @@
-// Text of addresses -> 16 bytes, and back.
+// Parses and formats addresses as 16 bytes.
 #include "server/access/address.hpp"
 
 #include <arpa/inet.h>
@@ -18,7 +18,7 @@ constexpr std::size_t text_max = 64;  // longer than any address with a zone
 constexpr std::size_t mapped_prefix = 12;
 constexpr std::size_t counted_bytes = 8;  // of IPv6: 64 bits
 
-// The zone ("%eth0") says where a link-local address is, not which.
+// The zone ("%eth0") names the interface and is not part of the address.
 std::optional<Bytes> parse_bytes(std::string_view text) {
   if (text.size() > text_max) return std::nullopt;
   const std::string plain(text.substr(0, text.find('%')));
@@ -101,7 +101,7 @@ std::string client_address(const std::string& peer, std::string_view forwarded_f
   std::string client = peer;
   for (auto hop = hops.rbegin(); hop != hops.rend(); ++hop) {
     const std::string_view address = without_port(*hop);
-    if (!parse_bytes(address)) return client;  // nobody that is trusted wrote this
+    if (!parse_bytes(address)) return client;  // not written by a trusted proxy
     client = address;
     if (!is_trusted(address, trusted)) return client;
   }

@@ -1,5 +1,4 @@
-// Whose connection it is: IP addresses as they count, networks that hold them, and what proxies
-// say.
+// Client addresses: IP addresses as counted by the quotas, networks, and the headers of proxies.
 #pragma once
 
 #include <array>
@@ -11,9 +10,9 @@
 
 namespace windsplat::net {
 
-// An address as limits count it: IPv4 as it is, also where it is mapped into IPv6; of IPv6 the
-// network of 64 bits ("2001:db8:1:2::/64"), all of which one host may have. What is no address
-// stays as it is.
+// Address as counted by quotas: IPv4 unchanged, also if mapped into IPv6; of IPv6 the network of 64
+// bits ("2001:db8:1:2::/64"), which one host may own entirely. Text that is not an address is
+// returned unchanged.
 std::string counted_address(std::string_view address);
 
 // ADDRESS or ADDRESS/BITS.
@@ -27,8 +26,8 @@ class Network {
   unsigned bits_ = 128;
 };
 
-// The address of whoever asks: the peer's, or where that is a trusted proxy the last element of
-// X-Forwarded-For that is none. Where the header says nothing that is an address, the peer's.
+// The client's address: the peer's, or behind a trusted proxy the last untrusted element of
+// X-Forwarded-For. The peer's if the header has no address.
 std::string client_address(const std::string& peer, std::string_view forwarded_for,
                            const std::vector<Network>& trusted);
 bool is_trusted(std::string_view peer, const std::vector<Network>& trusted);

@@ -1,4 +1,4 @@
-// A quota behind a lock; refusals -> problems.
+// A quota behind a mutex; converts refusals to problems.
 #include "server/access/admission.hpp"
 
 #include <chrono>
@@ -30,22 +30,21 @@ std::string detail_of(const Refusal& refusal) {
   const std::string limit = number(refusal.limit);
   switch (refusal.kind) {
     case LimitKind::connections:
-      return "the server has " + limit + " connections, the most it may have (--max-connections)";
+      return "the server has " + limit + " connections, the limit (--max-connections)";
     case LimitKind::address_connections:
       return "this address has " + limit +
-             " connections, the most it may have (--max-connections-per-address)";
+             " connections, the limit (--max-connections-per-address)";
     case LimitKind::sessions:
-      return "the server has " + limit + " sessions, the most it may have (--max-sessions)";
+      return "the server has " + limit + " sessions, the limit (--max-sessions)";
     case LimitKind::address_sessions:
-      return "this address has " + limit +
-             " sessions, the most it may have (--max-sessions-per-address)";
+      return "this address has " + limit + " sessions, the limit (--max-sessions-per-address)";
     case LimitKind::requests:
-      return "this address may make " + limit + " requests a second (--max-requests-per-address)";
+      return "this address may send " + limit + " requests a second (--max-requests-per-address)";
     case LimitKind::bytes:
-      return "this address may be sent " + limit + " bytes a second (--max-bytes-per-address)";
+      return "this address may receive " + limit + " bytes a second (--max-bytes-per-address)";
     case LimitKind::render:
       return "this address may have " + limit +
-             " seconds of drawing a minute (--max-render-per-address)";
+             " seconds of rendering a minute (--max-render-per-address)";
     case LimitKind::logins:
       return "this address may fail to log in " + limit +
              " times a minute (--max-failed-logins-per-address)";
@@ -57,20 +56,20 @@ std::string detail_of(const Refusal& refusal) {
     case LimitKind::handshakes:
       break;
   }
-  return "more is asked for than can be done; try again";
+  return "the server is overloaded; try again";
 }
 
-// Connections in TLS that were closed because handshakes had taken too much.
+// TLS connections closed because handshakes exceeded their processor time.
 struct ClosedHandshakes {
   std::int64_t connections = 0;
-  std::string address;  // the first one's
+  std::string address;  // of the first one
   bool several = false;
-  Admission::Micros since = 0;  // the first was closed; as it is logged: how long before
+  Admission::Micros since = 0;  // when the first was closed; logged as an age
 };
 
 void log_closed(const ClosedHandshakes& closed) {
   log::warn(
-      "connections were closed: TLS handshakes took too much processor time (--max-handshakes, "
+      "closed connections: TLS handshakes exceeded their processor time (--max-handshakes, "
       "--max-handshakes-per-address)",
       {{"connections", closed.connections},
        {"seconds", closed.since / 1'000'000},
@@ -85,7 +84,7 @@ struct Admission::State {
   State(const Limits& limits, std::function<Micros()> clock)
       : quota(limits), now(clock ? std::move(clock) : steady_us) {}
 
-  // Both under the mutex. A value: those since the last one, to be logged; one a minute at most.
+  // Both require the mutex. A value: closures since the last log line; at most one a minute.
   std::optional<Closed> count_refused_handshake(const std::string& address, Micros at) {
     if (closed.connections == 0) {
       closed.address = address;
@@ -110,8 +109,8 @@ struct Admission::State {
   Micros log_next = std::numeric_limits<Micros>::min();
 };
 
-// Gives back what was taken when it goes. It is made before anything is taken, so that nothing can
-// fail in between, and needs no memory when it goes.
+// Releases what was acquired on destruction. Constructed before the acquisition, so that nothing
+// can fail in between; destruction does not allocate.
 class Admission::Slot {
  public:
   Slot(std::shared_ptr<State> state, std::string address)
@@ -309,8 +308,8 @@ Result<void> Admission::check_estimate(const frame::Cost& cost, double estimate_
   if (limit_s <= 0 || estimate_ms <= 1000 * limit_s) return {};
   metrics_.refused(LimitKind::estimate);
   return make_error_at(ErrorKind::invalid, cost.dominant,
-                       "makes most of a picture that would take about " +
-                           number(std::ceil(estimate_ms / 1000)) + " s to draw; the limit is " +
+                       "dominates the cost of a picture with an estimated time of " +
+                           number(std::ceil(estimate_ms / 1000)) + " s; the limit is " +
                            number(limit_s) + " s (--max-render)");
 }
 

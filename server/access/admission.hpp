@@ -1,5 +1,5 @@
-// Who is let in, and what those are told who are not: the quotas of addresses by the clock, as
-// answers that say which limit it was.
+// Admission control: applies the quotas of addresses in real time; refusals are responses that name
+// the limit.
 #pragma once
 
 #include <cstdint>
@@ -17,19 +17,19 @@
 
 namespace windsplat::net {
 
-// Holds a place among connections or sessions until the last copy goes.
+// Holds a place among connections or sessions until the last copy is destroyed.
 using Ticket = std::shared_ptr<const void>;
 
-// A connection that was taken in.
+// An admitted connection.
 struct Visitor {
-  std::string peer;  // address of the other end
+  std::string peer;  // remote address
   Ticket place;
-  std::optional<Refusal> reserve;  // health alone is answered, and why
-  bool trusted = false;            // a proxy, whose connections are those of many clients
-  bool known = false;              // one of those, or its address has shown the token
+  std::optional<Refusal> reserve;  // only health is served, for this reason
+  bool trusted = false;            // a proxy, which has connections of many clients
+  bool known = false;              // a proxy, or the address has shown the token
 };
 
-// The server is at its limit, or the address is: 503 or 429 with Retry-After.
+// The server or the address is at its limit: 503 or 429 with Retry-After.
 Response refusal_response(const Refusal& refusal);
 
 // Thread-safe.
@@ -37,51 +37,51 @@ class Admission {
  public:
   using Micros = Quota::Micros;
 
-  // `now`: empty is a steady clock.
+  // `now`: clock in microseconds; empty: a steady clock.
   Admission(const Limits& limits, Metrics& metrics, std::function<Micros()> now = {});
 
-  // False: too many arrived recently, and it is to be closed without an answer. Before connect().
-  // Where handshakes took too much it is logged, once a minute for all.
+  // False: too many recent connections; close it without a response. Call before connect(). Excess
+  // handshake time is logged at most once a minute.
   bool arrive(const std::string& peer, bool tls);
-  // To be called again and again: logs those that were refused since that was logged last.
+  // Call periodically: logs refusals since the last log line.
   void log_refused_handshakes();
-  // What steps of a TLS handshake took of a processor; the address as it is counted. Needs no
+  // Charges processor time of a TLS handshake to the address. Does not allocate.
   // memory.
   void handshake_took(const std::string& address, bool trusted, Micros took);
-  // A request showed the token.
+  // A request has shown the token.
   void authenticated(const std::string& address);
-  // None: too many, to be closed without an answer.
+  // None: at the limit; close without a response.
   std::optional<Visitor> connect(const std::string& peer);
 
-  // Of one that was not: whether a place in the reserve that another gives up would be its.
+  // For a refused one: whether a place freed in the reserve would admit it.
   bool is_kept_out_by_others(const std::string& peer);
 
-  // Sets request.address to the client's. An answer: it is refused.
+  // Sets request.address to the client's. A value: the request is refused with it.
   std::optional<Response> request(const Visitor& visitor, Request& request, bool health);
-  // A request that was refused before it was understood counts as one all the same. False: there
+  // Counts a request refused before parsing. False: too many, do not log this one.
   // were too many, and this one is not worth a line in the log.
   bool count_malformed(const Visitor& visitor, const Request& request);
-  // Whether that address may have a picture drawn.
+  // Whether the address may have a picture drawn.
   std::optional<Response> picture(const std::string& address);
-  // A place for a stream, or why there is none.
+  // A place for a stream, or the refusal.
   struct Seat {
     Ticket place;
     std::optional<Response> refusal;
   };
   Seat open_session(const std::string& address);
-  // Whether a token that it shows may be compared: there were not too many wrong ones of late.
+  // Whether a token may be compared: the number of recent failures is within the limit.
   std::optional<Response> may_try_login(const std::string& address);
-  // What a wrong token is answered where there were too many of that address; none: as ever.
+  // The response to a wrong token above the limit of failures; none: the usual one.
   std::optional<Response> failed_login(const std::string& address);
-  // A message of a stream came: how long nothing more is to be read of it.
+  // Counts a message of a stream; returns how long to pause reading.
   Micros message_received(const std::string& address, std::size_t bytes);
-  // How long a stream's next frame has to wait for what its address owes.
+  // Delay of a stream's next frame until the address is within its quota.
   Micros throttle_delay(const std::string& address);
 
   void sent(const std::string& address, std::size_t bytes);
   void rendered(const std::string& address, Micros took);
 
-  // Both count what is refused.
+  // Both count refusals.
   Result<void> check(const frame::Cost& cost);
   Result<void> check_estimate(const frame::Cost& cost, double estimate_ms);
 
@@ -94,7 +94,7 @@ class Admission {
   const Limits limits_;
   std::vector<Network> trusted_;
   Metrics& metrics_;
-  std::shared_ptr<State> state_;  // which tickets keep
+  std::shared_ptr<State> state_;  // shared with tickets
 };
 
 }  // namespace windsplat::net

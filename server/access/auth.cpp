@@ -1,5 +1,5 @@
-// Digests by OpenSSL: what is compared are SHA-256 sums, so that neither length nor place of a
-// difference shows in the time it takes.
+// Tokens are compared by SHA-256 digests, so that the time reveals neither length nor position of a
+// difference.
 #include "server/access/auth.hpp"
 
 #include <openssl/crypto.h>
@@ -63,7 +63,7 @@ Error token_error(std::string detail) {
   return make_error(ErrorKind::invalid, "the token " + std::move(detail));
 }
 
-// RFC 4648, 5, without padding. Empty if it is none.
+// RFC 4648, 5, without padding. Empty if invalid.
 std::optional<std::string> from_base64url(std::string_view text) {
   constexpr std::string_view letters =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
@@ -83,8 +83,8 @@ std::optional<std::string> from_base64url(std::string_view text) {
   return whole ? std::optional(out) : std::nullopt;
 }
 
-// "Bearer TOKEN"; the scheme's name has no case (RFC 9110, 11.1). None where it is another: that
-// one is a proxy's business.
+// "Bearer TOKEN"; scheme names are case-insensitive (RFC 9110, 11.1). None for other schemes, which
+// belong to a proxy.
 std::optional<std::string> bearer_of(const Request& request) {
   const std::string authorization = request.header("Authorization");
   const std::string_view text = authorization;
@@ -103,7 +103,7 @@ std::optional<std::string> offered_token(const Request& request, bool upgrade) {
   return std::nullopt;
 }
 
-// A browser sends one for each path that it fits.
+// A browser sends every cookie whose path matches.
 bool has_good_cookie(const Request& request, const Token& token, std::int64_t now_s) {
   const std::string ours = cookie_name(request);
   for (const auto& [name, value] : request.headers) {
@@ -119,7 +119,7 @@ bool has_good_cookie(const Request& request, const Token& token, std::int64_t no
 
 enum class Credential { none, wrong, token, cookie };
 
-// The first that is there decides: a wrong token is not made good by a cookie.
+// The first credential decides: a valid cookie does not make up for a wrong token.
 Credential credential_of(const Request& request, bool upgrade, const Token& token,
                          std::int64_t now_s) {
   auto shown = bearer_of(request);
@@ -146,7 +146,7 @@ Result<Token> Token::parse(std::string_view file) {
   if (file.ends_with('\r')) file.remove_suffix(1);
   if (file.empty()) return token_error("is missing: the file is empty");
   if (file.find('\n') != std::string_view::npos) {
-    return token_error("must stand alone, on the only line");
+    return token_error("must be on the only line of the file");
   }
   if (file.size() < chars_min || file.size() > chars_max) {
     return token_error("has " + std::to_string(file.size()) + " characters; it must have " +
@@ -154,8 +154,8 @@ Result<Token> Token::parse(std::string_view file) {
   }
   if (!is_b64token(file)) {
     return token_error(
-        "has a character that no bearer token may have: letters, digits and -._~+/ "
-        "can be used, and = at its end");
+        "has an invalid character; allowed are letters, digits, -._~+/ "
+        "and = at the end");
   }
   Token token;
   token.digest_ = sha256(file);
@@ -222,7 +222,7 @@ Verdict judge(const Request& request, bool upgrade, const Token* token,
   const std::string origin = request.header("Origin");
   const bool reads = !upgrade && (request.method == "GET" || request.method == "HEAD" ||
                                   request.method == "OPTIONS");
-  // Browsers say one or the other of what a page does; programs say neither.
+  // Browsers send one or the other for requests of a page; programs send neither.
   const bool own_page = origin.empty()
                             ? request.header("Sec-Fetch-Site") == "same-origin"
                             : origin_allowed(origin, request.header("Host"), allowed_origins, tls);
@@ -237,7 +237,7 @@ Verdict judge(const Request& request, bool upgrade, const Token* token,
     case Credential::token:
       return Verdict::allowed;
     case Credential::cookie:
-      // Sent by the browser itself, whoever's page asks.
+      // Cookies are attached by the browser for pages of any origin.
       return reads || own_page ? Verdict::allowed : Verdict::wrong_origin;
   }
   return Verdict::no_token;

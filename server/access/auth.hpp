@@ -1,5 +1,5 @@
-// Who may come in: the bearer token, the cookie that stands for it, the origins of web pages. Pure:
-// a request in, a verdict out.
+// Authentication: bearer token, login cookie and origins of web pages. Pure functions: a request
+// in, a verdict out.
 #pragma once
 
 #include <array>
@@ -13,24 +13,24 @@
 
 namespace windsplat::net {
 
-// The secret that whoever may come in knows. What is compared takes as long wherever it differs.
+// The shared secret. Comparisons take constant time.
 class Token {
  public:
   static constexpr std::size_t chars_min = 16;
   static constexpr std::size_t chars_max = 512;
 
-  // The text of a token file: one line of the characters of RFC 6750's b64token.
-  // Errors: invalid, which do not repeat the text.
+  // Parses a token file: one line of the characters of RFC 6750's b64token. Errors: invalid,
+  // without the text of the token.
   static Result<Token> parse(std::string_view file);
 
   [[nodiscard]] bool is(std::string_view given) const;
 
-  // A cookie's value: good until `ends_s` (seconds since 1970), for this token alone. Nothing has
-  // to be kept for it.
+  // A cookie value, valid until `ends_s` (seconds since 1970) for this token only. Needs no stored
+  // state.
   [[nodiscard]] std::string cookie(std::int64_t ends_s) const;
   [[nodiscard]] bool admits(std::string_view cookie, std::int64_t now_s) const;
 
-  bool operator==(const Token& other) const = default;  // of tokens of ours, not of a given one
+  bool operator==(const Token& other) const = default;  // for own tokens, not constant-time
 
  private:
   using Digest = std::array<std::uint8_t, 32>;
@@ -40,38 +40,38 @@ class Token {
   Digest cookie_key_{};
 };
 
-// Overwrites a secret before its memory is given back.
+// Overwrites a secret before its memory is freed.
 void wipe(std::string& secret);
 
-// Whether who was let in under `before` has to show a token anew; null: none is asked for.
+// Whether clients authorised under `before` must authenticate again; null: no token required.
 bool is_other_token(const Token* before, const Token* now);
 
-// "windsplat", with the port that the request's Host names: cookies are sent to every port of a
-// host, and two daemons there would log each other's viewers out.
+// "windsplat" with the port of the request's Host: cookies are sent to every port of a host, and
+// two daemons would overwrite each other's.
 std::string cookie_name(const Request& request);
-// Of a WebSocket, for clients that can set no header: "bearer." and the token in base64url (RFC
-// 4648, 5) without padding.
+// WebSocket subprotocol for clients that cannot set headers: "bearer." and the token in base64url
+// (RFC 4648, 5) without padding.
 inline constexpr std::string_view bearer_protocol = "bearer.";
 
 enum class Verdict {
   allowed,
-  token_in_url,  // where it would be logged and kept
-  wrong_origin,  // a page of another site
+  token_in_url,  // URLs are logged and stored
+  wrong_origin,  // a page of another origin
   no_token,
   wrong_token,
 };
 
-// `token` null: nobody is asked for one. `upgrade`: the request opens a WebSocket. `tls`: it came
-// in TLS. What needs no token: /livez and /readyz, and the login itself, which must come from a
-// page of ours.
+// `token` null: no authentication. `upgrade`: the request opens a WebSocket. `tls`: it uses TLS.
+// Exempt from the token: /livez and /readyz, and the login itself, which must come from a page of
+// this server.
 Verdict judge(const Request& request, bool upgrade, const Token* token,
               const std::vector<std::string>& allowed_origins, std::int64_t now_s,
               bool tls = false);
 
-// Whether judge() would compare a token that the request shows, so that it may be a guess.
+// Whether judge() would compare a token of the request, so that it may be a guess.
 bool shows_token(const Request& request, bool upgrade);
 
-// Whether it posts the login form; only where there is a token.
+// Whether it posts the login form; only if a token is set.
 bool is_login(const Request& request);
 
 }  // namespace windsplat::net

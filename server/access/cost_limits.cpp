@@ -1,4 +1,4 @@
-// Cost and limits -> the error that names the dominant setting.
+// Compares the cost with the limits; the error names the dominant setting.
 #include "server/access/cost_limits.hpp"
 
 #include <array>
@@ -24,9 +24,9 @@ Result<void> check_cost(const frame::Cost& cost, const Limits& limits) {
   }
   if (limits.kernels > 0 && !(cost.kernels <= limits.kernels)) {
     return make_error_at(ErrorKind::invalid, cost.dominant,
-                         "makes most of a picture that takes the work of up to " +
-                             in_short(cost.kernels) + " kernels; the limit is " +
-                             in_short(limits.kernels) + " (--max-kernels)");
+                         "dominates the cost of a picture with up to " + in_short(cost.kernels) +
+                             " kernels; the limit is " + in_short(limits.kernels) +
+                             " (--max-kernels)");
   }
   return {};
 }

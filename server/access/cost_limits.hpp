@@ -1,4 +1,4 @@
-// The limits of what one picture may cost.
+// Limits on the cost of one picture.
 #pragma once
 
 #include "server/access/limits.hpp"

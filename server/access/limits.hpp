@@ -1,4 +1,4 @@
-// How much one address and all of them together may take of the server. 0 is no limit.
+// Limits per client address and in total. 0 means no limit.
 #pragma once
 
 #include <cstddef>
@@ -10,39 +10,42 @@
 
 namespace windsplat::net {
 
-// An address is an IPv4 address or an IPv6 network of 64 bits (address.hpp). The defaults are meant
-// never to be met by people, a room of them behind one address among these;
-// docs/user/configuration.md says what happens at each.
+// An address is an IPv4 address or an IPv6 network of 64 bits (address.hpp). The defaults are above
+// the usage of many people behind one address; docs/user/configuration.md describes the effect of
+// each.
 struct Limits {
   std::size_t connections = 512;
   std::size_t connections_per_address = 256;
-  // New ones a second, ten seconds' worth at once; one in TLS counts as Quota::tls_arrivals. In all
-  // only those of addresses are refused that had more than a second's worth of late.
+  // New connections per second, in bursts of ten seconds' worth; one over TLS counts as
+  // Quota::tls_arrivals. The total limit refuses only addresses with more than a second's worth
+  // recently.
   double arrivals = 2000;
   double arrivals_per_address = 500;
-  // Processor time of TLS handshakes, milliseconds a second; ten seconds' worth at once, and what a
-  // handshake under way takes may go beyond. In total for addresses that have not shown the token
-  // recently, and as much again for those that have; 127.0.0.1 and ::1 have the address's alone.
+  // Processor time of TLS handshakes in milliseconds per second, in bursts of ten seconds' worth; a
+  // handshake in progress may exceed it. The total applies to addresses that have not shown the
+  // token recently, and again to those that have; 127.0.0.1 and ::1 have only the limit per
+  // address.
   double handshake_ms = 250;
   double handshake_ms_per_address = 100;
-  std::size_t sessions_per_address = 48;  // all of them: ServerOptions::sessions_max
-  double requests_per_address = 1000;     // a second; ten seconds' worth may come at once
-  double messages_per_address = 4000;     // of streams, a second
-  double received_per_address = 8e6;      // bytes of those messages a second
-  double bytes_per_address = 0;           // sent, a second; one answer may go beyond
-  double render_s_per_address = 0;        // of the renderer, a minute; one may go beyond
-  double failed_logins_per_address = 30;  // a minute
+  std::size_t sessions_per_address = 48;  // total: ServerOptions::sessions_max
+  double requests_per_address = 1000;     // per second; bursts of ten seconds' worth
+  double messages_per_address = 4000;     // of streams, per second
+  double received_per_address = 8e6;      // bytes of those messages per second
+  double bytes_per_address = 0;           // sent per second; the last response may exceed it
+  double render_s_per_address = 0;        // render time per minute; the last one may exceed it
+  double failed_logins_per_address = 30;  // per minute
   std::int64_t pixels = protocol::limits::image_pixels_max;  // of a picture
   double kernels = 1e10;                                     // of a picture (cost.hpp)
-  double render_s = 120;  // to draw a picture asked for by HTTP, as far as that can be told
-  // A picture asked for by HTTP is refused where those of other addresses will keep it waiting
-  // longer than this and than it takes itself, milliseconds: so nobody who is let in waits much
+  double render_s = 120;  // estimated time of a picture requested by HTTP
+  // Limit in milliseconds on how long requests of other addresses may delay a picture requested by
+  // HTTP that is itself shorter; above it the picture is refused, which bounds the delay of
+  // admitted ones.
   // longer than where there is nobody else.
   double wait_ms = 25;
-  // Peers whose X-Forwarded-For is believed: addresses, or networks as ADDRESS/BITS.
+  // Proxies whose X-Forwarded-For is trusted: addresses, or networks as ADDRESS/BITS.
   std::vector<std::string> trusted_proxies;
 
-  // What clients are told: the protocol has a limit of its own.
+  // Limits as published to clients, capped by the protocol's own.
   [[nodiscard]] std::int64_t pixels_max_reported() const {
     constexpr std::int64_t most = protocol::limits::image_pixels_max;
     return pixels > 0 && pixels < most ? pixels : most;

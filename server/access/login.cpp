@@ -1,6 +1,6 @@
-// The login page is whole in itself, so that nothing else has to be served to strangers. Its script
-// keeps the view of a shared link, which is in the address's fragment; without scripts it works,
-// too.
+// The login page is self-contained, so that unauthenticated clients need no other resource. Its
+// script keeps the fragment of the URL, which holds the view of a shared link; without scripts the
+// login still works.
 #include "server/access/login.hpp"
 
 #include <openssl/evp.h>
@@ -26,7 +26,7 @@ constexpr std::string_view style =
 
 constexpr std::string_view script = "document.forms[0].action+=location.hash";
 
-// "'sha256-...'" as a content policy names an inline element.
+// "'sha256-...'" source expression of an inline element for the Content-Security-Policy.
 std::string policy_hash(std::string_view text) {
   std::array<unsigned char, 32> digest{};
   unsigned int bytes = 0;
@@ -45,12 +45,12 @@ const std::string& policy() {
   return text;
 }
 
-// `base_path` has only letters that HTML does not escape, `message` is ours.
+// Neither `base_path` nor `message` needs HTML escaping.
 std::string page(const std::string& base_path, std::string_view message) {
   std::string html =
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
-      // Else the browser would say Origin: null with the form.
+      // Without it the browser would send the form with Origin: null.
       "<meta name=\"referrer\" content=\"same-origin\"><link rel=\"icon\" href=\"data:,\">"
       "<title>windsplat: log in</title><style>";
   html += style;
@@ -70,7 +70,7 @@ std::string page(const std::string& base_path, std::string_view message) {
 }
 
 void add_challenge(Response& response, bool wrong) {
-  // RFC 6750, 3: no error is named where nothing was shown.
+  // RFC 6750, 3: no error code if the request has no credentials.
   response.headers.emplace_back(
       "WWW-Authenticate",
       wrong ? "Bearer realm=\"windsplat\", error=\"invalid_token\"" : "Bearer realm=\"windsplat\"");
@@ -101,7 +101,7 @@ std::optional<unsigned> hex_digit(char c) {
   return std::nullopt;
 }
 
-// Of application/x-www-form-urlencoded; what is no escape stands for itself.
+// Decodes application/x-www-form-urlencoded; invalid escapes are kept as they are.
 std::string form_text(std::string_view text) {
   std::string out;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -119,7 +119,7 @@ std::string form_text(std::string_view text) {
   return out;
 }
 
-// The form's only field, without the spaces that come with copied text.
+// The form's only field, without spaces around pasted text.
 std::string posted_token(const std::string& body) {
   for (const std::string_view pair : split_list(body, '&')) {
     const std::size_t equals = pair.find('=');
@@ -136,18 +136,17 @@ Response turned_away(Verdict verdict, const Request& request, const std::string&
   switch (verdict) {
     case Verdict::token_in_url:
       return problem_response(400, "Bad Request",
-                              "a token does not belong into an address, where it is kept and "
+                              "do not send the token in the URL, where it is stored and "
                               "logged: send it as Authorization: Bearer");
     case Verdict::wrong_origin:
       if (request.header("Origin").empty()) {
-        return problem_response(
-            403, "Forbidden",
-            "a cookie or the login form counts from a page alone, and no Origin "
-            "tells of one: programs send Authorization: Bearer");
+        return problem_response(403, "Forbidden",
+                                "cookies and the login form require an Origin header of a page; "
+                                "programs must send Authorization: Bearer");
       }
       return problem_response(403, "Forbidden",
                               "pages of " + printable(request.header("Origin")) +
-                                  " may not connect here; --allow-origin names those that may");
+                                  " may not connect; use --allow-origin to allow them");
     case Verdict::allowed:
     case Verdict::no_token:
     case Verdict::wrong_token:
@@ -157,7 +156,7 @@ Response turned_away(Verdict verdict, const Request& request, const std::string&
   if (wants_page(request)) return login_page(base_path, "", wrong);
   Response response = problem_response(
       401, "Unauthorized",
-      wrong ? "that is not the token" : "a token is needed: Authorization: Bearer TOKEN");
+      wrong ? "invalid token" : "a token is required: Authorization: Bearer TOKEN");
   add_challenge(response, wrong);
   return response;
 }
@@ -167,16 +166,16 @@ Response log_in(const Request& request, const Token& token, const std::string& b
   const std::string type = request.header("Content-Type");
   if (!equal_without_case(split_list(type, ';')[0], "application/x-www-form-urlencoded")) {
     return problem_response(415, "Unsupported Media Type",
-                            "a login is application/x-www-form-urlencoded");
+                            "Content-Type must be application/x-www-form-urlencoded");
   }
   if (!token.is(posted_token(request.body))) {
-    log::warn("a login failed", {{"request", request.id}});
-    return login_page(base_path, "That is not the token.", true);
+    log::warn("login failed", {{"request", request.id}});
+    return login_page(base_path, "Invalid token.", true);
   }
   std::string cookie = cookie_name(request) + '=' + token.cookie(now_s + cookie_lasts_s);
   cookie += "; Path=" + base_path + "; Max-Age=" + std::to_string(cookie_lasts_s) +
             "; HttpOnly; SameSite=Strict";
-  // Behind a proxy that speaks TLS for us the page's own address tells.
+  // Behind a proxy that terminates TLS, the page's origin shows https.
   if (tls || request.header("Origin").starts_with("https://")) cookie += "; Secure";
   return {
       303,

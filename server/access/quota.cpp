@@ -1,4 +1,4 @@
-// Counters and buckets of addresses.
+// Counters and token buckets of addresses.
 #include "server/access/quota.hpp"
 
 #include <algorithm>
@@ -13,7 +13,7 @@ constexpr double quota_us_per_ms = 1e3;
 constexpr double s_per_minute = 60;
 constexpr Quota::Micros forget_after = 600'000'000;
 constexpr int quota_retry_s_max = 3600;
-// How many seconds' worth may be taken at once.
+// Size of a burst in seconds of the rate.
 constexpr double at_once_s = 10;
 constexpr double received_at_once_s = 2;
 
@@ -22,7 +22,7 @@ int whole_seconds(Quota::Micros wait) {
   return static_cast<int>(std::clamp(seconds, 1.0, double{quota_retry_s_max}));
 }
 
-// 127.0.0.1 and ::1 as they are counted: where health checks of the machine itself come from.
+// 127.0.0.1 and ::1 as counted: health checks of the machine itself use them.
 bool is_own_machine(const std::string& address) {
   return address == "127.0.0.1" || address == "::/64";
 }
@@ -80,7 +80,7 @@ std::optional<Refusal> Quota::arrive(const std::string& address, bool trusted, b
   Bucket& own = here.arrivals;
   const Rate own_rate = rate_for_ten_seconds(limits_.arrivals_per_address);
   const Rate rate = rate_for_ten_seconds(limits_.arrivals);
-  // What one connection takes is never more than there may be at once.
+  // The cost of one connection never exceeds the size of a burst.
   const Micros own_wait =
       trusted ? 0 : wait_for(own, own_rate, std::min(cost, own_rate.at_once), now);
   if (own_wait > 0) {
@@ -96,7 +96,7 @@ std::optional<Refusal> Quota::arrive(const std::string& address, bool trusted, b
   return std::nullopt;
 }
 
-// Debts, like bytes and time of drawing: what a handshake takes is known when it is done.
+// May be overdrawn, like bytes and render time: the cost of a handshake is known afterwards.
 std::optional<Refusal> Quota::may_handshake(Entry& entry, bool trusted, Micros now) {
   const Rate own_rate = rate_for_ten_seconds(limits_.handshake_ms_per_address);
   const Micros own_wait = trusted ? 0 : wait_for(entry.handshakes, own_rate, 0, now);
@@ -111,8 +111,8 @@ std::optional<Refusal> Quota::may_handshake(Entry& entry, bool trusted, Micros n
   return Refusal{LimitKind::handshakes, limits_.handshake_ms, whole_seconds(wait)};
 }
 
-// The machine's own health checks must not wait for strangers: where each of its addresses has an
-// allowance, that alone bounds them.
+// Health checks of the machine itself must not wait for unknown addresses: if a limit per address
+// is set, only that applies to them.
 Quota::Bucket* Quota::shared_handshakes(const Entry* entry, bool trusted) {
   if (trusted) return &known_handshakes_;
   if (entry == nullptr) return &stranger_handshakes_;
@@ -281,10 +281,10 @@ bool Quota::is_idle(Entry& entry, Micros now) const {
   if (entry.connections + entry.reserved + entry.sessions > 0) return false;
   entry.bytes.refill(byte_rate(), now);
   entry.render.refill(render_rate(), now);
-  return entry.bytes.taken <= 0 && entry.render.taken <= 0;  // the others came back long ago
+  return entry.bytes.taken <= 0 && entry.render.taken <= 0;  // the other buckets refilled long ago
 }
 
-// One or two at a time, so that nobody waits for a long list to be looked through.
+// Evict one or two at a time to bound the time of a call.
 void Quota::forget_idle(Micros now) {
   for (int n = 0; n < 2 && !entries_.empty(); ++n) {
     Entry& oldest = entries_.front();
@@ -298,8 +298,8 @@ void Quota::forget_idle(Micros now) {
   }
 }
 
-// Whoever has a connection stays: there are fewer of those than of entries. Strangers go first,
-// who alone can bring many addresses.
+// Addresses with connections stay: there are fewer of them than entries. Evict unknown addresses
+// first, as only they can come in large numbers.
 void Quota::make_room() {
   const auto is_away = [](const Entry& known) {
     return known.connections + known.reserved + known.sessions == 0;

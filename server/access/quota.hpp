@@ -1,5 +1,5 @@
-// What each address has of the server and had of late, as a pure state machine: events with their
-// times in, refusals out. It owns no socket, lock or clock.
+// Current and recent usage of each address as a pure state machine: timed events in, refusals out.
+// Owns no socket, lock or clock.
 #pragma once
 
 #include <cstddef>
@@ -16,60 +16,60 @@ namespace windsplat::net {
 
 struct Refusal {
   LimitKind kind = LimitKind::connections;
-  double limit = 0;       // as Limits has it
-  int retry_after_s = 1;  // until it would be let in, as far as that is known
+  double limit = 0;       // as in Limits
+  int retry_after_s = 1;  // estimated time until admission
 };
 
 class Quota {
  public:
-  using Micros = std::int64_t;  // of a clock that never goes back
+  using Micros = std::int64_t;  // of a monotonic clock
 
-  static constexpr std::size_t addresses_max = 4096;  // known at a time
-  // Beyond the limits so many connections more are taken in, of an address a quarter of them, in
-  // which health alone is asked about.
+  static constexpr std::size_t addresses_max = 4096;  // tracked at a time
+  // Size of the reserve: connections above the limits that serve health only. One address may use a
+  // quarter of it.
   static constexpr std::size_t reserve_max = 64;
   static constexpr std::size_t reserve_per_address = reserve_max / 4;
-  static constexpr double tls_arrivals = 5;  // a handshake takes so many plain connections' work
+  static constexpr double tls_arrivals = 5;  // cost of a handshake in plain connections
 
   explicit Quota(const Limits& limits) : limits_(limits) {}
 
-  // What a connection that comes is: one like others, one of the reserve (and why), or too much.
+  // Decision on a new connection: ordinary, in the reserve (with the reason), or refused.
   enum class Slot { ordinary, reserve, none };
   struct Arrival {
     Slot place = Slot::none;
-    std::optional<Refusal> reason;  // of what is not ordinary
+    std::optional<Refusal> reason;  // set unless ordinary
     bool known = false;             // a proxy, or the address has shown the token
   };
-  // Before a connection is looked at any further: whether there were not too many of late.
+  // Call first for a new connection: whether the rate of recent ones is within the limits.
   std::optional<Refusal> arrive(const std::string& address, bool trusted, bool tls, Micros now);
-  // What a TLS handshake has taken of a processor so far. Needs no memory.
+  // Charges processor time of a TLS handshake. Does not allocate.
   void handshake_took(const std::string& address, bool trusted, Micros took, Micros now);
-  // The address has shown the token: until it is forgotten its handshakes do not compete with those
-  // of strangers.
+  // The address has shown the token: until its entry is evicted, its handshakes do not compete with
+  // those of unknown addresses.
   void authenticated(const std::string& address, Micros now);
-  // `trusted`: a proxy's, which brings many and counts in total alone.
+  // `trusted`: of a proxy, which is counted in the total only.
   Arrival connect(const std::string& address, bool trusted, Micros now);
-  // Whether it found no place because the reserve is full, of others that is.
+  // Whether it was refused because the reserve is filled by other addresses.
   [[nodiscard]] bool is_kept_out_by_others(const std::string& address, bool trusted, Micros now);
-  void disconnect(const std::string& address, Slot place);  // needs no memory
+  void disconnect(const std::string& address, Slot place);  // does not allocate
 
   std::optional<Refusal> open_session(const std::string& address, Micros now);
-  void close_session(const std::string& address);  // needs no memory
+  void close_session(const std::string& address);  // does not allocate
 
-  // A request that was understood. Those for health have an allowance of their own, as large.
+  // A parsed request. Health requests have a separate allowance of the same size.
   std::optional<Refusal> request(const std::string& address, bool health, Micros now);
-  // Whether a picture may be begun: nothing is owed of bytes and renderer's time.
+  // Whether a picture may start: quotas of bytes and render time are not exceeded.
   std::optional<Refusal> picture(const std::string& address, Micros now);
-  // How long until nothing is owed.
+  // Time until no quota is exceeded.
   Micros throttle_delay(const std::string& address, Micros now);
 
   void sent(const std::string& address, std::size_t bytes, Micros now);
   void rendered(const std::string& address, Micros took, Micros now);
-  // Asked before a token is compared: there were not too many wrong ones of late.
+  // Call before comparing a token: whether recent failures are within the limit.
   std::optional<Refusal> may_try_login(const std::string& address, Micros now);
-  // A message of a stream: how long nothing more is to be read of it.
+  // A message of a stream; returns how long to pause reading.
   Micros message_received(const std::string& address, std::size_t bytes, Micros now);
-  // Refused where there were too many of late; the others are let off with being told so.
+  // Refused above the limit of recent failures; otherwise the failure is only counted.
   std::optional<Refusal> failed_login(const std::string& address, Micros now);
 
   [[nodiscard]] std::size_t known() const { return entries_.size(); }
@@ -77,13 +77,13 @@ class Quota {
   [[nodiscard]] std::size_t reserved() const { return reserved_; }
 
  private:
-  // What may be taken of something that comes back at a rate. It may go into debt.
+  // A token bucket that refills at a constant rate. May be overdrawn.
   struct Rate {
-    double a_second = 0;  // 0: as much as is wanted
+    double a_second = 0;  // 0: unlimited
     double at_once = 0;
   };
   struct Bucket {
-    double taken = 0;  // less what came back: 0 is full
+    double taken = 0;  // net of refill; 0 is full
     Micros at = 0;
     void refill(const Rate& rate, Micros now);
   };
@@ -96,12 +96,12 @@ class Quota {
     Bucket arrivals, handshakes, requests, health, messages, received, bytes, render, logins;
     Micros seen = 0;
   };
-  using Entries = std::list<Entry>;  // the one not seen for longest first
+  using Entries = std::list<Entry>;  // least recently seen first
 
   [[nodiscard]] static Rate rate_for_ten_seconds(double a_second);
   [[nodiscard]] Rate request_rate() const;
   std::optional<Refusal> may_handshake(Entry& entry, bool trusted, Micros now);
-  // What counts an address's handshakes beside its own allowance; null: nothing.
+  // The bucket for an address's handshakes besides its own; null: none.
   Bucket* shared_handshakes(const Entry* entry, bool trusted);
   [[nodiscard]] Rate byte_rate() const;
   [[nodiscard]] Rate render_rate() const;
@@ -110,9 +110,9 @@ class Quota {
                                          double limit, Micros now);
   static Micros wait_for(Bucket& bucket, const Rate& rate, double room, Micros now);
 
-  // Where memory fails for a new one, nothing has changed.
+  // Strong exception guarantee if an allocation fails.
   Entry& entry(const std::string& address, Micros now);
-  // Of one that has connections or sessions, and so is known. Needs no memory.
+  // For an address with connections or sessions, which has an entry. Does not allocate.
   Entry* known_entry(const std::string& address);
   void forget(Entries::iterator entry);
   void forget_idle(Micros now);
@@ -122,7 +122,7 @@ class Quota {
   Limits limits_;
   Entries entries_;
   std::unordered_map<std::string, Entries::iterator> by_address_;
-  Bucket arrivals_;  // of all
+  Bucket arrivals_;  // of all addresses
   Bucket stranger_handshakes_, known_handshakes_;
   std::size_t connections_ = 0;
   std::size_t reserved_ = 0;

@@ -29,7 +29,7 @@ Result<protocol::View> read_view(Services& services, const Request& request) {
       static_cast<std::size_t>(view.image.width) * static_cast<std::size_t>(view.image.height);
   if (pixels > retained_pixels) {
     std::string detail = "a reference has at most " + std::to_string(retained_pixels);
-    detail += " pixels: use `windsplat render`";
+    detail += " pixels; draw larger ones with `windsplat render`";
     return make_error_at(ErrorKind::too_large, "/image", std::move(detail));
   }
   if (const auto drawable = services.backend.check(view); !drawable) return drawable.error();

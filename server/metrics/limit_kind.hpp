@@ -1,11 +1,11 @@
-// The limits that can refuse a request, a connection or work, and their names in metrics.
+// The limits that can refuse a request, a connection or work, with their labels in metrics.
 #pragma once
 
 #include <array>
 
 namespace windsplat::net {
 
-// Which limit refused something: a fixed set, and the names that metrics have for them.
+// The limit that caused a refusal: a fixed set, with the labels used in metrics.
 enum class LimitKind {
   connections,
   address_connections,
@@ -17,9 +17,9 @@ enum class LimitKind {
   logins,
   pixels,
   kernels,
-  waiting,     // work that waits: pictures, loads, jobs
-  arrivals,    // connections a second
-  estimate,    // time that a picture would take
+  waiting,     // queued work: pictures, loads, jobs
+  arrivals,    // connections per second
+  estimate,    // estimated time of a picture
   handshakes,  // processor time of TLS handshakes
 };
 inline constexpr std::array limit_names{

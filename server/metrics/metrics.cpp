@@ -1,4 +1,4 @@
-// Families of prometheus-cpp, and figures of others that are looked up when they are asked for.
+// Families of prometheus-cpp, and values of other components read on each scrape.
 #include "server/metrics/metrics.hpp"
 
 #include <dirent.h>
@@ -43,7 +43,7 @@ const Histogram::BucketBoundaries& error_bounds() {
   return bounds;
 }
 
-// A family with one series that is not ours to count.
+// A family with one series whose value is counted elsewhere.
 void add(Families& out, prometheus::MetricType type, const char* name, const char* help,
          double value) {
   prometheus::ClientMetric metric;
@@ -76,14 +76,14 @@ void add_budget(Families& out, const data::BudgetCounts& budget) {
   add_gauge(out, "windsplat_resident_bytes",
             "Bytes of data that are in memory or reserved for a load.",
             static_cast<double>(budget.bytes));
-  add_gauge(out, "windsplat_memory_limit_bytes", "The most that resident data may have.",
+  add_gauge(out, "windsplat_memory_limit_bytes", "Limit of resident data.",
             static_cast<double>(budget.bytes_max));
   add_labelled(out, "windsplat_data_lookups_total",
-               "Volumes and averages that were asked for, by whether they were resident.", "result",
+               "Requests for volumes and averages, by residency.", "result",
                {{"hit", budget.hits}, {"miss", budget.misses}});
-  add_counter(out, "windsplat_data_evictions_total", "Volumes and averages that made room.",
+  add_counter(out, "windsplat_data_evictions_total", "Volumes and averages evicted.",
               budget.evictions);
-  add_counter(out, "windsplat_data_refusals_total", "Loads for which there was no room.",
+  add_counter(out, "windsplat_data_refusals_total", "Loads refused for lack of memory.",
               budget.refusals);
   add_labelled(out, "windsplat_volume_loads_total",
                "Volumes read from their files or made by a sample.", "result",
@@ -116,10 +116,9 @@ void add_process(Families& out) {
   add_gauge(out, "process_resident_memory_bytes", "Resident memory of this process.",
             resident_process_bytes());
   add(out, prometheus::MetricType::Counter, "process_cpu_seconds_total",
-      "Processor time of this process, its own and the system's for it.",
+      "User and system processor time of this process.",
       seconds(used.ru_utime) + seconds(used.ru_stime));
-  add_gauge(out, "process_open_fds", "File descriptors of this process that are open.",
-            open_files());
+  add_gauge(out, "process_open_fds", "Open file descriptors of this process.", open_files());
 }
 
 }  // namespace
@@ -134,15 +133,15 @@ struct Metrics::State {
   Histogram& stage(const char* name) {
     return prometheus::BuildHistogram()
         .Name("windsplat_stage_seconds")
-        .Help("Time of a picture in each stage on its way.")
+        .Help("Time of a picture in each stage.")
         .Register(registry)
         .Add({{"stage", name}}, second_bounds());
   }
   Counter& frame(const char* tier) {
-    return counter("windsplat_frames_total", "Frames sent to viewers.", {{"tier", tier}});
+    return counter("windsplat_frames_total", "Frames sent to sessions.", {{"tier", tier}});
   }
   Counter& bytes(const char* over) {
-    return counter("windsplat_sent_bytes_total", "Bytes handed to sockets, but for their framing.",
+    return counter("windsplat_sent_bytes_total", "Bytes sent to sockets, without framing.",
                    {{"over", over}});
   }
   Histogram& error(const char* kind) {
@@ -154,20 +153,20 @@ struct Metrics::State {
   }
   Counter& background(const char* result) {
     return counter("windsplat_background_jobs_total",
-                   "Measurements made while nothing else was to be drawn.", {{"result", result}});
+                   "Calibration measurements made while the renderer was idle.",
+                   {{"result", result}});
   }
   Counter& limit(const char* name) {
-    return counter("windsplat_refused_total", "What was refused, by the limit that it was beyond.",
+    return counter("windsplat_refused_total", "Refused work, by the limit exceeded.",
                    {{"limit", name}});
   }
   Counter& opened(const char* result) {
-    return counter("windsplat_dataset_opens_total", "Datasets that POST asked to open.",
+    return counter("windsplat_dataset_opens_total", "Datasets opened by POST.",
                    {{"result", result}});
   }
 
   explicit State(std::span<const char* const> routes) {
-    gauge("windsplat_build_info", "1; its label tells the version.",
-          {{"version", WINDSPLAT_VERSION}})
+    gauge("windsplat_build_info", "1, labelled with the version.", {{"version", WINDSPLAT_VERSION}})
         .Set(1);
     for (const char* route : routes) count_requests_of(route);
     count_requests_of(route_other);
@@ -176,7 +175,7 @@ struct Metrics::State {
 
   void count_requests_of(const char* route) {
     for (std::size_t i = 0; i < status_classes.size(); ++i) {
-      requests[route][i] = &counter("windsplat_http_requests_total", "Requests that were answered.",
+      requests[route][i] = &counter("windsplat_http_requests_total", "HTTP requests answered.",
                                     {{"route", route}, {"status", status_classes[i]}});
     }
   }
@@ -190,20 +189,18 @@ struct Metrics::State {
   Histogram& estimated = error("estimated");
   Histogram& measured = error("measured");
   Counter& dropped = counter("windsplat_frames_dropped_total",
-                             "Frames that were drawn and not sent: the view had moved on.");
-  Counter& cancelled = counter("windsplat_renders_cancelled_total",
-                               "Frames that were given up before they were drawn.");
-  Gauge& sessions = gauge("windsplat_sessions", "Viewers that are connected.");
-  Gauge& unsent =
-      gauge("windsplat_unsent_bytes", "Bytes of messages that wait for viewers to take them.");
-  Counter& sessions_opened =
-      counter("windsplat_sessions_opened_total", "Viewers that ever connected.");
-  Counter& accept_failures = counter("windsplat_accept_failures_total",
-                                     "Connections that the system could not hand over.");
+                             "Frames drawn but not sent because the view had changed.");
+  Counter& cancelled =
+      counter("windsplat_renders_cancelled_total", "Frames cancelled before they were drawn.");
+  Gauge& sessions = gauge("windsplat_sessions", "Open sessions.");
+  Gauge& unsent = gauge("windsplat_unsent_bytes", "Bytes of queued messages.");
+  Counter& sessions_opened = counter("windsplat_sessions_opened_total", "Sessions opened.");
+  Counter& accept_failures =
+      counter("windsplat_accept_failures_total", "Connections that could not be accepted.");
   Counter& handshakes =
       counter("windsplat_tls_handshake_seconds_total", "Processor time of TLS handshakes.");
   Counter& closed = counter("windsplat_connections_refused_total",
-                            "Connections closed unanswered: there were too many.");
+                            "Connections closed without a response because of a limit.");
   std::array<Counter*, 2> opens{&opened("failed"), &opened("ok")};
   std::array<Counter*, 2> studies{&background("done"), &background("cancelled")};
   std::map<std::string, std::array<Counter*, 5>, std::less<>> requests;

@@ -1,5 +1,5 @@
-// What the server counts about itself: events in from any thread, text in Prometheus' exposition
-// format out. Every series is there from the start, so that no client can make more of them.
+// Metrics of the server: events in from any thread, Prometheus text format out. All series exist
+// from the start, so that clients cannot create more.
 // docs/user/metrics.md describes each.
 #pragma once
 
@@ -23,30 +23,30 @@ class Metrics {
   enum class Stage { queue, render, encode, write };
   enum class Over { http, stream };
 
-  // Answers are counted by route: one of `routes`, else "other".
+  // Responses are counted by route: one of `routes`, else "other".
   explicit Metrics(std::span<const char* const> routes = {});
   ~Metrics();
   Metrics(const Metrics&) = delete;
   Metrics& operator=(const Metrics&) = delete;
 
   void stage_took(Stage stage, std::int64_t us);
-  // A frame that was handed to the socket whole.
+  // A frame written completely to the socket.
   void frame_sent(session::Tier tier, const protocol::FrameHeader& header);
   void frames_dropped(std::uint64_t count);
   void renders_cancelled(std::uint64_t count);
   void bytes_sent(Over over, std::size_t bytes);
-  void unsent(std::int64_t more_bytes);  // or fewer
+  void unsent(std::int64_t more_bytes);  // negative: fewer
   void session_opened();
   void session_closed();
   void answered(std::string_view route, int status);
   void accept_failed();
-  void handshake_took(std::int64_t us);  // of a processor
-  void connection_refused();             // closed unanswered: there were too many
+  void handshake_took(std::int64_t us);  // processor time
+  void connection_refused();             // closed without a response at the limit
   void refused(LimitKind kind);
   void dataset_opened(bool ok);
   void background_done(bool cancelled);
 
-  // All of it, with what `budget` counts and what the system tells of this process.
+  // All metrics, with those of `budget` and of the process.
   [[nodiscard]] std::string text(const data::BudgetCounts& budget) const;
 
  private:

@@ -1,5 +1,5 @@
-// A map in front of a folder. Files are named by ids that were made or checked here, so that no
-// client's words become a path.
+// An in-memory map with optional files. File names are ids generated or checked here, so that no
+// client input becomes a path.
 #include "server/views/saved_views.hpp"
 
 #include <fcntl.h>
@@ -31,9 +31,9 @@ using protocol::ViewDocument;
 
 constexpr std::size_t file_bytes_max = protocol::limits::message_bytes_max;
 constexpr std::string_view suffix = ".json";
-constexpr int complaints_max = 20;  // of files that are no views, one by one
+constexpr int complaints_max = 20;  // limit of log lines for invalid files
 
-// Closed with its owner, and with it the lock that it may hold.
+// A file descriptor with RAII; closing it releases its lock.
 class Handle {
  public:
   explicit Handle(int number = -1) : number_(number) {}
@@ -69,21 +69,22 @@ void warn_if_anybody_writes(int folder, const fs::path& path) {
   if ((facts.st_mode & S_IWOTH) == 0 || (facts.st_mode & S_ISVTX) != 0) return;
   std::array<char, 8> mode{};
   std::snprintf(mode.data(), mode.size(), "%04o", static_cast<unsigned>(facts.st_mode & 07777U));
-  log::warn("every user of this machine can change the saved views",
+  log::warn("saved views are writable by every user of this machine",
             {{"folder", path.native()}, {"mode", mode.data()}});
 }
 
-// The folder itself, held against other processes for as long as the handle lives.
+// Opens and locks the folder against other processes until the handle is closed.
 Result<Handle> claim(const fs::path& folder) {
   std::error_code fault;
   fs::create_directories(folder, fault);
-  if (fault) return unusable(folder, "cannot be made: " + fault.message());
+  if (fault) return unusable(folder, "cannot be created: " + fault.message());
   Handle handle(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (handle.get() < 0) return unusable(folder, "cannot be opened: " + words_of(errno));
   if (::flock(handle.get(), LOCK_EX | LOCK_NB) != 0) {
-    return unusable(folder, errno == EWOULDBLOCK
-                                ? "is in use by another windsplat; --state-dir names one for this"
-                                : "cannot be locked: " + words_of(errno));
+    return unusable(folder,
+                    errno == EWOULDBLOCK
+                        ? "is in use by another windsplat; use --state-dir to choose another"
+                        : "cannot be locked: " + words_of(errno));
   }
   const Handle views(::openat(handle.get(), "views", O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (views.get() < 0 && errno != ENOENT) {
@@ -94,22 +95,22 @@ Result<Handle> claim(const fs::path& folder) {
   return handle;
 }
 
-// Why nothing can be written below the folder of views, as an errno, or 0. Creates the folder where
-// it is missing. Whoever knows a view's id may change it: the list is for nobody else.
+// The errno that prevents writing to the folder of views, or 0. Creates the folder if missing,
+// readable only by its owner: knowledge of a view's id grants write access.
 int write_fault(const fs::path& folder) {
   if (::mkdir(folder.c_str(), S_IRWXU) != 0 && errno != EEXIST) return errno;
   return ::faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) == 0 ? 0 : errno;
 }
 
-// A regular file of at most file_bytes_max bytes, or what is wrong with it.
+// Reads a regular file of at most file_bytes_max bytes, or returns why not.
 Result<std::string> read_small_file(const fs::path& path) {
   const auto refuse = [](const std::string& why) { return make_error(ErrorKind::bad_data, why); };
   const Handle file(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   if (file.get() < 0) return refuse(words_of(errno));
   struct stat status {};
   if (::fstat(file.get(), &status) != 0) return refuse(words_of(errno));
-  if (!S_ISREG(status.st_mode)) return refuse("it is no regular file");
-  if (static_cast<std::uint64_t>(status.st_size) > file_bytes_max) return refuse("it is too long");
+  if (!S_ISREG(status.st_mode)) return refuse("not a regular file");
+  if (static_cast<std::uint64_t>(status.st_size) > file_bytes_max) return refuse("file too long");
   std::string text(file_bytes_max + 1, '\0');
   std::size_t length = 0;
   while (length < text.size()) {
@@ -127,13 +128,13 @@ Result<SavedView> read_view(const fs::path& path) {
   const std::string name = path.filename().native();
   const std::string_view id = std::string_view(name).substr(0, protocol::view_id_chars);
   if (!protocol::is_view_id(id) || std::string_view(name).substr(id.size()) != suffix) {
-    return make_error(ErrorKind::bad_data, "its name is no view's");
+    return make_error(ErrorKind::bad_data, "the file name is not a view id");
   }
   const auto text = read_small_file(path);
   if (!text) return text.error();
   auto saved = protocol::parse_view_file(*text);
   if (saved && saved->id != id) {
-    return make_error(ErrorKind::bad_data, "its id is not that of its name");
+    return make_error(ErrorKind::bad_data, "the id does not match the file name");
   }
   return saved;
 }
@@ -141,7 +142,7 @@ Result<SavedView> read_view(const fs::path& path) {
 Result<std::string> random_id() {
   std::array<unsigned char, protocol::view_id_chars> bytes{};
   if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
-    return make_error(ErrorKind::internal, "the machine gives no random numbers");
+    return make_error(ErrorKind::internal, "no random numbers available");
   }
   std::string id;
   for (const unsigned char byte : bytes) id += protocol::view_id_letters[byte & 31U];
@@ -149,9 +150,8 @@ Result<std::string> random_id() {
 }
 
 Error full(const std::string& what) {
-  return make_error(ErrorKind::out_of_memory,
-                    "this server keeps at most " + what +
-                        " and has no room for this one; delete views that nobody wants any more");
+  return make_error(ErrorKind::out_of_memory, "this server stores at most " + what +
+                                                  "; delete views that are no longer needed");
 }
 
 }  // namespace
@@ -169,8 +169,8 @@ struct SavedViews::State {
     return folder / name;
   }
 
-  // What a process that was killed had begun to write, `<id>.json.<process>.part`: the folder is
-  // this one's alone, so nobody goes on with it.
+  // Removes temporary files `<id>.json.<process>.part` of a killed process: the folder is locked,
+  // so no other process writes them.
   static bool is_left_over(const fs::path& path) {
     const std::string name = path.filename().native();
     const std::string_view id = std::string_view(name).substr(0, protocol::view_id_chars);
@@ -181,10 +181,10 @@ struct SavedViews::State {
            fs::is_regular_file(fs::symlink_status(path, ignored));
   }
 
-  // A folder that cannot be written to serves the views that it holds.
+  // A read-only folder still serves its views.
   void read_folder() {
     if (const int fault = write_fault(folder); fault != 0) {
-      log::warn("the state folder cannot be written to: saved views can be read, not changed",
+      log::warn("the state folder is not writable: saved views are read-only",
                 {{"folder", folder.native()}, {"fault", words_of(fault)}});
     }
     std::error_code fault;
@@ -197,7 +197,7 @@ struct SavedViews::State {
       }
       auto read = entries.size() < options.views_max
                       ? read_view(at->path())
-                      : make_error(ErrorKind::out_of_memory, "there are too many");
+                      : make_error(ErrorKind::out_of_memory, "too many views");
       if (read) {
         const std::size_t size = protocol::encode_view_file(*read).size();
         if (bytes + size <= options.bytes_max) {
@@ -206,13 +206,13 @@ struct SavedViews::State {
           entries.emplace(std::move(id), Entry{std::move(*read), size});
           continue;
         }
-        read = make_error(ErrorKind::out_of_memory, "there are too many bytes of views");
+        read = make_error(ErrorKind::out_of_memory, "too many bytes of views");
       }
       if (++left_alone > complaints_max) continue;
-      log::warn("a file is no saved view that can be read, and is left alone",
+      log::warn("ignoring an unreadable saved view",
                 {{"file", at->path().native()}, {"fault", read.error().message}});
     }
-    if (fault) log::warn("not all saved views could be read", {{"fault", fault.message()}});
+    if (fault) log::warn("cannot read all saved views", {{"fault", fault.message()}});
     log::info("saved views",
               {{"folder", folder.native()}, {"views", entries.size()}, {"left_alone", left_alone}});
   }
@@ -224,7 +224,7 @@ struct SavedViews::State {
     return at->second;
   }
 
-  // The rest under `changing`.
+  // The functions below require the mutex `changing`.
   [[nodiscard]] Result<std::string> unused_id() const {
     for (;;) {
       auto id = random_id();
@@ -237,25 +237,24 @@ struct SavedViews::State {
   }
 
   [[nodiscard]] Error disk_error(const Error& error) const {
-    log::error("a saved view could not be changed on disk", {{"fault", error.message}});
+    log::error("cannot change a saved view on disk", {{"fault", error.message}});
     if (const int fault = write_fault(folder); fault != 0) {
-      return make_error(ErrorKind::out_of_memory,
-                        "saved views cannot be changed now, only read: " + words_of(fault));
+      return make_error(ErrorKind::out_of_memory, "saved views are read-only: " + words_of(fault));
     }
     return make_error(error.kind, error.kind == ErrorKind::out_of_memory
-                                      ? "the disk that views are kept on is full"
+                                      ? "the disk of the saved views is full"
                                       : "the view could not be changed on disk");
   }
 
-  // `before`: bytes of the one that gives way.
+  // `before`: size of the replaced entry, bytes.
   Result<SavedView> put(SavedView saved, std::size_t before) {
     const std::string text = protocol::encode_view_file(saved);
-    WINDSPLAT_CHECK(text.size() <= file_bytes_max);  // its schema leaves a view no more room
+    WINDSPLAT_CHECK(text.size() <= file_bytes_max);  // guaranteed by the schema
     if (bytes - before + text.size() > options.bytes_max) {
       return full(std::to_string(options.bytes_max) + " bytes of views");
     }
     if (on_disk()) {
-      static_cast<void>(write_fault(folder));  // makes the folder where that was impossible before
+      static_cast<void>(write_fault(folder));  // creates the folder if that failed before
       const auto written = write_whole_file(file_of(saved.id), text, Sync::now);
       if (!written) return disk_error(written.error());
     }
@@ -268,8 +267,8 @@ struct SavedViews::State {
   Options options;
   fs::path folder;
   Handle lock;
-  std::mutex changing;         // held over disk and map
-  mutable std::mutex reading;  // of the map, which changes under both
+  std::mutex changing;         // held during changes of disk and map
+  mutable std::mutex reading;  // guards the map, which changes under both mutexes
   std::map<std::string, Entry> entries;
   std::size_t bytes = 0;
 };
@@ -337,7 +336,7 @@ Result<bool> SavedViews::remove(const std::string& id, const Check& may) {
   if (!may(entry->saved)) return false;
   if (state_->on_disk()) {
     std::error_code fault;
-    fs::remove(state_->file_of(id), fault);  // no error where somebody else removed it
+    fs::remove(state_->file_of(id), fault);  // not an error if another process removed it
     if (fault) return state_->disk_error(make_error(ErrorKind::internal, fault.message()));
     if (const auto ok = sync_folder(state_->folder); !ok) return state_->disk_error(ok.error());
   }

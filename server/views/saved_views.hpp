@@ -1,5 +1,4 @@
-// Views that clients left here, under short ids: in memory and, where there is a folder, each in a
-// file of its own. Checked views in, the same out.
+// Storage of saved views under short ids: in memory and, with a folder, each in its own file.
 #pragma once
 
 #include <cstddef>
@@ -16,18 +15,17 @@
 namespace windsplat::views {
 
 struct Options {
-  // The views are in its folder "views"; both are made where they are missing. Empty: memory alone.
+  // Views are stored in its subfolder "views"; both are created if missing. Empty: memory only.
   std::filesystem::path state_folder;
   std::size_t views_max = std::size_t{protocol::limits::views_max};
-  std::size_t bytes_max = std::size_t{protocol::limits::views_bytes_max};  // of all as JSON
+  std::size_t bytes_max = std::size_t{protocol::limits::views_bytes_max};  // total, as JSON
 };
 
-// Any thread. find() never waits for a disk; what changes views does, one at a time.
+// Any thread. find() never waits for a disk; changes do, one at a time.
 class SavedViews {
  public:
-  // Reads what is there. Other files are logged and left alone, and so is a
-  // folder that cannot be written to: its views are served, changes are refused. Errors: invalid,
-  // where the folder cannot be used or another process does.
+  // Reads the stored views. Other files are logged and ignored; a read-only folder serves its views
+  // and refuses changes. Errors: invalid if the folder cannot be used or another process uses it.
   static Result<std::shared_ptr<SavedViews>> open(Options options);
   ~SavedViews();
   SavedViews(const SavedViews&) = delete;
@@ -37,18 +35,18 @@ class SavedViews {
   // Errors: not_found.
   [[nodiscard]] Result<protocol::SavedView> find(const std::string& id) const;
 
-  // Under a new id. None that is there gives way. Errors: out_of_memory (views_max, bytes_max, the
-  // disk is full or cannot be written to), internal (the disk fails).
+  // Stores under a new id; never evicts. Errors: out_of_memory (views_max, bytes_max, disk full or
+  // not writable), internal (disk failure).
   Result<protocol::SavedView> add(protocol::ViewDocument view, std::string created);
 
-  // Whether what is there now may be changed; and what it becomes, or why not. Nobody else changes
-  // it meanwhile.
+  // Decides whether the current view may be changed, and returns the new one or an error. Calls are
+  // serialised.
   using Check = std::function<bool(const protocol::SavedView& now)>;
   using Change = std::function<Result<protocol::ViewDocument>(const protocol::ViewDocument& now)>;
-  // Empty where it may not be. Errors: not_found, those of the change, those of add().
+  // Empty if the change is not permitted. Errors: not_found, those of the change, those of add().
   Result<std::optional<protocol::SavedView>> replace(const std::string& id, const Check& may,
                                                      const Change& change);
-  // False where it may not be. Errors: not_found, those of the disk as in add().
+  // False if not permitted. Errors: not_found, those of the disk as in add().
   Result<bool> remove(const std::string& id, const Check& may);
 
  private:

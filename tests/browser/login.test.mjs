@@ -33,7 +33,7 @@ test("the login leads to the page, and its stream works by the cookie", () =>
     await shot(page, "login");
     await logIn(page, "not-the-token-at-all");
     await page.locator("[role=alert]").waitFor();
-    assert.match(await page.locator("[role=alert]").innerText(), /not the token/);
+    assert.match(await page.locator("[role=alert]").innerText(), /Invalid token/);
     await logIn(page, token);
     await page.waitForURL((url) => url.pathname === "/");
     await finalPicture(page);

@@ -194,7 +194,7 @@ TEST(Limits, drawing_is_charged_and_its_debt_is_waited_for) {
   EXPECT_EQ(get(server.port(), frame).status, 200) << "the first may go into debt";
   std::this_thread::sleep_for(std::chrono::milliseconds(200));  // it is charged once it is answered
   const Answer second = get(server.port(), frame);
-  expect_limit(second, 429, "seconds of drawing a minute");
+  expect_limit(second, 429, "seconds of rendering a minute");
   EXPECT_GT(std::atoi(second.header("retry-after").c_str()), 10);
   expect_limit(post_view(server.port(), R"({"dataset":"small"})"), 429, "drawing");
   expect_limit(request(server.port(), "POST", "/v1/references",

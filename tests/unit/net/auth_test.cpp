@@ -358,7 +358,7 @@ TEST(Login, with_another_token_shows_the_form_again) {
     const Response out = log_in(login(body), token(), "/", false, now_s);
     EXPECT_EQ(out.status, 401) << body;
     EXPECT_EQ(header_of(out, "Set-Cookie"), "");
-    EXPECT_THAT(text_of(out), HasSubstr("That is not the token."));
+    EXPECT_THAT(text_of(out), HasSubstr("Invalid token."));
   }
   Request json = login("token=0123456789abcdef-._~%2B/==");
   json.headers.insert(json.headers.begin(), {"Content-Type", "application/json"});
