@@ -1,4 +1,4 @@
-// The front of error against time, walked with patience.
+// Walks the front of error against time with hysteresis.
 #include "server/session/chooser.hpp"
 
 #include <algorithm>
@@ -8,11 +8,11 @@
 namespace windsplat::session {
 namespace {
 
-// How long a setting's own correction stands although the view has moved on.
+// Time constant of the correction per setting when the view moves.
 constexpr Micros correction_life_us = 4'000'000;
 constexpr double newest_weight = 0.5;
 constexpr double own_share = 0.3;
-// A slower setting is taken where it would fit this share of the budget, too.
+// A slower setting must also fit this share of the budget.
 constexpr double headroom_to_change = 0.92;
 }  // namespace
 
@@ -21,7 +21,7 @@ void Chooser::learn(std::size_t setting, Micros cost, const quality::Forecasts& 
   const quality::Forecast& forecast = forecasts[setting];
   const double ratio =
       std::log(static_cast<double>(std::max<Micros>(cost, 1)) / (1000 * forecast.ms));
-  // What was learnt of guesses says nothing of surveyed times.
+  // Corrections of guesses do not apply to calibrated times.
   const bool timed = std::any_of(forecasts.begin(), forecasts.end(),
                                  [](const quality::Forecast& known) { return known.timed; });
   if (!measured_ || timed_ != timed) {
@@ -34,11 +34,11 @@ void Chooser::learn(std::size_t setting, Micros cost, const quality::Forecasts& 
   timed_ = timed;
   Correction& own = corrections_[setting];
   const bool fresh = own.known && now - own.at < correction_life_us;
-  // One frame that was disturbed is believed no more than this.
+  // Clamps the influence of a single disturbed frame.
   constexpr double believed = 0.92;  // a factor of 2.5
   const double beyond =
       std::clamp(ratio - log_ratio_ - (fresh ? own.log_ratio : 0), -believed, believed);
-  // What is slow or fast is mostly the machine's load and the view, which all settings share.
+  // Load of the machine and the view affect all settings alike.
   log_ratio_ += (1 - own_share) * newest_weight * beyond;
   own.log_ratio = (fresh ? own.log_ratio : 0) + own_share * newest_weight * beyond;
   own.at = now;
@@ -70,7 +70,7 @@ quality::Choice Chooser::best(const protocol::View& view, const quality::Forecas
 std::size_t Chooser::choose(const protocol::View& view, const quality::Forecasts& forecasts,
                             const quality::Aim& aim, double pixels_most, Micros now) {
   const quality::Choice wanted = best(view, forecasts, aim, pixels_most, now);
-  // Patience keeps a picture that moves from flickering: one that rested begins anew.
+  // Hysteresis avoids flicker during motion; after a rest the choice starts anew.
   constexpr Micros rest = 1'000'000;
   if (now - chosen_at_ > rest) chosen_.reset();
   chosen_at_ = now;
@@ -82,7 +82,7 @@ std::size_t Chooser::choose(const protocol::View& view, const quality::Forecasts
     return wanted.setting;
   }
   if (is_wrong(wanted.setting, forecasts, aim, now)) {
-    // What was tried did not fit.
+    // The tried setting did not fit.
     constexpr Micros of_the_try = 500'000;
     if (tried_at_ && now - *tried_at_ < of_the_try) {
       try_after_ = std::min(2 * std::max(try_after_, correction_life_us), try_after_most);
@@ -97,7 +97,7 @@ std::size_t Chooser::choose(const protocol::View& view, const quality::Forecasts
   return *chosen_;
 }
 
-// Whether the present setting breaks an aim that the wanted one keeps.
+// Whether the current setting violates a limit that the wanted one meets.
 bool Chooser::is_wrong(std::size_t wanted, const quality::Forecasts& forecasts,
                        const quality::Aim& aim, Micros now) const {
   const std::size_t here = *chosen_;
@@ -124,7 +124,7 @@ std::size_t Chooser::patient(const quality::Choice& calm, const quality::Forecas
   if (is_sure(wanted, forecasts, now)) return wanted;
   if (tried_at_ && now - *tried_at_ < try_after_) return here;
   tried_at_ = now;
-  // A guess: the next finer resolution of the same kind.
+  // Guess: the next finer resolution of the same kind.
   const quality::Setting& own = quality::settings[here];
   std::optional<std::size_t> next;
   for (std::size_t i = 0; i < quality::settings_count; ++i) {

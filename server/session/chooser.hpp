@@ -1,5 +1,5 @@
-// Which setting a moving frame is drawn at: forecasts, a budget and an error in, a setting out;
-// times measured correct what was forecast.
+// Selects the setting of moving frames: forecasts, budget and error in, a setting out; measured
+// times correct the forecasts.
 #pragma once
 
 #include <array>
@@ -14,40 +14,40 @@
 
 namespace windsplat::session {
 
-using Micros = std::int64_t;  // microseconds of a clock that only goes forward
+using Micros = std::int64_t;  // microseconds of a monotonic clock
 
-// Predict, then correct. A forecast's time is multiplied by what frames took lately over what was
-// forecast for them: of all settings together, and beyond that of the setting itself. A slower
-// setting is taken only after `slack_frames` frames in a row that would have allowed it, a faster
-// one at once, so that the picture does not flicker. Times that are only guessed (nothing was
-// surveyed yet) are tried with the next finer resolution, seldom where that did not fit before.
+// Predict, then correct. A forecast's time is multiplied by the recent ratio of measured to
+// forecast times, common to all settings and additionally per setting. A slower setting is taken
+// only after `slack_frames` consecutive frames that would have allowed it, a faster one at once, to
+// avoid flicker. Without calibrated times the next finer resolution is tried, rarely if it did not
+// fit before.
 class Chooser {
  public:
   static constexpr int slack_frames = 5;
   static constexpr Micros try_after_first = 200'000;
   static constexpr Micros try_after_most = 32'000'000;
 
-  // A frame at that setting took `cost`.
+  // Records that a frame at the setting took `cost`.
   void learn(std::size_t setting, Micros cost, const quality::Forecasts& forecasts, Micros now);
 
-  // Of the settings that quality::is_allowed for the view, and whose pictures have at most
-  // `pixels_most` pixels unless none has.
+  // Chooses among settings that quality::is_allowed permits for the view and whose pictures have at
+  // most `pixels_most` pixels, or all if none has.
   std::size_t choose(const protocol::View& view, const quality::Forecasts& forecasts,
                      const quality::Aim& aim, double pixels_most, Micros now);
 
-  // What a frame at that setting is expected to cost.
+  // Expected cost of a frame at the setting.
   [[nodiscard]] Micros expected(std::size_t setting, const quality::Forecasts& forecasts,
                                 Micros now) const;
 
-  // The allowed setting that errs least among those expected to cost at most `budget`, without
-  // patience or trying; none where there is none.
+  // The allowed setting with the least error among those expected to cost at most `budget`, without
+  // hysteresis; none if there is none.
   [[nodiscard]] std::optional<std::size_t> least_error(const protocol::View& view,
                                                        const quality::Forecasts& forecasts,
                                                        Micros budget, Micros now) const;
 
  private:
   struct Correction {
-    double log_ratio = 0;  // beyond that of all settings
+    double log_ratio = 0;  // relative to that of all settings
     Micros at = 0;
     bool known = false;
   };
@@ -63,11 +63,11 @@ class Chooser {
 
   double log_ratio_ = 0;  // of times measured over forecast
   bool measured_ = false;
-  bool timed_ = false;  // log_ratio_ is of a style that was surveyed
+  bool timed_ = false;  // log_ratio_ is of a calibrated scene signature
   std::array<Correction, quality::settings_count> corrections_{};
-  std::optional<std::size_t> chosen_;  // for the newest frame; forgotten after a rest
+  std::optional<std::size_t> chosen_;  // for the newest frame; reset after a rest
   Micros chosen_at_ = 0;
-  int slack_ = 0;  // frames in a row that would have allowed a slower setting
+  int slack_ = 0;  // consecutive frames that would have allowed a slower setting
   std::optional<Micros> tried_at_;
   Micros try_after_ = try_after_first;
 };

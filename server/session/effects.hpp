@@ -1,4 +1,4 @@
-// What a session asks of its surroundings, and what they answer, as plain values.
+// Requests of a session to its environment and their results, as plain values.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ namespace windsplat::session {
 
 using Payload = std::shared_ptr<const std::vector<std::uint8_t>>;
 
-// How a frame's pixels are to be made and encoded.
+// How to render and encode a frame.
 struct Encoding {
   protocol::Codec codec = protocol::Codec::jpeg;
   int quality = 75;
@@ -28,7 +28,8 @@ struct Encoding {
 struct SendText {
   protocol::ServerMessage message;
 };
-// Answered by Session::on_described with the same id. Loads fields: not for the caller's thread.
+// Answered by Session::on_described with the same id. Loads fields: do not run on the caller's
+// thread.
 struct Describe {
   std::uint32_t id = 0;
   std::string dataset;
@@ -43,27 +44,27 @@ struct StartRender {
 struct CancelRender {
   std::uint64_t ticket = 0;
 };
-// What a frame is for: `moving` and `rest` come while the view changes and before its final frame.
+// Purpose of a frame: `moving` and `rest` precede the final frame, during and after a change.
 enum class Tier { moving, rest, final, still };
-// Goes before what comes next, or not at all. Its pong is answered by Session::on_pong.
+// Sent directly before the next message or not at all. The pong calls Session::on_pong.
 struct Ping {
-  std::uint32_t seq = 0;  // of the frame that comes next
+  std::uint32_t seq = 0;  // of the next frame
 };
-// At most one is on its way: the next comes after Session::on_written.
+// At most one is being written: the next follows Session::on_written.
 struct SendFrame {
   protocol::FrameHeader header;
   Payload payload;
   Tier tier = Tier::moving;
 };
-// The steps whose fields a view will probably need soon, the most urgent first; it takes the place
-// of the wish before. None: nothing is wanted any more. Not answered.
+// The steps whose fields a view will probably need soon, most urgent first; replaces the previous
+// request. None: withdraws it. Not answered.
 struct Prefetch {
   protocol::View view;  // not completed; names its dataset unless there are no steps
   std::vector<int> steps;
-  quality::Setting setting;  // that they will be drawn by
+  quality::Setting setting;  // for drawing them
 };
-// The view rests: time to learn what each setting costs and errs for it. Not answered, and given up
-// as soon as anything is to be drawn.
+// The view is at rest: measure time and error of each setting for it. Not answered; cancelled by
+// the next render.
 struct Calibrate {
   protocol::View view;  // not completed; names its dataset
 };
@@ -76,12 +77,12 @@ using Effect = std::variant<SendText, Describe, StartRender, CancelRender, Ping,
                             Prefetch, Calibrate, Close>;
 using Effects = std::vector<Effect>;
 
-// A frame as it was drawn.
+// A rendered frame.
 struct Drawn {
   Payload payload;
   protocol::FrameInfo info;
   std::string view_json;              // the completed view, canonical
-  quality::SceneSignature signature;  // of the view that was asked for, and where it is seen from
+  quality::SceneSignature signature;  // of the requested view, with its viewpoint
   quality::Viewpoint viewpoint;
   std::int64_t queue_us = 0;
   std::int64_t render_us = 0;

@@ -1,4 +1,4 @@
-// Bytes of moving frames -> a model of them -> quality and size that the link carries in time.
+// Models the size of moving frames and finds the quality and size that fit the rate of the link.
 #include "server/session/jpeg_rate.hpp"
 
 #include <algorithm>
@@ -8,12 +8,12 @@
 namespace windsplat::session {
 namespace {
 
-constexpr double head_bytes = 620;  // of a JPEG: its tables
+constexpr double head_bytes = 620;  // JPEG tables
 constexpr double pixels_power = 0.8;
 constexpr double scale_power = 0.47;
 constexpr int quality_step = 5;
-constexpr double to_rise = 0.8;      // of the limit: what a better quality may take
-constexpr double to_coarsen = 1.25;  // times the most pixels: what is borne
+constexpr double to_rise = 0.8;      // share of the limit that a better quality may take
+constexpr double to_coarsen = 1.25;  // tolerated factor above the maximum of pixels
 constexpr int slack_frames = 4;
 constexpr int level_max = 4;
 constexpr int edge_min = 64;  // pixels; no level makes an edge shorter than this
@@ -29,7 +29,7 @@ void JpegRate::learn(double pixels, int quality, std::size_t bytes, std::size_t 
   text_bytes_ = static_cast<double>(text_bytes);
   const double body = std::max(static_cast<double>(bytes) - head_bytes, 1.0);
   const double factor = body / (std::pow(pixels, pixels_power) * relative(quality));
-  // More is believed at once, less by and by.
+  // Rises at once, falls slowly.
   factor_ = std::max(factor, 0.5 * (factor_ + factor));
 }
 
@@ -39,7 +39,7 @@ double JpegRate::predicted_bytes(double pixels, int quality) const {
 
 int JpegRate::choose(double pixels, const Link& link, Micros budget) {
   if (!link.known()) return quality_;
-  const auto share = [&](int quality) {  // of the time it may take
+  const auto share = [&](int quality) {  // share of the time available
     const double limit = static_cast<double>(quality > quality_usual ? budget / 4 : budget);
     const double bytes = text_bytes_ + predicted_bytes(pixels, quality);
     return static_cast<double>(link.transfer(bytes)) / std::max(limit, 1.0);

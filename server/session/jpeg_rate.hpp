@@ -1,5 +1,4 @@
-// How good a JPEG the link can carry while the view moves: bytes of frames in, quality and size
-// out.
+// JPEG quality and picture size that the link can carry during motion.
 #pragma once
 
 #include <cstddef>
@@ -15,32 +14,32 @@ class JpegRate {
  public:
   static constexpr int quality_least = 40;
   static constexpr int quality_usual = 75;           // also while the link is unknown
-  static constexpr int quality_most = 85;            // where the link has plenty
+  static constexpr int quality_most = 85;            // on a fast link
   static constexpr Micros moving_most_us = 125'000;  // a moving frame's time on the link
 
-  // A moving frame of that many pixels took so many bytes; `text_bytes` go before each frame.
+  // A moving frame with that many pixels had that many bytes; `text_bytes` precede each frame.
   void learn(double pixels, int quality, std::size_t bytes, std::size_t text_bytes);
 
   [[nodiscard]] double predicted_bytes(double pixels, int quality) const;
 
-  // For the next moving frame: the best that the link carries within `budget`, above quality_usual
-  // within a quarter of it; from one call to the next it rises by one step at most.
+  // For the next moving frame: the best quality within `budget`, above quality_usual within a
+  // quarter of it; rises by at most one step per call.
   [[nodiscard]] int choose(double pixels, const Link& link, Micros budget);
 
-  // The most pixels whose frame at quality_least is on the link for no longer than `budget`, or
-  // moving_most_us if that is longer. Infinite while the link is unknown.
+  // Maximum of pixels whose frame at quality_least takes at most `budget`, or moving_most_us if
+  // longer, on the link. Infinite while the rate is unknown.
   [[nodiscard]] double pixels_max(const Link& link, Micros budget) const;
 
-  // For the next moving frame: the least level (each halves width and height) that pixels_max asks
-  // for. It stays where that changes by a quarter only, and gets finer only after a few frames.
+  // For the next moving frame: the least level (each halves width and height) within pixels_max.
+  // Tolerates deviations of a quarter, and gets finer only after a few frames.
   [[nodiscard]] int least_level(int width, int height, const Link& link, Micros budget);
 
  private:
-  double factor_ = 0.72;  // c, before anything was sent: climate's
+  double factor_ = 0.72;  // c; initial value of climate
   double text_bytes_ = 0;
   int quality_ = quality_usual;
   int level_ = 0;
-  int slack_ = 0;  // frames in a row that could have been finer
+  int slack_ = 0;  // consecutive frames that could have been finer
 };
 
 }  // namespace windsplat::session

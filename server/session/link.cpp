@@ -1,4 +1,4 @@
-// Times of frames sent and acknowledged -> round trip, rate, and when to begin the next one.
+// Estimates round trip and rate from frames sent and acknowledged, and when to start the next one.
 #include "server/session/link.hpp"
 
 #include <algorithm>
@@ -9,13 +9,13 @@
 namespace windsplat::session {
 namespace {
 
-// Less cannot be told from the noise of two machines' schedulers.
+// Smaller differences are scheduler noise.
 constexpr Micros least_took_us = 500;
-// A frame that took less beyond the round trip tells that the link is fast, not that it has become
-// slow: as samples of a flow that did not fill the link.
+// A small excess over the round trip proves that the link is fast, not that it became slow: such
+// samples are application-limited.
 constexpr Micros clear_took_us = 5'000;
-// One that took long counts as several: a link that has become slow must not go on being flooded
-// until as many frames as usual have told so.
+// A long one counts as several samples: stop flooding a slower link before the usual number of
+// frames has confirmed it.
 constexpr Micros long_took_us = 100'000;
 constexpr Micros counts_most = 4;
 constexpr double weight_of_new = 0.5;
@@ -84,17 +84,17 @@ void Link::acked(std::uint32_t seq, double decode_ms, Micros now) {
   const auto said = static_cast<Micros>(1000 * std::clamp(decode_ms, 0.0, 1e6));
   const Micros decode = std::min(said, now - newest.at);
   smooth(decode_us_, static_cast<double>(decode));
-  const Micros arrived = now - decode;  // and word of it came back
+  const Micros arrived = now - decode;  // and its acknowledgement returned
   trip_.add(arrived - newest.at, now);
   const Micros alone = arrived - newest.at - round_trip();
   const Micros in_row = arrived - newest.row_since - round_trip();
-  // Of a frame that was itself the fastest way there and back nothing is left to tell.
+  // The fastest frame itself has no excess over the round trip.
   if (alone > 0) {
     add_rate(std::max(rate_of(static_cast<double>(newest.frame.bytes), alone),
                       rate_of(newest.row_bytes, in_row)),
              alone);
   }
-  // What is still on its way is known better now.
+  // Update the prediction for frames in flight.
   Micros free = arrived - round_trip();
   Micros idle = now - round_trip();
   for (Flight& flight : flights_) {
@@ -139,7 +139,7 @@ Micros Link::may_start_at() const {
   const auto draw = static_cast<Micros>(draw_us_);
   const Micros moved = transfer(moving_bytes_);
   const Micros cycle = draw + moved + round_trip() + static_cast<Micros>(decode_us_);
-  // A little early: what is predicted too long must not cost frames.
+  // Slightly early: an overestimate must not cost frames.
   const Micros even = cycle * 9 / (10 * Micros{protocol::limits::frames_in_flight_max});
   return std::max({last.leaves - draw, last.done - moved - draw, last.frame.begun + even});
 }

@@ -1,4 +1,4 @@
-// Pacing of a session: which frame to draw next, and when.
+// Decides which frame is drawn next, and when.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,7 +16,7 @@ constexpr double budget_ms_default = 33;
 constexpr double budget_ms_least = 8;
 constexpr int final_quality = 92;
 constexpr int still_quality = 95;
-constexpr std::size_t chosen_bytes = 600;  // of the message, about, less its view
+constexpr std::size_t chosen_bytes = 600;  // approximate size of the message without its view
 constexpr Micros tell_reading_after = 300'000;
 constexpr Micros tell_reading_every = 250'000;
 
@@ -31,13 +31,13 @@ protocol::MethodCode method_code(const std::string& name) {
   return protocol::MethodCode::kernel;
 }
 
-// The view but for where it is looked at from.
+// The view without its camera.
 std::string without_camera(protocol::View view) {
   view.camera = {};
   return protocol::encode_view(view);
 }
 
-// Which data the view asks for, but for its step.
+// The data of the view, apart from its step.
 std::string fields_of(const protocol::View& view) {
   std::string names = view.dataset;
   const auto add = [&](const std::string& name) {
@@ -53,19 +53,19 @@ std::string fields_of(const protocol::View& view) {
   return names;
 }
 
-// Whether nothing but the background shows. The reference does not tell.
+// Whether only the background is visible. Unknown for the reference.
 bool is_blank(const protocol::FrameInfo& info) {
   return info.method != "reference" && info.tiles == 0;
 }
 
 }  // namespace
 
-// Both null: a stream keeps to a budget all the same.
+// If both are null, a stream keeps the default budget.
 quality::Aim Session::aim() const {
   quality::Aim aim{view_.quality.budget_ms, view_.quality.max_error};
   if (aim.budget_ms || aim.max_error) return aim;
-  // Where others wait for the renderer too, everyone's frames are made shorter, so that they come
-  // oftener: with n viewers of one kind by the root of n.
+  // When sessions compete for the renderer, shorten everyone's frames to raise the rate: for n
+  // similar sessions by the root of n.
   const double waited = 1e-3 * queue_us_;
   aim.budget_ms = std::max(budget_ms_least,
                            budget_ms_default * budget_ms_default / (budget_ms_default + waited));
@@ -82,7 +82,7 @@ bool Session::can_start() const {
 }
 
 bool Session::wants_final() const {
-  // While steps run by quickly a final frame would be out of date before it is seen.
+  // During fast playback a final frame would be outdated before it is shown.
   const bool still_enough = !player_.running() || player_.period() >= 4 * options_.quiet_us;
   return shown() && !drawn_final_ && still_enough && !hidden_;
 }
@@ -124,7 +124,7 @@ void Session::start_next(Micros now) {
     start_still(now);
   } else if (moving) {
     const bool cheap = final_cost(forecasts(), now) <= budget();
-    // A viewer that has stopped while its credit was out need not see a lesser frame first.
+    // A client that stopped while out of credit can skip intermediate frames.
     if (quiet && cheap && !player_.running()) {
       start_final(now);
     } else {
@@ -155,7 +155,7 @@ void Session::request_prefetch() {
   std::string fields = fields_of(view_);
   const bool none = steps.empty() && requested_.steps.empty();
   requested_at_rest_ = !player_.running();
-  // While steps run they are drawn as the last one was.
+  // Steps of playback are drawn at the setting of the previous one.
   const quality::Setting setting = player_.running() && !steps.empty()
                                        ? moving_setting_
                                        : quality::settings[quality::own_setting(view_)];
@@ -166,7 +166,7 @@ void Session::request_prefetch() {
   effects_.emplace_back(requested_);
 }
 
-// Of a description 0, of a frame its ticket.
+// 0 for a description, the ticket for a frame.
 std::optional<std::uint64_t> Session::waited_for() const {
   if (closed_ || !surroundings_.what_is_read || hidden_) return std::nullopt;
   if (!openings_.empty()) return 0;
@@ -185,8 +185,7 @@ void Session::tell_reading(Micros now) {
   }
 }
 
-// What a final frame is expected to take, the finer run that it is measured by among it, which is
-// by slabs whatever the frame is drawn by.
+// Expected time of a final frame, including the finer slab run that measures its error.
 Micros Session::final_cost(const quality::Forecasts& known, Micros now) const {
   const bool slab = view_.method.name == protocol::MethodName::slab;
   const double factor = final_factor_.value_or(slab ? 2.6 : 6.4);
@@ -194,7 +193,7 @@ Micros Session::final_cost(const quality::Forecasts& known, Micros now) const {
   return static_cast<Micros>(factor * static_cast<double>(own));
 }
 
-// A view's style is known once it was completed, which drawing does: until then its kind alone is.
+// The scene signature is known after completion during drawing; before that use the method only.
 quality::Forecasts Session::forecasts() const {
   quality::SceneSignature signature = quality::signature_of(view_);
   if (signature.key == drawn_style_) {
@@ -211,8 +210,7 @@ quality::Forecasts Session::forecasts() const {
   return out;
 }
 
-// What frames cost is learnt from those that are drawn as they are; what was read for them is not
-// theirs.
+// Learn times from frames drawn without loading only.
 void Session::learn(const Render& render, const Drawn& drawn, Micros now) {
   if (drawn.info.method == "reference" || render.purpose == Purpose::still) return;
   if (render.dataset != view_.dataset) return;
@@ -262,8 +260,8 @@ void Session::start_moving(Micros now) {
   start(render, view_);
 }
 
-// Towards the final frame: first what errs half as much as what is shown and takes a fraction of
-// its time.
+// Refinement before the final frame: half the error of the frame shown at a fraction of the final
+// time.
 void Session::start_refining(Micros now) {
   constexpr Micros long_in_coming = 200'000;
   constexpr double better = 0.5;
@@ -288,7 +286,7 @@ void Session::start_refining(Micros now) {
   start_final(now);
 }
 
-// The view as it stands; by thinner slabs where it would err more than is asked for.
+// The view as specified; with thinner slabs if its error would exceed maxError.
 quality::Setting Session::final_setting() const {
   quality::Setting setting = quality::settings[quality::own_setting(view_)];
   if (thinner_ == 0) return setting;
@@ -309,14 +307,14 @@ void Session::start_final(Micros now) {
   start(render, view_);
 }
 
-// Whether a final frame is not yet what maxError asks for, and thinner slabs are to be had.
+// Whether a final frame exceeds maxError and thinner slabs are possible.
 bool Session::errs_too_much(const Render& render, const Drawn& drawn) {
   constexpr int halvings_max = 4;
   const auto& most = view_.quality.max_error;
   if (render.purpose != Purpose::final || render.version != version_ || !most) return false;
   if (!drawn.info.error_value || *drawn.info.error_value <= *most) return false;
   if (drawn.info.method == "reference" || thinner_ >= halvings_max) return false;
-  // What slabs do not cause, averages of the data say, thinner ones do not mend.
+  // Errors of averaged data are not reduced by thinner slabs.
   constexpr double mended = 0.67;
   if (thinner_ > 0 && *drawn.info.error_value > mended * thicker_error_) return false;
   thicker_error_ = *drawn.info.error_value;
@@ -362,14 +360,14 @@ void Session::stand() {
   drawn_version_ = version_;
   drawn_final_ = true;
   standing_->view = protocol::encode_view(view_);
-  // An undo may have gone back to a rev that was never told.
+  // An undo may return to a rev that was never reported.
   if (!unanswered_ && standing_->rev == rev_) return;
   unanswered_.reset();
   standing_->rev = rev_;
   effects_.emplace_back(SendText{protocol::UnchangedMessage{rev_, standing_->seq}});
 }
 
-// Unless something else is on its way, which the viewer would see last.
+// Unless a pending frame would be shown after it.
 void Session::confirm_unchanged() {
   if (shown() || !standing_) return;
   if (render_ && !render_->unwanted && render_->purpose != Purpose::still) return;
@@ -380,7 +378,7 @@ void Session::withhold(const Render& render) {
   settle(render.version);
   drawn_version_ = render.version;
   drawn_final_ = false;
-  shown_error_ = 0;  // nothing but the final frame can tell more
+  shown_error_ = 0;  // only the final frame can improve on it
 }
 
 bool Session::looks_standing(const Render& render, const Drawn& drawn) const {
@@ -388,7 +386,7 @@ bool Session::looks_standing(const Render& render, const Drawn& drawn) const {
          is_blank(drawn.info) && standing_->without_camera == without_camera(view_);
 }
 
-// How fast steps run, told anew about once a second, and which of them came late for want of data.
+// Playback rate, reported about once a second, with the steps delayed by loading.
 void Session::count_played(const Render& render, bool loaded, Micros now) {
   constexpr Micros window_us = 1'000'000;
   if (!player_.running()) {
@@ -447,7 +445,7 @@ void Session::send_frame(const Render& render, Drawn drawn, Micros now) {
   const double unknown = std::numeric_limits<double>::quiet_NaN();
   header.error = static_cast<float>(drawn.info.error_value.value_or(unknown));
   header.jpeg_error = static_cast<float>(drawn.info.jpeg_error.value_or(unknown));
-  // What errs nobody knows how much is not refined twice.
+  // Do not refine twice if the error is unknown.
   const double otherwise = render.purpose == Purpose::refining ? 0 : 1;
   if (!still) shown_error_ = drawn.info.error_value.value_or(otherwise);
   header.queue_us = clamped_us(drawn.queue_us);
@@ -471,7 +469,7 @@ void Session::send_frame(const Render& render, Drawn drawn, Micros now) {
   drawn_version_ = render.version;
   drawn_final_ = final;
   standing_.reset();
-  // A final frame is of the present view: any change would have ended it.
+  // A final frame is of the current view: any change would have cancelled it.
   if (drawn_final_) {
     standing_ = {sent_seq_, render.rev, protocol::encode_view(view_),
                  blank ? without_camera(view_) : std::string()};

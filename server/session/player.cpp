@@ -1,4 +1,4 @@
-// The step that is due follows from the time of the next one; late calls skip or wait.
+// The due step follows from the time of the next one; late calls skip steps or wait.
 #include "server/session/player.hpp"
 
 #include <algorithm>
@@ -24,12 +24,12 @@ int Player::step_of(std::int64_t place) const {
 }
 
 void Player::start(const protocol::PlayMessage& message, int step, Micros now) {
-  const Micros before = due_ - period_us_;  // when the present step came
+  const Micros before = due_ - period_us_;  // when the current step began
   message_ = message;
   period_us_ = std::max<Micros>(1, std::llround(1e6 / message.fps));
   step_ = contains(step) ? step : message.from;
   if (running_) {
-    // Not in the past: what was late until now is not caught up with.
+    // Never in the past: earlier delays are not made up.
     due_ = std::max(now, before + period_us_);
   } else {
     if (ended()) step_ = message.from;
@@ -47,13 +47,13 @@ void Player::move_to(int step, Micros now) {
 
 Player::Advance Player::advance(Micros now, bool shown) {
   if (!running_) return {step_, 0};
-  if (ended() || count() == 1) {  // nothing follows
+  if (ended() || count() == 1) {  // no further step
     running_ = false;
     return {step_, 0};
   }
   if (now < due_ || (!message_.drop && !shown)) return {step_, 0};
   const std::int64_t late = message_.drop ? (now - due_) / period_us_ : 0;
-  // Without drop a late step does not make the following ones hurry.
+  // Without drop a late step does not shorten the following periods.
   due_ = message_.drop ? due_ + (1 + late) * period_us_ : std::max(due_ + period_us_, now);
   const std::int64_t here = place(step_);
   const std::int64_t there = here + 1 + late;

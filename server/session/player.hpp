@@ -1,4 +1,4 @@
-// Time steps running by themselves: a clock in, the step to show out.
+// Playback of time steps: a clock in, the step to show out.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@ namespace windsplat::session {
 
 class Player {
  public:
-  // Goes on from `step` if it is one of the message's, else begins at its first. From rest, a last
-  // step that nothing follows begins anew. While steps run already, only how they run changes: the
-  // next one comes when the new period has passed since the last one, at once if it has.
+  // Continues from `step` if it is in the message's range, else starts at its first. From rest,
+  // playback that ended starts anew. During playback only its parameters change: the next step is
+  // due one new period after the last one, at once if that has passed.
   void start(const protocol::PlayMessage& message, int step, Micros now);
   void stop() { running_ = false; }
-  // The user chose a step: time goes on from there.
+  // The user chose a step; playback continues from there.
   void move_to(int step, Micros now);
 
   [[nodiscard]] bool running() const { return running_; }
@@ -25,20 +25,20 @@ class Player {
 
   struct Advance {
     int step = 0;
-    std::int64_t passed = 0;  // steps on from the one before
+    std::int64_t passed = 0;  // steps since the previous one
   };
-  // The step due now. `shown`: the present one was sent; without `drop` the next waits for that.
-  // Stops by itself after the last step when it does not loop.
+  // The step due now. `shown`: the current one was sent; without `drop` the next waits for that.
+  // Stops after the last step unless it loops.
   Advance advance(Micros now, bool shown);
-  // When the next step is due; none if it waits for the present one.
+  // When the next step is due; none if it waits for the current one.
   [[nodiscard]] std::optional<Micros> next_at(bool shown) const;
-  // The steps after the present one, nearest first, each once, at most `most`.
+  // The steps after the current one, nearest first, each once, at most `most`.
   [[nodiscard]] std::vector<int> upcoming(int most) const;
 
  private:
   [[nodiscard]] bool contains(int step) const;
   [[nodiscard]] std::int64_t count() const;
-  [[nodiscard]] std::int64_t place(int step) const;     // in the order of showing, from 0
+  [[nodiscard]] std::int64_t place(int step) const;     // in playback order, from 0
   [[nodiscard]] int step_of(std::int64_t place) const;  // the inverse
   [[nodiscard]] bool ended() const { return !message_.loop && step_ == message_.to; }
 

@@ -1,4 +1,4 @@
-// Inputs of a session: messages, descriptions, frames and times -> changes of its state.
+// Inputs of a session: messages, descriptions, frames and times change its state.
 #include "server/session/session.hpp"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ constexpr int close_idle = 4410;
 
 constexpr std::size_t openings_max = 4;
 constexpr std::size_t stills_max = 2;
-// Changes kept apart until they are proved; more count as proved.
+// Limit of unconfirmed changes kept apart; more count as confirmed.
 constexpr std::size_t changes_max = 32;
 constexpr std::size_t change_bytes_max = limits::message_bytes_max;
 
@@ -33,7 +33,7 @@ std::string json_string(const std::string& text) {
   return out;
 }
 
-// Another dataset: what was said of the old one goes; the picture's size and budget stay.
+// Opening another dataset resets everything but picture size and budget.
 std::string open_patch(const std::string& dataset) {
   return "{\"dataset\":" + json_string(dataset) +
          ",\"step\":null,\"camera\":null,\"geometry\":null,\"vector\":null,\"scalars\":null,"
@@ -85,7 +85,7 @@ Effects Session::on_refused(const Error& error, const protocol::MessageTag& tag,
 }
 
 Effects Session::on_binary(Micros now) {
-  if (!closed_) close(close_bad_message, "a client sends text messages only");
+  if (!closed_) close(close_bad_message, "binary messages are not supported; send text");
   return finish(now);
 }
 
@@ -108,7 +108,7 @@ Effects Session::on_changed(const std::string& dataset, Micros now) {
       change(std::move(*next), std::nullopt, std::move(patch), now);
     }
   }
-  // A viewer that was told what the dataset holds is told anew.
+  // Describe the reopened dataset again if the client has its description.
   const bool is_asked = std::any_of(openings_.begin(), openings_.end(),
                                     [&](const Opening& known) { return known.id == opened_id_; });
   if (opened_id_ && !is_asked && openings_.size() < openings_max) {
@@ -150,8 +150,8 @@ Effects Session::on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros n
   render_.reset();
   if (!drawn) {
     const ErrorKind kind = drawn.error().kind;
-    // Data that were released while they were read are asked for again, by the view: a still has
-    // left its queue, and is answered.
+    // Data released during the read are requested again by the view; a still has left its queue and
+    // gets the error.
     const bool released = kind == ErrorKind::not_resident || kind == ErrorKind::draining;
     if (kind == ErrorKind::cancelled || (released && render.purpose != Purpose::still)) {
       ++stats_.cancelled;
@@ -176,8 +176,9 @@ Effects Session::on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros n
 
 void Session::follow(const protocol::OpenMessage& message, Micros now) {
   if (openings_.size() >= openings_max) {
-    refuse(make_error(ErrorKind::busy, "too many datasets are being opened at once"), message.id,
-           std::nullopt);
+    refuse(
+        make_error(ErrorKind::busy, "too many datasets are being opened; wait for one to finish"),
+        message.id, std::nullopt);
     return;
   }
   protocol::View bare;
@@ -214,7 +215,7 @@ void Session::follow(const protocol::PatchMessage& message, Micros now) {
     return;
   }
   const protocol::View view = next->view();
-  // A client may say how large its canvas is before it names a dataset.
+  // A client may set the picture size before it opens a dataset.
   if (!view.dataset.empty()) {
     if (const auto drawable = surroundings_.check(view); !drawable) {
       refuse(drawable.error(), std::nullopt, message.rev);
@@ -234,8 +235,8 @@ void Session::follow(const protocol::StillMessage& message, Micros /*now*/) {
   if (view_.dataset.empty()) {
     refuse(nothing_open(), message.id, std::nullopt);
   } else if (stills_.size() >= stills_max) {
-    refuse(make_error(ErrorKind::busy, "earlier stills are not finished yet"), message.id,
-           std::nullopt);
+    refuse(make_error(ErrorKind::busy, "earlier stills are pending; wait for one to finish"),
+           message.id, std::nullopt);
   } else if (const auto fits = size_still(message, still.view); !fits) {
     refuse(fits.error(), message.id, std::nullopt);
   } else {
@@ -270,7 +271,7 @@ void Session::follow(const protocol::PauseMessage& /*message*/, Micros /*now*/) 
 void Session::follow(const protocol::AckMessage& message, Micros now) {
   if (message.seq > sent_seq_) {
     refuse(make_error_at(ErrorKind::invalid, "/seq",
-                         "is a frame never sent; the newest is " + std::to_string(sent_seq_)),
+                         "was never sent; the newest frame is " + std::to_string(sent_seq_)),
            std::nullopt, std::nullopt);
     return;
   }
@@ -279,7 +280,7 @@ void Session::follow(const protocol::AckMessage& message, Micros now) {
 }
 
 void Session::follow(const protocol::VisibilityMessage& message, Micros now) {
-  // Nobody saw the steps that would have run meanwhile.
+  // Steps that passed in the meantime were not visible.
   if (hidden_ && !message.hidden) player_.move_to(view_.step, now);
   hidden_ = message.hidden;
   if (hidden_) abandon_render();
@@ -327,7 +328,7 @@ void Session::settle_oldest() {
 }
 
 void Session::settle(std::uint64_t version) {
-  if (version == version_) {  // as after most frames: no need to go through the changes
+  if (version == version_) {  // usual case: no need to search the changes
     proved_ = document_;
     proved_rev_ = rev_;
     changes_.clear();
@@ -362,20 +363,20 @@ void Session::render_failed(const Render& render, const Error& error, Micros now
   }
   auto fault = std::find_if(changes_.begin(), changes_.end(),
                             [&](const Change& kept) { return kept.version == render.version; });
-  // A view that was put together anew after an undo belongs to no change: its newest one goes next,
-  // until what is left was drawn before.
+  // A view reconstructed by an undo has no change of its own: undo the newest one next, until the
+  // rest has been drawn before.
   if (fault == changes_.end() && render.version == version_ && !changes_.empty()) {
     fault = std::prev(changes_.end());
   }
   if (fault != changes_.end()) {
-    // Time that ran into a step which cannot be shown stands still.
+    // Playback into a step that cannot be shown stops.
     if (!fault->rev) player_.stop();
     refuse(error, std::nullopt, fault->rev);
     not_opened_ = error;
     undo(fault->version, now);
     return;
   }
-  // Nothing to go back to: say so and wait for a change.
+  // No earlier view: report the error and wait for a change.
   refuse(error, std::nullopt, render.rev);
   answered(render.version);
   player_.stop();
@@ -409,7 +410,7 @@ void Session::abandon_render() {
 
 Effects Session::finish(Micros now) {
   if (!closed_ && now - heard_at_ >= options_.idle_timeout_us) {
-    close(close_idle, "nothing was heard for too long");
+    close(close_idle, "idle timeout: no message received");
   }
   if (!closed_) {
     advance_step(now);

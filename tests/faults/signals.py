@@ -186,7 +186,7 @@ def kill(program, folder, rounds, _slack=1):
         need(picture in (None, got), "a viewer that comes back sees another picture")
         picture = got
         for line in daemon.lines:
-            need("left alone" not in line, f"a file in the state folder cannot be read: {line}")
+            need("ignoring an unreadable" not in line, f"a file in the state folder cannot be read: {line}")
         loads = loaded(daemon.port)
         time.sleep(random.uniform(0.05, 0.6))
         daemon.stop(signal.SIGKILL)
