@@ -1,4 +1,4 @@
-// windsplat animate: dataset + view + steps -> a numbered picture a frame.
+// windsplat animate: draws a numbered picture for each frame.
 #include <unistd.h>
 
 #include <algorithm>
@@ -64,7 +64,7 @@ std::optional<Steps> parse_steps(std::string_view text) {
   return steps;
 }
 
-// A file's name around a number that is filled up with zeros.
+// A file name pattern with a zero-padded number.
 struct Pattern {
   std::string before;
   std::string after;
@@ -108,7 +108,7 @@ std::optional<Pattern> parse_pattern(std::string_view text) {
   return pattern;
 }
 
-// One line of stderr that is written over, if that is a terminal; colour unless NO_COLOR is set.
+// A progress line on stderr, overwritten on a terminal; coloured unless NO_COLOR is set.
 class Progress {
  public:
   explicit Progress(int total) : total_(total) {
@@ -148,7 +148,7 @@ class Progress {
   Clock::time_point start_ = Clock::now();
 };
 
-// What is to be drawn, checked before the first picture is.
+// The validated job.
 struct Plan {
   Steps steps;
   Pattern pattern;
@@ -193,7 +193,7 @@ Result<Plan> plan_of(const AnimateArguments& arguments, const data::DatasetInfo&
   const bool moves = view.vector.motion == protocol::MotionMode::phase && draws_lines(view, info);
   if (plan.per_step > 1 && !moves) {
     return make_error(ErrorKind::invalid,
-                      "--per-step: nothing moves between steps unless the view has lines and "
+                      "--per-step: has no effect unless the view has lines and "
                       "/vector/motion/mode=phase");
   }
   if (plan.steps.count() > std::numeric_limits<int>::max() / plan.per_step) {
@@ -226,7 +226,7 @@ Result<void> animate(const AnimateArguments& arguments, const CancelToken& cance
   for (int n = 0; n < total; ++n) {
     progress.show(n);
     view.step = plan->steps.first + n / plan->per_step * plan->steps.stride;
-    // Of the way to the next step that is drawn, so that the phase does not jump there.
+    // Fraction of the way to the next drawn step, so that the phase is continuous.
     const double part = static_cast<double>(n % plan->per_step) / plan->per_step;
     view.vector.motion_time = motion_start + plan->steps.stride * part;
     const auto picture = frame::produce(view, **dataset, encoding, pool, cancel, workspace);
@@ -241,13 +241,13 @@ Result<void> animate(const AnimateArguments& arguments, const CancelToken& cance
 }  // namespace
 
 void add_animate(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("animate", "Draw a picture a time step");
+  CLI::App* command = app.add_subcommand("animate", "Draw a picture for each time step");
   const auto arguments = std::make_shared<AnimateArguments>();
   add_view_options(*command, arguments->view);
   command
       ->add_option("--steps", arguments->steps, "First and last step, and a stride; default: all")
       ->type_name("A:B[:S]");
-  command->add_option("--per-step", arguments->per_step, "Frames a step, for motion by phase")
+  command->add_option("--per-step", arguments->per_step, "Frames per step, for phase motion")
       ->check(CLI::Range(1, per_step_max))
       ->type_name("N")
       ->capture_default_str();

@@ -1,4 +1,4 @@
-// Arguments -> the chosen command; what escapes it -> exit codes.
+// Runs the chosen command; converts exceptions to exit codes.
 #include "server/cli/cli.hpp"
 
 #include <sys/resource.h>
@@ -25,8 +25,7 @@ constexpr const char* description =
     "Exit codes: 0 ok, 1 failed, 2 usage, 3 bad data, 130 interrupted (animate, study, synth).\n"
     "An option that names an environment variable may be given by it; the option wins.";
 
-// How many letters are changed, added, taken away or swapped with their neighbour to make one word
-// of the other.
+// Edit distance of two words: letters changed, added, removed or swapped with a neighbour.
 std::size_t letters_between(std::string_view one, std::string_view other) {
   std::vector<std::vector<std::size_t>> to(one.size() + 1,
                                            std::vector<std::size_t>(other.size() + 1));
@@ -46,7 +45,7 @@ std::size_t letters_between(std::string_view one, std::string_view other) {
   return to.back().back();
 }
 
-// What a command does not know, and what may have been meant.
+// Describes an unknown word, with a suggestion.
 std::string unknown_argument(const CLI::App& app) {
   const std::vector<std::string> extras = app.remaining(true);
   const auto is_option = [](const std::string& word) { return word.starts_with('-'); };
@@ -55,11 +54,11 @@ std::string unknown_argument(const CLI::App& app) {
   const CLI::App& command = chosen.empty() ? app : *chosen.front();
   if (first == extras.end()) {
     const std::string& word = extras.empty() ? app.get_name() : extras.front();
-    return "'" + printable(word) + "' is one argument too many for '" + command.get_name() + "'";
+    return "'" + printable(word) + "' is an unexpected argument of '" + command.get_name() + "'";
   }
   const std::string word = first->substr(0, std::min<std::size_t>(first->find('='), 64));
   std::string nearest;
-  std::size_t least = 3;  // farther words have little in common
+  std::size_t least = 3;  // more distant words are unrelated
   for (const CLI::Option* option : command.get_options()) {
     for (const std::string& name : option->get_lnames()) {
       const std::size_t letters = letters_between(word, "--" + name);
@@ -68,12 +67,12 @@ std::string unknown_argument(const CLI::App& app) {
       nearest = name;
     }
   }
-  return "'" + printable(word) + "' is no option of '" + command.get_name() + "'" +
+  return "'" + printable(word) + "' is not an option of '" + command.get_name() + "'" +
          (nearest.empty() ? "" : "; did you mean --" + nearest + "?");
 }
 
-// The first option or argument that was given an empty value, as "--size"; empty if none was. An
-// empty value is no default: more likely a variable that is not set.
+// The first option or argument with an empty value, as "--size"; empty if there is none. An empty
+// value probably comes from an unset variable, so it is an error.
 std::string given_empty(const CLI::App& command) {
   for (const CLI::Option* option : command.get_options()) {
     const auto& values = option->results();
@@ -84,7 +83,7 @@ std::string given_empty(const CLI::App& command) {
   return {};
 }
 
-// What --help and --version print is data like any other: lost, it is a failure.
+// Output of --help and --version is data: failing to write it is a failure.
 int print(const CLI::App& app, const CLI::ParseError& wanted) {
   std::ostringstream text;
   app.exit(wanted, text, std::cerr);
@@ -99,7 +98,7 @@ int run_parsed(CLI::App& app, const Action& chosen, int argc, const char* const*
   }
   const auto is_meant = [&](const CLI::App* command) { return command->check_name(argv[1]); };
   if (argv[1][0] != '-' && app.get_subcommands(is_meant).empty()) {
-    complain("there is no command '" + printable(argv[1]) + "'; run with --help for those there");
+    complain("unknown command '" + printable(argv[1]) + "'; run with --help to list the commands");
     return exit_usage;
   }
   try {
@@ -115,13 +114,13 @@ int run_parsed(CLI::App& app, const Action& chosen, int argc, const char* const*
     return exit_usage;
   }
   if (const std::string empty = given_empty(*app.get_subcommands().front()); !empty.empty()) {
-    complain(empty + " is given an empty value");
+    complain(empty + " has an empty value");
     return exit_usage;
   }
   return chosen();
 }
 
-// What of memory and threads this process is limited to, as far as it is: " (limits: ...)".
+// Resource limits of this process, where known: " (limits: ...)".
 std::string memory_limits() {
   struct Limited {
     __rlimit_resource which;
@@ -137,7 +136,7 @@ std::string memory_limits() {
   return text.empty() ? text : " (limited to " + text + ')';
 }
 
-// The system refuses a thread for want of memory for its stack, or of numbers for threads.
+// Threads fail to start for lack of stack memory or thread ids.
 bool is_shortage(const std::error_code& code) {
   return code == std::errc::resource_unavailable_try_again || code == std::errc::not_enough_memory;
 }
@@ -152,7 +151,7 @@ std::string shortage(const std::string& what) {
 }  // namespace
 
 int run(int argc, const char* const* argv) {
-  // A reader that goes away is an error of write, not the end of the process.
+  // A closed pipe is a write error and must not kill the process.
   std::signal(SIGPIPE, SIG_IGN);
   try {
     if (argc == 2 && std::string_view(argv[1]) == "load") return load();
@@ -172,7 +171,7 @@ int run(int argc, const char* const* argv) {
   } catch (const std::bad_alloc&) {
     complain("out of memory" + memory_limits());
   } catch (const std::system_error& fault) {
-    complain(is_shortage(fault.code()) ? shortage("no thread can be started")
+    complain(is_shortage(fault.code()) ? shortage("cannot start a thread")
                                        : "internal error: " + printable(fault.what(), 1000));
   } catch (const std::exception& fault) {
     complain("internal error: " + printable(fault.what(), 1000));

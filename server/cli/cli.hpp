@@ -3,7 +3,8 @@
 
 namespace windsplat::cli {
 
-// Exit codes: 0 ok, 1 failed, 2 usage, 3 bad data. Data goes to stdout, messages to stderr.
+// Exit codes: 0 success, 1 failure, 2 usage, 3 bad data. Data is written to stdout, messages to
+// stderr.
 int run(int argc, const char* const* argv);
 
 }  // namespace windsplat::cli

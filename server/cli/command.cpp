@@ -1,4 +1,4 @@
-// The commands' common parts: numbers from words, bytes to files, errors to stderr.
+// Common parts of the commands: parsing of numbers, output to files, errors to stderr.
 #include "server/cli/command.hpp"
 
 #include <algorithm>
@@ -31,7 +31,7 @@ Error file_error(ErrorKind kind, const char* what, const std::string& path) {
 }  // namespace
 
 void add_threads_option(CLI::App& command, unsigned& threads) {
-  command.add_option("--threads", threads, "Threads that render; 0: one a hardware thread")
+  command.add_option("--threads", threads, "Render threads; 0: one per hardware thread")
       ->envname("WINDSPLAT_THREADS")
       ->check(CLI::Range(0U, threads_max))
       ->type_name("N")
@@ -57,12 +57,12 @@ Result<std::uint64_t> memory_limit(const std::string& text) {
                           bytes_text(memory_bytes_max));
   }
   if (*bytes > memory_bytes_max) {
-    return make_error(ErrorKind::malformed, option + "is beyond " + bytes_text(memory_bytes_max) +
+    return make_error(ErrorKind::malformed, option + "is above " + bytes_text(memory_bytes_max) +
                                                 ", more than a process can address");
   }
   if (*bytes >= memory_bytes_min) return *bytes;
   return make_error(ErrorKind::malformed,
-                    option + "is below the least of " + bytes_text(memory_bytes_min) + ": " +
+                    option + "is below the minimum of " + bytes_text(memory_bytes_min) + ": " +
                         bytes_text(program_bytes) + " for the program and a picture, the rest " +
                         "for a loader and fields (a number without K, M, G or T is of bytes)");
 }
@@ -132,7 +132,7 @@ std::optional<std::uint64_t> parse_bytes(std::string_view text) {
     is_whole = false;
     text.remove_suffix(1);
   }
-  // Digits at both ends: from_chars takes signs, "inf" and "1." too.
+  // Require digits at both ends: from_chars accepts signs, "inf" and "1.".
   const auto is_digit = [&](char one) { return digits.find(one) != std::string_view::npos; };
   if (text.empty() || !is_digit(text.front()) || !is_digit(text.back())) return std::nullopt;
   if (is_whole && !std::all_of(text.begin(), text.end(), is_digit)) return std::nullopt;

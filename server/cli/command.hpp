@@ -1,4 +1,4 @@
-// What the commands share: how they join the command line, answer errors, and read their arguments.
+// Common parts of the commands: registration, errors, and parsing of arguments.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -18,12 +18,12 @@ inline constexpr int exit_ok = 0;
 inline constexpr int exit_failed = 1;
 inline constexpr int exit_usage = 2;
 inline constexpr int exit_bad_data = 3;
-inline constexpr int exit_interrupted = 130;  // as shells say it of SIGINT
+inline constexpr int exit_interrupted = 130;  // the shell convention for SIGINT
 
-// What is run once the arguments are known to be right; the value is the exit code.
+// Runs a command with validated arguments; the value is the exit code.
 using Action = std::function<int()>;
 
-// Each adds its subcommand; when that is the one chosen, `chosen` is set to run it.
+// Each adds its subcommand, which sets `chosen` when selected.
 void add_serve(CLI::App& app, Action& chosen);
 void add_render(CLI::App& app, Action& chosen);
 void add_animate(CLI::App& app, Action& chosen);
@@ -32,31 +32,31 @@ void add_synth(CLI::App& app, Action& chosen);
 void add_healthcheck(CLI::App& app, Action& chosen);
 void add_study(CLI::App& app, Action& chosen);
 
-// `load`, which is not for people: how the program reads files apart. Returns the exit code.
+// The internal command `load`, which reads files in a separate process. Returns the exit code.
 int load();
 
-// --threads N, or WINDSPLAT_THREADS; 0, the default, means one a hardware thread.
+// --threads N, or WINDSPLAT_THREADS; 0, the default, means one per hardware thread.
 void add_threads_option(CLI::App& command, unsigned& threads);
 
-// --memory-limit BYTES, or WINDSPLAT_MEMORY_LIMIT; `bytes` is the default, and outlives the
+// --memory-limit BYTES, or WINDSPLAT_MEMORY_LIMIT; `bytes` holds the default and must outlive the
 // command.
 void add_memory_option(CLI::App& command, std::string& bytes);
-// Errors: malformed, also below memory_bytes_min and beyond memory_bytes_max (open_store.hpp).
+// Errors: malformed, also below memory_bytes_min and above memory_bytes_max (open_store.hpp).
 Result<std::uint64_t> memory_limit(const std::string& text);
 
-// One line on stderr.
+// Prints one line to stderr.
 void complain(std::string_view message);
 
-// Says the error on stderr, each value at fault with its JSON pointer, and returns the exit code of
-// its kind.
+// Prints the error to stderr, with the JSON pointer of each invalid value, and returns the exit
+// code of its kind.
 int answer(const Error& error);
 int exit_code(ErrorKind kind);
 
-// "1280x720" -> {1280, 720}: `count` whole numbers with an x between, at least 1 each.
+// "1280x720" -> {1280, 720}: `count` integers of at least 1, separated by x.
 std::optional<std::array<std::int64_t, 3>> parse_extent(std::string_view text, std::size_t count);
 
-// "8G", "1.5g" -> bytes; K, M, G and T are powers of 1024. A part of a byte is left out, and beyond
-// 2^53 the value is rounded. Empty if it is not of that form, less than a byte, or 2^64 and more.
+// "8G", "1.5g" -> bytes; K, M, G and T are powers of 1024. Fractions of a byte are dropped, values
+// above 2^53 rounded. Empty if malformed, less than a byte, or 2^64 and more.
 std::optional<std::uint64_t> parse_bytes(std::string_view text);
 
 // The whole file. Errors: not_found, too_large beyond `bytes_max`.

@@ -1,4 +1,4 @@
-// CLI11's own configuration files win over the environment; here they do not.
+// CLI11's own configuration files override the environment; these do not.
 #include "server/cli/config_file.hpp"
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 
 using protocol::ConfigEntry;
 
-// "listen", or "datasets" of what stands there without a name.
+// "listen", or "datasets" for the positional argument.
 std::string name_of(const CLI::Option& option) {
   return option.get_lnames().empty() ? option.get_name() : option.get_lnames().front();
 }
@@ -35,21 +35,21 @@ std::string known_names(CLI::App& command) {
   return names;
 }
 
-// What is wrong with the entry's kind; empty if nothing is.
+// Describes an entry of the wrong type; empty if it is valid.
 std::string kind_fault(const CLI::Option& option, ConfigEntry::Kind kind) {
   using Kind = ConfigEntry::Kind;
   if (option.get_expected_min() == 0) return kind == Kind::boolean ? "" : "must be true or false";
   if (option.get_expected_max() > 1) {
     return kind == Kind::text || kind == Kind::list ? "" : "must be a text or a list of texts";
   }
-  // Every number has a range, which its type tells: "N:INT in [1 - 10]".
+  // Every numeric option has a range in its type name: "N:INT in [1 - 10]".
   if (option.get_type_name().find(" in [") != std::string::npos) {
     return kind == Kind::number ? "" : "must be a number";
   }
   return kind == Kind::text ? "" : "must be a text";
 }
 
-// As the option's own rules read the words. Errors: CLI::Error.
+// Validates by the option's own rules. Errors: CLI::Error.
 void give(CLI::Option& option, const std::vector<std::string>& words) {
   option.clear();
   option.add_result(words);
@@ -71,7 +71,8 @@ Result<void> apply(CLI::App& command, const ConfigEntry& entry) {
   const std::vector<std::string> given = option->results();
   try {
     give(*option, entry.words);
-    if (!given.empty()) give(*option, given);  // it wins, and what the file says was checked
+    if (!given.empty())
+      give(*option, given);  // takes precedence; the file's value was validated above
   } catch (const CLI::Error& fault) {
     return protocol::config_error(entry.key, fault.what());
   }

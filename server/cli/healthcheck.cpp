@@ -1,4 +1,4 @@
-// windsplat healthcheck: asks a running daemon whether it is ready.
+// windsplat healthcheck: queries whether a running daemon is ready.
 #include <memory>
 #include <string>
 #include <utility>
@@ -26,7 +26,7 @@ int healthcheck(std::string url, const std::string& ca_file) {
   const auto status = net::http_status(url, timeout_s, ca);
   if (!status) return answer(status.error());
   if (*status == http_ok) return exit_ok;
-  complain(printable(url) + " answers " + std::to_string(*status));
+  complain(printable(url) + " returned status " + std::to_string(*status));
   return exit_failed;
 }
 
@@ -36,15 +36,16 @@ void add_healthcheck(CLI::App& app, Action& chosen) {
   CLI::App* command =
       app.add_subcommand("healthcheck", "Exit 0 if a daemon is ready to serve, 1 if not");
   const auto url = std::make_shared<std::string>("http://127.0.0.1:8080/");
-  command->add_option("url", *url, "The daemon's base URL")
+  command->add_option("url", *url, "Base URL of the daemon")
       ->envname("WINDSPLAT_URL")
       ->type_name("URL")
       ->capture_default_str();
   const auto ca = std::make_shared<std::string>();
   command
-      ->add_option("--ca", *ca,
-                   "Of https: trust these certificates (PEM), the daemon's own or its issuer's, in "
-                   "place of the system's")
+      ->add_option(
+          "--ca", *ca,
+          "For https: trust these certificates (PEM), the daemon's or its issuer's, instead "
+          "of the system's")
       ->envname("WINDSPLAT_CA")
       ->type_name("FILE");
   command->callback([&chosen, url, ca] { chosen = [url, ca] { return healthcheck(*url, *ca); }; });

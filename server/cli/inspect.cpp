@@ -1,4 +1,4 @@
-// windsplat inspect: dataset -> what is in it, as JSON or for a reader.
+// windsplat inspect: prints the content of a dataset as JSON or text.
 #include <algorithm>
 #include <cstdint>
 #include <memory>
@@ -17,10 +17,10 @@
 namespace windsplat::cli {
 namespace {
 
-// Unless asked, ranges are over the whole series where reading it takes moments, else over the
-// first step, and where even that would decode much more than is stored they are left out.
+// By default ranges are over all steps if reading them is fast, else over the first step, and
+// omitted if even that decodes much more than is stored.
 constexpr std::uint64_t whole_series_bytes_max = 1ULL << 30;
-constexpr std::uint64_t bytes_of_a_read = 65536;  // what each read costs at least
+constexpr std::uint64_t bytes_of_a_read = 65536;  // minimum cost of a read
 
 struct InspectArguments {
   std::string dataset;
@@ -29,11 +29,11 @@ struct InspectArguments {
   bool json = false;
 };
 
-// What reading fields at one step takes, in bytes.
-constexpr double chunks_at_a_time = 4;  // those that the library keeps, and what its filters hold
+// Cost of reading the fields at one step, in bytes.
+constexpr double chunks_at_a_time = 4;  // chunk cache of the library and buffers of its filters
 struct Cost {
-  double decoded = 0;  // of all fields together
-  double memory = 0;   // of the field that takes most, in its loader
+  double decoded = 0;  // total of all fields
+  double memory = 0;   // maximum over the fields, in the loader
 };
 
 Cost cost_of_step(const data::DatasetInfo& info) {
@@ -53,7 +53,7 @@ std::string size_text(double bytes) {
   return data::megabytes(static_cast<std::uint64_t>(std::min(bytes, 0x1p40)));
 }
 
-// Which steps ranges are over, and why not over all of them; empty if they are.
+// The steps that ranges cover, and the reason for not covering all; empty if they do.
 struct Choice {
   scene::RangesOf ranges = scene::RangesOf::all_steps;
   std::string note;
@@ -96,7 +96,7 @@ Choice asked_ranges(const std::string& ranges) {
           ""};
 }
 
-// One at a time is read. Empty: there is none.
+// Fields are read one at a time. Empty: none.
 std::string largest_field(const data::DatasetInfo& info) {
   std::string name;
   std::size_t components = 0;
@@ -127,7 +127,7 @@ Result<void> inspect(const InspectArguments& arguments) {
       const Error error =
           (*dataset)->with_need(ranged.error(), {largest_field((*dataset)->info())});
       if (asked || error.kind != ErrorKind::out_of_memory) return error;
-      // What needs no field is told all the same.
+      // Report what needs no field data.
       choice.note = "ranges are not read: " + error.message;
     }
   }
@@ -142,7 +142,7 @@ Result<void> inspect(const InspectArguments& arguments) {
 
 void add_inspect(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand(
-      "inspect", "Say what is in a file: axes, fields, ranges, steps, what is left out and why");
+      "inspect", "Describe a dataset: axes, fields, ranges, steps, and what is ignored and why");
   const auto arguments = std::make_shared<InspectArguments>();
   command->add_option("file", arguments->dataset, "A file, or a sample's name")
       ->required()
@@ -150,11 +150,11 @@ void add_inspect(CLI::App& app, Action& chosen) {
   add_memory_option(*command, arguments->memory);
   command
       ->add_option("--ranges", arguments->ranges,
-                   "Over which steps fields are read for their ranges, whatever it takes; auto: "
-                   "all, the first or none, by how much more is decoded than the file stores")
+                   "Steps to read for the ranges of fields, at any cost; auto: "
+                   "all, the first or none, depending on the cost of decoding")
       ->check(CLI::IsMember({"auto", "all", "first", "none"}))
       ->capture_default_str();
-  command->add_flag("--json", arguments->json, "For programs: one JSON object");
+  command->add_flag("--json", arguments->json, "Print one JSON object");
   command->callback([&chosen, arguments] {
     chosen = [arguments] {
       const auto done = inspect(*arguments);

@@ -1,5 +1,4 @@
-// Description -> text: one paragraph each for the grid, the fields, the steps, and what is left
-// out.
+// Formats a description as text: one paragraph each for the grid, the fields, the steps, and notes.
 #include "server/cli/inspect_text.hpp"
 
 #include <algorithm>
@@ -16,7 +15,7 @@ namespace {
 
 using Row = std::vector<std::string>;
 
-// Numbers that a float32 holds exactly differ from even spacing by their rounding alone.
+// Float32 coordinates deviate from even spacing by rounding.
 constexpr double uneven_tolerance = 1e-3;  // of the mean spacing
 constexpr std::size_t steps_listed_max = 12;
 constexpr std::size_t line_bytes_max = 80;  // of notes and reasons
@@ -32,7 +31,7 @@ std::string word(std::string_view text, std::string_view if_empty = "-") {
   return text.empty() ? std::string(if_empty) : printable(text, 80);
 }
 
-// Text that is not cut.
+// Text without truncation.
 std::string whole(std::string_view text) { return printable(text, std::string::npos); }
 
 std::string byte_count(std::uint64_t bytes) {
@@ -64,8 +63,8 @@ std::string table(const std::vector<Row>& rows) {
   return out;
 }
 
-// Words in lines of at most `line_bytes_max` as far as they fit; all lines but the first are
-// indented, and the first has at most so many bytes before it.
+// Wraps words into lines of at most `line_bytes_max`; the first line has the given number of bytes
+// before it, the others are indented.
 std::string wrapped(std::string_view text, std::size_t indent) {
   std::string out;
   std::size_t line = indent;
@@ -148,7 +147,7 @@ std::string fields_text(const protocol::DatasetDescription& dataset) {
       }
       kind += ')';
     }
-    std::string range = field.masked ? "no value" : any_range ? "made when shown" : "not read";
+    std::string range = field.masked ? "no value" : any_range ? "computed when shown" : "not read";
     if (field.range) {
       range = field.kind == "vector" ? "|v| " : "";
       range.append(number((*field.range)[0])).append(" .. ").append(number((*field.range)[1]));

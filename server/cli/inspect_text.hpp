@@ -1,4 +1,4 @@
-// A dataset's description as lines that a person reads.
+// Formats a dataset's description as text.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Splits at the last colon, then lets the system's own parser judge the address.
+// Splits at the last colon; inet_pton() parses the address.
 #include "server/cli/listen_address.hpp"
 
 #include <arpa/inet.h>

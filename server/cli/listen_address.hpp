@@ -11,8 +11,8 @@ namespace windsplat::cli {
 
 struct ListenAddress {
   std::string address = "127.0.0.1";  // IPv4 or IPv6, numeric, without brackets
-  std::uint16_t port = 8080;          // 0: any free one
-  bool loopback = true;               // reachable from this machine alone
+  std::uint16_t port = 8080;          // 0: any free port
+  bool loopback = true;               // reachable only from this machine
 };
 
 // "127.0.0.1:8080", "[::1]:8080", "localhost:80", ":0" (127.0.0.1). Errors: malformed.

@@ -1,4 +1,4 @@
-// windsplat load: what the program starts by itself to read files apart (server/data/loader).
+// windsplat load: internal command that reads files in a separate process (server/data/loader).
 #include "server/cli/command.hpp"
 #include "server/data/loader/loader.hpp"
 

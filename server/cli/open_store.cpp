@@ -1,4 +1,4 @@
-// A limit of bytes -> what of it is for data, and how files are opened.
+// Divides the memory limit between data and loaders, and opens files.
 #include "server/cli/open_store.hpp"
 
 #include <algorithm>
@@ -12,8 +12,8 @@ namespace windsplat::cli {
 
 namespace {
 
-// What a loader may take: a quarter of the limit within these bounds, or half of a limit of which
-// that is less than the lower one.
+// Memory of a loader: a quarter of the limit within these bounds, or half of a limit whose quarter
+// is below the lower bound.
 constexpr std::uint64_t loader_bytes_min = std::uint64_t{256} << 20;
 constexpr std::uint64_t loader_bytes_max = std::uint64_t{2} << 30;
 

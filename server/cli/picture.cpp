@@ -1,4 +1,4 @@
-// Arguments -> view, format and dataset of a picture.
+// Parses the arguments of a picture: view, format and dataset.
 #include "server/cli/picture.hpp"
 
 #include <algorithm>
@@ -21,7 +21,7 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
   command.add_option("--set", arguments.settings, "Change one key of the view; may be repeated")
       ->allow_extra_args(false)
       ->type_name("/json/pointer=value");
-  command.add_option("--quality", arguments.quality, "Of a JPEG: 1 smallest to 100 best")
+  command.add_option("--quality", arguments.quality, "JPEG quality, 1 (smallest) to 100 (best)")
       ->check(CLI::Range(1, 100))
       ->type_name("N")
       ->capture_default_str();
@@ -70,7 +70,7 @@ Result<frame::Format> format_of(const std::string& output) {
   if (extension == ".npy") return frame::Format::npy;
   if (is_stream(output)) return frame::Format::png;  // as "-"
   return make_error(ErrorKind::invalid,
-                    "-o '" + printable(output) + "': its name must end in .png, .jpg or .npy");
+                    "-o '" + printable(output) + "': the file name must end in .png, .jpg or .npy");
 }
 
 frame::Encoding file_encoding(frame::Format format, int quality) {
@@ -84,7 +84,7 @@ frame::Encoding file_encoding(frame::Format format, int quality) {
 Result<std::shared_ptr<data::Dataset>> open_dataset(const ViewArguments& arguments) {
   const auto limit = memory_limit(arguments.memory);
   if (!limit) return limit.error();
-  // The store keeps nothing that its datasets need after it.
+  // Datasets do not depend on the store.
   return data::Store(store_options(*limit)).add(arguments.dataset);
 }
 

@@ -1,4 +1,4 @@
-// What the commands that draw pictures share: the view they are told, where pictures go.
+// Common parts of the commands that draw pictures: view arguments and output files.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -21,22 +21,23 @@ struct ViewArguments {
   std::string size;
   std::vector<std::string> settings;  // "/json/pointer=value"
   std::string memory = "8G";
-  int quality = 95;  // JPEG: a file is kept, so it costs bytes rather than detail
+  int quality = 95;  // JPEG: files favour detail over size
 };
 
-// DATASET, --view, --size, --set, --quality and --memory-limit; `arguments` outlives the command.
+// DATASET, --view, --size, --set, --quality and --memory-limit; `arguments` must outlive the
+// command.
 void add_view_options(CLI::App& command, ViewArguments& arguments);
 
-// The view file, then --step, --size and --set on top of it, in this order.
+// The view file, overridden by --step, --size and --set in this order.
 Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments);
 
-// By the extension of a file's name. Errors: invalid.
+// From the extension of a file name. Errors: invalid.
 Result<frame::Format> format_of(const std::string& output);
 
-// How a kept picture is encoded, `quality` 1..100 for a JPEG; the reference is allowed.
+// Encoding of a picture file, `quality` 1..100 for a JPEG; the reference is allowed.
 frame::Encoding file_encoding(frame::Format format, int quality);
 
-// A dataset of its own for this command. Errors: malformed for a limit that is no number.
+// Opens the dataset for this command. Errors: malformed for an invalid limit.
 Result<std::shared_ptr<data::Dataset>> open_dataset(const ViewArguments& arguments);
 
 }  // namespace windsplat::cli

@@ -1,4 +1,4 @@
-// windsplat render: dataset + view -> one picture in a file or on stdout, and what it took.
+// windsplat render: draws one picture to a file or stdout, with an optional report.
 #include <unistd.h>
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace {
 struct RenderArguments {
   ViewArguments view;
   std::string output;
-  std::string report;  // empty: none
+  std::string report;  // empty: no report
   unsigned threads = 0;
 };
 
@@ -34,14 +34,14 @@ Result<void> write_report(const std::string& path, const frame::Frame& picture) 
 Result<void> render(const RenderArguments& arguments) {
   const bool to_stdout = arguments.output == "-";
   if (to_stdout && arguments.report == "-") {
-    return make_error(ErrorKind::invalid, "--report -: the picture goes to stdout already");
+    return make_error(ErrorKind::invalid, "--report -: stdout is used for the picture");
   }
   const auto format =
       to_stdout ? Result<frame::Format>(frame::Format::png) : format_of(arguments.output);
   if (!format) return format.error();
   if (to_stdout && isatty(STDOUT_FILENO) == 1) {
     return make_error(ErrorKind::invalid,
-                      "-o -: stdout is a terminal; send it to a file or a pipe");
+                      "-o -: stdout is a terminal; redirect it to a file or a pipe");
   }
   const auto document = assemble_view(arguments.view);
   if (!document) return document.error();
@@ -71,7 +71,7 @@ void add_render(CLI::App& app, Action& chosen) {
       ->type_name("FILE");
   command
       ->add_option("--report", arguments->report,
-                   "What the picture took and left out, as JSON; - writes it to stdout")
+                   "Write times, memory and omissions as JSON; - writes to stdout")
       ->type_name("FILE");
   add_threads_option(*command, arguments->threads);
   command->callback([&chosen, arguments] {

@@ -1,5 +1,5 @@
-// windsplat serve: datasets opened in order, then the daemon until SIGTERM or SIGINT; SIGHUP has it
-// read its configuration, token and certificate again, and try again what could not be opened.
+// windsplat serve: opens datasets, then runs the daemon until SIGTERM or SIGINT; SIGHUP reloads
+// configuration, token and certificate, and retries failed datasets.
 #include <unistd.h>
 
 #include <algorithm>
@@ -30,12 +30,12 @@
 namespace windsplat::cli {
 namespace {
 
-// What a running daemon takes over; the rest waits for the next start.
+// Options applied at a reload; others require a restart.
 constexpr std::array<std::string_view, 9> live_options{"token-file",   "tls-cert",   "tls-key",
                                                        "allow-origin", "allow-host", "allow-remote",
                                                        "allow-root",   "log-format", "log-level"};
 
-// At the end of the daemon. A disk may never answer.
+// Limit of the wait for a reload at shutdown: a disk may hang.
 constexpr std::chrono::seconds reload_patience{1};
 
 void configure_log(const ServeArguments& arguments) {
@@ -43,13 +43,13 @@ void configure_log(const ServeArguments& arguments) {
                  log::parse_level(arguments.log_level).value_or(log::Level::info));
 }
 
-// The signals' side of the daemon. The watching thread needs the server, which does not exist until
-// the datasets are open.
+// Signal handling of the daemon. The watching thread starts before the server, which exists only
+// when the datasets are open.
 class Control {
  public:
   explicit Control(const CLI::App& given) : given_(given) {}
 
-  // What was wanted before there was a server to change is done now.
+  // Applies requests received before the server existed.
   void arm(net::Server& server, std::shared_ptr<data::Store> store,
            std::unique_ptr<ServeSettings> started) {
     store_ = std::move(store);
@@ -72,15 +72,15 @@ class Control {
     server_ = nullptr;
   }
 
-  // Before there is anything to drain the program just ends. It waits for no reload.
+  // Before the server exists the process exits without waiting for a reload.
   void drain() {
     const std::lock_guard lock(mutex_);
     if (server_ == nullptr) _exit(exit_ok);
-    log::info("draining");  // before there can be word that it is done
+    log::info("draining");  // log it before the drain can complete
     server_->drain();
   }
 
-  // By one thread. Before there is anything to change it is done when there is.
+  // Called on one thread. Deferred until the server exists.
   void reload() {
     {
       const std::lock_guard lock(mutex_);
@@ -94,32 +94,32 @@ class Control {
   }
 
  private:
-  // All of it or nothing, also where memory or threads are short.
+  // All or nothing, also when memory or threads are short.
   void reload_now(const std::function<void(net::Access)>& change) {
     try {
       take_over(change);
     } catch (const std::exception& fault) {
-      log::error("the configuration stays as it was", {{"fault", fault.what()}});
+      log::error("the configuration is unchanged", {{"fault", fault.what()}});
     }
   }
 
-  // Reads for as long as a disk takes: the lock is `change`'s business.
+  // May block on a disk, so only `change` takes the lock.
   void take_over(const std::function<void(net::Access)>& change) {
     const auto fresh = read_settings(given_);
     if (!fresh) return refuse(fresh.error());
     const ServeSettings& settings = **fresh;
-    // The address stays what it is, so the rule is asked of that one, too.
+    // The address does not change at a reload, so check the rule for the current one.
     const auto exposed = check_exposure(settings.arguments, started_->options.local_hosts_only);
     if (!exposed) return refuse(exposed.error());
     for (const std::string& name : changed_options(started_->command, settings.command)) {
       if (std::find(live_options.begin(), live_options.end(), name) == live_options.end()) {
-        log::warn("an option has changed that needs a restart", {{"option", name}});
+        log::warn("a changed option requires a restart", {{"option", name}});
       }
     }
     const net::ServerOptions& options = settings.options;
     auto tls = tls_;
     if ((tls != nullptr) != (options.tls != nullptr)) {
-      log::warn("whether TLS is spoken needs a restart", {{"option", "tls-cert"}});
+      log::warn("enabling or disabling TLS requires a restart", {{"option", "tls-cert"}});
     } else {
       tls = options.tls;
     }
@@ -129,31 +129,29 @@ class Control {
     tls_ = std::move(tls);
     configure_log(settings.arguments);
     store_->try_failed_again();
-    log::info("read the configuration again");
+    log::info("configuration reloaded");
   }
 
   static void refuse(const Error& error) {
-    log::error("the configuration stays as it was", {{"fault", error.message}});
+    log::error("the configuration is unchanged", {{"fault", error.message}});
   }
 
   const CLI::App& given_;
   std::shared_ptr<data::Store> store_;
   std::unique_ptr<ServeSettings> started_;
   std::shared_ptr<net::TlsContext> tls_;  // the newest
-  std::mutex mutex_;                      // of the rest, held for moments
+  std::mutex mutex_;                      // guards the members below, held briefly
   net::Server* server_ = nullptr;
   bool reload_wanted_ = false;
 };
 
-// A dataset is refused where a field that is shown at first cannot be loaded at a step: its viewers
-// would be told at each frame.
+// Reject a dataset whose default fields cannot be loaded: every frame of it would fail.
 Result<void> check_first_view(const data::Dataset& dataset) {
   return dataset.check_room(scene::fields_of({}, dataset.info()));
 }
 
-// One bad file of many does not take the others from their viewers: it is listed as failed. The
-// value is the exit code where nothing can be served, that of bad data if any file is, else
-// exit_ok.
+// One bad file does not prevent serving the others: it is listed as failed. The value is the exit
+// code if nothing can be served (that of bad data if any file is bad), else exit_ok.
 int open_datasets(const std::vector<std::string>& named, data::Store& store) {
   int code = exit_ok;
   for (const std::string& name : named.empty() ? data::sample_names() : named) {
@@ -161,7 +159,7 @@ int open_datasets(const std::vector<std::string>& named, data::Store& store) {
     if (!dataset) {
       const Error& error = dataset.error();
       code = code == exit_bad_data ? code : exit_code(error.kind);
-      log::warn("a dataset cannot be opened", {{"dataset", name}, {"fault", error.message}});
+      log::warn("cannot open a dataset", {{"dataset", name}, {"fault", error.message}});
       store.list_failed(name, error);
       continue;
     }
@@ -179,7 +177,8 @@ int open_datasets(const std::vector<std::string>& named, data::Store& store) {
   }
   if (store.all().empty()) return code;
   if (code != exit_ok) {
-    log::warn("what cannot be opened is listed as failed", {{"datasets", store.failed().size()}});
+    log::warn("datasets that cannot be opened are listed as failed",
+              {{"datasets", store.failed().size()}});
   }
   return exit_ok;
 }
@@ -218,9 +217,9 @@ int serve(const CLI::App& given) {
     server.run();
     log::info("drained");
   }
-  control->disarm();  // from here on a signal ends the program
+  control->disarm();  // from here on a signal ends the process
   if (!signals.settle(reload_patience)) {
-    log::warn("a configuration that is still read is waited for no longer");
+    log::warn("reload did not finish before shutdown");
     _exit(code);
   }
   return code;

@@ -1,4 +1,4 @@
-// The options of `serve` that limit what clients may take.
+// The options of `serve` that limit the usage of clients.
 #pragma once
 
 #include <CLI/CLI.hpp>

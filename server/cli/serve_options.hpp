@@ -34,7 +34,7 @@ struct ServeArguments {
   net::Limits limits;
 };
 
-// `arguments` outlives the command.
+// `arguments` must outlive the command.
 void add_serve_options(CLI::App& command, ServeArguments& arguments);
 
 }  // namespace windsplat::cli

@@ -1,4 +1,4 @@
-// What is refused here is refused before anything is opened, or changed.
+// Validates settings before anything is opened or changed.
 #include "server/cli/serve_settings.hpp"
 
 #include <sys/resource.h>
@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::size_t token_file_bytes_max = 1024;
 
-// Letters that need no escape in a URL, in segments between single slashes.
+// Characters that need no escape in a URL, in segments between single slashes.
 bool is_base_path(const std::string& path) {
   if (path.empty() || path.front() != '/' || path.find("//") != std::string::npos) return false;
   return std::all_of(path.begin(), path.end(), [](unsigned char c) {
@@ -34,14 +34,14 @@ bool is_base_path(const std::string& path) {
   });
 }
 
-// Absolute and without links, as it is now: links that change later lead nowhere else.
+// Absolute path with links resolved now: later changes of links have no effect.
 Result<std::string> plain_folder(const std::string& folder) {
   if (folder.empty()) return std::string();
   std::error_code fault;
   const std::filesystem::path plain = std::filesystem::canonical(folder, fault);
   if (fault || !std::filesystem::is_directory(plain, fault)) {
     return make_error(ErrorKind::invalid,
-                      "--data-root '" + printable(folder) + "' is no folder that can be reached");
+                      "--data-root '" + printable(folder) + "' is not an accessible folder");
   }
   return plain.native();
 }
@@ -72,7 +72,7 @@ Result<std::shared_ptr<net::TlsContext>> read_tls(const ServeArguments& argument
     return std::shared_ptr<net::TlsContext>();
   }
   if (arguments.tls_cert.empty() || arguments.tls_key.empty()) {
-    return make_error(ErrorKind::invalid, "--tls-cert and --tls-key need each other");
+    return make_error(ErrorKind::invalid, "--tls-cert and --tls-key must be given together");
   }
   const auto chain = read_settings_file(arguments.tls_cert, net::pem_bytes_max);
   if (!chain) return of_file("--tls-cert", arguments.tls_cert, chain.error());
@@ -87,15 +87,15 @@ Result<std::shared_ptr<net::TlsContext>> read_tls(const ServeArguments& argument
   return tls;
 }
 
-// A dump of the memory would have the secrets in it. 1 rather than 0: with 0 the kernel still hands
-// one to a program that collects them (core(5)).
+// A core dump would contain the secrets. 1 rather than 0: with 0 the kernel still passes a dump to
+// a collecting program (core(5)).
 Result<void> forbid_dumps() {
   const rlimit one{1, 1};
   rlimit now{};
   if (::getrlimit(RLIMIT_CORE, &now) == 0 && now.rlim_cur <= 1 && now.rlim_max <= 1) return {};
   if (::setrlimit(RLIMIT_CORE, &one) == 0) return {};
   return make_error(ErrorKind::internal,
-                    "cannot forbid core dumps, which would hold the secrets: " +
+                    "cannot disable core dumps, which would contain secrets: " +
                         std::generic_category().message(errno));
 }
 
@@ -110,7 +110,7 @@ Result<void> check_host_names(const std::vector<std::string>& names) {
   const auto bad = std::find_if_not(names.begin(), names.end(), is_host_name);
   if (bad == names.end()) return {};
   return make_error(ErrorKind::malformed, "--allow-host '" + printable(*bad) +
-                                              "' is not a host's name, such as winds.example");
+                                              "' is not a host name such as winds.example");
 }
 
 Result<net::ServerOptions> server_options(const ServeArguments& arguments) {
@@ -139,7 +139,7 @@ Result<net::ServerOptions> server_options(const ServeArguments& arguments) {
   options.address = listen->address;
   options.port = listen->port;
   options.local_hosts_only = listen->loopback;
-  // Whoever has no token to show may be a page whose name was made to resolve to this machine.
+  // Without a token, a page whose name was rebound to this machine could connect.
   options.known_hosts_only = options.token == nullptr || !arguments.hosts.empty();
   options.allow_hosts = arguments.hosts;
   options.base_path = arguments.base_path;
@@ -155,19 +155,18 @@ Result<net::ServerOptions> server_options(const ServeArguments& arguments) {
 Result<void> check_exposure(const ServeArguments& arguments, bool loopback) {
   if (loopback) return {};
   const std::string reached =
-      "--listen '" + printable(arguments.listen) + "' can be reached from other machines, and ";
+      "--listen '" + printable(arguments.listen) + "' is reachable from other machines, and ";
   if (!arguments.allow_remote && arguments.token_file.empty()) {
-    return make_error(ErrorKind::invalid,
-                      reached +
-                          "nobody who reaches it is asked who they are: give --token-file, or say "
-                          "--allow-remote if that is wanted");
+    return make_error(ErrorKind::invalid, reached +
+                                              "clients are not authenticated: use --token-file, or "
+                                              "--allow-remote if this is intended");
   }
   if (::geteuid() == 0 && !arguments.allow_root) {
     return make_error(ErrorKind::invalid,
                       reached +
                           "this process runs as root: start it as another user (as "
-                          "deploy/windsplat.service and the Dockerfile do), or say --allow-root if "
-                          "that is wanted");
+                          "deploy/windsplat.service and the Dockerfile do), or use --allow-root if "
+                          "this is intended");
   }
   return {};
 }
@@ -177,7 +176,7 @@ void warn_of(const ServeSettings& settings) {
   const net::ServerOptions& options = settings.options;
   for (const std::string* secret : {&arguments.token_file, &arguments.tls_key}) {
     if (!secret->empty() && others_read(*secret)) {
-      log::warn("a secret can be read by others than its owner", {{"file", *secret}});
+      log::warn("a secret is readable by other users", {{"file", *secret}});
     }
   }
   if (options.tls != nullptr && net::certificate_ends(*options.tls) < std::time(nullptr)) {
@@ -186,13 +185,11 @@ void warn_of(const ServeSettings& settings) {
   const std::string expensive =
       options.tls != nullptr ? net::expensive_handshakes(*options.tls) : "";
   if (!expensive.empty()) {
-    log::warn("each TLS handshake costs more than usual",
-              {{"file", arguments.tls_cert}, {"fault", expensive}});
+    log::warn("TLS handshakes are expensive", {{"file", arguments.tls_cert}, {"fault", expensive}});
   }
   if (!options.local_hosts_only && options.token != nullptr && options.tls == nullptr) {
-    log::warn(
-        "the token travels in the clear: give --tls-cert, or put a proxy in front that speaks TLS",
-        {{"listen", arguments.listen}});
+    log::warn("the token is sent unencrypted: use --tls-cert or a proxy with TLS",
+              {{"listen", arguments.listen}});
   }
 }
 

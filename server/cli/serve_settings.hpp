@@ -1,5 +1,4 @@
-// Arguments of `windsplat serve` and the files they name -> checked settings, at the start and
-// again on SIGHUP.
+// Validates the arguments of `windsplat serve` and the files they name, at startup and on SIGHUP.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -12,21 +11,21 @@
 namespace windsplat::cli {
 
 struct ServeSettings {
-  CLI::App command;  // which of the arguments were given
+  CLI::App command;  // records which arguments were given
   ServeArguments arguments;
-  net::ServerOptions options;  // without what is made from other folders
+  net::ServerOptions options;  // without members built from other folders
 };
 
-// As `given` was given on the command line and in the environment, and as the configuration, the
-// token and the certificate are now. Errors say which option or file is at fault and why.
+// Settings from `given` (command line and environment) and the current configuration, token and
+// certificate. Errors name the option or file and the reason.
 Result<std::unique_ptr<ServeSettings>> read_settings(const CLI::App& given);
 
-// Logs what is allowed and yet no good: secrets that others can read or that travel in the clear, a
-// certificate that has expired.
+// Logs insecure but permitted settings: secrets that others can read or that are sent unencrypted,
+// an expired certificate.
 void warn_of(const ServeSettings& settings);
 
-// Whether others may reach the address without being asked for a token, or reach a process of
-// root's, though nobody said so. Errors: invalid.
+// Rejects, unless explicitly allowed, an address reachable by others without a token or by a
+// process of root. Errors: invalid.
 Result<void> check_exposure(const ServeArguments& arguments, bool loopback);
 
 }  // namespace windsplat::cli

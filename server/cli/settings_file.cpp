@@ -1,4 +1,4 @@
-// Opened without waiting, and looked at before it is read.
+// Opens without blocking and checks the file type before reading.
 #include "server/cli/settings_file.hpp"
 
 #include <fcntl.h>
@@ -24,14 +24,14 @@ Error read_error(const char* what, const std::string& path) {
                     what + (": " + std::generic_category().message(errno)));
 }
 
-// Up to its end, or one byte more than it may have.
+// Reads to the end, or one byte above the limit.
 Result<std::string> read_descriptor(int file, const std::string& path, std::size_t bytes_max) {
   struct stat facts {};
   if (::fstat(file, &facts) != 0) return read_error("cannot be read", path);
   if (!S_ISREG(facts.st_mode)) {
-    return file_error(ErrorKind::invalid, path, "is no regular file");
+    return file_error(ErrorKind::invalid, path, "is not a regular file");
   }
-  std::string text(bytes_max + 1, '\0');  // at once: no copies of a secret are left behind
+  std::string text(bytes_max + 1, '\0');  // allocated once: leaves no copies of a secret
   std::size_t bytes = 0;
   while (bytes < text.size()) {
     const ssize_t got = ::read(file, text.data() + bytes, text.size() - bytes);

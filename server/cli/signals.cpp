@@ -1,4 +1,4 @@
-// A thread polls a signalfd for the signals and an eventfd for the end of the watch.
+// A thread polls a signalfd and an eventfd that ends the watch.
 #include "server/cli/signals.hpp"
 
 #include <poll.h>
@@ -20,12 +20,12 @@
 namespace windsplat::cli {
 namespace {
 
-// Where memory is short there may be none for the words either.
+// Logging may fail when memory is exhausted.
 void complain_of(const std::exception& fault) noexcept {
   try {
-    log::error("what a signal asked for was not done", {{"fault", fault.what()}});
+    log::error("the action of a signal failed", {{"fault", fault.what()}});
   } catch (const std::bad_alloc&) {
-    log::error("what a signal asked for was not done", {});
+    log::error("the action of a signal failed", {});
   }
 }
 

@@ -1,4 +1,4 @@
-// SIGTERM and SIGINT, and where wanted SIGHUP -> a call in an ordinary thread.
+// Handles SIGTERM, SIGINT and optionally SIGHUP by calls on ordinary threads.
 #pragma once
 
 #include <chrono>
@@ -10,17 +10,17 @@
 
 namespace windsplat::cli {
 
-// A call that may take any time, by a thread of its own, so that whoever wants it never waits. It
-// is made once more where it is wanted while it is under way. What it throws is logged.
+// Runs a call on a thread of its own, so that requesting it never blocks. A request during a call
+// causes one more call. Exceptions are logged.
 class Errand {
  public:
   explicit Errand(std::function<void()> call);
-  ~Errand();  // waits for the call that is under way
+  ~Errand();  // waits for a running call
   Errand(const Errand&) = delete;
   Errand& operator=(const Errand&) = delete;
 
   void want();
-  // No further call is begun. Whether none is under way any more, at the latest after `patience`.
+  // Starts no further call. Returns whether none is running after at most `patience`.
   bool end(std::chrono::milliseconds patience);
 
  private:
@@ -31,28 +31,28 @@ class Errand {
   bool wanted_ = false;
   bool ending_ = false;
   bool ended_ = false;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // declared last: uses the other members
 };
 
-// What a second SIGTERM or SIGINT does: it ends the process at once.
+// Action on a second SIGTERM or SIGINT: exit at once.
 struct AtOnce {
-  int code = 1;                            // of the exit
-  std::function<void()> before = nullptr;  // by the watching thread, while the others go on
+  int code = 1;                            // exit code
+  std::function<void()> before = nullptr;  // on the watching thread, while others run
 };
 
-// Make it before any other thread: it blocks the signals for the thread that makes it and those
-// started from there, and waits for them in a thread of its own.
+// Construct before any other thread: blocks the signals for this thread and those it starts, and
+// waits for them on a thread of its own.
 class SignalWatch {
  public:
-  // `on_first` once, by the watching thread, for SIGTERM or SIGINT: it must not wait. `on_hangup`
-  // after every SIGHUP, by another thread; without it that one is left alone.
+  // Calls `on_first` once on the watching thread for SIGTERM or SIGINT: it must not block. Calls
+  // `on_hangup` on another thread after every SIGHUP, which is unchanged if it is empty.
   explicit SignalWatch(std::function<void()> on_first, std::function<void()> on_hangup = nullptr,
                        AtOnce on_second = {});
   ~SignalWatch();
   SignalWatch(const SignalWatch&) = delete;
   SignalWatch& operator=(const SignalWatch&) = delete;
 
-  // Calls `on_hangup` no more. False if a call did not end within `patience`: destroying this would
+  // Stops calling `on_hangup`. False if a call did not end within `patience`: the destructor would
   // wait for it.
   bool settle(std::chrono::milliseconds patience);
 

@@ -1,4 +1,4 @@
-// windsplat study: error against run time of every method, into a folder.
+// windsplat study: writes a report of error against run time of every method.
 #include "server/study/study.hpp"
 
 #include <unistd.h>
@@ -27,7 +27,7 @@ namespace windsplat::cli {
 namespace {
 
 constexpr int bar_width = 28;
-// Of the integral: a hundredth of the least error that a picture of floats in few layers has.
+// Tolerance of the integral: a hundredth of the least error of a float picture with few layers.
 constexpr double truth_tolerance = 1e-7;
 constexpr double quick_tolerance = 1e-6;
 
@@ -45,7 +45,7 @@ struct StudyArguments {
   std::string output;
 };
 
-// A bar with the time that is left where somebody watches, else a line a scene.
+// A progress bar with the remaining time on a terminal, else one line per scene.
 class Reporter {
  public:
   explicit Reporter(bool terminal) : terminal_(terminal) {}
@@ -153,9 +153,10 @@ std::string summary(const study::Report& report, const std::string& folder) {
   for (const study::SceneReport& scene : report.scenes) {
     if (!scene.calibration) continue;
     const study::Agreement of = study::agreement(*scene.calibration);
-    text += printable(scene.name) + ": errors told are within a factor of 2 of the true ones for ";
+    text +=
+        printable(scene.name) + ": reported errors are within a factor of 2 of the true ones for ";
     text += study::format_number("%.1f", 100 * of.within_two) + " % of ";
-    text += std::to_string(of.count) + " pictures of views not seen before\n";
+    text += std::to_string(of.count) + " pictures of unseen views\n";
   }
   return text;
 }
@@ -182,7 +183,7 @@ int study_command(const StudyArguments& arguments) {
   reporter.finish();
   if (!report) {
     if (report.error().kind != ErrorKind::cancelled) return answer(report.error());
-    complain("study: interrupted; the same command goes on from there");
+    complain("study: interrupted; run the same command to continue");
     return exit_interrupted;
   }
   const auto written = study::write_report(*report, arguments.output);
@@ -208,10 +209,10 @@ void add_study(CLI::App& app, Action& chosen) {
       ->type_name("WxH");
   command->add_flag("--quick", arguments->quick, "Small pictures and few points");
   command->add_flag("--no-reference", arguments->no_reference,
-                    "Take no integral: extrapolate the truth from method slab");
+                    "Do not integrate: extrapolate the reference from method slab");
   command->add_flag("--no-calibration", arguments->no_calibration,
-                    "Do not compare the errors that frames are told with true ones");
-  command->add_option("-o", arguments->output, "The report's folder; what it holds is not redone")
+                    "Do not compare reported errors with measured ones");
+  command->add_option("-o", arguments->output, "Folder of the report; existing results are reused")
       ->required()
       ->type_name("DIR");
   add_threads_option(*command, arguments->threads);

@@ -1,4 +1,4 @@
-// windsplat synth: built-in sample -> CF netCDF file.
+// windsplat synth: writes a built-in sample as a CF netCDF file.
 #include <unistd.h>
 
 #include <limits>
@@ -16,8 +16,8 @@ namespace {
 
 struct SynthArguments {
   std::string sample;
-  std::string dims;  // "XxYxZ", empty: the sample's own
-  int steps = 0;     // 0: the sample's own
+  std::string dims;  // "XxYxZ"; empty: default of the sample
+  int steps = 0;     // 0: default of the sample
   std::string output;
 };
 
@@ -47,14 +47,14 @@ Result<void> synth(const SynthArguments& arguments, const CancelToken& cancel) {
 void add_synth(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand("synth", "Write a built-in sample as a CF netCDF file");
   const auto arguments = std::make_shared<SynthArguments>();
-  command->add_option("sample", arguments->sample, "Which sample")
+  command->add_option("sample", arguments->sample, "Name of the sample")
       ->required()
       ->check(CLI::IsMember(data::sample_names()));
-  command->add_option("--dims", arguments->dims, "Samples along x, y and z")->type_name("XxYxZ");
-  command->add_option("--steps", arguments->steps, "Time steps")
+  command->add_option("--dims", arguments->dims, "Grid size along x, y and z")->type_name("XxYxZ");
+  command->add_option("--steps", arguments->steps, "Number of time steps")
       ->check(CLI::Range(1, std::numeric_limits<int>::max()).description(""))
       ->type_name("N");
-  command->add_option("-o", arguments->output, "The file to write")->required()->type_name("F.nc");
+  command->add_option("-o", arguments->output, "Output file")->required()->type_name("F.nc");
   command->callback([&chosen, arguments] {
     chosen = [arguments] {
       const CancelToken cancel;

@@ -186,7 +186,8 @@ def kill(program, folder, rounds, _slack=1):
         need(picture in (None, got), "a viewer that comes back sees another picture")
         picture = got
         for line in daemon.lines:
-            need("ignoring an unreadable" not in line, f"a file in the state folder cannot be read: {line}")
+            need("ignoring an unreadable" not in line,
+                 f"a file in the state folder cannot be read: {line}")
         loads = loaded(daemon.port)
         time.sleep(random.uniform(0.05, 0.6))
         daemon.stop(signal.SIGKILL)
@@ -246,7 +247,7 @@ def hang_up(program, folder, rounds, _slack=1):
                          PATIENCE_S, f"nothing in the log about a spoiled config ({how})")
             else:
                 wait_for(lambda at=said: [line for line in daemon.lines[at:]
-                                          if "read the configuration again" in line],
+                                          if "configuration reloaded" in line],
                          PATIENCE_S, "nothing in the log about a config that is good")
             for origin, status in ((allowed, 101), (other, 403)):
                 with Stream(daemon.port, [("Origin", origin)]) as one:

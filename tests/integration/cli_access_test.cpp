@@ -88,7 +88,7 @@ TEST_F(CliAccess, ATokenFileIsAskedForAndNeverTold) {
   EXPECT_EQ(run({"healthcheck", "http://127.0.0.1:" + std::to_string(port)}).code, 0);
   stop(daemon);
   EXPECT_THAT(daemon.messages(), Not(HasSubstr(first_token)));
-  EXPECT_THAT(daemon.messages(), Not(HasSubstr("can be read by others")));
+  EXPECT_THAT(daemon.messages(), Not(HasSubstr("is readable by other users")));
 }
 
 TEST_F(CliAccess, ATokenFileThatIsNoGoodStopsTheStart) {
@@ -116,7 +116,7 @@ TEST_F(CliAccess, ASecretThatOthersCanReadIsWarnedOf) {
   chmod(file.c_str(), 0644);
   Process daemon(serve({"--token-file", file}));
   port_of(daemon);
-  EXPECT_TRUE(says(daemon, "can be read by others"));
+  EXPECT_TRUE(says(daemon, "is readable by other users"));
 }
 
 TEST_F(CliAccess, BeyondLoopbackATokenIsNeededOrTheFlag) {
@@ -131,7 +131,7 @@ TEST_F(CliAccess, BeyondLoopbackATokenIsNeededOrTheFlag) {
   EXPECT_THAT(bare.err, HasSubstr("--token-file"));
   EXPECT_THAT(bare.err, HasSubstr("--allow-remote"));
   give_certificate("localhost");
-  EXPECT_EQ(run(with(tls_words())).code, 2) << "TLS alone asks nobody who they are";
+  EXPECT_EQ(run(with(tls_words())).code, 2) << "TLS alone does not authenticate clients";
   const Words token{"--token-file", secret("token", first_token)};
   {
     Process daemon(with(token));
@@ -262,12 +262,12 @@ TEST_F(CliAccess, SighupReadsTheTokenAgain) {
   secret("token", second_token);
   EXPECT_EQ(status_with(port, second_token), 401) << "not before it is told";
   daemon.send(SIGHUP);
-  EXPECT_TRUE(says(daemon, "read the configuration again"));
+  EXPECT_TRUE(says(daemon, "configuration reloaded"));
   EXPECT_EQ(status_with(port, second_token), 200);
   EXPECT_EQ(status_with(port, first_token), 401);
   secret("token", "short");
   daemon.send(SIGHUP);
-  EXPECT_TRUE(says(daemon, "stays as it was"));
+  EXPECT_TRUE(says(daemon, "configuration is unchanged"));
   EXPECT_THAT(daemon.messages(), HasSubstr(file));
   EXPECT_EQ(status_with(port, second_token), 200);
   stop(daemon);
@@ -284,7 +284,7 @@ TEST_F(CliAccess, SighupReadsTheCertificateAgainAndABadOneChangesNothing) {
   EXPECT_TRUE(eventually([&] { return name() == "second"; }));
   write_file(folder.file("cert.pem"), net_test::make_certificate("third").chain);  // not its key
   daemon.send(SIGHUP);
-  EXPECT_TRUE(says(daemon, "stays as it was"));
+  EXPECT_TRUE(says(daemon, "configuration is unchanged"));
   EXPECT_EQ(name(), "second");
   EXPECT_EQ(net_test::get(place, "/livez").status, 200);
   stop(daemon);
@@ -309,13 +309,13 @@ TEST_F(CliAccess, SighupTakesAllOfTheConfigurationOrNothing) {
   write(R"(, "allow-origin": ["https://friend.example"], "max-sessions": 9)");
   daemon.send(SIGHUP);
   EXPECT_TRUE(eventually([&] { return from_friend() == 101; }));
-  EXPECT_TRUE(says(daemon, "needs a restart"));
+  EXPECT_TRUE(says(daemon, "requires a restart"));
   EXPECT_THAT(daemon.messages(), HasSubstr("option=max-sessions"));
   // One value at fault, and the others are not taken either.
   secret("token", second_token);
   write(R"(, "max-sessions": "many")");
   daemon.send(SIGHUP);
-  EXPECT_TRUE(says(daemon, "stays as it was"));
+  EXPECT_TRUE(says(daemon, "configuration is unchanged"));
   EXPECT_THAT(daemon.messages(), HasSubstr("/max-sessions"));
   EXPECT_EQ(from_friend(), 101);
   EXPECT_EQ(status_with(port, second_token), 401);
@@ -347,7 +347,7 @@ TEST_F(CliAccess, SighupCannotTakeTheTokenFromWhatOthersReach) {
     const std::string before = daemon.messages();
     daemon.send(SIGHUP);
     EXPECT_TRUE(eventually([&] {
-      return daemon.messages().find("stays as it was", before.size()) != std::string::npos;
+      return daemon.messages().find("configuration is unchanged", before.size()) != std::string::npos;
     }));
     EXPECT_EQ(net_test::get(port, "/v1").status, 401);
   }
@@ -361,8 +361,8 @@ TEST_F(CliAccess, APipeInATokensPlaceIsRefusedAndKeepsNobodyWaiting) {
   std::filesystem::remove(file);
   ASSERT_EQ(mkfifo(file.c_str(), 0600), 0);
   daemon.send(SIGHUP);
-  EXPECT_TRUE(says(daemon, "stays as it was"));
-  EXPECT_THAT(daemon.messages(), HasSubstr("no regular file"));
+  EXPECT_TRUE(says(daemon, "configuration is unchanged"));
+  EXPECT_THAT(daemon.messages(), HasSubstr("not a regular file"));
   EXPECT_EQ(status_with(port, first_token), 200);
   EXPECT_EQ(refused({"--token-file", file}).code, 2);
   stop(daemon);

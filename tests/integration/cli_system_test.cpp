@@ -54,7 +54,7 @@ TEST(CliSystem, AnEmptyValueIsNoDefault) {
     EXPECT_EQ(outcome.out, "");
   }
   EXPECT_THAT(run({"render", "climate", "-o", picture, "--size", ""}).err,
-              HasSubstr("--size is given an empty value"));
+              HasSubstr("--size has an empty value"));
 }
 
 TEST(CliSystem, WhatCannotBePrintedIsAFailure) {

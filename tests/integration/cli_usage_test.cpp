@@ -108,8 +108,9 @@ TEST(CliUsage, WrongArgumentsExitWith2AndSayWhyOnStderrAlone) {
 TEST(CliUsage, AMemoryLimitThatCannotHoldIsRefusedWithWhatIsNeeded) {
   const Outcome outcome = run({"serve", "--memory-limit", "40M", "tornado"});
   EXPECT_EQ(outcome.code, 2);
-  EXPECT_THAT(outcome.err, StartsWith("windsplat: --memory-limit '40M' is below the least of 192M: "
-                                      "112M for the program and a picture"));
+  EXPECT_THAT(outcome.err,
+              StartsWith("windsplat: --memory-limit '40M' is below the minimum of 192M: "
+                         "112M for the program and a picture"));
 }
 
 TEST(CliUsage, AMemoryLimitMayHaveALowerCaseUnitAndDecimals) {
@@ -119,7 +120,7 @@ TEST(CliUsage, AMemoryLimitMayHaveALowerCaseUnitAndDecimals) {
   }
   const Outcome absurd = run({"inspect", "tornado:8", "--memory-limit", "8388608T"});
   EXPECT_EQ(absurd.code, 2);
-  EXPECT_THAT(absurd.err, HasSubstr("'8388608T' is beyond 128T"));
+  EXPECT_THAT(absurd.err, HasSubstr("'8388608T' is above 128T"));
 }
 
 TEST(CliUsage, HelpTellsTheLeastMemoryLimit) {
@@ -129,11 +130,12 @@ TEST(CliUsage, HelpTellsTheLeastMemoryLimit) {
 }
 
 TEST(CliUsage, AWordThatIsNotKnownIsNamedWithWhatMayBeMeant) {
-  EXPECT_THAT(run({"render", "tornado", "-o", "x.png", "--siez", "3x3"}).err,
-              StartsWith("windsplat: '--siez' is no option of 'render'; did you mean --size?\n"));
+  EXPECT_THAT(
+      run({"render", "tornado", "-o", "x.png", "--siez", "3x3"}).err,
+      StartsWith("windsplat: '--siez' is not an option of 'render'; did you mean --size?\n"));
   EXPECT_THAT(run({"serve", "--memory-limt=4G"}).err, HasSubstr("did you mean --memory-limit?"));
   EXPECT_THAT(run({"serve", "--banana"}).err,
-              StartsWith("windsplat: '--banana' is no option of 'serve'\n"));
+              StartsWith("windsplat: '--banana' is not an option of 'serve'\n"));
   EXPECT_THAT(run({"inspect", "tornado", "extra"}).err, HasSubstr("'extra' is one argument too"));
 }
 
@@ -146,7 +148,7 @@ TEST(CliUsage, MessagesHoldNoControlCharactersOfTheArguments) {
     EXPECT_EQ(outcome.err.find_first_of("\x1b\a"), std::string::npos) << outcome.err;
     EXPECT_THAT(outcome.err, Not(HasSubstr("\nwindsplat: all well"))) << outcome.err;
   }
-  EXPECT_THAT(run({"paint"}).err, HasSubstr("no command 'paint'"));
+  EXPECT_THAT(run({"paint"}).err, HasSubstr("unknown command 'paint'"));
 }
 
 // A flag that would do nothing must not be taken.
