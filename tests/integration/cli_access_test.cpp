@@ -1,5 +1,4 @@
-// The daemon's token, certificate and configuration as an operator gives them, and SIGHUP, which
-// has them read again.
+// Token, certificate and configuration of the daemon, and their reload on SIGHUP.
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
@@ -60,7 +59,7 @@ int status_with(std::uint16_t port, const std::string& token, bool tls = false) 
   return net_test::get(Place(port, tls), "/v1", {{"Authorization", "Bearer " + token}}).status;
 }
 
-// What a signal has done comes a little later.
+// The effect of a signal is delayed.
 bool eventually(const std::function<bool()>& is_so) {
   for (int turns = 0; turns < 2000; ++turns) {
     if (is_so()) return true;
@@ -232,7 +231,7 @@ TEST_F(CliAccess, TheConfigurationIsRefusedWithAPointer) {
            {R"({"max-sessions": 0})", "/max-sessions"},
            {R"({"max-sessions": 1.5})", "/max-sessions"},
            {R"({"max-sessions": 3000000000})", "/max-sessions"},
-           {R"({"threads": -1})", "/threads"},  // though the command line says another
+           {R"({"threads": -1})", "/threads"},  // although the command line overrides it
            {R"({"threads": "2"})", "/threads"},
            {R"({"allow-remote": 1})", "/allow-remote"},
            {R"({"allow-remote": "true"})", "/allow-remote"},
@@ -353,7 +352,7 @@ TEST_F(CliAccess, SighupCannotTakeTheTokenFromWhatOthersReach) {
   }
 }
 
-// Opening it would wait for somebody who writes to it.
+// Opening a pipe would block until a writer opens it.
 TEST_F(CliAccess, APipeInATokensPlaceIsRefusedAndKeepsNobodyWaiting) {
   const std::string file = secret("token", first_token);
   Process daemon(serve({"--token-file", file}));
@@ -383,7 +382,8 @@ TEST_F(CliAccess, SecretsAreInNoCoreDump) {
   EXPECT_THAT(limit(in_tls), testing::ContainsRegex("size +[01] +[01] +bytes"));
 }
 
-// A page can have its own name resolve to this machine, and a browser then takes it for ours.
+// DNS rebinding: a page's name can resolve to this machine, and the browser treats it as
+// same-origin.
 TEST_F(CliAccess, BeyondLoopbackWithoutATokenOnlyKnownNamesAreAnswered) {
   const auto status_for = [](std::uint16_t port, const std::string& host) {
     return net_test::raw(port, "GET /v1 HTTP/1.1\r\nHost: " + host + "\r\n\r\n").status;

@@ -1,4 +1,4 @@
-// `windsplat animate`: which files it writes, and that each is the picture of its step and time.
+// `windsplat animate`: names of the files written, and step and time of each picture.
 #include <gmock/gmock.h>
 
 #include <csignal>
@@ -106,7 +106,7 @@ TEST(CliAnimate, TimesRunOnOverAStrideFromTheViewsOwn) {
   }
 }
 
-// Nobody knows beforehand which frame the signal meets: every file there is must be whole.
+// The signal may arrive during any frame: every existing file must be complete.
 TEST(CliAnimate, ASignalStopsItBetweenWholeFiles) {
   for (const int signal : {SIGINT, SIGTERM}) {
     const Folder folder;

@@ -1,4 +1,4 @@
-// From a sample to a file, to its description, to its picture; and files and views that are wrong.
+// From a sample to a file, its description and its picture; invalid files and views.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 

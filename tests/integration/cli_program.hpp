@@ -1,4 +1,4 @@
-// Runs the built program for the command line's tests: arguments in, exit code and output out.
+// Runs the built program for command line tests: arguments in, exit code and output out.
 #pragma once
 
 #include <fcntl.h>
@@ -93,7 +93,7 @@ class Process {
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  // To this program alone: kill() takes a pid of -1 or 0 for every process there is.
+  // Signals this program only: kill() with a pid of -1 or 0 signals every process.
   void send(int signal) const {
     if (pid_ > 0) {
       kill(pid_, signal);
@@ -102,7 +102,7 @@ class Process {
     }
   }
 
-  // stdout up to and with `stop`, or to its end if that never comes.
+  // stdout up to and including `stop`, or to its end.
   std::string read_until(char stop) { return read_stdout(&stop); }
   std::string read_all() { return read_stdout(nullptr); }
 

@@ -1,4 +1,4 @@
-// A daemon that is restarted under its viewers: a client's whole view brings everything back.
+// Restart of a daemon with open sessions: the client's complete view restores its state.
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>

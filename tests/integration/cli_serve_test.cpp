@@ -1,4 +1,4 @@
-// The daemon as a person starts, asks and stops it.
+// Starting, querying and stopping the daemon.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <netinet/in.h>
@@ -145,7 +145,7 @@ TEST_F(CliServe, SigtermDoesNotWaitForALoaderThatHangs) {
 }
 
 #ifndef WINDSPLAT_SANITIZED  // whose shadow counts as memory
-// The first value of --memory-limit that a message says would do.
+// The first value of --memory-limit that a message suggests.
 std::string limit_told(const std::string& message) {
   const std::string before = ": --memory-limit ";
   const std::size_t at = message.find(before);
@@ -179,7 +179,7 @@ TEST_F(CliServe, ADatasetOfWhichNoStepFitsIsRefusedWithTheLimitThatWouldDo) {
   EXPECT_EQ(drawn.status, 200) << drawn.body;
 }
 
-// A loader and what reading takes are counted in what is told.
+// The reported memory includes a loader and the buffers for reading.
 TEST_F(CliServe, TheLimitThatIsToldDoesForFilesToo) {
   const std::string file = folder.file("large.nc");
   ASSERT_EQ(run({"synth", "tornado", "--dims", "180x180x180", "--steps", "1", "-o", file}).code, 0);

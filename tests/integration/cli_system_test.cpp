@@ -1,4 +1,4 @@
-// The program under what a shell sets up: outputs that are full or shared, limits, signals, links.
+// The program with full or shared outputs, resource limits, signals and links.
 #include <gmock/gmock.h>
 
 #include <array>

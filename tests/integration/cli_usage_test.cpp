@@ -1,4 +1,4 @@
-// What the program says of itself, and what it answers to arguments that are wrong.
+// Help, version and errors for invalid arguments.
 #include <gmock/gmock.h>
 
 #include <string>

@@ -113,7 +113,7 @@ Socket::~Socket() {
   if (handle_ >= 0) ::close(handle_);
 }
 
-// Until what OpenSSL waits for has come; false if that is nothing, or does not come.
+// Waits for the socket as OpenSSL requires; false on a deadline or another error.
 bool Socket::wait_for(int ssl_result, int timeout_ms) {
   const int wanted = SSL_get_error(tls_->ssl, ssl_result);
   if (wanted != SSL_ERROR_WANT_READ && wanted != SSL_ERROR_WANT_WRITE) return false;

@@ -1,5 +1,4 @@
-// A small client of its own for the tests of the network: plain sockets with deadlines, so that
-// what a well-behaved library would never send can be sent too.
+// Minimal client for network tests: plain sockets with deadlines, which can also send invalid data.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +24,8 @@ struct Place {
   bool tls;
 };
 
-// A TCP connection to this machine, in TLS or not. No certificate is checked: peer_name() tells it.
+// A TCP connection to this machine, with or without TLS. The certificate is not verified;
+// peer_name() returns its name.
 class Socket {
  public:
   explicit Socket(Place place, int receive_buffer_bytes = 0);
@@ -33,9 +33,9 @@ class Socket {
   Socket(const Socket&) = delete;
   Socket& operator=(const Socket&) = delete;
 
-  // As much as the peer takes; false if it has closed.
+  // Writes as much as the peer accepts; false if it has closed.
   bool send(std::string_view bytes);
-  // What comes next, at least one byte; empty at the end, on a reset or after the deadline.
+  // Reads at least one byte; empty at the end, on a reset or after the deadline.
   std::string receive(int timeout_ms = patience_ms);
   // Waits until the peer has closed; false if it does not.
   bool closed_by_peer(int timeout_ms = patience_ms);
@@ -67,7 +67,7 @@ struct Answer {
   [[nodiscard]] std::string header(const std::string& name) const;
 };
 
-// Reads one answer. `head`: it has no body whatever its length says.
+// Reads one response. `head`: it has no body regardless of its length.
 Answer read_answer(Socket& socket, bool head = false);
 
 // One request on a connection of its own.
@@ -83,7 +83,7 @@ enum class Opcode : std::uint8_t { more = 0, text = 1, binary = 2, close = 8, pi
 struct Message {
   Opcode kind = Opcode::text;
   std::string data;
-  int close_code = 0;  // of a close; 0 if it says none
+  int close_code = 0;  // of a close; 0 if absent
 };
 
 // A WebSocket. Answers pings by itself; acknowledges nothing.
@@ -96,13 +96,13 @@ class StreamClient {
 
   bool say(std::string_view json) { return send_frame(Opcode::text, json); }
   bool send_frame(Opcode opcode, std::string_view payload, bool fin = true);
-  // Text, binary or close; none when the connection ended otherwise or nothing came in time.
+  // Text, binary or close; none if the connection ended otherwise or the deadline passed.
   std::optional<Message> next(int timeout_ms = patience_ms);
   // The next text message of that type, others passed over.
   std::optional<std::string> next_text(const std::string& type, int timeout_ms = patience_ms);
   // The next frame, texts passed over (kept in `texts`).
   std::optional<std::string> next_frame(int timeout_ms = patience_ms);
-  // The code of the close that comes, what comes before it passed over; 0 if none comes.
+  // The code of the next close, skipping earlier messages; 0 if there is none.
   int close_code(int timeout_ms = patience_ms);
 
   std::vector<std::string> texts;  // every text so far

@@ -1,4 +1,4 @@
-// A server that asks for a token: who is let in over HTTP and over WebSockets, and by which proof.
+// A server with a token: authentication over HTTP and WebSocket by each credential.
 #include <gmock/gmock.h>
 
 #include "net_server.hpp"
@@ -87,7 +87,7 @@ TEST_F(Guarded, the_token_opens_everything) {
             200);
 }
 
-// No body is read of who is not let in, so the connection is of no further use.
+// The body of an unauthenticated request is not read, so the connection is closed.
 TEST_F(Guarded, a_stranger_is_refused_before_the_body) {
   Socket socket(port());
   socket.send("POST /v1/frames HTTP/1.1\r\nHost: x\r\nContent-Length: 60000\r\n\r\n");
@@ -155,7 +155,7 @@ TEST_F(Guarded, a_token_in_an_address_is_no_proof) {
   }
 }
 
-// Right ones are not looked at either: else whoever guesses on loses nothing by the limit.
+// Correct tokens are refused too: otherwise the limit would not slow down guessing.
 TEST(GuardedGuesses, are_answered_no_more_beyond_the_limit_and_cookies_are) {
   ServerOptions options = guarded();
   options.limits.failed_logins_per_address = 4;
@@ -190,7 +190,7 @@ TEST_F(Guarded, another_token_ends_cookies_and_streams) {
   const Headers cookie = with_cookie();
   StreamClient viewer(port(), bearer);
   ASSERT_TRUE(viewer.next_text("hello"));
-  // The same token again costs nobody anything.
+  // Reloading the same token closes no session.
   server_.server().change(Access{{}, token(), nullptr, false, {}});
   EXPECT_EQ(get(port(), "/v1", cookie).status, 200);
   viewer.say(R"({"type":"open","id":1,"dataset":"small"})");

@@ -1,4 +1,4 @@
-// Datasets that are opened, shared and read slowly: one client's must not be another's trouble.
+// Opening, sharing and slow reading of datasets: one client must not affect another.
 #include <gmock/gmock.h>
 #include <unistd.h>
 
@@ -185,7 +185,7 @@ TEST(ForgottenDatasets, APictureThatWaitsForOneIsToldWhatBecameOfIt) {
   fs::remove_all(name);
 }
 
-// Files that only their folders tell apart: name, size and time are the same.
+// Files that differ only in their folder: name, size and time are equal.
 TEST(KnownRanges, AreNotThoseOfAnotherFileThatLooksTheSameFromOutside) {
   std::string name = (fs::temp_directory_path() / "windsplat-twins-XXXXXX").string();
   ASSERT_NE(mkdtemp(name.data()), nullptr);

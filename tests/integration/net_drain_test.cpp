@@ -1,4 +1,4 @@
-// The orderly end: readiness goes first, streams are told, what is being drawn is answered.
+// Orderly shutdown: readiness fails first, streams are closed, pictures in progress are answered.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -70,7 +70,7 @@ TEST(Drain, is_not_put_off_by_clients_that_ask_again_and_again) {
   for (std::thread& client : clients) client.join();
 }
 
-// Whatever is under way when the time is up: nothing that ends later touches what has gone.
+// Operations still in progress at the deadline must not access destroyed objects.
 TEST(Drain, connections_that_outlast_it_are_ended) {
   windsplat::net::ServerOptions options;
   options.drain_cancel_after = std::chrono::milliseconds(0);

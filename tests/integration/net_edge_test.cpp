@@ -1,4 +1,4 @@
-// The HTTP edge against what no good client sends: each is refused, and the next one is served.
+// Malformed HTTP requests: each is refused, and the next request is served.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -84,7 +84,7 @@ TEST(LocalHosts, alone_are_answered_where_only_they_are_expected) {
 
 TEST_F(Edge, a_body_too_large_is_refused_before_it_is_read) {
   const std::string post = "POST /v1/frames HTTP/1.1\r\nHost: x\r\n";
-  // Nothing of the body was sent: the answer comes from the header alone.
+  // No body was sent: the response depends on the header only.
   for (const char* length : {"65537", "104857600", "9223372036854775808", "18446744073709551615"}) {
     SCOPED_TRACE(length);
     expect_refused(post + "Content-Length: " + length + "\r\n\r\n", 413);

@@ -1,5 +1,4 @@
-// Error against time over REST: what is told before anything was measured, and after a viewer has
-// looked.
+// Forecasts over REST: before any measurement and after a calibration run.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -66,7 +65,7 @@ TEST_F(Forecasts, AreACurveOfErrorAgainstTime) {
   EXPECT_TRUE(slabs);
 }
 
-// What is told to be chosen is how POST /v1/frames draws the view.
+// The forecast setting is the one with which POST /v1/frames draws the view.
 TEST_F(Forecasts, TheChosenPointIsHowThePictureIsDrawn) {
   Json view = view_of(320, 240);
   draw(view);

@@ -1,4 +1,4 @@
-// What TLS offers a stranger, and what a stranger can make the server compute before it knows him.
+// TLS versions and groups offered, and limits on the computation for unauthenticated clients.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <netinet/in.h>
@@ -191,7 +191,7 @@ TEST(TlsHandshakes, of_strangers_leave_time_for_health_asked_by_the_machine_itse
   EXPECT_THAT(log, HasSubstr("connections=1 seconds=0 address=127.0.0.2"));
 }
 
-// The line between HTTP and the quota: who showed the token has handshakes of its own.
+// HTTP reports to the quota which address has shown the token: it has separate handshakes.
 TEST(TlsHandshakes, of_an_address_that_showed_the_token_do_not_compete_with_strangers) {
   Limits limits;
   limits.handshake_ms = 0.001;  // a further handshake is paid within ten minutes
@@ -224,7 +224,7 @@ TEST(PlainHttp, at_the_port_of_tls_is_charged_to_its_address) {
   EXPECT_THAT(picture.body, HasSubstr("bytes a second"));
 }
 
-// OpenSSL takes a ClientHello of 131 kB, and waits for all of it.
+// OpenSSL accepts a ClientHello of 131 kB and waits for all of it.
 TEST(TlsHandshakes, that_send_much_are_ended_before_those_that_send_nothing) {
   TestServer server(over_tls());
   Socket silent(server.port());

@@ -1,4 +1,4 @@
-// Jobs: states, bounds, cancelling, and that a fault of the work is the job's alone.
+// Jobs: states, limits, cancellation, and that an error of the work fails only its job.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

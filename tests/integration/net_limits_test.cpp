@@ -1,5 +1,5 @@
-// Limits over real sockets: what is beyond each is answered with the limit and when to try again,
-// health is answered all the same, and what was taken is given back.
+// Limits over real sockets: excess is refused with the limit and a retry time, health is still
+// served, and resources are released.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -138,7 +138,7 @@ TEST(Limits, one_address_has_no_more_connections_than_it_may) {
   EXPECT_EQ(get(server.port(), "/readyz").status, 200);
 }
 
-// Those that say nothing hold their places for two seconds; what comes meanwhile is closed.
+// Silent connections hold their places for two seconds; others are closed meanwhile.
 TEST(Limits, the_reserve_is_bounded_and_clears_itself) {
   ServerOptions options;
   options.limits.connections = 1;

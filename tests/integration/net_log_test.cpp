@@ -1,4 +1,4 @@
-// A request's id in its answer and in the log; what the log does not tell.
+// Request ids in responses and in the log, and data that must not be logged.
 #include <gmock/gmock.h>
 
 #include <chrono>

@@ -1,4 +1,4 @@
-// Questions about values over REST, against the file's own numbers; datasets opened by POST.
+// Queries of values over REST against the numbers in the file; datasets opened by POST.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/stat.h>

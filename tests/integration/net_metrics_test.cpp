@@ -1,5 +1,4 @@
-// What the server counts, scraped through a socket: the format, that counters move by what was
-// done, and that clients cannot make series.
+// Metrics scraped over a socket: format, counters, and that clients cannot create series.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -66,7 +65,7 @@ TEST_F(MetricsTest, a_picture_moves_what_it_has_to_do_with_by_one) {
   for (const std::string stage : {"queue", "render", "encode", "write"}) {
     EXPECT_EQ(moved("windsplat_stage_seconds_count{stage=\"" + stage + "\"}"), 1) << stage;
   }
-  // Server-Timing tells the same, in milliseconds.
+  // Server-Timing reports the same times, in milliseconds.
   std::smatch render;
   const std::string timing = picture.header("server-timing");
   ASSERT_TRUE(std::regex_search(timing, render, std::regex("render;dur=([0-9.]+)"))) << timing;

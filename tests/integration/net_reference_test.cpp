@@ -1,5 +1,5 @@
-// References over real sockets: drawn by a job, the picture that `windsplat render` draws, bounded,
-// cancelled, and in nobody's way.
+// References over real sockets: drawn by a job, identical to those of `windsplat render`, bounded,
+// cancellable, and not delaying other work.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Every REST path: what it answers, what it refuses, and that the next request is served.
+// Every REST path: responses, refusals, and that the next request is served.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -334,7 +334,7 @@ TEST_F(Rest, head_is_get_without_the_body) {
 TEST_F(Rest, beyond_what_can_wait_comes_429_at_once) {
   // Resident, so that nothing is let in only to find that it has to be loaded first.
   ASSERT_EQ(get(port(), "/v1/datasets/small/frame.jpg?width=16&height=16").status, 200);
-  // More pictures than may wait, asked for before the first is done.
+  // More pictures than may wait, requested before the first is done.
   const std::string slow =
       "GET /v1/datasets/small/frame.png?width=4096&height=4096 HTTP/1.1\r\nHost: x\r\n\r\n";
   std::vector<std::unique_ptr<Socket>> sockets;
@@ -347,7 +347,7 @@ TEST_F(Rest, beyond_what_can_wait_comes_429_at_once) {
   expect_problem(refused, 429);
   EXPECT_FALSE(refused.header("retry-after").empty());
   EXPECT_EQ(get(port(), "/livez").status, 200);
-  sockets.clear();  // nobody waits any more: what is queued is given up
+  sockets.clear();  // cancels the queued requests
   const auto picture = [&] {
     return get(port(), "/v1/datasets/small/frame.jpg?width=32&height=32").status;
   };

@@ -1,4 +1,4 @@
-// Saved views over REST: their life from POST to DELETE, who may change them, what is refused.
+// Saved views over REST: from POST to DELETE, conditional changes, and refusals.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -166,7 +166,7 @@ TEST_F(Views, IfMatchLetsOnlyTheViewThatWasSeenBeChanged) {
   expect_views_problem(ask("DELETE", id, "", {{"If-Match", "*"}}), 404);
 }
 
-// Each adds to what it saw and tries again where somebody came first: nothing is lost.
+// Each client modifies what it read and retries on a conflict: no change is lost.
 TEST_F(Views, WritersThatHeedIfMatchLoseNoneOfTheirChanges) {
   const std::string id = saved(R"({"step":0})");
   constexpr int writers = 4;

@@ -1,4 +1,4 @@
-// Prometheus' text format, read strictly: what its specification does not allow is a failure.
+// Strict parser of Prometheus' text format: deviations from its specification are failures.
 #pragma once
 
 #include <map>

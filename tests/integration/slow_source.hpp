@@ -1,4 +1,4 @@
-// Data that is as slow as a test wants: sources that hang at a gate while they are read.
+// Slow data sources that block at a gate while they are read.
 #pragma once
 
 #include <atomic>
@@ -14,7 +14,7 @@
 
 namespace net_test {
 
-// Holds whoever passes until it is opened.
+// Blocks every caller until it is opened.
 class Gate {
  public:
   void open() { set(true); }

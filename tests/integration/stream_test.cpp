@@ -1,4 +1,4 @@
-// The stream end to end over a real socket: views in, frames out, and what is refused.
+// The stream end to end over a real socket: views in, frames out, and refusals.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -150,7 +150,7 @@ TEST_F(Stream, no_third_frame_before_an_ack) {
   for (std::uint32_t rev = 3; rev < 30; ++rev) {
     viewer.patch(rev, R"({"step":)" + std::to_string(rev % small_steps) + "}");
   }
-  // An error answer proves that all of them were heard.
+  // The error reply proves that all of them were received.
   viewer.say(R"({"type":"nonsense"})");
   ASSERT_TRUE(viewer.next_text("error"));
   EXPECT_FALSE(viewer.next_frame(400)) << "credit is two";
@@ -400,7 +400,7 @@ TEST_F(Stream, viewers_beyond_the_limit_are_told_so) {
     StreamClient three(server.port());
     EXPECT_EQ(three.close_code(), 1013);
   }
-  // Their places are free again once they have gone.
+  // Their places are free after they disconnect.
   for (int turns = 0; turns < 100; ++turns) {
     StreamClient next(server.port());
     if (next.next_text("hello")) return;

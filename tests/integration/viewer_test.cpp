@@ -1,4 +1,4 @@
-// What a viewer's render jobs tell of the time they took, and how they share memory that is short.
+// Times reported by a session's render jobs, and sharing of scarce memory.
 #include "server/work/viewer.hpp"
 
 #include <gtest/gtest.h>
@@ -127,7 +127,7 @@ TEST_F(LargePictures, WaitForTheRoomThatOthersHold) {
   net::Viewer viewer(services_->backend, 1, "192.0.2.1");
   ASSERT_EQ(fault_of(viewer, view_).get(), "") << "its data are resident from now on";
   auto others = store_->reserve(step_bytes);
-  while (!others) {  // the first picture's room goes a moment after its answer
+  while (!others) {  // memory is released shortly after the reply
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
     others = store_->reserve(step_bytes);
   }
