@@ -1,4 +1,4 @@
-// The configuration file's form: what it may hold, and where a refusal points.
+// The format of the configuration file, and the pointers of its errors.
 #include "protocol/config.hpp"
 
 #include <gmock/gmock.h>

@@ -335,7 +335,7 @@ TEST(Shapes, ServiceColorMapsAndPresets) {
   EXPECT_EQ(encode_presets({"default", "top"}), R"({"presets":["default","top"]})");
 }
 
-// Every constant of limits.hpp is told, under its name in camel case and with its value.
+// Every constant of limits.hpp is published under its name in camel case with its value.
 TEST(Shapes, LimitsAreThoseOfTheLimitsFile) {
   const Json limits = Json::parse(encode_service({}))["limits"];
   std::istringstream source(read_protocol_file("limits.hpp"));

@@ -1,4 +1,4 @@
-// Saved views as answers and as files, and what is no view's id.
+// Saved views as responses and as files, and invalid view ids.
 #include "protocol/saved_view.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// view.schema.json, limits.hpp and the structs of view.hpp say the same.
+// view.schema.json, limits.hpp and the structs of view.hpp are consistent.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// What `inspect` reads of a file that it was not asked for, how it says so, and the way round.
+// Which ranges `inspect` reads by default, how it reports omissions, and the override.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

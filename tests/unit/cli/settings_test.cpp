@@ -1,4 +1,4 @@
-// What the daemon's settings are read by: files that must not make it wait, and a thread apart.
+// Settings of the daemon: files that must not block, and calls on a separate thread.
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
@@ -44,7 +44,7 @@ TEST_F(SettingsFile, is_read_whole_and_no_further_than_it_may_be) {
   EXPECT_EQ(read_settings_file(file("absent"), 9).error().kind, ErrorKind::not_found);
 }
 
-// Opening a pipe that nobody writes to would wait for ever.
+// Opening a pipe without a writer would block.
 TEST_F(SettingsFile, that_is_none_is_not_waited_for) {
   ASSERT_EQ(mkfifo(file("pipe").c_str(), 0600), 0);
   for (const std::string& path : {file("pipe"), folder_.string(), std::string("/dev/zero")}) {
@@ -55,7 +55,7 @@ TEST_F(SettingsFile, that_is_none_is_not_waited_for) {
   }
 }
 
-// A call that ends when it is told to.
+// A call that ends on request.
 class Gate {
  public:
   void pass() {

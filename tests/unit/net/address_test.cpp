@@ -1,4 +1,4 @@
-// How addresses count, and whose word about them is taken.
+// Address keys of the quotas, and trusted proxies.
 #include "server/access/address.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// Who is let in: tokens, cookies, origins, and what is told to the others. No server is needed.
+// Authentication by tokens, cookies and origins, and the responses to refused clients. Needs no
+// server.
 #include "server/access/auth.hpp"
 
 #include <gmock/gmock.h>

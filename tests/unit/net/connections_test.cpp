@@ -1,4 +1,4 @@
-// Which connection gives its place to a newcomer.
+// Which connection is closed to admit a new one.
 #include "server/transport/connections.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What a view is told to cost before anything is read, and what is refused.
+// Estimated cost of views before data is read, and refusals by the limits.
 #include "server/frame/cost.hpp"
 
 #include <gtest/gtest.h>

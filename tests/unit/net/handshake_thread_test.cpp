@@ -1,4 +1,4 @@
-// The order of handshakes' steps, and what may go wrong in one.
+// Order of handshake steps, and failures of a step.
 #include "server/transport/handshake_thread.hpp"
 
 #include <gtest/gtest.h>

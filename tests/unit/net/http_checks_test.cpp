@@ -1,4 +1,4 @@
-// What HTTP allows and this server refuses, by the bytes and fields of a header alone.
+// Requests that HTTP allows and this server refuses, by their header only.
 #include "server/http/http_checks.hpp"
 
 #include <gtest/gtest.h>

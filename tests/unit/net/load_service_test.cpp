@@ -1,4 +1,4 @@
-// How many loads may wait: of one dataset, of all, and who is not counted.
+// Limits of waiting loads: per dataset, in total, and exemptions.
 #include "server/work/load_service.hpp"
 
 #include <gtest/gtest.h>

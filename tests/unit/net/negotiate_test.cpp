@@ -1,4 +1,4 @@
-// Which hosts a request may be meant for, and which of them are this machine's loopback.
+// Accepted hosts of a request, and recognition of loopback names.
 #include "server/http/negotiate.hpp"
 
 #include <gtest/gtest.h>

@@ -83,7 +83,7 @@ TEST(NoMemory, a_job_that_cannot_be_queued_changes_nothing) {
       queue.done(10);
       EXPECT_TRUE(queue.empty());
       EXPECT_FALSE(queue.pop()) << count;
-      // And who failed has its turn like anybody.
+      // A failed job still counts for its owner's turn.
       queue.push(job_of(kind, 2), 0);
       ASSERT_TRUE(queue.pop());
       queue.done(10);

@@ -1,5 +1,5 @@
-// What is known of sockets: whether the other end has gone, and connections that are turned away
-// when no file descriptor is left.
+// State of sockets: detection of a closed peer, and rejection of connections when descriptors run
+// out.
 #include "server/transport/peer.hpp"
 
 #include <arpa/inet.h>

@@ -1,5 +1,5 @@
-// What each address may have, by times that are told: connections and their reserve, buckets of
-// requests, bytes and drawing, and how addresses are forgotten.
+// Quotas of addresses in simulated time: connections and their reserve, token buckets of requests,
+// bytes and render time, and eviction of addresses.
 #include "server/access/quota.hpp"
 
 #include <gtest/gtest.h>

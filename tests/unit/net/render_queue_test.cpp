@@ -1,5 +1,5 @@
-// Whose turn it is at the renderer: shares of time, cancelled background work, refusals. Times are
-// told, not slept.
+// Scheduling of the renderer: shares of time, cancelled background jobs, refusals. Times are
+// simulated.
 #include "server/work/render_queue.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ class Renderer {
   }
   void ask(RenderKind kind, std::uint64_t owner) { queue_.push(job(kind, owner), now_us_); }
 
-  // Runs one job, `cost_us` by owner; who ran it.
+  // Runs one job with the cost of its owner in `cost_us`; returns the owner.
   std::uint64_t run(std::map<std::uint64_t, std::int64_t> cost_us, bool ask_again = true) {
     const auto next = queue_.pop();
     if (!next) return 0;
@@ -169,7 +169,7 @@ TEST(RenderQueue, a_newer_background_job_takes_the_place_of_the_older_which_is_t
   EXPECT_EQ(ran, expected);
 }
 
-// What a session that is gone had asked for: newcomers, who have used nothing yet, come before it.
+// Cancelled jobs of a closed session: new owners without usage run before them.
 TEST(RenderQueue, a_cancelled_job_does_not_wait_for_its_turn) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     SCOPED_TRACE(static_cast<int>(kind));
@@ -352,8 +352,8 @@ TEST(RenderService, ends_a_background_job_for_a_frame) {
   drawn.get_future().wait();
 }
 
-// Who asks while another address' picture is drawn and one waits is told to come back, unless its
-// own takes longer than what is before it; nobody is refused for what they themselves wait for.
+// A request is refused while another address's picture is drawn and one waits, unless its own cost
+// exceeds what is before it; waiting for one's own pictures is no reason for a refusal.
 TEST(RenderService, keeps_nobody_waiting_long_for_others) {
   std::atomic<std::int64_t> now_us{0};
   RenderService::Options options;
@@ -422,7 +422,7 @@ TEST(RenderService, under_overload_nobody_waits_for_a_whole_picture) {
   };
   EXPECT_TRUE(service.submit(std::move(first)));
   begun.get_future().wait();
-  RenderJob gone;  // nobody waits for it any more
+  RenderJob gone;  // cancelled
   gone.cost_ms = 100;
   gone.payer = "w";
   gone.run = [](std::int64_t /*queue_us*/) {};

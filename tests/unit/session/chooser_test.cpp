@@ -1,4 +1,5 @@
-// The chooser: times correct forecasts, finer settings come with patience, coarser ones at once.
+// The chooser: times correct forecasts; finer settings are chosen with hysteresis, coarser ones at
+// once.
 #include "server/session/chooser.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A session with a clock that is turned by hand and surroundings that do as they are told.
+// Drives a session with a manual clock and a scripted environment.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -144,7 +144,7 @@ class Driver {
   std::optional<Close> closed;
   bool write_at_once = true;
   int step_count = steps;
-  Micros queue = 0;                // that a frame waits for the renderer, as told
+  Micros queue = 0;                // simulated waiting time of a frame for the renderer
   std::optional<Reading> reading;  // of the dataset "wind"
   std::vector<Calibrate> calibrations;
   std::optional<quality::Forecasts> surveyed;  // what is known; empty: the prior

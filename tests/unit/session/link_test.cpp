@@ -1,4 +1,4 @@
-// What is told of a link whose rate and delay are known: closed forms. Times are microseconds.
+// Estimates for links of known rate and delay, against closed forms. Times are microseconds.
 #include "server/session/link.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Which frames a viewer gets, and when: credit, newest view first, what changes nothing.
+// Which frames are sent and when: credit, newest view first, unchanged pictures.
 #include <gmock/gmock.h>
 
 #include "driver.hpp"
@@ -216,7 +216,7 @@ TEST(Pacing, a_final_frame_that_was_done_just_before_the_change_is_dropped) {
   driver.wait(200 * ms);
   ASSERT_TRUE(driver.render);
   driver.patch(2, azimuth(1));
-  driver.cancelled = false;  // the renderer had finished before it heard
+  driver.cancelled = false;  // it finished before the cancellation
   driver.finish_render(1 * ms);
   EXPECT_EQ(driver.frames.size(), 1U);
   driver.settle();

@@ -1,5 +1,4 @@
-// Steps that run: order, pace, changes on the way, what is counted of them, and which are wished
-// for ahead.
+// Playback: order, rate, changes meanwhile, statistics, and prefetch requests.
 #include <gmock/gmock.h>
 
 #include <numeric>
@@ -254,7 +253,7 @@ TEST(PlayStats, count_the_steps_that_had_to_be_read_first) {
   EXPECT_EQ(driver.texts_of<protocol::StatsMessage>().back().steps_not_ready, 3U);
 }
 
-// --- wishes -------------------------------------------------------------------------------------
+// --- prefetch -----------------------------------------------------------------------------------
 
 std::vector<int> iota(int first, int count) {
   std::vector<int> out(static_cast<std::size_t>(count));

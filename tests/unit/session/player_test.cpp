@@ -1,4 +1,4 @@
-// When steps come, by the clock alone: what is late is dropped, or waits without hurry.
+// Times of steps by the clock only: late steps are dropped or delayed.
 #include "server/session/player.hpp"
 
 #include <gtest/gtest.h>

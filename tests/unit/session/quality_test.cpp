@@ -1,4 +1,4 @@
-// What frames are drawn by, what they say they err, and the way to the final one.
+// Settings of frames, their reported errors, and refinement to the final frame.
 #include <cmath>
 #include <functional>
 #include <optional>

@@ -1,4 +1,4 @@
-// What a session answers: opening, patches that cannot be followed, stills, steps that run, ends.
+// Replies of a session: opening, rejected patches, stills, playback, closing.
 #include <gmock/gmock.h>
 
 #include "driver.hpp"
@@ -64,7 +64,7 @@ TEST(Open, that_failed_is_why_there_is_nothing_to_play) {
   EXPECT_EQ(play(drawn).status, 404);
 }
 
-// What is quick is not told; nor is what is read for somebody else's frame while ours is drawn.
+// Progress is not reported for fast loads, nor for reads of other sessions while this one renders.
 TEST(Open, how_far_reading_has_come_is_told_while_a_frame_waits_for_it) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");

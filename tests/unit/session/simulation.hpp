@@ -1,5 +1,4 @@
-// Sessions on a simulated link: events in order of a made-up clock, from a hand that drags to
-// frames that are shown.
+// Sessions on a simulated link: discrete events in simulated time, from input to frames shown.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Views that are kept: their bounds, what outlasts a restart, and what a folder may hold besides.
+// Saved views: limits, persistence over a restart, and foreign files in the folder.
 #include "server/views/saved_views.hpp"
 
 #include <fcntl.h>
