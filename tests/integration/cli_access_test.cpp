@@ -155,7 +155,7 @@ TEST_F(CliAccess, HealthIsCheckedOverTlsByWhomItTrusts) {
   const std::string by_name =
       "https://localhost" + url.substr(std::string("https://127.0.0.1").size());
   const Outcome untrusted = run({"healthcheck", url});
-  EXPECT_EQ(untrusted.code, 1) << "signed by nobody";
+  EXPECT_EQ(untrusted.code, 1) << "untrusted certificate";
   EXPECT_THAT(untrusted.err, HasSubstr("use --ca to name certificates to trust"));
   EXPECT_EQ(run({"healthcheck", url, "--ca", folder.file("cert.pem")}).code, 0);
   EXPECT_EQ(run({"healthcheck", by_name}, {"WINDSPLAT_CA=" + folder.file("cert.pem")}).code, 0);
@@ -185,7 +185,7 @@ TEST_F(CliAccess, ACertificateThatIsNoGoodStopsTheStart) {
   give_certificate("old", -1);
   Process daemon(serve(tls_words()));
   port_of(daemon);
-  EXPECT_TRUE(says(daemon, "has expired")) << "who trusts it all the same may";
+  EXPECT_TRUE(says(daemon, "has expired")) << "clients may still trust it";
 }
 
 // --- the configuration ---------------------------------------------------------------------------
@@ -259,7 +259,7 @@ TEST_F(CliAccess, SighupReadsTheTokenAgain) {
   const auto port = port_of(daemon);
   ASSERT_EQ(status_with(port, first_token), 200);
   secret("token", second_token);
-  EXPECT_EQ(status_with(port, second_token), 401) << "not before it is told";
+  EXPECT_EQ(status_with(port, second_token), 401) << "not before SIGHUP";
   daemon.send(SIGHUP);
   EXPECT_TRUE(says(daemon, "configuration reloaded"));
   EXPECT_EQ(status_with(port, second_token), 200);

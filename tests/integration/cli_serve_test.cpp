@@ -68,7 +68,7 @@ TEST_F(CliServe, PrintsItsUrlAnswersHealthcheckAndDrainsOnSigterm) {
   const Outcome healthy = run({"healthcheck", url});
   EXPECT_EQ(healthy.code, 0) << healthy.err;
   daemon.send(SIGTERM);
-  EXPECT_EQ(daemon.read_all(), "") << "the URL is all that goes to stdout";
+  EXPECT_EQ(daemon.read_all(), "") << "stdout contains only the URL";
   EXPECT_EQ(daemon.wait(), 0) << daemon.messages();
   EXPECT_EQ(run({"healthcheck", url}).code, 1);
 }

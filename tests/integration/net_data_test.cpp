@@ -329,7 +329,7 @@ TEST(Viewer, OfManyWishesThatWaitOnlyTheNewestIsWorkedOut) {
       services.backend.loads.submit({{}, [&] { done.set_value(); }, true, dataset->shared_info()}));
   gate.open();
   done.get_future().wait();
-  EXPECT_FALSE(dataset->seen(scalar, 0)) << "nobody wishes for it any more";
+  EXPECT_FALSE(dataset->seen(scalar, 0)) << "the prefetch request was withdrawn";
   EXPECT_TRUE(dataset->seen(vector, 0));
 }
 

@@ -28,7 +28,7 @@ TEST(Drain, an_idle_server_ends) {
   TestServer server;
   EXPECT_EQ(get(server.port(), "/livez").status, 200);
   server.stop();
-  EXPECT_EQ(get(server.port(), "/livez").status, 0) << "nobody listens any more";
+  EXPECT_EQ(get(server.port(), "/livez").status, 0) << "the listening socket is closed";
 }
 
 TEST(Drain, twice_or_before_it_runs_is_no_harm) {

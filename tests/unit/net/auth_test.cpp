@@ -114,7 +114,7 @@ TEST(TokenFile, another_one_has_to_be_shown_anew) {
   EXPECT_FALSE(is_other_token(&first, &same));
   EXPECT_TRUE(is_other_token(&first, &other));
   EXPECT_TRUE(is_other_token(nullptr, &first));
-  EXPECT_FALSE(is_other_token(&first, nullptr)) << "nobody is asked any more";
+  EXPECT_FALSE(is_other_token(&first, nullptr)) << "no token is required any more";
   EXPECT_FALSE(is_other_token(nullptr, nullptr));
 }
 
@@ -140,7 +140,7 @@ TEST(Judge, health_is_open_and_nothing_else) {
     EXPECT_EQ(verdict(request("GET", path)), Verdict::no_token);
     EXPECT_EQ(verdict(request("DELETE", path)), Verdict::no_token);
     EXPECT_EQ(judge(request("GET", path), false, nullptr, {}, now_s), Verdict::allowed)
-        << "where there is no token nobody is asked";
+        << "without a token there is no authentication";
   }
 }
 

@@ -98,7 +98,7 @@ TEST(Connections, end_a_handshake_of_whom_has_most_and_strangers_first) {
   EXPECT_EQ(next(5), 3) << "the oldest of the stranger with two";
   EXPECT_EQ(next(4), 1) << "one each";
   EXPECT_EQ(next(3), 2);
-  EXPECT_EQ(next(2), 0) << "nobody else is left";
+  EXPECT_EQ(next(2), 0) << "no other connection is left";
   EXPECT_EQ(next(2), -1);
 }
 

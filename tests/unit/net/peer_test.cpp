@@ -78,7 +78,7 @@ TEST(Peer, has_left_when_it_closed_its_side_also_behind_unread_bytes) {
 TEST(SpareDescriptor, turns_a_client_away_when_there_is_no_other) {
   Listening listening;
   SpareDescriptor spare;
-  EXPECT_FALSE(spare.turn_away(listening.socket())) << "nobody waits";
+  EXPECT_FALSE(spare.turn_away(listening.socket())) << "no pending connection";
   const int client = listening.connect();
   rlimit before{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
@@ -90,7 +90,7 @@ TEST(SpareDescriptor, turns_a_client_away_when_there_is_no_other) {
   EXPECT_EQ(errno, EMFILE);
   EXPECT_TRUE(spare.turn_away(listening.socket()));
   char byte = 0;
-  EXPECT_LE(::recv(client, &byte, 1, 0), 0) << "it was told at once";
+  EXPECT_LE(::recv(client, &byte, 1, 0), 0) << "closed at once";
   EXPECT_EQ(::open("/dev/null", O_RDONLY), -1) << "the spare one is taken again";
   for (const int one : taken) ::close(one);
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);

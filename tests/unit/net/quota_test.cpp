@@ -176,7 +176,7 @@ TEST(Quota, new_connections_come_back_at_their_rate_and_tls_takes_more) {
   Quota quota(limits);
   for (int n = 0; n < 4; ++n) EXPECT_FALSE(quota.arrive(here, false, true, 0)) << n;
   const auto refused = quota.arrive(here, false, false, 0);
-  ASSERT_TRUE(refused) << "ten seconds' worth are gone";
+  ASSERT_TRUE(refused) << "the burst is used up";
   EXPECT_EQ(refused->kind, LimitKind::arrivals);
   EXPECT_FALSE(quota.arrive(there, false, false, 0));
   EXPECT_FALSE(quota.arrive(here, true, false, 0)) << "a proxy's";

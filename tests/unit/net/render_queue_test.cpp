@@ -384,7 +384,7 @@ TEST(RenderService, keeps_nobody_waiting_long_for_others) {
     };
     EXPECT_TRUE(service.submit(std::move(first)));
     begun.get_future().wait();
-    EXPECT_TRUE(ask("b", 90)) << "nobody else waits";
+    EXPECT_TRUE(ask("b", 90)) << "no other request waits";
     EXPECT_FALSE(ask("c", 90)) << "90 of the one that runs and 90 of b's";
     EXPECT_TRUE(ask("b", 90)) << "its own";
     EXPECT_TRUE(ask("c", 300)) << "a long one";

@@ -197,7 +197,7 @@ class Driver {
       if (auto* text = std::get_if<SendText>(&effect)) {
         texts.push_back(text->message);
         if (const auto* chosen = std::get_if<protocol::ChosenMessage>(&text->message)) {
-          ASSERT_EQ(chosen->seq, pinged_) << "the ping goes before what it measures";
+          ASSERT_EQ(chosen->seq, pinged_) << "the ping precedes its frame";
         }
       }
       if (auto* describe = std::get_if<Describe>(&effect)) describes.push_back(*describe);

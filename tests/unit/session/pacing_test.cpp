@@ -352,7 +352,7 @@ TEST(Unchanged, a_moving_frame_with_nothing_in_it_does_not_stand_for_the_final_o
   const std::size_t frames = driver.frames.size();
   driver.patch(2, azimuth(600));
   ASSERT_TRUE(driver.render);
-  EXPECT_FALSE(driver.render->encoding.full_chroma) << "a moving frame goes first";
+  EXPECT_FALSE(driver.render->encoding.full_chroma) << "a moving frame is sent first";
   driver.finish_render(10 * ms);
   EXPECT_EQ(driver.frames.size(), frames);
   EXPECT_TRUE(unchanged_revs(driver).empty()) << "that is not known yet";

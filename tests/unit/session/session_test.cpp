@@ -253,7 +253,7 @@ TEST(Patch, a_fault_beneath_later_patches_is_found_and_the_stream_goes_on) {
     named = named || error.rev == 3U;
     EXPECT_NE(error.rev, 5U);
   }
-  EXPECT_TRUE(named) << "the patch at fault is told";
+  EXPECT_TRUE(named) << "the rejected patch is named";
 }
 
 TEST(Patch, that_fails_for_good_is_not_tried_again_and_again) {
