@@ -36,7 +36,7 @@ struct Piece {
 // Pieces one after another, opened when they are read; a few stay open.
 std::shared_ptr<ByteStore> joined_store(std::vector<Piece> pieces);
 
-// That the file `by` refers to one that is not there: who named it, and where it was looked for.
+// Error for a file that `by` refers to and that is absent: names the reference and the folder.
 Error absent_companion(const std::string& name, const std::string& by);
 
 // The file of a name that the file `by` refers to, beside it. Errors: as Files::open(), and

@@ -27,7 +27,7 @@ constexpr std::uint64_t voluntary_bytes_max(std::uint64_t stored_bytes) {
   return (std::uint64_t{64} << 20) + 16 * stored_bytes;
 }
 
-// Private memory of a loader that has done nothing yet.
+// Private memory of an idle loader.
 inline constexpr std::uint64_t loader_bytes_min = std::uint64_t{8} << 20;
 
 // Decoded bytes that `inspect` may spend on ranges without being asked: a step of a few fields that

@@ -33,7 +33,7 @@ struct Spaced {
   [[nodiscard]] std::vector<double> coordinates() const;
 };
 
-// Nothing where the product is beyond 2^62.
+// nullopt where the product exceeds 2^62.
 std::optional<std::uint64_t> product(const std::vector<std::uint64_t>& factors);
 
 }  // namespace windsplat::data::bytes

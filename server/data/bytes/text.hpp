@@ -17,7 +17,7 @@ std::optional<std::int64_t> to_integer(std::string_view text);
 // The same for a sample among data: beyond a double's range it is infinite, or 0, with its sign.
 std::optional<double> to_sample(std::string_view text);
 
-// 0 to 15; -1 if it is no hexadecimal digit.
+// 0 to 15; -1 if it is not a hexadecimal digit.
 int hex_digit(char c);
 
 // A name with one %d, %4d or %04d and that number in its place. Nothing where there is no such

@@ -1,4 +1,4 @@
-// Decoders that can be copied where they stand, and the store that goes back to such a copy.
+// Decoders whose state can be copied, and the store that resumes from such a copy.
 #include "server/data/bytes/unrolled.hpp"
 
 #include <zlib.h>
@@ -70,7 +70,8 @@ class Decoder {
 class GzipDecoder final : public Decoder {
  public:
   explicit GzipDecoder(const Input& input) : Decoder(input) {
-    WINDSPLAT_CHECK(inflateInit2(&stream_, 15 + 32) == Z_OK);  // gzip or zlib, told by its header
+    WINDSPLAT_CHECK(inflateInit2(&stream_, 15 + 32) ==
+                    Z_OK);  // gzip or zlib, detected by the header
   }
   GzipDecoder(const GzipDecoder& other) : Decoder(other), ended_(other.ended_) {
     WINDSPLAT_CHECK(inflateCopy(&stream_, const_cast<z_stream*>(&other.stream_)) == Z_OK);
@@ -166,7 +167,7 @@ bool parse_number(std::string token, double& out) {
   const char* end = token.data() + token.size();
   const auto [stop, fault] = std::from_chars(from, end, out);
   if (fault == std::errc::result_out_of_range && stop == end) {
-    out = 0;  // too small; what is too large is no number that could be drawn
+    out = 0;  // underflow; overflow is rejected
     return token.find("e-") != std::string::npos;
   }
   return fault == std::errc() && stop == end;
@@ -188,7 +189,7 @@ class TextDecoder final : public Decoder {
       double value = 0;
       if (!parse_number(*token, value)) {
         return input_.file()->fault("is damaged: " + in_quotes(*token) + " before byte " +
-                                    std::to_string(input_.at()) + " is no number");
+                                    std::to_string(input_.at()) + " is not a number");
       }
       std::memcpy(out + made, &value, sizeof value);
     }
@@ -309,7 +310,7 @@ class UnrolledStore final : public ByteStore {
 
   void remember() {
     if (at_ < places_.back().at + spacing_ || at_ % sizeof(double) != 0) return;
-    if (places_.size() == places_max) {  // every other place goes
+    if (places_.size() == places_max) {  // drop every other checkpoint
       std::vector<Place> kept;
       for (std::size_t i = 0; i < places_.size(); i += 2) kept.push_back(std::move(places_[i]));
       places_ = std::move(kept);

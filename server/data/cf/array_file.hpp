@@ -31,7 +31,7 @@ struct Numbers {
 struct Unwritten {
   std::size_t chunks = 0;
   std::size_t looked_at = 0;  // chunks that were looked for, from the first; what has none is one
-  bool is_all = true;         // there are no others
+  bool is_all = true;         // false if values were omitted
 };
 
 class ArrayFile {
@@ -40,7 +40,7 @@ class ArrayFile {
 
   [[nodiscard]] virtual const FileContents& contents() const = 0;
   [[nodiscard]] virtual const std::string& name() const = 0;  // without its folder, for messages
-  // What a user is told that the data come from: where it is not name().
+  // The source's name in messages, where it differs from name().
   [[nodiscard]] virtual std::string origin() const { return name(); }
   [[nodiscard]] virtual std::string format() const = 0;  // "netCDF-4", "Zarr v2", ...
   // Differs whenever the numbers may: names, sizes and times of change; not where files lie.
@@ -51,7 +51,7 @@ class ArrayFile {
   [[nodiscard]] virtual Numbers numbers(int variable, const char* attribute) const = 0;
   // A text attribute, trimmed; empty if it is absent.
   [[nodiscard]] virtual std::string text_of(int variable, const char* attribute) const = 0;
-  // How much is best read at once along each dimension; 1 where that does not matter.
+  // Preferred read size along each dimension; 1 where it does not matter.
   [[nodiscard]] virtual std::vector<std::size_t> chunk(int variable) const = 0;
 
   // Where chunk() is how it is stored: what each chunk costs at least, in decoded bytes.
@@ -69,10 +69,10 @@ class ArrayFile {
   [[nodiscard]] virtual Unwritten unwritten(int /*variable*/, std::size_t /*most*/) const {
     return {};
   }
-  // Frees what the reader keeps of a variable between reads.
+  // Frees what the reader caches for a variable between reads.
   virtual void forget_chunks(int /*variable*/) const {}
 
-  // A whole variable of few values, for which charge() is asked first.
+  // Reads a whole small variable; call charge() first.
   [[nodiscard]] Result<std::vector<double>> read_all(int variable) const;
 
   // How large the files are, which bounds what charge() grants. Until then there is no bound.

@@ -26,7 +26,7 @@ bool is_angle(std::string_view units) {
   return units.empty() || is_radian(units) || is_one_of(units, known_units);
 }
 
-// What oceanographers tell depth in.
+// Units of depth used in oceanography.
 bool is_ocean_pressure(std::string_view units) {
   constexpr auto known_units = std::to_array<std::string_view>({"dbar", "decibar", "decibars"});
   return is_one_of(units, known_units);
@@ -125,7 +125,7 @@ Evidence by_units(std::string_view units) {
   return {};
 }
 
-// "lat_0", "isobaric1", "gridx_6": the number only tells one grid of a file from another.
+// "lat_0", "isobaric1", "gridx_6": the number only distinguishes the grids of a file.
 std::string_view without_number(std::string_view name) {
   const auto end = name.find_last_not_of("0123456789_");
   return end == std::string_view::npos ? name : name.substr(0, end + 1);
@@ -271,7 +271,7 @@ int coordinate_of(const FileContents& contents, int dimension) {
   return marked;
 }
 
-// What `positive` says outright beats what a name implies; pressure always grows downwards.
+// An explicit `positive` overrides what a name implies; pressure always grows downwards.
 void heed_positive(const FileVariable& variable, Evidence& found) {
   const std::string positive = lower(variable.positive);
   if (found.role != Role::z || found.kind == AxisKind::pressure ||

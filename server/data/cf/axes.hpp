@@ -15,7 +15,7 @@ namespace windsplat::data::cf {
 
 enum class Role { unknown, x, y, z, time, other };  // other: an ensemble, cell corners, ...
 
-// What is known of a dimension before any variable on it is looked at.
+// What is known about a dimension before the variables on it are examined.
 struct DimensionRole {
   Role role = Role::unknown;
   AxisKind kind = AxisKind::cartesian;
@@ -56,7 +56,7 @@ Layout lay_out(const FileContents& contents, const std::vector<DimensionRole>& r
 struct OrientedAxis {
   Axis axis;
   bool turned = false;
-  std::string note;  // what was taken for what; empty if there is nothing to say
+  std::string note;  // which assumption was made; empty if none
 };
 
 // which: 0 x, 1 y, 2 z. coordinates: as in the file, angles in degrees; empty: the dimension has

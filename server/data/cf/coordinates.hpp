@@ -11,7 +11,7 @@ namespace windsplat::data::cf {
 // All values of a variable of few values, unpacked, NaN where missing. Errors: bad_data.
 Result<std::vector<double>> unpacked_values(const ArrayFile& file, int variable);
 
-// The same of longitudes or latitudes, in degrees whatever angle the file tells them in.
+// The same for longitudes or latitudes, converted from any angular unit to degrees.
 Result<std::vector<double>> unpacked_degrees(const ArrayFile& file, int variable);
 
 }  // namespace windsplat::data::cf

@@ -23,7 +23,7 @@ struct Change {
   double fast = 0;
 };
 
-// A difference of longitudes goes the short way round.
+// Longitude differences take the shorter way around the globe.
 double difference(double a, double b, bool is_longitude) {
   return is_longitude ? std::remainder(b - a, 360.0) : b - a;
 }

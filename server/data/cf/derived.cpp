@@ -158,7 +158,7 @@ class DerivedFinder {
     }
   }
 
-  // Pa/s a unit of a component; 0 if it is no change of pressure.
+  // Pa/s for one unit of a component; 0 if the unit is not a change of pressure.
   [[nodiscard]] double omega_unit(const FileVariable& source) const {
     if (const auto unit = pascals_per_second_in(source.units)) return *unit;
     const bool named = source.standard_name == omega_name;

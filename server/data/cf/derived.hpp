@@ -18,9 +18,9 @@
 
 namespace windsplat::data::cf {
 
-// What tells the pressure of a sample, in Pa: levels by themselves, or over the surface's.
+// Source of the pressure of a sample, in Pa: fixed levels, or hybrid with surface pressure.
 struct PressureLevels {
-  std::vector<double> level;  // Pa, from below; empty where `hybrid` tells
+  std::vector<double> level;  // Pa, from below; empty where `hybrid` applies
   std::optional<HybridLevels> hybrid;
 };
 

@@ -1,4 +1,4 @@
-// Three ways to recognise the components of a vector, tried in the order of their trust.
+// Three ways to recognise the components of a vector, the most reliable first.
 #include "server/data/cf/fields.hpp"
 
 #include <algorithm>
@@ -83,7 +83,7 @@ class FieldFinder {
     return variable(a).units == variable(b).units;
   }
 
-  // A name that no variable and no other vector has: a view must be able to tell them apart.
+  // A name that no variable and no other vector has, since views refer to fields by name.
   [[nodiscard]] std::string free_name(const std::string& wanted) const {
     const auto is_taken = [&](const std::string& name) {
       return std::any_of(variables_.begin(), variables_.end(),

@@ -57,7 +57,7 @@ struct Named {
 
 constexpr const char* coordinate_variable = "coordinate variable";
 
-// Why a variable is no field whatever the grid; empty if it may be one.
+// Why a variable cannot be a field on any grid; empty if it can.
 std::string not_a_field(const FileContents& contents, const std::vector<DimensionRole>& roles,
                         const Named& named, std::size_t v) {
   const FileVariable& variable = contents.variables[v];
@@ -80,7 +80,7 @@ std::string not_a_field(const FileContents& contents, const std::vector<Dimensio
     return "description of the map projection";
   }
   if (variable.dims.size() >= 2 && is_position(variable)) {
-    return "coordinate of more than one dimension: tells where rows and columns run";
+    return "coordinate of more than one dimension: gives the positions of rows and columns";
   }
   if (named.coordinates.count(variable.name) > 0) {
     return "auxiliary coordinate";
@@ -106,7 +106,7 @@ std::string misplaced(const FileContents& contents, const FileVariable& variable
   return {};
 }
 
-// Why there is nothing to show, by the example of the variable with the most dimensions.
+// Why the file has no field, explained by the variable with the most dimensions.
 std::string nothing_to_show(const FileContents& contents, const std::vector<LeftOut>& left_out) {
   std::string text =
       "there is no numeric variable with two or three spatial dimensions; cells or stations in a "

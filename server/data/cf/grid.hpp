@@ -18,7 +18,7 @@ inline constexpr std::size_t volume_bytes_max = std::size_t{16} << 30;
 
 struct GridChoice {
   std::array<int, 3> space{-1, -1, -1};  // dimension ids of x, y, z; -1 where the grid is flat
-  int time = -1;                         // dimension id, -1 if nothing shown changes in time
+  int time = -1;                         // dimension id, -1 if no field depends on time
   std::vector<int> variables;            // those shown, in the file's order
   std::vector<LeftOut> left_out;
 };

@@ -151,7 +151,7 @@ float unpack(const Packing& packing, double stored) {
 std::optional<FloatMask> float_mask(const Packing& packing) {
   if (packing.packed || packing.wrap != 0) return std::nullopt;
   FloatMask mask;
-  // A missing value that no float32 equals masks nothing.
+  // A missing value that no float32 equals masks no sample.
   for (const double missing : packing.missing) {
     const auto rounded = static_cast<float>(missing);
     if (static_cast<double>(rounded) == missing) mask.missing.push_back(rounded);

@@ -11,7 +11,7 @@ namespace windsplat::data::cf {
 
 namespace {
 
-// Doubles read at a time: 32 MiB where whole chunks are wanted, otherwise 2 MiB.
+// Doubles read at a time: 32 MiB where whole chunks are needed, otherwise 2 MiB.
 constexpr std::size_t chunked_values = std::size_t{4} << 20;
 constexpr std::size_t plain_values = std::size_t{1} << 18;
 // One dimension of a variable on its way into the volume.
@@ -77,7 +77,7 @@ void scatter(const FloatMask& mask, float* block, const std::vector<std::size_t>
   });
 }
 
-// Whether a block lies in the volume as it lies in the file.
+// Whether a block has the same order of samples in the volume and in the file.
 bool in_one_piece(const std::vector<std::size_t>& count, const std::vector<Way>& ways) {
   std::ptrdiff_t values = 1;
   for (std::size_t d = ways.size(); d-- > 0;) {

@@ -14,7 +14,7 @@ namespace windsplat::data::cf {
 // Which dimensions of a file are a grid's axes, and how they lie in its volumes.
 struct Placement {
   std::array<int, 3> space{-1, -1, -1};             // dimension ids of x, y, z; -1: one sample
-  int time = -1;                                    // -1: nothing changes in time
+  int time = -1;                                    // -1: independent of time
   std::array<bool, 3> turned{false, false, false};  // the file's order is the other way round
   std::array<std::size_t, 3> length{1, 1, 1};       // samples along x, y, z
   [[nodiscard]] std::size_t layer() const { return length[0] * length[1]; }

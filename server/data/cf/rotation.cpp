@@ -1,4 +1,4 @@
-// Tangents as differences of places on the unit sphere, told along the local east and north.
+// Tangents as differences of positions on the unit sphere, expressed along local east and north.
 #include "server/data/cf/rotation.hpp"
 
 #include <array>

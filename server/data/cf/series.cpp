@@ -44,7 +44,7 @@ bool same_place(double a, double b) {
 
 constexpr std::size_t compared_max = std::size_t{1} << 24;  // values of a coordinate
 
-// How many values a variable has; compared_max + 1 stands for all that is more.
+// Number of values of a variable, at most compared_max + 1.
 std::size_t values_of(const FileContents& contents, int variable) {
   std::size_t values = 1;
   for (const int d : contents.variables.at(at(variable)).dims) {
@@ -284,14 +284,14 @@ Result<void> SeriesFile::add_times(std::size_t member, const ArrayFile& file) {
   const bool complete = std::all_of(values->begin(), values->end(),
                                     [](double value) { return std::isfinite(value); });
   if (values->size() != records || !complete) {
-    return misfit(file, *first_, "it does not tell the times of all its steps");
+    return misfit(file, *first_, "it does not give the times of all its steps");
   }
   const auto times = convert_times(*values, {found.units, found.calendar},
                                    {coordinate.units, coordinate.calendar});
   if (!times) {
     return misfit(file, *first_,
                   "its times, in " + in_quotes(found.units) + " (calendar " +
-                      in_quotes(found.calendar) + "), cannot be told in " +
+                      in_quotes(found.calendar) + "), cannot be expressed in " +
                       in_quotes(coordinate.units) + " (calendar " + in_quotes(coordinate.calendar) +
                       ")");
   }
@@ -321,7 +321,7 @@ void SeriesFile::sort_steps() {
   }
   if (within > 0) {
     contents_.notes.push_back(std::to_string(within) + (within == 1 ? " time is" : " times are") +
-                              " told again within one file: the later one is shown");
+                              " repeated within one file: the later one is shown");
   }
   steps_ = std::move(kept);
 }

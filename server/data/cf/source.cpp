@@ -115,7 +115,7 @@ class ArraySource final : public FileSource {
     bool follows_rows = false;  // from the file's rows and columns to the axes
   };
 
-  // Which way the components of what is told along the file's own rows and columns go.
+  // Directions of vector components given along the rows and columns of the file.
   struct ToAxes {
     bool swapped = false;
     std::array<bool, 2> negated{false, false};  // after the exchange
@@ -238,7 +238,7 @@ class ArraySource final : public FileSource {
       }
       coordinates = std::move(*read);
       if (is_angle && is_radian(variable.units)) {
-        info_.notes.push_back(in_quotes(variable.name) + " is told in radians: shown in degrees");
+        info_.notes.push_back(in_quotes(variable.name) + " is in radians: shown in degrees");
       }
     } else {
       info_.left_out.push_back(
@@ -304,7 +304,7 @@ class ArraySource final : public FileSource {
     return {};
   }
 
-  // A series of files is in order, a file by itself is shown as it is.
+  // A series is sorted by time; a single file is shown in its own order.
   void note_disorder(const std::string& name, const std::vector<double>& times) {
     std::size_t falls = 0;
     std::size_t repeats = 0;
@@ -316,7 +316,7 @@ class ArraySource final : public FileSource {
     std::string note = in_quotes(name);
     if (falls > 0) note += " goes back " + times_text(falls);
     if (falls > 0 && repeats > 0) note += " and";
-    if (repeats > 0) note += " stands still " + times_text(repeats);
+    if (repeats > 0) note += " does not advance " + times_text(repeats);
     note += ": steps are in the file's own order";
     info_.notes.push_back(std::move(note));
   }
@@ -400,7 +400,7 @@ class ArraySource final : public FileSource {
     info_.notes.push_back(hybrid.note);
     for (LeftOut& left : info_.left_out) {
       if (left.name == variable_name(hybrid.surface)) {
-        left.reason = "surface pressure: tells the pressure of the levels";
+        left.reason = "surface pressure: gives the pressure of the levels";
       }
       for (const int v : hybrid.coefficients) {
         if (left.name == variable_name(v)) left.reason = "coefficient of the levels' pressure";
@@ -490,7 +490,7 @@ class ArraySource final : public FileSource {
     plans_.push_back(std::move(plan));
   }
 
-  // How a vector comes to the grid's axes, which need not run east and north.
+  // How a vector is converted to the grid's axes, which need not run east and north.
   void find_turning(const FieldInfo& info, Plan& plan) {
     const auto& first =
         file_->contents().variables.at(static_cast<std::size_t>(plan.variables.front()));
@@ -501,10 +501,10 @@ class ArraySource final : public FileSource {
     std::string note = in_quotes(info.name);
     if (by_earth && info_.grid.columns) {
       note +=
-          " is told by east and north: turned into the directions of the grid's rows and columns";
+          " is given by east and north: turned into the directions of the grid's rows and columns";
     } else if (by_earth) {
       note +=
-          " is told by east and north, but the grid's longitudes and latitudes have gaps or are "
+          " is given by east and north, but the grid's longitudes and latitudes have gaps or are "
           "not in the file: it is drawn as if rows ran east";
     } else if (!by_grid) {
       note +=
@@ -516,7 +516,8 @@ class ArraySource final : public FileSource {
     // u and v without a word mean east and north, or nearly, more often than indices.
     plan.follows_rows = by_grid && to_axes_.any();
     if (!plan.follows_rows) return;
-    note = in_quotes(info.name) + " is told along the file's rows and columns: its components are ";
+    note =
+        in_quotes(info.name) + " is given along the file's rows and columns: its components are ";
     const bool turned = to_axes_.negated[0] || to_axes_.negated[1];
     note += to_axes_.swapped ? (turned ? "exchanged and turned" : "exchanged") : "turned";
     note += " with the axes";

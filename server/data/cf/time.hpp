@@ -14,7 +14,7 @@ namespace windsplat::data::cf {
 // CF 1.8, section 4.4.1. "standard" is Julian up to 1582-10-04 and Gregorian from 1582-10-15.
 enum class Calendar { standard, proleptic_gregorian, julian, noleap, all_leap, day360 };
 
-// The calendar of a `calendar` attribute; empty text means standard. Nothing if it is unknown.
+// The calendar of a `calendar` attribute; empty text means standard. nullopt if unknown.
 std::optional<Calendar> parse_calendar(std::string_view text);
 
 // A day of a calendar. Years count astronomically: the year before 1 is 0.

@@ -17,7 +17,7 @@ namespace windsplat::data::cf {
 namespace {
 
 constexpr double usual_reference_pa = 100000.0;
-constexpr double fraction_max = 2.0;  // a coefficient beyond is no share of a pressure
+constexpr double fraction_max = 2.0;  // larger coefficients are not fractions of a pressure
 
 int term_variable(const FileContents& contents, std::string_view name) {
   return name.empty() ? -1 : variable_named(contents, name);
@@ -97,7 +97,7 @@ Result<std::vector<double>> on_levels(const ArrayFile& file, const Placement& gr
   return values;
 }
 
-// A pressure by itself as the file has it, and what its unit is in Pa if it says so.
+// A pressure variable as stored, and its unit in Pa if given.
 struct Single {
   double value = 0;
   std::optional<double> unit_pa;
@@ -125,7 +125,7 @@ Result<double> reference_pressure(const ArrayFile& file, const std::string& name
   if (!found) return found.error();
   if (*found) {
     const Single& p0 = **found;
-    // A reference pressure is near 1000 hPa: its size tells what a unit does not.
+    // A reference pressure is near 1000 hPa: its magnitude implies a missing unit.
     return p0.value * (p0.unit_pa ? *p0.unit_pa : p0.value < 2000 ? 100.0 : 1.0);
   }
   note += "; no reference pressure in the file: 1000 hPa is taken";

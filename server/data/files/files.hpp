@@ -17,12 +17,12 @@ namespace windsplat::data {
 // What a user named, links resolved.
 struct Location {
   enum class Kind {
-    file,    // one file, and beside it what its format says that it refers to
+    file,    // one file and the companions that its format refers to
     series,  // the files that a pattern matches, in natural order (f2 before f10)
-    folder,  // a folder that is one dataset, with all that lies in it
+    folder,  // a folder that is one dataset, with all its contents
   };
   struct Member {
-    std::string name;  // as readers ask for it, and as messages tell it
+    std::string name;  // relative name, as used by readers and in messages
     std::string path;  // absolute
   };
   Kind kind = Kind::file;

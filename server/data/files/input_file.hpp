@@ -27,11 +27,11 @@ class InputFile {
   // The first bytes as text, at most `bytes_max`.
   [[nodiscard]] Result<std::string> head(std::size_t bytes_max) const;
 
-  // Name, size and time of last change, so independent of where the file lies.
+  // Name, size and modification time, so independent of the folder of the file.
   [[nodiscard]] std::string identity() const;
   // Errors: bad_data if size or time of change are no longer those at the time of opening.
   [[nodiscard]] Result<void> check_unchanged() const;
-  // A name by which a library that opens files itself reaches this very file.
+  // A path by which a library that opens files itself reaches this open file.
   [[nodiscard]] std::string library_path() const;
 
   // bad_data: "'name' what".

@@ -1,5 +1,5 @@
-// A path that a stranger named -> Location, with nothing outside the root within its reach: the
-// kernel resolves every part, and what it found is what is told.
+// Untrusted path -> Location confined to the data root: the
+// kernel resolves every component, and the resolved path is the one reported.
 #include <dirent.h>
 #include <fcntl.h>
 #include <fnmatch.h>
@@ -46,7 +46,7 @@ Error not_reached(const std::string& path, int reason) {
   return refused(path, "cannot be reached: " + std::generic_category().message(reason));
 }
 
-// By its letters alone, before anything is looked up.
+// Checks the text alone, before the file system is accessed.
 Result<void> check_letters(const std::string& path) {
   if (path.empty() || path.find('\0') != std::string::npos) {
     return make_error(ErrorKind::invalid, "no path is given");
@@ -70,7 +70,7 @@ Result<std::string> path_of(const Descriptor& descriptor, const std::string& pat
   const std::string link = "/proc/self/fd/" + std::to_string(descriptor.number());
   const ssize_t length = ::readlink(link.c_str(), target.data(), target.size());
   if (length <= 0 || static_cast<std::size_t>(length) == target.size() || target[0] != '/') {
-    return refused(path, "has no name that can be told");
+    return refused(path, "has no printable name");
   }
   return std::string(target.data(), static_cast<std::size_t>(length));
 }
@@ -140,7 +140,7 @@ Result<Location> series(int root, const std::string& root_path, const std::strin
   for (const std::string& name : *names) {
     const std::string below = (fs::path(folder) / name).native();
     const Descriptor found(open_beneath(root, below, O_PATH));
-    // A link that leads out of the root or nowhere is no file of the series.
+    // A link that leads out of the root or is dangling is not part of the series.
     const bool no_member = !found && (errno == EXDEV || errno == ELOOP || errno == ENOENT);
     left_out += no_member ? 1U : 0U;
     if (no_member) continue;
@@ -153,7 +153,7 @@ Result<Location> series(int root, const std::string& root_path, const std::strin
     out.members.push_back({name, std::move(*plain)});
   }
   if (out.members.empty() && left_out > 0) {
-    return refused(path, "matches nothing but links that lead out of the data root or nowhere");
+    return refused(path, "matches only links that are dangling or lead out of the data root");
   }
   if (out.members.empty()) {
     return make_error(ErrorKind::not_found, in_quotes(path) + ": no file matches");

@@ -17,7 +17,7 @@ bool comes_before(std::string_view a, std::string_view b);
 // The name without what a pattern leaves open and without its extension: "wrf_*.nc" is "wrf".
 std::string stem_of_pattern(const std::string& pattern);
 bool has_wildcard(std::string_view name);
-// Whether a file of that name is of a format whose header names files beside it.
+// Whether the file name belongs to a format whose header names companion files.
 bool may_have_companions(const std::string& name);
 // Of links that a series' pattern matches and that are none of its files: a note that says how many
 // and why. Empty where there are none.

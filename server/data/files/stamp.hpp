@@ -1,4 +1,4 @@
-// What tells two states of a file apart.
+// Identifies the state of a file, to detect changes.
 #pragma once
 
 #include <sys/stat.h>
@@ -8,7 +8,7 @@
 namespace windsplat::data {
 
 struct FileStamp {
-  std::string text;      // which file it is, its size and time of last change; "gone"
+  std::string text;      // identity, size and modification time of the file; "gone" if absent
   double changed_s = 0;  // that time, since the epoch
   bool operator==(const FileStamp& other) const { return text == other.text; }
 };

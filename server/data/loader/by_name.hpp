@@ -1,4 +1,4 @@
-// Calls that name a file, inside a confined process: a signal handler stands in for the kernel.
+// Calls that name a file, inside a confined process: a signal handler replaces the kernel.
 #pragma once
 
 #include <string>

@@ -35,7 +35,7 @@ class Writer {
       std::memcpy(bytes_.data() + at, values.data(), values.size() * sizeof(double));
     }
   }
-  // Room for so many bytes more, and nothing beyond.
+  // Reserves exactly so many more bytes.
   void reserve(std::size_t more) { bytes_.reserve(bytes_.size() + more); }
   [[nodiscard]] const std::string& bytes() const { return bytes_; }
   [[nodiscard]] std::string take() { return std::move(bytes_); }
@@ -86,7 +86,7 @@ class Reader {
     rest_ = {};
   }
   [[nodiscard]] bool sound() const { return sound_; }
-  // Everything was there, and nothing is left.
+  // All values were present and no bytes remain.
   [[nodiscard]] bool complete() const { return sound_ && rest_.empty(); }
 
  private:

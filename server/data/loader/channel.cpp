@@ -92,14 +92,14 @@ Fate send_message(int socket, Kind kind, const char* payload, std::size_t bytes,
 Fate receive_bytes(int socket, char* out, std::size_t bytes, Descriptor* descriptor,
                    const Deadline& deadline) {
   while (bytes > 0) {
-    // Looked at before every part: one that sends a byte at a time gains no time by it.
+    // Checked before every part: sending single bytes does not extend the deadline.
     if (deadline && Clock::now() >= *deadline) return Fate::late;
     iovec part{out, bytes};
     msghdr message{};
     message.msg_iov = &part;
     message.msg_iovlen = 1;
     Control control;
-    if (descriptor != nullptr) {  // otherwise the kernel closes what comes along
+    if (descriptor != nullptr) {  // otherwise the kernel closes the received descriptor
       message.msg_control = control.bytes.data();
       message.msg_controllen = control.bytes.size();
     }

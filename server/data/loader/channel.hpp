@@ -17,7 +17,7 @@ enum class Kind : std::uint32_t {
   // daemon -> loader: what to do
   open = 1,  // settings and location -> opened or failed
   read,      // field, step; with the memory to fill -> filled or failed
-  // daemon -> loader: answers to what it asks meanwhile
+  // daemon -> loader: answers to requests of the loader
   descriptor,  // with a descriptor
   names,
   yes,
@@ -27,7 +27,7 @@ enum class Kind : std::uint32_t {
   ask_list,
   ask_exists,
   ask_library,
-  // loader -> daemon: news and answers
+  // loader -> daemon: progress and answers
   progress,
   opened,
   filled,
@@ -41,10 +41,10 @@ enum class Fate {
   done,
   closed,  // by the other side, at whatever point
   late,
-  broken,  // what came is no message, or longer than it may be
+  broken,  // the bytes received are not a message, or exceed its limit
 };
 
-// done: there is something to receive, or nothing more will ever come.
+// done: there is data to receive, or the peer has closed.
 Fate wait_for_message(int socket, const Deadline& deadline);
 
 struct Frame {

@@ -1,5 +1,5 @@
 // The loader's side: task -> confined -> opened -> reads, one after another, until the socket
-// closes. What goes wrong with a file is answered; what goes wrong with the daemon ends it.
+// closes. File errors are sent as answers; channel errors end the process.
 #include <fcntl.h>
 #include <malloc.h>
 #include <poll.h>
@@ -33,7 +33,7 @@ constexpr std::uint64_t files_besides_members = 256;
 constexpr std::chrono::milliseconds progress_every{50};
 constexpr std::size_t answer_bytes_max = std::size_t{1} << 30;
 
-// There is nobody left to tell.
+// The channel is closed: no error can be reported.
 [[noreturn]] void leave() { ::_exit(1); }
 
 void say(Kind kind, std::string_view payload) {

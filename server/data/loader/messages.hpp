@@ -16,7 +16,7 @@ namespace windsplat::data::loader {
 inline constexpr std::size_t info_bytes_max = std::size_t{1} << 30;
 inline constexpr std::size_t question_bytes_max = std::size_t{1} << 16;
 
-// What a loader is told before it opens anything. Paths stay with the daemon.
+// What a loader receives before it opens a file. Paths stay with the daemon.
 struct Task {
   std::uint64_t memory_bytes = 0;
   std::vector<std::string> library_folders;

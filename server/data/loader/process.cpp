@@ -65,7 +65,7 @@ Result<int> null_device() {
 std::vector<std::string> environment_of_loader() {
   std::vector<std::string> out{"HDF5_USE_FILE_LOCKING=FALSE"};
   for (const char* name : {"ASAN_OPTIONS", "UBSAN_OPTIONS", "TSAN_OPTIONS", "LSAN_OPTIONS"}) {
-    const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nobody sets any
+    const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): no thread sets any
     if (value != nullptr) {
       std::string variable = name;
       variable += '=';

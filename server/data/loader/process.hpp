@@ -16,7 +16,7 @@ namespace windsplat::data::loader {
 
 // What a loader finds under these numbers when it starts.
 inline constexpr int socket_of_loader = 3;
-inline constexpr int life_of_loader = 4;  // a pipe whose other end closes with the daemon
+inline constexpr int life_of_loader = 4;  // pipe whose other end closes when the daemon exits
 
 class Process {
  public:
@@ -29,7 +29,7 @@ class Process {
   // internal.
   Result<void> start(const std::string& program);
 
-  // Kills it, from whichever thread; end() is still to be called. Nothing if there is none.
+  // Kills the process, from any thread; end() must still be called. No effect if there is none.
   void kill();
   // Waits a moment for one that is about to end, kills it otherwise; closes what belongs to it. How
   // it ended: "was ended by signal 11", "ended with code 1"; empty if there was none.
@@ -39,10 +39,10 @@ class Process {
   [[nodiscard]] std::uint64_t private_bytes() const;
   // From now on at most that many seconds of processor time.
   void allow_cpu(std::chrono::seconds more);
-  // From now on so much private memory, never more than it confined itself to.
+  // Raises the private memory limit, at most to the one set by confinement.
   void allow_memory(std::uint64_t bytes);
 
-  // Started, and not yet seen to have ended by itself.
+  // Started, and not known to have exited.
   [[nodiscard]] bool runs() const;
   [[nodiscard]] int socket() const { return socket_.number(); }
   [[nodiscard]] pid_t id() const;  // -1 if there is none

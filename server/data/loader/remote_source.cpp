@@ -1,4 +1,4 @@
-// The daemon's side: a call goes out, the loader's questions are answered, its answer is checked.
+// Daemon side: sends a call, serves the loader's requests, validates its answer.
 // Whatever else happens ends that loader and is an error of the call.
 #include <fcntl.h>
 #include <linux/openat2.h>
@@ -86,7 +86,7 @@ struct RemoteSource::State {
   // What a call may still take.
   struct Patience {
     Clock::time_point end;
-    Clock::time_point moved = Clock::now();  // when something came, or the loader had computed
+    Clock::time_point moved = Clock::now();  // time of the last message or progress of the loader
     Clock::time_point looked = Clock::now();
     std::chrono::nanoseconds cpu{};
   };
@@ -100,7 +100,7 @@ struct RemoteSource::State {
   Location location;
   Limits limits;
   DatasetInfo info;
-  std::string digest;  // of the info as it came
+  std::string digest;  // of the info as received
   std::vector<Companion> companions;
   std::uint64_t opened_bytes = 0;  // of the files that were opened to open the dataset
   Progress progress;
@@ -258,7 +258,7 @@ struct RemoteSource::State {
            " bytes is " + megabytes(bytes);
   }
 
-  // What the loader holds by itself counts in the limit.
+  // Private memory of the loader counts in the limit.
   Result<void> count_memory() {
     return process_memory.resize(std::max(loader_bytes_min, process.private_bytes()));
   }
@@ -309,7 +309,7 @@ struct RemoteSource::State {
                       whose_loader() + " was ended while " + what.doing + ": " + error.message);
   }
 
-  // Why there is no answer. The loader is gone after this.
+  // Why no answer was received. The loader has ended after this.
   Error ended(Fate fate, const Call& what, const Patience& patience) {
     constexpr std::chrono::milliseconds time_to_end{500};
     std::string how =

@@ -48,7 +48,7 @@ class Transfer {
   // What the first floats are now: whatever a loader does to them later is of no matter. Memory
   // that is not kept is given back as it is copied, so that a volume is not there twice.
   [[nodiscard]] Samples take(std::size_t floats);
-  // Nobody writes to it any more. False: somebody could.
+  // No process can write to it any more. False: a writer may remain.
   [[nodiscard]] bool close();
 
  private:

@@ -48,7 +48,7 @@ struct FieldInfo {
   std::string standard_name;
   std::string long_name;
   std::string dtype;     // of the file: "float32", "int16 packed", ...
-  bool derived = false;  // made of other fields when it is asked for, not in the file
+  bool derived = false;  // computed on request from other fields, not stored in the file
   // What is decoded to read one step, whole chunks counted; 0 where that is the volume itself.
   std::uint64_t decoded_bytes = 0;
   std::uint64_t chunk_bytes = 0;  // the largest chunk of it, decoded

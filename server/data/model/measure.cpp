@@ -35,7 +35,7 @@ bool visit_values(const Volume& volume, const CancelToken& cancel, Visit visit) 
   return true;
 }
 
-Error nobody_waits() { return make_error(ErrorKind::cancelled, "nobody waits for the answer"); }
+Error request_cancelled() { return make_error(ErrorKind::cancelled, "request cancelled"); }
 
 // Floats as whole numbers of the same order, and back.
 std::uint32_t order_of(float value) {
@@ -69,7 +69,7 @@ Result<std::optional<std::array<double, 2>>> clipped_range(const Volume& volume,
     ++upper[order_of(value) >> 16];
     ++total;
   });
-  if (!done) return nobody_waits();
+  if (!done) return request_cancelled();
   if (total == 0) return std::optional<std::array<double, 2>>();
   const auto dropped = std::min(
       (total - 1) / 2, static_cast<std::int64_t>(request.clip * static_cast<double>(total)));
@@ -83,7 +83,7 @@ Result<std::optional<std::array<double, 2>>> clipped_range(const Volume& volume,
       if (order >> 16 == half[end]) ++lower[end][order & 0xffffU];
     }
   });
-  if (!done) return nobody_waits();
+  if (!done) return request_cancelled();
   std::array<double, 2> range{};
   for (std::size_t end = 0; end < 2; ++end) {
     range[end] =
@@ -127,7 +127,7 @@ std::vector<double> edges_of(const std::array<double, 2>& range, int bins, bool 
   return edges;
 }
 
-// Finds bins by arithmetic, and by the edges themselves where rounding would tell otherwise.
+// Finds bins by arithmetic, then corrects by the bin edges where rounding would differ.
 class Binning {
  public:
   Binning(const std::vector<double>& edges, bool logarithmic)
@@ -139,7 +139,7 @@ class Binning {
   [[nodiscard]] std::size_t bin(double value) const {
     const auto last = static_cast<double>(edges_.size() - 2);
     const double near = (position(value) - low_) * per_bin_;
-    // One value wide: 0 / 0, which is no less than anything.
+    // Range of width zero: 0 / 0 is NaN, which no comparison accepts.
     auto at = near > 0 ? static_cast<std::size_t>(std::min(near, last)) : 0;
     while (at > 0 && value < edges_[at]) --at;
     while (at + 2 < edges_.size() && value >= edges_[at + 1] && edges_[at + 1] < edges_.back()) {
@@ -172,7 +172,7 @@ Result<Histogram> histogram(const Volume& volume, const HistogramRequest& reques
   out.masked = volume.masked;
   out.counts.assign(static_cast<std::size_t>(request.bins), 0);
   if (!out.range) {
-    // Logarithmic bins with nothing above zero.
+    // Logarithmic bins without positive values.
     out.below = static_cast<std::int64_t>(volume.samples()) - volume.masked;
     return out;
   }
@@ -189,7 +189,7 @@ Result<Histogram> histogram(const Volume& volume, const HistogramRequest& reques
       ++out.counts[binning.bin(value)];
     }
   });
-  if (!done) return nobody_waits();
+  if (!done) return request_cancelled();
   return out;
 }
 

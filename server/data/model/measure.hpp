@@ -21,7 +21,7 @@ struct HistogramRequest {
   std::optional<std::array<double, 2>> range = std::nullopt;
   // Without a range: it leaves out at most this share of the values at either end, below 0.5.
   double clip = 0;
-  bool logarithmic = false;  // bins of equal ratio; of values above zero alone
+  bool logarithmic = false;  // bins of equal ratio, for positive values only
 };
 
 struct Histogram {

@@ -1,4 +1,4 @@
-// Place in a grid's own units -> the sample whose cell it lies in.
+// Position in the units of a grid -> index of the sample whose cell contains it.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -141,7 +141,7 @@ Result<void> nearest_column(const Grid& grid, const std::array<std::optional<dou
     const auto [south, north] =
         std::minmax_element(columns.latitude.begin(), columns.latitude.end());
     std::string box = "no column is near latitude ";
-    box.append(number(*at[1])).append("; columns stand at longitudes ");
+    box.append(number(*at[1])).append("; columns are at longitudes ");
     box.append(interval({*west, *east}, "")).append(", latitudes ");
     box.append(interval({*south, *north}, "degrees"));
     return outside(0, *at[0], box);

@@ -17,7 +17,7 @@ std::shared_ptr<float> mapped(std::size_t bytes) {
   const std::size_t asked = bytes + huge_page;
   void* got = ::mmap(nullptr, asked, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (got == MAP_FAILED) throw std::bad_alloc();
-  // What lies before the first boundary of a huge page is never touched.
+  // The part before the first huge page boundary is never touched.
   const auto place = reinterpret_cast<std::uintptr_t>(got);
   auto* first = static_cast<std::byte*>(got) + (huge_page - place % huge_page) % huge_page;
 #ifdef MADV_HUGEPAGE

@@ -1,4 +1,4 @@
-// The floats of a volume: filled once by whoever makes it, then shared and only read.
+// The floats of a volume: written once by its producer, then shared read-only.
 #pragma once
 
 #include <algorithm>

@@ -26,7 +26,7 @@ class Source {
   virtual Result<Volume> read(std::size_t field, std::size_t step) = 0;
   // From any thread: a read in work ends soon, with cancelled, where the source can do that.
   virtual void cancel() {}
-  // Gives back what is kept for the next read: nothing is read for a while.
+  // Releases what is cached for the next read; called when the dataset is idle.
   virtual void release() {}
   // Files that were opened for it besides those that its location names, as they were then.
   [[nodiscard]] virtual std::vector<Companion> companions() const { return {}; }

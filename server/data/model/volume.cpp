@@ -15,13 +15,13 @@ namespace {
 constexpr float masked_value = std::numeric_limits<float>::quiet_NaN();
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-// Samples whose soundness is asked for at once: what is rare costs its own pass then.
+// Number of samples tested for finiteness together: a rare hit repeats the block in detail.
 constexpr std::size_t samples_at_once = 1024;
 // Numbers that a compiler can hold in the lanes of a register, each with a result of its own.
 constexpr std::size_t lanes = 16;
 
 bool are_finite(const float* values, std::size_t count) {
-  std::array<float, lanes> zeros{};  // nothing times a number is nothing, unless it is not finite
+  std::array<float, lanes> zeros{};  // 0 * x is 0 unless x is not finite
   std::size_t i = 0;
   for (; i + lanes <= count; i += lanes) {
     for (std::size_t l = 0; l < lanes; ++l) zeros[l] += 0.0F * values[i + l];

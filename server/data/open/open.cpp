@@ -1,4 +1,4 @@
-// The one door for files: by content, whatever the name. Files -> the reader of their format.
+// Format detection by content, whatever the name. Files -> the reader of their format.
 #include "server/data/open/open.hpp"
 
 #include <array>
@@ -28,7 +28,7 @@ namespace {
 
 using SourceResult = Result<std::unique_ptr<FileSource>>;
 
-// Formats of plain arrays, told by how a file begins.
+// Formats of plain arrays, recognised by the first bytes of a file.
 struct ArrayFormat {
   bool (*looks_like)(std::string_view head);
   Result<std::unique_ptr<cf::ArrayFile>> (*open)(const std::shared_ptr<Files>& files,

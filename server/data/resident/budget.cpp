@@ -21,7 +21,7 @@ Result<Resident> made(const Budget::Make& make) {
   } catch (const std::bad_alloc&) {
     return make_error(ErrorKind::out_of_memory, "the machine has no memory left");
   } catch (const std::exception& fault) {
-    log::error("making what is to be resident failed", {{"fault", fault.what()}});
+    log::error("failed to create a resident volume", {{"fault", fault.what()}});
     return make_error(ErrorKind::internal, "loading failed");
   }
 }
@@ -48,13 +48,13 @@ Result<Resident> Budget::get(const ResidentKey& key, std::uint64_t bytes, Urgenc
     const bool there_is_room = urgency == Urgency::in_turn ? wait_for_room(bytes, own, cancel, lock)
                                                            : make_room_beside_turn(bytes, urgency);
     if (!there_is_room && cancel != nullptr && cancel->cancelled()) {
-      return make_error(ErrorKind::cancelled, "nobody waits for the answer");
+      return make_error(ErrorKind::cancelled, "request cancelled");
     }
     if (!there_is_room) {
       ++counts_.refusals;
       return no_room("the field", bytes);
     }
-    // While it waited somebody else may have begun with the same.
+    // Another thread may have started the same load during the wait.
     if (entries_.count(key) == 0) break;
   }
   ++counts_.misses;
@@ -117,7 +117,7 @@ bool Budget::has(const ResidentKey& key) const {
 
 void Budget::request_prefetch(std::uint64_t owner, const std::vector<ResidentKey>& keys) {
   const std::lock_guard lock(mutex_);
-  // Taking wishes back needs no memory: destructors do it.
+  // Removing prefetch requests needs no memory: destructors do it.
   if (const auto before = requests_.find(owner); before != requests_.end()) {
     for (const ResidentKey& key : before->second) requested_.erase(requested_.find(key));
     requests_.erase(before);
@@ -199,7 +199,7 @@ void Budget::drop(std::list<ResidentKey>::iterator listed) {
   recent_.erase(listed);
 }
 
-// Listed no more, counted until it is let go of.
+// No longer listed, but counted until released.
 void Budget::drop_held(std::list<ResidentKey>::iterator listed) {
   Entry& entry = *entries_.find(*listed)->second;
   entry.exit.front().held = entry.answer->value();
@@ -280,7 +280,7 @@ std::uint64_t Budget::bytes_of_pins(const OwnPins& own) const {
   return bytes;
 }
 
-// The least recently used first, as many as make room once they are let go of.
+// The least recently used first, until their release makes enough room.
 void Budget::take_off_list(std::uint64_t bytes, const OwnPins& own) {
   std::uint64_t coming = bytes_max_ - std::min(used_, bytes_max_) + evictable_for(Urgency::demand);
   for (const Leaving& one : leaving_) coming += one.bytes;
@@ -294,7 +294,7 @@ void Budget::take_off_list(std::uint64_t bytes, const OwnPins& own) {
   }
 }
 
-// After a wait in vain: what is held takes its bytes either way, and may be asked for again.
+// After a timed-out wait: referenced volumes occupy memory anyway, so list them again.
 void Budget::list_again() {
   for (auto at = leaving_.begin(); at != leaving_.end();) {
     const auto next = std::next(at);
@@ -327,7 +327,7 @@ bool Budget::make_room_beside_turn(std::uint64_t bytes, Urgency urgency) {
 
 bool Budget::wait_for_room(std::uint64_t bytes, const OwnPins& own, const CancelToken* cancel,
                            std::unique_lock<std::mutex>& lock) {
-  // Use counts have no signal: they are looked at so often.
+  // Use counts send no notification: poll them.
   constexpr std::chrono::milliseconds look_every{5};
   using Clock = std::chrono::steady_clock;
   std::uint64_t released_before = released_total_;
@@ -352,7 +352,7 @@ bool Budget::wait_for_room(std::uint64_t bytes, const OwnPins& own, const Cancel
       changed = Clock::now();
     }
     if (Clock::now() - changed > patience) break;
-    // Resident data stay listed where reservations alone are in the way.
+    // Resident data stay listed where only reservations prevent the load.
     if (needs + reserved_ <= bytes_max_) take_off_list(bytes, own);
     arrived_.wait_for(lock, look_every);
   }
@@ -373,7 +373,7 @@ bool Budget::make_room(std::uint64_t bytes, Urgency urgency) {
   if (used_ - evictable_for(urgency) > bytes_max_ - bytes) {
     return false;
   }
-  // First what can be had again without its file, then what nobody wishes for, then the rest.
+  // First what can be recomputed without the file, then unrequested volumes, then the rest.
   using Rule = bool (*)(const Budget&, const ResidentKey&);
   constexpr std::array<Rule, 3> rules{
       [](const Budget& self, const ResidentKey& key) {
@@ -411,7 +411,7 @@ Result<void> Reservation::take(std::uint64_t bytes, Urgency urgency, const OwnPi
                                  ? budget_->wait_for_room(bytes, own, cancel, lock)
                                  : budget_->make_room_beside_turn(bytes, urgency);
   if (!there_is_room && cancel != nullptr && cancel->cancelled()) {
-    return make_error(ErrorKind::cancelled, "nobody waits for the answer");
+    return make_error(ErrorKind::cancelled, "request cancelled");
   }
   if (!there_is_room) {
     ++budget_->counts_.refusals;
@@ -432,7 +432,7 @@ void Reservation::set(std::uint64_t bytes) {
 Result<void> Reservation::resize(std::uint64_t bytes, Urgency urgency) {
   if (budget_ == nullptr) return {};
   std::unique_lock lock(budget_->mutex_);
-  // What is only asked for ahead of need is done without.
+  // Failed prefetches are ignored.
   const bool in_turn =
       urgency != Urgency::prefetch && budget_->turn_.thread == std::this_thread::get_id();
   if (bytes > bytes_ && !budget_->make_room(bytes - bytes_, urgency) &&

@@ -1,5 +1,5 @@
-// The bytes that the datasets of a store share, and what they were spent on: a cache of whatever is
-// resident. A load reserves its bytes first; the least recently used goes when room is needed.
+// Memory shared by the datasets of a store: a cache of resident volumes. A load reserves its bytes
+// first; the least recently used volume is evicted when room is needed.
 #pragma once
 
 #include <chrono>
@@ -23,27 +23,27 @@
 
 namespace windsplat::data {
 
-// What is kept: the dataset by its number in the budget, field, step, and what was made of it
-// (empty: as it was loaded).
+// Key of a resident volume: the dataset's number in the budget, field, step and variant (empty: as
+// loaded).
 using ResidentKey = std::tuple<std::uint64_t, std::size_t, std::size_t, std::string>;
 using Resident = std::shared_ptr<const void>;
 
 enum class Urgency {
-  in_turn,   // the only one of its kind at a time: waits for what others hold, see Budget::get()
-  demand,    // somebody waits: whatever nobody holds may go for it
-  prefetch,  // may be wanted soon: what is wished for stays
+  in_turn,   // exclusive: waits for volumes that others reference, see Budget::get()
+  demand,    // the caller waits: any unreferenced volume may be evicted
+  prefetch,  // needed soon: volumes with prefetch requests are not evicted
 };
 
-// What the caller of get() holds itself, and so cannot wait for.
+// What the caller of get() references itself, and so cannot wait for.
 using OwnPins = std::multiset<const void*>;
 
 struct BudgetCounts {
   std::uint64_t bytes_max = 0;
   std::uint64_t bytes = 0;      // resident and reserved
   std::uint64_t hits = 0;       // found resident
-  std::uint64_t misses = 0;     // had to be made
-  std::uint64_t evictions = 0;  // made room
-  std::uint64_t refusals = 0;   // found no room
+  std::uint64_t misses = 0;     // had to be loaded or computed
+  std::uint64_t evictions = 0;  // volumes evicted to make room
+  std::uint64_t refusals = 0;   // loads without room
   std::uint64_t reads = 0;      // volumes read from a source, and of these
   std::uint64_t reads_failed = 0;
 };
@@ -51,7 +51,7 @@ struct BudgetCounts {
 // How messages name the limit.
 struct LimitName {
   std::string text = "the memory limit";
-  // As it would have to be for so many bytes of data at least; none: nobody can change it.
+  // The same for at least so many bytes of data; nullopt: the limit is not configurable.
   std::function<std::string(std::uint64_t bytes)> raised = nullptr;
 };
 
@@ -65,72 +65,73 @@ class Budget {
 
   std::uint64_t next_owner();
 
-  // What is kept under `key`, or what `make` makes of `bytes` bytes, which at most one caller runs
-  // at a time for a key; the others wait and get the same answer. A failure is not remembered.
-  // Where there is no room, in_turn takes what others hold off the list, so that nobody holds it
-  // anew, and waits until they let go of it; meanwhile others get room only where all of it fits
-  // together. It fails at once where `own` and lasting reservations leave too little, where
-  // temporary ones do after `reservation_patience`, else when nothing was let go of for `patience`;
-  // what is still held then is listed again. `cancel` ends the wait for room.
-  // Errors: out_of_memory, cancelled, those of `make`.
+  // The volume under `key`, or the result of `make`, which takes `bytes` bytes. At most one caller
+  // runs `make` for a key; others wait and get the same result. A failure is not remembered. Where
+  // there is no room, in_turn unlists referenced volumes, so that they gain no new references, and
+  // waits for their release; meanwhile others get room only if all of it fits together. It fails at
+  // once where `own` and lasting reservations leave too little, after `reservation_patience` where
+  // temporary ones do, else when nothing was released for `patience`; volumes still referenced then
+  // are listed again. `cancel` ends the wait for room. Errors: out_of_memory, cancelled, those of
+  // `make`.
   Result<Resident> get(const ResidentKey& key, std::uint64_t bytes, Urgency urgency,
                        const Make& make, const OwnPins& own = {},
                        const CancelToken* cancel = nullptr);
-  // The same for what is there or on its way; none if nobody has asked for it.
+  // The same for a volume that is resident or loading; nullopt otherwise.
   std::optional<Result<Resident>> find(const ResidentKey& key);
-  // What is there now; null for what is not, or not yet.
+  // The resident volume; null if it is absent or still loading.
   Resident find_now(const ResidentKey& key);
-  // The same, and what was taken off the list but is still held by somebody.
+  // The same, including volumes no longer listed but still referenced.
   Resident find_held(const ResidentKey& key);
   [[nodiscard]] bool has(const ResidentKey& key) const;
 
-  // What `owner` wishes to have soon, in place of its earlier wishes.
+  // Replaces the prefetch requests of `owner`.
   void request_prefetch(std::uint64_t owner, const std::vector<ResidentKey>& keys);
 
   [[nodiscard]] std::uint64_t bytes_of(std::uint64_t owner) const;
-  // Drops what nobody holds of a dataset.
+  // Drops the unreferenced volumes of a dataset.
   void evict(std::uint64_t owner);
-  // Drops all of a dataset that is no more; what somebody holds of it counts until it is let go of.
+  // Drops all volumes of a removed dataset; those referenced count until released.
   void forget(std::uint64_t owner);
   void count_read(bool ok);
-  // Ends all waits for room: later calls get what is there or an error.
+  // Ends all waits for room: later calls return what is resident or an error.
   void end();
   [[nodiscard]] BudgetCounts counts() const;
-  // The most that a demand could have now: what is free and what may go for it.
+  // Upper bound of a demand at present: free bytes and those that can be evicted.
   [[nodiscard]] std::uint64_t room() const;
   [[nodiscard]] std::uint64_t bytes_max() const { return bytes_max_; }
   [[nodiscard]] const LimitName& name() const { return name_; }
   // "--memory-limit 192M leaves 68.0 MiB for data"
   [[nodiscard]] std::string limit_text() const;
 
-  // Longer than the slowest frames that hold a volume while they are drawn.
+  // Longer than the slowest frames that reference a volume during rendering.
   static constexpr std::chrono::seconds patience{20};
-  // Loaders that read for others and large pictures end within moments or not soon.
+  // Loaders of other datasets and large pictures end within moments or not soon.
   static constexpr std::chrono::seconds reservation_patience{12};
 
  private:
   friend class Reservation;
-  struct Leaving {  // not listed any more, but still held by somebody
+  struct Leaving {  // no longer listed, but still referenced
     ResidentKey key;
     std::weak_ptr<const void> held;
     std::uint64_t bytes = 0;
-    bool in_the_way = false;  // taken off for a load in turn, and not because it is no more
+    bool in_the_way = false;  // removed for a load in turn, not because the dataset was removed
   };
   struct Entry {
     std::uint64_t bytes = 0;
-    std::optional<Result<Resident>> answer;  // none while it is being made
+    std::optional<Result<Resident>> answer;  // empty while it is being made
     std::list<ResidentKey>::iterator place;  // in recent_, if listed
     bool listed = false;
-    std::list<Leaving> exit;  // its node of leaving_: destructors drop what is held
+    std::list<Leaving>
+        exit;  // its node of leaving_: allocated in advance, so that destructors need no memory
   };
 
-  // All under the mutex.
+  // All guarded by the mutex.
   std::optional<Result<Resident>> wait_for(const ResidentKey& key,
                                            std::unique_lock<std::mutex>& lock);
   void touch(Entry& entry);
   void drop(std::list<ResidentKey>::iterator listed);
   void drop_held(std::list<ResidentKey>::iterator listed);
-  // Nobody outside can gain a reference while the lock is held, so a count of one stays one.
+  // No reference can be added from outside while the lock is held, so a count of one is stable.
   [[nodiscard]] static bool is_held(const Entry& entry) {
     return entry.answer->value().use_count() > 1;
   }
@@ -138,8 +139,8 @@ class Budget {
     return requested_.count(key) > 0;
   }
   void drop_all(std::uint64_t owner, bool held_too);
-  // A volume whose packed form is kept too, or an average of a volume that is: had again at little
-  // cost.
+  // Whether a volume can be recomputed cheaply: from its packed form, or as the average of a
+  // resident volume.
   [[nodiscard]] bool is_derived(const ResidentKey& key) const;
   [[nodiscard]] bool may_go(const ResidentKey& key, Urgency urgency) const;
   [[nodiscard]] std::uint64_t evictable_for(Urgency urgency) const;
@@ -160,21 +161,21 @@ class Budget {
   std::condition_variable arrived_;
   std::uint64_t owners_ = 0;
   std::map<ResidentKey, std::shared_ptr<Entry>> entries_;
-  std::list<ResidentKey> recent_;  // what was made, the most recently used first
+  std::list<ResidentKey> recent_;  // most recently used first
   std::map<std::uint64_t, std::vector<ResidentKey>> requests_;
   std::multiset<ResidentKey> requested_;  // of all owners
   std::list<Leaving> leaving_;
-  std::uint64_t used_ = 0;            // all of it: listed, being made, leaving and reserved
+  std::uint64_t used_ = 0;            // total: listed, in construction, leaving and reserved
   std::uint64_t reserved_ = 0;        // of this by Reservations
   std::uint64_t lasting_ = 0;         // of these by lasting ones
   std::uint64_t released_total_ = 0;  // by what was leaving, ever
   bool in_turn_waits_ = false;
   std::uint64_t turn_needs_ = 0;  // while it waits: all that it holds and wants, and what others
                                   // got beside it
-  // Who makes something in turn, so that its reservations wait for room as it did itself.
+  // The thread that loads in turn, whose reservations wait for room as its load did.
   struct Turn {
     std::thread::id thread;
-    std::uint64_t bytes = 0;  // of what is being made
+    std::uint64_t bytes = 0;  // of the volume in construction
     OwnPins own;
     const CancelToken* cancel = nullptr;
   } turn_;
@@ -182,11 +183,11 @@ class Budget {
   BudgetCounts counts_;
 };
 
-// Memory that is no volume but counts in the limit for as long as this lives. One thread at a time.
+// Memory other than volumes that counts in the limit during its lifetime. One thread at a time.
 class Reservation {
  public:
   enum class Term {
-    temporary,  // for some work: who loads in turn waits for its end
+    temporary,  // for a task: a load in turn waits for its end
     lasting,    // as long as a dataset
   };
   explicit Reservation(std::shared_ptr<Budget> budget = nullptr, Term term = Term::temporary)
@@ -195,24 +196,25 @@ class Reservation {
   Reservation(const Reservation&) = delete;
   Reservation& operator=(const Reservation&) = delete;
 
-  // So many from none, by the rules of Budget::get(): in_turn waits for what others hold, and
-  // others get what is there beside one in turn that waits. Errors: out_of_memory, cancelled.
+  // Reserves so many bytes by the rules of Budget::get(): in_turn waits for volumes that others
+  // reference, and others get only room beside a waiting load in turn. Errors: out_of_memory,
+  // cancelled.
   Result<void> take(std::uint64_t bytes, Urgency urgency, const OwnPins& own,
                     const CancelToken* cancel);
-  // Errors: out_of_memory, where volumes that nobody holds do not make room for more (`ahead`:
-  // those that nobody wishes for either); the size stays. Waits as Budget::get() does where it is
-  // called by what that makes in turn. Without a budget all is allowed.
+  // Changes the size. Errors: out_of_memory, where evicting unreferenced volumes (`ahead`: those
+  // without prefetch requests) does not make room; the size stays. Waits as Budget::get() does when
+  // called within a load in turn. Always succeeds without a budget.
   Result<void> resize(std::uint64_t bytes, Urgency urgency = Urgency::demand);
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
-  void set(std::uint64_t bytes);  // under the budget's mutex
+  void set(std::uint64_t bytes);  // with the budget's mutex held
   std::shared_ptr<Budget> budget_;
   Term term_;
   std::uint64_t bytes_ = 0;
 };
 
-// Of a message: in MiB.
+// For messages: in MiB.
 std::string megabytes(std::uint64_t bytes);
 
 // The variant of a key under which a volume's packed twin is kept.

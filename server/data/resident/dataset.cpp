@@ -43,7 +43,7 @@ std::uint64_t bytes_of(const DatasetInfo& info) {
   return bytes;
 }
 
-// One reader at a time; those that somebody waits for come first.
+// One reader at a time; demanded loads precede prefetches.
 class Turnstile {
  public:
   void enter(Urgency urgency) {
@@ -62,7 +62,7 @@ class Turnstile {
     }
     free_.notify_all();
   }
-  // Enters if nobody is inside, waits, or was inside within that time.
+  // Enters if no reader is inside, waiting, or was inside within that time.
   bool enter_if_idle(double idle_s) {
     const std::lock_guard lock(mutex_);
     const std::chrono::duration<double> rest = Clock::now() - used_at_;
@@ -118,7 +118,7 @@ struct Dataset::State {
     return info.grid.samples() * info.fields[field].components.size();
   }
 
-  // Of these fields, each once.
+  // Fields without duplicates.
   [[nodiscard]] std::uint64_t bytes_at_a_step(const std::vector<std::string>& fields) const {
     std::set<std::string> counted;
     std::uint64_t bytes = 0;
@@ -166,7 +166,7 @@ struct Dataset::State {
     }
     auto volume = read(field, step, urgency);
     if (volume && storage == Storage::packed16) {
-      // Where there is no room for it the volume itself is all that is kept.
+      // Where it does not fit, only the volume itself is kept.
       (void)budget->get(twin, values(field) * sizeof(std::uint16_t), Urgency::prefetch,
                         [&] { return pack_volume(field, *volume); });
     }
@@ -239,7 +239,7 @@ struct Dataset::State {
       return make_error(ErrorKind::out_of_memory,
                         "the machine has no memory left for " + in_quotes(info.fields[field].name));
     } catch (const std::exception& fault) {
-      // What a fault of ours says is for the log: it may name places in the source.
+      // The text of an internal error is for the log only: it may name source locations.
       log::error("loading failed", {{"field", info.fields[field].name}, {"fault", fault.what()}});
       return make_error(ErrorKind::internal,
                         "loading " + in_quotes(info.fields[field].name) + " failed");
@@ -361,7 +361,7 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
     state_->add(&Counts::averages);
     return state_->guarded(*index, [&]() -> Result<Volume> { return coarsen(**fine, how); });
   });
-  if (own_) own_->erase(own_->find(fine->get()));  // given to nobody
+  if (own_) own_->erase(own_->find(fine->get()));  // not yet shared
   return level;
 }
 

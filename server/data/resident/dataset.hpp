@@ -1,4 +1,4 @@
-// One opened dataset: its fields by step, loaded on first need and shared by all who hold them.
+// One opened dataset: its fields by step, loaded on first need and shared by all users.
 #pragma once
 
 #include <any>
@@ -21,7 +21,7 @@ namespace windsplat::data {
 // How volumes stay in memory.
 enum class Storage {
   float32,
-  packed16,  // 16 bits a value beside the few that are being drawn (packed.hpp)
+  packed16,  // 16 bits a value, unpacked for rendering (packed.hpp)
 };
 
 // One opened dataset. A handle: copies are the same dataset. Thread-safe.
@@ -33,65 +33,64 @@ class Dataset {
           Storage storage = Storage::float32);
 
   [[nodiscard]] const DatasetInfo& info() const;
-  // The same as long as it is held; tells datasets of one id apart.
+  // Unique while it is held; distinguishes successive datasets of one id.
   [[nodiscard]] std::shared_ptr<const DatasetInfo> shared_info() const;
 
-  // The field at the step; loads it if it is not resident. What a caller holds stays valid.
-  // Errors: not_found (no such field or step, or forgotten while it was read), bad_data,
-  // out_of_memory, not_resident (evicted while it was read), draining (after end()).
+  // The field at the step; loads it if it is not resident. Volumes held by a caller stay valid.
+  // Errors: not_found (no such field or step, or removed during the read), bad_data, out_of_memory,
+  // not_resident (evicted during the read), draining (after end()).
   Result<std::shared_ptr<const Volume>> volume(const std::string& field, std::size_t step);
 
-  // The field at the step, coarser: averaged once on first need, shared and counted in the memory
-  // limit like the volume itself, which need not stay resident for it. One that asks while another
-  // averages waits for it. Nothing halved: the volume itself. Errors: those of volume();
+  // The field at the step, averaged to a coarser level on first need. The level is shared and
+  // counted in the memory limit; the volume itself need not stay resident for it. Concurrent
+  // callers wait for one averaging. Level zero is the volume itself. Errors: those of volume();
   // out_of_memory also where there is room for the volume but not for its level beside it.
   Result<std::shared_ptr<const Volume>> level(const std::string& field, std::size_t step,
                                               const Coarsening& how);
 
-  // A handle that never loads, averages or waits: what is not there is the error not_resident.
+  // A handle that never loads, averages or waits: absent volumes yield the error not_resident.
   [[nodiscard]] Dataset resident_only() const;
-  // A handle for whoever holds what it needs: found even where it was taken off the list meanwhile.
+  // A handle that also finds volumes that were unlisted while the caller references them.
   [[nodiscard]] Dataset held() const;
-  // A handle that waits for room where others hold it (Budget::get(), in_turn). For one thread at a
-  // time of all datasets that share a budget: one after the other has all that it needs. `cancel`
+  // A handle that waits for room that others occupy (Budget::get(), in_turn), for one thread at a
+  // time among all datasets that share a budget, so that each in turn gets all it needs. `cancel`
   // ends its waits for room, with the error cancelled.
   [[nodiscard]] Dataset in_turn(const CancelToken& cancel = {}) const;
-  // A handle for what is not needed yet: it gives way to loads that somebody waits for, and evicts
-  // nothing that is wished for.
+  // A handle for prefetching: it yields to demanded loads and does not evict volumes with prefetch
+  // requests.
   [[nodiscard]] Dataset prefetching() const;
-  // So many bytes of work beside the volumes count in the limit for as long as the answer is held.
-  // A handle in_turn() waits for room; others get what is there beside one that waits. Errors:
-  // out_of_memory, cancelled.
+  // Reserves so many bytes of working memory beside the volumes while the result lives. A handle
+  // in_turn() waits for room; others get only room beside a waiting one. Errors: out_of_memory,
+  // cancelled.
   [[nodiscard]] Result<std::shared_ptr<const void>> reserve(std::uint64_t bytes) const;
-  // Under which keys level() keeps its answer and what that is made of; none: no such field or
-  // step.
+  // The keys under which level() stores its result and the volume it is made of; none: no such
+  // field or step.
   [[nodiscard]] std::vector<ResidentKey> keys_of(const std::string& field, std::size_t step,
                                                  const Coarsening& how) const;
 
-  // What a caller derived from this dataset and would be slow to derive again: one value, replaced
-  // by the next. Empty unless it was kept under this key.
+  // A cached value derived from this dataset that is slow to recompute; each new value replaces the
+  // last. Empty unless stored under this key.
   [[nodiscard]] std::any kept(const std::string& key) const;
   void keep(std::string key, std::any value);
 
-  // A few numbers that follow from the data and whatever `key` names: made at most once while they
-  // are remembered, which the last 256 keys are, so that what they were made of need not stay
-  // resident. A failure is not remembered.
+  // A few numbers derived from the data and identified by `key`: computed at most once while the
+  // last 256 keys are cached, so that the volumes need not stay resident. A failure is not cached.
   Result<std::vector<double>> remembered(const std::string& key,
                                          const std::function<Result<std::vector<double>>()>& make);
 
-  // Drops what nobody holds, ends a load in work.
+  // Drops unreferenced volumes and cancels a running load.
   void evict();
-  // The same of a dataset that is on the list no more.
+  // The same for a dataset that is no longer listed.
   void forget();
 
-  // From now on nothing is read: who asks gets draining. Ends a load in work, unless it is just
-  // beginning: loading() tells.
+  // Ends reading: later calls return draining. Cancels a running load, unless it is just starting;
+  // see loading().
   void end();
 
-  // Lets the source give back what it keeps between reads if none was for so long.
+  // Frees the source's read caches if there was no read for so long.
   void release_idle(double idle_s);
 
-  // Range and masked count of a field at a step that was ever loaded; none: it was not.
+  // Range and masked count of a field at a step loaded before; none: never loaded.
   struct Seen {
     std::array<float, 2> range{};
     std::int64_t masked = 0;
@@ -100,9 +99,9 @@ class Dataset {
 
   struct Counts {
     std::uint64_t loads = 0;       // volumes read from the source
-    std::uint64_t prefetched = 0;  // of these, before anyone asked
+    std::uint64_t prefetched = 0;  // of these, before the first request
     std::uint64_t averages = 0;    // levels averaged
-    std::uint64_t unpacked = 0;    // volumes had from their packed form
+    std::uint64_t unpacked = 0;    // volumes restored from their packed form
     std::uint64_t failures = 0;    // reads that failed
   };
   [[nodiscard]] Counts counts() const;
@@ -110,7 +109,7 @@ class Dataset {
   [[nodiscard]] std::uint64_t loads() const { return counts().loads; }
   [[nodiscard]] std::uint64_t averages() const { return counts().averages; }
 
-  // The read in work, for whoever waits for it.
+  // The running read, for progress reports.
   struct Loading {
     std::string field;
     std::size_t step = 0;
@@ -118,21 +117,22 @@ class Dataset {
   };
   [[nodiscard]] std::optional<Loading> loading() const;
 
-  // Errors: out_of_memory, where one of the fields cannot be loaded at a step, not even alone: with
-  // what all of them need, and the limit that would do.
+  // Errors: out_of_memory, where one of the fields cannot be loaded at a step even alone: states
+  // what all of them need and the limit that would suffice.
   [[nodiscard]] Result<void> check_room(const std::vector<std::string>& fields) const;
-  // Of a message, where the limit leaves no room for these fields together at a step: "; ..." with
-  // what they need and the limit that would do. Empty where it does, and where nobody can raise it.
+  // Suffix of a message where the limit leaves no room for these fields together at a step: "; ..."
+  // with what they need and the limit that would suffice. Empty where they fit, and where the limit
+  // is not configurable.
   [[nodiscard]] std::string beyond_limit(const std::vector<std::string>& fields) const;
-  // The same behind an error for want of memory; others as they are.
+  // Appends it to an out_of_memory error; other errors are unchanged.
   [[nodiscard]] Error with_need(Error error, const std::vector<std::string>& fields) const;
 
-  // Counts what is known of the dataset, steps and places, in the memory limit too, where that is
-  // more than a megabyte. Errors: out_of_memory.
+  // Counts metadata of the dataset, steps and positions, in the memory limit if they exceed one
+  // megabyte. Errors: out_of_memory.
   Result<void> charge_info();
 
   [[nodiscard]] Storage storage() const;
-  // The most that a resident value of a field may err by being packed, in the units of its worst
+  // The largest error of a resident value of a field due to packing, in the units of its worst
   // component; 0 for float32.
   [[nodiscard]] float storage_error(const std::string& field) const;
 
@@ -149,7 +149,7 @@ class Dataset {
 
   std::shared_ptr<State> state_;
   Manner manner_ = Manner::demand;
-  std::shared_ptr<OwnPins> own_;       // of in_turn: what it gave
+  std::shared_ptr<OwnPins> own_;       // of in_turn: volumes it returned
   std::optional<CancelToken> cancel_;  // of in_turn
 };
 

@@ -1,4 +1,4 @@
-// Owners in turn, each one's soonest wish first; what cannot be loaded waits for other wishes.
+// Owners in turn, the earliest request of each first; failed requests wait for new ones.
 #include "server/data/resident/prefetcher.hpp"
 
 #include <algorithm>
@@ -48,7 +48,7 @@ struct Prefetcher::State {
     return last;
   }
 
-  // False: there is no memory for it.
+  // False: allocation failed.
   static bool load(const PrefetchRequest& request) noexcept {
     try {
       return try_to_load(request);
@@ -79,7 +79,7 @@ struct Prefetcher::State {
   std::condition_variable wake;
   struct Queue {
     std::deque<PrefetchRequest> requests;  // not yet loaded; never empty
-    std::uint64_t said = 0;                // tells it from later ones of the owner
+    std::uint64_t said = 0;                // distinguishes it from later requests of the owner
   };
   std::map<std::uint64_t, Queue> queues;  // by owner
   std::uint64_t said = 0;

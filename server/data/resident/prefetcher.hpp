@@ -1,4 +1,4 @@
-// The store's thread that loads what viewers will want next. Wishes in, resident volumes out.
+// The store's prefetch thread. Prefetch requests in, resident volumes out.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ class Prefetcher {
 
   // See Store::wish.
   void request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests);
-  // Nothing of a dataset is loaded any more.
+  // Stops loading for a dataset.
   void forget(const DatasetInfo& info);
 
  private:

@@ -25,7 +25,7 @@ namespace {
 
 using DatasetPtr = std::shared_ptr<Dataset>;
 
-// Files whose times are asked for at a look; of a longer series the newest.
+// Files whose modification times are read in one scan; the newest of a longer series.
 constexpr std::size_t files_watched_max = 64;
 
 Result<std::unique_ptr<Source>> open_here(const Location& location) {
@@ -34,7 +34,7 @@ Result<std::unique_ptr<Source>> open_here(const Location& location) {
   return std::unique_ptr<Source>(std::move(*source));
 }
 
-// The state of all files of a dataset that are looked at.
+// The combined state of the watched files of a dataset.
 FileStamp stamp_of_all(const Location& location, const std::vector<Companion>& companions) {
   std::vector<std::string> paths;
   if (location.kind == Location::Kind::folder) {
@@ -63,7 +63,7 @@ std::string stamp_as_opened(FileStamp before, const std::vector<Companion>& comp
   return std::move(before.text);
 }
 
-// A series whose folder has changed may have other members by now. False: nothing was looked at.
+// Rescans a series whose folder has changed. False: no scan was needed.
 bool match_again(std::optional<Location>& location, std::string& listed) {
   if (location->kind != Location::Kind::series) return false;
   std::string now = stamp_of(location->folder).text;
@@ -113,7 +113,7 @@ struct Store::State {
   };
   struct FailedEntry {
     std::string named;
-    std::string key;                   // of its files when they were looked at last
+    std::string key;                   // of its files at the last scan
     std::optional<std::string> tried;  // their stamp then; none: they are to be tried at any rate
     Clock::time_point retry_at;        // whether the stamp has changed or not
     Failed listed;
@@ -158,7 +158,7 @@ struct Store::State {
     try {
       return dataset.loading().has_value();
     } catch (const std::bad_alloc&) {
-      return true;  // there is a name, for which there is no memory
+      return true;  // the name exists, but allocation failed
     }
   }
 
@@ -210,7 +210,7 @@ struct Store::State {
     Entry entry;  // without a dataset
     std::unique_ptr<Source> source;
   };
-  // Throws nothing: others wait for the key.
+  // Does not throw: other threads wait for the key.
   template <class Open>
   static Result<Opened> open_entry(const std::string& key, std::optional<Location> location,
                                    const Open& open) {

@@ -9,7 +9,7 @@ namespace windsplat::data::climate {
 
 using Map = std::vector<float>;
 
-// Where the columns stand, degrees.
+// Column positions, degrees.
 struct Columns {
   std::vector<double> longitudes;
   std::vector<double> latitudes;

@@ -29,7 +29,7 @@ struct Track {
   double jet_speed;      // m/s
   double jet_width;      // degrees
   double meander;        // degrees, with the cyclones
-  double long_meander;   // degrees, with three waves that stand
+  double long_meander;   // degrees, with three stationary waves
   double jet_variation;  // of its speed along the latitude circle
 };
 constexpr std::array<Track, 2> tracks = {

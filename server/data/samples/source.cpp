@@ -1,4 +1,4 @@
-// The frame all built-in samples stand in, and the noise that gives them texture.
+// Common frame of all built-in samples, and the noise that gives them texture.
 #include "server/data/samples/source.hpp"
 
 #include <algorithm>

@@ -27,14 +27,14 @@ std::unique_ptr<Source> make_tornado(const SampleSize& size);
 std::unique_ptr<Source> make_climate(const SampleSize& size);
 std::unique_ptr<Source> make_efield(const SampleSize& size);
 
-// A source whose fields are computed when asked for, each without the others.
+// A source whose fields are computed on request, independently of each other.
 class SampleSource : public Source {
  public:
   [[nodiscard]] const DatasetInfo& info() const override { return info_; }
   Result<Volume> read(std::size_t field, std::size_t step) override;
 
  protected:
-  // `formula_version` goes into the digest: raise it whenever a formula changes.
+  // `formula_version` is part of the digest: raise it whenever a formula changes.
   SampleSource(const std::string& name, const std::string& title, const SampleSize& size,
                int formula_version, std::string time_units);
 

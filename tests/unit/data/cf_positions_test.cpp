@@ -45,7 +45,7 @@ TEST(Positions, RadiansBecomeDegrees) {
     EXPECT_NEAR(axes[0].coordinates.at(1), 90, 1e-9);
     EXPECT_NEAR(axes[1].coordinates.at(0), -90, 1e-9);
     EXPECT_NEAR(axes[1].coordinates.at(2), 45, 1e-9);
-    EXPECT_TRUE(has_note((*source)->info(), "'lat' is told in radians"));
+    EXPECT_TRUE(has_note((*source)->info(), "'lat' is in radians"));
   }
 }
 
@@ -254,7 +254,7 @@ TEST(Positions, ARotatedPolesColumnsAndWindsAreThoseOfItsFrame) {
       }
     }
     EXPECT_TRUE(has_note((*source)->info(), "computed from the rotated pole of 'rp'"));
-    EXPECT_TRUE(has_note((*source)->info(), "'wind' is told by east and north: turned"));
+    EXPECT_TRUE(has_note((*source)->info(), "'wind' is given by east and north: turned"));
   }
 }
 

@@ -185,7 +185,7 @@ INSTANTIATE_TEST_SUITE_P(
     All, DxRefusal,
     testing::Values(
         BadDxCase{"short", with_array("items 12 lsb ieee data 0"), "does not fit"},
-        BadDxCase{"follows", with_array("items 12 data follows 1 2 3"), "is no number"},
+        BadDxCase{"follows", with_array("items 12 data follows 1 2 3"), "is not a number"},
         BadDxCase{"huge", with_array("items 4294967295 lsb ieee data follows 1 2 3"), "cut short"},
         BadDxCase{"overflow",
                   with_array("rank 2 shape 9223372036854775807 9223372036854775807 items "
@@ -228,7 +228,7 @@ TEST(DxRefusal, CirclesEnd) {
                  field("4", "3"));
   EXPECT_THAT(refusal(folder / "c.dx"), HasSubstr("a product of products"));
   write_file(folder / "c.dx", "object 1 class series member 0 value 1\n");
-  EXPECT_THAT(refusal(folder / "c.dx"), HasSubstr("is no field"));
+  EXPECT_THAT(refusal(folder / "c.dx"), HasSubstr("is not a field"));
   write_file(folder / "c.dx", "object 1 class group member \"a\" value file \"c.dx\",1\n");
   EXPECT_THAT(refusal(folder / "c.dx"), HasSubstr("neither a field nor a series"));
 }

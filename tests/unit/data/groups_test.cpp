@@ -132,7 +132,7 @@ TEST(Groups, PositionsAndSurfacePressureOfTheGroupsAboveCount) {
   ASSERT_TRUE(source) << source.error().message;
   const DatasetInfo& info = (*source)->info();
   ASSERT_NE(info.grid.columns, nullptr);
-  EXPECT_TRUE(has_note(info, "'wind' is told by east and north: turned"));
+  EXPECT_TRUE(has_note(info, "'wind' is given by east and north: turned"));
   // Rows run north-east, so that a wind from due west is half along them, half against columns.
   const Volume wind = volume_of(**source, "wind");
   EXPECT_NEAR(wind.component(0)[1], 10 * std::sqrt(0.5), 0.05);

@@ -296,8 +296,8 @@ TEST(NetcdfAxes, TimesOutOfOrderAreNoted) {
   };
   for (const Case& c :
        {Case{{0, 6, 12}, ""}, Case{{12, 0, 6}, "'time' goes back once: "},
-        Case{{0, 6, 6, 6}, "'time' stands still 2 times: "},
-        Case{{0, 0, 6, 1, 0}, "'time' goes back 2 times and stands still once: "}}) {
+        Case{{0, 6, 6, 6}, "'time' does not advance 2 times: "},
+        Case{{0, 0, 6, 1, 0}, "'time' goes back 2 times and does not advance once: "}}) {
     const Folder folder;
     {
       NetcdfMaker file(folder / "t.nc");

@@ -72,7 +72,7 @@ TEST(Series, TimesToldAgainWithinAFileAreCounted) {
   auto source = open_file(folder / "*.nc");
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().steps.size(), 3U);
-  EXPECT_TRUE(has_note((*source)->info(), "2 times are told again within one file"));
+  EXPECT_TRUE(has_note((*source)->info(), "2 times are repeated within one file"));
   EXPECT_TRUE(has_note((*source)->info(), "1 time lies in more than one file"));
   EXPECT_EQ(first_sample(**source, 1), 2000);
 }

@@ -55,7 +55,7 @@ TEST(HybridLevels, Vinth2pHasThePressuresOfItsFormula) {
   EXPECT_NEAR(z.coordinates[1], 93757.4667948502, 0.01);
   EXPECT_NEAR(z.coordinates[17], 480.9299949556589, 1e-4);
   EXPECT_TRUE(has_note(info, "1000 hPa is taken"));  // P0 is named, but not in the file
-  EXPECT_EQ(reason_of(info, "PS"), "surface pressure: tells the pressure of the levels");
+  EXPECT_EQ(reason_of(info, "PS"), "surface pressure: gives the pressure of the levels");
   EXPECT_EQ(reason_of(info, "hyam"), "coefficient of the levels' pressure");
   ASSERT_NE(info.find("pressure"), nullptr);
   EXPECT_EQ(info.find("pressure")->units, "Pa");

@@ -143,7 +143,7 @@ class Opener {
     const auto fault = [&](const std::string& what) {
       return field.module->file->fault("has a field " + in_quotes(field.object->name) + " " + what);
     };
-    if (field.object->kind != Class::field) return fault("that is no field");
+    if (field.object->kind != Class::field) return fault("that is not a field");
     const auto data = component(field, "data");
     if (!data) return data.error();
     const auto positions = component(field, "positions");
@@ -218,7 +218,7 @@ class Opener {
           "the axes run obliquely through space: they are drawn along the nearest straight ones "
           "with their true spacing");
     }
-    if (first.cells) file_->add_note("values belong to cells: they stand in their middles");
+    if (first.cells) file_->add_note("values belong to cells: they are placed at cell centres");
   }
 
   // The steps of a series one after another.

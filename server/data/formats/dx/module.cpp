@@ -177,8 +177,8 @@ class Parser {
  private:
   void complain(const std::string& what) {
     if (problem_) return;
-    problem_ =
-        out_.file->fault("is no good DX file at byte " + std::to_string(words_.at()) + ": " + what);
+    problem_ = out_.file->fault("is not a valid DX file: byte " + std::to_string(words_.at()) +
+                                ": " + what);
   }
 
   void clause(const Word& word) {

@@ -276,9 +276,9 @@ class Parser {
     }
     const auto first = parse_date(line.words[3]);
     if (!first) {
-      complain(line, in_quotes(line.words[3]) + " is no time as in 00Z02JAN1987");
+      complain(line, in_quotes(line.words[3]) + " is not a time such as 00Z02JAN1987");
     } else if (!parse_increment(line.words[4], out_.clock)) {
-      complain(line, in_quotes(line.words[4]) + " is no increment as in 6hr");
+      complain(line, in_quotes(line.words[4]) + " is not an increment such as 6hr");
     } else {
       out_.clock.first = *first;
     }
@@ -310,7 +310,7 @@ class Parser {
     const std::string_view levels = line.words[1].substr(0, line.words[1].find(','));
     const auto count = bytes::to_integer(levels);
     if (!count || *count < 0 || *count > axis_max) {
-      complain(line, in_quotes(levels) + " is no number of levels");
+      complain(line, in_quotes(levels) + " is not a number of levels");
       return;
     }
     variable.levels = static_cast<std::size_t>(*count);
@@ -319,7 +319,7 @@ class Parser {
     set_structure(line, variable);
     const bool twice = std::any_of(out_.variables.begin(), out_.variables.end(),
                                    [&](const Variable& v) { return v.name == variable.name; });
-    if (twice || variable.name.empty()) complain(line, "the name is there twice or empty");
+    if (twice || variable.name.empty()) complain(line, "the name is empty or occurs twice");
     out_.variables.push_back(std::move(variable));
   }
 

@@ -135,7 +135,7 @@ class Opener {
     } else {
       return file.fault("has " + std::to_string(file.size()) + " bytes, " +
                         in_quotes(input_->name()) + " describes " + std::to_string(described) +
-                        ": the rest is no whole step of " + std::to_string(time_bytes_) +
+                        ": the rest is not a whole step of " + std::to_string(time_bytes_) +
                         " bytes, so that xdef, ydef, vars or headers cannot be right");
     }
     return {};
@@ -214,7 +214,7 @@ class Opener {
     const auto [south, north] = std::minmax_element(y.begin(), y.end());
     const bool globe = *south >= -90.001 && *north <= 90.001 && *west >= -720 && *east <= 720 &&
                        *east - *west <= 360.001;
-    if (!globe) file_->add_note("xdef and ydef are no longitudes and latitudes: plain distances");
+    if (!globe) file_->add_note("xdef and ydef are not longitudes and latitudes: plain distances");
     if (ctl_.yrev) std::reverse(y.begin(), y.end());
     y_ = file_->add_dimension(globe ? "lat" : "y", ctl_.y.count);
     file_->add_axis(y_, {globe ? "degrees_north" : "", "Y", "", ""}, std::move(y));

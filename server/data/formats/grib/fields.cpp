@@ -24,7 +24,7 @@ Error broken(const std::string& what) { return make_error(ErrorKind::bad_data, w
 
 void say_nothing(const codes_context* /*context*/, int /*level*/, const char* /*text*/) {}
 
-// The library keeps tables of its own between calls.
+// The library caches tables between calls.
 class LibraryLock {
  public:
   LibraryLock() : lock_(mutex()) {
@@ -67,7 +67,7 @@ class Message {
                ? value
                : std::numeric_limits<double>::quiet_NaN();
   }
-  // As many numbers as expected; nothing otherwise.
+  // The expected count of numbers; nullopt otherwise.
   [[nodiscard]] std::vector<double> numbers(const char* key, std::size_t expected) const {
     std::size_t count = 0;
     if (codes_get_size(handle_, key, &count) != CODES_SUCCESS || count != expected) return {};

@@ -1,4 +1,4 @@
-// What one GRIB message says of its field, and its numbers in the order of rows and columns.
+// Metadata of one GRIB message, and its values in the order of rows and columns.
 // Everything of ecCodes happens here, under one lock.
 #pragma once
 
@@ -32,7 +32,7 @@ struct Header {
   double level = 0;
   double hours = 0;  // of validity, since 1970-01-01
   bool relative_to_grid = false;
-  std::string grid_key;  // equal for fields whose grids are told by the same bytes
+  std::string grid_key;  // equal for fields whose grid definitions have the same bytes
 };
 
 // Errors: bad_data, a clause without a subject.

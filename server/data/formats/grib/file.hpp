@@ -65,7 +65,8 @@ class File final : public cf::ArrayFile {
   std::string format_;
   std::vector<FieldPlace> places_;
   std::vector<Grid> grids_;
-  std::map<std::string, std::size_t> grid_keys_;  // of their bytes; several may tell one grid
+  std::map<std::string, std::size_t>
+      grid_keys_;  // by their bytes; several keys may describe one grid
   std::vector<Group> groups_;
   std::map<std::size_t, std::vector<int>> grid_dims_;
   std::vector<Content> held_;  // parallel to the variables

@@ -1,4 +1,4 @@
-// Where the fields of a GRIB file lie. The file is run through once, headers only.
+// Byte offsets of the fields of a GRIB file, found by one pass over the headers.
 #pragma once
 
 #include <cstdint>

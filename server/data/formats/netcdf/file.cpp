@@ -135,7 +135,7 @@ std::vector<std::string> groups_below(int root, const std::string& root_path) {
   return paths;
 }
 
-// "but '/a', '/b'": for who named a group that is not there.
+// "but '/a', '/b'": lists the groups present where the requested one is absent.
 std::string there_is(const std::vector<std::string>& groups) {
   constexpr std::size_t told_max = 20;
   if (groups.empty()) return "nor any other";
@@ -368,7 +368,7 @@ Result<void> File::choose_group(const std::string& wanted, const std::vector<std
       return {};
     }
   }
-  return scan_group("");  // which tells why there is nothing
+  return scan_group("");  // reports why no field was found
 }
 
 bool File::has_field() const {
@@ -422,7 +422,7 @@ Result<void> File::scan_dimensions(int group) {
       return fault("is damaged: a dimension cannot be read");
     }
     dimension.name = name.data();
-    // Older versions of the library tell themselves by nothing but dimension scales.
+    // Older versions of the library leave no mark except dimension scales.
     netcdf4_ = netcdf4_ || !is_bare(dimension);
     dimension.unlimited = std::find(unlimited.begin(), unlimited.end(), id) != unlimited.end();
     contents_.dimensions.push_back(std::move(dimension));

@@ -64,7 +64,7 @@ std::string filter_problem(hid_t plan) {
   return {};
 }
 
-// Whether number_of() tells all chunks apart.
+// Whether number_of() is unique for each chunk.
 bool can_be_numbered(const DatasetStorage& storage) {
   std::uint64_t chunks = 1;
   for (std::size_t d = 0; d < storage.chunk.size(); ++d) {

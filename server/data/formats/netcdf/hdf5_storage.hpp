@@ -58,7 +58,7 @@ struct Block {
   const std::vector<std::size_t>& count;
 };
 
-// The file as HDF5 has it; nothing if it cannot be opened. Callers hold the LibraryLock.
+// The HDF5 handle of the file; nullopt if it cannot be opened. Callers hold the LibraryLock.
 Handle open_hdf5(const InputFile& input);
 
 // Chunks of a dataset that were found absent, by number.
@@ -72,7 +72,7 @@ class OpenDataset {
   OpenDataset(const Handle& file, const std::string& path, const DatasetStorage& storage,
               AbsentChunks& absent);
 
-  // How many of the first `most` chunks were never written. Nothing is read.
+  // How many of the first `most` chunks were never written. Reads no data.
   [[nodiscard]] cf::Unwritten count_absent(std::size_t most);
   // Before a block is read. Errors: bad_data where a stored chunk is larger than its array needs.
   Result<void> check(const Block& block);

@@ -1,4 +1,4 @@
-// Told by the names of all arrays together: meep writes no attributes.
+// Recognised by the names of all arrays together: meep writes no attributes.
 #include "server/data/formats/netcdf/meep.hpp"
 
 #include <algorithm>

@@ -17,7 +17,7 @@ namespace {
 // Of all variables together, or one chunk (resident.cpp estimates with it).
 constexpr double kept_bytes_max = 128 << 20;
 
-// A scalar has no extent, but the library still wants a place to look at.
+// A scalar has no extent, but the library requires a valid pointer.
 const std::size_t* place(const std::vector<std::size_t>& lengths) {
   static constexpr std::size_t none = 0;
   return lengths.empty() ? &none : lengths.data();

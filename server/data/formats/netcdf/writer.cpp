@@ -33,7 +33,7 @@ constexpr float fill_value = NC_FILL_FLOAT;
 
 struct OutVariable {
   std::string name;
-  std::size_t field = 0;      // whose volume holds it
+  std::size_t field = 0;      // index of the field whose volume contains it
   std::size_t component = 0;  // which array of that volume
   int id = -1;
 };
@@ -61,7 +61,7 @@ struct AxisWords {
   std::string positive;
 };
 
-// What an axis says of itself, with CF's words where it is silent.
+// Attributes of an axis, with those of CF where it has none.
 AxisWords words_of(const Axis& axis, std::size_t which) {
   constexpr std::array<const char*, 3> axis_letters{"X", "Y", "Z"};
   AxisWords words{axis_letters.at(which), axis.standard_name, axis.units, ""};
@@ -119,7 +119,7 @@ std::string component_standard_name(const DatasetInfo& info, const FieldInfo& fi
   return std::string(is_omega ? omega_name : "upward_air_velocity");
 }
 
-// Every variable of every field once: a vector's components, then the scalars not among them.
+// Every variable of every field once: components of vectors, then the remaining scalars.
 std::vector<OutVariable> plan_variables(const DatasetInfo& info) {
   std::vector<OutVariable> out;
   for (const FieldKind kind : {FieldKind::vector, FieldKind::scalar}) {
@@ -140,7 +140,7 @@ std::vector<OutVariable> plan_variables(const DatasetInfo& info) {
   return out;
 }
 
-// The library says "HDF error" where the disk is full.
+// The library reports "HDF error" where the disk is full.
 Error with_room_left(Error error, const std::string& path) {
   std::error_code fault;
   const auto room = std::filesystem::space(std::filesystem::path(path).parent_path(), fault);
@@ -235,7 +235,7 @@ class Writer {
     return status_;
   }
 
-  // A dimension of time is only written where the data have one to tell.
+  // A time dimension is written only where the data have times.
   void define_time() {
     if (info_.steps.size() < 2 && info_.time_units.empty()) {
       return;

@@ -276,7 +276,7 @@ class Placer {
                        [&](const PlacedAxis& axis) { return axis.name == name; });
   }
 
-  // Labels where they tell axes apart, else x, y, z in the order of the file or of space.
+  // Labels where they are distinct, else x, y, z in the order of the file or of space.
   void name_axes() {
     std::size_t next = 0;
     for (std::size_t a = 0; a < rank(); ++a) {
@@ -293,7 +293,7 @@ class Placer {
       axis.name =
           header.label.empty() || is_taken(header.label) ? world_names.at(place) : header.label;
       while (is_taken_by_other(axis)) axis.name += '_';
-      // A label may tell more than the order does: "lon", "z", ...
+      // A label may be more specific than the order: "lon", "z", ...
       if (header.label.empty()) axis.world = static_cast<int>(place);
     }
   }

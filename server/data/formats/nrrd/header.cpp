@@ -1,4 +1,4 @@
-// Lines -> fields -> Header. `dimension` is wanted first by the format and looked for first here.
+// Lines -> fields -> Header. `dimension` must be first in the format and is processed first.
 #include "server/data/formats/nrrd/header.hpp"
 
 #include <algorithm>
@@ -71,7 +71,7 @@ constexpr auto type_names = std::to_array<TypeName>({
     {"double", bytes::Scalar::float64},
 });
 
-// Fields that say nothing about where and what the samples are.
+// Fields without effect on position and meaning of the samples.
 constexpr auto ignored_fields = std::to_array<std::string_view>(
     {"number", "min", "max", "old min", "oldmin", "old max", "oldmax", "thicknesses"});
 
@@ -101,7 +101,7 @@ class Parser {
  private:
   void complain(const Line& line, const std::string& what) {
     if (!problem_.empty()) return;
-    problem_ = "is no good NRRD: line " + std::to_string(line.number) + " (";
+    problem_ = "is not a valid NRRD file: line " + std::to_string(line.number) + " (";
     problem_ += printable(line.key, 40);
     problem_ += "): " + what;
   }
@@ -130,7 +130,8 @@ class Parser {
         complain({number, "", line}, "neither a field nor a comment");
         return;
       }
-      if (colon + 1 < line.size() && line[colon + 1] == '=') continue;  // a key of somebody's own
+      if (colon + 1 < line.size() && line[colon + 1] == '=')
+        continue;  // a key/value pair defined by the user
       lines_.push_back({number, line.substr(0, colon), trim(line.substr(colon + 1))});
       const Line& last = lines_.back();
       if (is_data_file(last) && last.value.starts_with("LIST")) list(last);
@@ -152,7 +153,7 @@ class Parser {
   void file_dimension(const Line& line, std::string_view word) {
     const auto count = bytes::to_integer(word);
     if (!count || *count < 1 || *count > dimension_max) {
-      complain(line, "the dimension of a data file is no small number");
+      complain(line, "the dimension of a data file is not a small number");
     } else {
       header_.file_dimension = static_cast<std::size_t>(*count);
     }
@@ -207,7 +208,7 @@ class Parser {
     const auto words = one_each(line);
     for (std::size_t a = 0; a < words.size(); ++a) {
       const auto value = bytes::to_double(words[a]);
-      if (!value || std::isinf(*value)) complain(line, in_quotes(words[a]) + " is no number");
+      if (!value || std::isinf(*value)) complain(line, in_quotes(words[a]) + " is not a number");
       header_.axes[a].*member = value.value_or(not_given);
     }
   }
@@ -218,7 +219,7 @@ class Parser {
     std::string_view rest = line.value;
     while (!(rest = trim(rest)).empty()) {
       if (rest.front() != '"') {
-        complain(line, "text must stand between double quotes");
+        complain(line, "text must be in double quotes");
         return out;
       }
       std::string text;
@@ -252,7 +253,7 @@ class Parser {
       const auto words = one_each(line);
       for (std::size_t a = 0; a < words.size(); ++a) {
         const auto size = bytes::to_integer(words[a]);
-        if (!size || *size < 1) complain(line, in_quotes(words[a]) + " is no size");
+        if (!size || *size < 1) complain(line, in_quotes(words[a]) + " is not a size");
         header_.axes[a].size =
             static_cast<std::uint64_t>(std::max<std::int64_t>(1, size.value_or(1)));
       }
@@ -287,7 +288,7 @@ class Parser {
     return true;
   }
 
-  // "(1,0,0) none (0,1,0)": nothing where it cannot be read.
+  // "(1,0,0) none (0,1,0)": nullopt if malformed.
   std::optional<std::vector<std::vector<double>>> vectors(std::string_view text) {
     std::vector<std::vector<double>> out;
     while (!(text = trim(text)).empty()) {
@@ -350,9 +351,9 @@ class Parser {
     if (at != type_names.end()) {
       header_.type = at->type;
     } else if (name == "block") {
-      complain(line, "blocks of bytes are no numbers");
+      complain(line, "blocks of bytes are not numbers");
     } else {
-      complain(line, in_quotes(name) + " is no type of NRRD");
+      complain(line, in_quotes(name) + " is not a NRRD type");
     }
   }
 
@@ -367,7 +368,7 @@ class Parser {
     } else if (name == "bzip2" || name == "bz2") {
       complain(line, "bzip2 is not read; save it with encoding gzip or raw");
     } else {
-      complain(line, in_quotes(name) + " is no encoding of NRRD");
+      complain(line, in_quotes(name) + " is not a NRRD encoding");
     }
   }
 

@@ -48,7 +48,7 @@ class Watch {
     } else if (event == json::parse_event_t::key &&
                !keys_.back().insert(parsed.get<std::string>()).second) {
       throw Refused{"the document: the key " + in_quotes(parsed.get<std::string>()) +
-                    " is there twice in one object"};
+                    " occurs twice in one object"};
     }
     return true;
   }
@@ -57,7 +57,7 @@ class Watch {
   std::vector<std::set<std::string>> keys_;
 };
 
-// An object of the document and where it stands.
+// An object of the document and its JSON pointer.
 class Object {
  public:
   Object(const json& value, std::string pointer, std::initializer_list<std::string_view> keys)
@@ -232,7 +232,7 @@ AxisText axis_of(const json& value, const std::string& pointer, std::size_t coun
                                               std::to_string(listed.size()));
     }
     if (object.has("first") || object.has("spacing")) {
-      refuse(pointer, "has coordinates and first or spacing: only one of both may be there");
+      refuse(pointer, "has coordinates and first or spacing: give only one of them");
     }
     return out;
   }
@@ -280,8 +280,7 @@ void set_steps(const Object& root, Document& out) {
     auto& listed = out.times.listed;
     listed = Object::numbers_of(steps.at("coordinates"), steps.below("coordinates"), count);
     if (listed.size() != count || steps.has("start") || steps.has("step")) {
-      refuse(steps.below("coordinates"),
-             "must have count numbers, and stand without start and step");
+      refuse(steps.below("coordinates"), "must have count numbers, and excludes start and step");
     }
     return;
   }
@@ -304,7 +303,7 @@ void set_fields(const Object& root, Document& out, const Field& defaults) {
     if (own.empty()) own.push_back(field.name);
     for (const std::string& name : own) {
       if (name.empty() || !names.insert(name).second) {
-        refuse(here, "the name " + in_quotes(name) + " is empty or there twice");
+        refuse(here, "the name " + in_quotes(name) + " is empty or occurs twice");
       }
     }
     if (field.files.names.empty() && out.files.names.empty()) {
@@ -355,7 +354,7 @@ Result<Document> parse_document(const InputFile& file) {
   } catch (const Refused& refused) {
     return file.fault("is refused: " + refused.what);
   } catch (const json::exception& fault) {
-    return file.fault("is no good JSON: " + printable(fault.what()));
+    return file.fault("is not valid JSON: " + printable(fault.what()));
   }
 }
 

@@ -1,4 +1,4 @@
-// Which files hold which steps, and where each component lies within a step.
+// Maps steps to files, and components to byte offsets within a step.
 #include "server/data/formats/raw/file.hpp"
 
 #include <algorithm>
@@ -52,7 +52,7 @@ class Opener {
     std::uint64_t step_bytes;
   };
 
-  // What the description says of a file, over all fields in it.
+  // Layout that the description declares for a file, over all its fields.
   struct Extent {
     std::uint64_t size = 0;
     std::uint64_t described = 0;                 // bytes up to the end of the last step
@@ -70,12 +70,12 @@ class Opener {
       const auto step = std::find_if(extent.step_bytes.begin(), extent.step_bytes.end(),
                                      [&](std::uint64_t bytes) { return rest % bytes == 0; });
       if (step == extent.step_bytes.end()) {
-        return make_error(ErrorKind::bad_data,
-                          in_quotes(name) + " has " + std::to_string(extent.size) + " bytes, " +
-                              in_quotes(input_->name()) + " describes " +
-                              std::to_string(extent.described) + ": the rest is no whole step of " +
-                              std::to_string(extent.step_bytes.front()) +
-                              " bytes, so that dims or type cannot be right");
+        return make_error(
+            ErrorKind::bad_data,
+            in_quotes(name) + " has " + std::to_string(extent.size) + " bytes, " +
+                in_quotes(input_->name()) + " describes " + std::to_string(extent.described) +
+                ": the rest is not a whole step of " + std::to_string(extent.step_bytes.front()) +
+                " bytes, so that dims or type cannot be right");
       }
       if (++longer > 1) continue;
       const std::uint64_t steps = rest / *step;

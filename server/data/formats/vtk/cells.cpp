@@ -241,7 +241,7 @@ SlantedBox::SlantedBox(Shape shape, const Corners& corners)
     edges[0][2] = edges[1][2] = 0;
     edges[2] = {0, 0, 1};
   }
-  // Their directions alone count; products of long ones might overflow.
+  // Only the directions matter; products of long vectors might overflow.
   for (Point& edge : edges) {
     const double most = std::max({std::abs(edge[0]), std::abs(edge[1]), std::abs(edge[2])});
     for (double& part : edge) part = most > 0 ? part / most : 0;
@@ -269,7 +269,7 @@ SlantedBox::SlantedBox(Shape shape, const Corners& corners)
   }
 }
 
-// A slab without a direction bounds nothing.
+// A slab without a direction bounds no volume.
 std::array<std::size_t, 2> SlantedBox::along_row(const Point& from, double step,
                                                  std::size_t count) const {
   const Point place = minus(from, origin_);

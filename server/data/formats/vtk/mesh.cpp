@@ -71,7 +71,7 @@ class Counts {
     }
     const double value = block_[used_++];
     if (!(value >= 0 && value < 9e15)) {
-      return file_->fault("is broken: its cells have a number that is no index");
+      return file_->fault("is broken: its cells have a number that is not an index");
     }
     return static_cast<std::uint64_t>(value);
   }
@@ -181,7 +181,7 @@ class PieceCells {
   }
 
  private:
-  // XML does not tell how many indices there are: the last offset does.
+  // XML does not state the number of indices: the last offset does.
   Result<void> open_offsets(std::optional<Counts>& offsets) {
     StoredArray array = *piece_.offsets;
     offsets.emplace(file_, array);

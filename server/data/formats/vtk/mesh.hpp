@@ -42,7 +42,7 @@ Result<Mesh> read_mesh(const std::shared_ptr<const InputFile>& file, const Snaps
 // Differs if points or cells do; before forget_points().
 std::string digest_of_mesh(const Mesh& mesh);
 
-// What the ghost array among a piece's point or cell data says; empty if there is none.
+// Content of the ghost array among a piece's point or cell data; empty if absent.
 Result<std::vector<double>> read_ghosts(const std::shared_ptr<const InputFile>& file,
                                         const std::vector<StoredArray>& arrays);
 // Whether one of its values has one of these bits.

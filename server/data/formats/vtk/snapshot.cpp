@@ -15,7 +15,7 @@ constexpr auto count_max = static_cast<std::int64_t>(cf::samples_max);
 // Pieces of one cell share each point with seven others, and may have layers of ghosts besides.
 constexpr std::uint64_t overlap_max = 64;
 
-// The product, or nothing if it is beyond what is read.
+// The product, or nullopt beyond the supported size.
 std::optional<std::uint64_t> product(const std::array<std::int64_t, 3>& counts) {
   std::uint64_t all = 1;
   for (const std::int64_t count : counts) {
@@ -94,7 +94,7 @@ Result<void> check_data(const std::shared_ptr<const InputFile>& file, Snapshot& 
   return {};
 }
 
-// Coordinates and cells that the kind asks for.
+// Coordinates and cells that the kind requires.
 Result<void> check_geometry(const std::shared_ptr<const InputFile>& file, const Snapshot& snapshot,
                             const Piece& piece) {
   const auto counts = piece.extent.points();

@@ -84,7 +84,7 @@ struct Collection {
   };
   std::vector<Member> members;
 };
-// Nothing if the file is no collection. Errors: bad_data.
+// nullopt if the file is not a collection. Errors: bad_data.
 Result<std::optional<Collection>> read_collection(const std::shared_ptr<const InputFile>& file);
 
 // Sets the counts of a piece's points and cells from its extent, and checks every array against

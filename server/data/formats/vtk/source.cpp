@@ -41,7 +41,7 @@ Result<Snapshot> read_snapshot(const FilePtr& file) {
   if (!head) return head.error();
   if (is_legacy(*head)) return read_legacy(file);
   if (is_xml(*head)) return read_xml(file);
-  return file->fault("is no VTK file");
+  return file->fault("is not a VTK file");
 }
 
 const StoredArray* find_array(const std::vector<StoredArray>& arrays, const std::string& name) {

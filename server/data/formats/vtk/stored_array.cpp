@@ -136,7 +136,7 @@ class ArrayReader::Stream {
     return file_->fault("is broken: the array " + in_quotes(array_.name) + " " + what);
   }
 
-  // How many bytes the room can hold once base64 is undone.
+  // Number of bytes available after base64 decoding.
   [[nodiscard]] std::uint64_t capacity() const {
     return array_.encoding == Encoding::base64 ? array_.room / 4 * 3 + 3 : array_.room;
   }

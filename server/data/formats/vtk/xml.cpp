@@ -78,7 +78,7 @@ std::vector<std::string_view> words(std::string_view text) {
   return out;
 }
 
-// Exactly N numbers, or nothing.
+// Exactly N numbers, or nullopt.
 template <class T, std::size_t N, class Parse>
 bool parse_list(std::string_view text, std::array<T, N>& out, const Parse& parse) {
   const auto found = words(text);
@@ -100,7 +100,7 @@ std::optional<bytes::Scalar> type_named(std::string_view name) {
   return static_cast<bytes::Scalar>(at - names.begin());
 }
 
-// Reads one document. Its text lives as long as this.
+// Reads one document. Its text must outlive this object's views, so it is owned here.
 class Document {
  public:
   explicit Document(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}
@@ -225,12 +225,12 @@ class Document {
     };
     if (!list("Origin", out.origin) || !list("Spacing", out.spacing) ||
         !list("Direction", out.direction)) {
-      return file_->fault("has an Origin, Spacing or Direction that is no list of numbers");
+      return file_->fault("has an Origin, Spacing or Direction that is not a list of numbers");
     }
     return {};
   }
 
-  // Where an array's values lie; nothing, with the reason, for what is not read.
+  // Location of an array's values; nullopt, with the reason, where unsupported.
   Result<std::optional<StoredArray>> array_of(const xml_node& node, std::uint64_t tuples,
                                               Snapshot& out) {
     StoredArray array;
@@ -333,7 +333,7 @@ class Document {
     }
     if (auto done = read_axes(node.child("Coordinates"), out, piece); !done) return done;
     if (auto done = read_cells(node.child("Cells"), out, piece); !done) return done;
-    // An empty piece is how writers with many processes say that one had nothing.
+    // Parallel writers emit an empty piece for a process without cells.
     if (points > 0) out.pieces.push_back(std::move(piece));
     return {};
   }
@@ -421,7 +421,7 @@ Result<std::optional<Collection>> read_collection(const std::shared_ptr<const In
     const auto time = text ? bytes::to_sample(trim(text.value()))
                            : std::optional(static_cast<double>(out.members.size()));
     if (name.empty() || !time || !std::isfinite(*time)) {
-      return file->fault("has a DataSet without a file, or with a timestep that is no number");
+      return file->fault("has a DataSet without a file, or with a timestep that is not a number");
     }
     out.members.push_back({*time, name});
   }

@@ -93,7 +93,7 @@ Result<Bytes> decompress(Compressor compressor, Bytes stored, std::size_t bytes)
   return out;
 }
 
-// All first bytes of the elements stand together, then all second ones.
+// Shuffle: all first bytes of the elements, then all second bytes, and so on.
 Bytes unshuffle(const Bytes& in, std::size_t element_bytes) {
   Bytes out(in.size());
   const std::size_t count = in.size() / element_bytes;

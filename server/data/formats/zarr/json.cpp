@@ -56,7 +56,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
 
   bool parse_error(std::size_t position, const std::string& /*token*/,
                    const nlohmann::detail::exception& /*fault*/) override {
-    fault_ = "it is no JSON at byte " + std::to_string(position);
+    fault_ = "it is not valid JSON at byte " + std::to_string(position);
     return false;
   }
 
@@ -107,7 +107,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
 
   std::vector<Open> stack_;
   Json root_;
-  std::string fault_ = "it is no JSON";
+  std::string fault_ = "it is not valid JSON";
 };
 
 // Puts the three bare words between quotes.
@@ -148,7 +148,7 @@ const Json* Json::find(std::string_view key) const {
 Result<Json> parse_json(std::string_view text) {
   // The parser takes a NUL for the end of its input.
   if (text.find('\0') != std::string_view::npos) {
-    return make_error(ErrorKind::bad_data, "it is no JSON: it has a NUL");
+    return make_error(ErrorKind::bad_data, "it is not valid JSON: it has a NUL");
   }
   const std::string plain = quote_bare_words(text);
   TreeBuilder builder;

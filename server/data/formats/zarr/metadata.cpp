@@ -1,4 +1,4 @@
-// Every member of .zarray is looked at before a byte is reserved for what it promises.
+// Every member of .zarray is validated before memory is reserved for it.
 #include "server/data/formats/zarr/metadata.hpp"
 
 #include <algorithm>
@@ -44,7 +44,7 @@ Result<std::vector<std::size_t>> lengths(const Json& json, const char* key, std:
   return out;
 }
 
-// The empty optional for what is no plain number.
+// nullopt for anything but a plain number.
 std::optional<Dtype> parse_dtype(const Json* json) {
   if (json == nullptr || json->kind != Json::Kind::text || json->text.size() != 3) return {};
   const std::string_view text = json->text;
@@ -61,7 +61,7 @@ std::optional<Dtype> parse_dtype(const Json* json) {
   return fits ? std::optional(out) : std::nullopt;
 }
 
-// A type that is left out, told by its name.
+// An unsupported data type, reported by name.
 std::string why_no_number(const Json* json) {
   if (json == nullptr || json->kind != Json::Kind::text) return "of a structured type";
   const std::string& text = json->text;
@@ -99,7 +99,7 @@ bool same(const Dtype& a, const Dtype& b) {
   return a.kind == b.kind && a.bytes == b.bytes && a.big_endian == b.big_endian;
 }
 
-// Filters that round as they encode have nothing to undo.
+// Filters that only round on encoding need no decoding.
 bool is_undone_already(const Json& json) {
   const std::string id = id_of(json);
   const Json* decoded = json.find("dtype");
@@ -108,7 +108,7 @@ bool is_undone_already(const Json& json) {
                               (encoded == nullptr || encoded->text == decoded->text));
 }
 
-// Whether we undo the filter; it is told in `out` then.
+// Whether the filter is supported; if so it is added to `out`.
 bool parse_filter(const Json& json, Filter& out) {
   const std::string id = id_of(json);
   if (id == "shuffle") {
@@ -145,7 +145,7 @@ bool parse_filter(const Json& json, Filter& out) {
 void parse_filters(const Json* json, ArrayMetadata& out) {
   if (json == nullptr || json->kind == Json::Kind::null) return;
   if (json->kind != Json::Kind::list || json->list.size() > filters_max) {
-    out.problem = "its filters are no list of at most " + std::to_string(filters_max);
+    out.problem = "its filters are not a list of at most " + std::to_string(filters_max);
     return;
   }
   Dtype now = out.dtype;
@@ -153,7 +153,7 @@ void parse_filters(const Json* json, ArrayMetadata& out) {
     if (is_undone_already(entry)) continue;
     Filter filter;
     const bool typed = parse_filter(entry, filter);
-    // A chain of filters must hand on what the next one takes.
+    // The output type of a filter must be the input type of the next.
     if (!typed || (filter.kind != Filter::Kind::shuffle && !same(filter.decoded, now))) {
       out.problem = "encoded with the filter " + in_quotes(id_of(entry)) + " in a way not read";
       return;
@@ -233,7 +233,7 @@ Result<ArrayMetadata> parse_array(const Json& json) {
   if (const Json* fill = json.find("fill_value"); fill != nullptr) {
     out.fill_value = as_number(*fill);
     if (!out.fill_value && fill->kind != Json::Kind::null) {
-      return broken_metadata("'fill_value' is no number");
+      return broken_metadata("'fill_value' is not a number");
     }
   }
   return out;

@@ -1,4 +1,4 @@
-// What .zarray says of an array, as plain data, checked. Json -> ArrayMetadata.
+// Contents of .zarray as plain, validated data. Json -> ArrayMetadata.
 #pragma once
 
 #include <cstddef>

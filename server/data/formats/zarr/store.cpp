@@ -1,4 +1,4 @@
-// What the store says of itself: arrays, dimensions, attributes.
+// Metadata of the store: arrays, dimensions, attributes.
 #include "server/data/formats/zarr/store.hpp"
 
 #include <algorithm>
@@ -82,7 +82,7 @@ Result<Json> Store::read_json(const std::string& path) {
   identity_ += path + ' ' + (*input)->identity() + '\n';
   auto json = parse_json(text);
   if (!json) return broken_store(path, json.error().message);
-  if (json->kind != Json::Kind::object) return broken_store(path, "it is no JSON object");
+  if (json->kind != Json::Kind::object) return broken_store(path, "it is not a JSON object");
   return json;
 }
 
@@ -192,7 +192,7 @@ void Store::name_dimensions(Array& array) const {
     const std::set<std::string> distinct(array.dimensions.begin(), array.dimensions.end());
     array.named_dimensions = names->list.size() == shape.size() && distinct.size() == shape.size();
     if (array.named_dimensions) return;
-    array.metadata.problem = "its _ARRAY_DIMENSIONS are no names, one for each dimension";
+    array.metadata.problem = "its _ARRAY_DIMENSIONS are not names, one for each dimension";
   }
   array.dimensions.clear();
   for (std::size_t d = 0; d < shape.size(); ++d) {
@@ -281,7 +281,7 @@ void Store::identify() {
     if (array.metadata.problem.empty()) chunks += chunk_count(array.metadata);
   }
   const std::uint64_t step = std::max<std::uint64_t>(1, chunks / stamped_chunks_max);
-  std::uint64_t next = 0;  // counted from the array at hand
+  std::uint64_t next = 0;  // counted from the current array
   for (const Array& array : arrays_) {
     if (!array.metadata.problem.empty()) continue;
     const std::uint64_t here = chunk_count(array.metadata);
