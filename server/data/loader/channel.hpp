@@ -22,7 +22,7 @@ enum class Kind : std::uint32_t {
   names,
   yes,
   no,  // with an error, or empty
-  // loader -> daemon: questions
+  // loader -> daemon: requests
   ask_open,
   ask_list,
   ask_exists,
@@ -35,11 +35,11 @@ enum class Kind : std::uint32_t {
 };
 
 using Clock = std::chrono::steady_clock;
-using Deadline = std::optional<Clock::time_point>;  // none: however long it takes
+using Deadline = std::optional<Clock::time_point>;  // none: unlimited
 
 enum class Fate {
   done,
-  closed,  // by the other side, at whatever point
+  closed,  // by the peer, at any point
   late,
   broken,  // the bytes received are not a message, or exceed its limit
 };
@@ -53,10 +53,10 @@ struct Frame {
   std::uint64_t bytes = 0;
 };
 
-// These allocate nothing, so that a signal handler may call them. `descriptor` -1: none goes along.
+// Async-signal-safe: no allocation. `descriptor` -1: none is sent.
 Fate send_message(int socket, Kind kind, const char* payload, std::size_t bytes, int descriptor,
                   const Deadline& deadline);
-// Exactly `bytes`; a descriptor that comes along is closed unless there is a place for it.
+// Exactly `bytes`; a received descriptor is closed unless `descriptor` is given.
 Fate receive_bytes(int socket, char* out, std::size_t bytes, Descriptor* descriptor,
                    const Deadline& deadline);
 
@@ -68,7 +68,7 @@ struct Message {
 
 enum class Descriptors { refused, taken };
 
-// Payloads are taken up as they arrive: what a frame announces is not allocated ahead.
+// Payloads are allocated as they arrive, not by the length that a frame announces.
 Fate receive_message(int socket, Message& out, std::size_t bytes_max, Descriptors descriptors,
                      const Deadline& deadline);
 

@@ -1,4 +1,4 @@
-// The loader's side: task -> confined -> opened -> reads, one after another, until the socket
+// Loader side: task -> confined -> opened -> reads, one after another, until the socket
 // closes. File errors are sent as answers; channel errors end the process.
 #include <fcntl.h>
 #include <malloc.h>
@@ -47,7 +47,7 @@ void hear(Message& out) {
   }
 }
 
-// Files that the daemon opens: questions out, descriptors in.
+// Files that the daemon opens: sends requests, receives descriptors.
 class BrokeredFiles final : public Files {
  public:
   explicit BrokeredFiles(Location location) : location_(std::move(location)) {}
@@ -85,7 +85,7 @@ class BrokeredFiles final : public Files {
   Location location_;
 };
 
-// Calls `work`; what it throws is an error too.
+// Calls `work`; exceptions become errors.
 template <class Work>
 auto guarded(const Work& work) -> decltype(work()) {
   try {
@@ -113,9 +113,9 @@ Result<void> fill(FileSource& source, std::size_t field, std::size_t step, const
   return {};
 }
 
-// Libraries take and give back buffers of a chunk's size at every read. Given back to the system
-// their pages would be cleared and mapped anew each time, which took a third of the time of a read.
-// Where there is little memory that is what it costs.
+// Libraries allocate and free chunk-sized buffers at every read. If these were returned to the
+// system, clearing and mapping the pages anew would take a third of the read time. With little
+// memory that cost is accepted.
 void keep_freed_memory(std::uint64_t memory_bytes) {
   constexpr std::uint64_t mapped_from = 32U << 20U;  // the most that glibc allows
   constexpr std::uint64_t kept = 48U << 20U;
@@ -191,9 +191,9 @@ class Loader {
   Clock::time_point told_;
 };
 
-// Ends this process with the daemon, even while it reads: the daemon's end of the pipe closes, and
-// SIGIO ends who does not handle it. (The signal on a parent's death is no help here: it comes with
-// the end of the thread that started us.)
+// Ends this process with the daemon, even during a read: the daemon's end of the pipe closes, and
+// the default action of SIGIO ends the process. (The parent death signal is unsuitable: it is sent
+// when the thread that started the process ends.)
 bool end_with_daemon() {
   if (::fcntl(life_of_loader, F_SETOWN, ::getpid()) != 0) return false;
   const int flags = ::fcntl(life_of_loader, F_GETFL);
@@ -218,7 +218,7 @@ int run() {
     Message message;
     const Fate fate =
         receive_message(socket_of_loader, message, answer_bytes_max, Descriptors::taken, {});
-    if (fate == Fate::closed) ::_exit(0);  // without the last acts of libraries and sanitizers
+    if (fate == Fate::closed) ::_exit(0);  // skip exit handlers of libraries and sanitizers
     if (fate != Fate::done) leave();
     if (message.kind == Kind::open) {
       loader.open(message.payload);

@@ -1,5 +1,5 @@
 // Daemon side: sends a call, serves the loader's requests, validates its answer.
-// Whatever else happens ends that loader and is an error of the call.
+// Any other event ends the loader and is an error of the call.
 #include <fcntl.h>
 #include <linux/openat2.h>
 #include <sys/stat.h>
@@ -83,7 +83,7 @@ struct RemoteSource::State {
     std::chrono::milliseconds time{};
   };
 
-  // What a call may still take.
+  // Remaining time of a call.
   struct Patience {
     Clock::time_point end;
     Clock::time_point moved = Clock::now();  // time of the last message or progress of the loader
@@ -102,18 +102,19 @@ struct RemoteSource::State {
   DatasetInfo info;
   std::string digest;  // of the info as received
   std::vector<Companion> companions;
-  std::uint64_t opened_bytes = 0;  // of the files that were opened to open the dataset
+  std::uint64_t opened_bytes = 0;  // of the files read to open the dataset
   Progress progress;
-  std::shared_ptr<Files> files;  // while there is a loader
+  std::shared_ptr<Files> files;  // set while a loader runs
   Process process;
-  std::optional<Transfer> transfer;  // as the loader has it mapped
+  std::optional<Transfer> transfer;  // as mapped by the loader
   Reservation process_memory;
-  Reservation transfer_memory;  // where it is kept: else it is the volume's that comes
+  Reservation transfer_memory;  // of a transfer that is reused; otherwise it belongs to the volume
+                                // being read
   std::mutex mutex;             // of the two below
   bool under_way = false;
   bool cancelled = false;
 
-  // Starts a loader and has it open the dataset: the info, encoded.
+  // Starts a loader, which opens the dataset; returns the encoded info.
   Result<std::string> start() {
     release();
     const std::string path = program_path();
@@ -139,7 +140,7 @@ struct RemoteSource::State {
         call({Kind::open, encode_task(task), -1, Kind::opened, "opening it", limits.open_time});
     if (!answer) {
       Error error = answer.error();
-      // Without files the loader has been ended already, for want of room beside others.
+      // Without files the loader has already ended for lack of memory.
       if (files && error.kind == ErrorKind::out_of_memory) error.message += opening_limit();
       release();
       return error;
@@ -173,7 +174,7 @@ struct RemoteSource::State {
     process.kill();
   }
 
-  // There is a loader that has opened what was opened at first.
+  // Ensures a running loader with the same files open as at first.
   Result<void> be_ready() {
     if (process.runs()) return {};
     auto encoded = start();
@@ -229,8 +230,8 @@ struct RemoteSource::State {
     return std::min(patience.end, Clock::now() + limits.stall_time);
   }
 
-  // Until a message begins. Processor time is progress, for a reader may compute for long. Errors:
-  // out_of_memory, for readers grow while they read.
+  // Waits for the next message. Processor time counts as progress, since a reader may compute for
+  // long. Errors: out_of_memory, since readers allocate while they read.
   [[nodiscard]] Result<Fate> wait(Patience& patience) {
     constexpr std::chrono::milliseconds look_every{50};
     constexpr std::chrono::seconds pause_min{1};
@@ -240,7 +241,7 @@ struct RemoteSource::State {
       const auto cpu = process.cpu_time();
       if (cpu != patience.cpu) patience.moved = now;
       patience.cpu = cpu;
-      // Where this process was stopped as well, that is no time in which the loader stood still.
+      // Time during which this process was stopped as well does not count as a stall.
       if (now - patience.looked > pause_min) patience.moved += now - patience.looked;
       patience.looked = now;
       const auto end = std::min(patience.end, patience.moved + limits.stall_time);
@@ -330,8 +331,7 @@ struct RemoteSource::State {
            in_quotes(location.members.empty() ? location.stem : location.members.front().name);
   }
 
-  // Memory for the transfer that stays for the next one is quicker, but only where volumes do not
-  // need the room.
+  // Reusing the transfer memory is faster, but only where volumes do not need the room.
   bool is_worth_keeping(std::uint64_t bytes) {
     constexpr std::uint64_t share = 8;
     if (bytes > Transfer::kept_bytes_max) return false;
@@ -341,7 +341,7 @@ struct RemoteSource::State {
 
   Result<Volume> read(std::size_t field, std::size_t step) {
     if (auto ready = be_ready(); !ready) return ready.error();
-    // A loader that was only just started was none yet that cancel() could end.
+    // cancel() could not end a loader that was just being started.
     if (is_cancelled()) return make_error(ErrorKind::cancelled, "reading was cancelled");
     const FieldInfo& about = info.fields[field];
     Volume volume;
@@ -368,9 +368,9 @@ struct RemoteSource::State {
               limits.read_time};
     what.time += std::chrono::milliseconds(bytes * 1000 / limits.read_bytes_per_second);
     if (auto done = call(what); !done) {
-      // What a loader has written to memory that is not kept goes with the loader.
+      // Pages written by the loader are released with the loader unless the transfer is reused.
       if (transfer && !transfer->is_kept()) release();
-      if (is_new) drop_transfer();  // whether the loader has it mapped is not known
+      if (is_new) drop_transfer();  // the loader may or may not have mapped it
       return done.error();
     }
     volume.values = transfer->take(floats);
@@ -418,7 +418,7 @@ Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits) {
   auto state = std::make_unique<RemoteSource::State>(std::move(location), std::move(limits));
   auto encoded = state->start();
   if (!encoded) return encoded.error();
-  if (!state->count_memory()) state->release();  // it has answered, and another can be started
+  if (!state->count_memory()) state->release();  // after its answer it can be restarted
   auto info = decode_info(*encoded);
   if (!info) return info.error();
   state->info = std::move(*info);

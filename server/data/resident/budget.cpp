@@ -1,4 +1,4 @@
-// One map of what is kept, one list in the order of use.
+// One map of resident volumes, one list in order of use.
 #include "server/data/resident/budget.hpp"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace windsplat::data {
 
 namespace {
 
-// Others wait for the answer, so there is one whatever happens.
+// Other threads wait for the result, so exceptions become errors.
 Result<Resident> made(const Budget::Make& make) {
   try {
     return make();
@@ -316,7 +316,7 @@ void Budget::list_again() {
   }
 }
 
-// While one in turn waits: only what is there beside all that it needs.
+// While a load in turn waits, others get only the room beyond its needs.
 bool Budget::make_room_beside_turn(std::uint64_t bytes, Urgency urgency) {
   if (!in_turn_waits_) return make_room(bytes, urgency);
   const bool fits = turn_needs_ <= bytes_max_ && bytes <= bytes_max_ - turn_needs_;
@@ -369,7 +369,7 @@ bool Budget::make_room(std::uint64_t bytes, Urgency urgency) {
   if (used_ <= bytes_max_ - bytes) {
     return true;
   }
-  // Only evict if that will do: a request that fails must not empty the cache for others.
+  // Evict only if that makes enough room: a failed request must not empty the cache.
   if (used_ - evictable_for(urgency) > bytes_max_ - bytes) {
     return false;
   }

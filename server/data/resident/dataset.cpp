@@ -1,4 +1,4 @@
-// One dataset's volumes: from the budget's cache, or read, unpacked or averaged into it.
+// Volumes of one dataset: cached in the budget, or read, unpacked or averaged into it.
 #include "server/data/resident/dataset.hpp"
 
 #include <algorithm>
@@ -31,7 +31,7 @@ Result<VolumePtr> as_volume(const Result<Resident>& kept) {
   return std::static_pointer_cast<const Volume>(*kept);
 }
 
-// What grows with the file in the description of a dataset.
+// Bytes of the dataset description that grow with the file.
 std::uint64_t bytes_of(const DatasetInfo& info) {
   std::uint64_t bytes = 0;
   for (const Axis& axis : info.grid.axes) bytes += axis.coordinates.size() * sizeof(double);
@@ -99,7 +99,7 @@ struct Dataset::State {
   State(const State&) = delete;
   State& operator=(const State&) = delete;
 
-  // Checked: where a field and a step are. Errors: not_found.
+  // Validates field and step indices. Errors: not_found.
   [[nodiscard]] Result<std::size_t> find(const std::string& field, std::size_t step) const {
     const FieldInfo* found = info.find(field);
     if (found == nullptr) {
@@ -130,13 +130,13 @@ struct Dataset::State {
     return bytes;
   }
 
-  // What counts in the limit while a field is read.
+  // Bytes reserved in the limit while a field is read.
   [[nodiscard]] std::uint64_t bytes_beside(std::uint64_t loader_bytes) const {
     return charged.bytes() + (info.stored_bytes > 0 ? loader_bytes : 0);
   }
 
-  // What loaders were seen to need at most beside the volumes, while they read these fields. Chunks
-  // that are needed again are kept, 128 MiB in all or one chunk.
+  // Measured upper bound of a loader's memory beside the volumes while it reads these fields.
+  // Chunks needed again are cached, 128 MiB in all or one chunk.
   [[nodiscard]] std::uint64_t reading_bytes(const std::vector<std::string>& fields) const {
     constexpr std::uint64_t mib = std::uint64_t{1} << 20;
     std::uint64_t bytes = 32 * mib;
@@ -155,7 +155,7 @@ struct Dataset::State {
                                                    std::to_string(step) + " is not in memory yet");
   }
 
-  // Reads the volume from its source, or has it from its packed form.
+  // Reads the volume from its source, or restores it from its packed form.
   Result<Resident> load(std::size_t field, std::size_t step, Urgency urgency) {
     const ResidentKey twin{owner, field, step, packed_variant};
     if (const Resident packed = budget->find_now(twin)) {
@@ -202,8 +202,8 @@ struct Dataset::State {
     return volume;
   }
 
-  // Of a read that end(), forget() or evict() cancelled: whoever asked is still there. Under the
-  // mutex.
+  // The error of a read cancelled by end(), forget() or evict(), for its callers. Called with the
+  // mutex held.
   [[nodiscard]] Error why_cancelled() const {
     if (ended) return make_error(ErrorKind::draining, "the server is shutting down");
     if (forgotten) {
@@ -226,7 +226,7 @@ struct Dataset::State {
     return Resident(std::make_shared<const PackedVolume>(std::move(*packed)));
   }
 
-  // Runs what makes a volume; what it throws becomes an error.
+  // Runs a function that makes a volume; exceptions become errors.
   template <class Make>
   Result<Resident> guarded(std::size_t field, const Make& make) const {
     try {
@@ -352,7 +352,7 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
     if (*there && own_) own_->insert((*there)->get());
     return as_volume(*there);
   }
-  // Held first, so that it is never evicted for a level that could not then be made of it.
+  // Referenced first, so that the volume is not evicted before the level is made of it.
   const auto fine = volume(field, step);
   if (!fine) {
     return fine.error();

@@ -1,4 +1,4 @@
-// The registry: what was named -> one dataset each, opened anew when its files change.
+// Dataset registry: location -> one shared dataset, reopened when its files change.
 #include "server/data/resident/store.hpp"
 
 #include <algorithm>
@@ -57,7 +57,7 @@ FileStamp stamp_of_all(const Location& location, const std::vector<Companion>& c
   return out;
 }
 
-// As they were when the dataset was opened: members as `before`, companions as the source met them.
+// States at the time of opening: members as `before`, companions as read by the source.
 std::string stamp_as_opened(FileStamp before, const std::vector<Companion>& companions) {
   for (const Companion& companion : companions) before.text += ';' + companion.stamp.text;
   return std::move(before.text);
@@ -105,9 +105,9 @@ struct Store::State {
     std::string key;  // of its files, or the sample's name
     std::optional<Location> location;
     std::vector<Companion> companions;
-    std::string listed;   // of a series: the folder's stamp when the pattern was matched last
-    std::string stamp;    // of the files as they were opened
-    std::string refused;  // stamp with which they could not be opened anew
+    std::string listed;   // of a series: the folder's stamp at the last pattern match
+    std::string stamp;    // of the files when opened
+    std::string refused;  // stamp with which reopening failed
     std::string problem;
     std::string note;
   };
@@ -119,7 +119,7 @@ struct Store::State {
     Failed listed;
   };
 
-  // All under the mutex.
+  // All guarded by the mutex.
   [[nodiscard]] const Entry* find(const std::string& id) const {
     const auto at = std::find_if(entries.begin(), entries.end(), [&](const Entry& entry) {
       return entry.dataset->info().id == id;
@@ -136,7 +136,7 @@ struct Store::State {
                                  [&](const FailedEntry& one) { return one.listed.id == id; });
     return at == failed.end() ? nullptr : &*at;
   }
-  // `key`: of what failed and is replaced, so that its id is free; empty: of nothing.
+  // `key`: of a failed dataset that is replaced, so that its id is free; empty: none.
   [[nodiscard]] std::string unique_id(const std::string& wanted, const std::string& key) {
     std::string id = wanted;
     const auto is_taken = [&] {
@@ -147,7 +147,7 @@ struct Store::State {
     return id;
   }
 
-  // Not under the mutex. Asks for no memory: a daemon ends where there is none.
+  // Called without the mutex. Must not allocate: the daemon ends when allocation fails here.
   [[nodiscard]] DatasetPtr one_that_reads() const {
     const std::lock_guard lock(mutex);
     const auto at = std::find_if(entries.begin(), entries.end(),
@@ -162,15 +162,15 @@ struct Store::State {
     }
   }
 
-  // Under the mutex.
+  // Called with the mutex held.
   void unlist_failed(const std::string& key) {
     failed.erase(std::remove_if(failed.begin(), failed.end(),
                                 [&](const FailedEntry& one) { return one.key == key; }),
                  failed.end());
   }
 
-  // The dataset of `key`, opened by at most one caller at a time. `failed_id`: of what is listed as
-  // failed and tried again, which may be taken off the list meanwhile; empty: of nothing.
+  // The dataset of `key`, opened by at most one caller at a time. `failed_id`: of a failed dataset
+  // that is retried, which may be removed meanwhile; empty: none.
   template <class Open>
   Result<Added> add(const std::string& key, const std::string& wanted_id,
                     std::optional<Location> location, const Open& open,
@@ -217,7 +217,7 @@ struct Store::State {
     try {
       Opened out;
       out.entry.key = key;
-      // Before they are read: what changes meanwhile is noticed later.
+      // Stamp taken before reading, so that changes during the read are detected.
       FileStamp before;
       if (location) {
         before = stamp_of_all(*location, {});
@@ -239,12 +239,12 @@ struct Store::State {
     }
   }
 
-  // Tries what is listed as failed: when its files have changed and rested, once a minute as long
-  // as that is quick (what it refers to may have changed), and where it is to be tried at any rate.
-  // The ids of what could be opened.
+  // Retries failed datasets: when their files have changed and are stable, once a minute while that
+  // is quick (files they refer to may have changed), and where a retry is forced. Returns the ids
+  // of those opened.
   std::vector<std::string> open_failed(double rest_s) {
     constexpr std::chrono::minutes retry_every{1};
-    constexpr int share = 20;  // a disk that hangs must not keep the looks to itself
+    constexpr int share = 20;  // a slow disk must not monopolise the scans
     std::vector<FailedEntry> looked_at;
     {
       const std::lock_guard lock(mutex);
@@ -263,7 +263,7 @@ struct Store::State {
       {
         const std::lock_guard lock(mutex);
         FailedEntry* const listed = find_failed(id);
-        if (ended || listed == nullptr) continue;  // taken off the list meanwhile
+        if (ended || listed == nullptr) continue;  // removed meanwhile
         listed->key = key;
         listed->tried = now.text;
         listed->retry_at = begin + retry_every;
@@ -289,8 +289,8 @@ struct Store::State {
     return out;
   }
 
-  // Puts `entry` in place of the one with the dataset `old`, if that is still there; what was there
-  // is given back, to end outside of the lock.
+  // Replaces the entry of dataset `old` by `entry` if still present; returns the old entry, to be
+  // destroyed outside the lock.
   Entry put(Entry entry, const DatasetPtr& old) {
     const std::lock_guard lock(mutex);
     const auto at = std::find_if(entries.begin(), entries.end(),
@@ -344,7 +344,7 @@ Result<DatasetPtr> Store::add(const Location& location) {
 }
 
 Result<Store::Added> Store::add_or_find(const Location& location) {
-  // Many files opened one after another leave few loaders behind.
+  // Limits idle loaders when many files are opened in sequence.
   constexpr double hardly_idle_s = 0.5;
   release_idle(hardly_idle_s);
   return state_->add(key_of(location), printable(location.stem), location,
@@ -443,13 +443,13 @@ std::vector<std::string> Store::look_for_changes(double rest_s) {
     auto opened = State::open_entry(key_of(*entry.location), entry.location,
                                     [&] { return state_->options.open(*entry.location); });
     Result<void> usable = opened ? Result<void>() : opened.error();
-    // For want of memory it is tried again; other faults stay until the files change.
+    // Out of memory is retried; other errors persist until the files change.
     bool lasts = !usable && usable.error().kind != ErrorKind::out_of_memory;
     if (opened) {
       DatasetPtr& anew = opened->entry.dataset;
       anew = std::make_shared<Dataset>(std::move(opened->source), id, state_->budget,
                                        state_->options.storage);
-      (void)anew->charge_info();  // it was there before: kept, though not counted
+      (void)anew->charge_info();  // it was resident before: keep it even if not counted
       if (state_->options.check) usable = state_->options.check(*anew);
       lasts = !usable;
     }

@@ -1,4 +1,4 @@
-// Coarser volumes: what averages keep, what masks do, and how a dataset shares and pays for them.
+// Coarser volumes: what averages conserve, how masks combine, and how a dataset shares levels.
 #include "server/data/model/coarsen.hpp"
 
 #include <gtest/gtest.h>

@@ -265,7 +265,7 @@ TEST(Groups, ArraysOfMeepRunAlongXFirst) {
   field = volume_of(**source, "h", 4);
   ASSERT_EQ(field.dims, (std::array<int, 3>{2, 3, 4}));
   EXPECT_EQ(field.component(2)[1 + 2 * (2 + 3 * 3)], 21234);
-  // One name of another kind: nobody knows the order, and the last index is x as elsewhere.
+  // One unknown name: the axis order is unknown, and the last index is x as elsewhere.
   write_like_meep(folder / "o.h5", {"ex", "ey", "ez", "rho"}, {2, 3, 4});
   source = open_file(folder / "o.h5");
   ASSERT_TRUE(source) << source.error().message;

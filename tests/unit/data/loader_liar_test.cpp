@@ -189,7 +189,7 @@ TEST_F(Liar, one_that_says_more_than_a_read_has_to_say) {
       "the loader of 'some.nc' said what it must not and was ended while reading 'wind'");
 }
 
-// What it wrote into memory that is not used again goes with it.
+// Memory written by a loader and not reused is released with it.
 TEST_F(Liar, one_that_fails_to_fill_much_is_ended) {
   describe_much();
   speak("fd = told()\nos.pwrite(fd, b'x' * 1000, 0)\nfail('no')\nhear()\n");

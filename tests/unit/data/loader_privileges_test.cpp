@@ -1,4 +1,4 @@
-// What the kernel says of a live loader: it holds no capability, whoever started it.
+// Capabilities of a running loader as the kernel reports them: none, whichever user started it.
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <sys/mount.h>

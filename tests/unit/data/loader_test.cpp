@@ -163,7 +163,7 @@ TEST_F(Loader, volumes_small_and_large_read_as_in_this_process) {
     const bool is_cloud = source->info().fields[field].name == "cloud";
     EXPECT_EQ(volume->values[0], static_cast<float>(((is_cloud ? 4 : 5) * samples) % 1000003));
     EXPECT_EQ(transfers_kept(), is_cloud ? 1U : 0U);
-    // Of 35 MiB nothing is left beside the copy.
+    // No room remains of 35 MiB beside the copy.
     EXPECT_LT(shared_by(source->process()), is_cloud ? 13 : 1);
   }
 }
@@ -268,7 +268,7 @@ TEST_F(Loader, what_is_no_dataset_is_the_same_error_as_in_this_process) {
   EXPECT_EQ(there.error().message, here.error().message);
 }
 
-// HDF5 reads numbers out of whatever file a dataset names.
+// HDF5 reads external files that a dataset names.
 TEST_F(Loader, external_storage_is_refused_by_name) {
   const std::string other = folder_ / "other";
   test::write_floats(other, 64, 42.0F);
@@ -404,7 +404,7 @@ TEST_F(Loader, one_that_outgrows_the_budget_while_it_opens_is_an_error) {
   const std::string path = folder_ / "a.nc";
   test::write_positions(path, 1500);  // 36 MB of coordinates
   Limits limits;
-  // What a loader takes that has done nothing, and little more.
+  // Memory of an idle loader, and little more.
   limits.budget = std::make_shared<Budget>((std::uint64_t{8} << 20) + (std::uint64_t{64} << 10));
   for (int n = 0; n < 3; ++n) {
     const auto source = open_path(path, limits);

@@ -1,4 +1,4 @@
-// What can be named below a data root, and that nothing else can.
+// Paths below a data root that can be opened, and rejection of all others.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -54,7 +54,7 @@ class LocateBeneath : public testing::Test {
     const auto found = locate_beneath(root_.native(), path);
     EXPECT_FALSE(found) << path;
     if (found) return ErrorKind::internal;
-    EXPECT_THAT(found.error().message, Not(HasSubstr(root_.native()))) << "tells where the root is";
+    EXPECT_THAT(found.error().message, Not(HasSubstr(root_.native()))) << "reveals the data root";
     EXPECT_THAT(found.error().message, Not(HasSubstr(above_.filename().native())));
     return found.error().kind;
   }
@@ -156,7 +156,7 @@ TEST_F(LocateBeneath, APipeIsRefusedWithoutWaitingForItsWriter) {
   EXPECT_EQ(refusal("pipe*"), ErrorKind::not_found) << "a series is of files";
 }
 
-// A folder is looked into whenever its files are read, long after it was located.
+// A folder is accessed whenever its files are read, long after it was located.
 TEST_F(LocateBeneath, AFolderThatBecomesALinkLeadsNowhere) {
   fs::create_directories(above_ / "elsewhere");
   std::ofstream(above_ / "elsewhere/f2.nc") << "secret";

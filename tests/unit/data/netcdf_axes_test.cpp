@@ -35,7 +35,7 @@ const std::string& reason_for(const DatasetInfo& info, const std::string& name) 
   return at == info.left_out.end() ? none : at->reason;
 }
 
-// A number that tells its place: the file holds f(x, y, z) = x + 1000 y + z / 16.
+// A value that encodes its position: the file contains f(x, y, z) = x + 1000 y + z / 16.
 float place_value(double x, double y, double z) {
   return static_cast<float>(x + 1000 * y + z / 16);
 }
@@ -253,7 +253,7 @@ TEST(NetcdfAxes, OceanPressureIsNoAir) {
   EXPECT_EQ(source->info().grid.axes[2].coordinates, (std::vector<double>{1000, 10, 0}));
 }
 
-// A second dimension along one axis that is 1 long needs no place, wherever it stands.
+// A second dimension of length 1 along one axis is ignored, at any position.
 TEST(NetcdfAxes, ASecondTimeOrLevelOfLengthOneIsPassedOver) {
   for (const int second : {0, 1, 2, 3}) {
     const Folder folder;

@@ -15,7 +15,7 @@
 
 namespace windsplat::data::test {
 
-// A folder of its own for each test, gone with it.
+// A temporary folder for each test, removed at its end.
 class Folder {
  public:
   Folder() {

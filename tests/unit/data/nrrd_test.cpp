@@ -409,7 +409,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadNrrdCase{"no_line", small + "encoding raw\n", "abcd", "neither a field nor a comment"}),
     [](const auto& test) { return std::string(test.param.name); });
 
-// Whatever is cut off or overwritten, there is an answer, and it comes without a wrong read.
+// Truncated or overwritten data yield an error, without an invalid read.
 TEST(NrrdRefusal, BrokenDataAreFoundWhenTheyAreRead) {
   const Folder folder;
   const std::string good = gzipped(packed<float>(counted(12)));

@@ -144,7 +144,7 @@ TEST(Raw, BytesThatNothingDescribesAreWholeStepsOrRefused) {
   EXPECT_THAT(message, HasSubstr("no whole step of 48 bytes"));
 }
 
-// Two fields of one file, each told by its offset, describe it together.
+// Two fields of one file, each given by its offset, describe it together.
 TEST(Raw, FieldsOfOneFileDescribeItTogether) {
   const Folder folder;
   write_file(folder / "a.json", document(R"("fields": [{"name": "a", "file": "a.raw"},
@@ -215,7 +215,7 @@ std::string with(const std::string& more, const std::string& fields = R"([{"name
 INSTANTIATE_TEST_SUITE_P(
     All, RawRefusal,
     testing::Values(
-        BadRawCase{"cut", R"({"windsplat": "raw", )", "no good JSON"},
+        BadRawCase{"cut", R"({"windsplat": "raw", )", "not valid JSON"},
         BadRawCase{"deep", with(R"("steps": )" + std::string(100000, '[') + ", "),
                    "nested deeper than 8"},
         BadRawCase{"twice", with(R"("type": "uint8", )"), "'type' is there twice"},
@@ -248,7 +248,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadRawCase{"order", with(R"("order": "zzx", )"), "/order"},
         BadRawCase{"axis", with(R"("axes": {"x": {"coordinates": [1, 2, 3]}}, )"),
                    "/axes/x/coordinates"},
-        BadRawCase{"infinite", with(R"("axes": {"x": {"first": 1e999}}, )"), "no good JSON"},
+        BadRawCase{"infinite", with(R"("axes": {"x": {"first": 1e999}}, )"), "not valid JSON"},
         BadRawCase{"steps", with(R"("steps": {"count": 99999999999}, )"), "/steps/count"},
         BadRawCase{"same_name", with("", R"([{"name": "p"}, {"name": "p"}])"), "/fields/1"},
         BadRawCase{"components", with("", R"([{"name": "p", "components": ["a"]}])"),

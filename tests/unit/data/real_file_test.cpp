@@ -85,7 +85,7 @@ TEST_F(RealFile, NamesAndUnits) {
   EXPECT_EQ(info().first(FieldKind::vector), info().find("wind"));
   EXPECT_EQ(info().find("wind")->components, (std::vector<std::string>{"U", "V"}));
   EXPECT_EQ(info().find("wind")->units, "m/s");
-  // The file says C although the numbers are Kelvin: what is written is shown.
+  // The file declares C although the numbers are Kelvin: the declared unit is shown.
   EXPECT_EQ(info().find("T")->units, "C");
   EXPECT_EQ(info().find("U")->dtype, "float32");
   EXPECT_EQ(info().steps.size(), 1U);

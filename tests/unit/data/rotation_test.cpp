@@ -172,7 +172,7 @@ TEST(Rotation, WindsAlongTheGridStayAndUnnamedOnesAreNoted) {
 }
 
 TEST(Rotation, AGridSeenFromBelowKeepsEastEast) {
-  // x runs north and y runs east: a wind to the east goes along y.
+  // x runs north and y runs east: an eastward wind is along y.
   Columns columns;
   for (std::size_t j = 0; j < 3; ++j) {
     for (std::size_t i = 0; i < 4; ++i) {

@@ -239,7 +239,7 @@ TEST(Series, FilesWithoutATimeDimensionAreOneStepEach) {
       file.text(file.variable("time", NC_DOUBLE, {}, {hour}), "units", "hours since 2001-01-01");
     file.variable("f", NC_FLOAT, {z, y, x}, counting(12, base));
   };
-  // In natural order where nothing tells a time.
+  // In natural order where no member has times.
   write("snap10.nc", 300, -1);
   write("snap2.nc", 200, -1);
   write("snap1.nc", 100, -1);

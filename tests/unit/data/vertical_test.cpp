@@ -136,7 +136,7 @@ TEST(HybridLevels, FormsOfTheFormulaGiveTheSamePressures) {
     EXPECT_FLOAT_EQ(p.values[4], 350);
     EXPECT_FLOAT_EQ(p.values[6], 300);
     EXPECT_EQ(p.masked, 2);  // where the surface pressure is missing
-    // The field stands on the levels that the pressures are of.
+    // The field is on the levels whose pressures are given.
     EXPECT_EQ(volume_of(**source, "f").values[0], levels.top_first ? 4 : 0);
   }
 }
@@ -291,7 +291,7 @@ TEST(Omega, BecomesMetresASecondByTheFilesTemperature) {
     EXPECT_TRUE(has_note(info, "'wind' is in 'Pa s-1': its lines point up where air rises"));
     EXPECT_EQ(has_note(info, "its values are Kelvin"), c.units == "C");
     EXPECT_TRUE(has_note(info, "'ps' is the surface pressure"));
-    // Nothing is masked for lying below the surface pressure.
+    // No sample is masked for being below the surface pressure.
     EXPECT_EQ(volume_of(**source, "ua").masked, 0);
   }
 }

@@ -31,7 +31,7 @@ TEST(VtkBroken, EveryCutIsAnError) {
     for (const char* compressor : {"", "ZLib", "LZ4"}) {
       const std::string whole = image({format, compressor, false, 4});
       ASSERT_EQ(refusal(folder.write("a.vti", whole)), "");
-      // Appended data end before the closing tags, whose loss hurts nobody.
+      // Appended data end before the closing tags, whose loss has no effect.
       const std::size_t end = whole.find("\n</AppendedData>");
       const std::size_t needed = end == std::string::npos ? whole.size() - 12 : end;
       for (std::size_t bytes = 100; bytes < needed; bytes += 100) {
@@ -42,7 +42,7 @@ TEST(VtkBroken, EveryCutIsAnError) {
   }
 }
 
-// Any byte may be any other: no crash, and nothing else than an error or numbers.
+// Any changed byte yields an error or numbers, never a crash.
 TEST(VtkBroken, AnyByteMayBeWrong) {
   const VtkFolder folder;
   for (const char* format : {"ascii", "appended-raw"}) {

@@ -17,7 +17,7 @@ const char* xml_name(const std::string& type) {
   return type == "short" ? "Int16" : "Int32";
 }
 
-// What follows a line that tells a type.
+// Text after a line that names a type.
 std::string values(bool binary, const std::string& type, const std::vector<double>& numbers) {
   return (binary ? packed(xml_name(type), numbers, true) : VtkXml::text(numbers)) + "\n";
 }

@@ -543,7 +543,7 @@ TEST_F(VtkResampling, BrokenCellsAreErrors) {
   };
   EXPECT_EQ(file([](TestMesh&) {}), "");
   EXPECT_THAT(file([](TestMesh& m) { m.connectivity[5] = 27; }), HasSubstr("corner 27"));
-  EXPECT_THAT(file([](TestMesh& m) { m.connectivity[5] = -1; }), HasSubstr("no index"));
+  EXPECT_THAT(file([](TestMesh& m) { m.connectivity[5] = -1; }), HasSubstr("not an index"));
   EXPECT_THAT(file([](TestMesh& m) { m.offsets[3] = 2; }), HasSubstr("offsets go back"));
   EXPECT_THAT(file([](TestMesh& m) { m.offsets[7] = 72; }), HasSubstr("bytes where"));
   EXPECT_THAT(file([](TestMesh& m) { m.offsets[7] = 2e9; }), HasSubstr("bytes where"));

@@ -47,7 +47,7 @@ std::string array_json(const std::string& shape, const std::string& chunks,
          compressor + more + "}";
 }
 
-// A store with one array f[y=2, x=3], its axes unnamed, and whatever a test adds.
+// A store with one array f[y=2, x=3], its axes unnamed, and the additions of a test.
 class Store {
  public:
   explicit Store(const std::string& name = "s.zarr") : root_(folder_ / name) {
@@ -241,7 +241,7 @@ TEST(Zarr, AnAbsentChunkIsTheFillValueAndNeverZeroByChance) {
   // By xarray 0 then means missing; without its names it is the number Zarr's default leaves.
   expect_same(without_second("<i2", "0", named), {7, kMasked, kMasked, kMasked});
   expect_same(without_second("<i2", "0", "{}"), {7, 0, 0, 0});
-  // netCDF's default fill values mean nothing here: -32767 is that of a short.
+  // netCDF's default fill values have no meaning here: -32767 is that of a short.
   const Store store;
   store.put("f/.zarray", array_json("[1,2]", "[1,2]", "<i2"));
   store.put("f/0.0", bytes_of_items<std::int16_t>({-32767, 1}));

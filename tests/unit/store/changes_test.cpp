@@ -89,7 +89,7 @@ TEST(Store, WhatIsLeftOutOfASeriesIsNoted) {
   EXPECT_EQ(store.note(id), "");
 }
 
-// As a model does that goes on writing: the same file of the same size.
+// Like a running model's output: the same file of the same size.
 TEST(Store, AFileThatIsWrittenOverInPlaceIsOpenedAnew) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);

@@ -289,7 +289,7 @@ TEST(Resident, EvictionFreesWhatNobodyHolds) {
   EXPECT_EQ(f.dataset->seen("f", 1)->range[0], 1.0F) << "its range is remembered";
 }
 
-// Whoever asked is still there, so the error says what became of the data.
+// The caller still waits, so the error states why the data were removed.
 TEST(Resident, ALoadThatSomebodyElseEndsSaysWhy) {
   const std::vector<std::pair<std::function<void(Fixture&)>, ErrorKind>> ends{
       {[](Fixture& f) { f.dataset->evict(); }, ErrorKind::not_resident},

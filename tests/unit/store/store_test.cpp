@@ -421,7 +421,7 @@ TEST(Store, WhatIsRefusedStaysListedAsFailedUntilItPasses) {
   EXPECT_TRUE(store.failed().empty());
 }
 
-// Whoever waits for the same volume must not wait for ever.
+// Other waiters for the same volume must not wait forever.
 TEST(Budget, WhatThrowsIsAnErrorAndCanBeAskedForAgain) {
   Budget budget(1000);
   const ResidentKey key{budget.next_owner(), 0, 0, ""};

@@ -1,4 +1,4 @@
-// Room that others hold: who loads in turn waits until it is let go of, and only where that helps.
+// Loads in turn wait until memory referenced by others is released, and only where that helps.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -59,7 +59,7 @@ class Turn : public testing::Test {
 TEST_F(Turn, AStepThatIsHeldGivesWayToTheNextOnceItIsLetGoOf) {
   auto shown = dataset_->volume("a", 0);
   ASSERT_TRUE(shown);
-  EXPECT_FALSE(dataset_->volume("a", 1)) << "who does not wait is told at once";
+  EXPECT_FALSE(dataset_->volume("a", 1)) << "without in_turn the error is immediate";
   auto next = std::async(std::launch::async, [&] {
     Dataset patient = dataset_->in_turn();
     return patient.volume("a", 1);
