@@ -46,9 +46,9 @@ struct Layout {
   [[nodiscard]] int rank() const;  // how many spatial dimensions it has
 };
 
-// Dimensions of unknown role take the places that are free, the last one x, then y, then z; an
-// unlimited first one is time. A dimension of another role must have length 1; where two want one
-// place the longer has it, and one of length 1 needs none.
+// Dimensions of unknown role take the free axes, the last one x, then y, then z; an unlimited first
+// one is time. Other dimensions must have length 1; of two candidates for one axis the longer is
+// used, and one of length 1 is ignored.
 Layout lay_out(const FileContents& contents, const std::vector<DimensionRole>& roles,
                const FileVariable& variable);
 
@@ -60,8 +60,8 @@ struct OrientedAxis {
 };
 
 // which: 0 x, 1 y, 2 z. coordinates: as in the file, angles in degrees; empty: the dimension has
-// none, samples are placed by index. horizontal: the x axis' kind, which tells a height from a
-// plain z. Errors: bad_data if the coordinates are not finite and strictly monotonic.
+// none, samples are placed by index. horizontal: kind of the x axis, which distinguishes a height
+// from a plain z. Errors: bad_data if the coordinates are not finite and strictly monotonic.
 Result<OrientedAxis> orient_axis(const FileContents& contents, const DimensionRole& role,
                                  int dimension, int which, std::vector<double> coordinates,
                                  AxisKind horizontal);

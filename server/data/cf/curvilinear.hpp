@@ -1,5 +1,5 @@
-// Files whose longitude and latitude are 2-D: the coordinates tell which dimension runs east, which
-// north, and where each column stands. File and choice in, a choice with its directions out.
+// Curvilinear grids: 2-D longitudes and latitudes give the direction of each dimension and the
+// position of each column. File and choice in, choice with directions out.
 #pragma once
 
 #include <array>
@@ -21,8 +21,8 @@ struct Bearing {
   std::shared_ptr<const Columns> columns;    // turned likewise; null where some are missing
 };
 
-// Where x and y have no coordinates of their own and 2-D longitudes and latitudes lie on them:
-// swaps choice.space[0] and [1] if longitude changes more along y than along x, and tells the
+// For 2-D longitudes and latitudes, where x and y have no coordinates of their own: swaps
+// choice.space[0] and [1] if longitude changes more along y than along x, and returns the
 // directions. Errors: bad_data if the coordinates cannot be read.
 Result<Bearing> find_bearing(const ArrayFile& file, const std::vector<DimensionRole>& roles,
                              GridChoice& choice);
@@ -35,7 +35,7 @@ Result<std::shared_ptr<const Columns>> find_columns(const ArrayFile& file, const
 int grid_mapping_of(const ArrayFile& file, const std::vector<int>& variables);
 
 // Longitudes and latitudes of a grid whose axes are degrees about a rotated pole (CF 1.8, appendix
-// F); mapping: the variable that tells the pole. Null if it does not.
+// F); mapping: the variable with the pole's position. Null if it has none.
 std::shared_ptr<const Columns> columns_about_pole(const ArrayFile& file, int mapping,
                                                   const Grid& grid);
 

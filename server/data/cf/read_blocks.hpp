@@ -26,8 +26,8 @@ struct Levels {
   std::size_t count = 0;
 };
 
-// Unpacked values of those levels of a variable, NaN where masked; `out` holds levels.count layers,
-// of a variable without levels one. `tell` hears of the part that is done. Errors: bad_data.
+// Unpacked values of those levels of a variable, NaN where masked; `out` has levels.count layers,
+// one for a variable without levels. `tell` receives the fraction done. Errors: bad_data.
 Result<void> read_variable(const ArrayFile& file, const Placement& grid, int variable,
                            std::size_t step, const Levels& levels, float* out,
                            const Progress& tell);

@@ -1,5 +1,5 @@
-// Which files a dataset may consist of, and the one way to open them. What a user named -> Location
-// -> Files -> InputFile.
+// The files of a dataset, and the only way to open them. User input -> Location -> Files ->
+// InputFile.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace windsplat::data {
 
-// What a user named, links resolved.
+// The location of a dataset, links resolved.
 struct Location {
   enum class Kind {
     file,    // one file and the companions that its format refers to
@@ -41,13 +41,12 @@ struct Location {
 // other files). Errors: not_found; bad_data for URLs and what is neither file nor folder.
 Result<Location> locate(const std::string& path_or_pattern);
 
-// The same of a path that a stranger named, below the folder `root`: neither "..", an absolute
-// path, nor a link ever leads out of it, and no link that is absolute is followed. Nothing is read
-// but names. Errors: invalid (refused, or neither file nor folder), not_found; they name the path
-// as it was given, not the root.
+// The same for an untrusted path below the folder `root`: "..", absolute paths and links cannot
+// leave it, and absolute links are not followed. Reads names only. Errors: invalid (refused, or
+// neither file nor folder), not_found; they contain the path as given, not the root.
 Result<Location> locate_beneath(const std::string& root, const std::string& path_or_pattern);
 
-// What the pattern of a series matches by now. Errors: those of the function that located it.
+// Matches the pattern of a series again. Errors: those of the function that located it.
 Result<Location> locate_again(const Location& series);
 
 class Files {
@@ -57,7 +56,7 @@ class Files {
   // `name`: a member's, or that of a companion, relative to the folder, parts between '/'; never
   // above the folder. Errors: not_found, bad_data.
   virtual Result<std::shared_ptr<const InputFile>> open(const std::string& name) = 0;
-  // What lies in a folder below (empty: the folder itself), sorted; folders end in '/'. Errors:
+  // Entries of a folder below (empty: the folder itself), sorted; folders end in '/'. Errors:
   // not_found, bad_data.
   virtual Result<std::vector<std::string>> list(const std::string& folder) = 0;
   // Whether there is such a file or folder.

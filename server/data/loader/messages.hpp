@@ -1,5 +1,5 @@
-// What the payloads of messages say: location and limits to the loader, errors and the dataset's
-// info back. Decoding checks everything that the rest of the program relies on.
+// Message payloads: location and limits to the loader, errors and dataset info back. Decoding
+// validates everything that the rest of the program relies on.
 #pragma once
 
 #include <cstdint>
@@ -27,13 +27,13 @@ std::string encode_task(const Task& task);
 Result<Task> decode_task(std::string_view bytes);
 
 std::string encode_error(const Error& error);
-// Whatever the bytes: an error of a kind that reading can have, its message fit for a log.
+// For any bytes: an error of a kind that readers return, its message printable.
 Error decode_error(std::string_view bytes);
 
 std::string encode_info(const DatasetInfo& info);
-// Errors: bad_data for what is no info, or one that no reader would give: axes that are not finite
-// and strictly monotonic, fields without components, no steps, more than cf's limits. Texts come
-// out printable.
+// Errors: bad_data for invalid info, or info that no reader returns: axes that are not finite and
+// strictly monotonic, fields without components, no steps, more than cf's limits. Texts are made
+// printable.
 Result<DatasetInfo> decode_info(std::string_view bytes);
 
 std::string encode_names(const std::vector<std::string>& names);

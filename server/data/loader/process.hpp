@@ -1,4 +1,4 @@
-// One loader process: started, talked to, ended. Never outlives its object, nor the daemon.
+// One loader process: start, communication, end. Outlives neither its object nor the daemon.
 #pragma once
 
 #include <sys/types.h>
@@ -14,7 +14,7 @@
 
 namespace windsplat::data::loader {
 
-// What a loader finds under these numbers when it starts.
+// Descriptors of a loader at its start.
 inline constexpr int socket_of_loader = 3;
 inline constexpr int life_of_loader = 4;  // pipe whose other end closes when the daemon exits
 
@@ -25,19 +25,18 @@ class Process {
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  // Runs `program load` with an empty environment and nothing else that is open here. Errors:
-  // internal.
+  // Runs `program load` with an empty environment and no other open descriptors. Errors: internal.
   Result<void> start(const std::string& program);
 
   // Kills the process, from any thread; end() must still be called. No effect if there is none.
   void kill();
-  // Waits a moment for one that is about to end, kills it otherwise; closes what belongs to it. How
-  // it ended: "was ended by signal 11", "ended with code 1"; empty if there was none.
+  // Waits briefly for a process that is about to exit, kills it otherwise; closes its resources.
+  // Returns the cause: "was ended by signal 11", "ended with code 1"; empty if there was none.
   std::string end(std::chrono::milliseconds patience = std::chrono::milliseconds(0));
-  // What it has used, and its memory that no file or other process has; 0 if there is none.
+  // Processor time used, and private memory; 0 if there is no process.
   [[nodiscard]] std::chrono::nanoseconds cpu_time() const;
   [[nodiscard]] std::uint64_t private_bytes() const;
-  // From now on at most that many seconds of processor time.
+  // Limits further processor time to that many seconds.
   void allow_cpu(std::chrono::seconds more);
   // Raises the private memory limit, at most to the one set by confinement.
   void allow_memory(std::uint64_t bytes);
@@ -48,7 +47,7 @@ class Process {
   [[nodiscard]] pid_t id() const;  // -1 if there is none
 
  private:
-  // The same without words, for which there may be no memory: its status, as of waitpid.
+  // The same without allocation: the status as of waitpid.
   std::optional<int> reap(std::chrono::milliseconds patience) noexcept;
 
   mutable std::mutex mutex_;  // of id_: a number is signalled only before it is waited for

@@ -1,5 +1,5 @@
-// The memory in which a loader hands over a volume: sized and sealed here, filled there, copied out
-// here, and used again for the next volume.
+// Shared memory for volumes: created and sealed by the daemon, filled by the loader, copied out by
+// the daemon, and reused for the next volume.
 #pragma once
 
 #include <cstddef>
@@ -34,19 +34,19 @@ class Mapping {
 // The daemon's side of it.
 class Transfer {
  public:
-  // Memory that is larger is never kept. What is not kept is for one volume: unmapped by the loader
-  // before it says so, given back as the volume is copied out of it, and closed.
+  // Larger memory is never reused. Memory that is not reused is for one volume: unmapped by the
+  // loader before it answers, freed while the volume is copied out, and closed.
   static constexpr std::size_t kept_bytes_max = std::size_t{32} << 20;
 
-  // Room for so many floats, whose size nobody can change. Errors: out_of_memory.
+  // Allocates memory for so many floats, sealed against resizing. Errors: out_of_memory.
   static Result<Transfer> make(std::size_t floats, bool kept);
 
   [[nodiscard]] int descriptor() const { return memory_.number(); }
   [[nodiscard]] std::size_t floats() const { return mapping_.floats(); }
   [[nodiscard]] bool is_kept() const { return kept_; }
 
-  // What the first floats are now: whatever a loader does to them later is of no matter. Memory
-  // that is not kept is given back as it is copied, so that a volume is not there twice.
+  // Copies the first floats, so that later writes by a loader have no effect. Memory that is not
+  // reused is freed during the copy, so that a volume is not in memory twice.
   [[nodiscard]] Samples take(std::size_t floats);
   // No process can write to it any more. False: a writer may remain.
   [[nodiscard]] bool close();

@@ -186,7 +186,7 @@ TEST(Grads, BytesThatNothingDescribesAreWholeStepsOrRefused) {
   EXPECT_THAT(source->info().notes, Contains(HasSubstr("4 bytes after the last steps")));
 }
 
-TEST(Grads, WhoNamesAFileThatIsNotThereIsTold) {
+TEST(Grads, AMissingFileIsReportedWithItsReference) {
   const Folder folder;
   write_file(folder / "d.ctl", descriptor(two_days, one_u));
   write_file(folder / "t.ctl", descriptor(two_days + "\noptions template", one_u, "^t%d2.dat"));

@@ -137,7 +137,7 @@ class Liar : public testing::Test {
   Limits limits_;
 };
 
-TEST_F(Liar, one_that_speaks_the_protocol_is_believed) {
+TEST_F(Liar, a_valid_answer_is_accepted) {
   speak("fd = told()\nos.pwrite(fd, floats(*range(16)), 0)\nos.close(fd)\nsay('filled')\nhear()\n");
   const auto volume = read();
   ASSERT_TRUE(volume) << volume.error().message;
@@ -161,13 +161,13 @@ TEST_F(Liar, one_that_spins) {
   expect_not_opened("the loader of 'some.nc' was ended after 0.3 s while opening it");
 }
 
-TEST_F(Liar, one_that_says_a_byte_at_a_time) {
+TEST_F(Liar, one_that_sends_single_bytes) {
   limits_.open_time = milliseconds(700);
   speak("while True: s.send(b'\\x01\\0\\0\\0'[:1]); time.sleep(0.06)\n");
   expect_not_opened("the loader of 'some.nc' was ended after 0.7 s while opening it");
 }
 
-TEST_F(Liar, one_that_says_nonsense) {
+TEST_F(Liar, one_that_sends_malformed_messages) {
   const std::string message =
       "the loader of 'some.nc' said what it must not and was ended while opening it";
   speak("s.sendall(b'x' * 1000)\nhear()\n");
@@ -183,7 +183,7 @@ TEST_F(Liar, one_that_says_nonsense) {
 }
 
 // Where little is due, little is taken.
-TEST_F(Liar, one_that_says_more_than_a_read_has_to_say) {
+TEST_F(Liar, one_that_sends_too_many_messages) {
   speak("told()\nsay('progress', b'x' * 100000)\nhear()\n");
   expect_not_read(
       "the loader of 'some.nc' said what it must not and was ended while reading 'wind'");
@@ -215,13 +215,13 @@ TEST_F(Liar, one_that_keeps_much_mapped_is_ended) {
   EXPECT_GT((*source)->process(), 0);
 }
 
-TEST_F(Liar, one_that_asks_for_ever) {
+TEST_F(Liar, one_that_sends_endless_requests) {
   limits_.opens_max = 100;
   speak("while True: ask('ask_exists', b'some.nc')\n");
   expect_not_opened("the loader of 'some.nc' said what it must not and was ended while opening it");
 }
 
-TEST_F(Liar, one_that_asks_for_other_files) {
+TEST_F(Liar, one_that_requests_other_files) {
   std::ofstream(folder_ / "beside") << "private";
   limits_.library_folders = {folder_ / "tables"};
   std::filesystem::create_directories(folder_ / "tables");
@@ -305,7 +305,7 @@ TEST_F(Liar, one_that_is_slow_has_time_by_the_bytes_that_are_read) {
   EXPECT_TRUE(volume) << volume.error().message;
 }
 
-TEST_F(Liar, one_that_tells_how_far_it_is_is_heard) {
+TEST_F(Liar, progress_is_reported) {
   speak(
       "told()\nfor done in (0, 0.5, 1): say('progress', struct.pack('<d', done))\n"
       "say('filled')\nhear()\n");

@@ -93,7 +93,7 @@ TEST(NetcdfValues, ValidRangeIsInStoredNumbers) {
   expect_values(other_side, {-2, 0.3F, kNan});
 }
 
-TEST(NetcdfValues, WhatTheFileCallsValidIsTold) {
+TEST(NetcdfValues, TheValidRangeIsReported) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "v.nc");

@@ -217,7 +217,7 @@ std::string attribute(int ncid, const char* variable, const char* name) {
   return text;
 }
 
-TEST(NetcdfWriter, SpeaksCf) {
+TEST(NetcdfWriter, FollowsCfConventions) {
   FakeSource source(make_info({axis("lon", AxisKind::longitude, {0, 90}),
                                axis("lat", AxisKind::latitude, {0, 60}),
                                axis("plev", AxisKind::pressure, {1000, 500}, "hPa")}));

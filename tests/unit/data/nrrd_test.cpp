@@ -304,7 +304,7 @@ TEST(Nrrd, DataFilesOutsideTheFolderAreRefused) {
   }
 }
 
-TEST(Nrrd, BytesBehindTheSamplesAreTold) {
+TEST(Nrrd, BytesAfterTheSamplesAreReported) {
   const Folder folder;
   const std::string raw = packed<float>(counted(12));
   const std::string fields = plain_2x3x2 + "encoding: raw\n";

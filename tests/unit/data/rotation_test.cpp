@@ -85,7 +85,7 @@ void write_lambert(const std::string& path, const Lambert& grid, const std::stri
   }
 }
 
-TEST(Rotation, WindsByEastAndNorthAreToldAlongTheGridsAxes) {
+TEST(Rotation, EastNorthWindsAreRotatedToTheGridsAxes) {
   for (const double turn : {0.0, 25 * degree, -30 * degree}) {
     for (const bool south : {false, true}) {
       for (const bool with_metres : {false, true}) {

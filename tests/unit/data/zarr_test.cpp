@@ -320,7 +320,7 @@ TEST(Zarr, FiltersAreUndoneLastFirst) {
   expect_same(store.values(), {10, 10.25, 10, 138});
 }
 
-TEST(Zarr, WhatIsNotReadIsToldWithItsReason) {
+TEST(Zarr, UnsupportedArraysAreReportedWithReason) {
   const Store store;
   store.put("f/.zarray", array_json("[1,2]", "[1,2]", "|u1"));
   store.put("f/0.0", "ab");

@@ -36,7 +36,7 @@ std::int64_t minutes_since_first(const Clock& clock, const Date& date);
 // "1999-03-05 12:30:00"
 std::string text_of(const Date& date);
 
-// The name of the file that holds a step. Nothing where the template has a part that is not known;
+// The name of the file that contains a step. nullopt where the template has an unknown part;
 // `problem` then names it.
 std::optional<std::string> expand(std::string_view name, const Clock& clock, std::int64_t step,
                                   std::string& problem);

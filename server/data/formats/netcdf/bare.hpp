@@ -6,12 +6,12 @@
 
 namespace windsplat::data::netcdf {
 
-// Whether the netCDF library made the dimension up, for a file that has only arrays.
+// Whether the netCDF library generated the dimension, for a file that has only arrays.
 bool is_bare(const FileDimension& dimension);
 
-// Does nothing where any dimension has a name of the file's. An array of four dimensions gets a
-// time dimension of its own in place of its first one, unless that grows, which tells time by
-// itself, or the last one is so short that it may count components. Leaves a note of what it did.
+// No effect where any dimension is named in the file. The first dimension of a 4-D array becomes a
+// separate time dimension, unless it is unlimited, and so already time, or the last one is so short
+// that it may be the components. Adds a note of the assumption.
 void name_steps_of_bare_arrays(FileContents& contents);
 
 }  // namespace windsplat::data::netcdf

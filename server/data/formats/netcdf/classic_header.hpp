@@ -1,5 +1,5 @@
-// The size a classic netCDF file must have by its own header. The library opens a shorter file and
-// reads zeros where data are missing, so the reader asks here first.
+// The size that a classic netCDF file must have by its header. The library reads zeros beyond the
+// end of a truncated file, so the reader checks the size first.
 #pragma once
 
 #include <cstdint>

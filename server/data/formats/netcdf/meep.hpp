@@ -6,10 +6,9 @@
 
 namespace windsplat::data::netcdf {
 
-// Does nothing unless every array is named as meep names its own ("ex", "hz.r", "eps", ...) and all
-// have the same two to four dimensions, none of which has a name of the file's. meep's first index
-// runs along x, and a growing last one along time: read as netCDF's order, its vectors would be
-// mirrored. Leaves a note of what it did.
+// No effect unless every array has a name used by meep ("ex", "hz.r", "eps", ...) and all have the
+// same two to four dimensions without names. meep's first index runs along x, and an unlimited last
+// one along time: in netCDF's order, its vectors would be mirrored. Adds a note of the assumption.
 void name_axes_of_meep(FileContents& contents);
 
 }  // namespace windsplat::data::netcdf

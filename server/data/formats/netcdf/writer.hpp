@@ -9,9 +9,9 @@
 
 namespace windsplat::data {
 
-// Writes every field and step of a source as CF netCDF-4 that open_file reads back. Nothing is left
-// behind where it fails or is cancelled. Errors: cancelled; those of reading and writing.
-// Until it is whole the file has the name netcdf_part(path).
+// Writes every field and step of a source as CF netCDF-4. The file is named netcdf_part(path) until
+// it is complete, and removed on failure or cancellation. Errors: cancelled; those of reading and
+// writing.
 std::string netcdf_part(const std::string& path);
 Result<void> write_netcdf(Source& source, const std::string& path, const CancelToken& cancel = {});
 

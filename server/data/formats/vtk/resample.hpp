@@ -1,4 +1,4 @@
-// Meshes of any shape -> an even lattice: for each sample the cell that holds it, found once.
+// Meshes of any shape -> an even lattice: the cell containing each sample, found once.
 #pragma once
 
 #include <array>
