@@ -171,7 +171,7 @@ TEST(Raw, FilesOfAPatternThatAreTooLongAreCounted) {
                   "'a0.raw' has 1 more step than described, and 1 more files are too long"));
 }
 
-TEST(Raw, WhoNamesAFileThatIsNotThereIsTold) {
+TEST(Raw, AMissingFileIsReportedWithItsReference) {
   const Folder folder;
   write_file(folder / "a.json", document(R"("file": "none_%03d.bin", "fields": [{"name": "p"}])"));
   const auto source = open_file(folder / "a.json");
