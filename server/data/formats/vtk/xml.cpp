@@ -100,7 +100,7 @@ std::optional<bytes::Scalar> type_named(std::string_view name) {
   return static_cast<bytes::Scalar>(at - names.begin());
 }
 
-// Reads one document. Its text must outlive this object's views, so it is owned here.
+// Reads one document, whose text has the same lifetime as this object.
 class Document {
  public:
   explicit Document(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}
