@@ -1,5 +1,5 @@
-// CHECK: an invariant whose failure is a bug of ours. It throws, so that a session's catch can end
-// that session and the daemon lives on.
+// CHECK: an invariant whose failure is a bug in this program. It throws, so that a session can
+// catch it and close while the daemon keeps running.
 #pragma once
 
 #include <stdexcept>

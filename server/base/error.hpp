@@ -23,8 +23,8 @@ enum class ErrorKind {
   busy,           // 429, exit 1
   draining,       // 503, exit 1
   out_of_memory,  // 507, exit 1: over the memory limit, or a disk that is full or read-only
-  cancelled,      // 499, exit 1: nobody wants the answer any more
-  internal,       // 500, exit 1: a fault of ours
+  cancelled,      // 499, exit 1: the request was cancelled
+  internal,       // 500, exit 1: an internal error
 };
 
 // A value at fault: JSON pointer (RFC 6901) into the document, and what its limit is.

@@ -157,7 +157,7 @@ void write(Level level, std::string_view message, Fields fields) {
   try {
     write_line(level, message, fields);
   } catch (const std::exception&) {
-    // No memory for the line: who logs because something failed must not fail by that.
+    // Allocation failed: logging an error must not itself throw.
     constexpr std::string_view lost = "a line of the log is lost: no memory\n";
     (void)std::fwrite(lost.data(), 1, lost.size(), stderr);
   }

@@ -185,7 +185,7 @@ ThreadPool::ThreadPool(unsigned threads) : state_(std::make_unique<State>()) {
     for (unsigned worker = 1; worker < threads; ++worker) {
       state_->workers.emplace_back([state = state_.get(), worker] { state->work(worker); });
     }
-  } catch (...) {  // no thread to be had: those that started must end before their State does
+  } catch (...) {  // thread creation failed: join the started threads before State is destroyed
     state_->stop();
     throw;
   }
@@ -203,7 +203,7 @@ void ThreadPool::run_loop(std::size_t count, Loop loop) {
   state.count = count;
   state.loop = loop;
   state.next.store(0);
-  // One index is the caller's: nobody need come.
+  // The caller runs one index, so a single index needs no worker.
   const bool shared = count > 1 && !state.workers.empty();
   if (shared) {
     // Closed and empty: only the loop's number and the open bit change.

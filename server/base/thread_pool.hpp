@@ -9,7 +9,7 @@ namespace windsplat {
 class ThreadPool {
  public:
   // `threads` counts the caller: 1 means no worker is started. 0 means one a hardware thread.
-  // Throws std::system_error if the system has no thread to give.
+  // Throws std::system_error if the system cannot create a thread.
   explicit ThreadPool(unsigned threads);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;

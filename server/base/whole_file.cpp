@@ -81,7 +81,7 @@ Result<void> write_in_place(const fs::path& path, std::string_view bytes) {
   return {};
 }
 
-// A new file; one that a process of the same number left there gives way.
+// A new file, replacing one left by an earlier process with the same id.
 int create(const fs::path& path) {
   constexpr int flags = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW;
   const int file = ::open(path.c_str(), flags, mode_of_new_files);
