@@ -72,7 +72,7 @@ struct Name {
 };
 
 // One JSON object, read key by key. A value that breaks its limit is recorded and leaves `out` as
-// it was. Keys that nobody asked for are recorded by finish().
+// it was. finish() records unknown keys.
 class ObjectReader {
  public:
   ObjectReader(const Json& value, std::string pointer, Faults& faults);
@@ -131,7 +131,7 @@ class ObjectReader {
   [[nodiscard]] const std::string& pointer() const { return pointer_; }
   Faults& faults() { return faults_; }
 
-  void finish();  // refuses keys that nobody asked for, and says which are known
+  void finish();  // records unknown keys as faults and lists the known ones
 
  private:
   [[nodiscard]] std::string known_keys() const;
