@@ -37,10 +37,6 @@ function(windsplat_smoke name)
 endfunction()
 
 # Sanitizers need memory of their own.
-set(memory_limit --max-mb=100)
-if(WINDSPLAT_SANITIZE)
-  set(memory_limit --size=64x48 --dims=32x16x8)
-endif()
 
 windsplat_smoke(frame bench_frame --smoke)
 windsplat_smoke(kernels bench_kernels --smoke)
@@ -49,15 +45,13 @@ windsplat_smoke(picture bench_picture --benchmark_filter=640x480 --benchmark_min
 file(WRITE ${PROJECT_BINARY_DIR}/bench_views.jsonl "{\"image\":{\"width\":32,\"height\":24}}\n")
 windsplat_smoke(path bench_path tornado bench_views.jsonl bench_view.png)
 windsplat_smoke(memory python3 ${bench_dir}/memory.py --program=$<TARGET_FILE:windsplat>
-  --frames=4 --sessions=2 ${memory_limit})
+  --frames=4 --sessions=2 --max-mb=100)
 windsplat_smoke(load bench_load --program=$<TARGET_FILE:windsplat> --dims=32x16x8 --rounds=1)
 windsplat_smoke(playback python3 ${bench_dir}/playback.py --program=$<TARGET_FILE:windsplat>
   --dims=32x16x8 --steps=6 --size=64x48 --memory-limit=512M)
-if(NOT WINDSPLAT_SANITIZE)  # sanitizers take more memory than the limit
-  windsplat_smoke(memory_limit python3 ${bench_dir}/playback.py
-    --program=$<TARGET_FILE:windsplat> --sessions=8 --apart --steps=12 --seconds=8 --size=160x120
-    --memory-limit=192M --check-memory)
-endif()
+windsplat_smoke(memory_limit python3 ${bench_dir}/playback.py
+  --program=$<TARGET_FILE:windsplat> --sessions=8 --apart --steps=12 --seconds=8 --size=160x120
+  --memory-limit=192M --check-memory)
 windsplat_smoke(budgets python3 ${bench_dir}/budgets.py --program=$<TARGET_FILE:windsplat>
   --dataset=climate:32x16x6 --size=160x120 --frames=10 --rest=1 --budgets=16,66 --max-errors=0.05)
 windsplat_smoke(links python3 ${bench_dir}/links.py --program=$<TARGET_FILE:windsplat> --smoke)

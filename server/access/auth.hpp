@@ -68,7 +68,7 @@ Verdict judge(const Request& request, bool upgrade, const Token* token,
               const std::vector<std::string>& allowed_origins, std::int64_t now_s,
               bool tls = false);
 
-// Whether judge() would compare a token of the request, so that it may be a guess.
+// Whether judge() would compare a token of the request, which may be an attempt to guess it.
 bool shows_token(const Request& request, bool upgrade);
 
 // Whether it posts the login form; only if a token is set.

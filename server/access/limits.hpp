@@ -35,7 +35,7 @@ struct Limits {
   double render_s_per_address = 0;        // render time per minute; the last one may exceed it
   double failed_logins_per_address = 30;  // per minute
   std::int64_t pixels = protocol::limits::image_pixels_max;  // of a picture
-  double kernels = 1e10;                                     // of a picture (cost.hpp)
+  double kernels = 1e10;                                     // of a picture (frame/cost.hpp)
   double render_s = 120;  // estimated time of a picture requested by HTTP
   // Limit in milliseconds on how long requests of other addresses may delay a picture requested by
   // HTTP that is itself shorter; above it the picture is refused, which bounds the delay of

@@ -70,8 +70,8 @@ struct Rendered {
 // What frames need beside their scene, for a caller that draws one after another: frames of the
 // same kind then allocate nothing. One frame at a time. It holds the last plan, what bricks of the
 // last few scenes hold (summaries.hpp), each worker's tile, and the newest picture that was not
-// delivered to a sink; pixels that one frame needed beyond kept_pixels are given back by the next
-// smaller one.
+// delivered to a sink; pixels that one frame needed beyond retained_pixels are given back by the
+// next smaller one.
 class RenderSpace {
  public:
   RenderSpace();

@@ -105,7 +105,7 @@ void each_vector(const Visit& visit) {
   visit([](SweepSpace & s) -> auto& { return s.spare_met; });
 }
 
-// Between looks at whether the tile is done or nobody wants it any more.
+// Between two checks of whether the tile is done or cancelled.
 constexpr std::int64_t slabs_between_checks = 4;
 
 // True if every block of the tile that the brick may touch lets no light through any more.

@@ -62,7 +62,8 @@ struct Workspace {
   std::array<float, 3> background{};  // linear
 };
 
-// What drawing and encoding a picture take beyond one of kept_pixels (base/kept.hpp), at most.
+// What drawing and encoding a picture take beyond one of retained_pixels (base/trim_storage.hpp),
+// at most.
 std::uint64_t bytes_beyond_kept(int width, int height, Format format);
 
 // What draw() will need of the dataset, loaded; it stays resident as long as the answer is held.

@@ -1,4 +1,5 @@
-// What pictures err: a frame against a finer run of itself, and a survey of every setting.
+// The error of pictures: a frame against a finer run of itself, and a calibration run of all
+// settings.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +27,8 @@ Result<scene::Completed> complete_at(const protocol::View& view, data::Dataset& 
 // Where a completed view is seen from. Errors: invalid (its camera).
 Result<quality::Viewpoint> viewpoint_of(const scene::Completed& completed);
 
-// Whether the frame of this scene will be measured: pictures of full size alone, up to kept_pixels.
+// Whether the frame of this scene will be measured: pictures of full size alone, up to
+// retained_pixels.
 bool is_measured(const scene::Scene& scene, const Encoding& encoding);
 
 // Linear RMSE over premultiplied RGBA of the workspace's picture, of which the differences are
@@ -41,8 +43,9 @@ Result<std::optional<double>> measured_error(const scene::Completed& completed,
 
 // Draws the view at every setting that is allowed for it and compares each with the truth: slabs of
 // half and a quarter of the view's thickness, extrapolated. Reports each as it is known, the
-// settings in no certain order. Pictures of more than kept_pixels are surveyed smaller; `sight`
-// says how they are. Times are of drawing alone. Errors: cancelled; not_resident; those of scenes.
+// settings in no certain order. Pictures of more than retained_pixels are calibrated smaller;
+// `viewpoint` says how they are. Times are of drawing alone. Errors: cancelled; not_resident; those
+// of scenes.
 struct CalibrationSample {
   std::size_t setting = 0;
   quality::Viewpoint viewpoint;
@@ -53,7 +56,7 @@ inline std::uint64_t calibration_bytes(const protocol::ImageView& image) {
   const auto pixels = static_cast<std::uint64_t>(image.width) * image.height;
   return std::min<std::uint64_t>(pixels, retained_pixels) * 2 * 4 * sizeof(float);
 }
-inline bool is_worth_calibrating(const protocol::View& view) {  // nobody looks at icons for long
+inline bool is_worth_calibrating(const protocol::View& view) {  // not for thumbnails
   return std::min(view.image.width, view.image.height) >= 64;
 }
 Result<void> calibrate(const protocol::View& completed, data::Dataset& dataset, ThreadPool& pool,

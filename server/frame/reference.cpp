@@ -39,7 +39,7 @@ class CountedMemory {
   std::uint64_t held_ = 0;
 };
 
-Error unwanted() { return make_error(ErrorKind::cancelled, "nobody wants the reference"); }
+Error unwanted() { return make_error(ErrorKind::cancelled, "reference cancelled"); }
 
 }  // namespace
 

@@ -29,7 +29,7 @@ struct FreeJpeg {
 
 using Compressor = std::unique_ptr<std::remove_pointer_t<tjhandle>, DestroyCompressor>;
 
-// The settled picture (4:4:4) takes the accurate transform, the moving one the fast.
+// The final frame (4:4:4) uses the accurate DCT, moving frames the fast one.
 int transform_of(Subsampling subsampling) {
   return subsampling == Subsampling::s444 ? TJFLAG_ACCURATEDCT : TJFLAG_FASTDCT;
 }
@@ -93,7 +93,7 @@ struct JpegEncoder::State {
 
   // What the strips of one huge picture took is given back by the next smaller one.
   void make_room(const Cut& cut, int mcu) {
-    // Of a picture of kept_pixels at 4:4:4, cut into as many strips as there may be.
+    // Of a picture of retained_pixels at 4:4:4, cut into as many strips as there may be.
     const std::size_t kept = strips_max * tjBufSize(1920, 80, TJSAMP_444);
     const auto count = static_cast<std::size_t>(cut.strips);
     const std::size_t needed = count * tjBufSize(cut.mcu_columns * mcu, cut.strip_rows * mcu,
@@ -168,7 +168,7 @@ Result<void> JpegEncoder::encode(const YccPicture& picture, int quality, ThreadP
   for (std::size_t worker = 0; worker < state.failed.size(); ++worker) {
     if (state.failed[worker] != 0) return fault_of(state.compressors[worker]);
   }
-  if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "nobody waits for the JPEG");
+  if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "request cancelled");
   state.pieces.clear();
   for (std::size_t s = 0; s < count; ++s) {
     state.pieces.emplace_back(state.strips[s].jpeg.get(), state.strips[s].size);

@@ -46,7 +46,7 @@ Result<Bytes> encode_npy(std::span<const float> rgba, int width, int height,
   bytes.insert(bytes.end(), text.begin(), text.end());
   const auto* const values = reinterpret_cast<const std::uint8_t*>(rgba.data());
   for (std::size_t at = 0; at < rgba.size_bytes(); at += bytes_between_looks) {
-    if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "nobody waits for the array");
+    if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "request cancelled");
     const std::size_t end = std::min(at + bytes_between_looks, rgba.size_bytes());
     bytes.insert(bytes.end(), values + at, values + end);
   }

@@ -114,7 +114,7 @@ Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int heigh
   PngWriter writer;
   switch (writer.write(rgb.data(), width, height, cancel)) {
     case Fate::cancelled:
-      return make_error(ErrorKind::cancelled, "nobody waits for the PNG");
+      return make_error(ErrorKind::cancelled, "request cancelled");
     case Fate::failed:
       return writer.error();
     case Fate::done:

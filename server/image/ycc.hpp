@@ -31,7 +31,7 @@ class YccPicture {
     int height = 0;
   };
 
-  // Every pixel becomes the linear background. Storage is kept up to kept_pixels.
+  // Every pixel becomes the linear background. Storage is kept up to retained_pixels.
   void reset(int width, int height, Subsampling subsampling,
              const std::array<float, 3>& background);
 

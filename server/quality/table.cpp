@@ -116,7 +116,7 @@ void Table::add(std::size_t setting, const Viewpoint& viewpoint, const Measured&
   std::deque<Entry>& entries = entries_[setting];
   entries.push_back(entry);
   if (entries.size() <= measurements_max) return;
-  // Times come from surveys alone: they outlast what only tells an error.
+  // Times come from calibration runs only: they outlast entries that have only an error.
   const auto oldest = std::find_if(entries.begin(), entries.end() - 1,
                                    [](const Entry& kept) { return !kept.log_ms; });
   entries.erase(oldest == entries.end() - 1 ? entries.begin() : oldest);

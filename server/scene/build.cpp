@@ -249,7 +249,8 @@ Result<Scene> build_scene(const Completed& completed, data::Dataset& dataset) {
   auto built = at_level(scene, level, view, placed, dataset);
   const bool reduced = level != std::array{0, 0, 0};
   if (built || !reduced || built.error().kind != ErrorKind::out_of_memory) return built;
-  // Where volumes fit but not their levels beside them, every sample is drawn, as the frame tells.
+  // If memory has room for the volumes but not for their levels, every sample is drawn; the report
+  // of the frame says so.
   return at_level(std::move(scene), {0, 0, 0}, view, placed, dataset);
 }
 

@@ -346,7 +346,8 @@ TEST_F(CliAccess, SighupCannotTakeTheTokenFromWhatOthersReach) {
     const std::string before = daemon.messages();
     daemon.send(SIGHUP);
     EXPECT_TRUE(eventually([&] {
-      return daemon.messages().find("configuration is unchanged", before.size()) != std::string::npos;
+      return daemon.messages().find("configuration is unchanged", before.size()) !=
+             std::string::npos;
     }));
     EXPECT_EQ(net_test::get(port, "/v1").status, 401);
   }

@@ -10,6 +10,8 @@ import googletest
 from outcome import Outcome
 
 OUTPUT_BYTES_MAX = 100_000_000
+# A race or a misuse of memory rarely shows twice: its first report counts.
+REPORTED = re.compile(r"(WARNING|ERROR): \w+Sanitizer|runtime error:")
 
 
 @dataclasses.dataclass
@@ -51,7 +53,7 @@ def run_ctest(prefix, build, selection, jobs, emit):
 
 
 def status(case):
-    """run (it passed), fail, or skip: a program that is not there was not skipped."""
+    """run (it passed), fail, or skip: a missing program counts as failed."""
     reason = case.find("skipped")
     if reason is None:
         return "fail" if case.get("status") == "fail" else "run"
@@ -75,6 +77,9 @@ class Suite:
             self.note(name, known[name], status, seconds, said)
         for name, said, passes in self.again:
             self.emit(f"\n{name} failed:\n{said}\n")
+            if REPORTED.search(said):
+                self.outcome.failed[name] = said
+                continue
             passed = passes()
             (self.outcome.unstable if passed else self.outcome.failed)[name] = said
             self.outcome.passed += passed
@@ -104,12 +109,14 @@ class Suite:
             else:
                 self.outcome.passed += result == "ok"
                 self.outcome.skipped += result == "skipped"
-        if status == "fail" and all(result in ("ok", "skipped")
-                                    for result, _, _ in found.values()):
-            tail = "\n".join(said.splitlines()[-40:])  # after its tests: a leak, for example
+        everywhere = "\n".join(words for _, _, words in found.values())
+        reported = REPORTED.search(said) and not REPORTED.search(everywhere)
+        if status == "fail" and (reported or all(result in ("ok", "skipped")
+                                                 for result, _, _ in found.values())):
+            tail = "\n".join(said.splitlines()[-60:])  # after its tests: a leak, for example
             self.again.append((name, tail, lambda: self.entry_passes(name)))
 
     def entry_passes(self, name):
         only = ["-R", f"^{re.escape(name)}$"]
-        return all(status == "run" for status, _, _ in
-                   run_ctest(self.prefix, self.build, only, 1, self.emit).values())
+        results = run_ctest(self.prefix, self.build, only, 1, self.emit)
+        return bool(results) and all(status == "run" for status, _, _ in results.values())

@@ -46,6 +46,13 @@ add_test(fails "{python}" -c "raise SystemExit('a reason')")
 add_test(skips "{python}" -c "raise SystemExit(77)")
 set_tests_properties(skips PROPERTIES SKIP_RETURN_CODE 77)
 add_test(absent "{program}-that-is-not-there")
+add_test(races "{python}" -c "
+import pathlib
+once = pathlib.Path('races.once')
+if not once.exists():
+    once.touch()
+    raise SystemExit('WARNING: ThreadSanitizer: data race')
+")
 """
 
 
@@ -62,7 +69,8 @@ class Suites(unittest.TestCase):
         (self.folder / "CTestTestfile.cmake").write_text(
             ENTRIES.format(python=sys.executable, program=program))
         outcome = ctest_suite.Suite(self.folder, [], 2, self.said.append).run()
-        self.assertEqual(set(outcome.failed), {"Case.bad", "Case.crash", "fails", "absent"})
+        self.assertEqual(set(outcome.failed),
+                         {"Case.bad", "Case.crash", "fails", "absent", "races"})
         self.assertEqual(set(outcome.unstable), {"Case.flaky"})
         self.assertEqual((outcome.passed, outcome.skipped), (4, 2))  # good, flaky, after, passes
         self.assertIn("why Case.bad fails", outcome.failed["Case.bad"])

@@ -19,9 +19,10 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build"
 LOGS = BUILD / "test-logs"
 # More than cores: tests wait for clocks and sockets as long as they compute.
-JOBS = 2 * (os.cpu_count() or 2)
+CORES = len(os.sched_getaffinity(0))
+JOBS = min(2 * CORES, CORES + 4)
 # A browser and its daemon keep a core busy; node itself runs one file fewer than cores.
-BROWSERS = os.cpu_count() or 2
+BROWSERS = min(CORES, 4)
 SEARCH_SECONDS = 30  # a fuzzer
 SANITIZERS = {
     "ASAN_OPTIONS": "detect_leaks=1:strict_string_checks=1:check_initialization_order=1",

@@ -31,7 +31,7 @@ struct Numbers {
 struct Unwritten {
   std::size_t chunks = 0;
   std::size_t looked_at = 0;  // chunks that were looked for, from the first; what has none is one
-  bool is_all = true;         // false if values were omitted
+  bool is_all = true;         // whether all chunks were examined
 };
 
 class ArrayFile {

@@ -84,7 +84,7 @@ Result<void> drop_capabilities() {
   return {};
 }
 
-// No rule at all: no file may be reached by name. A kernel without it leaves that to the filter.
+// An empty Landlock ruleset: no file can be opened by name. Without Landlock the filter does that.
 void forbid_paths() {
 #ifdef SYS_landlock_create_ruleset
   const long version =
@@ -109,6 +109,7 @@ class Filter {
   Filter() : filter_(seccomp_init(SCMP_ACT_ERRNO(EPERM))), fault_(filter_ ? 0 : -ENOMEM) {
     set(SCMP_FLTATR_ACT_BADARCH, SCMP_ACT_KILL_PROCESS);
     set(SCMP_FLTATR_CTL_TSYNC, 1);
+    set(SCMP_FLTATR_API_SYSRAWRC, 1);  // the kernel's errno, not ECANCELED for all
   }
 
   // Where all conditions hold. A call that this machine does not have is a number no kernel knows.
@@ -129,11 +130,12 @@ class Filter {
   int fault_;
 };
 
-scmp_arg_cmp equals(unsigned argument, scmp_datum_t value) {
-  return {argument, SCMP_CMP_EQ, value, 0};
-}
 scmp_arg_cmp has_bits(unsigned argument, scmp_datum_t mask, scmp_datum_t value) {
   return {argument, SCMP_CMP_MASKED_EQ, mask, value};
+}
+// Of an int: the kernel ignores the upper half of the register, which callers need not clear.
+scmp_arg_cmp equals(unsigned argument, int value) {
+  return has_bits(argument, 0xffffffff, static_cast<std::uint32_t>(value));
 }
 
 // 0 or a negative errno.
@@ -147,7 +149,7 @@ int forbid_calls() {
         SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
         SCMP_SYS(restart_syscall), SCMP_SYS(exit), SCMP_SYS(exit_group),
 #ifdef WINDSPLAT_SANITIZED
-        // By a pipe the sanitizers find out whether memory can be read.
+        // The sanitizers probe through a pipe whether memory can be read.
         SCMP_SYS(pipe2), SCMP_SYS(pipe),
 #endif
         SCMP_SYS(sendmsg), SCMP_SYS(recvmsg), SCMP_SYS(ppoll), SCMP_SYS(poll), SCMP_SYS(write),

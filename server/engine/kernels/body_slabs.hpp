@@ -98,7 +98,7 @@ int pack_lines(const Camera& camera, const Prepared& p, float slab_depth,
 // A slab without a medium at hand: all ways of compositing are the same.
 constexpr int compositing_no_medium = -1;
 
-// What has happened to the light of a vector of a block's pixels within the slab at hand.
+// Light and transmittance of a vector of a block's pixels within the current slab.
 struct Passage {
   Pixel tau;
   Attenuation<Pixel> medium;

@@ -244,7 +244,7 @@ TEST(LoaderConfinement, nothing_but_reading_and_computing_is_left) {
 }
 
 #ifdef __x86_64__
-// What x32 numbers its own way no rule speaks of.
+// No rule covers the call numbers of x32.
 TEST(LoaderConfinement, a_call_of_another_abi_ends_the_process) {
   constexpr long x32 = 0x40000000;
   std::fflush(nullptr);

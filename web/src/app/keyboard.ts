@@ -32,7 +32,7 @@ function nameOf({ key, ctrlKey, metaKey, shiftKey }: KeyboardEvent): string {
 
 const isMac = (): boolean => /Mac|iPhone|iPad/.test(navigator.platform);
 
-// How a key with ctrl or cmd is called here.
+// The label of a key with ctrl or cmd.
 export const modText = (key: string): string => (isMac() ? `⌘ ${key}` : `ctrl ${key}`);
 
 export function bindKeys(bindings: Binding[], target: EventTarget): void {

@@ -259,7 +259,8 @@ Result<void> File::open_library() {
   const LibraryLock lock;
   unsigned plugins = 1;
   if (H5PLget_loading_state(&plugins) < 0 || plugins != 0) {
-    return make_error(ErrorKind::internal, "HDF5 would load plugins that a file names");
+    return make_error(ErrorKind::internal,
+                      "the file requests an HDF5 plugin, which is not allowed");
   }
   if (!classic_) {
     auto storage = survey_storage(*input_);

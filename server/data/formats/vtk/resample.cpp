@@ -280,7 +280,7 @@ class Resampler {
       for (std::size_t j = span[1][0]; j < span[1][1]; ++j) {
         scan_row(cell, shape, corners, slanted, {span[0][0], j, k}, span[0][1] - span[0][0]);
         if (work_ > allowed) {
-          return refuse("has cells that overlap, or lie thin and aslant, too much to be resampled");
+          return refuse("has cells that overlap, or are too thin and oblique to be resampled");
         }
       }
     }

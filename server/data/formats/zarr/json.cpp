@@ -148,7 +148,7 @@ const Json* Json::find(std::string_view key) const {
 Result<Json> parse_json(std::string_view text) {
   // The parser takes a NUL for the end of its input.
   if (text.find('\0') != std::string_view::npos) {
-    return make_error(ErrorKind::bad_data, "it is not valid JSON: it has a NUL");
+    return make_error(ErrorKind::bad_data, "it is not valid JSON: it contains a NUL");
   }
   const std::string plain = quote_bare_words(text);
   TreeBuilder builder;
