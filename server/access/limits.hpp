@@ -40,7 +40,6 @@ struct Limits {
   // Limit in milliseconds on how long requests of other addresses may delay a picture requested by
   // HTTP that is itself shorter; above it the picture is refused, which bounds the delay of
   // admitted ones.
-  // longer than where there is nobody else.
   double wait_ms = 25;
   // Proxies whose X-Forwarded-For is trusted: addresses, or networks as ADDRESS/BITS.
   std::vector<std::string> trusted_proxies;

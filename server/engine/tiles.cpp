@@ -91,7 +91,7 @@ class OpenBricks {
 
 void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
                const CancelToken& cancel, std::size_t index, Tile& tile, TileWork& work) {
-  // Between looks at the caller's patience.
+  // Bricks between checks for cancellation.
   constexpr std::size_t bricks_between_checks = 16;
   OpenBricks bricks(bins, index, tile);
   const Brick* next = bricks.next();

@@ -136,14 +136,14 @@ TEST_F(CliAccess, BeyondLoopbackATokenIsNeededOrTheFlag) {
     Process daemon(with(token));
     const auto port = port_of(daemon);
     EXPECT_EQ(status_with(port, first_token), 200);
-    EXPECT_TRUE(says(daemon, "in the clear"));
+    EXPECT_TRUE(says(daemon, "sent unencrypted"));
   }
   Words both = tls_words();
   both.insert(both.end(), token.begin(), token.end());
   Process daemon(with(both));
   EXPECT_EQ(status_with(port_of(daemon), first_token, true), 200);
   stop(daemon);
-  EXPECT_THAT(daemon.messages(), Not(HasSubstr("in the clear")));
+  EXPECT_THAT(daemon.messages(), Not(HasSubstr("sent unencrypted")));
 }
 
 TEST_F(CliAccess, HealthIsCheckedOverTlsByWhomItTrusts) {

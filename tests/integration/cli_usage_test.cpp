@@ -136,7 +136,8 @@ TEST(CliUsage, AWordThatIsNotKnownIsNamedWithWhatMayBeMeant) {
   EXPECT_THAT(run({"serve", "--memory-limt=4G"}).err, HasSubstr("did you mean --memory-limit?"));
   EXPECT_THAT(run({"serve", "--banana"}).err,
               StartsWith("windsplat: '--banana' is not an option of 'serve'\n"));
-  EXPECT_THAT(run({"inspect", "tornado", "extra"}).err, HasSubstr("'extra' is one argument too"));
+  EXPECT_THAT(run({"inspect", "tornado", "extra"}).err,
+              HasSubstr("'extra' is an unexpected argument"));
 }
 
 // What a user's words bring into a message cannot pose as lines or colours of the program's own.

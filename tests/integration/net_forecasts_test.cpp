@@ -154,7 +154,7 @@ TEST_F(Forecasts, WhatHasNoneIsRefused) {
   Json reference = view_of(320, 240);
   reference["method"]["name"] = "reference";
   const Answer refused = post(reference);
-  expect_refused(refused, 422, "one way");
+  expect_refused(refused, 422, "single setting");
   EXPECT_EQ(json_of(refused)["errors"][0]["pointer"], "/method/name");
   Json nowhere = view_of(320, 240);
   nowhere["dataset"] = "none";

@@ -187,7 +187,7 @@ TEST(TlsHandshakes, of_strangers_leave_time_for_health_asked_by_the_machine_itse
   EXPECT_LT(shaken, 5000);
   EXPECT_EQ(healthy, 5);
   EXPECT_LT(others, 5) << "they wait for what the first stranger owes";
-  EXPECT_THAT(log, HasSubstr("too much processor time"));
+  EXPECT_THAT(log, HasSubstr("exceeded their processor time"));
   EXPECT_THAT(log, HasSubstr("connections=1 seconds=0 address=127.0.0.2"));
 }
 

@@ -196,10 +196,10 @@ TEST(Limits, drawing_is_charged_and_its_debt_is_waited_for) {
   const Answer second = get(server.port(), frame);
   expect_limit(second, 429, "seconds of rendering a minute");
   EXPECT_GT(std::atoi(second.header("retry-after").c_str()), 10);
-  expect_limit(post_view(server.port(), R"({"dataset":"small"})"), 429, "drawing");
+  expect_limit(post_view(server.port(), R"({"dataset":"small"})"), 429, "seconds of rendering");
   expect_limit(request(server.port(), "POST", "/v1/references",
                        {{"Content-Type", "application/json"}}, R"({"dataset":"small"})"),
-               429, "drawing");
+               429, "seconds of rendering");
   expect_no_upgrade(StreamClient(server.port()), 429);
   EXPECT_EQ(get(server.port(), "/v1/datasets").status, 200) << "what draws nothing is answered";
   EXPECT_EQ(refused(server.port(), "render"), 4);

@@ -321,7 +321,7 @@ struct RemoteSource::State {
     } else if (fate == Fate::late) {
       how = "was ended after " + seconds_text(what.time);
     } else if (fate != Fate::closed) {
-      how = "said what it must not and was ended";
+      how = "violated the protocol and was ended";
     }
     return make_error(ErrorKind::bad_data, whose_loader() + ' ' + how + " while " + what.doing);
   }

@@ -169,7 +169,7 @@ TEST_F(Liar, one_that_sends_single_bytes) {
 
 TEST_F(Liar, one_that_sends_malformed_messages) {
   const std::string message =
-      "the loader of 'some.nc' said what it must not and was ended while opening it";
+      "the loader of 'some.nc' violated the protocol and was ended while opening it";
   speak("s.sendall(b'x' * 1000)\nhear()\n");
   expect_not_opened(message);
   speak("s.sendall(struct.pack('<IIQ', K['opened'], 0, 1 << 60))\nhear()\n");
@@ -186,7 +186,7 @@ TEST_F(Liar, one_that_sends_malformed_messages) {
 TEST_F(Liar, one_that_sends_too_many_messages) {
   speak("told()\nsay('progress', b'x' * 100000)\nhear()\n");
   expect_not_read(
-      "the loader of 'some.nc' said what it must not and was ended while reading 'wind'");
+      "the loader of 'some.nc' violated the protocol and was ended while reading 'wind'");
 }
 
 // Memory written by a loader and not reused is released with it.
@@ -218,7 +218,7 @@ TEST_F(Liar, one_that_keeps_much_mapped_is_ended) {
 TEST_F(Liar, one_that_sends_endless_requests) {
   limits_.opens_max = 100;
   speak("while True: ask('ask_exists', b'some.nc')\n");
-  expect_not_opened("the loader of 'some.nc' said what it must not and was ended while opening it");
+  expect_not_opened("the loader of 'some.nc' violated the protocol and was ended while opening it");
 }
 
 TEST_F(Liar, one_that_requests_other_files) {

@@ -141,7 +141,7 @@ TEST(Raw, BytesThatNothingDescribesAreWholeStepsOrRefused) {
   write_file(folder / "a.raw", data(14));
   const std::string message = refusal(folder / "a.json");
   EXPECT_THAT(message, HasSubstr("'a.raw' has 64 bytes, 'a.json' describes 56"));
-  EXPECT_THAT(message, HasSubstr("no whole step of 48 bytes"));
+  EXPECT_THAT(message, HasSubstr("not a whole step of 48 bytes"));
 }
 
 // Two fields of one file, each given by its offset, describe it together.
@@ -218,7 +218,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadRawCase{"cut", R"({"windsplat": "raw", )", "not valid JSON"},
         BadRawCase{"deep", with(R"("steps": )" + std::string(100000, '[') + ", "),
                    "nested deeper than 8"},
-        BadRawCase{"twice", with(R"("type": "uint8", )"), "'type' is there twice"},
+        BadRawCase{"twice", with(R"("type": "uint8", )"), "'type' occurs twice"},
         BadRawCase{"unknown", with(R"("colour": 1, )"), "/colour: this key is not known"},
         BadRawCase{"unknown_below", with("", R"([{"name": "p", "unit": "m"}])"),
                    "/fields/0/unit: this key is not known"},

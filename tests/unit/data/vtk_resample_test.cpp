@@ -432,14 +432,15 @@ TEST_F(VtkResampling, CellsThatAskForMoreWorkThanTheirFileIsWorthAreRefused) {
     VtkXml xml;
     const auto data = xml.array("Float64", "a", 1, at_points(mesh, linear));
     const std::string said = refusal(folder_.write("a.vtu", vtu(mesh, data, "", xml)));
-    EXPECT_EQ(said.find("too much to be resampled") != std::string::npos, count == 200) << said;
+    EXPECT_EQ(said.find("too thin and oblique to be resampled") != std::string::npos, count == 200)
+        << said;
   }
   // So thin that the lattice has all the samples that it may, whose rows are in every one's box.
   const TestMesh thin = slivers(1e-4, 60);
   VtkXml xml;
   const auto data = xml.array("Float64", "a", 1, at_points(thin, linear));
   EXPECT_THAT(refusal(folder_.write("a.vtu", vtu(thin, data, "", xml))),
-              HasSubstr("too much to be resampled"));
+              HasSubstr("too thin and oblique to be resampled"));
 }
 
 // As much overlap as a file can honestly have: a cell that lies in the cube a thousand times over.

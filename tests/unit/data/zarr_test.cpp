@@ -364,7 +364,7 @@ TEST(Zarr, BrokenMetadataIsRefused) {
               HasSubstr("'shape'"));
   EXPECT_THAT(fault_of(array_json("[1,1,1,1,1,1,1,1,1]", "[1,1,1,1,1,1,1,1,1]", "<f4")),
               HasSubstr("at most 8"));
-  EXPECT_THAT(fault_of(good.substr(0, 40)), HasSubstr("no JSON"));
+  EXPECT_THAT(fault_of(good.substr(0, 40)), HasSubstr("not valid JSON"));
   EXPECT_THAT(fault_of(good.substr(0, good.size() - 1) + R"(,"order":"C"})"),
               HasSubstr("'order' twice"));
   EXPECT_THAT(fault_of(std::string(100000, '[')), HasSubstr("32 levels"));
