@@ -304,8 +304,8 @@ test("a hidden page does not let its lines flow; still lines do not", () =>
       const last = window.patches.at(-1).patch.vector?.motion;
       return last?.mode === "still";
     });
-    await page.waitForTimeout(300);
-    assert.equal(await control(page, "animate lines", "input").isChecked(), false);
+    const unchecked = page.locator("input:not(:checked)");
+    await control(page, "animate lines", "input").and(unchecked).waitFor({ state: "attached" });
     assert.equal(await lastPatch(page, "vector", "motion", "mode"), "still");
   }));
 
