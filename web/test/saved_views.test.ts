@@ -102,8 +102,8 @@ test("a short link names a view that the server stores", async () => {
   assert.deepEqual(await loadView(fetch, "http://host/a/", "k7"), stored);
   assert.equal(asked[1]!.url, "http://host/a/v1/views/k7");
   assert.equal(asked[1]!.options.method ?? "GET", "GET");
-  const refused = server(() => problem(404, "there is no view k8"));
-  await assert.rejects(loadView(refused.fetch, "http://host/", "k8"), /no view k8/);
+  const refused = server(() => problem(404, "unknown view id: k8"));
+  await assert.rejects(loadView(refused.fetch, "http://host/", "k8"), /unknown view id: k8/);
   const odd = server(() => new Response("[]"));
   await assert.rejects(loadView(odd.fetch, "http://host/", "k8"), /understood/);
   const none = server(() => Response.json({ id: "k8", view: null }));
