@@ -32,12 +32,14 @@ struct CameraView {
   Vec3 up{0, 0, 1};
   double fov_y = 35;             // degrees, perspective
   std::optional<double> height;  // world height of the picture at the target, orthographic
+  bool operator==(const CameraView&) const = default;
 };
 
 struct ImageView {
   int width = 1280;
   int height = 720;
   std::string background = "#000000";  // sRGB
+  bool operator==(const ImageView&) const = default;
 };
 
 // One layer of the grid.
@@ -71,6 +73,7 @@ struct VectorColorView {
   std::optional<Range> range;        // of what `by` measures
   double rise_weight = 0.2;          // 0..1, `rise` only: 0 height alone, 1 rise alone
   std::string constant = "#ffffff";  // sRGB, `constant` only
+  bool operator==(const VectorColorView&) const = default;
 };
 
 struct JitterView {
@@ -79,6 +82,7 @@ struct JitterView {
   bool overlap = true;  // kernels as wide as `span`; false: no wider than the stride
   std::int64_t seed = 1;
   bool per_step = false;  // a new pattern for each time step
+  bool operator==(const JitterView&) const = default;
 };
 
 struct VectorView {
@@ -101,11 +105,13 @@ struct VectorView {
   double motion_rate = 1.0;  // cycles a step at the top of magnitude_range
   double motion_time = 0.0;  // steps, added to the step
   JitterView jitter;
+  bool operator==(const VectorView&) const = default;
 };
 
 struct ScalarColorView {
   std::optional<std::string> map;
   std::optional<Range> range;
+  bool operator==(const ScalarColorView&) const = default;
 };
 
 struct ScalarView {
@@ -115,12 +121,14 @@ struct ScalarView {
   std::optional<std::vector<std::array<double, 2>>> extinction;
   double min_optical_depth = 1e-4;  // splats below it are left out
   int stride = 1;
+  bool operator==(const ScalarView&) const = default;
 };
 
 struct DepthCueView {
   double strength = 0.3;
   double near = 0;  // 0: where the volume is nearest to the eye
   double far = 1;   // 1: where it is farthest
+  bool operator==(const DepthCueView&) const = default;
 };
 
 struct MethodView {
@@ -129,6 +137,7 @@ struct MethodView {
   double slab_thickness = 1;  // grid cells along the line of sight, `slab` only
   double stop_transmittance = 1.5e-4;
   Detail detail = Detail::automatic;  // automatic: coarser where cells are below a pixel
+  bool operator==(const MethodView&) const = default;
 };
 
 // What the server may choose by itself: resolution, method and slabs of a frame that is not pure.
@@ -136,6 +145,7 @@ struct QualityView {
   std::optional<double> budget_ms;  // milliseconds of drawing and encoding
   std::optional<double> max_error;  // linear RMSE
   bool lossless = false;            // final frames of a stream as PNG
+  bool operator==(const QualityView&) const = default;
 };
 
 struct View {
@@ -149,6 +159,7 @@ struct View {
   DepthCueView depth_cue;
   MethodView method;
   QualityView quality;
+  bool operator==(const View&) const = default;
 };
 
 }  // namespace windsplat::protocol

@@ -10,7 +10,7 @@
 #include "server/frame/measure.hpp"
 #include "server/http/problem.hpp"
 #include "server/quality/curve.hpp"
-#include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
 
 namespace windsplat::net {
 namespace {
@@ -38,12 +38,11 @@ Error naming_the_way_out(Error error) {
 
 Result<protocol::ForecastDescription> forecast(quality::Tables& tables, const protocol::View& view,
                                                data::Dataset resident) {
-  const auto placed = scene::complete_and_place(view, resident);
-  if (!placed) return naming_the_way_out(placed.error());
-  const auto viewpoint = frame::viewpoint_of(*placed);
-  if (!viewpoint) return viewpoint.error();
-  return quality::curve(placed->view,
-                        tables.forecasts(quality::signature_of(placed->view), *viewpoint));
+  const auto completed = scene::complete(view, resident);
+  if (!completed) return naming_the_way_out(completed.error());
+  return quality::curve(
+      completed->view(),
+      tables.forecasts(quality::signature_of(completed->view()), frame::viewpoint_of(*completed)));
 }
 
 }  // namespace

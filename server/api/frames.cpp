@@ -13,11 +13,13 @@
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
 #include "server/quality/pick.hpp"
-#include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
+#include "server/scene/completed_view.hpp"
+#include "server/scene/presets.hpp"
 #include "server/work/drawing.hpp"
 #include "server/work/error_report.hpp"
 #include "server/work/run_guarded.hpp"
+#include "server/work/view_completion.hpp"
 
 namespace windsplat::net {
 namespace {
@@ -97,22 +99,22 @@ std::string picture_etag(const protocol::View& view, const data::Dataset& datase
                  std::to_string(encoding.quality));
 }
 
-Result<protocol::View> resolve(const Picture& picture, data::Dataset& dataset) {
-  auto view = scene::complete_view(picture.view, dataset);
-  if (!view || (picture.preset.empty() && !picture.orbit)) return view;
-  const auto placed = scene::place_dataset(view->geometry, dataset);
-  if (!placed) return placed.error();
-  const scene::Lattice& lattice = (*placed)->lattice;
-  if (!picture.preset.empty()) {
-    if (const auto ok = scene::apply_preset(*view, lattice, picture.preset); !ok) {
-      return ok.error();
+// The view of the request, with its preset and orbit.
+Result<scene::CompletedView> complete(const Picture& picture, ViewCompletion& completion,
+                                      data::Dataset& dataset) {
+  const auto completed = completion.of(picture.view, dataset);
+  if (!completed) return completed;
+  const scene::Lattice& lattice = completed->lattice();
+  Result<void> preset;
+  auto framed = completed->with([&](protocol::View& view) {
+    if (!picture.preset.empty()) preset = scene::apply_preset(view, lattice, picture.preset);
+    if (picture.orbit) {
+      const Orbit& orbit = *picture.orbit;
+      scene::orbit(view, lattice, orbit.azimuth, orbit.elevation, orbit.zoom);
     }
-  }
-  if (picture.orbit) {
-    const Orbit& orbit = *picture.orbit;
-    scene::orbit(*view, lattice, orbit.azimuth, orbit.elevation, orbit.zoom);
-  }
-  return scene::complete_view(*view, dataset);
+  });
+  if (!preset) return preset.error();
+  return framed;
 }
 
 // With a budget or an error limit the server chooses settings, and the picture depends on more than
@@ -121,76 +123,59 @@ bool is_chosen(const protocol::View& view) {
   return view.quality.budget_ms || view.quality.max_error;
 }
 
-Result<quality::Setting> setting_of(Services& services, const protocol::View& completed,
-                                    data::Dataset& dataset) {
-  if (!is_chosen(completed) || completed.method.name == protocol::MethodName::reference) {
-    return quality::settings[quality::own_setting(completed)];
+quality::Setting setting_of(quality::Tables& tables, const scene::CompletedView& completed) {
+  const protocol::View& view = completed.view();
+  if (!is_chosen(view) || view.method.name == protocol::MethodName::reference) {
+    return frame::own_setting(completed);
   }
-  const auto placed = scene::complete_and_place(completed, dataset);
-  if (!placed) return placed.error();
-  const auto viewpoint = frame::viewpoint_of(*placed);
-  if (!viewpoint) return viewpoint.error();
-  const auto known =
-      services.backend.quality.forecasts(quality::signature_of(completed), *viewpoint);
-  const quality::Aim aim{completed.quality.budget_ms, completed.quality.max_error};
-  return quality::settings[quality::pick(completed, known, aim).setting];
+  const auto known = tables.forecasts(quality::signature_of(view), frame::viewpoint_of(completed));
+  const quality::Aim aim{view.quality.budget_ms, view.quality.max_error};
+  return quality::settings[quality::pick(view, known, aim).setting];
 }
 
-frame::Encoding encoding_at(frame::Encoding encoding, const quality::Setting& setting) {
-  encoding.half_level = setting.half_level;
-  encoding.coarser = setting.coarser;
-  return encoding;
+Response unchanged_response(const std::string& etag) {
+  return {304, "", {{"Cache-Control", "no-cache"}, {"ETag", etag}}, {}};
 }
 
-// The view used for loading is also used for drawing, even if more data is known by then.
-using LoadedFor = std::optional<quality::Setting>;
-
-Result<std::shared_ptr<const void>> load(Services& services, const Picture& picture,
-                                         data::Dataset& loading, LoadedFor& loaded_for) {
-  const std::string& id = loading.info().id;
-  const auto view = resolve(picture, loading);
-  if (!view) return with_dataset_name(view.error(), id);
-  const auto setting = setting_of(services, *view, loading);
-  if (!setting) return with_dataset_name(setting.error(), id);
-  loaded_for = *setting;
-  return load_picture(quality::at_setting(*view, *setting), loading,
-                      encoding_at(picture.encoding, *setting));
-}
-
-Result<Response> draw(Services& services, const Picture& picture, data::Dataset& dataset,
-                      std::int64_t queue_us, const LoadedFor& loaded_for,
-                      const CancelToken& cancel) {
-  const auto view = resolve(picture, dataset);
-  if (!view) return view.error();
-  Response response;
-  if (is_chosen(*view)) {
-    response.headers = {{"Cache-Control", "no-store"}};
-  } else {
-    const std::string etag = picture_etag(*view, dataset, picture.encoding);
-    response.headers = {{"Cache-Control", "no-cache"}, {"ETag", etag}};
+// Null if the client has the picture already: `reply` is called with 304.
+Result<PreparedPtr> prepare(quality::Tables& tables, const Picture& picture,
+                            ViewCompletion& completion, data::Dataset& dataset, Loading loading,
+                            const Reply& reply) {
+  const auto completed = complete(picture, completion, dataset);
+  if (!completed) {
+    if (loading == Loading::none) return completed.error();
+    return with_dataset_name(completed.error(), dataset.info().id);
+  }
+  if (!is_chosen(completed->view())) {
+    const std::string etag = picture_etag(completed->view(), dataset, picture.encoding);
     if (matches_etag(picture.if_none_match, etag)) {
-      response.status = 304;
-      return response;
+      reply(unchanged_response(etag));
+      return PreparedPtr();
     }
   }
-  const auto setting =
-      loaded_for ? Result<quality::Setting>(*loaded_for) : setting_of(services, *view, dataset);
-  if (!setting) return setting.error();
-  const frame::Encoding encoding = encoding_at(picture.encoding, *setting);
-  const auto room = reserve_picture(dataset, view->image, encoding, loaded_for.has_value());
-  if (!room) return room.error();
-  auto drawn = frame::produce(quality::at_setting(*view, *setting), dataset, encoding,
-                              *services.backend.pool, cancel, services.backend.frames);
+  return prepare_picture(*completed, setting_of(tables, *completed), picture.encoding, dataset,
+                         loading);
+}
+
+Result<Response> draw(Services& services, const Picture& picture, const PreparedPicture& prepared,
+                      data::Dataset& dataset, std::int64_t queue_us, const CancelToken& cancel) {
+  auto drawn = frame::produce(prepared.frame, dataset, *services.backend.pool, cancel,
+                              services.backend.frames);
   if (!drawn) return drawn.error();
   protocol::FrameInfo info = frame::frame_info(*drawn, drawn->view);
-  report_error(*drawn, observed_in(*drawn, *setting), *setting, encoding, services.backend.quality,
-               info);
+  report_error(*drawn, observed_in(*drawn, prepared.frame.setting), prepared.frame.setting,
+               prepared.frame.encoding, services.backend.quality, info);
   services.metrics.stage_took(Metrics::Stage::queue, queue_us);
   services.metrics.stage_took(Metrics::Stage::render, drawn->render_us);
   services.metrics.stage_took(Metrics::Stage::encode, drawn->encode_us);
-  // Settings chosen by the server reduce the work below the estimate.
-  if (!is_chosen(*view)) {
-    services.backend.costs.learn(view->dataset, view->method.name, picture.cost.kernels,
+  Response response;
+  if (is_chosen(drawn->view)) {
+    response.headers = {{"Cache-Control", "no-store"}};
+  } else {
+    response.headers = {{"Cache-Control", "no-cache"},
+                        {"ETag", picture_etag(drawn->view, dataset, picture.encoding)}};
+    // Settings chosen by the server reduce the work below the estimate.
+    services.backend.costs.learn(drawn->view.dataset, drawn->view.method.name, picture.cost.kernels,
                                  drawn->render_us + drawn->encode_us);
   }
   response.content_type = media_type(picture.encoding.format);
@@ -227,20 +212,20 @@ void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dat
       request.address.empty() ? request.peer : std::hash<std::string>{}(request.address);
   Drawing drawing{
       RenderService::Kind::request, owner, cancel, std::move(dataset), {}, {}, {}, 0, {}};
-  const auto loaded_for = std::make_shared<LoadedFor>();
-  drawing.draw = [&services, picture, answer, cancel, loaded_for, id = request.id](
-                     data::Dataset& resident, std::int64_t queue_us, bool after_load) {
+  drawing.prepare = [&tables = services.backend.quality, picture, answer, cancel,
+                     completion = std::make_shared<ViewCompletion>(),
+                     id = request.id](data::Dataset& available, Loading loading) {
+    return run_guarded<PreparedPtr>(
+        "preparing a picture", cancel,
+        [&] { return prepare(tables, *picture, *completion, available, loading, *answer); }, id);
+  };
+  drawing.draw = [&services, picture, answer, cancel, id = request.id](
+                     const PreparedPicture& prepared, data::Dataset& resident,
+                     std::int64_t queue_us, Loading /*loading*/) {
     auto response = run_guarded<Response>(
         "a picture", cancel,
-        [&] { return draw(services, *picture, resident, queue_us, *loaded_for, cancel); }, id);
-    if (!after_load && !response && response.error().kind == ErrorKind::not_resident) return false;
+        [&] { return draw(services, *picture, prepared, resident, queue_us, cancel); }, id);
     (*answer)(response ? std::move(*response) : problem_response(response.error()));
-    return true;
-  };
-  drawing.load = [&services, picture, cancel, loaded_for, id = request.id](data::Dataset& loading) {
-    return run_guarded<std::shared_ptr<const void>>(
-        "loading a picture's fields", cancel,
-        [&] { return load(services, *picture, loading, *loaded_for); }, id);
   };
   drawing.payer = request.address;
   drawing.cost_ms = estimate_ms;

@@ -8,8 +8,8 @@
 #include "server/data/model/digest.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
-#include "server/scene/build.hpp"
 #include "server/scene/colormap.hpp"
+#include "server/scene/presets.hpp"
 #include "server/work/run_guarded.hpp"
 
 namespace windsplat::net {

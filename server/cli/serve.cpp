@@ -24,6 +24,7 @@
 #include "server/data/resident/store.hpp"
 #include "server/data/samples/samples.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
 #include "server/transport/server.hpp"
 #include "server/views/saved_views.hpp"
 

@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "server/data/model/coarsen.hpp"
+#include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
+#include "server/scene/lattice.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -51,12 +53,11 @@ VisiblePart visible_part(const scene::Camera& camera, const scene::Lattice& latt
 
 class Counting {
  public:
-  Counting(const scene::Completed& completed, const scene::Camera& camera,
-           const std::array<int, 3>& level)
-      : view_(completed.view),
-        lattice_(completed.placed->lattice),
-        visible_(visible_part(camera, lattice_)),
-        pixels_(static_cast<double>(camera.width) * camera.height) {
+  Counting(const scene::ViewOutline& outline, const std::array<int, 3>& level)
+      : view_(outline.view),
+        lattice_(outline.lattice),
+        visible_(visible_part(outline.camera, lattice_)),
+        pixels_(static_cast<double>(outline.camera.width) * outline.camera.height) {
     const auto slice = scene::slice_of(view_.geometry);
     for (std::size_t a = 0; a < 3; ++a) {
       const bool one = slice && slice->axis == static_cast<int>(a);
@@ -114,8 +115,10 @@ class Counting {
   }
 
   void add_medium(const protocol::ScalarView& scalar, const std::string& pointer) {
-    const bool absorbs = std::any_of(scalar.extinction->begin(), scalar.extinction->end(),
-                                     [](const auto& point) { return point[1] > 0; });
+    // The default absorbs.
+    const bool absorbs =
+        !scalar.extinction || std::any_of(scalar.extinction->begin(), scalar.extinction->end(),
+                                          [](const auto& point) { return point[1] > 0; });
     if (!absorbs) return;
     const double face = (cell_[0] * cell_[1] + cell_[1] * cell_[2] + cell_[2] * cell_[0]) / 3;
     const double covered = footprint * face * scalar.stride * scalar.stride * visible_.px2;
@@ -135,16 +138,9 @@ class Counting {
 
 }  // namespace
 
-Result<Cost> cost_of(const scene::Completed& completed, bool bent) {
-  const auto camera = scene::resolve_camera(completed.view, completed.placed->lattice);
-  if (!camera) return camera.error();
-  std::array<int, 3> level{0, 0, 0};
-  if (!bent) {
-    const auto shown = scene::shown_by(completed);
-    if (!shown) return shown.error();
-    level = shown->coarsening.halvings;
-  }
-  return Counting(completed, *camera, level).count();
+Cost cost_of(const scene::ViewOutline& outline) {
+  const std::array<int, 3> level = outline.bent ? std::array{0, 0, 0} : scene::level_of(outline);
+  return Counting(outline, level).count();
 }
 
 }  // namespace windsplat::frame

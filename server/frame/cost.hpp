@@ -6,7 +6,7 @@
 #include <string>
 
 #include "server/base/error.hpp"
-#include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
 
 namespace windsplat::frame {
 
@@ -21,8 +21,8 @@ struct Cost {
   std::string dominant;  // JSON pointer to the setting with the largest share
 };
 
-// `completed` is placed flat. `bent`: it will be drawn on a bent lattice, of which every sample is
-// drawn. What lies outside the picture counts by its share of the volume.
-Result<Cost> cost_of(const scene::Completed& completed, bool bent);
+// Every sample of a bent lattice is drawn. What lies outside the picture counts by its share of the
+// volume.
+Cost cost_of(const scene::ViewOutline& outline);
 
 }  // namespace windsplat::frame

@@ -1,4 +1,3 @@
-// View -> completed view -> scene -> linear pixels -> encoded bytes, each stage timed.
 #include "server/frame/frame.hpp"
 
 #include <algorithm>
@@ -18,8 +17,6 @@ namespace windsplat::frame {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-constexpr int half_level_max = 31;
 
 std::int64_t microseconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration_cast<std::chrono::microseconds>(to - from).count();
@@ -69,22 +66,29 @@ void name_fields(const scene::Scene& scene, const protocol::View& completed,
 
 }  // namespace
 
-// Defaults come from the whole picture, so that every level frames the volume alike; radii follow
-// the height that is drawn.
-Result<scene::Completed> complete_at(const protocol::View& view, data::Dataset& dataset,
-                                     const Encoding& encoding) {
-  if (encoding.half_level < 0 || encoding.half_level > half_level_max) {
-    return make_error(ErrorKind::invalid, "a frame's half level is 0 to " +
-                                              std::to_string(half_level_max) + ", not " +
-                                              std::to_string(encoding.half_level));
+Result<scene::CompletedView> complete(const protocol::View& view, data::Dataset& dataset,
+                                      bool allow_reference) {
+  if (view.method.name == protocol::MethodName::reference && !allow_reference) {
+    return make_error_at(ErrorKind::invalid, "/method/name",
+                         "reference takes too long to share a server: draw it with "
+                         "`windsplat render`");
   }
-  Result<scene::Completed> completed = scene::complete_and_place(view, dataset);
-  if (!completed) return completed;
-  protocol::ImageView& image = completed->view.image;
-  image.width = quality::edge_at(view.image.width, encoding.half_level);
-  image.height = quality::edge_at(view.image.height, encoding.half_level);
-  completed->coarser = encoding.coarser;
+  auto completed = scene::complete(view, dataset);
+  if (!completed) return with_need(completed.error(), view, dataset);
   return completed;
+}
+
+Result<scene::CompletedView> at_setting(const scene::CompletedView& completed,
+                                        const quality::Setting& setting) {
+  return completed.coarsened(setting.coarser).with([&](protocol::View& view) {
+    view = quality::at_setting(std::move(view), setting);
+    view.image.width = quality::edge_at(view.image.width, setting.half_level);
+    view.image.height = quality::edge_at(view.image.height, setting.half_level);
+  });
+}
+
+quality::Setting own_setting(const scene::CompletedView& completed) {
+  return quality::settings[quality::own_setting(completed.view())];
 }
 
 namespace {
@@ -113,8 +117,9 @@ void put_in_strips(const engine::Image& picture, ThreadPool& pool, image::YccPic
   });
 }
 
-Result<engine::WorkReport> render_scene(const scene::Scene& scene, ThreadPool& pool,
+Result<engine::WorkReport> render_scene(const Prepared& prepared, ThreadPool& pool,
                                         const CancelToken& cancel, Workspace& workspace) {
+  const scene::Scene& scene = prepared.scene;
   engine::Image& picture = workspace.space.image();
   image::YccPicture& planes = workspace.planes;
   const bool jpeg = workspace.encoding.format == Format::jpeg;
@@ -131,7 +136,7 @@ Result<engine::WorkReport> render_scene(const scene::Scene& scene, ThreadPool& p
     }
     return work;
   }
-  const bool measured = is_measured(scene, workspace.encoding);
+  const bool measured = is_measured(prepared);
   const auto to_planes = [&planes](const engine::TilePixels& tile) {
     planes.put({tile.x, tile.y, tile.width, tile.height, tile.rgba, tile.stride});
   };
@@ -177,49 +182,42 @@ std::uint64_t bytes_beyond_kept(int width, int height, Format format) {
   return (pixels - retained_pixels) * bytes_a_pixel;
 }
 
-Result<std::shared_ptr<const void>> load(const protocol::View& view, data::Dataset& dataset,
-                                         const Encoding& encoding) {
-  auto completed = complete_at(view, dataset, encoding);
-  if (!completed) return with_need(completed.error(), view, dataset);
-  auto scene = scene::build_scene(*completed, dataset);
-  if (!scene) return with_need(scene.error(), view, dataset);
-  return std::shared_ptr<const void>(std::make_shared<const scene::Scene>(std::move(*scene)));
+Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,
+                         data::Dataset& dataset, const Encoding& encoding) {
+  const Clock::time_point start = Clock::now();
+  auto drawn = at_setting(completed, setting);
+  if (!drawn) return drawn.error();
+  auto scene = scene::build_scene(*drawn, dataset);
+  if (!scene) return with_need(scene.error(), completed.view(), dataset);
+  return Prepared{std::move(*drawn), completed.view().image,           std::move(*scene), setting,
+                  encoding,          microseconds(start, Clock::now())};
 }
 
-Result<void> draw(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
-                  ThreadPool& pool, const CancelToken& cancel, Workspace& workspace) {
-  if (view.method.name == protocol::MethodName::reference && !encoding.allow_reference) {
-    return make_error_at(ErrorKind::invalid, "/method/name",
-                         "reference takes too long to share a server: draw it with "
-                         "`windsplat render`");
-  }
+Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& pool,
+                  const CancelToken& cancel, Workspace& workspace) {
   const Clock::time_point start = Clock::now();
-  Result<scene::Completed> completed = complete_at(view, dataset, encoding);
-  if (!completed) return with_need(completed.error(), view, dataset);
-  const Result<scene::Scene> scene = scene::build_scene(*completed, dataset);
-  if (!scene) return with_need(scene.error(), view, dataset);
-  workspace.encoding = encoding;
-  workspace.background = scene->background;
-  Result<engine::WorkReport> work = render_scene(*scene, pool, cancel, workspace);
+  const scene::Scene& scene = prepared.scene;
+  workspace.encoding = prepared.encoding;
+  workspace.background = scene.background;
+  Result<engine::WorkReport> work = render_scene(prepared, pool, cancel, workspace);
   if (!work) return given_up(work.error(), workspace);
 
   Frame& drawn = workspace.drawn;
   drawn = Frame();
-  drawn.width = scene->camera.width;
-  drawn.height = scene->camera.height;
+  drawn.width = scene.camera.width;
+  drawn.height = scene.camera.height;
   drawn.work = std::move(*work);
-  name_fields(*scene, completed->view, drawn.work);
-  drawn.view = completed->view;
-  drawn.view.image = view.image;
-  const Result<double> detail = scene::detail_shown(*completed);
-  if (!detail) return given_up(detail.error(), workspace);
-  drawn.detail = *detail * view.image.height / drawn.height;
-  drawn.render_us = microseconds(start, Clock::now());
-  if (is_measured(*scene, encoding)) {
-    auto error = measured_error(*completed, *scene, dataset, pool, cancel, workspace);
+  name_fields(scene, prepared.completed.view(), drawn.work);
+  drawn.view = prepared.completed.view();
+  drawn.view.image = prepared.asked;
+  drawn.detail = scene::detail_shown(prepared.completed) * prepared.asked.height / drawn.height;
+  drawn.render_us = prepared.prepare_us + microseconds(start, Clock::now());
+  if (is_measured(prepared)) {
+    const Clock::time_point measured_from = Clock::now();
+    auto error = measured_error(prepared, dataset, pool, cancel, workspace);
     if (!error) return given_up(error.error(), workspace);
     drawn.error = *error;
-    drawn.measure_us = microseconds(start, Clock::now()) - drawn.render_us;
+    drawn.measure_us = microseconds(measured_from, Clock::now());
   }
   return {};
 }
@@ -243,12 +241,19 @@ Result<Frame> encode(Workspace& workspace, ThreadPool& pool, const CancelToken& 
   return frame;
 }
 
+Result<Frame> produce(const Prepared& prepared, data::Dataset& dataset, ThreadPool& pool,
+                      const CancelToken& cancel, Workspace& workspace) {
+  if (auto drawn = draw(prepared, dataset, pool, cancel, workspace); !drawn) return drawn.error();
+  return encode(workspace, pool, cancel);
+}
+
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
                       ThreadPool& pool, const CancelToken& cancel, Workspace& workspace) {
-  if (auto drawn = draw(view, dataset, encoding, pool, cancel, workspace); !drawn) {
-    return drawn.error();
-  }
-  return encode(workspace, pool, cancel);
+  const auto completed = complete(view, dataset, encoding.allow_reference);
+  if (!completed) return completed.error();
+  const auto prepared = prepare(*completed, own_setting(*completed), dataset, encoding);
+  if (!prepared) return prepared.error();
+  return produce(*prepared, dataset, pool, cancel, workspace);
 }
 
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,

@@ -1,5 +1,5 @@
-// One frame from a view to encoded bytes with its times and report: what REST, the stream and the
-// command line share.
+// One frame in four steps, which REST, the stream and the command line share: complete the view
+// (scene/completed_view.hpp), prepare its scene, draw it, encode it.
 #pragma once
 
 #include <array>
@@ -17,6 +17,9 @@
 #include "server/image/encode.hpp"
 #include "server/image/jpeg_encoder.hpp"
 #include "server/image/ycc.hpp"
+#include "server/quality/setting.hpp"
+#include "server/scene/completed_view.hpp"
+#include "server/scene/scene.hpp"
 
 namespace windsplat::frame {
 
@@ -26,12 +29,7 @@ struct Encoding {
   Format format = Format::jpeg;
   int quality = 90;
   image::Subsampling subsampling = image::Subsampling::s444;
-  // Whether the reference may be drawn, which takes seconds to minutes: by a command line that has
-  // the machine to itself, not where others wait for the renderer.
-  bool allow_reference = false;
-  // Rendered at the view's width and height times 2^(-half_level / 2), at least one pixel.
-  int half_level = 0;
-  int coarser = 0;  // of the data (scene::Completed)
+  bool allow_reference = false;  // see complete()
   // Whether the picture's error is measured by a second, finer run, and a JPEG's own.
   bool measure = false;
 };
@@ -66,21 +64,48 @@ struct Workspace {
 // at most.
 std::uint64_t bytes_beyond_kept(int width, int height, Format format);
 
-// What draw() will need of the dataset, loaded; it stays resident as long as the answer is held.
-// Errors: those of the scene.
-Result<std::shared_ptr<const void>> load(const protocol::View& view, data::Dataset& dataset,
-                                         const Encoding& encoding);
+// A view completed for its dataset; where memory does not suffice the error states what all fields
+// of the view need. Errors: those of scene::complete(); invalid at /method/name for a reference
+// that is not allowed: it takes seconds to minutes, so that only a command line that has the
+// machine to itself allows it.
+Result<scene::CompletedView> complete(const protocol::View& view, data::Dataset& dataset,
+                                      bool allow_reference = false);
 
-// `view` need not be completed. The report's fields and bytes are those of the volumes shown.
-// Errors: those of the scene and the engine (invalid, out_of_memory, cancelled, ...); invalid for a
-// half level outside 0..31, and at /method/name for a reference that is not allowed.
-Result<void> draw(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
-                  ThreadPool& pool, const CancelToken& cancel, Workspace& workspace);
+// The view as a setting draws it: its method and slabs, the size of the picture, the level of the
+// data. Defaults stay those of the whole picture, so that every size frames the volume alike; radii
+// follow the height that is drawn.
+Result<scene::CompletedView> at_setting(const scene::CompletedView& completed,
+                                        const quality::Setting& setting);
+
+// A scene ready to be drawn: what it shows is loaded and stays resident while this lives.
+struct Prepared {
+  scene::CompletedView completed;  // at the setting
+  protocol::ImageView asked;       // the size that the view asks for
+  scene::Scene scene;
+  quality::Setting setting;
+  Encoding encoding;
+  std::int64_t prepare_us = 0;
+};
+// Errors: those of the scene.
+Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,
+                         data::Dataset& dataset, const Encoding& encoding);
+// The setting that draws the view as it stands.
+quality::Setting own_setting(const scene::CompletedView& completed);
+
+// The report's fields and bytes are those of the volumes shown. `dataset` is read only to measure
+// the error, and only as far as it is resident. Errors: those of the engine (out_of_memory,
+// cancelled, ...).
+Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& pool,
+                  const CancelToken& cancel, Workspace& workspace);
 
 // The bytes of what was drawn, once. Errors: too_large (for the format), cancelled.
 Result<Frame> encode(Workspace& workspace, ThreadPool& pool, const CancelToken& cancel = {});
 
-// Both, one after the other.
+// Draws and encodes.
+Result<Frame> produce(const Prepared& prepared, data::Dataset& dataset, ThreadPool& pool,
+                      const CancelToken& cancel, Workspace& workspace);
+
+// All four steps, at the view's own setting.
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
                       ThreadPool& pool, const CancelToken& cancel, Workspace& workspace);
 

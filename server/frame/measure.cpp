@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/base/trim_storage.hpp"
+#include "server/scene/build.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -32,25 +33,27 @@ bool is_exact(const scene::Scene& scene) {
 
 // The view by analytic slabs of its thickness over `thinner`, of every sample where that is to be
 // had. The second: whether it is.
-Result<std::pair<scene::Scene, bool>> finer_scene(const scene::Completed& completed,
+Result<std::pair<scene::Scene, bool>> finer_scene(const scene::CompletedView& completed,
                                                   data::Dataset& dataset, int thinner,
                                                   double samples_max) {
-  scene::Completed finer = completed;
-  finer.view.method.name = protocol::MethodName::slab;
-  finer.view.method.compositing = protocol::Compositing::analytic;
-  double& stop = finer.view.method.stop_transmittance;
-  stop = std::min(stop, quality::stop_of_the_truth);
-  finer.view.method.slab_thickness /= thinner;
-  finer.coarser = 0;
-  const bool few = samples_of(completed.placed->lattice) <= samples_max;
+  const auto finer = completed.coarsened(0).with([&](protocol::View& view) {
+    protocol::MethodView& method = view.method;
+    method.name = protocol::MethodName::slab;
+    method.compositing = protocol::Compositing::analytic;
+    method.stop_transmittance = std::min(method.stop_transmittance, quality::stop_of_the_truth);
+    method.slab_thickness /= thinner;
+  });
+  if (!finer) return finer.error();
+  const bool few = samples_of(completed.lattice()) <= samples_max;
   if (few) {
-    scene::Completed full = finer;
-    full.view.method.detail = protocol::Detail::full;
-    auto scene = scene::build_scene(full, dataset);
+    const auto full =
+        finer->with([](protocol::View& view) { view.method.detail = protocol::Detail::full; });
+    if (!full) return full.error();
+    auto scene = scene::build_scene(*full, dataset);
     if (scene) return std::pair{std::move(*scene), true};
     if (scene.error().kind != ErrorKind::not_resident) return scene.error();
   }
-  auto scene = scene::build_scene(finer, dataset);
+  auto scene = scene::build_scene(*finer, dataset);
   if (!scene) return scene.error();
   const bool every = scene->level == std::array<int, 3>{0, 0, 0};
   return std::pair{std::move(*scene), every};
@@ -131,29 +134,22 @@ struct Truth {
 
 class CalibrationRun {
  public:
-  CalibrationRun(const protocol::View& view, data::Dataset& dataset, ThreadPool& pool,
+  CalibrationRun(scene::CompletedView completed, data::Dataset& dataset, ThreadPool& pool,
                  const CancelToken& cancel, Workspace& workspace,
                  const std::function<void(const CalibrationSample&)>& report)
-      : view_(view),
+      : completed_(std::move(completed)),
         dataset_(dataset),
         pool_(pool),
         cancel_(cancel),
         workspace_(workspace),
-        report_(report) {
-    const double pixels = static_cast<double>(view_.image.width) * view_.image.height;
-    const double scale = std::sqrt(static_cast<double>(retained_pixels) / pixels);
-    if (scale < 1) {
-      view_.image.width = std::max(1, static_cast<int>(view_.image.width * scale));
-      view_.image.height = std::max(1, static_cast<int>(view_.image.height * scale));
-    }
-  }
+        report_(report) {}
 
   Result<void> run() {
     workspace_.space.image() = {};  // a picture that was drawn before
     if (auto drawn = draw_truth(); !drawn) return drawn.error();
     for (std::size_t i = 0; i < quality::settings_count; ++i) {
       const quality::Setting& setting = quality::settings[i];
-      if (!quality::is_allowed(setting, view_)) continue;
+      if (!quality::is_allowed(setting, completed_.view())) continue;
       const bool slab = setting.method == protocol::MethodName::slab;
       if (slab && setting.thinner > 1 && told_) continue;
       const auto measured = measure(setting);
@@ -171,16 +167,12 @@ class CalibrationRun {
   }
 
   Result<void> draw_truth() {
-    auto completed = complete_at(view_, dataset_, {});
-    if (!completed) return completed.error();
-    const auto viewpoint = viewpoint_of(*completed);
-    if (!viewpoint) return viewpoint.error();
-    viewpoint_ = *viewpoint;
-    const auto own = scene::build_scene(*completed, dataset_);
+    viewpoint_ = viewpoint_of(completed_);
+    const auto own = scene::build_scene(completed_, dataset_);
     if (!own) return own.error();
     const std::array<int, 3> own_level = own->level;
     for (const int thinner : {2, 4}) {
-      const auto finer = finer_scene(*completed, dataset_, thinner, truth_samples_max);
+      const auto finer = finer_scene(completed_, dataset_, thinner, truth_samples_max);
       if (!finer) return finer.error();
       const Clock::time_point start = Clock::now();
       auto drawn = thinner == 2 ? draw_half(finer->first) : draw_quarter(finer->first);
@@ -195,10 +187,10 @@ class CalibrationRun {
   }
 
   Result<void> draw_half(const scene::Scene& scene) {
-    const std::size_t values =
-        channels * static_cast<std::size_t>(view_.image.width) * view_.image.height;
+    const std::size_t values = channels * static_cast<std::size_t>(completed_.view().image.width) *
+                               completed_.view().image.height;
     truth_.rgba.assign(values, 0);
-    const int width = view_.image.width;
+    const int width = completed_.view().image.width;
     const auto keep = [&](const engine::TilePixels& tile) {
       each_value(tile, width, [&](std::size_t at, float value) { truth_.rgba[at] = value; });
     };
@@ -211,7 +203,7 @@ class CalibrationRun {
   Result<void> draw_quarter(const scene::Scene& scene) {
     std::mutex mutex;
     double squares = 0;
-    const int width = view_.image.width;
+    const int width = completed_.view().image.width;
     const auto extrapolate = [&](const engine::TilePixels& tile) {
       double sum = 0;
       each_value(tile, width, [&](std::size_t at, float value) {
@@ -232,17 +224,14 @@ class CalibrationRun {
   }
 
   void tell_run(const quality::Setting& setting, double error, double ms) {
-    if (!quality::is_allowed(setting, view_)) return;
+    if (!quality::is_allowed(setting, completed_.view())) return;
     report_({quality::index_of(setting).value(), viewpoint_, {error, ms}});
   }
 
   Result<quality::Measured> measure(const quality::Setting& setting) {
-    Encoding encoding;
-    encoding.half_level = setting.half_level;
-    encoding.coarser = setting.coarser;
-    const auto completed = complete_at(quality::at_setting(view_, setting), dataset_, encoding);
-    if (!completed) return completed.error();
-    const auto scene = scene::build_scene(*completed, dataset_);
+    const auto drawn = at_setting(completed_, setting);
+    if (!drawn) return drawn.error();
+    const auto scene = scene::build_scene(*drawn, dataset_);
     if (!scene) return scene.error();
     quality::Measured out;
     const bool full = setting.half_level == 0;
@@ -264,7 +253,8 @@ class CalibrationRun {
       return out;
     }
     const engine::Image& picture = workspace_.space.image();
-    out.error = apart(picture, truth_.rgba, view_.image.width, view_.image.height, pool_);
+    out.error = apart(picture, truth_.rgba, completed_.view().image.width,
+                      completed_.view().image.height, pool_);
     return out;
   }
 
@@ -273,7 +263,7 @@ class CalibrationRun {
   Result<engine::WorkReport> compare(const scene::Scene& scene, double& beyond) {
     std::mutex mutex;
     beyond = 0;
-    const int width = view_.image.width;
+    const int width = completed_.view().image.width;
     const auto add = [&](const engine::TilePixels& tile) {
       double sum = 0;
       each_value(tile, width, [&](std::size_t at, float value) {
@@ -291,7 +281,7 @@ class CalibrationRun {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   }
 
-  protocol::View view_;
+  scene::CompletedView completed_;
   data::Dataset& dataset_;
   ThreadPool& pool_;
   const CancelToken& cancel_;
@@ -305,29 +295,28 @@ class CalibrationRun {
 
 }  // namespace
 
-Result<quality::Viewpoint> viewpoint_of(const scene::Completed& completed) {
-  quality::Viewpoint viewpoint = quality::viewpoint_of(completed.view);
-  const auto detail = scene::detail_shown(completed);
-  if (!detail) return detail.error();
-  viewpoint.detail = *detail;
+quality::Viewpoint viewpoint_of(const scene::CompletedView& completed) {
+  quality::Viewpoint viewpoint = quality::viewpoint_of(completed.view());
+  viewpoint.detail = scene::detail_shown(completed);
   return viewpoint;
 }
 
-bool is_measured(const scene::Scene& scene, const Encoding& encoding) {
+bool is_measured(const Prepared& prepared) {
+  const scene::Scene& scene = prepared.scene;
   const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
-  return encoding.measure && encoding.half_level == 0 && scene.method != scene::Method::reference &&
-         pixels <= static_cast<double>(retained_pixels);
+  return prepared.encoding.measure && prepared.setting.half_level == 0 &&
+         scene.method != scene::Method::reference && pixels <= static_cast<double>(retained_pixels);
 }
 
-Result<std::optional<double>> measured_error(const scene::Completed& completed,
-                                             const scene::Scene& scene, data::Dataset& dataset,
+Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dataset& dataset,
                                              ThreadPool& pool, const CancelToken& cancel,
                                              Workspace& workspace) {
   // The renderer waits for no file, others no longer than for a few frames more.
   constexpr double times_as_many = 4;
+  const scene::Scene& scene = prepared.scene;
   data::Dataset resident = dataset.resident_only();
   const auto finer =
-      finer_scene(completed, resident, 2,
+      finer_scene(prepared.completed, resident, 2,
                   std::min(truth_samples_max, times_as_many * samples_of(scene.lattice)));
   if (!finer || !finer->second) return std::optional<double>();
   // A PNG is coded from the picture afterwards.
@@ -346,10 +335,19 @@ Result<std::optional<double>> measured_error(const scene::Completed& completed,
   return std::optional(rms(left) * (order_two ? 4.0 / 3 : 1.0));
 }
 
-Result<void> calibrate(const protocol::View& completed, data::Dataset& dataset, ThreadPool& pool,
-                       const CancelToken& cancel, Workspace& workspace,
+Result<void> calibrate(const scene::CompletedView& completed, data::Dataset& dataset,
+                       ThreadPool& pool, const CancelToken& cancel, Workspace& workspace,
                        const std::function<void(const CalibrationSample&)>& report) {
-  return CalibrationRun(completed, dataset, pool, cancel, workspace, report).run();
+  const protocol::ImageView& image = completed.view().image;
+  const double pixels = static_cast<double>(image.width) * image.height;
+  const double scale = std::sqrt(static_cast<double>(retained_pixels) / pixels);
+  const auto sized = completed.with([scale](protocol::View& view) {
+    if (scale >= 1) return;
+    view.image.width = std::max(1, static_cast<int>(view.image.width * scale));
+    view.image.height = std::max(1, static_cast<int>(view.image.height * scale));
+  });
+  if (!sized) return sized.error();
+  return CalibrationRun(*sized, dataset, pool, cancel, workspace, report).run();
 }
 
 }  // namespace windsplat::frame

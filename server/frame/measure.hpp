@@ -11,7 +11,7 @@
 #include "server/base/trim_storage.hpp"
 #include "server/frame/frame.hpp"
 #include "server/quality/table.hpp"
-#include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
 
 namespace windsplat::frame {
 
@@ -19,25 +19,18 @@ namespace windsplat::frame {
 // picture itself is drawn from.
 inline constexpr double truth_samples_max = 32.0 * 1024 * 1024;
 
-// The view at the encoding's size and detail. Errors: those of complete_and_place; invalid for a
-// half level outside 0..31.
-Result<scene::Completed> complete_at(const protocol::View& view, data::Dataset& dataset,
-                                     const Encoding& encoding);
+// Where a completed view is seen from.
+quality::Viewpoint viewpoint_of(const scene::CompletedView& completed);
 
-// Where a completed view is seen from. Errors: invalid (its camera).
-Result<quality::Viewpoint> viewpoint_of(const scene::Completed& completed);
-
-// Whether the frame of this scene will be measured: pictures of full size alone, up to
-// retained_pixels.
-bool is_measured(const scene::Scene& scene, const Encoding& encoding);
+// Whether the frame will be measured: pictures of full size alone, up to retained_pixels.
+bool is_measured(const Prepared& prepared);
 
 // Linear RMSE over premultiplied RGBA of the workspace's picture, of which the differences are
 // left. The finer run is by slabs of half the thickness, of every sample. Slabs err by order 2 in
 // their thickness, so by 4/3 of the difference; other pictures by the difference. Empty where the
 // finer run is not to be had: averaged data of which not every sample is resident, or which has
 // more than four times the samples drawn. Reads no file. Errors: those of the engine.
-Result<std::optional<double>> measured_error(const scene::Completed& completed,
-                                             const scene::Scene& scene, data::Dataset& dataset,
+Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dataset& dataset,
                                              ThreadPool& pool, const CancelToken& cancel,
                                              Workspace& workspace);
 
@@ -59,8 +52,8 @@ inline std::uint64_t calibration_bytes(const protocol::ImageView& image) {
 inline bool is_worth_calibrating(const protocol::View& view) {  // not for thumbnails
   return std::min(view.image.width, view.image.height) >= 64;
 }
-Result<void> calibrate(const protocol::View& completed, data::Dataset& dataset, ThreadPool& pool,
-                       const CancelToken& cancel, Workspace& workspace,
+Result<void> calibrate(const scene::CompletedView& completed, data::Dataset& dataset,
+                       ThreadPool& pool, const CancelToken& cancel, Workspace& workspace,
                        const std::function<void(const CalibrationSample&)>& report);
 
 }  // namespace windsplat::frame

@@ -9,6 +9,7 @@
 #include "server/base/trim_storage.hpp"
 #include "server/frame/measure.hpp"
 #include "server/image/encode.hpp"
+#include "server/scene/build.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -51,22 +52,16 @@ ReferenceDrawing::ReferenceDrawing(scene::Scene own, std::array<float, 3> backgr
       height_(height),
       pieces_a_row_(static_cast<std::size_t>((width + piece_pixels - 1) / piece_pixels)) {}
 
-Result<std::unique_ptr<ReferenceDrawing>> ReferenceDrawing::begin(const protocol::View& view,
-                                                                  data::Dataset& dataset,
-                                                                  unsigned workers,
-                                                                  const CancelToken& cancel,
-                                                                  const WorkMemory& memory) {
+Result<std::unique_ptr<ReferenceDrawing>> ReferenceDrawing::begin(
+    const scene::CompletedView& completed, data::Dataset& dataset, unsigned workers,
+    const CancelToken& cancel, const WorkMemory& memory) {
   if (cancel.cancelled()) return unwanted();
-  const auto scene_of = [&](const protocol::View& asked) -> Result<scene::Scene> {
-    const auto completed = complete_at(asked, dataset, {});
-    if (!completed) return completed.error();
-    return scene::build_scene(*completed, dataset);
-  };
-  auto own = scene_of(view);
+  auto own = scene::build_scene(completed, dataset);
   if (!own) return own.error();
-  protocol::View exact = view;
-  exact.method.name = protocol::MethodName::reference;
-  const auto truth = scene_of(exact);
+  const auto exact = completed.with(
+      [](protocol::View& view) { view.method.name = protocol::MethodName::reference; });
+  if (!exact) return exact.error();
+  const auto truth = scene::build_scene(*exact, dataset);
   if (!truth) return truth.error();
   if (cancel.cancelled()) return unwanted();
   const int width = truth->camera.width;

@@ -32,9 +32,9 @@ struct WorkMemory {
 class ReferenceDrawing {
  public:
   // Loads what the view shows and lists its kernels, which takes up to seconds: not for the
-  // renderer's thread. `view` need not be completed; its method is what the truth is compared with.
+  // renderer's thread. The view's method is what the truth is compared with.
   // Errors: those of the scene; cancelled; out_of_memory at /image.
-  static Result<std::unique_ptr<ReferenceDrawing>> begin(const protocol::View& view,
+  static Result<std::unique_ptr<ReferenceDrawing>> begin(const scene::CompletedView& completed,
                                                          data::Dataset& dataset, unsigned workers,
                                                          const CancelToken& cancel,
                                                          const WorkMemory& memory);

@@ -8,7 +8,7 @@
 #include "protocol/view.hpp"
 #include "server/base/error.hpp"
 #include "server/data/model/dataset_info.hpp"
-#include "server/scene/build.hpp"
+#include "server/scene/lattice.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::scene {

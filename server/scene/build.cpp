@@ -1,4 +1,3 @@
-// Completed view + dataset -> Scene: tables, camera, placement and the fields that are shown.
 #include "server/scene/build.hpp"
 
 #include <algorithm>
@@ -134,12 +133,12 @@ double averaged_below_px(const View& view) {
 }
 
 // How much of the detail a view asks for its picture can show.
-std::array<int, 3> level_of(const Completed& completed, const Scene& scene) {
-  const double below_px = averaged_below_px(completed.view);
+std::array<int, 3> level_for(const View& view, const Camera& camera, const Lattice& lattice,
+                             int coarser) {
+  const double below_px = averaged_below_px(view);
   if (below_px == 0) return {0, 0, 0};
-  const Lattice& full = completed.placed->lattice;
-  const auto level = choose_level(scene.camera, full, scene.slice, below_px);
-  return coarser_level(full, scene.slice, level, completed.coarser);
+  const auto slice = slice_of(view.geometry);
+  return coarser_level(lattice, slice, choose_level(camera, lattice, slice, below_px), coarser);
 }
 
 Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
@@ -228,14 +227,20 @@ Result<Scene> at_level(Scene scene, const std::array<int, 3>& level, const View&
 
 }  // namespace
 
-Result<Scene> build_scene(const Completed& completed, data::Dataset& dataset) {
-  const View& view = completed.view;
-  const Placed& placed = *completed.placed;
+std::array<int, 3> level_of(const CompletedView& completed) {
+  return level_for(completed.view(), completed.camera(), completed.lattice(), completed.coarser());
+}
+
+std::array<int, 3> level_of(const ViewOutline& outline) {
+  return level_for(outline.view, outline.camera, outline.lattice, 0);
+}
+
+Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset) {
+  const View& view = completed.view();
+  const Placed& placed = completed.placed();
   Scene scene;
   scene.slice = slice_of(view.geometry);
-  auto camera = resolve_camera(view, placed.lattice);
-  if (!camera) return camera.error();
-  scene.camera = *camera;
+  scene.camera = completed.camera();
   const auto depths = view_depths(scene.camera, placed.lattice);
   const double depth = depths[1] - depths[0];
   scene.depth_cue = {view.depth_cue.strength, depths[0] + view.depth_cue.near * depth,
@@ -245,7 +250,7 @@ Result<Scene> build_scene(const Completed& completed, data::Dataset& dataset) {
   scene.slab_thickness = view.method.slab_thickness;
   scene.stop_transmittance = view.method.stop_transmittance;
   scene.background = parse_color(view.image.background).value();
-  const auto level = level_of(completed, scene);
+  const auto level = level_of(completed);
   auto built = at_level(scene, level, view, placed, dataset);
   const bool reduced = level != std::array{0, 0, 0};
   if (built || !reduced || built.error().kind != ErrorKind::out_of_memory) return built;
@@ -254,24 +259,17 @@ Result<Scene> build_scene(const Completed& completed, data::Dataset& dataset) {
   return at_level(std::move(scene), {0, 0, 0}, view, placed, dataset);
 }
 
-Result<double> detail_shown(const Completed& completed) {
-  const double below_px = averaged_below_px(completed.view);
+double detail_shown(const CompletedView& completed) {
+  const double below_px = averaged_below_px(completed.view());
   if (below_px == 0) return 0;
-  const Lattice& lattice = completed.placed->lattice;
-  const auto camera = resolve_camera(completed.view, lattice);
-  if (!camera) return camera.error();
-  return finest_cell_px(*camera, lattice, slice_of(completed.view.geometry)) / below_px;
+  const auto slice = slice_of(completed.view().geometry);
+  return finest_cell_px(completed.camera(), completed.lattice(), slice) / below_px;
 }
 
-Result<Shown> shown_by(const Completed& completed) {
-  const View& view = completed.view;
-  Scene scene;
-  scene.slice = slice_of(view.geometry);
-  auto camera = resolve_camera(view, completed.placed->lattice);
-  if (!camera) return camera.error();
-  scene.camera = *camera;
+Shown shown_by(const CompletedView& completed) {
+  const View& view = completed.view();
   Shown shown;
-  shown.coarsening = coarsening_of(completed.placed->lattice, level_of(completed, scene));
+  shown.coarsening = coarsening_of(completed.lattice(), level_of(completed));
   if (shows_lines(view)) {
     shown.fields.push_back(view.vector.field.name);
     if (view.vector.color.by == protocol::ColorBy::scalar) {
@@ -284,11 +282,10 @@ Result<Shown> shown_by(const Completed& completed) {
   return shown;
 }
 
-Result<Scene> build_scene(const View& completed, data::Dataset& dataset) {
-  // A complete one passes through and loads nothing.
-  const auto checked = complete_and_place(completed, dataset);
-  if (!checked) return checked.error();
-  return build_scene(*checked, dataset);
+Result<Scene> build_scene(const View& view, data::Dataset& dataset) {
+  const auto completed = complete(view, dataset);
+  if (!completed) return completed.error();
+  return build_scene(*completed, dataset);
 }
 
 }  // namespace windsplat::scene

@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "server/scene/angles.hpp"
-#include "server/scene/build.hpp"
+#include "server/scene/lattice.hpp"
 
 namespace windsplat::scene {
 

@@ -32,6 +32,11 @@ struct Framing {
 Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dvec3& target,
                   double fov_y, const protocol::ImageView& image);
 
+// An orbit about the volume's centre, degrees; azimuth 0 looks north, positive moves the eye
+// eastward; zoom 1 frames the whole box. Sets camera.eye, target and height of a view.
+void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double elevation,
+           double zoom);
+
 // A completed view's camera. Errors: invalid with a pointer (eye on the target; up parallel to the
 // view or without a length).
 Result<Camera> resolve_camera(const protocol::View& completed, const Lattice& lattice);

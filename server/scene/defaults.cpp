@@ -8,8 +8,8 @@
 #include <limits>
 #include <string_view>
 
-#include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
+#include "server/scene/lattice.hpp"
 
 namespace windsplat::scene {
 

@@ -9,7 +9,8 @@
 
 #include "server/data/model/measure.hpp"
 #include "server/scene/bend.hpp"
-#include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
+#include "server/scene/lattice.hpp"
 
 namespace windsplat::scene {
 
@@ -150,9 +151,9 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
   out.bytes_when_resident = components * info.grid.samples() * sizeof(float) * info.steps.size();
   out.default_view.dataset = info.id;
   if (ranges != RangesOf::none) {
-    auto view = default_view(dataset);
-    if (!view) return view.error();
-    out.default_view = std::move(*view);
+    auto completed = complete(out.default_view, dataset);
+    if (!completed) return completed.error();
+    out.default_view = completed->view();
     if (ranges == RangesOf::seen) add_seen_ranges(dataset, out);
   }
   return out;

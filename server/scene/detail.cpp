@@ -6,8 +6,8 @@
 #include <limits>
 #include <utility>
 
-#include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
+#include "server/scene/lattice.hpp"
 
 namespace windsplat::scene {
 

@@ -1,12 +1,13 @@
 // Grid + geometry -> Lattice: coordinates become raw positions, raw positions cells, cells a box
 // whose longest edge is 2. What is bent goes on to bend.cpp.
+#include "server/scene/lattice.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "server/scene/bend.hpp"
-#include "server/scene/build.hpp"
 
 namespace windsplat::scene {
 

@@ -1,4 +1,5 @@
-// A view's geometry and a dataset -> what is wrong with it, or where its samples stand.
+#include "server/scene/place.hpp"
+
 #include <any>
 #include <array>
 #include <memory>
@@ -7,7 +8,7 @@
 #include <utility>
 
 #include "server/scene/bend.hpp"
-#include "server/scene/build.hpp"
+#include "server/scene/lattice.hpp"
 #include "server/scene/refusal.hpp"
 
 namespace windsplat::scene {
@@ -39,6 +40,10 @@ Result<const data::FieldInfo*> find_field(const data::DatasetInfo& info, const s
   return field;
 }
 
+bool is_bent(const protocol::GeometryView& geometry) {
+  return geometry.mapping != protocol::GeometryMapping::flat || geometry.height_field.has_value();
+}
+
 std::optional<Slice> slice_of(const protocol::GeometryView& geometry) {
   if (!geometry.slice) return std::nullopt;
   return Slice{static_cast<int>(geometry.slice->axis), geometry.slice->index};
@@ -67,8 +72,7 @@ Result<void> check_geometry(const protocol::GeometryView& geometry, const data::
 Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView& geometry,
                                                     data::Dataset& dataset) {
   const data::DatasetInfo& info = dataset.info();
-  const bool bent =
-      geometry.mapping != protocol::GeometryMapping::flat || geometry.height_field.has_value();
+  const bool bent = is_bent(geometry);
   protocol::GeometryView unsliced = geometry;
   unsliced.slice.reset();
   if (bent) {

@@ -1,8 +1,8 @@
-// Named starting points: each changes a few keys of a complete view.
+#include "server/scene/presets.hpp"
+
 #include <array>
 #include <string_view>
 
-#include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
 
 namespace windsplat::scene {

@@ -16,6 +16,9 @@
 #include "server/quality/laws.hpp"
 #include "server/quality/pick.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/camera.hpp"
+#include "server/scene/completed_view.hpp"
+#include "server/scene/place.hpp"
 #include "server/study/metrics.hpp"
 #include "server/study/sweep.hpp"
 
@@ -89,7 +92,9 @@ class Calibrator {
   }
 
   Result<void> calibrate(const protocol::View& view, bool first, quality::Table& table) {
-    auto done = frame::calibrate(view, *subject_.dataset, pool_, cancel_, workspace_,
+    const auto completed = frame::complete(view, *subject_.dataset);
+    if (!completed) return completed.error();
+    auto done = frame::calibrate(*completed, *subject_.dataset, pool_, cancel_, workspace_,
                                  [&](const frame::CalibrationSample& found) {
                                    table.add(found.setting, found.viewpoint, found.measured);
                                  });
@@ -111,11 +116,9 @@ class Calibrator {
     if (!truth) return truth.error();
     auto errors = setting_errors(view, truth->picture);
     if (!errors) return errors.error();
-    const auto completed = frame::complete_at(view, *subject_.dataset, {});
+    const auto completed = frame::complete(view, *subject_.dataset);
     if (!completed) return completed.error();
-    const auto seen_at = frame::viewpoint_of(*completed);
-    if (!seen_at) return seen_at.error();
-    const quality::Viewpoint viewpoint = *seen_at;
+    const quality::Viewpoint viewpoint = frame::viewpoint_of(*completed);
     const quality::Forecasts forecasts = table.forecasts(viewpoint);
     for (std::size_t i = 0; i < errors->size(); ++i) {
       if (std::isnan((*errors)[i])) continue;
@@ -138,18 +141,16 @@ class Calibrator {
   }
 
   Result<SettingErrors> setting_errors(const protocol::View& view, const Picture& truth) {
+    const auto completed = frame::complete(view, *subject_.dataset);
+    if (!completed) return completed.error();
     SettingErrors errors;
     errors.fill(std::nan(""));
     for (std::size_t i = 0; i < errors.size(); ++i) {
       const quality::Setting& setting = quality::settings[i];
       if (!quality::is_allowed(setting, view)) continue;
-      frame::Encoding encoding;
-      encoding.half_level = setting.half_level;
-      encoding.coarser = setting.coarser;
-      const auto completed =
-          frame::complete_at(quality::at_setting(view, setting), *subject_.dataset, encoding);
-      if (!completed) return completed.error();
-      const auto scene = scene::build_scene(*completed, *subject_.dataset);
+      const auto at_setting = frame::at_setting(*completed, setting);
+      if (!at_setting) return at_setting.error();
+      const auto scene = scene::build_scene(*at_setting, *subject_.dataset);
       if (!scene) return scene.error();
       const auto drawn = engine::render(*scene, pool_, cancel_);
       if (!drawn) return drawn.error();
@@ -185,7 +186,12 @@ class Calibrator {
     frame::Encoding encoding;
     encoding.format = frame::Format::npy;
     encoding.measure = true;
-    return frame::draw(view, *subject_.dataset, encoding, pool_, cancel_, workspace_);
+    const auto completed = frame::complete(view, *subject_.dataset);
+    if (!completed) return completed.error();
+    const auto prepared =
+        frame::prepare(*completed, frame::own_setting(*completed), *subject_.dataset, encoding);
+    if (!prepared) return prepared.error();
+    return frame::draw(*prepared, *subject_.dataset, pool_, cancel_, workspace_);
   }
 
   // Of the workspace's picture; the planes are the workspace's too.

@@ -9,6 +9,8 @@
 #include "server/base/check.hpp"
 #include "server/data/samples/samples.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/camera.hpp"
+#include "server/scene/completed_view.hpp"
 #include "server/study/blobs.hpp"
 
 namespace windsplat::study {
@@ -122,14 +124,11 @@ Result<Subject> make_subject(const std::string& name, std::shared_ptr<data::Data
   wanted.image.width = size.width;
   wanted.image.height = size.height;
   const bool framed = view.camera.eye || view.camera.target || view.camera.height;
-  auto completed = scene::complete_view(wanted, *dataset);
+  const auto completed = scene::complete(wanted, *dataset);
   if (!completed) return completed.error();
-  if (!framed) {
-    const auto placed = scene::place_dataset(completed->geometry, *dataset);
-    if (!placed) return placed.error();
-    scene::orbit(*completed, (*placed)->lattice, azimuth, elevation, 1);
-  }
-  return Subject{name, std::move(*completed), std::move(dataset)};
+  protocol::View looked_at = completed->view();
+  if (!framed) scene::orbit(looked_at, completed->lattice(), azimuth, elevation, 1);
+  return Subject{name, std::move(looked_at), std::move(dataset)};
 }
 
 Knobs own_knobs(const protocol::View& view) {

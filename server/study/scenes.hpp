@@ -32,7 +32,7 @@ std::vector<std::string> standard_names();
 Result<Subject> standard_subject(const std::string& name, bool quick);
 
 // Any dataset seen as a view says, but for the picture's size; obliquely if the view says nothing
-// of eye, target and height. Errors: those of complete_view.
+// of eye, target and height. Errors: those of scene::complete().
 Result<Subject> make_subject(const std::string& name, std::shared_ptr<data::Dataset> dataset,
                              const protocol::View& view, PictureSize size);
 

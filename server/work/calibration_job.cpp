@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "server/frame/measure.hpp"
-#include "server/scene/build.hpp"
 #include "server/work/run_guarded.hpp"
 
 namespace windsplat::net {
@@ -14,7 +13,7 @@ namespace {
 // A study that is started in the tables and ended there by its destructor.
 class Study {
  public:
-  Study(Backend& backend, protocol::View completed, quality::SceneSignature signature)
+  Study(Backend& backend, scene::CompletedView completed, quality::SceneSignature signature)
       : backend_(backend), completed_(std::move(completed)), signature_(std::move(signature)) {}
   ~Study() {
     backend_.quality.end_study(signature_, complete_);
@@ -28,9 +27,9 @@ class Study {
   Result<void> load(data::Dataset& dataset, const CancelToken& unwanted) {
     for (const int coarser : {0, 1, 2}) {
       if (unwanted.cancelled()) return make_error(ErrorKind::cancelled, "calibration cancelled");
-      frame::Encoding encoding;
-      encoding.coarser = coarser;
-      const auto loaded = frame::load(completed_, dataset, encoding);
+      quality::Setting setting = frame::own_setting(completed_);
+      setting.coarser = coarser;
+      const auto loaded = frame::prepare(completed_, setting, dataset, {});
       if (!loaded && coarser == 0) return loaded.error();
     }
     return {};
@@ -42,7 +41,8 @@ class Study {
       backend_.quality.add(signature_, found.setting, found.viewpoint, found.measured);
     };
     complete_ = static_cast<bool>(run_guarded<void>("a survey", stop, [&]() -> Result<void> {
-      const auto room = backend_.catalogue.reserve(frame::calibration_bytes(completed_.image));
+      const auto room =
+          backend_.catalogue.reserve(frame::calibration_bytes(completed_.view().image));
       if (!room) return room.error();  // memory is in use by others
       return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
     }));
@@ -50,31 +50,32 @@ class Study {
 
  private:
   Backend& backend_;
-  protocol::View completed_;
+  scene::CompletedView completed_;
   quality::SceneSignature signature_;
   bool complete_ = false;
 };
 
-std::shared_ptr<Study> begin(Backend& backend, const protocol::View& view, data::Dataset& dataset) {
-  auto completed = scene::complete_and_place(view, dataset);
-  if (!completed || !frame::is_worth_calibrating(completed->view)) return nullptr;
-  const auto viewpoint = frame::viewpoint_of(*completed);
-  quality::SceneSignature signature = quality::signature_of(completed->view);
-  if (!viewpoint || !backend.quality.begin_study(signature, *viewpoint)) return nullptr;
-  return std::make_shared<Study>(backend, std::move(completed->view), std::move(signature));
+std::shared_ptr<Study> begin(Backend& backend, const scene::CompletedView& completed) {
+  if (!frame::is_worth_calibrating(completed.view())) return nullptr;
+  quality::SceneSignature signature = quality::signature_of(completed.view());
+  if (!backend.quality.begin_study(signature, frame::viewpoint_of(completed))) return nullptr;
+  return std::make_shared<Study>(backend, completed, std::move(signature));
 }
 
 }  // namespace
 
 void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::View& view,
+                        const std::shared_ptr<ViewCompletion>& completion,
                         const CancelToken& unwanted) {
   const auto found = backend.catalogue.find(view.dataset);
   if (!found) return;
-  const auto run = [&backend, owner, view, unwanted, dataset = *found] {
+  const auto run = [&backend, owner, view, completion, unwanted, dataset = *found] {
     std::shared_ptr<Study> study;
     const auto loaded = run_guarded<void>("calibration load", unwanted, [&]() -> Result<void> {
       data::Dataset prefetching = dataset->prefetching();
-      study = begin(backend, view, prefetching);
+      const auto completed = completion->of(view, prefetching);
+      if (!completed) return completed.error();
+      study = begin(backend, *completed);
       if (!study) return make_error(ErrorKind::not_found, "no settings to calibrate");
       return study->load(prefetching, unwanted);
     });

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
 #include "protocol/view.hpp"
 #include "server/base/cancel.hpp"
 #include "server/work/backend.hpp"
+#include "server/work/view_completion.hpp"
 
 namespace windsplat::net {
 
@@ -13,6 +15,7 @@ namespace windsplat::net {
 // setting while the renderer is idle. Does nothing if the tables cover the scene near this
 // viewpoint, the picture is small, or `unwanted` is raised. Never evicts data of prefetch requests.
 void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::View& view,
+                        const std::shared_ptr<ViewCompletion>& completion,
                         const CancelToken& unwanted);
 
 }  // namespace windsplat::net

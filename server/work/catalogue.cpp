@@ -3,8 +3,7 @@
 
 #include <utility>
 
-#include "server/scene/build.hpp"
-#include "server/scene/defaults.hpp"
+#include "server/scene/completed_view.hpp"
 #include "server/scene/describe.hpp"
 
 namespace windsplat::net {
@@ -141,33 +140,9 @@ void Catalogue::remove(const std::string& id) {
 Result<Catalogue::Checked> Catalogue::check(const protocol::View& view) const {
   const auto dataset = find(view.dataset);
   if (!dataset) return dataset.error();
-  // A complete view is completed without loading: fields to be read are replaced by any valid
-  // value.
-  protocol::View full = view;
-  if (!full.vector.magnitude_range) full.vector.magnitude_range = protocol::Range{0, 1};
-  if (!full.vector.min_magnitude) full.vector.min_magnitude = 0;
-  if (!full.vector.color.range) full.vector.color.range = protocol::Range{0, 1};
-  if (!full.scalars) {
-    full.scalars.emplace();
-    for (const std::string& name : scene::default_scalars((*dataset)->info())) {
-      full.scalars->emplace_back().field = name;
-    }
-  }
-  for (protocol::ScalarView& scalar : *full.scalars) {
-    if (!scalar.color.range) scalar.color.range = protocol::Range{0, 1};
-    if (!scalar.extinction) scalar.extinction.emplace(1, std::array<double, 2>{0, 1});
-  }
-  // Mapping the grid takes long and may read a field: do not do it here.
-  if (auto ok = scene::check_geometry(full.geometry, (*dataset)->info()); !ok) return ok.error();
-  const bool bent = full.geometry.mapping != protocol::GeometryMapping::flat ||
-                    full.geometry.height_field.has_value();
-  full.geometry.mapping = protocol::GeometryMapping::flat;
-  full.geometry.height_field.reset();
-  const auto completed = scene::complete_and_place(full, **dataset);
-  if (!completed) return completed.error();
-  auto cost = frame::cost_of(*completed, bent);
-  if (!cost) return cost.error();
-  return Checked{static_cast<int>((*dataset)->info().steps.size()), std::move(*cost)};
+  const auto outline = scene::outline(view, (*dataset)->info());
+  if (!outline) return outline.error();
+  return Checked{static_cast<int>((*dataset)->info().steps.size()), frame::cost_of(*outline)};
 }
 
 Error with_dataset_name(Error error, const std::string& dataset, const std::string& field) {

@@ -11,7 +11,20 @@ namespace {
 using DrawingPtr = std::shared_ptr<const Drawing>;
 using Held = std::shared_ptr<const void>;
 
-Result<void> enqueue(Backend& backend, const DrawingPtr& drawing, Held loaded);
+void draw(const Drawing& drawing, const PreparedPtr& picture, std::int64_t queue_us,
+          Loading loading) {
+  if (picture == nullptr) return;
+  data::Dataset resident = drawing.dataset->resident_only();
+  drawing.draw(*picture, resident, queue_us, loading);
+}
+
+Result<void> draw_after_load(Backend& backend, const DrawingPtr& drawing, PreparedPtr picture) {
+  return backend.renderer.submit({drawing->kind, drawing->owner, drawing->cancel,
+                                  [drawing, picture = std::move(picture)](std::int64_t queue_us) {
+                                    draw(*drawing, picture, queue_us, Loading::allowed);
+                                  },
+                                  true, drawing->cost_ms, drawing->payer});  // admitted before
+}
 
 void load(Backend& backend, const DrawingPtr& drawing) {
   const auto run = [&backend, drawing] {
@@ -19,9 +32,13 @@ void load(Backend& backend, const DrawingPtr& drawing) {
       drawing->fail(make_error(ErrorKind::cancelled, "request cancelled"));
       return;
     }
-    auto loaded = backend.catalogue.load(*drawing->dataset, drawing->load, drawing->cancel);
-    if (!loaded) return drawing->fail(loaded.error());
-    if (const auto queued = enqueue(backend, drawing, std::move(*loaded)); !queued) {
+    const auto prepare = [&](data::Dataset& loading) {
+      return drawing->prepare(loading, Loading::allowed);
+    };
+    auto picture = backend.catalogue.load(*drawing->dataset, prepare, drawing->cancel);
+    if (!picture) return drawing->fail(picture.error());
+    if (*picture == nullptr) return;
+    if (const auto queued = draw_after_load(backend, drawing, std::move(*picture)); !queued) {
       drawing->fail(queued.error());
     }
   };
@@ -33,23 +50,8 @@ void load(Backend& backend, const DrawingPtr& drawing) {
   }
 }
 
-Result<void> enqueue(Backend& backend, const DrawingPtr& drawing, Held loaded) {
-  const bool after_load = loaded != nullptr;  // and was admitted before
-  return backend.renderer.submit(
-      {drawing->kind, drawing->owner, drawing->cancel,
-       [&backend, drawing, after_load, loaded = std::move(loaded)](std::int64_t queue_us) {
-         data::Dataset dataset =
-             after_load ? drawing->dataset->held() : drawing->dataset->resident_only();
-         if (!drawing->draw(dataset, queue_us, after_load)) load(backend, drawing);
-       },
-       after_load, drawing->cost_ms, drawing->payer});
-}
-
-Result<Held> room_for(const data::Dataset& dataset, const protocol::ImageView& image,
-                      const frame::Encoding& encoding) {
-  const int width = quality::edge_at(image.width, encoding.half_level);
-  const int height = quality::edge_at(image.height, encoding.half_level);
-  const std::uint64_t bytes = frame::bytes_beyond_kept(width, height, encoding.format);
+Result<Held> room_for(const data::Dataset& dataset, int width, int height, frame::Format format) {
+  const std::uint64_t bytes = frame::bytes_beyond_kept(width, height, format);
   if (bytes == 0) return Held();
   auto reserved = dataset.reserve(bytes);
   if (reserved || reserved.error().kind != ErrorKind::out_of_memory) return reserved;
@@ -60,26 +62,50 @@ Result<Held> room_for(const data::Dataset& dataset, const protocol::ImageView& i
 
 }  // namespace
 
-Result<Held> reserve_picture(const data::Dataset& dataset, const protocol::ImageView& image,
-                             const frame::Encoding& encoding, bool after_load) {
-  if (after_load) return Held();
-  auto room = room_for(dataset, image, encoding);
-  if (room) return room;
-  return make_error(ErrorKind::not_resident, room.error().message);
+Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
+                                    const quality::Setting& setting,
+                                    const frame::Encoding& encoding, data::Dataset& dataset,
+                                    Loading loading) {
+  const protocol::ImageView& image = completed.view().image;
+  const int width = quality::edge_at(image.width, setting.half_level);
+  const int height = quality::edge_at(image.height, setting.half_level);
+  Held reserved;
+  if (loading == Loading::none) {
+    auto room = room_for(dataset, width, height, encoding.format);
+    if (!room) return make_error(ErrorKind::not_resident, room.error().message);
+    reserved = std::move(*room);
+  }
+  auto prepared = frame::prepare(completed, setting, dataset, encoding);
+  if (!prepared) {
+    if (loading == Loading::none) return prepared.error();
+    return with_dataset_name(prepared.error(), dataset.info().id);
+  }
+  // Reserve after loading, so that a conflict of the two is found at once.
+  if (loading == Loading::allowed) {
+    auto room = room_for(dataset, width, height, encoding.format);
+    if (!room) return room.error();
+    reserved = std::move(*room);
+    prepared->prepare_us = 0;  // loading is not drawing
+  }
+  return std::make_shared<const PreparedPicture>(
+      PreparedPicture{std::move(*prepared), std::move(reserved)});
 }
 
-Result<Held> load_picture(const protocol::View& view, data::Dataset& loading,
-                          const frame::Encoding& encoding) {
-  auto fields = frame::load(view, loading, encoding);
-  if (!fields) return with_dataset_name(fields.error(), loading.info().id);
-  // Reserve last, so that a conflict of the two is found at once.
-  auto room = room_for(loading, view.image, encoding);
-  if (!room) return room.error();
-  return Held(std::make_shared<const std::pair<Held, Held>>(std::move(*fields), std::move(*room)));
-}
-
-Result<void> submit(Backend& backend, Drawing drawing) {
-  return enqueue(backend, std::make_shared<const Drawing>(std::move(drawing)), nullptr);
+Result<void> submit(Backend& backend, Drawing asked) {
+  const auto drawing = std::make_shared<const Drawing>(std::move(asked));
+  return backend.renderer.submit({drawing->kind, drawing->owner, drawing->cancel,
+                                  [&backend, drawing](std::int64_t queue_us) {
+                                    data::Dataset resident = drawing->dataset->resident_only();
+                                    auto picture = drawing->prepare(resident, Loading::none);
+                                    if (picture) {
+                                      draw(*drawing, *picture, queue_us, Loading::none);
+                                    } else if (picture.error().kind == ErrorKind::not_resident) {
+                                      load(backend, drawing);
+                                    } else {
+                                      drawing->fail(picture.error());
+                                    }
+                                  },
+                                  false, drawing->cost_ms, drawing->payer});
 }
 
 }  // namespace windsplat::net

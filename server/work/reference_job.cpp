@@ -13,7 +13,7 @@
 #include "protocol/codec.hpp"
 #include "server/data/model/digest.hpp"
 #include "server/frame/reference.hpp"
-#include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
 #include "server/work/run_guarded.hpp"
 
 namespace windsplat::net {
@@ -82,11 +82,12 @@ std::string id_of(const protocol::View& completed, const data::Dataset& dataset)
 Result<protocol::JobResult> draw_reference(Backend& backend, const protocol::View& view,
                                            data::Dataset& dataset, const Jobs::Handle& handle,
                                            const std::string& payer, const std::string& base_path) {
-  auto completed = scene::complete_view(view, dataset);
+  protocol::View asked = view;
+  asked.quality = {};  // affects how a stream renders, not the content
+  const auto completed = scene::complete(asked, dataset);
   if (!completed) return completed.error();
-  completed->quality = {};  // affects how a stream renders, not the content
   protocol::ReferenceDescription description;
-  description.id = id_of(*completed, dataset);
+  description.id = id_of(completed->view(), dataset);
   if (const auto kept = backend.references.find(description.id)) return kept->description;
   const frame::WorkMemory memory{
       [&](std::uint64_t bytes) { return backend.catalogue.reserve(bytes); },

@@ -61,7 +61,6 @@ class Shares {
 // An owner has at most one waiting background job: a newer one replaces it, and the cancelled one
 // runs before all others so that its submitter is notified. The next job of an owner also runs
 // first once it is cancelled, since it costs almost nothing.
-// is cancelled: it costs next to nothing.
 class RenderQueue {
  public:
   struct Next {

@@ -8,7 +8,6 @@
 
 #include "protocol/codec.hpp"
 #include "server/frame/frame_info.hpp"
-#include "server/frame/measure.hpp"
 #include "server/scene/build.hpp"
 #include "server/work/calibration_job.hpp"
 #include "server/work/drawing.hpp"
@@ -18,31 +17,26 @@
 namespace windsplat::net {
 namespace {
 
-frame::Encoding frame_encoding(const session::Encoding& wanted, const quality::Setting& setting) {
+frame::Encoding frame_encoding(const session::Encoding& wanted) {
   frame::Encoding encoding;
   const bool png = wanted.codec == protocol::Codec::png;
   encoding.format = png ? frame::Format::png : frame::Format::jpeg;
   encoding.quality = wanted.quality;
   encoding.subsampling = wanted.full_chroma ? image::Subsampling::s444 : image::Subsampling::s420;
-  encoding.half_level = setting.half_level;
-  encoding.coarser = setting.coarser;
   encoding.measure = wanted.measure;
   return encoding;
 }
 
-Result<session::Drawn> draw(Backend& backend, const session::StartRender& wanted,
-                            data::Dataset& dataset, std::int64_t queue_us, bool after_load,
+Result<session::Drawn> draw(Backend& backend, const PreparedPicture& picture,
+                            data::Dataset& dataset, std::int64_t queue_us,
                             const CancelToken& cancel) {
-  const frame::Encoding encoding = frame_encoding(wanted.encoding, wanted.setting);
-  const auto room = reserve_picture(dataset, wanted.view.image, encoding, after_load);
-  if (!room) return room.error();
-  auto drawn = frame::produce(quality::at_setting(wanted.view, wanted.setting), dataset, encoding,
-                              *backend.pool, cancel, backend.frames);
+  auto drawn = frame::produce(picture.frame, dataset, *backend.pool, cancel, backend.frames);
   if (!drawn) return drawn.error();
   session::Drawn out;
   out.info = frame::frame_info(*drawn, drawn->view);
-  Observation observed = observed_in(*drawn, wanted.setting);
-  report_error(*drawn, observed, wanted.setting, encoding, backend.quality, out.info);
+  Observation observed = observed_in(*drawn, picture.frame.setting);
+  report_error(*drawn, observed, picture.frame.setting, picture.frame.encoding, backend.quality,
+               out.info);
   out.signature = std::move(observed.signature);
   out.viewpoint = observed.viewpoint;
   out.view_json = protocol::encode_view(drawn->view);
@@ -70,17 +64,18 @@ Result<protocol::DatasetDescription> encoded(Result<protocol::DatasetDescription
 constexpr int describing_max = 4;  // limit per session
 
 Result<std::vector<data::PrefetchRequest>> prefetch_requests_of(const data::Dataset& dataset,
-                                                                const session::Prefetch& wanted) {
+                                                                const session::Prefetch& wanted,
+                                                                ViewCompletion& completion) {
   data::Dataset prefetching = dataset.prefetching();
-  const auto completed = frame::complete_at(quality::at_setting(wanted.view, wanted.setting),
-                                            prefetching, frame_encoding({}, wanted.setting));
+  const auto completed = completion.of(wanted.view, prefetching);
   if (!completed) return completed.error();
-  const auto shown = scene::shown_by(*completed);
-  if (!shown) return shown.error();
+  const auto drawn = frame::at_setting(*completed, wanted.setting);
+  if (!drawn) return drawn.error();
+  const scene::Shown shown = scene::shown_by(*drawn);
   std::vector<data::PrefetchRequest> requests;
   for (const int step : wanted.steps) {
-    for (const std::string& field : shown->fields) {
-      requests.push_back({dataset, field, static_cast<std::size_t>(step), shown->coarsening});
+    for (const std::string& field : shown.fields) {
+      requests.push_back({dataset, field, static_cast<std::size_t>(step), shown.coarsening});
     }
   }
   return requests;
@@ -122,21 +117,22 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
   const auto shared = std::make_shared<const DrawnReply>(std::move(reply));
   Drawing drawing{
       RenderService::Kind::stream, owner_, cancel, std::move(*dataset), {}, {}, {}, 0, payer_};
-  drawing.draw = [&backend = backend_, effect, cancel, shared](
-                     data::Dataset& resident, std::int64_t queue_us, bool after_load) {
-    auto drawn = run_guarded<session::Drawn>("a frame", cancel, [&] {
-      return draw(backend, effect, resident, queue_us, after_load, cancel);
+  drawing.prepare = [effect, cancel, completion = completion_](data::Dataset& available,
+                                                               Loading loading) {
+    return run_guarded<PreparedPtr>("preparing a frame", cancel, [&]() -> Result<PreparedPtr> {
+      const auto completed = completion->of(effect.view, available);
+      if (!completed) return completed.error();
+      return prepare_picture(*completed, effect.setting, frame_encoding(effect.encoding), available,
+                             loading);
     });
-    if (!after_load && !drawn && drawn.error().kind == ErrorKind::not_resident) return false;
-    if (drawn) drawn->loaded = after_load;
-    (*shared)(effect.ticket, std::move(drawn));
-    return true;
   };
-  drawing.load = [effect, cancel](data::Dataset& loading) {
-    return run_guarded<std::shared_ptr<const void>>("loading a frame's fields", cancel, [&] {
-      return load_picture(quality::at_setting(effect.view, effect.setting), loading,
-                          frame_encoding(effect.encoding, effect.setting));
-    });
+  drawing.draw = [&backend = backend_, ticket = effect.ticket, cancel, shared](
+                     const PreparedPicture& picture, data::Dataset& resident, std::int64_t queue_us,
+                     Loading loading) {
+    auto drawn = run_guarded<session::Drawn>(
+        "a frame", cancel, [&] { return draw(backend, picture, resident, queue_us, cancel); });
+    if (drawn) drawn->loaded = loading == Loading::allowed;
+    (*shared)(ticket, std::move(drawn));
   };
   drawing.fail = [ticket = effect.ticket, shared](const Error& error) { (*shared)(ticket, error); };
   // Jobs of streams are refused at shutdown only.
@@ -179,13 +175,15 @@ void Viewer::start(const session::Prefetch& effect) {
     if (!requests_->queued.insert(of.get()).second) return;
   }
   // Completing the view, to find its fields and levels, may block: not here.
-  const auto run = [&backend = backend_, owner = owner_, requests = requests_, key = of.get()] {
-    resolve_prefetch(backend, owner, *requests, key);
+  const auto run = [&backend = backend_, owner = owner_, requests = requests_,
+                    completion = completion_, key = of.get()] {
+    resolve_prefetch(backend, owner, *requests, completion, key);
   };
   (void)backend_.loads.submit({gone_, run, true, of});
 }
 
 void Viewer::resolve_prefetch(Backend& backend, std::uint64_t owner, PrefetchState& requests,
+                              const std::shared_ptr<ViewCompletion>& completion,
                               const data::DatasetInfo* of) {
   std::optional<PrefetchState::Newest> newest;
   std::uint64_t epoch = 0;
@@ -196,8 +194,9 @@ void Viewer::resolve_prefetch(Backend& backend, std::uint64_t owner, PrefetchSta
     newest = std::exchange(requests.newest, std::nullopt);
     epoch = requests.epoch;
   }
-  auto found = run_guarded<std::vector<data::PrefetchRequest>>(
-      "prefetch", {}, [&] { return prefetch_requests_of(newest->dataset, newest->effect); });
+  auto found = run_guarded<std::vector<data::PrefetchRequest>>("prefetch", {}, [&] {
+    return prefetch_requests_of(newest->dataset, newest->effect, *completion);
+  });
   const std::lock_guard lock(requests.mutex);
   if (found && requests.epoch == epoch)
     backend.catalogue.request_prefetch(owner, std::move(*found));
@@ -214,7 +213,7 @@ void Viewer::cancel_prefetch() {
 void Viewer::start(const session::Calibrate& effect) {
   calibration_.cancel();
   calibration_ = CancelToken();
-  submit_calibration(backend_, owner_, effect.view, calibration_);
+  submit_calibration(backend_, owner_, effect.view, completion_, calibration_);
 }
 
 void Viewer::cancel(std::uint64_t ticket) {

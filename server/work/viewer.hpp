@@ -9,6 +9,7 @@
 
 #include "server/session/effects.hpp"
 #include "server/work/backend.hpp"
+#include "server/work/view_completion.hpp"
 
 namespace windsplat::net {
 
@@ -38,6 +39,7 @@ class Viewer {
  private:
   struct PrefetchState;
   static void resolve_prefetch(Backend& backend, std::uint64_t owner, PrefetchState& requests,
+                               const std::shared_ptr<ViewCompletion>& completion,
                                const data::DatasetInfo* of);
   void cancel_prefetch();
 
@@ -46,7 +48,9 @@ class Viewer {
   const std::string payer_;
   std::map<std::uint64_t, CancelToken> running_;  // by ticket
   std::shared_ptr<PrefetchState> requests_;       // shared with the jobs that evaluate them
-  CancelToken gone_;                              // cancels descriptions
+  // Shared with jobs.
+  std::shared_ptr<ViewCompletion> completion_ = std::make_shared<ViewCompletion>();
+  CancelToken gone_;  // cancels descriptions
   std::shared_ptr<const char> describing_ =
       std::make_shared<const char>();  // held by each description job
   CancelToken calibration_;            // of the latest calibration

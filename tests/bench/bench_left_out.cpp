@@ -22,6 +22,9 @@
 #include "server/engine/render.hpp"
 #include "server/frame/frame.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/camera.hpp"
+#include "server/scene/completed_view.hpp"
+#include "server/scene/place.hpp"
 #include "tests/bench/left_out_table.hpp"
 
 namespace windsplat {
@@ -173,14 +176,14 @@ std::vector<Feature> features() {
 
 View make_view(const Feature& feature, const Change& change, protocol::MethodName method) {
   data::Dataset& dataset = dataset_of(feature.dataset);
-  View view = value_or_give_up(scene::default_view(dataset));
+  View view = value_or_give_up(scene::complete({}, dataset)).view();
   view.image.width = 640;
   view.image.height = 480;
   const auto placed = value_or_give_up(scene::place_dataset(view.geometry, dataset));
   scene::orbit(view, placed->lattice, 20, 35, 1);
   view.method.name = method;
   change(view);
-  return value_or_give_up(scene::complete_view(view, dataset));
+  return value_or_give_up(scene::complete(view, dataset)).view();
 }
 
 // The report as a frame has it; the picture is the end of an NPY file.

@@ -19,7 +19,7 @@
 #include "server/data/samples/samples.hpp"
 #include "server/frame/frame.hpp"
 #include "server/image/jpeg_encoder.hpp"
-#include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
 
 namespace windsplat::image {
 namespace {
@@ -142,9 +142,9 @@ class Loop {
     auto source = data::open_sample("climate");
     if (!source) give_up(source.error());
     dataset_.emplace(std::move(*source), "climate", std::uint64_t{1} << 30U);
-    auto view = scene::default_view(*dataset_);
-    if (!view) give_up(view.error());
-    view_ = *view;
+    auto completed = scene::complete({}, *dataset_);
+    if (!completed) give_up(completed.error());
+    view_ = completed->view();
     view_.image.width = size.width;
     view_.image.height = size.height;
     view_.method.name = protocol::MethodName::kernel;
@@ -153,7 +153,12 @@ class Loop {
 
   void draw(frame::Workspace& space) {
     const frame::Encoding moving{frame::Format::jpeg, 80, Subsampling::s420};
-    const auto done = frame::draw(view_, *dataset_, moving, pool_, CancelToken(), space);
+    const auto completed = frame::complete(view_, *dataset_);
+    if (!completed) give_up(completed.error());
+    const auto prepared =
+        frame::prepare(*completed, frame::own_setting(*completed), *dataset_, moving);
+    if (!prepared) give_up(prepared.error());
+    const auto done = frame::draw(*prepared, *dataset_, pool_, CancelToken(), space);
     if (!done) give_up(done.error());
   }
 

@@ -20,6 +20,7 @@
 #include "server/engine/tiles.hpp"
 #include "server/frame/frame.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
 #include "tests/bench/allocations.hpp"
 #include "tests/bench/support.hpp"
 #include "tests/bench/text_table.hpp"
@@ -78,7 +79,7 @@ void staged_frame(const protocol::View& asked, const Workload& workload, ThreadP
     series.add(stages[stage++], ms_since(start));
     start = Clock::now();
   };
-  const protocol::View view = value_or_give_up(scene::complete_view(asked, dataset));
+  const protocol::View view = value_or_give_up(scene::complete(asked, dataset)).view();
   lap();
   const scene::Scene scene = value_or_give_up(scene::build_scene(view, dataset));
   lap();

@@ -17,6 +17,10 @@
 #include "server/data/samples/samples.hpp"
 #include "server/engine/kernels/dispatch.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/camera.hpp"
+#include "server/scene/completed_view.hpp"
+#include "server/scene/place.hpp"
+#include "server/scene/presets.hpp"
 
 namespace windsplat::bench {
 
@@ -47,7 +51,7 @@ protocol::View view_of(const Workload& workload) {
   // Before defaults are looked for, so that a field which is not drawn is never loaded.
   const std::string preset = workload.preset;
   if (preset == "clouds") view.vector.field = {protocol::FieldChoice::Kind::none, ""};
-  view = value_or_give_up(scene::complete_view(view, dataset));
+  view = value_or_give_up(scene::complete(view, dataset)).view();
   const auto placed = value_or_give_up(scene::place_dataset(view.geometry, dataset));
   if (auto done = scene::apply_preset(view, placed->lattice, preset); !done) {
     give_up(done.error().message);

@@ -340,19 +340,20 @@ TEST(Drawings, ARequestThatWasLetInIsNotRefusedOnceItsDataIsThere) {
   net::Services services({}, store, std::make_shared<ThreadPool>(1));
   net::Drawing drawing;
   drawing.dataset = store->add("climate:8x8x4").value();
-  drawing.draw = [&](data::Dataset& /*dataset*/, std::int64_t /*queue_us*/, bool after_load) {
-    if (after_load) told.set_value("drawn");
-    return after_load;
+  drawing.draw = [&](const net::PreparedPicture& /*picture*/, data::Dataset& /*dataset*/,
+                     std::int64_t /*queue_us*/, net::Loading loading) {
+    told.set_value(loading == net::Loading::allowed ? "drawn" : "drawn without loading");
   };
   // While it loads, as many others come as may wait.
-  drawing.load = [&](data::Dataset& /*dataset*/) -> Result<std::shared_ptr<const void>> {
+  drawing.prepare = [&](data::Dataset& dataset, net::Loading loading) -> Result<net::PreparedPtr> {
+    if (loading == net::Loading::none) return make_error(ErrorKind::not_resident, "not loaded");
     const auto hold = [&](std::int64_t /*queue_us*/) { gate.pass(); };
     const net::RenderService::Job job{net::RenderService::Kind::request, 1, {}, hold, false, 0};
     EXPECT_TRUE(services.backend.renderer.submit(job));
     EXPECT_TRUE(gate.wait_for(1));
     while (services.backend.renderer.submit(job)) {
     }
-    return std::shared_ptr<const void>(std::make_shared<int>(1));
+    return net::prepare_picture(frame::complete({}, dataset).value(), {}, {}, dataset, loading);
   };
   drawing.fail = [&](const Error& error) { told.set_value(error.message); };
   ASSERT_TRUE(net::submit(services.backend, std::move(drawing)));

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "net_server.hpp"
+#include "server/scene/completed_view.hpp"
 #include "server/transport/http_client.hpp"
 
 namespace net_test {
@@ -392,6 +393,16 @@ TEST_F(Rest, the_page_is_served_safely_and_cached) {
   const Answer code = get(port(), "/" + script);
   EXPECT_EQ(code.status, 200) << script;
   EXPECT_THAT(code.header("cache-control"), HasSubstr("immutable"));
+}
+
+TEST(RestFrames, APostedViewIsCompletedOnceThoughItsDataHadToBeLoaded) {
+  const TestServer server;
+  const std::uint64_t before = windsplat::scene::completions();
+  const std::string view = R"({"dataset":"small","image":{"width":40,"height":30}})";
+  EXPECT_EQ(post_view(server.port(), view).status, 200);
+  EXPECT_EQ(windsplat::scene::completions() - before, 1U);
+  EXPECT_EQ(post_view(server.port(), view).status, 200);
+  EXPECT_EQ(windsplat::scene::completions() - before, 2U) << "one each";
 }
 
 TEST(RestBase, everything_lies_below_the_base_path_and_health_at_the_root_too) {

@@ -13,6 +13,7 @@
 #include "net_server.hpp"
 #include "server/api/services.hpp"
 #include "server/frame/frame.hpp"
+#include "server/scene/completed_view.hpp"
 
 namespace net_test {
 namespace {
@@ -20,9 +21,10 @@ namespace {
 using namespace windsplat;  // NOLINT(google-build-using-namespace)
 
 // Whether data was prepared for the frame, which the next of its kind need not do again.
-bool prepared(net::Viewer& viewer, std::uint64_t ticket, const protocol::View& view) {
+bool prepared(net::Viewer& viewer, std::uint64_t ticket, const protocol::View& view,
+              const quality::Setting& setting = {}) {
   std::promise<bool> told;
-  viewer.start(session::StartRender{ticket, view, {}, {}},
+  viewer.start(session::StartRender{ticket, view, setting, {}},
                [&](std::uint64_t /*ticket*/, Result<session::Drawn> drawn) {
                  EXPECT_TRUE(drawn) << (drawn ? "" : drawn.error().message);
                  told.set_value(drawn && drawn->loaded);
@@ -51,6 +53,31 @@ TEST(Viewer, AFrameThatWaitedForAveragesSaysSoAsOneThatWaitedForFields) {
   ASSERT_GT(dataset->averages(), 0U) << "the picture is too large for a coarser level";
   EXPECT_EQ(dataset->loads(), loads);
   EXPECT_FALSE(prepared(viewer, 4, view));
+}
+
+// The first frame has to wait for its fields, the second is drawn at another setting, and the view
+// is calibrated besides.
+TEST(Viewer, CompletesAViewOnceForAllThatIsDrawnOfIt) {
+  const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
+  const auto dataset = store->add(small_file()).value();
+  net::Services services({}, store, std::make_shared<ThreadPool>(2));
+  net::Viewer viewer(services.backend, 1, "192.0.2.1");
+  protocol::View view;
+  view.dataset = "small";
+  view.image.width = 96;
+  view.image.height = 72;
+  const std::uint64_t before = scene::completions();
+  EXPECT_TRUE(prepared(viewer, 1, view));
+  EXPECT_FALSE(prepared(viewer, 2, view, {protocol::MethodName::kernel, 2}));
+  viewer.start(session::Calibrate{view});
+  std::promise<void> calibrated;
+  ASSERT_TRUE(services.backend.loads.submit(
+      {{}, [&] { calibrated.set_value(); }, true, dataset->shared_info()}));
+  calibrated.get_future().wait();
+  EXPECT_EQ(scene::completions() - before, 1U);
+  view.camera.eye = protocol::Vec3{3, -3, 2};
+  EXPECT_FALSE(prepared(viewer, 3, view));
+  EXPECT_EQ(scene::completions() - before, 2U) << "another view";
 }
 
 // Data of one step and a half fit: every frame has to wait until those before it are drawn.

@@ -144,7 +144,15 @@ void draw(std::unique_ptr<FileSource> source) {
     frame::Encoding encoding;
     encoding.format = frame::Format::npy;  // keeps the linear picture
     frame::Workspace workspace;
-    const auto done = frame::draw(view, dataset, encoding, pool, CancelToken(), workspace);
+    const auto draw = [&]() -> Result<void> {
+      const auto completed = frame::complete(view, dataset);
+      if (!completed) return completed.error();
+      const auto prepared =
+          frame::prepare(*completed, frame::own_setting(*completed), dataset, encoding);
+      if (!prepared) return prepared.error();
+      return frame::draw(*prepared, dataset, pool, CancelToken(), workspace);
+    };
+    const auto done = draw();
     if (done) {
       expect_premultiplied(workspace.space.image());
     } else {

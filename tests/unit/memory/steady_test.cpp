@@ -17,6 +17,9 @@
 #include "server/frame/frame.hpp"
 #include "server/image/encode.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/camera.hpp"
+#include "server/scene/completed_view.hpp"
+#include "server/scene/place.hpp"
 
 namespace {
 
@@ -103,7 +106,7 @@ std::vector<scene::Scene> orbit(Look look, std::array<int, 3> dims, int width, i
                                 double offset = 0) {
   data::Dataset dataset(data::open_sample("climate", dims, 1).value(), "climate",
                         std::uint64_t{1} << 30U);
-  protocol::View view = scene::default_view(dataset).value();
+  protocol::View view = scene::complete({}, dataset).value().view();
   view.image.width = width;
   view.image.height = height;
   if (look == Look::globe) {
@@ -175,7 +178,7 @@ INSTANTIATE_TEST_SUITE_P(Looks, SteadyState,
 TEST(SteadyStateItself, AJpegCostsItsOwnBytes) {
   data::Dataset dataset(data::open_sample("climate", {64, 40, 12}, 1).value(), "climate",
                         std::uint64_t{1} << 30U);
-  protocol::View view = scene::default_view(dataset).value();
+  protocol::View view = scene::complete({}, dataset).value().view();
   view.image.width = 320;
   view.image.height = 240;
   view.method.name = protocol::MethodName::kernel;
@@ -227,7 +230,7 @@ TEST(HugePicture, FloatsAreGivenBackByTheNextSmallerOne) {
 TEST(HugePicture, FloatsOfAPngAreGivenBackWhenItIsEncoded) {
   data::Dataset dataset(data::open_sample("climate", {8, 8, 4}, 1).value(), "climate",
                         std::uint64_t{1} << 30U);
-  protocol::View view = scene::default_view(dataset).value();
+  protocol::View view = scene::complete({}, dataset).value().view();
   ThreadPool pool(2);
   frame::Workspace workspace;
   for (const int width : {320, huge_width}) {

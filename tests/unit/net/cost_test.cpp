@@ -25,11 +25,9 @@ class CostTest : public testing::Test {
   }
 
   frame::Cost cost(const protocol::View& view) {
-    const auto completed = scene::complete_and_place(view, *dataset_);
-    EXPECT_TRUE(completed) << (completed ? "" : completed.error().message);
-    const auto found = frame::cost_of(*completed, false);
-    EXPECT_TRUE(found);
-    return found.value();
+    const auto outline = scene::outline(view, dataset_->info());
+    EXPECT_TRUE(outline) << (outline ? "" : outline.error().message);
+    return frame::cost_of(outline.value());
   }
 
   protocol::ScalarView medium() {

@@ -15,6 +15,7 @@
 #include "server/engine/reference/reference.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
+#include "server/scene/completed_view.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -29,15 +30,17 @@ class Measure : public testing::Test {
     wanted.dataset = "tornado";
     wanted.image.width = 128;
     wanted.image.height = 96;
-    auto completed = scene::complete_view(wanted, *dataset);
+    auto completed = scene::complete(wanted, *dataset);
     ASSERT_TRUE(completed) << completed.error().message;
-    view = std::move(*completed);
+    view = completed->view();
   }
+
+  scene::CompletedView completed() { return scene::complete(view, *dataset).value(); }
 
   std::map<std::size_t, quality::Measured> surveyed() {
     std::map<std::size_t, quality::Measured> found;
-    const auto done =
-        calibrate(view, *dataset, pool, cancel, workspace, [&](const CalibrationSample& one) {
+    const auto done = calibrate(
+        completed(), *dataset, pool, cancel, workspace, [&](const CalibrationSample& one) {
           EXPECT_TRUE(found.emplace(one.setting, one.measured).second) << one.setting;
           EXPECT_EQ(one.viewpoint.pixels_high, 96);
         });
@@ -144,8 +147,9 @@ TEST_F(Measure, EveryFormatOfAPictureIsToldTheSameError) {
 TEST_F(Measure, OnlyPicturesOfFullSizeAreMeasured) {
   Encoding encoding;
   encoding.measure = true;
-  encoding.half_level = 1;
-  const auto small = produce(view, *dataset, encoding, pool, cancel);
+  const auto prepared = prepare(completed(), {view.method.name, 1}, *dataset, encoding);
+  ASSERT_TRUE(prepared);
+  const auto small = produce(*prepared, *dataset, pool, cancel, workspace);
   ASSERT_TRUE(small);
   EXPECT_FALSE(small->error);
 }
@@ -178,10 +182,8 @@ TEST_F(Measure, ASurveyAgreesWithWhatFramesMeasure) {
 
 // Seen from far away the view averages its data: slabs of any thickness err alike then.
 TEST_F(Measure, ASurveyOfAveragesDrawsThemAsFramesDo) {
-  auto placed = scene::complete_and_place(view, *dataset);
-  scene::orbit(view, placed.value().placed->lattice, 20, 30, 0.05);
-  placed = scene::complete_and_place(view, *dataset);
-  EXPECT_LT(viewpoint_of(placed.value()).value().detail, 1);
+  scene::orbit(view, completed().lattice(), 20, 30, 0.05);
+  EXPECT_LT(viewpoint_of(completed()).detail, 1);
   auto found = surveyed();
   const auto error_of = [&](int thinner) {
     return found.at(quality::index_of({protocol::MethodName::slab, 0, 0, thinner}).value())
@@ -192,31 +194,32 @@ TEST_F(Measure, ASurveyOfAveragesDrawsThemAsFramesDo) {
 
 // What is told of the detail is what scenes are built by.
 TEST_F(Measure, AViewAveragesWhereItsDetailIsBelowOne) {
-  const auto placed = scene::complete_and_place(view, *dataset).value();
+  const scene::CompletedView first = completed();
   int averaged = 0;
   for (const bool lines : {true, false}) {
     if (!lines) view.vector.field = {protocol::FieldChoice::Kind::none, ""};
     for (double zoom = 0.02; zoom < 4; zoom *= 1.3) {
-      scene::orbit(view, placed.placed->lattice, 20, 30, zoom);
-      const auto seen = scene::complete_and_place(view, *dataset).value();
+      scene::orbit(view, first.lattice(), 20, 30, zoom);
+      const auto seen = completed();
       const auto built = scene::build_scene(seen, *dataset).value();
       const bool is_averaged = built.level != std::array{0, 0, 0};
-      EXPECT_EQ(scene::detail_shown(seen).value() < 1, is_averaged) << zoom;
+      EXPECT_EQ(scene::detail_shown(seen) < 1, is_averaged) << zoom;
       averaged += is_averaged ? 1 : 0;
     }
   }
   EXPECT_GT(averaged, 4);
   EXPECT_LT(averaged, 36);
   view.method.detail = protocol::Detail::full;
-  EXPECT_EQ(scene::detail_shown(scene::complete_and_place(view, *dataset).value()).value(), 0);
+  EXPECT_EQ(scene::detail_shown(completed()), 0);
 }
 
 TEST_F(Measure, ACancelledSurveyEnds) {
   int told = 0;
   const CancelToken stop;
-  const auto done = calibrate(view, *dataset, pool, stop, workspace, [&](const CalibrationSample&) {
-    if (++told == 2) stop.cancel();
-  });
+  const auto done =
+      calibrate(completed(), *dataset, pool, stop, workspace, [&](const CalibrationSample&) {
+        if (++told == 2) stop.cancel();
+      });
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().kind, ErrorKind::cancelled);
   EXPECT_LE(told, 4);

@@ -7,6 +7,9 @@
 
 #include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
+#include "server/scene/completed_view.hpp"
+#include "server/scene/lattice.hpp"
+#include "server/scene/place.hpp"
 #include "tests/unit/scene/fake.hpp"
 
 namespace windsplat::scene {
@@ -313,7 +316,7 @@ TEST(HeightField, IsRefusedWhereItIsNoHeight) {
   const auto refusal = [](data::Dataset& dataset, const char* field) {
     View view;
     view.geometry.height_field = field;
-    const auto refused = complete_view(view, dataset);
+    const auto refused = complete(view, dataset);
     EXPECT_FALSE(refused) << field;
     return refused ? std::string() : refused.error().at.at(0).pointer;
   };
@@ -337,19 +340,19 @@ TEST(HeightField, IsLoadedOnceAndOnlyIfNamed) {
   View view;
   view.step = 1;
   view.scalars.emplace();
-  ASSERT_TRUE(build_scene(*complete_view(view, *dataset), *dataset));
+  ASSERT_TRUE(build_scene(*complete(view, *dataset), *dataset));
   EXPECT_EQ(reads->count("z@0"), 0U);
   view.geometry = with_heights();
-  const auto scene = build_scene(*complete_view(view, *dataset), *dataset);
+  const auto scene = build_scene(*complete(view, *dataset), *dataset);
   ASSERT_TRUE(scene);
   EXPECT_TRUE(scene->lattice.places);
   EXPECT_EQ((*reads)["z@0"], 1);
   EXPECT_EQ(reads->count("z@1"), 0U);
   // The next frame has the same places, not others like them.
-  const auto again = build_scene(*complete_view(view, *dataset), *dataset);
+  const auto again = build_scene(*complete(view, *dataset), *dataset);
   EXPECT_EQ(again->lattice.places, scene->lattice.places);
   view.geometry.scale = {1, 1, 2};
-  const auto taller = build_scene(*complete_view(view, *dataset), *dataset);
+  const auto taller = build_scene(*complete(view, *dataset), *dataset);
   EXPECT_NE(taller->lattice.places, scene->lattice.places);
 }
 
@@ -360,7 +363,7 @@ TEST(WorldRates, OnTheGlobeAreLengthsPerMetre) {
   View view;
   view.geometry.mapping = GeometryMapping::sphere;
   view.vector.space = protocol::VectorSpace::world;
-  const auto scene = build_scene(*complete_view(view, *dataset), *dataset);
+  const auto scene = build_scene(*complete(view, *dataset), *dataset);
   ASSERT_TRUE(scene) << scene.error().message;
   const double inner = 1 / 1.15;
   const double rate = 0.5 * (1 + inner) / 6371000.0;
@@ -379,7 +382,7 @@ TEST(WorldRates, OnACurvilinearMapAreThoseOfDegrees) {
   View view;
   view.geometry.mapping = GeometryMapping::curvilinear;
   view.vector.space = protocol::VectorSpace::world;
-  const auto scene = build_scene(*complete_view(view, *dataset), *dataset);
+  const auto scene = build_scene(*complete(view, *dataset), *dataset);
   ASSERT_TRUE(scene) << scene.error().message;
   const double metre = 2.0 / 46 / (6371000.0 * degree);
   EXPECT_NEAR(scene->vector->rate_y, metre, 1e-5 * metre);

@@ -9,7 +9,10 @@
 #include <numbers>
 
 #include "server/scene/colormap.hpp"
+#include "server/scene/completed_view.hpp"
 #include "server/scene/describe.hpp"
+#include "server/scene/lattice.hpp"
+#include "server/scene/presets.hpp"
 #include "tests/unit/scene/fake.hpp"
 
 namespace windsplat::scene {
@@ -223,7 +226,7 @@ TEST(WorldRates, AreAbsentForComponentsAndRefusedWhereUnknown) {
       std::make_unique<FakeSource>(std::move(grid), std::vector<data::FieldInfo>{wind_info()}, 1));
   View view;
   view.vector.space = protocol::VectorSpace::world;
-  const auto refused = build_scene(*complete_view(view, *dataset), *dataset);
+  const auto refused = build_scene(*complete(view, *dataset), *dataset);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::invalid);
   EXPECT_EQ(refused.error().at.at(0).pointer, "/vector/space");
@@ -232,7 +235,7 @@ TEST(WorldRates, AreAbsentForComponentsAndRefusedWhereUnknown) {
 TEST(Presets, ChangeWhatTheirNamesSay) {
   auto dataset = weather();
   const Lattice lattice = *place_lattice(dataset->info().grid, {});
-  const View start = *default_view(*dataset);
+  const View start = complete({}, *dataset)->view();
   EXPECT_THAT(preset_names(), testing::ElementsAre("default", "winds", "clouds", "top", "south"));
   for (const std::string& name : preset_names()) {
     View view = start;

@@ -8,6 +8,8 @@
 #include <numbers>
 
 #include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
+#include "server/scene/lattice.hpp"
 #include "tests/unit/scene/fake.hpp"
 
 namespace windsplat::scene {
@@ -27,9 +29,7 @@ Pixel project(const Camera& camera, const glm::dvec3& point) {
 }
 
 Scene default_scene(data::Dataset& dataset, const protocol::View& view = {}) {
-  auto complete = complete_view(view, dataset);
-  EXPECT_TRUE(complete);
-  auto scene = build_scene(*complete, dataset);
+  auto scene = build_scene(view, dataset);
   EXPECT_TRUE(scene);
   return std::move(*scene);
 }
@@ -158,7 +158,7 @@ TEST(Orbit, ZoomTwoDrawsTheCentreTwiceAsLarge) {
   }
 }
 
-std::string pointer_of(const Result<protocol::View>& result) {
+std::string pointer_of(const Result<CompletedView>& result) {
   if (result) return "accepted";
   if (result.error().kind != ErrorKind::invalid || result.error().at.empty()) return "other error";
   return result.error().at[0].pointer;
@@ -168,15 +168,15 @@ TEST(Camera, ImpossibleCamerasAreRefusedByName) {
   auto dataset = atmosphere();
   protocol::View view;
   view.camera.eye = protocol::Vec3{0, 0, 4};
-  EXPECT_EQ(pointer_of(complete_view(view, *dataset)), "/camera/up");
+  EXPECT_EQ(pointer_of(complete(view, *dataset)), "/camera/up");
   view.camera.up = {0, 0, -1e3};
-  EXPECT_EQ(pointer_of(complete_view(view, *dataset)), "/camera/up");
+  EXPECT_EQ(pointer_of(complete(view, *dataset)), "/camera/up");
   view.camera.up = {0, 0, 0};
-  EXPECT_EQ(pointer_of(complete_view(view, *dataset)), "/camera/up");
+  EXPECT_EQ(pointer_of(complete(view, *dataset)), "/camera/up");
   view.camera.up = {0, 1, 0};
-  EXPECT_EQ(pointer_of(complete_view(view, *dataset)), "accepted");
+  EXPECT_EQ(pointer_of(complete(view, *dataset)), "accepted");
   view.camera.target = view.camera.eye;
-  EXPECT_EQ(pointer_of(complete_view(view, *dataset)), "/camera/eye");
+  EXPECT_EQ(pointer_of(complete(view, *dataset)), "/camera/eye");
 }
 
 TEST(DepthCue, ItsEndsAreTheBoxsNearestAndFarthestCorners) {

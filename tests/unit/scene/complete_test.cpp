@@ -7,8 +7,8 @@
 #include <functional>
 
 #include "server/data/samples/samples.hpp"
-#include "server/scene/build.hpp"
 #include "server/scene/colormap.hpp"
+#include "server/scene/completed_view.hpp"
 #include "server/scene/defaults.hpp"
 #include "tests/unit/scene/fake.hpp"
 
@@ -28,9 +28,9 @@ std::unique_ptr<data::Dataset> cloudy_weather(std::shared_ptr<FakeSource::Reads>
 }
 
 View completed(const View& view, data::Dataset& dataset) {
-  auto full = complete_view(view, dataset);
+  auto full = complete(view, dataset);
   EXPECT_TRUE(full);
-  return std::move(*full);
+  return full->view();
 }
 
 // Every optional of a view as text, to compare two of them.
@@ -71,7 +71,7 @@ TEST(CompleteView, FillsEverythingAndIsIdempotent) {
 TEST(CompleteView, DefaultsAreFitForTheSchema) {
   for (const std::string& name : data::sample_names()) {
     auto dataset = sample_dataset(name, {24, 16, 12});
-    const View full = *default_view(*dataset);
+    const View full = complete({}, *dataset)->view();
     EXPECT_GT(*full.vector.length, 0.0);
     EXPECT_LE(*full.vector.length, 10.0);
     EXPECT_LT((*full.vector.magnitude_range)[0], (*full.vector.magnitude_range)[1]);
@@ -126,9 +126,9 @@ TEST(CompleteView, TheFieldsThatAViewMayLoadAreKnownWithoutLoading) {
   const data::DatasetInfo& info = dataset->info();
   protocol::View view;
   EXPECT_THAT(fields_of(view, info), testing::ElementsAre("wind", "cloud"));
-  const auto completed = complete_view(view, *dataset);
+  const auto completed = complete(view, *dataset);
   ASSERT_TRUE(completed);
-  EXPECT_EQ(fields_of(*completed, info), fields_of(view, info));
+  EXPECT_EQ(fields_of(completed->view(), info), fields_of(view, info));
   view.vector.field = {protocol::FieldChoice::Kind::none, ""};
   view.scalars.emplace(2);
   (*view.scalars)[0].field = "vorticity";
@@ -262,7 +262,7 @@ TEST(CompleteView, RefusesByPointer) {
   for (const auto& [pointer, spoil] : cases) {
     View view;
     spoil(view);
-    const auto refused = complete_view(view, *dataset);
+    const auto refused = complete(view, *dataset);
     ASSERT_FALSE(refused) << pointer;
     EXPECT_EQ(refused.error().kind, ErrorKind::invalid) << pointer;
     ASSERT_FALSE(refused.error().at.empty()) << pointer;
@@ -277,7 +277,7 @@ TEST(CompleteView, StepEdgesInAnOpacityFunctionAreAllowed) {
   scalar.field = "cloud";
   scalar.extinction = {{0, 0}, {5, 0}, {5, 9}};
   view.scalars = {scalar};
-  EXPECT_TRUE(complete_view(view, *dataset));
+  EXPECT_TRUE(complete(view, *dataset));
 }
 
 TEST(Defaults, NiceNumbersRoundUp) {

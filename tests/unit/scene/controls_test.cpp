@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
 #include "server/scene/defaults.hpp"
 #include "tests/unit/scene/fake.hpp"
 
@@ -26,7 +26,7 @@ std::unique_ptr<data::Dataset> known_weather(std::shared_ptr<FakeSource::Reads> 
 }
 
 std::string pointer_of_refusal(const View& view, data::Dataset& dataset) {
-  const auto refused = complete_view(view, dataset);
+  const auto refused = complete(view, dataset);
   if (refused || refused.error().at.empty()) return "(taken)";
   EXPECT_EQ(refused.error().kind, ErrorKind::invalid);
   return refused.error().at[0].pointer;
@@ -50,10 +50,10 @@ TEST(Slice, BeyondTheGridIsRefusedWithItsLimit) {
     const int count = layers.at(static_cast<std::size_t>(axis));
     View view;
     view.geometry.slice = SliceView{axis, count - 1};
-    EXPECT_TRUE(complete_view(view, *dataset));
+    EXPECT_TRUE(complete(view, *dataset));
     view.geometry.slice->index = count;
     EXPECT_EQ(pointer_of_refusal(view, *dataset), "/geometry/slice/index");
-    EXPECT_THAT(complete_view(view, *dataset).error().message,
+    EXPECT_THAT(complete(view, *dataset).error().message,
                 testing::HasSubstr("0 to " + std::to_string(count - 1)));
   }
 }
@@ -61,16 +61,16 @@ TEST(Slice, BeyondTheGridIsRefusedWithItsLimit) {
 // A full volume hides itself unless weak lines are left out; a slice does not.
 TEST(Slice, KeepsItsLinesByDefault) {
   auto dataset = sample_dataset("climate", {96, 48, 19});
-  const View whole = *default_view(*dataset);
+  const View whole = complete({}, *dataset)->view();
   const double least = (*whole.vector.magnitude_range)[1] / 100;
   EXPECT_GT(*whole.vector.min_magnitude, 5 * least);
   for (const GridAxis axis : {GridAxis::x, GridAxis::y, GridAxis::z}) {
     View view;
     view.geometry.slice = SliceView{axis, 9};
-    const auto full = complete_view(view, *dataset);
+    const auto full = complete(view, *dataset);
     ASSERT_TRUE(full);
-    EXPECT_EQ(full->vector.magnitude_range, whole.vector.magnitude_range);
-    EXPECT_DOUBLE_EQ(*full->vector.min_magnitude, least) << static_cast<int>(axis);
+    EXPECT_EQ(full->view().vector.magnitude_range, whole.vector.magnitude_range);
+    EXPECT_DOUBLE_EQ(*full->view().vector.min_magnitude, least) << static_cast<int>(axis);
   }
 }
 
@@ -94,16 +94,16 @@ TEST(Slice, CountsItsOwnLinesAlone) {
   View view;
   view.vector.magnitude_range = protocol::Range{0, 1};
   view.geometry.slice = SliceView{GridAxis::z, 0};
-  const auto full = complete_view(view, *dataset);
+  const auto full = complete(view, *dataset);
   ASSERT_TRUE(full);
   // The layer is 2 by 2; seen from 35 degrees above, 720 pixels are 2.08 (sin 35 + 0.01) high, so
   // 900 x 900 lines of three quarters of five spacings by 2 pixels are there to cover three times
   // that area.
   const double pixel = 2.08 * (std::sin(35 * std::numbers::pi / 180) + 0.005) / 720;
   const double wanted = 1 - 3 * 4 / (0.75 * 0.011 * 2 * pixel * 810000);
-  EXPECT_NEAR(*full->vector.min_magnitude, wanted, 0.06);
+  EXPECT_NEAR(*full->view().vector.min_magnitude, wanted, 0.06);
   view.geometry.slice->index = 1;
-  EXPECT_DOUBLE_EQ(*complete_view(view, *dataset)->vector.min_magnitude, 0.9);  // all but the top
+  EXPECT_DOUBLE_EQ(*complete(view, *dataset)->view().vector.min_magnitude, 0.9);  // all but the top
 }
 
 TEST(Slice, LinesAndMediumAreMeasuredByTheLayer) {

@@ -8,6 +8,7 @@
 
 #include "server/data/samples/samples.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
 #include "tests/unit/scene/fake.hpp"
 
 namespace windsplat::scene {
@@ -183,7 +184,7 @@ class LevelOfAScene : public testing::Test {
     view.image.height = 30;
   }
   Scene built() {
-    const auto completed = complete_view(view, *dataset);
+    const auto completed = complete(view, *dataset);
     EXPECT_TRUE(completed) << completed.error().message;
     auto scene = build_scene(*completed, *dataset);
     EXPECT_TRUE(scene) << scene.error().message;
@@ -279,7 +280,7 @@ TEST_F(LevelWithin, ALevelIsDrawnWhereThereIsRoom) {
 
 TEST_F(LevelWithin, WhatFullDetailRefusesIsRefused) {
   open_within(fine);
-  const auto completed = complete_view(view, *dataset).value();
+  const auto completed = complete(view, *dataset).value();
   open_within(fine - 1);
   EXPECT_EQ(build_scene(completed, *dataset).error().kind, ErrorKind::out_of_memory);
 }
@@ -312,10 +313,10 @@ TEST(LevelOfRates, AreMeansOfTheRowsAndLayersMerged) {
   protocol::View view;
   view.vector.space = protocol::VectorSpace::world;
   view.image.width = view.image.height = 50;
-  const Scene coarse = build_scene(*complete_view(view, *dataset), *dataset).value();
+  const Scene coarse = build_scene(*complete(view, *dataset), *dataset).value();
   ASSERT_EQ(coarse.level, (Level{1, 1, 0})) << "three layers stay three";
   view.method.detail = protocol::Detail::full;
-  const Scene full = build_scene(*complete_view(view, *dataset), *dataset).value();
+  const Scene full = build_scene(*complete(view, *dataset), *dataset).value();
   ASSERT_EQ(coarse.vector->rate_x.size(), 32U);
   for (std::size_t j = 0; j < 32; ++j) {
     EXPECT_NEAR(coarse.vector->rate_x[j],

@@ -16,6 +16,7 @@
 #include "server/data/resident/dataset.hpp"
 #include "server/data/samples/samples.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
 
 namespace windsplat::scene {
 
@@ -122,7 +123,7 @@ inline std::unique_ptr<data::Dataset> sample_dataset(const std::string& name,
 
 // A view completed and built; the test fails where that does.
 inline Scene built(const protocol::View& view, data::Dataset& dataset) {
-  auto full = complete_view(view, dataset);
+  auto full = complete(view, dataset);
   EXPECT_TRUE(full) << full.error().message;
   auto scene = build_scene(*full, dataset);
   EXPECT_TRUE(scene) << scene.error().message;

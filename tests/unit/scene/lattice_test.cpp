@@ -1,9 +1,10 @@
 // Where samples stand: closed forms of placement, proportion and scale.
+#include "server/scene/lattice.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "server/scene/build.hpp"
 #include "tests/unit/scene/fake.hpp"
 
 namespace windsplat::scene {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "server/data/resident/store.hpp"
-#include "server/scene/build.hpp"
 #include "server/scene/describe.hpp"
+#include "server/scene/lattice.hpp"
 #include "tests/unit/data/netcdf_maker.hpp"
 
 namespace windsplat::scene {

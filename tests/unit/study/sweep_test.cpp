@@ -7,7 +7,9 @@
 #include <cmath>
 
 #include "server/frame/difference.hpp"
-#include "server/scene/build.hpp"
+#include "server/scene/camera.hpp"
+#include "server/scene/lattice.hpp"
+#include "server/scene/place.hpp"
 #include "server/study/metrics.hpp"
 #include "tests/unit/scene/fake.hpp"
 

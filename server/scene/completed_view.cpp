@@ -1,15 +1,18 @@
-// View -> the same view with every default of its dataset filled in. What the user said stays as it
-// was said; a complete view passes through unchanged and loads nothing.
+// Completes a view in two passes: what the dataset's description determines, then what follows from
+// data. A view that states everything loads nothing.
+#include "server/scene/completed_view.hpp"
+
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <utility>
 
 #include "server/data/model/digest.hpp"
-#include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"
 #include "server/scene/defaults.hpp"
+#include "server/scene/lattice.hpp"
 #include "server/scene/refusal.hpp"
 
 namespace windsplat::scene {
@@ -112,7 +115,6 @@ Result<void> complete_magnitudes(View& view, const Lattice& lattice,
   }
   if (!vector.magnitude_range) vector.magnitude_range = Range{0, 1};
   const Range& range = *vector.magnitude_range;
-  if (!(range[0] < range[1])) return invalid_at("/vector/magnitudeRange", "does not ascend");
   if (!vector.min_magnitude && named) {
     // Of the lines as they are by default: a view that changes one of their keys changes that
     // alone.
@@ -212,18 +214,35 @@ Result<void> check_extinction(const protocol::ScalarView& scalar, const std::str
   return {};
 }
 
-Result<void> complete_scalar(protocol::ScalarView& scalar, const std::string& pointer,
-                             const Lattice& lattice, const std::optional<Slice>& slice,
-                             data::Dataset& dataset) {
-  auto found =
-      find_field(dataset.info(), scalar.field, data::FieldKind::scalar, pointer + "/field");
-  if (!found) return found.error();
-  const data::FieldInfo& field = **found;
-  if (!scalar.color.map) scalar.color.map = scalar_style(field).map;
+// Style and checks of a medium; no data.
+Result<void> outline_scalar(protocol::ScalarView& scalar, const std::string& pointer,
+                            const data::DatasetInfo& info) {
+  const auto field = find_field(info, scalar.field, data::FieldKind::scalar, pointer + "/field");
+  if (!field) return field.error();
+  if (!scalar.color.map) scalar.color.map = scalar_style(**field).map;
   if (auto ok = check_map(*scalar.color.map, pointer + "/color/map"); !ok) return ok;
   if (auto ok = check_color_range(scalar.color.range, pointer + "/color/range"); !ok) return ok;
-  if (auto ok = check_extinction(scalar, pointer); !ok) return ok;
+  return check_extinction(scalar, pointer);
+}
+
+Result<void> outline_scalars(View& view, const data::DatasetInfo& info) {
+  if (!view.scalars) {
+    view.scalars.emplace();
+    for (const std::string& name : default_scalars(info)) {
+      view.scalars->emplace_back().field = name;
+    }
+  }
+  for (std::size_t n = 0; n < view.scalars->size(); ++n) {
+    auto ok = outline_scalar((*view.scalars)[n], "/scalars/" + std::to_string(n), info);
+    if (!ok) return ok;
+  }
+  return {};
+}
+
+Result<void> complete_scalar(protocol::ScalarView& scalar, const Lattice& lattice,
+                             const std::optional<Slice>& slice, data::Dataset& dataset) {
   if (scalar.color.range && scalar.extinction) return {};
+  const data::FieldInfo& field = *dataset.info().find(scalar.field);
   const auto range = first_scalar_range(field, dataset);
   if (!range) return range.error();
   if (!scalar.color.range) scalar.color.range = *range;
@@ -231,60 +250,97 @@ Result<void> complete_scalar(protocol::ScalarView& scalar, const std::string& po
   return {};
 }
 
-Result<void> complete_scalars(View& view, const Lattice& lattice, const std::optional<Slice>& slice,
-                              data::Dataset& dataset) {
-  if (!view.scalars) {
-    view.scalars.emplace();
-    for (const std::string& name : default_scalars(dataset.info())) {
-      protocol::ScalarView scalar;
-      scalar.field = name;
-      view.scalars->push_back(std::move(scalar));
-    }
+// Checks that need neither data nor a placement.
+Result<void> check(const View& view, const data::DatasetInfo& info) {
+  if (view.step < 0 || static_cast<std::size_t>(view.step) >= info.steps.size()) {
+    return invalid_at("/step", "dataset " + in_double_quotes(info.id) + " has steps 0 to " +
+                                   std::to_string(info.steps.size() - 1));
   }
-  for (std::size_t n = 0; n < view.scalars->size(); ++n) {
-    auto ok = complete_scalar((*view.scalars)[n], "/scalars/" + std::to_string(n), lattice, slice,
-                              dataset);
-    if (!ok) return ok;
+  if (auto ok = check_color(view.image.background, "/image/background"); !ok) return ok;
+  if (auto ok = check_vector(view.vector); !ok) return ok;
+  if (view.depth_cue.near >= view.depth_cue.far) {
+    return invalid_at("/depthCue/near", "is not less than far");
+  }
+  return check_geometry(view.geometry, info);
+}
+
+// The first pass: camera, fields and styles, as the description and the placement determine them.
+Result<Camera> complete_from_description(View& view, const data::DatasetInfo& info,
+                                         const Lattice& lattice) {
+  complete_camera(view, lattice);
+  auto camera = resolve_camera(view, lattice);
+  if (!camera) return camera;
+  protocol::VectorView& vector = view.vector;
+  if (auto ok = choose_vector_field(view, info); !ok) return ok.error();
+  if (!vector.length) vector.length = default_length(lattice, 1, slice_of(view.geometry));
+  if (const auto& range = vector.magnitude_range; range && !((*range)[0] < (*range)[1])) {
+    return invalid_at("/vector/magnitudeRange", "does not ascend");
+  }
+  if (auto ok = check_color_field(vector.color, info); !ok) return ok.error();
+  if (!vector.color.by) vector.color.by = default_color_by(info.grid);
+  if (auto ok = outline_scalars(view, info); !ok) return ok.error();
+  return camera;
+}
+
+// The second pass: ranges and extinctions.
+Result<void> complete_from_data(View& view, const Camera& camera, const Lattice& lattice,
+                                data::Dataset& dataset) {
+  const std::optional<Slice> slice = slice_of(view.geometry);
+  if (auto ok = complete_magnitudes(view, lattice, slice, dataset); !ok) return ok;
+  if (!view.vector.color.range) {
+    auto range = default_color_range(view, lattice, view_depths(camera, lattice), dataset);
+    if (!range) return range.error();
+    view.vector.color.range = *range;
+  }
+  for (protocol::ScalarView& scalar : *view.scalars) {
+    if (auto ok = complete_scalar(scalar, lattice, slice, dataset); !ok) return ok;
   }
   return {};
 }
 
+std::atomic<std::uint64_t> completed_views{0};
+
 }  // namespace
 
-Result<Completed> complete_and_place(const View& view, data::Dataset& dataset) {
+Result<void> CompletedView::resolve() {
+  auto camera = resolve_camera(view_, placed_->lattice);
+  if (!camera) return camera.error();
+  camera_ = *camera;
+  return {};
+}
+
+Result<CompletedView> complete(const View& view, data::Dataset& dataset) {
   const data::DatasetInfo& info = dataset.info();
   View full = view;
   if (full.dataset.empty()) full.dataset = info.id;
-  if (full.step < 0 || static_cast<std::size_t>(full.step) >= info.steps.size()) {
-    return invalid_at("/step", "dataset " + in_double_quotes(info.id) + " has steps 0 to " +
-                                   std::to_string(info.steps.size() - 1));
-  }
-  if (auto ok = check_color(full.image.background, "/image/background"); !ok) return ok.error();
-  if (auto ok = check_vector(full.vector); !ok) return ok.error();
-  if (full.depth_cue.near >= full.depth_cue.far) {
-    return invalid_at("/depthCue/near", "is not less than far");
-  }
-  if (auto ok = check_geometry(full.geometry, info); !ok) return ok.error();
+  if (auto ok = check(full, info); !ok) return ok.error();
   auto placed = place_dataset(full.geometry, dataset);
   if (!placed) return placed.error();
-  const Lattice* const lattice = &(*placed)->lattice;
-  const std::optional<Slice> slice = slice_of(full.geometry);
-  complete_camera(full, *lattice);
-  auto camera = resolve_camera(full, *lattice);
+  const Lattice& lattice = (*placed)->lattice;
+  const auto camera = complete_from_description(full, info, lattice);
   if (!camera) return camera.error();
-  if (auto ok = choose_vector_field(full, info); !ok) return ok.error();
-  protocol::VectorView& vector = full.vector;
-  if (!vector.length) vector.length = default_length(*lattice, 1, slice);
-  if (auto ok = complete_magnitudes(full, *lattice, slice, dataset); !ok) return ok.error();
-  if (auto ok = check_color_field(vector.color, info); !ok) return ok.error();
-  if (!vector.color.by) vector.color.by = default_color_by(info.grid);
-  if (!vector.color.range) {
-    auto range = default_color_range(full, *lattice, view_depths(*camera, *lattice), dataset);
-    if (!range) return range.error();
-    vector.color.range = *range;
-  }
-  if (auto ok = complete_scalars(full, *lattice, slice, dataset); !ok) return ok.error();
-  return Completed{std::move(full), std::move(*placed)};
+  if (auto ok = complete_from_data(full, *camera, lattice, dataset); !ok) return ok.error();
+  ++completed_views;
+  return CompletedView(std::move(full), std::move(*placed), *camera);
+}
+
+std::uint64_t completions() { return completed_views; }
+
+Result<ViewOutline> outline(const View& view, const data::DatasetInfo& info) {
+  ViewOutline out;
+  out.view = view;
+  if (auto ok = check(view, info); !ok) return ok.error();
+  out.bent = is_bent(view.geometry);
+  // Mapping the grid takes long and may read a field.
+  out.view.geometry.mapping = protocol::GeometryMapping::flat;
+  out.view.geometry.height_field.reset();
+  auto lattice = place_lattice(info.grid, out.view.geometry);
+  if (!lattice) return lattice.error();
+  out.lattice = std::move(*lattice);
+  const auto camera = complete_from_description(out.view, info, out.lattice);
+  if (!camera) return camera.error();
+  out.camera = *camera;
+  return out;
 }
 
 std::vector<std::string> fields_of(const View& view, const data::DatasetInfo& info) {
@@ -309,18 +365,6 @@ std::vector<std::string> fields_of(const View& view, const data::DatasetInfo& in
   }
   if (view.geometry.height_field) add(*view.geometry.height_field);
   return fields;
-}
-
-Result<View> complete_view(const View& view, data::Dataset& dataset) {
-  auto completed = complete_and_place(view, dataset);
-  if (!completed) return completed.error();
-  return std::move(completed->view);
-}
-
-Result<View> default_view(data::Dataset& dataset) {
-  View view;
-  view.dataset = dataset.info().id;
-  return complete_view(view, dataset);
 }
 
 }  // namespace windsplat::scene

@@ -1,0 +1,81 @@
+// A view with every default of its dataset filled in: the only form that is drawn.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "protocol/view.hpp"
+#include "server/base/error.hpp"
+#include "server/data/resident/dataset.hpp"
+#include "server/scene/place.hpp"
+#include "server/scene/scene.hpp"
+
+namespace windsplat::scene {
+
+// Made by complete() alone. Immutable; independent of how long the dataset stays resident.
+class CompletedView {
+ public:
+  [[nodiscard]] const protocol::View& view() const { return view_; }
+  // Where the dataset's samples stand for it.
+  [[nodiscard]] const Placed& placed() const { return *placed_; }
+  [[nodiscard]] const Lattice& lattice() const { return placed_->lattice; }
+  [[nodiscard]] const Camera& camera() const { return camera_; }
+  // How often more than the picture asks for the data is halved, where the view leaves that open
+  // (detail.hpp, coarser_level).
+  [[nodiscard]] int coarser() const { return coarser_; }
+
+  // The same view after change(protocol::View&), which may set the camera, the method, the size of
+  // the picture and `quality`, or remove layers: nothing from which a default follows. Errors:
+  // invalid with a pointer (its camera).
+  template <class Change>
+  [[nodiscard]] Result<CompletedView> with(const Change& change) const {
+    CompletedView changed = *this;
+    change(changed.view_);
+    if (auto ok = changed.resolve(); !ok) return ok.error();
+    return changed;
+  }
+  [[nodiscard]] CompletedView coarsened(int times) const {
+    CompletedView changed = *this;
+    changed.coarser_ = times;
+    return changed;
+  }
+
+ private:
+  friend Result<CompletedView> complete(const protocol::View& view, data::Dataset& dataset);
+  CompletedView(protocol::View view, std::shared_ptr<const Placed> placed, const Camera& camera)
+      : view_(std::move(view)), placed_(std::move(placed)), camera_(camera) {}
+  Result<void> resolve();  // the camera
+
+  protocol::View view_;
+  std::shared_ptr<const Placed> placed_;
+  Camera camera_;
+  int coarser_ = 0;
+};
+
+// Fills in every default; values that the view states are kept. Loads nothing but what ranges and
+// placement need, and nothing at all where the view states them. Errors: invalid with a pointer (no
+// such field, step, colour map; up parallel to the view; eye on the target); those of loading.
+Result<CompletedView> complete(const protocol::View& view, data::Dataset& dataset);
+
+// Views completed in this process: tests compare it with the number of views drawn.
+std::uint64_t completions();
+
+// A view as far as the description of its dataset determines it, placed flat: enough to refuse it
+// or to estimate its cost before data is read. Defaults that follow from data stay open.
+struct ViewOutline {
+  protocol::View view;
+  Lattice lattice;
+  Camera camera;
+  bool bent = false;  // will be drawn on a bent lattice
+};
+// Loads nothing. Errors: those of complete() that need no data.
+Result<ViewOutline> outline(const protocol::View& view, const data::DatasetInfo& info);
+
+// The fields that a view, completed or not, may load of a dataset: each once, without those that
+// do not exist. Loads nothing.
+std::vector<std::string> fields_of(const protocol::View& view, const data::DatasetInfo& info);
+
+}  // namespace windsplat::scene

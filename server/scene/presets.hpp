@@ -1,0 +1,20 @@
+// Named starting points of a view.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "protocol/view.hpp"
+#include "server/base/error.hpp"
+#include "server/scene/scene.hpp"
+
+namespace windsplat::scene {
+
+// "default", "winds" (no medium), "clouds" (no lines), "top", "south".
+std::vector<std::string> preset_names();
+
+// Changes a completed view's camera, or removes a kind of layer. Errors: invalid at /preset.
+Result<void> apply_preset(protocol::View& completed, const Lattice& lattice,
+                          const std::string& preset);
+
+}  // namespace windsplat::scene

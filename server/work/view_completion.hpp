@@ -1,0 +1,30 @@
+// The completed form of the latest view: completed once for all work that needs it.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "server/data/resident/dataset.hpp"
+#include "server/frame/frame.hpp"
+#include "server/scene/completed_view.hpp"
+
+namespace windsplat::net {
+
+// Thread-safe. Never held locked while a view is completed, which may wait for a file.
+class ViewCompletion {
+ public:
+  // Errors: those of frame::complete().
+  Result<scene::CompletedView> of(const protocol::View& view, data::Dataset& dataset);
+
+ private:
+  struct Latest {
+    protocol::View view;
+    std::weak_ptr<const data::DatasetInfo> info;  // a reopened dataset has another
+    scene::CompletedView completed;
+  };
+  std::mutex mutex_;
+  std::optional<Latest> latest_;
+};
+
+}  // namespace windsplat::net
