@@ -1,4 +1,4 @@
-// Projects bricks, culls them and lists them by tile.
+// Projection and culling of bricks, and their lists by tile.
 #include "server/engine/bins.hpp"
 
 #include <algorithm>
@@ -17,10 +17,10 @@ namespace {
 using kernels::Brick;
 using kernels::Pass;
 
-// The first stop of the brick that holds a stop.
+// Index of the first kernel position of the brick that contains a position.
 int brick_start(int stop) { return stop / kernels::brick_side * kernels::brick_side; }
 
-// Of a curved lattice: from where its stops really are.
+// Curved lattices: the bounding box of the actual kernel positions.
 Box curved_box(const Pass& pass, const Brick& brick) {
   Box box;
   box.low.fill(1e300);
@@ -42,7 +42,7 @@ Box curved_box(const Pass& pass, const Brick& brick) {
   return box;
 }
 
-// The brick's stops stand one after another.
+// Bounding box of the kernel positions of a brick.
 Box stops_box(const PassPlan& plan, const Brick& brick) {
   const Pass& pass = plan.kernel;
   if (pass.places != nullptr) return curved_box(pass, brick);
@@ -59,13 +59,13 @@ Box stops_box(const PassPlan& plan, const Brick& brick) {
   return box;
 }
 
-// How far kernels reach beyond their stops along each world axis.
+// Extent of kernels beyond their positions along each world axis.
 std::array<double, 3> kernel_reach(const Pass& pass, double line_reach, bool splats) {
   std::array<double, 3> reach{};
   for (int a = 0; a < 3; ++a) {
     const double cell = pass.cell_max[a];
     const double moved = 0.5 * (pass.line.jitter_center + pass.line.jitter_stride) * cell;
-    // No line leaves its kernel's box.
+    // Lines are clipped to the boxes of their kernels.
     const double inside = std::min<double>(line_reach, pass.line.half_span * cell);
     const double line = pass.has_lines != 0 && line_reach >= 0 ? inside + moved : 0;
     const double splat = splats ? kernels::footprint_radius * cell : 0;
@@ -74,17 +74,17 @@ std::array<double, 3> kernel_reach(const Pass& pass, double line_reach, bool spl
   return reach;
 }
 
-// Pixels a world unit at a view depth, or the nearest that is drawn.
+// Pixels per world unit at a view depth, clamped to the near plane.
 double scale_at(const kernels::Camera& camera, double depth) {
   if (camera.perspective == 0) return camera.inverse_pixel;
   return camera.inverse_pixel / std::max<double>(depth, camera.near);
 }
 
-// The sum over the picture of the alphas that a brick's weak lines and thin splats would have, at
-// most: a line covers its length times r1 + r2 and two half discs, a splat spreads its extinction
-// times its volume. All are taken at the brick's nearest, where there are `scale` pixels a world
-// unit. Pixels sample what they show: shapes that are no narrower than a pixel, and lines whose
-// ramp is not, add up to at most this many times their area, over all places and turns.
+// Upper bound of the alphas, summed over the picture, of the lines and splats of a brick that are
+// below tolerance: a line covers its length times r1 + r2 and two half discs, a splat its
+// extinction times its volume. All are assumed at the nearest depth of the brick, with `scale`
+// pixels per world unit. The sampling factors bound the ratio of the sum over pixels to the area,
+// over all positions and rotations, for shapes and line ramps no narrower than a pixel.
 double left_out(const RenderPlan& plan, const PassPlan& pass, const KeptSummary& summary,
                 double cover, double scale) {
   constexpr double line_sampling = 1.2;
@@ -93,7 +93,7 @@ double left_out(const RenderPlan& plan, const PassPlan& pass, const KeptSummary&
   const kernels::Camera& camera = plan.camera;
   const kernels::LineStyle& line = pass.kernel.line;
   const double pixels = static_cast<double>(camera.width) * camera.height;
-  double oblique = 1;  // a ray's length at unit depth, at most
+  double oblique = 1;  // longest ray at unit depth
   if (camera.perspective != 0) {
     oblique = std::hypot(1.0, std::hypot(camera.half_width_px, camera.half_height_px) *
                                   static_cast<double>(camera.pixel));
@@ -119,9 +119,9 @@ void set_blocks(const Rectangle& r, const kernels::Camera& camera, Brick& brick)
   brick.block_y_last = block(r.y1, camera.height);
 }
 
-// How many times more of the picture a brick's thin splats may cover, where there are `scale`
-// pixels a world unit, than at a scale of 0: see splat_cover of the kernels, whose largest of three
-// terms this is over the third. Of a brick of uneven cells the widest count.
+// Upper bound of the area that thin splats of a brick cover at `scale` pixels per world unit, as a
+// multiple of that at a scale of 0: the largest of the three terms of splat_cover of the kernels,
+// divided by the third. Uses the widest cells of the brick.
 double splat_cover(const Pass& pass, const Brick& brick, double scale) {
   std::array<double, 3> edge{};
   const auto widest = [&](int a, int first, int count) {
@@ -143,7 +143,7 @@ double splat_cover(const Pass& pass, const Brick& brick, double scale) {
   return std::max({edge[0] * edge[1] * scale * scale, edge[1] * scale, 1.0});
 }
 
-// One frame's way from bricks of the lattice to those that are drawn.
+// Selects the bricks that a frame draws.
 class Binner {
  public:
   Binner(const RenderPlan& plan, const kernels::Table& table, BinSpace& space)
@@ -159,14 +159,14 @@ class Binner {
     order_slabs();
   }
 
-  // Regions of which every brick has the same fate: wholly in sight and blank, or out of sight.
-  // They are counted here and their bricks passed over. Row: of regions along u.
+  // Counts the regions of a row along u whose bricks need no individual test: blank and entirely
+  // visible, or entirely invisible.
   [[nodiscard]] std::size_t rows() const {
     std::size_t sum = 0;
     for (std::size_t p = 0; p < plan_.passes.size(); ++p) sum += rows_of(p);
     return sum;
   }
-  void look_at_row(std::size_t row, BrickCounts& counts);
+  void count_regions(std::size_t row, BrickCounts& counts);
 
   void add_slab(const SlabKey& key, SlabBricks& out);
 
@@ -212,7 +212,7 @@ void Binner::order_slabs() {
       keys.push_back({ahead >= 0 ? 0 : 1, std::abs(ahead), p, s});
     }
   }
-  // No two are alike.
+  // Keys are unique, so the order is deterministic.
   std::sort(keys.begin(), keys.end(), [](const SlabKey& a, const SlabKey& b) {
     if (a.side != b.side) return a.side < b.side;
     if (a.distance != b.distance) return a.distance < b.distance;
@@ -220,7 +220,7 @@ void Binner::order_slabs() {
   });
 }
 
-void Binner::look_at_row(std::size_t row, BrickCounts& counts) {
+void Binner::count_regions(std::size_t row, BrickCounts& counts) {
   std::size_t p = 0;
   for (; row >= rows_of(p); ++p) row -= rows_of(p);
   const PassPlan& pass = plan_.passes[p];
@@ -259,7 +259,7 @@ void Binner::look_at_row(std::size_t row, BrickCounts& counts) {
   }
 }
 
-// A brick as it stands in the lattice.
+// The same brick with indices in lattice order instead of visit order.
 Brick in_lattice(const PassPlan& pass, const Brick& brick) {
   const Pass& kernel = pass.kernel;
   Brick own = brick;
@@ -275,7 +275,7 @@ KeptSummary& summary_at(const PassPlan& pass, PassBins& shared, const Brick& bri
                                                 own.u_first / kernels::brick_side)];
 }
 
-// Half the longest line of a brick, world units; negative if it has none.
+// Half the longest line of a brick in world units; negative if it has none.
 double line_reach(const Pass& pass, const PassBins& shared, const KeptSummary& kept) {
   if (kept.lines == 0) return -1;
   const double part = std::min(1.0F, kept.magnitude_max * pass.line.inverse_full_magnitude);
@@ -286,7 +286,8 @@ std::array<double, 3> reach_of(const Pass& pass, const PassBins& shared, const K
   return kernel_reach(pass, line_reach(pass, shared, kept), kept.splats > 0);
 }
 
-// Read in the lattice's own order, so that sums do not depend on where the first reader stood.
+// Reads in lattice order, so that floating-point sums do not depend on the camera of the first
+// frame.
 void Binner::read_summary(const PassPlan& pass, const PassBins& shared, const Brick& brick,
                           KeptSummary& kept) {
   kept = summarise(table_, shared.pass, in_lattice(pass, brick));
@@ -297,8 +298,8 @@ void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from
   const std::int64_t stops = static_cast<std::int64_t>(brick.u_count) * brick.v_count;
   const Box box = stops_box(pass, brick);
   out.counts.samples += stops;
-  // First by the longest line that the style allows: what is outside is not even read. A brick that
-  // is known is in sight if what it holds is.
+  // A brick without summary is first culled by the longest line that the style allows, before any
+  // sample is read; one with a summary by its actual contents.
   KeptSummary& kept = summary_at(pass, shared, brick);
   const bool known = kept.known() && !kept.left_out_any() && kept.holds_any();
   Projected found;
@@ -379,9 +380,9 @@ void each_tile(const Bins& bins, const TileRange& range, const Visit& visit) {
   }
 }
 
-// Worthless if cancelled.
+// The lists are invalid after cancellation.
 void list_by_tile(const RenderPlan& plan, const CancelToken& cancel, BinSpace& space) {
-  constexpr std::size_t bricks_between_looks = 1024;
+  constexpr std::size_t bricks_between_checks = 1024;
   Bins& bins = space.bins;
   const std::size_t tiles = static_cast<std::size_t>(bins.tiles_x) * bins.tiles_y;
   bins.first.assign(tiles + 1, 0);
@@ -392,7 +393,7 @@ void list_by_tile(const RenderPlan& plan, const CancelToken& cancel, BinSpace& s
   bins.entries.resize(bins.first[tiles]);
   space.next.assign(bins.first.begin(), bins.first.end() - 1);
   for (std::size_t b = 0; b < bins.bricks.size(); ++b) {
-    if (b % bricks_between_looks == 0 && cancel.cancelled()) return;
+    if (b % bricks_between_checks == 0 && cancel.cancelled()) return;
     each_tile(bins, tiles_of(plan, bins.bricks[b]), [&](std::size_t tile) {
       bins.entries[space.next[tile]++] = static_cast<std::uint32_t>(b);
     });
@@ -400,17 +401,17 @@ void list_by_tile(const RenderPlan& plan, const CancelToken& cancel, BinSpace& s
 }
 
 void add_load(const RenderPlan& plan, Bins& bins, const SlabBricks& slab) {
-  constexpr std::int64_t of_a_brick = 8;
+  constexpr std::int64_t brick_overhead = 8;  // in kernels
   for (std::size_t b = 0; b < slab.bricks.size(); ++b) {
     const Brick& brick = slab.bricks[b];
     const TileRange range = tiles_of(plan, brick);
     const std::int64_t tiles = std::int64_t{range.x1 - range.x0 + 1} * (range.y1 - range.y0 + 1);
-    const std::int64_t load = of_a_brick + slab.kernels[b] / tiles;
+    const std::int64_t load = brick_overhead + slab.kernels[b] / tiles;
     each_tile(bins, range, [&](std::size_t tile) { bins.load[tile] += load; });
   }
 }
 
-// Swept by depth: those that begin first come first, the others as they were.
+// Sorts bricks by their first depth; equal depths keep their order.
 void sort_by_depth(BinSpace& space) {
   std::vector<Brick>& bricks = space.bins.bricks;
   space.by_depth.resize(bricks.size());
@@ -421,7 +422,7 @@ void sort_by_depth(BinSpace& space) {
     return a.depth != b.depth ? a.depth < b.depth : a.brick < b.brick;
   });
   space.sorted.clear();
-  for (const auto& place : space.by_depth) space.sorted.push_back(bricks[place.brick]);
+  for (const auto& key : space.by_depth) space.sorted.push_back(bricks[key.brick]);
   bricks.swap(space.sorted);
 }
 
@@ -448,7 +449,7 @@ const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, Threa
   binner.begin();
   space.rows.assign(binner.rows(), BrickCounts());
   pool.run(space.rows.size(), [&](std::size_t row, unsigned) {
-    if (!cancel.cancelled()) binner.look_at_row(row, space.rows[row]);
+    if (!cancel.cancelled()) binner.count_regions(row, space.rows[row]);
   });
   const std::size_t slabs = space.slabs.size();
   if (space.found.size() < slabs) space.found.resize(slabs);
@@ -471,7 +472,7 @@ const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, Threa
   work.skipped_vector += sum.without_line;
   work.skipped_scalar += sum.without_splat;
   work.skipped_both += sum.without_both;
-  // A pixel changes by no more than all of its light.
+  // The alpha of a pixel is at most 1.
   work.skipped_bound =
       std::min(1.0, sum.left_out / (static_cast<double>(plan.camera.width) * plan.camera.height));
   if (plan.slabs || plan.curved) sort_by_depth(space);

@@ -15,7 +15,7 @@ using kernels::Brick;
 using kernels::Prepared;
 using kernels::Tile;
 
-// Of view depth, from the camera's depth origin.
+// View depths from the camera's depth origin.
 struct Interval {
   float front = 0, back = 0;
 };
@@ -80,8 +80,8 @@ class Sweep {
 
   void activate(const CancelToken& cancel) {
     for (; next_ < last_ && brick(next_).depth_first < slab_.back; ++next_) {
-      constexpr std::size_t bricks_between_looks = 64;
-      if (next_ % bricks_between_looks == 0 && cancel.cancelled()) return;
+      constexpr std::size_t bricks_between_checks = 64;
+      if (next_ % bricks_between_checks == 0 && cancel.cancelled()) return;
       const Brick& here = brick(next_);
       if (all_closed(tile_, here)) {
         count_occluded(here);
@@ -107,7 +107,7 @@ class Sweep {
                         space_.active.end());
   }
 
-  // The kernels whose centres lie in the slab, one after the other.
+  // Draws the kernels whose centres lie in the slab, in order of depth.
   void draw_kernels() {
     space_.order.clear();
     for (const DepthEntry& entry : space_.active) {

@@ -1,5 +1,4 @@
-// Part of the kernel body: the cells that stops stand for, from grid strides to the world
-// and back.
+// Part of the kernel body: the cells of kernel positions, with transforms between grid and world.
 #pragma once
 
 #include "server/engine/kernels/body_stops.hpp"
@@ -7,13 +6,13 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// Of a curved lattice's pair of rows: world = sum over axes a of edge[a] * grid[a]; grid[a] =
-// inverse[a] . world. Components of the world come second, lanes last.
+// The cells of a pair of rows of a curved lattice: world = sum over axes a of edge[a] * grid[a];
+// grid[a] = inverse[a] . world. Indices: axis, world component, lane.
 struct Cells {
   alignas(64) float edge[3][3][pair_stops];
   alignas(64) float inverse[3][3][pair_stops];
-  alignas(64) float from_eye[3][pair_stops];  // of the stop, world units
-  std::uint32_t solid;                        // bit clear: the cell spans no volume
+  alignas(64) float from_eye[3][pair_stops];  // kernel position, world units
+  std::uint32_t solid;                        // bit clear: the cell has no volume
 };
 
 inline void cross3(const float a[3], const float b[3], float out[3]) {
@@ -26,9 +25,9 @@ inline float dot3(const float a[3], const float b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-// The edge of a curved cell along axis a: half the way from the sample before to the one after, at
-// an end the way to the one neighbour, times the samples that the stop stands for. False along an
-// axis of one sample.
+// The edge of a curved cell along axis a: half the vector from the previous sample to the next (at
+// an end, the vector to the only neighbour), times the number of samples that the position
+// represents. Returns false for an axis of one sample.
 inline bool edge_between(const Pass& pass, const Rows& rows, int a, int i, float edge[3]) {
   const int dim = pass.dims[a];
   if (dim == 1) return false;
@@ -43,7 +42,7 @@ inline bool edge_between(const Pass& pass, const Rows& rows, int a, int i, float
   return true;
 }
 
-// Along an axis of one sample a cell stands at right angles to its other two edges.
+// Along an axis of one sample the edge is perpendicular to the other two.
 inline void raise_edge(const float unbent, int a, float edge[3][3]) {
   float across[3];
   cross3(edge[(a + 1) % 3], edge[(a + 2) % 3], across);
@@ -52,7 +51,7 @@ inline void raise_edge(const float unbent, int a, float edge[3][3]) {
   for (int c = 0; c < 3; ++c) edge[a][c] = across[c] * (unbent / area);
 }
 
-// Where neighbours meet (at a pole) a cell spans no volume, and its stop shows nothing.
+// Where neighbours coincide (at a pole) the cell has no volume, and its kernel is not drawn.
 inline void fill_curved_cell(const Pass& pass, const Rows& rows, int i, Cells& cells) {
   constexpr float flattest = 1e-6F;
   float edge[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
@@ -93,7 +92,8 @@ void fill_cells(const Camera& camera, const Pass& pass, const Rows& rows, Cells&
   }
 }
 
-// The cells of a vector of stops. A rectilinear lattice has edges along the world's axes alone.
+// The cells of a vector of kernel positions. On a rectilinear lattice all edges are parallel to the
+// world axes.
 template <bool Curved>
 struct CellLanes;
 
@@ -119,7 +119,7 @@ struct CellLanes<false> {
     return {inverse.x * all<Stop>(world[0]), inverse.y * all<Stop>(world[1]),
             inverse.z * all<Stop>(world[2])};
   }
-  // The edge along axis a, seen along a direction.
+  // Component of the edge along axis a in a world direction.
   KERNEL_INLINE Stop edge_along(int a, const float direction[3]) const {
     const Stop& width = a == 0 ? edge.x : a == 1 ? edge.y : edge.z;
     return width * all<Stop>(direction[a]);
@@ -168,8 +168,8 @@ struct CellLanes<true> {
   }
 };
 
-// Directions along a curved cell's own east, north and up become the world's, of the same length:
-// of a slice's, what lies in its plane.
+// Transforms directions along the edges of a curved cell to the world, keeping their lengths. For a
+// slice, only the part in its plane.
 KERNEL_INLINE Three<Stop> bent_direction(const LineStyle& line, const CellLanes<true>& cells,
                                          const Three<Stop>& direction) {
   const Stop kept[3] = {direction.x * all<Stop>(line.keep[0]),

@@ -1,4 +1,4 @@
-// Part of the kernel body: one line, one splat or both composited into one block of pixels.
+// Part of the kernel body: composites a line, a splat or both into one block of pixels.
 #pragma once
 
 #include "server/engine/kernels/body_math.hpp"
@@ -7,29 +7,29 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// scene::Compositing and scene::LineColor are told by their numbers.
+// The values of scene::Compositing, whose header is not included here.
 constexpr int compositing_simple = 0;
 constexpr int compositing_cd_naive = 1;
 constexpr int compositing_cd = 2;
 constexpr int compositing_analytic = 3;
 constexpr int compositing_cd_euler = 4;
 
-// How a line looks along itself: of one colour, with a head, with a head and a moving texture.
+// Style of a line: uniform colour, with a head, or with a head and a moving texture.
 constexpr int style_plain = 0;
 constexpr int style_head = 1;
 constexpr int style_moving = 2;
 
-// Pixel centres of a block, from its corner.
+// Pixel centres of a block, relative to its corner.
 alignas(64) constexpr float lane_x[block_pixels] = {0.5F, 1.5F, 2.5F, 3.5F, 0.5F, 1.5F, 2.5F, 3.5F,
                                                     0.5F, 1.5F, 2.5F, 3.5F, 0.5F, 1.5F, 2.5F, 3.5F};
 alignas(64) constexpr float lane_y[block_pixels] = {0.5F, 0.5F, 0.5F, 0.5F, 1.5F, 1.5F, 1.5F, 1.5F,
                                                     2.5F, 2.5F, 2.5F, 2.5F, 3.5F, 3.5F, 3.5F, 3.5F};
 
-// A line's constants, each in every lane.
+// Constants of a line, broadcast to all lanes.
 struct RibbonLanes {
   Pixel x, y, ux, uy;
   Pixel wx, wy, w0;   // w = wx dx + wy dy + w0
-  Pixel ratio, bend;  // depth ratio, and that minus 1
+  Pixel ratio, bend;  // depth ratio, and depth ratio - 1
   Pixel tail[3], rise[3];
   Pixel phase, phase_rise;
   Pixel reach, steep, opacity;  // the ramp: clamp(reach - steep distance, 0, opacity)
@@ -55,7 +55,7 @@ KERNEL_INLINE RibbonLanes spread(const Ribbon& r) {
           lanes(r.opacity)};
 }
 
-// The same from a brick's arrays.
+// The same from the arrays of a brick.
 KERNEL_INLINE RibbonLanes spread(const LineStyle& line, const Ribbons& r, int l) {
   const auto lanes = [&](const float* v) { return all<Pixel>(v[l]); };
   const auto one = [](float v) { return all<Pixel>(v); };
@@ -91,8 +91,8 @@ struct RibbonLane {
   Pixel f;
 };
 
-// How f follows from w, the place along the line on the screen: 1/z is linear there. The series is
-// good to bend^2 / 6.
+// How f is computed from w, the position along the line on the screen, where 1/z is linear. The
+// error of the series is below bend^2 / 6.
 enum class Depth { flat, series, exact };
 constexpr float series_bend_max = 4e-3F;
 
@@ -106,7 +106,7 @@ KERNEL_INLINE Pixel along_ribbon(const RibbonLanes& r, Pixel w) {
   return w;
 }
 
-// dx, dy: pixels from the line's f = 0.
+// dx, dy: pixels from the point f = 0 of the line.
 template <Depth Along, int Style>
 KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
   const Pixel zero = hn::Zero(PixelTag());
@@ -127,7 +127,7 @@ KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
   return {cover, f};
 }
 
-// A splat's constants, each in every lane.
+// Constants of a splat, broadcast to all lanes.
 struct SplatLanes {
   Pixel x, y, ex, ey, xx, xy, yy;
   Pixel b0, bx, by, d0, dx, dy, dxx, dxy, dyy, d2_least;
@@ -147,17 +147,17 @@ KERNEL_INLINE SplatLanes spread(const Splat& s) {
       lanes(s.near), lanes(s.strength), {lanes(s.color[0]), lanes(s.color[1]), lanes(s.color[2])}};
 }
 
-// Where a pixel's ray passes a splat, see Splats.
+// A splat along the rays of pixels; see Splats.
 struct SplatLane {
   Pixel r2;      // squared distance from the centre, cells
   Pixel tau;     // optical depth of the whole splat
   Pixel cells;   // per unit of view depth along the ray
-  Pixel behind;  // how far beyond the centre's view depth the ray is closest to it
+  Pixel behind;  // view depth of the point closest to the centre minus that of the centre
 };
 
-// From: the rays' beginning. `eye`: far before the splat. `eye_inside`: the same, and the splat's
-// centre lies in the picture, so that (ex, ey) is (x, y). `near_plane`: the splat reaches it, and
-// the part of it that lies before counts no more, as if the splat were even over one cell.
+// Start of the rays. `eye`: the splat lies beyond the near plane. `eye_inside`: the same, and its
+// centre lies in the picture, so that (ex, ey) is (x, y). `near_plane`: the splat reaches the near
+// plane; the part before it is removed as if the splat were homogeneous over one cell.
 enum class From { eye, eye_inside, near_plane };
 
 template <bool Perspective, From Start>
@@ -165,7 +165,7 @@ KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixe
   const Pixel zero = hn::Zero(PixelTag());
   const Pixel dx = px - s.x;
   const Pixel dy = py - s.y;
-  // The quadratic form is never negative; its rounded sum may be.
+  // The quadratic form is non-negative, but its rounded sum may be negative.
   const Pixel slope = hn::MulAdd(s.xx, dx, s.xy * dy);
   const Pixel top = hn::Max(hn::MulAdd(slope, dx, s.yy * dy * dy), zero);
   if constexpr (Perspective) {
@@ -212,12 +212,12 @@ KERNEL_INLINE void add_product(float* channel, Pixel a, Pixel b) {
   store(hn::MulAdd(a, b, load<Pixel>(channel)), channel);
 }
 
-// Whether a block's pixels let more than `stop` through: found out by whoever changes them.
+// Largest transmittance of the pixels of a block, collected while they are written.
 struct Light {
   Pixel most = hn::Zero(PixelTag());
 
   KERNEL_INLINE void see(Pixel transmittance) { see_positive(hn::Abs(transmittance)); }
-  // What no rule but forward Euler's makes negative.
+  // For all compositing methods but forward Euler.
   KERNEL_INLINE void see_positive(Pixel transmittance) {
     most = pixel_lanes == block_pixels ? transmittance : hn::Max(most, transmittance);
   }
@@ -226,8 +226,8 @@ struct Light {
   }
 };
 
-// Forward Euler takes the optical depth itself for the absorbed part: stable below 1 alone. Bounded
-// so that a picture that diverges stays a number.
+// Forward Euler uses the optical depth as the absorbed fraction, which is stable only below 1.
+// Clamped so that a diverging picture remains finite.
 KERNEL_INLINE Attenuation<Pixel> euler_attenuation(Pixel tau) {
   const Pixel bounded = hn::Min(tau, all<Pixel>(1e6F));
   return {bounded, all<Pixel>(1.0F) - bounded};
@@ -254,11 +254,11 @@ KERNEL_INLINE void see_light(Pixel transmittance, Light& light) {
   }
 }
 
-// What is left of a line's light in front of which the part `place` of the medium lies.
+// Transmittance of the medium in front of a line at relative position `place` in the cell.
 template <int Compositing>
 KERNEL_INLINE Pixel light_before(const Attenuation<Pixel>& medium, Pixel tau, Pixel place) {
   if (Compositing == compositing_simple) return medium.transmitted;
-  // tau is finite (the plan bounds extinctions), so that 0 times it is 0.
+  // tau is finite (the plan bounds extinctions), so that 0 * tau is 0.
   if (Compositing == compositing_analytic) return attenuation(tau * place).transmitted;
   return hn::NegMulAdd(place, medium.absorbed, all<Pixel>(1.0F));
 }
@@ -279,7 +279,7 @@ inline float top_of(const Tile& tile, int row) {
   return static_cast<float>(tile.y + row * block_side);
 }
 
-// A block that lets nothing through any more is closed for all that lies behind.
+// Closes an opaque block for everything behind it.
 inline void mark_closed(int row, std::uint32_t bit, Tile& tile) {
   tile.open[row] &= ~bit;
   tile.any_closed = 1;
@@ -295,7 +295,7 @@ struct Window {
   std::uint64_t blocks;
 };
 
-// Which of a window's blocks are open.
+// The open blocks of a window.
 inline std::uint64_t open_window(const Tile& tile, int row, int column) {
   std::uint64_t open = 0;
   for (int k = 0; k < window_side && row + k < tile_blocks; ++k) {
@@ -305,7 +305,7 @@ inline std::uint64_t open_window(const Tile& tile, int row, int column) {
   return open;
 }
 
-// Composites into each of a window's blocks what add(left, top, ray, block) does.
+// Calls add(left, top, ray, block) for each block of a window; add returns its Light.
 template <bool Perspective, class Add>
 KERNEL_INLINE void each_block(const Window& window, Tile& tile, const Add& add) {
   for (std::uint64_t blocks = window.blocks; blocks != 0; blocks &= blocks - 1U) {
@@ -367,8 +367,8 @@ KERNEL_INLINE Light splat_block(const SplatLanes& s, float x, float y,
   return light;
 }
 
-// The paper's first form: front part, line and back part one over the other, where the ray meets
-// the line at all.
+// The first form of [CM92]: the front part of the medium, the line and the back part composited one
+// over the other where the ray meets the line.
 KERNEL_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const RibbonLane& line,
                                 const Attenuation<Pixel>& medium, Pixel place, const Channels& to,
                                 int l) {
@@ -387,8 +387,9 @@ KERNEL_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const
   return t * (rest * (one - back));
 }
 
-// A line inside its homogeneous cell, at x = tf / tau of the way through it:
-// A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tf) (c_v - c_s).
+// A line in a homogeneous cell of optical depth tau, with optical depth tau_f in front of it
+// (x = tau_f / tau is its relative position):
+// A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tau_f) (c_v - c_s).
 template <bool Perspective, int Compositing, int Style, From Start>
 KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_rise,
                                const SplatLanes& s, float x, float y, const float* HWY_RESTRICT ray,
@@ -460,13 +461,13 @@ using BothFunction = void (*)(const Ribbon& r, const Splat& s, const Window& win
 
 constexpr int from_count = 3;
 
-// The functions that a pass composites kernels with a splat with, chosen once a brick. Splats by
-// where their rays begin.
+// The functions that composite the kernels of a pass, selected once per brick; those with a splat
+// by the start of the rays.
 struct Compositor {
   LineFunction line;
   SplatFunction splat[from_count];
   BothFunction both[from_count];
-  int splat_exponentials;  // a pixel
+  int splat_exponentials;  // per pixel
   int both_exponentials;
 };
 
@@ -491,7 +492,7 @@ inline Compositor compositor_with() {
           Compositing == compositing_analytic ? 2 : splat};
 }
 
-// A plain line is one whose head is like its tail.
+// A plain line is drawn as one whose head equals its tail.
 template <bool Perspective, int Compositing>
 inline Compositor compositor_with(int style) {
   return style == style_moving ? compositor_with<Perspective, Compositing, style_moving>()

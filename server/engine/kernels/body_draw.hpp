@@ -1,5 +1,5 @@
-// Part of the kernel body: a brick's prepared lines and splats composited into a tile's blocks,
-// front to back.
+// Part of the kernel body: composites the prepared lines and splats of a brick into the blocks of a
+// tile, front to back.
 #pragma once
 
 #include "server/engine/kernels/body_composite.hpp"
@@ -64,7 +64,7 @@ inline Splat splat_at(const Prepared& p, int l) {
   return out;
 }
 
-// Pixels from a window's corner to each of its blocks.
+// Offsets of the blocks of a window from its corner, in pixels.
 struct WindowOffsets {
   float x[window_side * window_side];
   float y[window_side * window_side];
@@ -83,12 +83,12 @@ constexpr WindowOffsets window_offsets() {
 
 constexpr WindowOffsets offsets_in_window = window_offsets();
 
-// The two halves of a window's blocks, as Footing has them.
+// Joins the two halves of a window as stored in Footing.
 inline std::uint64_t joined(std::uint32_t high, std::uint32_t low) {
   return static_cast<std::uint64_t>(high) << 32U | low;
 }
 
-// Composites one line into its blocks; how many.
+// Composites one line into its blocks. Returns their number.
 template <Depth Along, int Style>
 KERNEL_INLINE int draw_windowed(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
   const int row = f.line_first[l];
@@ -115,7 +115,7 @@ KERNEL_INLINE int draw_windowed(const RibbonLanes& lanes, const Footing& f, int 
   return blocks;
 }
 
-// The same for one that reaches farther than a window does.
+// The same for a line larger than a window.
 template <Depth Along, int Style>
 int draw_ribbon(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
   int blocks = 0;
@@ -162,7 +162,7 @@ void draw_styled(const Prepared& p, int style, int l, Tile& tile) {
   }
 }
 
-// Where the rays that meet a kernel's splat begin.
+// Start of the rays through a splat.
 template <bool Perspective>
 inline From from_of(const Prepared& p, int l) {
   if (!Perspective) return From::eye;
@@ -194,14 +194,14 @@ inline bool within_window(const Box& box) {
   return box.row_last - box.row < window_side && box.column_last - box.column < window_side;
 }
 
-// A window's blocks as another window's, whose corner is not right of or below its own and which
-// holds them all.
+// Converts the blocks of a window to another window that contains them all; its corner must not lie
+// right of or below the first.
 inline std::uint64_t moved(std::uint64_t blocks, const Box& from, const Window& to) {
   return blocks << static_cast<unsigned>(window_side * (from.row - to.row) + from.column -
                                          to.column);
 }
 
-// The blocks of a window that row_of(row) has set, for what reaches beyond one.
+// The blocks of a window that are set in row_of(row), for outlines larger than a window.
 template <class RowOf>
 inline std::uint64_t in_window(const Box& box, const Window& window, const RowOf& row_of) {
   std::uint64_t blocks = 0;
@@ -214,7 +214,7 @@ inline std::uint64_t in_window(const Box& box, const Window& window, const RowOf
   return blocks;
 }
 
-// A kernel that has a splat, and perhaps a line.
+// A kernel with a splat and optionally a line.
 struct KernelDrawing {
   const Compositor& with;
   Tile& tile;
@@ -222,7 +222,7 @@ struct KernelDrawing {
   Ribbon ribbon;
   int from;
 
-  // `lines` and `splats`: the window's blocks that each may touch.
+  // `lines`, `splats`: blocks of the window that the line and the splat may touch.
   KERNEL_INLINE void draw(int row, int column, std::uint64_t lines, std::uint64_t splats) const {
     if (tile.any_closed != 0) {
       const std::uint64_t open = open_window(tile, row, column);
@@ -284,26 +284,26 @@ KERNEL_INLINE void draw_stop(const Prepared& p, const Compositor& with, int styl
   }
 }
 
-// For each set of a row's stops: their places, one a byte, ascending.
-struct RowPlaces {
+// For each subset of a row: the indices of its members, one per byte, ascending.
+struct RowIndices {
   std::uint64_t of[256];
 };
 
-constexpr RowPlaces make_row_places() {
-  RowPlaces places = {};
+constexpr RowIndices make_row_indices() {
+  RowIndices indices = {};
   for (unsigned bits = 0; bits < 256; ++bits) {
     unsigned n = 0;
     for (unsigned i = 0; i < brick_side; ++i) {
-      if ((bits >> i & 1U) != 0) places.of[bits] |= std::uint64_t{i} << (8 * n++);
+      if ((bits >> i & 1U) != 0) indices.of[bits] |= std::uint64_t{i} << (8 * n++);
     }
   }
-  return places;
+  return indices;
 }
 
-constexpr RowPlaces row_places = make_row_places();
+constexpr RowIndices row_indices = make_row_indices();
 
-// A brick's stops in visibility order: rows outward from the eye's, stops outward in each; how
-// many. `order` has room for brick_side more.
+// Lists the kernel positions of a brick in visibility order: rows outward from the eye, positions
+// outward in each. Returns their number. `order` must have room for brick_side more.
 inline int order_stops(const Brick& brick, const Pass& pass, std::uint64_t kept,
                        std::uint8_t* order) {
   const int* us = pass.axis[pass.u].visit + brick.u_first;
@@ -316,9 +316,9 @@ inline int order_stops(const Brick& brick, const Pass& pass, std::uint64_t kept,
     const std::uint32_t bits = row_at(kept, vs[j] - v_low);
     const int row = brick_side * (vs[j] - v_low);
     if (ascending) {
-      const std::uint64_t places =
-          row_places.of[bits] + static_cast<std::uint64_t>(row) * 0x0101010101010101U;
-      __builtin_memcpy(order + n, &places, sizeof places);
+      const std::uint64_t indices =
+          row_indices.of[bits] + static_cast<std::uint64_t>(row) * 0x0101010101010101U;
+      __builtin_memcpy(order + n, &indices, sizeof indices);
       n += __builtin_popcount(bits);
       continue;
     }
@@ -341,7 +341,7 @@ void draw_in_order(const Brick& brick, const Prepared& p, Tile& tile) {
   for (int i = 0; i < count; ++i) draw_stop<Perspective>(p, with, style, order[i], tile);
 }
 
-// A row's samples lie on one cache line or two.
+// The samples of a row occupy one or two cache lines.
 inline void prefetch_row(const float* from, std::int64_t length) {
   const float* last = from + length - 1;
   __builtin_prefetch(from);
@@ -352,8 +352,8 @@ inline void prefetch_row(const float* from, std::int64_t length) {
   }
 }
 
-// Brings a brick's samples closer while the one before it is drawn: rows of a brick are far apart
-// in memory, which no processor guesses.
+// Prefetches the samples of a brick while the one before it is drawn: its rows are far apart in
+// memory, so that hardware prefetching does not help.
 void prefetch_brick(const Pass& pass, const Brick& brick) {
   const Axis& u = pass.axis[pass.u];
   const Axis& v = pass.axis[pass.v];
@@ -393,7 +393,7 @@ void draw(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile
   }
 }
 
-// Lengths of pixels' rays at unit depth.
+// Lengths of the rays of pixels at unit depth.
 void fill_rays(const Camera& camera, const Tile& tile, float* rays) {
   const Pixel pixel = all<Pixel>(camera.pixel);
   const Pixel one = all<Pixel>(1.0F);
@@ -411,8 +411,8 @@ void fill_rays(const Camera& camera, const Tile& tile, float* rays) {
   }
 }
 
-// Whatever is not let through is absorbed. Forward Euler may let less than nothing through: what
-// has diverged is to be seen.
+// alpha = 1 - transmittance. With forward Euler the transmittance may be negative; divergence is
+// shown, not clamped.
 void copy_row(const Tile& tile, int y, float* rgba) {
   const hn::CappedTag<float, block_side> tag;
   constexpr int lanes = static_cast<int>(hn::MaxLanes(tag));

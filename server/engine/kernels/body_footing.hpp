@@ -1,4 +1,4 @@
-// Part of the kernel body: the blocks of a tile that a row's lines and splats may touch.
+// Part of the kernel body: the blocks of a tile that lines and splats may touch.
 #pragma once
 
 #include "server/engine/kernels/body_lines.hpp"
@@ -7,7 +7,7 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// What lies right of the widest tile begins at a block that no word has a bit for.
+// Clamps the first column: for outlines right of the tile it exceeds the bits of a word.
 KERNEL_INLINE UnsignedOf<Stop> shift_of(StopInteger first) {
   const auto most = hn::Set(StopIntegers(), tile_blocks - 1);
   return hn::BitCast(hn::RebindToUnsigned<StopTag>(), hn::Min(first, most));
@@ -25,14 +25,14 @@ KERNEL_INLINE UnsignedOf<Stop> range_masks(const Ranges& range) {
   return hn::IfThenZeroElse(hn::RebindMask(tag, none), bits);
 }
 
-// The largest of the lanes that are among `bits`, at least 0.
+// The largest of the lanes selected by `bits`, at least 0.
 KERNEL_INLINE int most_of(StopInteger value, std::uint32_t bits) {
   const auto among = hn::RebindMask(StopIntegers(), mask_of<Stop>(bits));
   return hn::GetLane(hn::MaxOfLanes(
       StopIntegers(), hn::Max(hn::IfThenElseZero(among, value), hn::Zero(StopIntegers()))));
 }
 
-// A row's lines from lane 0 of l on, as segments from the tile's corner.
+// The lines of a vector of kernel positions as segments relative to the corner of the tile.
 struct LineSpans {
   Stop x, y, ux, uy;
   Ranges rows, columns;
@@ -55,8 +55,8 @@ KERNEL_INLINE LineSpans line_spans(const LineStyle& line, const Ribbons& r, cons
   return s;
 }
 
-// The rows of blocks that a row's lines may touch; which of `bits` touch any. `most` becomes the
-// largest number of rows, beyond the first, of a line so far.
+// Computes the rows of blocks that lines may touch. Returns which of `bits` touch any. `most` is
+// updated to the largest number of rows after the first of any line.
 KERNEL_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons& r,
                                            const Tile& tile, int l, std::uint32_t bits,
                                            StopInteger& most, Footing& f) {
@@ -75,14 +75,14 @@ KERNEL_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons&
   store(s.columns.last, f.line_column_last + l);
   const std::uint32_t touching = bits & ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
   if (touching == 0) return 0;
-  // Lanes that are no lines may hold NaN, of which comparisons and clamping make anything.
+  // Lanes without a line may hold NaN, so their comparisons are meaningless.
   const auto among = hn::RebindMask(StopIntegers(), mask_of<Stop>(touching));
   most = hn::Max(most, hn::IfThenElseZero(among, tall));
   return touching;
 }
 
-// The columns of blocks that a row's lines may touch in each of their rows, up to `most` beyond the
-// first: of the part of the segment within r2 of the row's pixel centres, widened by r2.
+// Computes the columns of blocks that lines may touch in each of their rows, up to `most` after the
+// first: those of the part of the segment within r2 of the pixel centres of the row, widened by r2.
 KERNEL_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, const Tile& tile,
                                      int l, int most, Footing& f) {
   const LineSpans s = line_spans(line, r, tile, l);
@@ -90,7 +90,7 @@ KERNEL_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, co
   const Stop radius = all<Stop>(line.r2);
   const Stop zero = hn::Zero(StopTag());
   const Stop one = all<Stop>(1.0F);
-  // A level line's whole length counts in every row.
+  // A horizontal line uses its whole length in every row.
   const auto level = hn::Le(hn::Abs(s.uy), all<Stop>(1e-3F));
   const Stop inverse = inverse_of(hn::IfThenElse(level, one, s.uy));
   const Stop widen = hn::IfThenElseZero(level, all<Stop>(1e6F));
@@ -112,7 +112,7 @@ KERNEL_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, co
     const auto here =
         range_masks(blocks_between(hn::Min(xa, xb) - radius, hn::Max(xa, xb) + radius, columns));
     hn::Store(here, masks, f.line_columns[k] + l);
-    // Lines that end before row k may have bits here.
+    // Discard the bits of lines that end before row k.
     const auto ends = hn::Gt(hn::Set(StopIntegers(), k), tall);
     const auto shifted = hn::IfThenZeroElse(hn::RebindMask(masks, ends), hn::Shr(here, column));
     if (k < window_side / 2) {
@@ -125,7 +125,7 @@ KERNEL_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, co
   hn::Store(high, masks, f.window_high + l);
 }
 
-// What of an oval lies between two heights below its middle, as distances right of it. Its
+// Horizontal extent of an ellipse between two heights below its centre, relative to the centre. Its
 // rightmost and leftmost points are at heights `turn` and -turn.
 KERNEL_INLINE Extent oval_between(const Oval& o, Stop top, Stop bottom) {
   const Stop turn = o.shear * o.half_width;
@@ -139,7 +139,7 @@ KERNEL_INLINE Extent oval_between(const Oval& o, Stop top, Stop bottom) {
           chord(clamped(turn, top, bottom), one)};
 }
 
-// Of each row of blocks of a splat's box: the columns that its oval meets.
+// Computes the columns that the ellipse of a splat touches in each row of its box of blocks.
 KERNEL_INLINE void find_splat_columns(const Outline& outline, const Ranges& across,
                                       const Ranges& down, const Tile& tile, int l, int most,
                                       Footing& f) {
@@ -171,7 +171,7 @@ KERNEL_INLINE void find_splat_columns(const Outline& outline, const Ranges& acro
   hn::Store(high, masks, f.splat_high + l);
 }
 
-// The blocks that a row's splats may touch; which of `bits` touch any.
+// Computes the blocks that splats may touch. Returns which of `bits` touch any.
 KERNEL_INLINE std::uint32_t find_splat_blocks(const Outline& outline, const Tile& tile, int l,
                                               std::uint32_t bits, Footing& f) {
   const Stop left = all<Stop>(static_cast<float>(tile.x));

@@ -1,4 +1,4 @@
-// Part of the kernel body: oriented lines, from winds to ribbons on the screen.
+// Part of the kernel body: oriented lines, from vectors to ribbons on the screen.
 #pragma once
 
 #include "server/engine/kernels/body_cells.hpp"
@@ -6,13 +6,12 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// Where lines begin and end before they are projected. q runs from -1/2 at the tail to 1/2 at the
-// head; what is drawn lies in [low, high].
+// Lines before projection. q runs from -1/2 at the tail to 1/2 at the head; [low, high] is drawn.
 struct Segments {
-  Three<Stop> offset;  // of the line's centre from the stop, world units
+  Three<Stop> offset;  // of the centre of the line from the kernel position, world units
   Three<Stop> extent;  // tail to head, world units
   Stop low, high;
-  Stop lift;   // of the line's centre from the stop along z, cells
+  Stop lift;   // of the centre of the line from the kernel position along z, cells
   Stop phase;  // of the texture's motion
 };
 
@@ -33,7 +32,7 @@ KERNEL_INLINE void clip_to_box(float half_span, const Three<Stop>& in_box, const
   };
   const Stop most = hn::Max(hn::Max(reach(in_box.x, along.x), reach(in_box.y, along.y)),
                             reach(in_box.z, along.z));
-  // Asked lane by lane: what a line is does not hang on its neighbours.
+  // Selected per lane, so that a line does not depend on its neighbours.
   const auto inside = hn::Le(most, half);
   if (hn::AllTrue(StopTag(), inside)) return;
   const auto clip = [&](Stop at, Stop way) {
@@ -48,25 +47,25 @@ KERNEL_INLINE void clip_to_box(float half_span, const Three<Stop>& in_box, const
   clip(in_box.z, along.z);
 }
 
-// The drawn vector, in the world; a slice keeps what lies in its plane.
+// The drawn vector in world units; for a slice, its part in the plane.
 template <bool Curved>
 KERNEL_INLINE Three<Stop> extent_of(const LineStyle& line, const CellLanes<Curved>& cells,
-                                    const Winds& winds) {
-  const Stop part = clamped(winds.magnitude * all<Stop>(line.inverse_full_magnitude), 0.0F, 1.0F);
+                                    const Vectors& vectors) {
+  const Stop part = clamped(vectors.magnitude * all<Stop>(line.inverse_full_magnitude), 0.0F, 1.0F);
   const Stop length = all<Stop>(line.length) * part;
   if constexpr (Curved) {
-    const Three<Stop> bent = bent_direction(line, cells, winds.direction);
+    const Three<Stop> bent = bent_direction(line, cells, vectors.direction);
     return {bent.x * length, bent.y * length, bent.z * length};
   } else {
-    return {winds.direction.x * length * all<Stop>(line.keep[0]),
-            winds.direction.y * length * all<Stop>(line.keep[1]),
-            winds.direction.z * length * all<Stop>(line.keep[2])};
+    return {vectors.direction.x * length * all<Stop>(line.keep[0]),
+            vectors.direction.y * length * all<Stop>(line.keep[1]),
+            vectors.direction.z * length * all<Stop>(line.keep[2])};
   }
 }
 
 template <bool Curved>
 KERNEL_INLINE Segments place_segments(const LineStyle& line, const Rows& rows,
-                                      const CellLanes<Curved>& cells, const Winds& winds,
+                                      const CellLanes<Curved>& cells, const Vectors& vectors,
                                       const Hash3<std::uint32_t>& key, int i) {
   const Hash3<UnsignedOf<Stop>> kernel = pcg3d(
       Hash3<UnsignedOf<Stop>>{hashed_sample(rows, 0, i, key.x), hashed_sample(rows, 1, i, key.y),
@@ -83,7 +82,7 @@ KERNEL_INLINE Segments place_segments(const LineStyle& line, const Rows& rows,
                              hn::MulAdd(by_stride, centred(kernel.z), in_box.z)};
   Segments s;
   s.offset = cells.to_world(moved);
-  s.extent = extent_of(line, cells, winds);
+  s.extent = extent_of(line, cells, vectors);
   s.lift = moved.z;
   s.phase = hn::Zero(StopTag());
   if (line.moving != 0) s.phase = unit_interval<Stop>(pcg3d(centre).x);
@@ -91,10 +90,10 @@ KERNEL_INLINE Segments place_segments(const LineStyle& line, const Rows& rows,
   return s;
 }
 
-// On the screen; which lanes have a line there.
+// Projects lines to the screen. Returns the lanes with a visible line.
 template <bool Perspective>
 KERNEL_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyle& line,
-                                            const Stops& stops, int l, const Winds& winds,
+                                            const Stops& stops, int l, const Vectors& vectors,
                                             Segments& s, Ribbons& r) {
   const Stop vx = dot3(camera.right, s.extent);
   const Stop vy = dot3(camera.down, s.extent);
@@ -106,21 +105,21 @@ KERNEL_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyl
   const Stop near = all<Stop>(camera.near);
   const Stop one = all<Stop>(1.0F);
   const Stop half_way = all<Stop>(0.5F) * hn::Abs(vz);
-  // Negative if there is no line, nothing of it in its box, or nothing beyond the near plane.
-  Stop shown = hn::Min(winds.magnitude, s.high - s.low);
+  // Negative without a line, or if no part lies in the kernel box or beyond the near plane.
+  Stop shown = hn::Min(vectors.magnitude, s.high - s.low);
   Stop z0 = one;
   Stop z1 = one;
   if (Perspective) {
     const auto beyond = hn::Ge(pz - half_way, near);
     if (!hn::AllTrue(StopTag(), beyond)) {
-      // The near plane takes off the end that is nearer to the eye.
+      // The near plane clips the end nearer to the eye.
       const Stop q_near = (near - pz) / divisor(vz);
       const Stop zero = hn::Zero(StopTag());
       const auto tail_off = hn::AndNot(beyond, hn::Gt(vz, zero));
       const auto head_off = hn::AndNot(beyond, hn::Lt(vz, zero));
       s.low = hn::Max(s.low, hn::IfThenElse(tail_off, q_near, all<Stop>(-0.5F)));
       s.high = hn::Min(s.high, hn::IfThenElse(head_off, q_near, all<Stop>(0.5F)));
-      shown = hn::Min(winds.magnitude, s.high - s.low);
+      shown = hn::Min(vectors.magnitude, s.high - s.low);
       shown = hn::Min(shown, pz + half_way - near);
     }
     z0 = hn::Max(hn::MulAdd(s.low, vz, pz), near);
@@ -133,8 +132,8 @@ KERNEL_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyl
   const Stop ay = hn::MulAdd(s.low, vy, py);
   const Stop x0 = ax * k0;
   const Stop y0 = ay * k0;
-  // b / z1 - a / z0 with b = a + l v and z1 = z0 + l v_z is l (v z0 - a v_z) / (z0 z1): what is
-  // left of a line seen end-on has the digits that it has in the world, not those of two pixels.
+  // b / z1 - a / z0 with b = a + l v and z1 = z0 + l v_z is l (v z0 - a v_z) / (z0 z1): avoids the
+  // cancellation of pixel coordinates for lines seen end-on.
   const Stop part = (s.high - s.low) * k0;
   const Stop ux = Perspective ? hn::MulSub(vx, z0, ax * vz) * (part * inverse_z1) : vx * part;
   const Stop uy = Perspective ? hn::MulSub(vy, z0, ay * vz) * (part * inverse_z1) : vy * part;
@@ -156,11 +155,11 @@ KERNEL_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyl
   return hn::Ge(shown, hn::Zero(StopTag()));
 }
 
-// Where along its texture each line begins: a line at full magnitude runs through motion_cycles.
-void phase_ribbons(const LineStyle& line, const Winds& winds, const Segments& s, int l,
+// Phase of the texture of each line; at full magnitude it advances by motion_cycles.
+void phase_ribbons(const LineStyle& line, const Vectors& vectors, const Segments& s, int l,
                    Ribbons& r) {
   alignas(64) float magnitude[pair_stops], phase[pair_stops], low[pair_stops], high[pair_stops];
-  store(winds.magnitude, magnitude);
+  store(vectors.magnitude, magnitude);
   store(s.phase, phase);
   store(s.low, low);
   store(s.high, high);
@@ -189,15 +188,16 @@ KERNEL_INLINE Stop bearing(Stop x, Stop y) {
   p = hn::MulAdd(p, t2, all<Stop>(0.99997726F));
   const Stop zero = hn::Zero(StopTag());
   const Stop from_axis = p * t * all<Stop>(57.29577951F);  // 0 .. 45 degrees
-  // From north towards east.
+  // Clockwise from north.
   const Stop first = hn::IfThenElse(hn::Gt(ax, ay), all<Stop>(90.0F) - from_axis, from_axis);
   const Stop half = hn::IfThenElse(hn::Lt(y, zero), all<Stop>(180.0F) - first, first);
   const Stop whole = hn::IfThenElse(hn::Lt(x, zero), all<Stop>(360.0F) - half, half);
   return hn::IfThenElse(hn::Lt(whole, all<Stop>(360.0F)), whole, zero);
 }
 
-// What the colour tells. Height is that of the unbent lattice on a curved one.
-KERNEL_INLINE Stop color_value(const LineStyle& line, const Rows& rows, const Winds& winds,
+// The quantity that determines the colour. On a curved lattice, heights are those of the uncurved
+// one.
+KERNEL_INLINE Stop color_value(const LineStyle& line, const Rows& rows, const Vectors& vectors,
                                const Segments& s, Stop view_distance, int i) {
   const Stop z = hn::MulAdd(s.lift, load<Stop>(rows.cell[2] + i), load<Stop>(rows.height + i));
   switch (line.color_by) {
@@ -208,14 +208,14 @@ KERNEL_INLINE Stop color_value(const LineStyle& line, const Rows& rows, const Wi
     case 2: {
       const Stop height = (z - all<Stop>(line.box_low_z)) * all<Stop>(line.inverse_box_height);
       const Stop half = all<Stop>(0.5F);
-      const Stop rise = hn::MulAdd(winds.direction.z * all<Stop>(line.keep[2]), half, half);
+      const Stop rise = hn::MulAdd(vectors.direction.z * all<Stop>(line.keep[2]), half, half);
       return all<Stop>(1.0F - line.rise_weight) * height + all<Stop>(line.rise_weight) * rise;
     }
     case 3:
-      return winds.magnitude;
+      return vectors.magnitude;
     case 4:
-      return bearing(winds.direction.x * all<Stop>(line.keep[0]),
-                     winds.direction.y * all<Stop>(line.keep[1]));
+      return bearing(vectors.direction.x * all<Stop>(line.keep[0]),
+                     vectors.direction.y * all<Stop>(line.keep[1]));
     case 5:
       return fetch(line.color_values, rows, i);
     default:
@@ -235,8 +235,8 @@ KERNEL_INLINE void blend(const float* entry, float part, float* rgb) {
   }
 }
 
-// One line's colours: `tail` holds its table's. It is dimmed, and towards the head it turns grey by
-// `grey` at its start and by `more` on the way.
+// Colours of one line from that of its table in `tail`: dimmed, and desaturated by `grey` at the
+// tail and a further `more` at the head.
 KERNEL_INLINE void shade(float dim, float grey, float more, float* tail, float* rise) {
   const ColorTag tag;
   const float top = dim * larger(larger(tail[0], tail[1]), tail[2]);
@@ -248,30 +248,30 @@ KERNEL_INLINE void shade(float dim, float grey, float more, float* tail, float* 
   }
 }
 
-// What of the lines' colours is told by all stops of a vector together.
+// Inputs of the colours of lines, computed for a vector of kernel positions at a time.
 struct Shades {
-  alignas(64) std::int32_t entry[brick_stops];  // of the table, and the way to the next
+  alignas(64) std::int32_t entry[brick_stops];  // of the table; `part`: weight of the next entry
   alignas(64) float part[brick_stops];
   alignas(64) float dim[brick_stops];
   alignas(64) float grey[brick_stops];
   alignas(64) float more[brick_stops];
-  std::uint64_t unknown;  // bit l set: stop l has no value there
+  std::uint64_t unknown;  // bit l set: the field that determines the colour is masked
 };
 
-// Colour by the table, dimmed by magnitude and by view distance.
+// Table position and dimming by magnitude and view distance.
 KERNEL_INLINE void shade_ribbons(const Camera& camera, const LineStyle& line, const Rows& rows,
-                                 const Stops& stops, const Winds& winds, const Segments& s, int i,
-                                 int l, Shades& shades) {
+                                 const Stops& stops, const Vectors& vectors, const Segments& s,
+                                 int i, int l, Shades& shades) {
   const Stop distance = load<Stop>(stops.z + l) + dot3(camera.forward, s.offset);
   const Stop one = all<Stop>(1.0F);
   const Stop strong =
-      clamped((winds.magnitude - all<Stop>(line.intensity_low)) * all<Stop>(line.intensity_scale),
+      clamped((vectors.magnitude - all<Stop>(line.intensity_low)) * all<Stop>(line.intensity_scale),
               0.0F, 1.0F);
   const Stop far =
       clamped((distance - all<Stop>(line.cue_near)) * all<Stop>(line.cue_scale), 0.0F, 1.0F);
   const Stop dim = hn::NegMulAdd(all<Stop>(line.intensity), one - strong, one) *
                    hn::NegMulAdd(all<Stop>(line.cue_strength), far, one);
-  const Stop value = color_value(line, rows, winds, s, distance, i);
+  const Stop value = color_value(line, rows, vectors, s, distance, i);
   const auto masked = is_masked(value);
   const ColorTable& table = line.color;
   const Stop known = hn::IfThenElse(masked, all<Stop>(table.low), value);
@@ -287,7 +287,7 @@ KERNEL_INLINE void shade_ribbons(const Camera& camera, const LineStyle& line, co
   shades.unknown |= static_cast<std::uint64_t>(bits_of<Stop>(masked)) << static_cast<unsigned>(l);
 }
 
-// The colours of the lines that are left.
+// Computes the colours of the remaining lines.
 inline void color_ribbons(const ColorTable& table, const Shades& shades, std::uint64_t lines,
                           Ribbons& r) {
   for (std::uint64_t left = lines; left != 0; left &= left - 1U) {
@@ -296,7 +296,7 @@ inline void color_ribbons(const ColorTable& table, const Shades& shades, std::ui
           r.tail[l]);
     shade(shades.dim[l], shades.grey[l], shades.more[l], r.tail[l], r.rise[l]);
   }
-  // Where the field that tells the colour is masked: mid-grey.
+  // Mid-grey where the field that determines the colour is masked.
   for (std::uint64_t left = lines & shades.unknown; left != 0; left &= left - 1U) {
     const int l = __builtin_ctzll(left);
     for (float& c : r.tail[l]) c = 0.5F;
@@ -304,17 +304,18 @@ inline void color_ribbons(const ColorTable& table, const Shades& shades, std::ui
   }
 }
 
-// A vector of lines made ready; which lanes have one on the screen.
+// Prepares a vector of lines. Returns the lanes with a visible line.
 template <bool Perspective, bool Curved>
 KERNEL_INLINE std::uint32_t prepare_ribbons(const Camera& camera, const Pass& pass,
                                             const Rows& rows, const Stops& stops,
-                                            const CellLanes<Curved>& cells, const Winds& winds,
+                                            const CellLanes<Curved>& cells, const Vectors& vectors,
                                             const Hash3<std::uint32_t>& key, int i, int l,
                                             Shades& shades, Ribbons& ribbons) {
-  Segments s = place_segments<Curved>(pass.line, rows, cells, winds, key, i);
-  const auto shown = project_segments<Perspective>(camera, pass.line, stops, l, winds, s, ribbons);
-  shade_ribbons(camera, pass.line, rows, stops, winds, s, i, l, shades);
-  if (pass.line.moving != 0) phase_ribbons(pass.line, winds, s, l, ribbons);
+  Segments s = place_segments<Curved>(pass.line, rows, cells, vectors, key, i);
+  const auto shown =
+      project_segments<Perspective>(camera, pass.line, stops, l, vectors, s, ribbons);
+  shade_ribbons(camera, pass.line, rows, stops, vectors, s, i, l, shades);
+  if (pass.line.moving != 0) phase_ribbons(pass.line, vectors, s, l, ribbons);
   return bits_of<Stop>(shown);
 }
 

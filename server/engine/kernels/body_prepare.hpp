@@ -1,5 +1,5 @@
-// Part of the kernel body: a brick made ready for a tile. Each stage goes through all rows before
-// the next begins, so that rows do not wait for each other's branches.
+// Part of the kernel body: prepares a brick for a tile. Each stage processes all rows before the
+// next begins, so that a mispredicted branch of one row does not delay the others.
 #pragma once
 
 #include "server/engine/kernels/body_footing.hpp"
@@ -9,7 +9,7 @@ namespace {
 
 inline bool has(std::uint64_t bits, int l) { return (bits >> static_cast<unsigned>(l) & 1U) != 0; }
 
-// The bits of the vector of stops that begins at l.
+// The bits of the vector of kernel positions that begins at l.
 inline std::uint32_t lanes_at(std::uint64_t bits, int l) {
   constexpr std::uint64_t lanes = (std::uint64_t{2} << (stop_lanes - 1)) - 1U;
   return static_cast<std::uint32_t>(bits >> static_cast<unsigned>(l) & lanes);
@@ -30,14 +30,15 @@ inline std::uint64_t bytes_of(std::uint32_t bits) {
   return lowest * 0xffU;
 }
 
-// The stops of a brick that are there at all.
+// The valid positions of a brick.
 inline std::uint64_t brick_bits(const Rows& rows) {
   const std::uint64_t row = row_bits(rows);
   const std::uint64_t all = row * 0x0101010101010101U;
   return all >> static_cast<unsigned>(brick_side * (brick_side - rows.v_count));
 }
 
-// Places a brick's stops; those whose kernel may touch an open block of the tile.
+// Computes the kernel positions of a brick. Returns those whose kernels may touch an open block of
+// the tile.
 template <bool Perspective, bool Curved>
 std::uint64_t place_stops(const Camera& camera, const Pass& pass, const Brick& brick,
                           const Frustum& frustum, Rows& rows, Tile& tile, Stops& stops) {
@@ -68,7 +69,7 @@ struct BrickMaker {
   Tile& tile;
   Prepared& out;
   Hash3<std::uint32_t> key;
-  Rows rows;  // the two are filled pair by pair
+  Rows rows;  // rows and cells hold one pair at a time
   Cells cells;
   Shades shades;
 
@@ -79,15 +80,15 @@ struct BrickMaker {
         out(into),
         key(hash_key(of_pass.line.seed, of_pass.line.epoch)) {}
 
-  // The lines of a vector of stops; which of `bits` have one.
+  // Prepares the lines of a vector of kernel positions. Returns which of `bits` have one.
   KERNEL_INLINE std::uint32_t make_lines(const CellLanes<Curved>& cell, int i, int l,
                                          std::uint32_t bits) {
-    const Winds winds = read_winds(pass, rows, i);
+    const Vectors vectors = read_vectors(pass, rows, i);
     const Stop least = all<Stop>(least_magnitude(pass.line));
-    const std::uint32_t lines = bits & bits_of<Stop>(hn::Ge(winds.magnitude, least));
+    const std::uint32_t lines = bits & bits_of<Stop>(hn::Ge(vectors.magnitude, least));
     if (lines == 0) return 0;
-    return lines & prepare_ribbons<Perspective, Curved>(camera, pass, rows, out.stops, cell, winds,
-                                                        key, i, l, shades, out.ribbons);
+    return lines & prepare_ribbons<Perspective, Curved>(camera, pass, rows, out.stops, cell,
+                                                        vectors, key, i, l, shades, out.ribbons);
   }
 
   KERNEL_INLINE std::uint32_t make_splats(const CellLanes<Curved>& cell, int i, int l,
@@ -151,7 +152,7 @@ struct BrickMaker {
   }
 };
 
-// Everything up to the pixels: what of a brick may touch the tile's open blocks, made ready.
+// Prepares the lines and splats of a brick that may touch open blocks of the tile.
 template <bool Lines, bool Medium, bool Perspective, bool Curved>
 void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
                    Prepared& out) {

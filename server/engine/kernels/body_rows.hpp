@@ -1,5 +1,5 @@
-// Part of the kernel body: a brick's stops two rows at a time, one lane a stop: where they stand,
-// and which of them the tile can show.
+// Part of the kernel body: computes and culls the kernel positions of a brick, two rows at a time
+// with one lane per position.
 #pragma once
 
 #include "server/engine/kernels/body_math.hpp"
@@ -8,12 +8,13 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// A brick's rows run along u; two neighbours are a pair. Each entry [axis][i] holds what the axis
-// has at the pair's i-th stop, brick_side of the first row and then those of the second: along u
-// they differ, along v by row, along the third they are all the same. What lies beyond a row's last
-// stop repeats it, and so does a row beyond the last.
+// The rows of a brick run along u; two consecutive rows are a pair. Entry [axis][i] is the value of
+// the axis at the i-th kernel position of the pair: brick_side values of the first row, then those
+// of the second. Along u the values differ by column, along v by row; along the major axis all are
+// equal. Lanes beyond the end of a row repeat its last position, and a missing second row repeats
+// the first.
 struct Rows {
-  alignas(64) double across[3][brick_side];  // right, down, forward: the part of u
+  alignas(64) double across[3][brick_side];  // right, down, forward: contribution of u
   alignas(64) float cell[3][pair_stops];
   alignas(64) float inverse_cell[3][pair_stops];
   alignas(64) float from_eye[3][pair_stops];
@@ -21,14 +22,14 @@ struct Rows {
   alignas(64) std::int32_t sample[3][pair_stops];
   std::int32_t group[3][pair_stops];
   std::int64_t along_u[brick_side];
-  std::int64_t offset[2];  // of each row's first sample in the fields
+  std::int64_t offset[2];  // of the first sample of each row in the fields
   int u_count, v_count, pairs;
-  int there;        // rows of the pair that are there
-  int first[3];     // of the brick's stops along each axis
-  int consecutive;  // a row's samples are neighbours in memory, and there are brick_side of them
+  int there;        // number of valid rows of the pair
+  int first[3];     // kernel position of the brick along each axis
+  int consecutive;  // rows are full, and their samples are consecutive in memory
 };
 
-// What one stop of an axis has, in a row's lanes from First on.
+// Broadcasts the values of one kernel position of an axis to the row of lanes from First on.
 template <int First>
 KERNEL_INLINE void fill_row(const Pass& pass, int a, int stop, Rows& rows) {
   const Axis& axis = pass.axis[a];
@@ -47,7 +48,7 @@ KERNEL_INLINE void fill_row(const Pass& pass, int a, int stop, Rows& rows) {
   for (int i = First; a == 2 && i < last; ++i) rows.height[i] = height;
 }
 
-// What the stops of a row have along it; stop_of(i): the one in lane i.
+// Fills the values along u; stop_of(i) returns the kernel position of lane i.
 template <class StopOf>
 KERNEL_INLINE void fill_along(const Pass& pass, Rows& rows, const StopOf& stop_of) {
   const int a = pass.u;
@@ -61,7 +62,8 @@ KERNEL_INLINE void fill_along(const Pass& pass, Rows& rows, const StopOf& stop_o
   for (int i = 0; a == 2 && i < brick_side; ++i) both(rows.height, i, axis.position[stop_of(i)]);
 }
 
-// Visiting lists name a brick's stops outward from the eye; its rows hold them in world order.
+// The first kernel position of a brick in world order; visit lists are ordered outward from the
+// eye.
 inline int lowest(const int* visit) { return visit[0] / brick_side * brick_side; }
 
 void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
@@ -93,7 +95,7 @@ void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
   rows.consecutive = full && rows.along_u[brick_side - 1] == brick_side - 1 ? 1 : 0;
 }
 
-// A pair's second row, or its first where that is the brick's last.
+// The second row of a pair, or the first if that is the last row of the brick.
 inline int second_row(const Rows& rows, int pair) {
   return 2 * pair + 1 < rows.v_count ? 2 * pair + 1 : 2 * pair;
 }
@@ -110,13 +112,13 @@ void set_pair(const Pass& pass, int pair, Rows& rows) {
   }
 }
 
-// Where a pair's i-th stop has its sample in the fields.
+// Offset of the i-th sample of a pair in the fields.
 inline std::int64_t offset_of(const Rows& rows, int i) {
   return rows.offset[i / brick_side] + rows.along_u[i % brick_side];
 }
 
-// Camera coordinates of a row, as row `to_row`, summed in double so that an eye far away or close
-// by loses nothing.
+// Camera coordinates of row j, stored as row `to_row`. Summed in double, so that a distant eye
+// costs no precision.
 void place_row(const Camera& camera, const Pass& pass, int j, int to_row, const Rows& rows,
                Stops& stops) {
   const double* from_slab =
@@ -145,7 +147,7 @@ inline double dot3(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-// The same for stops that stand where the field says.
+// The same for a curved lattice, whose positions are stored by sample.
 void place_curved_pair(const Camera& camera, const Pass& pass, int pair, const Rows& rows,
                        Stops& stops) {
   for (int i = 0; i < pair_stops; ++i) {
@@ -161,7 +163,7 @@ void place_curved_pair(const Camera& camera, const Pass& pass, int pair, const R
   }
 }
 
-// Values at a pair's consecutive samples from lane i on.
+// Values at the samples of a pair of consecutive rows from lane i on.
 KERNEL_INLINE Stop fetch_consecutive(const float* values, const Rows& rows, int i) {
 #if HWY_TARGET != HWY_SCALAR
   if constexpr (stop_lanes == pair_stops) {
@@ -173,7 +175,7 @@ KERNEL_INLINE Stop fetch_consecutive(const float* values, const Rows& rows, int 
   return load_unaligned<Stop>(values + rows.offset[i / brick_side] + i % brick_side);
 }
 
-// A field's values at a pair's stops from lane i on.
+// Values of a field at the kernel positions of a pair from lane i on.
 KERNEL_INLINE Stop fetch(const float* values, const Rows& rows, int i) {
   if (rows.consecutive != 0) return fetch_consecutive(values, rows, i);
   alignas(64) float lanes[pair_stops];
@@ -181,13 +183,13 @@ KERNEL_INLINE Stop fetch(const float* values, const Rows& rows, int i) {
   return load<Stop>(lanes + i);
 }
 
-// The stops of a row that are there at all, and those of a pair.
+// The valid positions of a row and of a pair.
 inline std::uint32_t row_bits(const Rows& rows) { return (2U << (rows.u_count - 1)) - 1U; }
 inline std::uint32_t pair_bits(const Rows& rows) {
   return rows.there == 2 ? row_bits(rows) | row_bits(rows) << brick_side : row_bits(rows);
 }
 
-// How far a brick's kernels reach beyond their stops along right, down and forward.
+// Extent of the kernels of a brick beyond their positions along right, down and forward.
 void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, const Rows& rows,
                  float reach[3]) {
   float cell[3];
@@ -213,7 +215,7 @@ void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, con
   }
   const float* const frame[3] = {camera.right, camera.down, camera.forward};
   for (int c = 0; c < 3; ++c) {
-    float box = 0;    // half the kernel's, along this axis of the camera
+    float box = 0;    // half the kernel box along this camera axis
     float shift = 0;  // of its centre
     float square = 0;
     for (int a = 0; a < 3; ++a) {
@@ -228,9 +230,9 @@ void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, con
   }
 }
 
-// Planes through the tile's edges, moved outward by what a kernel reaches.
+// Planes through the edges of the tile, moved outward by the extent of a kernel.
 struct Frustum {
-  float x0, x1, y0, y1;  // the tile's edges at unit depth, widened by `margin` pixels
+  float x0, x1, y0, y1;  // edges of the tile at unit depth, widened by `margin` pixels
   float left, right, top, bottom;
   float reach[3];
   float margin;
@@ -253,7 +255,7 @@ Frustum frustum_of(const Camera& camera, const Tile& tile, const float reach[3],
   return f;
 }
 
-// The stops of a pair that are not nearer than the near plane and whose kernel may touch the tile.
+// The positions of a pair that lie beyond the near plane and whose kernels may touch the tile.
 template <bool Perspective>
 std::uint32_t seen_in_pair(const Camera& camera, const Frustum& f, const Stops& stops, int pair) {
   std::uint32_t bits = 0;
@@ -263,7 +265,7 @@ std::uint32_t seen_in_pair(const Camera& camera, const Frustum& f, const Stops& 
     const Stop y = load<Stop>(stops.y + l);
     const Stop depth = load<Stop>(stops.z + l);
     const Stop z = Perspective ? depth : all<Stop>(1.0F);
-    // The largest of how far it lies outside any plane.
+    // Largest distance outside any plane.
     Stop outside = hn::MulSub(all<Stop>(f.x0), z, x) - all<Stop>(f.left);
     outside = hn::Max(outside, hn::NegMulAdd(all<Stop>(f.x1), z, x) - all<Stop>(f.right));
     outside = hn::Max(outside, hn::MulSub(all<Stop>(f.y0), z, y) - all<Stop>(f.top));
@@ -283,18 +285,18 @@ struct Range {
 using StopIntegers = hn::RebindToSigned<StopTag>;
 using StopInteger = hn::Vec<StopIntegers>;
 
-// The same for a vector of them.
+// The same with one lane per outline.
 struct Ranges {
   StopInteger first, last;
 };
 
-// Blocks of the tile whose pixel centres may lie between two coordinates in pixels from the tile's
-// edge. Block b holds the centres 4 b + 0.5 to 4 b + 3.5.
+// Blocks of the tile with pixel centres between two coordinates in pixels from the edge of the
+// tile. Block b has the centres 4 b + 0.5 to 4 b + 3.5.
 KERNEL_INLINE Ranges blocks_between(Stop low, Stop high, int blocks) {
   constexpr float per_block = 1.0F / block_side;
   constexpr float slack = 1e-3F;
   const float bound = static_cast<float>(blocks);
-  // Truncation rounds down because nothing below zero is truncated.
+  // Truncation rounds down because the values are not negative.
   const Stop first = clamped((low + all<Stop>(0.5F - slack)) * all<Stop>(per_block), 0.0F, bound);
   const Stop last =
       clamped((high + all<Stop>(slack - 0.5F)) * all<Stop>(per_block), -1.0F, bound - 0.5F);
@@ -313,12 +315,12 @@ inline std::uint32_t range_mask(Range range) {
          << static_cast<unsigned>(range.first);
 }
 
-// Where on the screen boxes about points may lie, in pixels along one axis.
+// Bounds of projected boxes about points along one axis of the screen.
 struct Shadow {
   Stop low, high;
 
-  // Widened by a box as far as `reach` about `at`; near, far: the inverse depths of its ends, one
-  // of which widens it most, on either side of the middle.
+  // Extends the bounds by a box of half width `reach` about `at`. near, far: inverse depths of its
+  // ends; one of them is extreme on either side of the centre.
   KERNEL_INLINE void add(Stop at, float reach, Stop near, Stop far) {
     const Stop from = at - all<Stop>(reach);
     const Stop to = at + all<Stop>(reach);
@@ -344,7 +346,7 @@ inline Under under(const Tile& tile, const Brick& brick) {
       range_mask({within(brick.block_x - left, wide), within(brick.block_x_last - left, wide)})};
 }
 
-// Whether any block there lets no more light through.
+// Whether any of these blocks is closed.
 inline bool partly_closed(const Tile& tile, const Brick& brick) {
   if (tile.any_closed == 0) return false;
   const Under blocks = under(tile, brick);
@@ -353,7 +355,7 @@ inline bool partly_closed(const Tile& tile, const Brick& brick) {
   return (open & blocks.columns) != blocks.columns;
 }
 
-// The i-th stops of a brick's rows from row j on, a lane a row; lanes beyond the last repeat it.
+// The i-th position of the rows from row j on, one lane per row; lanes beyond the last repeat it.
 KERNEL_INLINE Stop across_rows(const float* stops, int i, int j, int v_count) {
   alignas(64) float lanes[stop_lanes];
   for (int k = 0; k < stop_lanes; ++k) {
@@ -362,13 +364,13 @@ KERNEL_INLINE Stop across_rows(const float* stops, int i, int j, int v_count) {
   return load<Stop>(lanes);
 }
 
-// The blocks that rows' kernels may touch, a lane a row.
+// The blocks that the kernels of rows may touch, one lane per row.
 struct Footprints {
   Ranges rows, columns;
 };
 
-// On straight rows the ends reach as far as any stop between them; of curved ones every stop is
-// asked. A kernel that reaches behind the near plane casts a shadow without an end there.
+// On straight rows the two ends bound all positions between them; on curved rows every position is
+// tested. A kernel that extends beyond the near plane is unbounded on the screen.
 template <bool Perspective>
 KERNEL_INLINE Footprints footprints_of(const Camera& camera, const Frustum& f, const Stops& stops,
                                        int j, const Rows& rows, bool straight, const Tile& tile) {
@@ -403,7 +405,7 @@ KERNEL_INLINE Footprints footprints_of(const Camera& camera, const Frustum& f, c
           blocks(across, camera.half_width_px, tile.x, tile.width)};
 }
 
-// The rows of a brick whose kernels may touch a block that still lets light through: bit j set.
+// The rows of a brick whose kernels may touch an open block, as bits.
 template <bool Perspective>
 std::uint32_t rows_to_see(const Camera& camera, const Frustum& f, const Stops& stops,
                           const Rows& rows, bool straight, const Tile& tile) {

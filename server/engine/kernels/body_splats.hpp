@@ -26,8 +26,8 @@ KERNEL_INLINE Extent silhouette(Stop v, Stop z, Stop s11, Stop s13, Stop s33) {
           hn::IfThenElse(bounded, (middle + root) * inverse, all<Stop>(1e30F))};
 }
 
-// What of the cell a view direction meets: its squares along the camera's axes times t^2, and the
-// screen's axes in cells a pixel.
+// The cell in camera space: squares and products of its extents along the camera axes times t^2,
+// and the axes of the screen in cells per pixel.
 struct Facing {
   Stop s11, s22, s33, s13, s23;
   Three<Stop> right, down;  // cells per pixel
@@ -56,17 +56,17 @@ KERNEL_INLINE Facing face(const Camera& camera, const CellLanes<Curved>& cells) 
   return f;
 }
 
-// An ellipse about a splat's projected centre, pixels: what lies at height y below its middle is
-// within sqrt(half_chord2 - narrowing y^2) of lean y; its rightmost point lies half_width right and
-// shear half_width below the middle. Not known: where the picture shows no ellipse, or not from
-// near its middle.
+// An ellipse about the projected centre of a splat, in pixels: at distance y below its centre it
+// spans lean y +- sqrt(half_chord2 - narrowing y^2); its rightmost point lies half_width right of
+// and shear half_width below the centre. Not known where the outline is no ellipse, or too large.
 struct Oval {
   MaskOf<Stop> known;
   Stop x, y;
   Stop half_chord2, narrowing, lean, half_width, shear;
 };
 
-// xx dx^2 + xy dx dy + yy dy^2, and det = xx yy - xy^2 / 4, told apart so that it never cancels.
+// xx dx^2 + xy dx dy + yy dy^2, and det = xx yy - xy^2 / 4, computed separately to avoid
+// cancellation.
 struct Form {
   Stop xx, xy, yy, det;
 };
@@ -84,10 +84,10 @@ KERNEL_INLINE void store_form(const Form& form, int l, Splats& s) {
   store(form.yy, s.yy + l);
 }
 
-// t^2, and room for rounding.
+// t^2 with a margin for rounding.
 constexpr float oval_limit = 1.002F * footprint_t * footprint_t;
 
-// Where the form is at most `limit`.
+// The ellipse on which the form equals `limit`.
 KERNEL_INLINE Oval oval_of(const Form& form, Stop limit) {
   Oval o;
   const Stop least = all<Stop>(1e-36F);
@@ -102,17 +102,17 @@ KERNEL_INLINE Oval oval_of(const Form& form, Stop limit) {
   return o;
 }
 
-// Where on the picture the silhouette lies, pixels: its box, and an ellipse that it lies in.
+// Bounding box and bounding ellipse of the silhouette, in pixels.
 struct Outline {
   Extent x, y;
   Oval oval;
 };
 
-// |d|^2 about a point of the picture, see Splats.
+// |d|^2 as a function of the offset from a point of the picture; see Splats.
 struct RaySquares {
   Stop d0, dx, dy, dxx, dxy, dyy, least;
 
-  // At most so far from the point.
+  // Upper bound within w and h pixels of the point.
   KERNEL_INLINE Stop most(Stop w, Stop h) const {
     const Stop bent = hn::MulAdd(dxx, w * w, hn::MulAdd(hn::Abs(dxy), w * h, dyy * h * h));
     return hn::Max(d0 + hn::MulAdd(hn::Abs(dx), w, hn::MulAdd(hn::Abs(dy), h, bent)), least);
@@ -129,7 +129,7 @@ KERNEL_INLINE void store_squares(const RaySquares& r, int l, Splats& s) {
   store(r.least, s.d2_least + l);
 }
 
-// The outline of splats whose projected centres are (px, py). The ellipse is where the form is at
+// The outline of splats whose projected centres are (px, py). Within the ellipse the form is at
 // most t^2 times the largest |d|^2 of the box.
 KERNEL_INLINE Outline perspective_outline(const Camera& camera, const Stops& stops, int l,
                                           const Facing& f, const Form& form, const RaySquares& rays,
@@ -169,7 +169,7 @@ KERNEL_INLINE Outline perspective_splats(const Camera& camera, const Stops& stop
   const Stop scale = all<Stop>(camera.inverse_pixel) * inverse_z;
   const Stop px = hn::MulAdd(load<Stop>(stops.x + l), scale, half_width);
   const Stop py = hn::MulAdd(load<Stop>(stops.y + l), scale, half_height);
-  // The nearest point of the picture; its ray, forward component 1, in cells.
+  // The nearest point of the picture, and its ray in cells with forward component 1.
   const Stop ex = clamped(px, hn::Zero(StopTag()), two * half_width);
   const Stop ey = clamped(py, hn::Zero(StopTag()), two * half_height);
   const auto inside = hn::And(hn::Eq(ex, px), hn::Eq(ey, py));
@@ -231,7 +231,7 @@ KERNEL_INLINE Outline orthographic_splats(const Camera& camera, const Stops& sto
   return {{x - wide, x + wide}, {y - tall, y + tall}, oval};
 }
 
-// A row's splats from lane i on, made ready.
+// Prepares the splats of a vector of kernel positions.
 template <bool Perspective, bool Curved>
 KERNEL_INLINE Outline prepare_splats(const Camera& camera, const Stops& stops,
                                      const CellLanes<Curved>& cells, int l, Stop rho, Splats& s) {

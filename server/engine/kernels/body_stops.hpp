@@ -1,4 +1,5 @@
-// Part of the kernel body: what a brick's stops have in the fields, as magnitudes and extinctions.
+// Part of the kernel body: magnitudes and extinctions at the kernel positions of a brick, read from
+// the fields.
 #pragma once
 
 #include "server/engine/kernels/body_rows.hpp"
@@ -8,19 +9,19 @@ namespace {
 
 constexpr float magnitude_least = 1.17549435e-38F;  // denormal vectors count as zero
 
-// What a pair's lines need of the field.
-struct Winds {
+// The vectors at kernel positions.
+struct Vectors {
   Stop magnitude;         // of the raw data; negative: no line
-  Three<Stop> direction;  // a unit vector along the cell's own axes
+  Three<Stop> direction;  // a unit vector along the axes of the cell
 };
 
-// Lengths, and their inverses: of a vector shorter than magnitude_least, some finite number.
+// Lengths and their inverses; the inverse is finite but arbitrary below magnitude_least.
 struct Norm {
   Stop length, inverse;
 };
 
-// Without overflow or underflow: the largest component is taken out first, unless every lane's is
-// zero or far from either.
+// Avoids overflow and underflow by dividing by the largest component, unless that is zero or of
+// moderate size in every lane.
 KERNEL_INLINE Norm norm_of(const Three<Stop>& v) {
   const Stop top = hn::Max(hn::Max(hn::Abs(v.x), hn::Abs(v.y)), hn::Abs(v.z));
   const auto moderate = hn::And(hn::Ge(top, all<Stop>(1e-15F)), hn::Le(top, all<Stop>(1e15F)));
@@ -28,7 +29,7 @@ KERNEL_INLINE Norm norm_of(const Three<Stop>& v) {
   if (HWY_LIKELY(hn::AllTrue(StopTag(), hn::Or(moderate, nothing)))) {
     const Stop square = dot3(v, v);
     const Stop inverse = inverse_root(hn::Max(square, all<Stop>(1e-30F)));
-    // Another step for the length: a vector as long as a tolerance is not to fall below it.
+    // One more Newton step: a vector whose length equals a tolerance must not fall below it.
     const Stop length = square * inverse;
     const Stop rest = hn::NegMulAdd(length, length, square);
     return {hn::MulAdd(rest, all<Stop>(0.5F) * inverse, length), inverse};
@@ -41,7 +42,7 @@ KERNEL_INLINE Norm norm_of(const Three<Stop>& v) {
 }
 
 // Vectors in the field; zero if masked (a masked sample is masked in every component).
-KERNEL_INLINE Three<Stop> fetch_winds(const Pass& pass, const Rows& rows, int i) {
+KERNEL_INLINE Three<Stop> fetch_vectors(const Pass& pass, const Rows& rows, int i) {
   const LineStyle& line = pass.line;
   const Stop zero = hn::Zero(StopTag());
   const Stop x = fetch(line.velocity[0], rows, i);
@@ -52,7 +53,7 @@ KERNEL_INLINE Three<Stop> fetch_winds(const Pass& pass, const Rows& rows, int i)
           hn::IfThenElse(masked, zero, z)};
 }
 
-// The rates that turn a pair's vectors into the picture's.
+// Scale factors from vectors of the field to those drawn.
 KERNEL_INLINE Stop rate_of(const float* rates, const Rows& rows, int a, int i) {
   if (rates == nullptr) return all<Stop>(1.0F);
   alignas(64) float lanes[pair_stops];
@@ -62,9 +63,9 @@ KERNEL_INLINE Stop rate_of(const float* rates, const Rows& rows, int a, int i) {
 
 // Unit directions as drawn, and magnitudes; a masked sample or one without a direction gets a
 // negative magnitude.
-KERNEL_INLINE Winds read_winds(const Pass& pass, const Rows& rows, int i) {
+KERNEL_INLINE Vectors read_vectors(const Pass& pass, const Rows& rows, int i) {
   const LineStyle& line = pass.line;
-  const Three<Stop> v = fetch_winds(pass, rows, i);
+  const Three<Stop> v = fetch_vectors(pass, rows, i);
   const Norm raw = norm_of(v);
   // Scaled by 1/m first: the products stay finite for any data.
   const Three<Stop> drawn = {
@@ -81,7 +82,7 @@ inline float least_magnitude(const LineStyle& line) {
   return larger(line.min_magnitude, magnitude_least);
 }
 
-// The widest a ray's cell can be, over all view directions: the stop's longest edge.
+// Upper bound of the width of the cell over all view directions: its longest edge.
 KERNEL_INLINE Stop cell_longest(const Rows& rows, int i) {
   const Stop x = load<Stop>(rows.cell[0] + i);
   const Stop y = load<Stop>(rows.cell[1] + i);
@@ -89,8 +90,8 @@ KERNEL_INLINE Stop cell_longest(const Rows& rows, int i) {
 }
 
 struct Extinctions {
-  Stop rho;           // per world length, the layers' together
-  MaskOf<Stop> kept;  // no lane whose optical depth stays below tolerance from every side
+  Stop rho;           // per world unit, sum of all layers
+  MaskOf<Stop> kept;  // optical depth reaches the tolerance in at least one view direction
 };
 
 KERNEL_INLINE Extinctions read_extinctions(const Pass& pass, const Rows& rows, int i) {
@@ -101,7 +102,7 @@ KERNEL_INLINE Extinctions read_extinctions(const Pass& pass, const Rows& rows, i
     const Extinction& extinction = medium.layer[k].extinction;
     const Stop raw = fetch(medium.layer[k].values, rows, i);
     const auto masked = is_masked(raw);
-    // Below the first point its value holds; a masked sample is below every point.
+    // The value of the first point extends below it. A masked sample lies below every point.
     const Stop value = hn::IfThenElse(masked, all<Stop>(-3e38F), raw);
     Stop rho = hn::IfThenElse(masked, zero, all<Stop>(extinction.y[0]));
     for (int p = 0; p < extinction.points; ++p) {
@@ -116,7 +117,7 @@ KERNEL_INLINE Extinctions read_extinctions(const Pass& pass, const Rows& rows, i
   return {total, hn::And(hn::Ge(depth, all<Stop>(medium.min_optical_depth)), hn::Gt(total, zero))};
 }
 
-// Colours mix by extinction.
+// The colour of all layers together, weighted by their extinctions.
 void color_density(const Pass& pass, std::int64_t offset, float* color) {
   const Medium& medium = pass.medium;
   if (medium.layers == 1) {
@@ -140,10 +141,10 @@ void color_density(const Pass& pass, std::int64_t offset, float* color) {
   for (int c = 0; c < 3; ++c) color[c] *= inverse;
 }
 
-// At most how many pixels a splat of unit extinction covers times its optical depth there: a splat
-// whose cell is no narrower than a pixel spreads its volume. One that is narrower is no higher than
-// the splat one pixel wide with its peak; then a section of the cell counts, or its longest chord.
-// `scale` is pixels a world unit; of a curved cell the extents bound all three.
+// Upper bound of the optical depth summed over pixels of a splat of unit extinction: the volume of
+// the cell if it is no narrower than a pixel. A narrower splat is bounded by one that is a pixel
+// wide with the same peak, hence by a section of the cell or its longest chord. `scale` is pixels
+// per world unit. The extents of a curved cell bound all three.
 inline float splat_cover(const Pass& pass, const Rows& rows, int i, float scale) {
   const bool curved = pass.places != nullptr;
   float edge[3];
@@ -159,18 +160,18 @@ inline float splat_cover(const Pass& pass, const Rows& rows, int i, float scale)
   return larger(larger(volume * scale * scale, section * scale), chord);
 }
 
-// Adds a pair's lines to the summary; which stops have one.
+// Adds the lines of a pair of rows to the summary. Returns the positions with a line.
 std::uint32_t summarise_lines(const Pass& pass, const Rows& rows, BrickSummary& summary) {
   const Stop least = all<Stop>(least_magnitude(pass.line));
   std::uint32_t lines = 0;
   for (int i = 0; i < pair_stops; i += stop_lanes) {
     const std::uint32_t here = pair_bits(rows) >> static_cast<unsigned>(i);
-    const Winds winds = read_winds(pass, rows, i);
-    const auto drawn = hn::Ge(winds.magnitude, least);
+    const Vectors vectors = read_vectors(pass, rows, i);
+    const auto drawn = hn::Ge(vectors.magnitude, least);
     const std::uint32_t bits = bits_of<Stop>(drawn) & here;
     lines |= bits << static_cast<unsigned>(i);
     alignas(64) float magnitude[pair_stops];
-    store(winds.magnitude, magnitude);
+    store(vectors.magnitude, magnitude);
     for (int k = 0; k < stop_lanes; ++k) {
       if ((bits >> static_cast<unsigned>(k) & 1U) != 0) {
         summary.magnitude_max = larger(summary.magnitude_max, magnitude[k]);
