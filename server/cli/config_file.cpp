@@ -40,13 +40,13 @@ std::string kind_fault(const CLI::Option& option, ConfigEntry::Kind kind) {
   using Kind = ConfigEntry::Kind;
   if (option.get_expected_min() == 0) return kind == Kind::boolean ? "" : "must be true or false";
   if (option.get_expected_max() > 1) {
-    return kind == Kind::text || kind == Kind::list ? "" : "must be a text or a list of texts";
+    return kind == Kind::text || kind == Kind::list ? "" : "must be a string or a list of strings";
   }
   // Every numeric option has a range in its type name: "N:INT in [1 - 10]".
   if (option.get_type_name().find(" in [") != std::string::npos) {
     return kind == Kind::number ? "" : "must be a number";
   }
-  return kind == Kind::text ? "" : "must be a text";
+  return kind == Kind::text ? "" : "must be a string";
 }
 
 // Validates by the option's own rules. Errors: CLI::Error.
