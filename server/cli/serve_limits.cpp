@@ -19,7 +19,7 @@ CLI::Validator up_to(Number most) {
       [most](const std::string& text) {
         if (CLI::Range(Number{0}, most)(text).empty()) return std::string();
         std::ostringstream words;
-        words << "is a number from 0 (no limit) to " << most << ", not '" << text << "'";
+        words << "must be a number from 0 (no limit) to " << most << ", not '" << text << "'";
         return words.str();
       },
       "");
@@ -38,56 +38,57 @@ void add(CLI::App& command, const char* flag, const char* environment, Number& v
 
 std::string fault_of_proxy(const std::string& text) {
   if (net::Network::parse(text)) return "";
-  return "is an address or a network such as 172.17.0.0/16, not '" + text + "'";
+  return "must be an address or a network such as 172.17.0.0/16, not '" + text + "'";
 }
 
 }  // namespace
 
 void add_limit_options(CLI::App& command, net::Limits& limits) {
   add(command, "--max-connections", "WINDSPLAT_MAX_CONNECTIONS", limits.connections, count_max,
-      "Connections at a time, viewers' among them", "N");
+      "Concurrent connections, including streams", "N");
   add(command, "--max-connections-per-address", "WINDSPLAT_MAX_CONNECTIONS_PER_ADDRESS",
-      limits.connections_per_address, count_max, "Of one address (IPv6: of 64 bits)", "N");
+      limits.connections_per_address, count_max,
+      "Concurrent connections per address (IPv6: per /64)", "N");
   add(command, "--max-arrivals", "WINDSPLAT_MAX_ARRIVALS", limits.arrivals, number_max,
-      "New connections a second; one in TLS counts as 5", "N");
+      "New connections per second; a TLS connection counts as 5", "N");
   add(command, "--max-arrivals-per-address", "WINDSPLAT_MAX_ARRIVALS_PER_ADDRESS",
-      limits.arrivals_per_address, number_max, "Of one address", "N");
+      limits.arrivals_per_address, number_max, "New connections per second per address", "N");
   add(command, "--max-handshakes", "WINDSPLAT_MAX_HANDSHAKES", limits.handshake_ms, number_max,
-      "Processor time a second of TLS handshakes, of addresses that have not shown the token "
-      "recently; those that have get as much again. 127.0.0.1 and ::1 count by themselves alone",
+      "CPU time per second of TLS handshakes from addresses without a recent valid token; the "
+      "same again for those with one. 127.0.0.1 and ::1 have only the limit per address",
       "MS");
   add(command, "--max-handshakes-per-address", "WINDSPLAT_MAX_HANDSHAKES_PER_ADDRESS",
-      limits.handshake_ms_per_address, number_max, "Of one address", "MS");
+      limits.handshake_ms_per_address, number_max,
+      "CPU time per second of TLS handshakes per address", "MS");
   add(command, "--max-sessions-per-address", "WINDSPLAT_MAX_SESSIONS_PER_ADDRESS",
-      limits.sessions_per_address, count_max, "Viewers of one address at a time", "N");
+      limits.sessions_per_address, count_max, "Concurrent sessions per address", "N");
   add(command, "--max-requests-per-address", "WINDSPLAT_MAX_REQUESTS_PER_ADDRESS",
-      limits.requests_per_address, number_max, "Requests a second of one address", "N");
+      limits.requests_per_address, number_max, "Requests per second per address", "N");
   add(command, "--max-messages-per-address", "WINDSPLAT_MAX_MESSAGES_PER_ADDRESS",
-      limits.messages_per_address, number_max, "Messages a second of one address's viewers", "N");
+      limits.messages_per_address, number_max, "Stream messages per second per address", "N");
   add(command, "--max-received-per-address", "WINDSPLAT_MAX_RECEIVED_PER_ADDRESS",
-      limits.received_per_address, number_max, "Bytes of them a second", "BYTES");
+      limits.received_per_address, number_max, "Bytes of stream messages per second per address",
+      "BYTES");
   add(command, "--max-bytes-per-address", "WINDSPLAT_MAX_BYTES_PER_ADDRESS",
-      limits.bytes_per_address, number_max, "Sent to one address a second", "BYTES");
+      limits.bytes_per_address, number_max, "Bytes sent per second per address", "BYTES");
   add(command, "--max-render-per-address", "WINDSPLAT_MAX_RENDER_PER_ADDRESS",
-      limits.render_s_per_address, number_max, "Time of drawing for one address a minute",
-      "SECONDS");
+      limits.render_s_per_address, number_max, "Rendering time per minute per address", "SECONDS");
   add(command, "--max-failed-logins-per-address", "WINDSPLAT_MAX_FAILED_LOGINS_PER_ADDRESS",
-      limits.failed_logins_per_address, number_max, "Wrong tokens of one address a minute", "N");
+      limits.failed_logins_per_address, number_max, "Failed logins per minute per address", "N");
   add(command, "--max-pixels", "WINDSPLAT_MAX_PIXELS", limits.pixels,
-      protocol::limits::image_pixels_max, "Pixels of a picture", "N");
+      protocol::limits::image_pixels_max, "Pixels per picture", "N");
   add(command, "--max-kernels", "WINDSPLAT_MAX_KERNELS", limits.kernels, number_max,
-      "Work of a picture, in lines and samples and in pixels that they cover, 16 counting as one",
-      "N");
+      "Estimated cost of a picture: lines, samples and the pixels they cover (16 count as 1)", "N");
   add(command, "--max-render", "WINDSPLAT_MAX_RENDER", limits.render_s, number_max,
-      "Time to draw a picture asked for by HTTP, by what those before it took", "SECONDS");
+      "Estimated rendering time of a picture requested by HTTP", "SECONDS");
   add(command, "--max-wait", "WINDSPLAT_MAX_WAIT", limits.wait_ms, number_max,
-      "Refuse a picture asked for by HTTP that those of other addresses keep waiting longer than "
-      "this, and than it takes itself",
+      "Reject an HTTP request for a picture that would wait for other addresses longer than this "
+      "and longer than its own rendering time",
       "MS");
   command
       .add_option("--trusted-proxy", limits.trusted_proxies,
-                  "A proxy whose X-Forwarded-For tells the client's address: an address or a "
-                  "network; may be repeated")
+                  "Address or network of a proxy whose X-Forwarded-For header is trusted; may be "
+                  "repeated")
       ->envname("WINDSPLAT_TRUSTED_PROXY")
       ->allow_extra_args(false)
       ->delimiter(',')

@@ -36,10 +36,11 @@ TEST(CliUsage, ALimitThatIsNoNumberIsNamedWithItsRange) {
   for (const char* wrong : {"abc", "-1", "1e19"}) {
     const Outcome outcome = run({"serve", "--max-handshakes", wrong});
     EXPECT_EQ(outcome.code, 2) << wrong;
-    EXPECT_THAT(outcome.err,
-                StartsWith(std::string("windsplat: --max-handshakes: is a number from 0 (no limit) "
-                                       "to 1e+18, not '") +
-                           wrong + "'"));
+    EXPECT_THAT(
+        outcome.err,
+        StartsWith(std::string("windsplat: --max-handshakes: must be a number from 0 (no limit) "
+                               "to 1e+18, not '") +
+                   wrong + "'"));
   }
 }
 
