@@ -10,7 +10,7 @@ namespace windsplat::data::cf {
 
 namespace {
 
-constexpr double layer_gas_constant = 287.05287;  // the standard's own
+constexpr double layer_gas_constant = 287.05287;  // value of the standard
 
 struct Layer {
   double height;       // of its base, geopotential metres

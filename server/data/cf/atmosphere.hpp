@@ -7,8 +7,8 @@ namespace windsplat::data::cf {
 inline constexpr double standard_gravity = 9.80665;  // m s-2
 inline constexpr double dry_air_constant = 287.05;   // J kg-1 K-1
 
-// Geopotential height in metres and temperature in kelvin where the pressure (Pa) is so. Beyond
-// 71 km the highest layer goes on. NaN unless pascals > 0.
+// Geopotential height in metres and temperature in kelvin at a pressure in Pa. The highest layer is
+// extrapolated above 71 km. NaN unless pascals > 0.
 double standard_height(double pascals);
 double standard_temperature(double pascals);
 

@@ -1,4 +1,4 @@
-// Evidence for an axis' role and kind, a variable's layout, and the turning of axes.
+// Evidence for the role and kind of axes, layout of variables, and orientation of axes.
 #include "server/data/cf/axes.hpp"
 
 #include <algorithm>
@@ -125,7 +125,7 @@ Evidence by_units(std::string_view units) {
   return {};
 }
 
-// "lat_0", "isobaric1", "gridx_6": the number only distinguishes the grids of a file.
+// Strips the number that distinguishes grids of a file: "lat_0", "isobaric1", "gridx_6".
 std::string_view without_number(std::string_view name) {
   const auto end = name.find_last_not_of("0123456789_");
   return end == std::string_view::npos ? name : name.substr(0, end + 1);
@@ -171,7 +171,7 @@ Evidence by_name(std::string_view full_name, std::string_view units, bool has_co
   Evidence found;
   found.role = exact == Role::unknown ? role_of_name(name) : exact;
   if (!has_coordinates) {
-    return found;  // a place by index has no kind but a plain one
+    return found;  // coordinates by index have no kind
   }
   if (found.role == Role::x && name.find("lon") != std::string_view::npos && is_angle(units)) {
     found.kind = AxisKind::longitude;
@@ -209,8 +209,8 @@ Role role_of_axis_attribute(std::string_view axis) {
   return axis == "t" ? Role::time : Role::unknown;
 }
 
-// The strongest of several pieces of evidence gives the role; a weaker one that agrees in the role
-// may still tell the kind.
+// The strongest evidence determines the role; weaker evidence for the same role may determine the
+// kind.
 Evidence weigh(const std::vector<Evidence>& pieces) {
   Evidence out;
   for (const Evidence& piece : pieces) {
@@ -244,8 +244,8 @@ Evidence by_attributes(const FileVariable& variable) {
   return weigh({axis, by_standard_name(lower(variable.standard_name)), by_units(units), vertical});
 }
 
-// A coordinate variable has its dimension's name; failing that, a 1-D variable on the dimension
-// whose attributes say that it is an axis.
+// The coordinate variable of a dimension: the one with its name, otherwise a 1-D variable on it
+// with the attributes of an axis.
 int coordinate_of(const FileContents& contents, int dimension) {
   const std::string& name = contents.dimensions.at(static_cast<std::size_t>(dimension)).name;
   int marked = -1;
@@ -258,7 +258,7 @@ int coordinate_of(const FileContents& contents, int dimension) {
       return static_cast<int>(v);
     }
     const std::string units = lower(variable.units);
-    // "minutes since ..." of WRF's XTIME; not the time that a forecast started from.
+    // "minutes since ..." of XTIME of WRF, but not the reference time of a forecast.
     const bool tells_time =
         variable.standard_name.empty() && units.find(" since ") != std::string::npos;
     const bool says_axis = !variable.axis.empty() || is_east(units) || is_north(units) ||
@@ -271,7 +271,7 @@ int coordinate_of(const FileContents& contents, int dimension) {
   return marked;
 }
 
-// An explicit `positive` overrides what a name implies; pressure always grows downwards.
+// An explicit `positive` overrides the name; pressure always increases downward.
 void heed_positive(const FileVariable& variable, Evidence& found) {
   const std::string positive = lower(variable.positive);
   if (found.role != Role::z || found.kind == AxisKind::pressure ||
@@ -284,15 +284,15 @@ void heed_positive(const FileVariable& variable, Evidence& found) {
   }
 }
 
-// Dimensionless sigma is 1 at the ground and 0 at the top in air, 0 at the surface and -1 at the
-// bottom in water. Only where nothing but the name or the unit tells of it.
+// Whether an axis is dimensionless sigma by name or unit only: 1 at the ground and 0 at the top in
+// the atmosphere, 0 at the surface and -1 at the bottom in the ocean.
 bool is_bare_sigma(const FileVariable& variable) {
   return variable.standard_name.empty() && variable.positive.empty() &&
          (without_number(lower(variable.name)) == "sigma" ||
           lower(variable.units) == "sigma_level");
 }
 
-// What the values of a vertical axis say where `positive` is silent.
+// Direction of a vertical axis by its values if `positive` is absent.
 void heed_values(const FileVariable& variable, const std::vector<double>& coordinates,
                  AxisKind& kind, bool& positive_down, std::string& note) {
   const auto [low, high] = std::minmax_element(coordinates.begin(), coordinates.end());
@@ -301,10 +301,10 @@ void heed_values(const FileVariable& variable, const std::vector<double>& coordi
   if (kind == AxisKind::depth && positive_down && below_zero) {
     kind = AxisKind::height;
     positive_down = false;
-    note = in_quotes(variable.name) + " has depths below 0: they are taken for heights";
+    note = in_quotes(variable.name) + " has depths below 0: interpreted as heights";
   } else if (kind == AxisKind::level && is_bare_sigma(variable)) {
     const bool is_named = without_number(lower(variable.name)) == "sigma";
-    constexpr double ground = 1.1;  // some models go beyond 1 by half a layer
+    constexpr double ground = 1.1;  // some models exceed 1 by half a layer
     positive_down = !below_zero && (is_named || (*low >= 0 && *high <= ground));
   }
 }
@@ -337,8 +337,8 @@ std::string dimension_name(const FileContents& contents, int dimension) {
   return contents.dimensions.at(static_cast<std::size_t>(dimension)).name;
 }
 
-// Gives a dimension its place; false if the place is taken.
-bool take_place(Layout& layout, Role role, int dimension) {
+// Assigns a dimension to a role; false if the role is already assigned.
+bool assign_role(Layout& layout, Role role, int dimension) {
   int& place = role == Role::time ? layout.time
                                   : layout.space.at(role == Role::x   ? 0
                                                     : role == Role::y ? 1
@@ -404,17 +404,17 @@ Layout lay_out(const FileContents& contents, const std::vector<DimensionRole>& r
                          "' is neither space nor time";
         return layout;
       }
-    } else if (length != 1 && !take_place(layout, role, dimension)) {
+    } else if (length != 1 && !assign_role(layout, role, dimension)) {
       layout.problem = "two of its dimensions run along the same axis";
       return layout;
     }
   }
-  // Those of length 1 take what is left, the last ones first: time stands behind the time that a
-  // forecast started from. The rest hold one place each and need none.
+  // Dimensions of length 1 get the remaining roles, the last ones first, because time follows the
+  // reference time of a forecast. Further ones need no role.
   for (auto d = variable.dims.rbegin(); d != variable.dims.rend(); ++d) {
     const Role role = roles.at(static_cast<std::size_t>(*d)).role;
     if (length_of(*d) == 1 && role != Role::unknown && role != Role::other) {
-      take_place(layout, role, *d);
+      assign_role(layout, role, *d);
     }
   }
   if (!unknown.empty() && layout.time < 0 && unknown.front() == variable.dims.front() &&

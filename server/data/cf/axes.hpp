@@ -1,5 +1,5 @@
-// Which dimension of a file is which axis of the world, by CF attributes first and usual names
-// last. Pure: FileContents in, roles and oriented axes out.
+// FileContents -> roles of dimensions and oriented axes, by CF attributes first and common names
+// last.
 #pragma once
 
 #include <array>
@@ -19,40 +19,41 @@ enum class Role { unknown, x, y, z, time, other };  // other: an ensemble, cell 
 struct DimensionRole {
   Role role = Role::unknown;
   AxisKind kind = AxisKind::cartesian;
-  bool kind_is_sure = false;   // false: only "it is vertical" or the like is known
+  bool kind_is_sure = false;   // false: only the role is known, e.g. vertical
   bool positive_down = false;  // larger coordinates lie lower
   int coordinate = -1;         // the 1-D variable that gives its coordinates; -1: none
 };
 
-// One entry a dimension of the file. Evidence in the order of trust: the `axis` attribute,
+// One entry per dimension of the file. Evidence in order of reliability: the `axis` attribute,
 // standard_name, units, `positive`, then the names of coordinate variable and dimension.
 std::vector<DimensionRole> classify_dimensions(const FileContents& contents);
 
 // Whether lower-case units are one of CF's spellings of degrees_east.
 bool is_east(std::string_view units);
 
-// Whether units, in whatever case, are radians.
+// Whether units in any case are radians.
 bool is_radian(std::string_view units);
 
-// Whether a variable holds longitudes or latitudes, of whatever rank.
+// Whether a variable contains longitudes or latitudes, of any rank.
 bool is_position(const FileVariable& variable);
 
-// How a variable's dimensions span space and time; -1 where it lacks one.
+// Assignment of the dimensions of a variable to space and time; -1 if missing.
 struct Layout {
   std::array<int, 3> space{-1, -1, -1};  // dimension ids of x, y, z
   int time = -1;
   std::string problem;  // why the variable cannot be placed; empty if it can
 
-  [[nodiscard]] int rank() const;  // how many spatial dimensions it has
+  [[nodiscard]] int rank() const;  // number of spatial dimensions
 };
 
-// Dimensions of unknown role take the free axes, the last one x, then y, then z; an unlimited first
-// one is time. Other dimensions must have length 1; of two candidates for one axis the longer is
-// used, and one of length 1 is ignored.
+// Dimensions of unknown role are assigned to free axes, the last one to x, then y, then z; an
+// unlimited first one is time. Other dimensions must have length 1. Of two candidates for one axis,
+// one of length 1 is ignored.
 Layout lay_out(const FileContents& contents, const std::vector<DimensionRole>& roles,
                const FileVariable& variable);
 
-// An axis whose index grows with the world coordinate, and whether the file's order was turned.
+// An axis whose index ascends with the world coordinate, and whether the file has the reverse
+// order.
 struct OrientedAxis {
   Axis axis;
   bool turned = false;

@@ -1,5 +1,5 @@
-// Mean changes of longitude and latitude along two dimensions decide which is which; the values are
-// kept in the order of the volumes.
+// Identifies x and y by the mean changes of longitude and latitude along two dimensions, and stores
+// the values in the order of volumes.
 #include "server/data/cf/curvilinear.hpp"
 
 #include <algorithm>
@@ -51,13 +51,13 @@ Change change_of(const std::vector<double>& values, std::size_t rows, std::size_
   return sum;
 }
 
-// Of a variable that is_position() already took for one of the two.
+// Requires is_position(variable).
 bool is_longitude(const FileVariable& variable) {
   const std::string name = lower(variable.standard_name);
   return name == "longitude" || (name != "latitude" && is_east(lower(variable.units)));
 }
 
-// The 2-D longitude (or latitude) on exactly the two dimensions; -1 if there is none.
+// The 2-D longitude or latitude variable on exactly these two dimensions; -1 if there is none.
 int position_on(const FileContents& contents, int a, int b, bool longitude) {
   for (std::size_t v = 0; v < contents.variables.size(); ++v) {
     const FileVariable& variable = contents.variables[v];
@@ -70,15 +70,15 @@ int position_on(const FileContents& contents, int a, int b, bool longitude) {
   return -1;
 }
 
-// 2-D values as the file has them, its slower dimension first.
+// 2-D values in the order of the file, slower dimension first.
 struct Table {
   std::vector<double> values;
   int slow = -1;  // dimension ids
   std::size_t columns = 0;
 };
 
-// In the volumes' order: x fastest, from west to east and from south to north. In place, but for
-// the exchange of rows and columns.
+// Reorders to that of volumes: x fastest, west to east, south to north. In place unless rows and
+// columns are exchanged.
 std::vector<double> in_order(Table table, int x, std::array<std::size_t, 2> lengths,
                              const std::array<bool, 2>& turned) {
   const std::size_t width = lengths[0];
@@ -98,8 +98,7 @@ std::vector<double> in_order(Table table, int x, std::array<std::size_t, 2> leng
   return out;
 }
 
-// Longitudes go on beyond 360 where that is the short way to the neighbour: along the first column,
-// then along every row.
+// Unwraps longitudes to be continuous, along the first column and then along every row.
 void unwrap(std::vector<double>& longitude, std::size_t width) {
   const auto follow = [&](std::size_t from, std::size_t to) {
     longitude[to] = longitude[from] + difference(longitude[from], longitude[to], true);
@@ -197,7 +196,7 @@ Result<std::shared_ptr<const Columns>> find_columns(const ArrayFile& file, const
 
 int grid_mapping_of(const ArrayFile& file, const std::vector<int>& variables) {
   for (const int v : variables) {
-    // "name", or "name: coordinate coordinate name: ...": the first one counts.
+    // "name", or "name: coordinate coordinate name: ..."; the first name is used.
     std::string name = file.contents().variables.at(at(v)).grid_mapping;
     name = name.substr(0, name.find_first_of(": \t"));
     const int mapping = name.empty() ? -1 : variable_named(file.contents(), name);

@@ -17,8 +17,8 @@ namespace windsplat::data::cf {
 struct Bearing {
   bool is_curvilinear = false;               // 2-D coordinates were found
   bool swapped = false;                      // the file's y dimension became x
-  std::array<bool, 2> turned{false, false};  // x and y: the file's order runs west or south
-  std::shared_ptr<const Columns> columns;    // turned likewise; null where some are missing
+  std::array<bool, 2> turned{false, false};  // x and y: the file is ordered westward or southward
+  std::shared_ptr<const Columns> columns;    // in the order of volumes; null if some are missing
 };
 
 // For 2-D longitudes and latitudes, where x and y have no coordinates of their own: swaps
@@ -27,15 +27,15 @@ struct Bearing {
 Result<Bearing> find_bearing(const ArrayFile& file, const std::vector<DimensionRole>& roles,
                              GridChoice& choice);
 
-// The same of a grid whose axes have coordinates of their own (metres of a projection, a rotated
-// pole's degrees). Null where there are no 2-D longitudes and latitudes or some are missing.
+// The columns of a grid whose axes have 1-D coordinates (metres of a projection, degrees of a
+// rotated pole). Null if 2-D longitudes or latitudes are absent or incomplete.
 Result<std::shared_ptr<const Columns>> find_columns(const ArrayFile& file, const Placement& grid);
 
-// The variable that describes the map projection of one of those variables; -1 if there is none.
+// The grid mapping variable of one of `variables`; -1 if there is none.
 int grid_mapping_of(const ArrayFile& file, const std::vector<int>& variables);
 
-// Longitudes and latitudes of a grid whose axes are degrees about a rotated pole (CF 1.8, appendix
-// F); mapping: the variable with the pole's position. Null if it has none.
+// Longitudes and latitudes of a rotated-pole grid (CF 1.8, appendix F). mapping: the grid mapping
+// variable. Null if it has no position of the pole.
 std::shared_ptr<const Columns> columns_about_pole(const ArrayFile& file, int mapping,
                                                   const Grid& grid);
 

@@ -1,5 +1,5 @@
-// What can be made is found by standard names, units and usual names; rules run over some levels at
-// a time.
+// Finds derivable fields by standard names, units and common names; computes them a few levels at a
+// time.
 #include "server/data/cf/derived.hpp"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace windsplat::data::cf {
 namespace {
 
 constexpr double zero_celsius = 273.15;
-constexpr double warmest_celsius = 100;  // what is called Celsius and hotter than that is Kelvin
+constexpr double warmest_celsius = 100;  // larger values are taken as kelvin
 constexpr std::size_t values_at_a_time = std::size_t{1} << 20;
 
 bool is_kelvin(std::string_view units) {
@@ -33,7 +33,7 @@ bool is_celsius(std::string_view units) {
   return is_one_of(units, known);
 }
 
-// Pa of every sample of some levels at a step.
+// Pressure of samples at a step, in Pa.
 class Pressures {
  public:
   Pressures(const PressureLevels& levels, const Placement& grid)
@@ -121,7 +121,7 @@ class DerivedFinder {
     return found_.back();
   }
 
-  // Metres a unit of a variable that is a geopotential or a geopotential height; 0 if it is none.
+  // Metres per unit of a geopotential or geopotential height; 0 for other variables.
   [[nodiscard]] double metres_of(const FileVariable& source) const {
     const std::string units = lower(source.units);
     const std::string name = lower(source.name);
@@ -158,7 +158,7 @@ class DerivedFinder {
     }
   }
 
-  // Pa/s for one unit of a component; 0 if the unit is not a change of pressure.
+  // Pa/s per unit of a component; 0 if the unit is not a rate of pressure.
   [[nodiscard]] double omega_unit(const FileVariable& source) const {
     if (const auto unit = pascals_per_second_in(source.units)) return *unit;
     const bool named = source.standard_name == omega_name;
@@ -184,14 +184,14 @@ class DerivedFinder {
     return best;
   }
 
-  // Of a temperature that says Celsius its lowest level is looked at. Errors: bad_data beyond the
-  // limit of what opening may decode.
-  Result<void> may_look_at(int temperature) {
+  // Charges the lowest level of a temperature in degrees Celsius, which celsius_of() examines.
+  // Errors: bad_data beyond the limit of bytes that opening may decode.
+  Result<void> charge_lowest_level(int temperature) {
     if (is_kelvin(lower(variable(temperature).units))) return {};
     return file_.charge(temperature, decoded_step_bytes(file_, grid_, temperature, {0, 1}));
   }
 
-  // What to add to a temperature, after may_look_at().
+  // The offset of a temperature to kelvin; requires charge_lowest_level().
   Result<double> celsius_of(int temperature) {
     const FileVariable& source = variable(temperature);
     if (is_kelvin(lower(source.units))) return 0.0;
@@ -204,8 +204,8 @@ class DerivedFinder {
     float warmest = -1;
     for (const float value : values) warmest = value > warmest ? value : warmest;
     if (static_cast<double>(warmest) <= warmest_celsius) return zero_celsius;
-    notes_.push_back(in_quotes(source.name) + " says " + in_quotes(source.units) +
-                     " but its values are Kelvin: taken as such for vertical motion");
+    notes_.push_back(in_quotes(source.name) + " has units " + in_quotes(source.units) +
+                     " but values in kelvin: used as kelvin for vertical velocity");
     return 0.0;
   }
 
@@ -222,9 +222,9 @@ class DerivedFinder {
     std::string note = "the vertical part of ";
     std::string from = "the ICAO standard atmosphere's temperature";
     if (field.temperature >= 0) {
-      if (auto fine = may_look_at(field.temperature); !fine) {
+      if (auto fine = charge_lowest_level(field.temperature); !fine) {
         notes_.push_back("the vertical part of " + in_quotes(plan.info.name) +
-                         " is not made metres a second: " + fine.error().message);
+                         " is not converted to metres per second: " + fine.error().message);
         return {};
       }
       auto celsius = celsius_of(field.temperature);
@@ -237,7 +237,7 @@ class DerivedFinder {
     field.info.derived = true;
     field.info.components[2] = "w(" + variable(omega).name + ")";
     field.info.component_units[2] = "m s-1";
-    field.info.long_name = plan.info.long_name + " as metres a second";
+    field.info.long_name = plan.info.long_name + " in metres per second";
     note += in_quotes(field.info.name) + " is -omega R T / (p g) of " +
             in_quotes(variable(omega).name) + " and " + from;
     notes_.push_back(std::move(note));
@@ -258,7 +258,7 @@ class DerivedFinder {
   std::vector<DerivedField> found_;
 };
 
-// u, v and omega as they are, then w in place of omega, some levels at a time.
+// Reads u, v and omega, then converts omega to w in place, a few levels at a time.
 Result<void> fill_rise(const ArrayFile& file, const Placement& grid, const Pressures& pressures,
                        const DerivedField& field, std::size_t step, float* out,
                        const Progress& tell) {

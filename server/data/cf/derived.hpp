@@ -1,5 +1,5 @@
-// Fields that a file's own variables make together: pressure, heights, vertical motion in metres a
-// second. Known at once, computed when one is asked for.
+// Fields derived from variables of a file: pressure, heights, vertical velocity in metres per
+// second. Listed on opening, computed on demand.
 #pragma once
 
 #include <array>
@@ -26,21 +26,21 @@ struct PressureLevels {
 
 struct DerivedField {
   enum class Rule {
-    pressure,         // of every sample, in the surface pressure's units
+    pressure,         // of every sample, in the units of the surface pressure
     height,           // inputs[0] times scale, in metres
-    standard_height,  // where the standard atmosphere has the sample's pressure
+    standard_height,  // height of the pressure of the sample in the standard atmosphere
     rise,             // inputs: u, v, omega: w = -omega R T / (p g) as the third component
   };
   Rule rule = Rule::pressure;
   FieldInfo info;
   std::vector<int> inputs;  // variables
   double scale = 1;         // of inputs[0] (height), of omega to Pa/s (rise)
-  int temperature = -1;     // variable; -1: the standard atmosphere's
+  int temperature = -1;     // variable; -1: that of the standard atmosphere
   double celsius = 0;       // added to temperatures
 };
 
-// plans: the fields that the file has by itself; variables: those on the grid. Notes say what was
-// taken for what. Errors: bad_data if a file must be looked into and cannot be read.
+// plans: the fields of the file; variables: those on the grid. Adds notes of the assumptions.
+// Errors: bad_data if a variable that must be examined cannot be read.
 Result<std::vector<DerivedField>> find_derived(const ArrayFile& file, const Placement& grid,
                                                const std::vector<FieldPlan>& plans,
                                                const std::vector<int>& variables,

@@ -18,7 +18,7 @@ bool contains(std::string_view text, std::string_view part) {
   return text.find(part) != std::string_view::npos;
 }
 
-// Whether units are those of a horizontal velocity. Absent units do not speak against it.
+// Whether units are those of a horizontal velocity; absent units are accepted.
 bool is_velocity(const std::string& units) {
   constexpr auto known_units = std::to_array<std::string_view>(
       {"",        "m/s",           "m s-1",          "m s**-1",   "m s^-1",       "m.s-1",
@@ -58,8 +58,8 @@ class FieldFinder {
     });
   }
 
-  // A free variable on the same dimensions as `like`, in whatever order, whose text is `wanted`; -1
-  // if there is none.
+  // An unused variable on the dimensions of `like`, in any order, whose text is `wanted`; -1 if
+  // there is none.
   template <class Text>
   [[nodiscard]] int partner(int like, std::string_view wanted, Text text) const {
     for (const int v : variables_) {
@@ -83,7 +83,7 @@ class FieldFinder {
     return variable(a).units == variable(b).units;
   }
 
-  // A name that no variable and no other vector has, since views refer to fields by name.
+  // A name different from those of all variables and vectors, since views refer to fields by name.
   [[nodiscard]] std::string free_name(const std::string& wanted) const {
     const auto is_taken = [&](const std::string& name) {
       return std::any_of(variables_.begin(), variables_.end(),
@@ -115,7 +115,7 @@ class FieldFinder {
     plan.info.dtype = dtype_of(first);
     for (const int v : components) {
       plan.info.components.push_back(variable(v).name);
-      // The convention's own unit, where a file leaves it out.
+      // The unit by convention if the file has none.
       const bool is_bare_omega =
           variable(v).units.empty() && variable(v).standard_name == omega_name;
       plan.info.component_units.push_back(is_bare_omega ? "Pa s-1" : variable(v).units);
@@ -141,7 +141,7 @@ class FieldFinder {
     plans_.push_back(std::move(plan));
   }
 
-  // What our writer noted: "<name> <index>".
+  // By the attribute of the netCDF writer: "<name> <index>".
   void by_mark() {
     for (const int v : variables_) {
       const std::string& mark = variable(v).vector_mark;
@@ -166,7 +166,7 @@ class FieldFinder {
     return up >= 0 ? up : standing_for(like, std::string(omega_name));
   }
 
-  // standard_name pairs and the quantity they are of: eastward_Q/northward_Q, x_Q/y_Q, Q_x_R/Q_y_R.
+  // By pairs of standard_name: eastward_Q/northward_Q, x_Q/y_Q, Q_x_R/Q_y_R.
   void by_standard_name() {
     for (const int v : variables_) {
       const std::string& name = variable(v).standard_name;
@@ -197,7 +197,7 @@ class FieldFinder {
         continue;
       }
       int z = quantity == "wind" ? rising_air(v) : standing_for(v, third);
-      if (z < 0) {  // the vertical part often lacks the attribute that the others have
+      if (z < 0) {  // the vertical component often lacks standard_name
         const std::string short_name = lower(variable(v).name);
         z = vertical_partner(v, short_name.starts_with('u') ? short_name.substr(1) : "");
       }
@@ -245,7 +245,7 @@ class FieldFinder {
     add_vector(shown, z >= 0 ? std::vector<int>{v, y, z} : std::vector<int>{v, y});
   }
 
-  // w... alike, else the usual names of a vertical motion of the air.
+  // w... with the same rest, otherwise a common name of vertical velocity.
   [[nodiscard]] int vertical_partner(int v, const std::string& rest) const {
     const int alike = named(v, 'w' + rest);
     if (alike >= 0 || !is_velocity(variable(v).units)) {

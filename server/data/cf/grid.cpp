@@ -20,7 +20,7 @@ struct Candidate {
 struct Group {
   std::array<int, 3> space{};
   int rank = 0;
-  double samples = 0;  // over all variables; only compared, so a double's width is enough
+  double samples = 0;  // over all variables; only compared, so rounding is harmless
   std::vector<Candidate> members;
 };
 
@@ -28,8 +28,8 @@ std::size_t length_of(const FileContents& contents, int dimension) {
   return contents.dimensions.at(static_cast<std::size_t>(dimension)).length;
 }
 
-// The words of a blank-separated attribute of all variables, gathered once: a file may have
-// thousands of variables, each with a long list.
+// The words of a blank-separated attribute of all variables, collected once, because a file may
+// have thousands of variables with long lists.
 std::unordered_set<std::string_view> names_in(const FileContents& contents,
                                               const std::string FileVariable::*attribute) {
   std::unordered_set<std::string_view> out;
@@ -44,7 +44,7 @@ std::unordered_set<std::string_view> names_in(const FileContents& contents,
   return out;
 }
 
-// What variables name in their attributes.
+// Names that occur in attributes of variables.
 struct Named {
   explicit Named(const FileContents& contents)
       : bounds(names_in(contents, &FileVariable::bounds)),
@@ -106,7 +106,7 @@ std::string misplaced(const FileContents& contents, const FileVariable& variable
   return {};
 }
 
-// Why the file has no field, explained by the variable with the most dimensions.
+// Error text for a file without fields, explained by the variable with most dimensions.
 std::string nothing_to_show(const FileContents& contents, const std::vector<LeftOut>& left_out) {
   std::string text =
       "there is no numeric variable with two or three spatial dimensions; cells or stations in a "
@@ -168,7 +168,7 @@ std::string grid_text(const FileContents& contents, const std::array<int, 3>& sp
   return text + ")";
 }
 
-// The time dimension that most members have; the first of equals.
+// The time dimension of most members; the first of equals.
 int common_time(const std::vector<Candidate>& members) {
   int best = -1;
   std::ptrdiff_t best_count = 0;
@@ -213,7 +213,7 @@ Result<GridChoice> choose_grid(const FileContents& contents,
         add_to_group(contents, groups, std::move(candidate));
       }
     }
-    // A coordinate is not left out: it places the others.
+    // Coordinate variables are used, so they are not listed as omitted.
     if (!reason.empty() && reason != coordinate_variable) {
       choice.left_out.push_back({variable.name, std::move(reason)});
     }

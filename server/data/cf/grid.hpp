@@ -1,5 +1,5 @@
-// Which variables of a file share the one grid that is shown, and why the others are left out.
-// Pure: FileContents and dimension roles in, a choice out.
+// FileContents and dimension roles -> the grid to show, its variables, and the reasons why others
+// are omitted.
 #pragma once
 
 #include <array>
@@ -17,14 +17,14 @@ inline constexpr std::size_t samples_max = std::size_t{1} << 31;
 inline constexpr std::size_t volume_bytes_max = std::size_t{16} << 30;
 
 struct GridChoice {
-  std::array<int, 3> space{-1, -1, -1};  // dimension ids of x, y, z; -1 where the grid is flat
+  std::array<int, 3> space{-1, -1, -1};  // dimension ids of x, y, z; -1: missing dimension
   int time = -1;                         // dimension id, -1 if no field depends on time
-  std::vector<int> variables;            // those shown, in the file's order
+  std::vector<int> variables;            // those shown, in the order of the file
   std::vector<LeftOut> left_out;
 };
 
-// Grids with three spatial dimensions come first, then the one that holds the most samples over
-// all its variables. Errors: bad_data if there is none, or if it is beyond samples_max.
+// Prefers grids with three spatial dimensions, then the one with most samples over all its
+// variables. Errors: bad_data if there is none, or if it exceeds samples_max.
 Result<GridChoice> choose_grid(const FileContents& contents,
                                const std::vector<DimensionRole>& roles);
 

@@ -55,7 +55,7 @@ GridBearing bearing_of(const Columns& columns, std::size_t width) {
   const std::size_t height = count / width;
   std::vector<Plane> x(count);
   std::vector<Plane> y(count);
-  double turning = 0;  // above 0 where y is to the left of x
+  double turning = 0;  // positive if y is to the left of x
   for (std::size_t n = 0; n < count; ++n) {
     const std::size_t i = n % width;
     const std::size_t j = n / width;

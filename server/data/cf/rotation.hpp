@@ -1,5 +1,5 @@
-// Winds told by east and north, on grids whose own axes run otherwise: longitudes and latitudes of
-// the columns in, components along the axes out.
+// Rotates vectors given by east and north to the axes of the grid, from the longitudes and
+// latitudes of its columns.
 #pragma once
 
 #include <cstddef>
@@ -9,19 +9,19 @@
 
 namespace windsplat::data::cf {
 
-// One a column: where the x axis points on the ground. The y axis is at right angles to it; it is
-// to the left, or to the right where the grid is seen from below (side = -1).
+// Direction of the x axis at each column. The y axis is perpendicular to it, on the left, or on the
+// right for a left-handed grid (side = -1).
 struct GridBearing {
-  std::vector<float> east;  // of the x axis' unit vector
+  std::vector<float> east;  // components of the unit vector along x
   std::vector<float> north;
   float side = 1;
 };
 
-// width: columns along x. By the neighbours on the sphere; where the axes are not at right angles,
-// the mean of what both say.
+// width: columns along x. Computed from neighbours on the sphere; if the axes are not
+// perpendicular, the mean direction of both.
 GridBearing bearing_of(const Columns& columns, std::size_t width);
 
-// Components east and north become those along x and y, in place; `levels` layers of both.
+// Converts components along east and north to those along x and y in place, for `levels` layers.
 void rotate(const GridBearing& bearing, std::size_t levels, float* east, float* north);
 
 }  // namespace windsplat::data::cf

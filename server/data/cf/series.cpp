@@ -1,5 +1,5 @@
-// Members are compared with the first one, their times put on one axis, and blocks passed on to the
-// member that has the step.
+// Compares members with the first one, merges their times, and forwards reads to the member that
+// contains the step.
 #include "server/data/cf/series.hpp"
 
 #include <algorithm>
@@ -37,7 +37,7 @@ bool same_packing(const Packing& a, const Packing& b) {
                     same_number);
 }
 
-// Whether coordinates are the same to the rounding of single precision.
+// Whether coordinates are equal within single precision.
 bool same_place(double a, double b) {
   return same_number(a, b) || std::abs(a - b) <= 1e-6 * std::max(std::abs(a), std::abs(b)) + 1e-9;
 }
@@ -69,7 +69,7 @@ Error misfit(const ArrayFile& file, const ArrayFile& first, const std::string& w
                                              in_quotes(first.name()) + ": " + what);
 }
 
-// Every value of a block of one step, put where it belongs among those of all steps.
+// Scatters a block of one step into the array of all steps.
 template <class T>
 void interleave(const std::vector<std::size_t>& count, std::size_t axis, std::size_t step,
                 const std::vector<T>& block, T* out) {
@@ -129,7 +129,7 @@ Result<void> SeriesFile::begin() {
   return {};
 }
 
-// Whether all members are taken to have the first one's values.
+// Whether the values of the first member are used for all members.
 bool SeriesFile::is_static(std::size_t in_first) const {
   const FileVariable& variable = first_->contents().variables[in_first];
   if (static_cast<int>(in_first) == time_coordinate_) return false;
@@ -173,7 +173,7 @@ Result<void> SeriesFile::check_space(const ArrayFile& file) const {
   return {};
 }
 
-// Coordinates of space, of whatever rank, and what stands beside them along an axis.
+// Compares spatial coordinates of any rank, and other variables along an axis.
 Result<void> SeriesFile::check_values(const ArrayFile& file) const {
   const FileContents& contents = first_->contents();
   for (std::size_t v = 0; v < contents.variables.size(); ++v) {
@@ -326,7 +326,7 @@ void SeriesFile::sort_steps() {
   steps_ = std::move(kept);
 }
 
-// Puts the first member's contents and what was found about the others together.
+// Builds the contents from the first member and the comparison with the others.
 void SeriesFile::finish() {
   const FileContents& own = first_->contents();
   contents_.title = own.title;
@@ -364,7 +364,7 @@ void SeriesFile::finish() {
   contents_.notes.push_back(std::to_string(members_.size()) + " files joined along time");
 }
 
-// Members that are single steps get a dimension that they lack.
+// Adds a time dimension for members that are single steps.
 void SeriesFile::add_time_dimension() {
   FileDimension dimension;
   dimension.name = time_coordinate_ >= 0 ? first_->contents().variables[at(time_coordinate_)].name
@@ -406,7 +406,7 @@ std::size_t SeriesFile::chunk_cost_bytes(int variable) const {
   return in_first < 0 ? 0 : first_->chunk_cost_bytes(in_first);
 }
 
-// Of the first member, which stands for the others: they are not opened for it.
+// Examines the first member only, to avoid opening the others.
 Unwritten SeriesFile::unwritten(int variable, std::size_t most) const {
   const int in_first = variables_.at(at(variable)).in_first;
   if (in_first < 0) return {};
@@ -495,7 +495,7 @@ Result<void> SeriesFile::read_steps(int variable, const std::vector<std::size_t>
   std::vector<std::size_t> from = start;
   std::vector<std::size_t> here = count;
   here[axis] = 1;
-  if (time_ < 0) {  // the dimension that members lack
+  if (time_ < 0) {  // members have no time dimension
     from.erase(from.begin());
     here.erase(here.begin());
   }

@@ -1,5 +1,5 @@
-// Puts together what the files beside this one find out, and reads one field at one step: blocks of
-// the file in its own order, unpacked and scattered into x-fastest volumes.
+// Combines grid, axes, times and fields into a dataset, and reads one field at one step into a
+// volume, x fastest.
 #include "server/data/cf/source.hpp"
 
 #include <algorithm>
@@ -65,7 +65,7 @@ class ArraySource final : public FileSource {
       return named(done.error());
     }
     if (info_.fields.empty()) {
-      return named(make_error(ErrorKind::bad_data, "no field fits into the limit of 16 GiB"));
+      return named(make_error(ErrorKind::bad_data, "every field exceeds the limit of 16 GiB"));
     }
     tell_valid_values();
     tell_unwritten();
@@ -107,12 +107,12 @@ class ArraySource final : public FileSource {
   }
 
  private:
-  // How a field is made.
+  // How a field is read or derived.
   struct Plan {
     std::vector<int> variables;
     int derived = -1;           // index into derived_
-    bool rotated = false;       // from east and north to the axes
-    bool follows_rows = false;  // from the file's rows and columns to the axes
+    bool rotated = false;       // components from east and north to the axes
+    bool follows_rows = false;  // components from rows and columns of the file to the axes
   };
 
   // Directions of vector components given along the rows and columns of the file.
@@ -131,7 +131,7 @@ class ArraySource final : public FileSource {
     return file_->contents().dimensions.at(static_cast<std::size_t>(id));
   }
 
-  // What has no coordinates in the file is counted, which takes memory for every entry.
+  // Dimensions without coordinates get counted ones, which need memory per entry.
   [[nodiscard]] Result<void> check_entries() const {
     const auto stored = file_->stored_bytes();
     for (const int id : {choice_.space[0], choice_.space[1], choice_.space[2], choice_.time}) {
@@ -178,7 +178,7 @@ class ArraySource final : public FileSource {
     return bearing->is_curvilinear ? Result<void>() : find_projection();
   }
 
-  // Where axes with coordinates of their own are those of a map.
+  // Finds the projection of axes with 1-D coordinates.
   Result<void> find_projection() {
     const auto& [x, y, z] = info_.grid.axes;
     const int mapping = grid_mapping_of(*file_, choice_.variables);
@@ -209,7 +209,7 @@ class ArraySource final : public FileSource {
 
   [[nodiscard]] Levels all_levels() const { return {0, placement_.length[2]}; }
 
-  // The axis of a dimension that the data lack.
+  // The axis of a missing dimension.
   [[nodiscard]] Axis flat_axis(std::size_t which) const {
     constexpr std::array<const char*, 3> known_names{"x", "y", "z"};
     Axis axis;
@@ -304,7 +304,7 @@ class ArraySource final : public FileSource {
     return {};
   }
 
-  // A series is sorted by time; a single file is shown in its own order.
+  // A series is sorted by time; a single file keeps its order.
   void note_disorder(const std::string& name, const std::vector<double>& times) {
     std::size_t falls = 0;
     std::size_t repeats = 0;
@@ -325,7 +325,7 @@ class ArraySource final : public FileSource {
     return count == 1 ? std::string("once") : std::to_string(count) + " times";
   }
 
-  // Where levels follow the ground the vertical axis becomes that of mean pressures.
+  // For terrain-following levels, the vertical axis becomes that of mean pressures.
   Result<void> find_pressures() {
     Axis& axis = info_.grid.axes[2];
     const int z = choice_.space[2];
@@ -342,8 +342,8 @@ class ArraySource final : public FileSource {
       const int surface = find_surface_pressure(file_->contents(), placement_);
       if (surface >= 0) {
         info_.notes.push_back(in_quotes(variable_name(surface)) +
-                              " is the surface pressure: what lies below it is shown as the file "
-                              "has it, unless it is marked as missing");
+                              " is the surface pressure: samples below the surface are shown "
+                              "unless marked as missing");
       }
     }
     return {};
@@ -374,7 +374,7 @@ class ArraySource final : public FileSource {
     const auto mean = [&](std::size_t k) {
       return hybrid.a[k] / hybrid.unit_pa + hybrid.b[k] * sum / count;
     };
-    // Levels may be counted from the top without the file saying so.
+    // Levels may be counted from the top without an attribute that states it.
     if (count > 0 && mean(0) < mean(axis.coordinates.size() - 1)) {
       std::reverse(hybrid.a.begin(), hybrid.a.end());
       std::reverse(hybrid.b.begin(), hybrid.b.end());
@@ -490,7 +490,8 @@ class ArraySource final : public FileSource {
     plans_.push_back(std::move(plan));
   }
 
-  // How a vector is converted to the grid's axes, which need not run east and north.
+  // Determines how a vector is converted to the axes of the grid, which may differ from east and
+  // north.
   void find_turning(const FieldInfo& info, Plan& plan) {
     const auto& first =
         file_->contents().variables.at(static_cast<std::size_t>(plan.variables.front()));
@@ -507,13 +508,11 @@ class ArraySource final : public FileSource {
           " is given by east and north, but the grid's longitudes and latitudes have gaps or are "
           "not in the file: it is drawn as if rows ran east";
     } else if (!by_grid) {
-      note +=
-          " does not say which way its components point: taken to be along the axes as they are "
-          "drawn";
+      note += " does not specify the direction of its components: assumed to be along the axes";
     }
     if (by_earth || !by_grid) info_.notes.push_back(std::move(note));
     plan.rotated = by_earth && info_.grid.columns;
-    // u and v without a word mean east and north, or nearly, more often than indices.
+    // u and v without attributes more often mean east and north than rows and columns.
     plan.follows_rows = by_grid && to_axes_.any();
     if (!plan.follows_rows) return;
     note =
@@ -543,7 +542,7 @@ class ArraySource final : public FileSource {
   Placement placement_;
   DatasetInfo info_;
   PressureLevels pressures_;
-  bool follows_other_axes_ = false;  // rows need not run east
+  bool follows_other_axes_ = false;  // rows may not point east
   ToAxes to_axes_;
   std::optional<GridBearing> bearing_;
   std::vector<DerivedField> derived_;

@@ -1,4 +1,4 @@
-// Coefficients and the surface pressure by the terms of a formula.
+// Finds coefficients and surface pressure by formula terms or common names.
 #include "server/data/cf/vertical.hpp"
 
 #include <algorithm>
@@ -44,7 +44,7 @@ std::map<std::string, std::string> terms_of(const std::string& text) {
   return terms;
 }
 
-// What NCL and models without formula_terms say or imply.
+// Terms by the attributes of NCL and by common names, for files without formula_terms.
 std::map<std::string, std::string> usual_terms(const ArrayFile& file, int coordinate,
                                                const Placement& grid) {
   std::map<std::string, std::string> terms;
@@ -83,7 +83,7 @@ bool on_columns(const FileContents& contents, const Placement& grid, int variabl
   return found.numeric && horizontal == wanted;
 }
 
-// One value a level, from below; empty if the variable is not so.
+// One value per level, from below; empty if the variable has other dimensions.
 Result<std::vector<double>> on_levels(const ArrayFile& file, const Placement& grid,
                                       const std::string& name) {
   const int v = term_variable(file.contents(), name);
@@ -118,7 +118,7 @@ Result<std::optional<Single>> single_pressure(const ArrayFile& file, const std::
   return Found({values->front(), pascals_in(variable.units)});
 }
 
-// In Pa; the usual one if it is not in the file.
+// In Pa; 1000 hPa if it is not in the file.
 Result<double> reference_pressure(const ArrayFile& file, const std::string& name,
                                   std::string& note) {
   const auto found = single_pressure(file, name);
@@ -128,11 +128,11 @@ Result<double> reference_pressure(const ArrayFile& file, const std::string& name
     // A reference pressure is near 1000 hPa: its magnitude implies a missing unit.
     return p0.value * (p0.unit_pa ? *p0.unit_pa : p0.value < 2000 ? 100.0 : 1.0);
   }
-  note += "; no reference pressure in the file: 1000 hPa is taken";
+  note += "; no reference pressure in the file: using 1000 hPa";
   return usual_reference_pa;
 }
 
-// In Pa; 0 if it is not in the file. Without a unit of its own it has the surface pressure's.
+// In Pa; 0 if it is not in the file. Without a unit, that of the surface pressure is assumed.
 Result<double> top_pressure(const ArrayFile& file, const std::string& name, int surface,
                             std::string& note) {
   const auto found = single_pressure(file, name);
@@ -140,7 +140,7 @@ Result<double> top_pressure(const ArrayFile& file, const std::string& name, int 
   if (!*found) {
     note += name.empty() ? "; the formula names no pressure at the top"
                          : "; the pressure at the top, " + in_quotes(name) + ", is not in the file";
-    note += ": 0 is taken";
+    note += ": using 0";
     return 0.0;
   }
   if ((*found)->unit_pa) return (*found)->value * *(*found)->unit_pa;
@@ -236,9 +236,9 @@ Result<std::optional<HybridLevels>> find_hybrid(const ArrayFile& file, const Pla
   if (!unit) return Found();
   out.unit_pa = *unit;
   std::string note =
-      "levels follow the ground: the vertical axis has their pressures over the mean of ";
+      "levels follow the terrain: the vertical axis has their pressures for the mean of ";
   note += in_quotes(surface.name) + " at the first step" + out.note;
-  if (!by_formula) note += "; the file has no formula_terms, usual names were taken";
+  if (!by_formula) note += "; without formula_terms, identified by common names";
   out.note = std::move(note);
   return Found(std::move(out));
 }

@@ -145,7 +145,7 @@ TEST_P(TurnedAxes, VectorsThatSayNothingStayAsTheyAreAndANoteSaysSo) {
   const Volume wind = volume_of(**source, "wind");
   EXPECT_EQ(wind.component(0)[5], 10);
   EXPECT_EQ(wind.component(1)[5], 1);
-  EXPECT_TRUE(has_note((*source)->info(), "does not say which way its components point"));
+  EXPECT_TRUE(has_note((*source)->info(), "does not specify the direction of its components"));
 }
 
 TEST_P(TurnedAxes, TheDerivedVerticalMotionsHorizontalPartToo) {

@@ -167,7 +167,8 @@ TEST(Rotation, WindsAlongTheGridStayAndUnnamedOnesAreNoted) {
     const Volume wind = volume_of(**source, "wind");
     EXPECT_EQ(wind.component(0)[10], 3);
     EXPECT_EQ(wind.component(1)[10], 4);
-    EXPECT_EQ(has_note((*source)->info(), "does not say which way its components point"), !named);
+    EXPECT_EQ(has_note((*source)->info(), "does not specify the direction of its components"),
+              !named);
   }
 }
 

@@ -54,7 +54,7 @@ TEST(HybridLevels, Vinth2pHasThePressuresOfItsFormula) {
   EXPECT_NEAR(z.coordinates[0], 95886.22888248185, 0.01);
   EXPECT_NEAR(z.coordinates[1], 93757.4667948502, 0.01);
   EXPECT_NEAR(z.coordinates[17], 480.9299949556589, 1e-4);
-  EXPECT_TRUE(has_note(info, "1000 hPa is taken"));  // P0 is named, but not in the file
+  EXPECT_TRUE(has_note(info, "using 1000 hPa"));  // P0 is named, but not in the file
   EXPECT_EQ(reason_of(info, "PS"), "surface pressure: gives the pressure of the levels");
   EXPECT_EQ(reason_of(info, "hyam"), "coefficient of the levels' pressure");
   ASSERT_NE(info.find("pressure"), nullptr);
@@ -171,13 +171,13 @@ TEST(HybridLevels, ATopThatIsNotToldIsNotedAndOneWithoutAUnitHasTheSurfaces) {
     double half;  // Pa
     const char* note;
   };
-  for (const Case& c :
-       {Case{"sigma: sigma ps: ps ptop: absent", "Pa", 2000, "Pa", 50000,
-             "the pressure at the top, 'absent', is not in the file: 0 is taken"},
-        Case{"sigma: sigma ps: ps", "Pa", 2000, "Pa", 50000, "names no pressure at the top: 0"},
-        Case{"sigma: sigma ps: ps ptop: PTOP", "Pa", 1000, "Pa", 50500, ""},
-        Case{"sigma: sigma ps: ps ptop: PTOP", "", 1000, "Pa", 50500, ""},
-        Case{"sigma: sigma ps: ps ptop: PTOP", "", 10, "hPa", 50500, ""}}) {
+  for (const Case& c : {Case{"sigma: sigma ps: ps ptop: absent", "Pa", 2000, "Pa", 50000,
+                             "the pressure at the top, 'absent', is not in the file: using 0"},
+                        Case{"sigma: sigma ps: ps", "Pa", 2000, "Pa", 50000,
+                             "names no pressure at the top: using 0"},
+                        Case{"sigma: sigma ps: ps ptop: PTOP", "Pa", 1000, "Pa", 50500, ""},
+                        Case{"sigma: sigma ps: ps ptop: PTOP", "", 1000, "Pa", 50500, ""},
+                        Case{"sigma: sigma ps: ps ptop: PTOP", "", 10, "hPa", 50500, ""}}) {
     const Folder folder;
     {
       NetcdfMaker file(folder / "s.nc");
@@ -196,7 +196,7 @@ TEST(HybridLevels, ATopThatIsNotToldIsNotedAndOneWithoutAUnitHasTheSurfaces) {
     ASSERT_TRUE(source) << source.error().message;
     const double unit = *c.ps_units == 'h' ? 100 : 1;
     EXPECT_FLOAT_EQ(volume_of(**source, "pressure").values[4] * unit, c.half) << c.ptop;
-    EXPECT_EQ(has_note((*source)->info(), "0 is taken"), *c.note != '\0');
+    EXPECT_EQ(has_note((*source)->info(), "using 0"), *c.note != '\0');
     EXPECT_TRUE(has_note((*source)->info(), c.note));
   }
 }
@@ -289,7 +289,7 @@ TEST(Omega, BecomesMetresASecondByTheFilesTemperature) {
     EXPECT_TRUE(std::isnan(wind.component(0)[7]));
     EXPECT_TRUE(has_note(info, "the temperature 'ta'"));
     EXPECT_TRUE(has_note(info, "'wind' is in 'Pa s-1': its lines point up where air rises"));
-    EXPECT_EQ(has_note(info, "its values are Kelvin"), c.units == "C");
+    EXPECT_EQ(has_note(info, "values in kelvin"), c.units == "C");
     EXPECT_TRUE(has_note(info, "'ps' is the surface pressure"));
     // No sample is masked for being below the surface pressure.
     EXPECT_EQ(volume_of(**source, "ua").masked, 0);
@@ -320,7 +320,7 @@ TEST(Omega, StaysWhereLookingAtTheTemperatureIsBeyondTheLimit) {
   EXPECT_NE(info.find("wind"), nullptr);
   EXPECT_NE(info.find("T"), nullptr);
   EXPECT_EQ(info.find("wind_m"), nullptr);
-  EXPECT_TRUE(has_note(info, "the vertical part of 'wind' is not made metres a second"));
+  EXPECT_TRUE(has_note(info, "the vertical part of 'wind' is not converted to metres per second"));
   EXPECT_TRUE(has_note(info, "'T' is too large"));
 }
 
