@@ -1,5 +1,5 @@
-// A new dimension is made: the library gives one dimension to all arrays of a length, so that the
-// steps of one may be the rows of another.
+// Adds a new dimension, because the library assigns one dimension to all arrays of equal length, so
+// that the steps of one array may share a dimension with the rows of another.
 #include "server/data/formats/netcdf/bare.hpp"
 
 #include <algorithm>

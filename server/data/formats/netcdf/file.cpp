@@ -1,4 +1,4 @@
-// Opening, scanning and reading through the netCDF C library, one caller at a time.
+// Opens and scans files by the netCDF C library under a lock.
 #include "server/data/formats/netcdf/file.hpp"
 
 #include <hdf5.h>
@@ -27,8 +27,8 @@ namespace windsplat::data::netcdf {
 
 namespace {
 
-constexpr std::size_t text_max = 4096;      // bytes of a text attribute that are kept
-constexpr std::size_t numbers_max = 65536;  // values of a numeric attribute that are read
+constexpr std::size_t text_max = 4096;      // bytes of a text attribute; the rest is dropped
+constexpr std::size_t numbers_max = 65536;  // values of a numeric attribute
 constexpr int variables_max = 8192;
 constexpr std::size_t groups_max = 1024;
 constexpr int depth_max = 64;  // of groups within groups
@@ -39,7 +39,7 @@ std::mutex& library_mutex() {
   return mutex;
 }
 
-// A window on the file, so that a header's many small integers do not each cost a system call.
+// A buffer of the file, to avoid a system call per integer of the header.
 class Window {
  public:
   explicit Window(const InputFile& input) : input_(input) {}
@@ -67,7 +67,7 @@ class Window {
   std::vector<unsigned char> bytes_;
 };
 
-// The signature may stand behind a user block of 512, 1024, 2048, ... bytes.
+// The signature may follow a user block of 512, 1024, 2048, ... bytes.
 bool has_hdf5_signature(const InputFile& input) {
   std::array<unsigned char, 8> found{};
   for (std::uint64_t at = 0; at + found.size() <= input.size(); at = at == 0 ? 512 : at * 2) {
@@ -152,10 +152,9 @@ std::string there_is(const std::vector<std::string>& groups) {
 
 LibraryLock::LibraryLock() {
   library_mutex().lock();
-  // Files must not choose code to load (open_library makes sure of it), and HDF5 must not write its
-  // own account of every missing attribute to stderr, which is a setting of each thread.
-  // A file that could not be written (a full disk) stays open in HDF5, and its own clean-up at the
-  // end of the process crashes on it; everything here closes what it opens.
+  // Files must not load plugins (see open_library), and HDF5 must not print every missing attribute
+  // to stderr (a setting per thread). After a failed write (full disk) HDF5 keeps the file open,
+  // and its exit handler crashes on it; it is disabled, since all handles are closed here.
   static const bool without_last_words = H5dont_atexit() >= 0;
   static const bool without_plugins = H5PLset_loading_state(0) >= 0;
   thread_local const bool without_noise = H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr) >= 0;
@@ -182,17 +181,17 @@ Result<std::string> writable_path(const std::string& path) {
     return make_error(ErrorKind::not_found, in_quotes(path) + ": there is no folder " +
                                                 in_quotes(plain.parent_path().native()));
   }
-  // The file takes its name when it is whole: a device or a pipe would be gone then.
+  // The complete file is renamed to its name, which would replace a device or pipe.
   const fs::file_status status = fs::status(plain, fault);
   if (fs::exists(status) && !fs::is_regular_file(status)) {
     return make_error(ErrorKind::invalid,
                       in_quotes(path) + " is not a regular file, which netCDF needs");
   }
-  // The library reads directions behind '#' and rewrites '\\' in names.
+  // The library interprets '#' as the start of mode options and rewrites '\\' in names.
   if (plain.native().find_first_of("#\\") != std::string::npos ||
       path.find("://") != std::string::npos) {
     return make_error(ErrorKind::bad_data,
-                      in_quotes(path) + ": a path with '#', '\\' or '://' is not written");
+                      in_quotes(path) + ": output paths must not contain '#', '\\' or '://'");
   }
   return plain.native();
 }
@@ -469,7 +468,7 @@ Result<void> File::scan_variable(const Place& place, bool above) {
   variable.standard_name = text(place, "standard_name");
   variable.long_name = text(place, "long_name");
   variable.units = text(place, "units");
-  // Of the groups above only what places the variables counts.
+  // From parent groups only coordinates are used.
   if (above && rank > 1 &&
       (!(cf::is_position(variable) || cf::is_surface_pressure(variable)) ||
        cf::variable_named(contents_, variable.name) >= 0)) {
@@ -504,7 +503,7 @@ void File::look_at_storage(const Place& place, FileVariable& variable) {
       nc_inq_grpname_full(place.group, nullptr, path.data());
     }
     if (path == "/") path.clear();
-    // A variable that has a dimension's name and is no coordinate of it is stored under another.
+    // A variable with the name of a dimension that is not its coordinate has another name in HDF5.
     const std::string other = path + "/_nc4_non_coord_" + variable.name;
     path += '/' + variable.name;
     if (storage_.count(other) > 0) path = other;

@@ -1,4 +1,4 @@
-// Recognised by the names of all arrays together: meep writes no attributes.
+// Identifies meep by the names of all arrays, since it writes no attributes.
 #include "server/data/formats/netcdf/meep.hpp"
 
 #include <algorithm>

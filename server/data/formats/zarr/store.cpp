@@ -179,7 +179,7 @@ Result<void> Store::add_array(const std::string& name, const std::string& path, 
   return {};
 }
 
-// Without names, arrays of the same lengths in the same places share their dimensions.
+// Without names, arrays share dimensions of equal length at equal positions.
 void Store::name_dimensions(Array& array) const {
   const auto& shape = array.metadata.shape;
   const Json* names = array.attributes.find("_ARRAY_DIMENSIONS");
@@ -201,7 +201,7 @@ void Store::name_dimensions(Array& array) const {
   }
 }
 
-// Coordinates first: where two arrays disagree on a dimension's length, they are right.
+// Coordinates first: their lengths have precedence over those of other arrays.
 void Store::describe_all() {
   contents_.title = text_in(attributes_, "title");
   const auto is_coordinate = [](const Array& array) {
@@ -212,7 +212,7 @@ void Store::describe_all() {
   for (const Array& array : arrays_) describe(array, is_coordinate(array));
 }
 
-// Where every possible field is unread, the reason is worth more than that there is none.
+// If no field can be read, returns the reason instead of a missing field.
 Result<void> Store::check_any_field() const {
   const FileVariable* unread = nullptr;
   for (const FileVariable& variable : contents_.variables) {
@@ -269,7 +269,7 @@ void Store::describe(const Array& array, bool coordinate) {
   }
 }
 
-// Zarr's own default fill_value is 0: only xarray means missing values by it.
+// The default fill_value of Zarr is 0; only xarray uses it for missing values.
 bool Store::is_fill_a_number(const Array& array) const {
   const auto& fill = array.metadata.fill_value;
   return fill && *fill == 0 && !array.named_dimensions;
