@@ -56,8 +56,8 @@ void File::free_chunks(int variable) const {
   std::size_t size = 0;
   std::size_t slots = 0;
   float preemption = 0;
-  // Setting the cache size, even to the same value, reopens the variable in the library, so compare
-  // first. A failure only wastes memory.
+  // Setting the cache size, even to the same value, makes the library reopen the variable, which
+  // frees its chunks. A failure only leaves memory in use.
   if (nc_get_var_chunk_cache(group, id, &size, &slots, &preemption) == NC_NOERR) {
     nc_set_var_chunk_cache(group, id, size, slots, preemption);
   }

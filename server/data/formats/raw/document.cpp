@@ -1,5 +1,4 @@
-// JSON with limits: size, depth, no key twice, no unknown key, every number checked before it is
-// taken.
+// JSON with limits of size and depth; rejects duplicate and unknown keys and checks every number.
 #include "server/data/formats/raw/document.hpp"
 
 #include <algorithm>

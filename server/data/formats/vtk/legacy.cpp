@@ -1,5 +1,5 @@
-// Legacy VTK files ("# vtk DataFile Version"), ASCII or BINARY. Words of the file, one after
-// another -> Snapshot; the arrays' values are passed over and noted by where they lie.
+// Legacy VTK files ("# vtk DataFile Version"), ASCII or BINARY. Words of the file -> Snapshot;
+// values of arrays are skipped, and their locations recorded.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,7 +19,7 @@ constexpr std::size_t text_buffer_bytes = std::size_t{1} << 18;
 constexpr std::size_t line_max = 4096;
 constexpr std::size_t arrays_max = 10'000;
 
-// Words and lines of a file, with the place where each begins.
+// Words and lines of a file with their offsets.
 class Scanner {
  public:
   explicit Scanner(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}
@@ -27,7 +27,7 @@ class Scanner {
   [[nodiscard]] std::uint64_t at() const { return at_; }
   [[nodiscard]] bool ended() const { return at_ >= file_->size(); }
 
-  // Up to the end of the line, which is passed over. Errors: a line beyond the limit.
+  // Reads to the end of the line and skips it. Errors: a line beyond the limit.
   Result<std::string> line() {
     std::string out;
     while (!ended()) {
@@ -134,7 +134,7 @@ std::optional<bytes::Scalar> type_named(const std::string& name) {
   return at->second;
 }
 
-// Names are written with %20 for a blank and the like.
+// Decodes names with percent encoding.
 std::string decoded(const std::string& name) {
   std::string out;
   for (std::size_t i = 0; i < name.size(); ++i) {
@@ -275,7 +275,7 @@ class Reader {
     return fault(in_quotes(key) + " where a section is due");
   }
 
-  // Passes over the values that follow the line, and notes where they are.
+  // Skips the values after the line and records their location.
   Result<void> take(StoredArray& array, bool known_bits = false, std::uint64_t value_bits = 0) {
     array.coding = {.big_endian = true, .has_header = false};
     array.encoding = binary_ ? Encoding::raw : Encoding::text;
@@ -291,7 +291,7 @@ class Reader {
     return done;
   }
 
-  // The rest of a line whose words are told, then the values. type: as the file calls it.
+  // Reads the values after a line. type: its name in the file.
   Result<bool> take_typed(StoredArray& array, const std::string& type) {
     const auto known = type_named(lower(type));
     if (known) {
@@ -341,8 +341,8 @@ class Reader {
     return {};
   }
 
-  // Before version 5: cells and numbers, then each cell's count and indices. Since: one more than
-  // cells and indices, then OFFSETS and CONNECTIVITY.
+  // Before version 5: numbers of cells and entries, then count and indices of each cell. Since: the
+  // number of cells plus one and of indices, then OFFSETS and CONNECTIVITY.
   Result<void> read_cells() {
     const auto first = count();
     if (!first) return first.error();
@@ -400,7 +400,7 @@ class Reader {
     return {};
   }
 
-  // What POINT_DATA and CELL_DATA hold.
+  // Reads an attribute of POINT_DATA or CELL_DATA.
   Result<void> read_attribute(const std::string& key) {
     const auto line = scan_.line();
     if (!line) return line.error();
@@ -516,7 +516,7 @@ class Reader {
     return {};
   }
 
-  // Of the arrays that belong to the whole file only the time is of use.
+  // Of the field data of the file, only the time is used.
   Result<void> take_time(const StoredArray& array) {
     const std::string name = lower(array.name);
     if ((name != "time" && name != "timevalue") || array.values() != 1) return {};
@@ -526,7 +526,7 @@ class Reader {
     return {};
   }
 
-  // Lines up to an empty one; COMPONENT_NAMES are those of the array before.
+  // Reads lines up to an empty one; COMPONENT_NAMES refers to the previous array.
   Result<void> read_metadata() {
     if (auto rest = scan_.line(); !rest) return rest.error();
     StoredArray* last = into_ == nullptr || into_->empty() ? nullptr : &into_->back();

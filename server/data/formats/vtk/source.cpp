@@ -1,4 +1,4 @@
-// Steps' files -> one grid, on axes or resampled -> fields that all steps have -> volumes.
+// Files of steps -> one grid, rectilinear or resampled -> fields common to all steps -> volumes.
 #include "server/data/formats/vtk/source.hpp"
 
 #include <algorithm>
@@ -98,7 +98,7 @@ class VtkSource final : public FileSource {
   }
 
  private:
-  // Which files, and what times a collection gives them.
+  // Finds the files of the steps, and their times in a collection.
   Result<void> find_steps() {
     for (const auto& member : files_->location().members) {
       steps_.push_back({member.name, {}, {}});
@@ -125,7 +125,7 @@ class VtkSource final : public FileSource {
     return {};
   }
 
-  // Opens the file of a step as file_, and notes its identity.
+  // Opens the file of a step as file_ and records its identity.
   Result<Snapshot> open_step(std::size_t step) {
     auto file = files_->open(steps_[step].name);
     if (!file) return file.error();
@@ -168,7 +168,7 @@ class VtkSource final : public FileSource {
     return of_cells_ ? piece.cell_data : piece.point_data;
   }
 
-  // Points or cells: whichever has more fields, points of equals. The others are left out.
+  // Chooses point or cell data, whichever has more fields, points if equal; omits the other.
   void choose_data(const Snapshot& snapshot) {
     const Piece& piece = snapshot.pieces.front();
     const auto fields = [](const std::vector<StoredArray>& arrays) {
@@ -291,7 +291,7 @@ class VtkSource final : public FileSource {
     return {};
   }
 
-  // Leaves out the fields that a piece lacks.
+  // Omits fields that are missing in a piece.
   void keep_common_fields(const Snapshot& snapshot) {
     std::erase_if(info_.fields, [&](const FieldInfo& field) {
       const bool common =
@@ -322,7 +322,7 @@ class VtkSource final : public FileSource {
     return {};
   }
 
-  // The files' own times if all have one and they ascend; otherwise steps are counted.
+  // Uses the times of the files if all have one and they ascend; otherwise counts steps.
   void set_times() {
     bool timed = true;
     for (std::size_t s = 0; s < steps_.size(); ++s) {
@@ -338,7 +338,7 @@ class VtkSource final : public FileSource {
     }
   }
 
-  // Calls take(tuples, how many) for blocks of a piece's array, in order.
+  // Calls take(tuples, count) for blocks of an array of a piece, in order.
   template <class Take>
   Result<void> read_tuples(const StoredArray& array, const Take& take) {
     auto reader = ArrayReader::open(file_, array);
@@ -366,8 +366,8 @@ class VtkSource final : public FileSource {
     return array;
   }
 
-  // Where the tuples of a piece go: offsets from the first sample, in the piece's order.
-  // along[a]: how far neighbours along index axis a lie apart.
+  // Destination of the tuples of a piece: offsets from the first sample, in the order of the piece.
+  // along[a]: offset between neighbours along index axis a.
   struct Target {
     std::ptrdiff_t origin = 0;
     std::array<std::ptrdiff_t, 3> along{};
@@ -381,7 +381,7 @@ class VtkSource final : public FileSource {
     }
   };
 
-  // The same grid for a piece of it. world: by index axis the axis of the volume; turned likewise.
+  // The destination of a piece. world: axis of the volume by index axis; likewise turned.
   [[nodiscard]] static Target target_of(const Extent& whole, const Extent& piece, bool of_cells,
                                         const std::array<std::size_t, 3>& world,
                                         const std::array<bool, 3>& turned) {
@@ -477,7 +477,7 @@ class VtkSource final : public FileSource {
   }
 
   std::shared_ptr<Files> files_;
-  FilePtr file_;  // of the step read last
+  FilePtr file_;  // of the last step read
   std::vector<StepFile> steps_;
   DatasetInfo info_;
   Kind kind_ = Kind::image;
@@ -485,7 +485,7 @@ class VtkSource final : public FileSource {
   std::optional<double> time_;
   bool of_cells_ = false;
   RegularGrid points_grid_;
-  RegularGrid grid_;          // of what is shown, unless resampled
+  RegularGrid grid_;          // of the shown data, unless resampled
   std::optional<Mesh> mesh_;  // if resampled, without its points
   Resampling resampling_;
   std::string mesh_digest_;
