@@ -31,7 +31,7 @@ Box curved_box(const Pass& pass, const Brick& brick) {
   for (int v = 0; v < brick.v_count; ++v) {
     for (int u = 0; u < brick.u_count; ++u) {
       const float* place =
-          pass.places + 3 * (offset(pass.major, brick.slab) + offset(pass.v, brick.v_first + v) +
+          pass.places + 3 * (offset(pass.major, brick.sheet) + offset(pass.v, brick.v_first + v) +
                              offset(pass.u, brick.u_first + u));
       for (int c = 0; c < 3; ++c) {
         box.low[c] = std::min<double>(box.low[c], place[c]);
@@ -53,7 +53,7 @@ Box stops_box(const PassPlan& plan, const Brick& brick) {
     box.low[a] = axis.position[low];
     box.high[a] = axis.position[low + count - 1];
   };
-  extend(pass.major, brick.slab, 1);
+  extend(pass.major, brick.sheet, 1);
   extend(pass.u, brick.u_first, brick.u_count);
   extend(pass.v, brick.v_first, brick.v_count);
   return box;
@@ -136,7 +136,7 @@ double splat_cover(const Pass& pass, const Brick& brick, double scale) {
     return std::max(
         {edge[0] * edge[1] * edge[2] / chord * scale * scale, section / chord * scale, 1.0});
   }
-  widest(pass.major, brick.slab, 1);
+  widest(pass.major, brick.sheet, 1);
   widest(pass.u, brick.u_first, brick.u_count);
   widest(pass.v, brick.v_first, brick.v_count);
   std::sort(edge.begin(), edge.end());
@@ -156,7 +156,7 @@ class Binner {
     for (std::size_t p = 0; p < count; ++p) {
       begin_pass(plan_.passes[p], space_.passes[p]);
     }
-    order_slabs();
+    order_sheets();
   }
 
   // Counts the regions of a row along u whose bricks need no individual test: blank and entirely
@@ -168,12 +168,12 @@ class Binner {
   }
   void count_regions(std::size_t row, BrickCounts& counts);
 
-  void add_slab(const SlabKey& key, SlabBricks& out);
+  void add_sheet(const SheetKey& key, SheetBricks& out);
 
  private:
   void begin_pass(const PassPlan& pass, PassBins& to);
-  void order_slabs();
-  void add_brick(const PassPlan& pass, PassBins& shared, const Brick& brick, SlabBricks& out);
+  void order_sheets();
+  void add_brick(const PassPlan& pass, PassBins& shared, const Brick& brick, SheetBricks& out);
   void read_summary(const PassPlan& pass, const PassBins& shared, const Brick& brick,
                     KeptSummary& kept);
   [[nodiscard]] std::size_t rows_of(std::size_t p) const {
@@ -201,8 +201,8 @@ void Binner::begin_pass(const PassPlan& pass, PassBins& to) {
   to.done.assign(to.kept->blank_regions.size(), 0);
 }
 
-void Binner::order_slabs() {
-  std::vector<SlabKey>& keys = space_.slabs;
+void Binner::order_sheets() {
+  std::vector<SheetKey>& keys = space_.sheets;
   keys.clear();
   for (int p = 0; p < static_cast<int>(plan_.passes.size()); ++p) {
     const PassPlan& pass = plan_.passes[p];
@@ -213,7 +213,7 @@ void Binner::order_slabs() {
     }
   }
   // Keys are unique, so the order is deterministic.
-  std::sort(keys.begin(), keys.end(), [](const SlabKey& a, const SlabKey& b) {
+  std::sort(keys.begin(), keys.end(), [](const SheetKey& a, const SheetKey& b) {
     if (a.side != b.side) return a.side < b.side;
     if (a.distance != b.distance) return a.distance < b.distance;
     return a.pass < b.pass;
@@ -263,7 +263,7 @@ void Binner::count_regions(std::size_t row, BrickCounts& counts) {
 Brick in_lattice(const PassPlan& pass, const Brick& brick) {
   const Pass& kernel = pass.kernel;
   Brick own = brick;
-  own.slab = pass.axis[kernel.major].visit[brick.slab];
+  own.sheet = pass.axis[kernel.major].visit[brick.sheet];
   own.u_first = brick_start(pass.axis[kernel.u].visit[brick.u_first]);
   own.v_first = brick_start(pass.axis[kernel.v].visit[brick.v_first]);
   return own;
@@ -271,7 +271,7 @@ Brick in_lattice(const PassPlan& pass, const Brick& brick) {
 
 KeptSummary& summary_at(const PassPlan& pass, PassBins& shared, const Brick& brick) {
   const Brick own = in_lattice(pass, brick);
-  return shared.kept->bricks[shared.kept->brick(own.slab, own.v_first / kernels::brick_side,
+  return shared.kept->bricks[shared.kept->brick(own.sheet, own.v_first / kernels::brick_side,
                                                 own.u_first / kernels::brick_side)];
 }
 
@@ -293,7 +293,8 @@ void Binner::read_summary(const PassPlan& pass, const PassBins& shared, const Br
   kept = summarise(table_, shared.pass, in_lattice(pass, brick));
 }
 
-void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from, SlabBricks& out) {
+void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from,
+                       SheetBricks& out) {
   Brick brick = from;
   const std::int64_t stops = static_cast<std::int64_t>(brick.u_count) * brick.v_count;
   const Box box = stops_box(pass, brick);
@@ -333,14 +334,14 @@ void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from
   out.kernels.push_back(kept.lines + kept.splats);
 }
 
-void Binner::add_slab(const SlabKey& key, SlabBricks& out) {
+void Binner::add_sheet(const SheetKey& key, SheetBricks& out) {
   const PassPlan& pass = plan_.passes[key.pass];
   const Pass& kernel = pass.kernel;
   PassBins& shared = space_.passes[key.pass];
   out.bricks.clear();
   out.kernels.clear();
   out.counts = {};
-  const int layer = pass.axis[kernel.major].visit[key.slab];
+  const int layer = pass.axis[kernel.major].visit[key.sheet];
   const AxisArrays& along_u = pass.axis[kernel.u];
   const AxisArrays& along_v = pass.axis[kernel.v];
   for (const auto& v : along_v.bricks) {
@@ -350,7 +351,7 @@ void Binner::add_slab(const SlabKey& key, SlabBricks& out) {
       if (shared.done[shared.kept->region(layer, v_brick, u_brick)] != 0) continue;
       Brick brick{};
       brick.pass = key.pass;
-      brick.slab = key.slab;
+      brick.sheet = key.sheet;
       brick.u_first = u[0];
       brick.u_count = u[1];
       brick.v_first = v[0];
@@ -400,13 +401,13 @@ void list_by_tile(const RenderPlan& plan, const CancelToken& cancel, BinSpace& s
   }
 }
 
-void add_load(const RenderPlan& plan, Bins& bins, const SlabBricks& slab) {
+void add_load(const RenderPlan& plan, Bins& bins, const SheetBricks& sheet) {
   constexpr std::int64_t brick_overhead = 8;  // in kernels
-  for (std::size_t b = 0; b < slab.bricks.size(); ++b) {
-    const Brick& brick = slab.bricks[b];
+  for (std::size_t b = 0; b < sheet.bricks.size(); ++b) {
+    const Brick& brick = sheet.bricks[b];
     const TileRange range = tiles_of(plan, brick);
     const std::int64_t tiles = std::int64_t{range.x1 - range.x0 + 1} * (range.y1 - range.y0 + 1);
-    const std::int64_t load = brick_overhead + slab.kernels[b] / tiles;
+    const std::int64_t load = brick_overhead + sheet.kernels[b] / tiles;
     each_tile(bins, range, [&](std::size_t tile) { bins.load[tile] += load; });
   }
 }
@@ -451,21 +452,21 @@ const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, Threa
   pool.run(space.rows.size(), [&](std::size_t row, unsigned) {
     if (!cancel.cancelled()) binner.count_regions(row, space.rows[row]);
   });
-  const std::size_t slabs = space.slabs.size();
-  if (space.found.size() < slabs) space.found.resize(slabs);
-  pool.run(slabs, [&](std::size_t i, unsigned) {
+  const std::size_t sheets = space.sheets.size();
+  if (space.found.size() < sheets) space.found.resize(sheets);
+  pool.run(sheets, [&](std::size_t i, unsigned) {
     if (cancel.cancelled()) return;
     const FlushDenormals flush;
-    binner.add_slab(space.slabs[i], space.found[i]);
+    binner.add_sheet(space.sheets[i], space.found[i]);
   });
   if (cancel.cancelled()) return bins;
   BrickCounts sum;
   for (const BrickCounts& row : space.rows) sum += row;
-  for (std::size_t i = 0; i < slabs && !cancel.cancelled(); ++i) {
-    const SlabBricks& slab = space.found[i];
-    bins.bricks.insert(bins.bricks.end(), slab.bricks.begin(), slab.bricks.end());
-    add_load(plan, bins, slab);
-    sum += slab.counts;
+  for (std::size_t i = 0; i < sheets && !cancel.cancelled(); ++i) {
+    const SheetBricks& sheet = space.found[i];
+    bins.bricks.insert(bins.bricks.end(), sheet.bricks.begin(), sheet.bricks.end());
+    add_load(plan, bins, sheet);
+    sum += sheet.counts;
   }
   work.samples += sum.samples;
   work.culled += sum.culled;

@@ -38,21 +38,21 @@ struct BrickCounts {
   BrickCounts& operator+=(const BrickCounts& other);
 };
 
-// Bricks of one slab of one pass.
-struct SlabBricks {
+// Bricks of one sheet of one pass.
+struct SheetBricks {
   std::vector<kernels::Brick> bricks;
   std::vector<std::int32_t> kernels;  // lines and splats of each brick
   BrickCounts counts;
 };
 
-// Sort key of the slabs of all passes, front to back: the slab of the eye and those above it in
+// Sort key of the sheets of all passes, front to back: the sheet of the eye and those above it in
 // ascending order, then those below it in descending order. Passes of different strides are
 // interleaved by distance, lines first.
-struct SlabKey {
+struct SheetKey {
   int side;      // 0: from the eye upward; 1: downward
   int distance;  // in samples from the sample of the eye
   int pass;
-  int slab;
+  int sheet;
 };
 
 // Data shared by the bricks of a pass during one frame.
@@ -71,9 +71,9 @@ struct BinSpace {
   Bins bins;
   SummaryCache summaries;
   std::vector<PassBins> passes;
-  std::vector<SlabKey> slabs;
-  std::vector<SlabBricks> found;  // by slab
-  std::vector<BrickCounts> rows;  // of the regions counted as a whole, by row
+  std::vector<SheetKey> sheets;
+  std::vector<SheetBricks> found;  // by sheet
+  std::vector<BrickCounts> rows;   // of the regions counted as a whole, by row
   struct DepthKey {
     float depth;
     std::uint32_t brick;

@@ -13,8 +13,8 @@
 
 namespace windsplat::engine {
 
-// The axis along which slabs of kernels are stacked: the one along which the view direction crosses
-// most cells, |forward_a| / mean spacing_a largest; the first of equals.
+// The axis along which sheets of kernels are stacked: the one along which the view direction
+// crosses most cells, |forward_a| / mean spacing_a largest; the first of equals.
 int major_axis(const scene::Camera& camera, const scene::Lattice& lattice);
 
 // A kernel position along one axis: it represents `stride` samples from `first` on, the last
@@ -54,7 +54,7 @@ struct LayerArrays {
 };
 
 // Layers of equal stride share a pass: a line and a splat at one kernel position are composited as
-// one kernel. Layers of other strides have separate passes, interleaved slab by slab.
+// one kernel. Layers of other strides have separate passes, interleaved sheet by sheet.
 struct PassPlan {
   int stride = 1;
   const scene::VectorLayer* vector = nullptr;

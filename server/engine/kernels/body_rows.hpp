@@ -74,7 +74,7 @@ void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
   rows.pairs = (brick.v_count + 1) / 2;
   rows.first[pass.u] = lowest(u.visit + brick.u_first);
   rows.first[pass.v] = lowest(pass.axis[pass.v].visit + brick.v_first);
-  rows.first[pass.major] = pass.axis[pass.major].visit[brick.slab];
+  rows.first[pass.major] = pass.axis[pass.major].visit[brick.sheet];
   const int first = rows.first[pass.u];
   if (count == brick_side) {
     fill_along(pass, rows, [first](int i) { return first + i; });
@@ -121,18 +121,18 @@ inline std::int64_t offset_of(const Rows& rows, int i) {
 // costs no precision.
 void place_row(const Camera& camera, const Pass& pass, int j, int to_row, const Rows& rows,
                Stops& stops) {
-  const double* from_slab =
+  const double* from_sheet =
       pass.axis[pass.major].camera + 3 * static_cast<std::ptrdiff_t>(rows.first[pass.major]);
   const double* from_v =
       pass.axis[pass.v].camera + 3 * static_cast<std::ptrdiff_t>(rows.first[pass.v] + j);
   const std::ptrdiff_t row = std::ptrdiff_t{brick_side} * to_row;
   float* const to[3] = {stops.x + row, stops.y + row, stops.z + row};
   for (int c = 0; c < 3; ++c) {
-    const double base = from_slab[c] + from_v[c];
+    const double base = from_sheet[c] + from_v[c];
     for (int i = 0; i < brick_side; ++i) to[c][i] = static_cast<float>(base + rows.across[c][i]);
   }
   if (pass.by_depth == 0) return;
-  const double middle = from_slab[2] + from_v[2] - camera.depth_origin;
+  const double middle = from_sheet[2] + from_v[2] - camera.depth_origin;
   for (int i = 0; i < brick_side; ++i) {
     stops.depth[row + i] = static_cast<float>(middle + rows.across[2][i]);
   }

@@ -106,7 +106,7 @@ struct Camera {
 // Kernel positions of one stride, with their lines and media.
 struct Pass {
   Axis axis[3];
-  int major, u, v;       // slabs are stacked along major; u is innermost
+  int major, u, v;       // sheets are stacked along major; u is innermost
   std::int64_t step[3];  // of a sample index along each axis, in samples
   int has_lines;
   int has_medium;
@@ -128,7 +128,7 @@ constexpr float partial_one = 65535;  // table value of 1
 
 // A brick of 8 x 8 x 1 kernel positions, as ranges of the visit lists.
 struct Brick {
-  std::int32_t slab;  // position along the major axis' visit list
+  std::int32_t sheet;  // index in the major axis' visit list
   std::int32_t u_first, u_count;
   std::int32_t v_first, v_count;
   std::int32_t pass;

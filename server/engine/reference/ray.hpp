@@ -1,4 +1,4 @@
-// Integrates the light along one ray: a medium given as a function of depth, with sheets (lines).
+// Integrates the light along one ray: a medium given as a function of depth, with surfaces (lines).
 //
 // A piece of the ray is integrated by Gauss quadrature; the optical depths at its nodes are
 // computed from the same nodes (collocation). Nodes are graded quadratically towards breaks of the
@@ -52,8 +52,8 @@ struct Light {
   double transmittance = 1;
 };
 
-// A sheet across the ray.
-struct Sheet {
+// An infinitely thin, partly opaque surface across the ray: a line.
+struct Surface {
   double depth = 0;
   double opacity = 0;
   std::array<double, 3> color{};
@@ -76,11 +76,11 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples);
 // Transmittance below which the rest of a ray is ignored.
 constexpr double transmittance_least = 1e-16;
 
-inline void cross_sheet(const Sheet& sheet, Light& light) {
-  const double seen = light.transmittance * sheet.opacity;
-  for (int c = 0; c < 3; ++c) light.rgb[c] += seen * sheet.color[c];
+inline void cross_surface(const Surface& surface, Light& light) {
+  const double seen = light.transmittance * surface.opacity;
+  for (int c = 0; c < 3; ++c) light.rgb[c] += seen * surface.color[c];
   light.alpha += seen;
-  light.transmittance *= 1 - sheet.opacity;
+  light.transmittance *= 1 - surface.opacity;
 }
 
 // Integrates [from, to] with an error of about `tolerance`; if infinite, as one piece without
@@ -112,34 +112,35 @@ void integrate_piece(const Rules& rules, const Medium& medium, double from, doub
 }
 
 // Integrates a whole ray, divided at `breaks` (depths where the medium begins, ends or is not
-// smooth) and at `sheets`; both ascend. medium.begin(from, to) is called before each piece, in
+// smooth) and at `surfaces`; both ascend. medium.begin(from, to) is called before each piece, in
 // ascending order.
 template <class Medium>
 Light integrate_ray(const Rules& rules, Medium& medium, const std::vector<double>& breaks,
-                    const std::vector<Sheet>& sheets, double tolerance, RayCount& count) {
+                    const std::vector<Surface>& surfaces, double tolerance, RayCount& count) {
   Light light;
-  const std::size_t cuts = breaks.size() + sheets.size();
+  const std::size_t cuts = breaks.size() + surfaces.size();
   const double share = tolerance / static_cast<double>(std::max<std::size_t>(cuts, 1));
   std::size_t b = 0;
   std::size_t s = 0;
   double from = 0;
-  bool after_sheet = false;
+  bool after_surface = false;
   for (std::size_t done = 0; done < cuts; ++done) {
-    const bool sheet = s < sheets.size() && (b == breaks.size() || sheets[s].depth <= breaks[b]);
-    const double to = sheet ? sheets[s].depth : breaks[b];
+    const bool surface =
+        s < surfaces.size() && (b == breaks.size() || surfaces[s].depth <= breaks[b]);
+    const double to = surface ? surfaces[s].depth : breaks[b];
     // There is no medium before the first break or after the last one.
     if (b > 0 && b < breaks.size() && to > from) {
       medium.begin(from, to);
-      const unsigned ends = (after_sheet ? 0 : break_before) | (sheet ? 0 : break_after);
+      const unsigned ends = (after_surface ? 0 : break_before) | (surface ? 0 : break_after);
       integrate_piece(rules, medium, from, to, ends, share, light, count);
     }
     if (light.transmittance < transmittance_least) break;
-    if (sheet) {
-      cross_sheet(sheets[s++], light);
+    if (surface) {
+      cross_surface(surfaces[s++], light);
     } else {
       ++b;
     }
-    after_sheet = sheet;
+    after_surface = surface;
     from = to;
   }
   return light;

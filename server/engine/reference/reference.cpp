@@ -149,13 +149,13 @@ class Painter {
  public:
   Painter(const Frame& frame, const Profile& profile) : frame_(frame), medium_(profile) {}
 
-  // Storage for a pixel that so many kernels may cover; sorting sheets needs a second copy.
+  // Storage for a pixel that so many kernels may cover; sorting surfaces needs a second copy.
   static std::uint64_t bytes_for(std::uint64_t splats, std::uint64_t ribbons) {
-    return SplatMedium::bytes_for(splats) + 2 * ribbons * sizeof(Sheet);
+    return SplatMedium::bytes_for(splats) + 2 * ribbons * sizeof(Surface);
   }
   void make_room(std::size_t splats, std::size_t ribbons) {
     medium_.make_room(splats);
-    sheets_.reserve(ribbons);
+    surfaces_.reserve(ribbons);
   }
 
   Light pixel(int x, int y, RayCount& count) {
@@ -165,8 +165,8 @@ class Painter {
     medium_.start(make_ray(px, py), view.perspective ? view.near : lowest);
     for (const std::uint32_t id : frame_.splats.at(x, y)) medium_.add(frame_.kernels.splats[id]);
     const std::vector<double>& breaks = medium_.finish();
-    gather_sheets(x, y, px, py);
-    return integrate_ray(frame_.rules, medium_, breaks, sheets_, frame_.tolerance, count);
+    gather_surfaces(x, y, px, py);
+    return integrate_ray(frame_.rules, medium_, breaks, surfaces_, frame_.tolerance, count);
   }
 
  private:
@@ -184,20 +184,20 @@ class Painter {
     return ray;
   }
 
-  void gather_sheets(int x, int y, double px, double py) {
-    sheets_.clear();
+  void gather_surfaces(int x, int y, double px, double py) {
+    surfaces_.clear();
     for (const std::uint32_t id : frame_.ribbons.at(x, y)) {
       const auto hit = hit_ribbon(frame_.kernels.ribbons[id], px, py);
-      if (hit.opacity > 0) sheets_.push_back({hit.depth, hit.opacity, hit.color});
+      if (hit.opacity > 0) surfaces_.push_back({hit.depth, hit.opacity, hit.color});
     }
     // Stable: equal depths stay in order of id.
-    std::stable_sort(sheets_.begin(), sheets_.end(),
-                     [](const Sheet& a, const Sheet& b) { return a.depth < b.depth; });
+    std::stable_sort(surfaces_.begin(), surfaces_.end(),
+                     [](const Surface& a, const Surface& b) { return a.depth < b.depth; });
   }
 
   const Frame& frame_;
   SplatMedium medium_;
-  std::vector<Sheet> sheets_;
+  std::vector<Surface> surfaces_;
 };
 
 Error cancelled_error() { return make_error(ErrorKind::cancelled, "reference cancelled"); }
