@@ -18,7 +18,7 @@ using kernels::Brick;
 using kernels::Pass;
 
 // Index of the first kernel position of the brick that contains a position.
-int brick_start(int stop) { return stop / kernels::brick_side * kernels::brick_side; }
+int brick_start(int index) { return index / kernels::brick_side * kernels::brick_side; }
 
 // Curved lattices: the bounding box of the actual kernel positions.
 Box curved_box(const Pass& pass, const Brick& brick) {
@@ -43,7 +43,7 @@ Box curved_box(const Pass& pass, const Brick& brick) {
 }
 
 // Bounding box of the kernel positions of a brick.
-Box stops_box(const PassPlan& plan, const Brick& brick) {
+Box positions_box(const PassPlan& plan, const Brick& brick) {
   const Pass& pass = plan.kernel;
   if (pass.places != nullptr) return curved_box(pass, brick);
   Box box;
@@ -233,7 +233,7 @@ void Binner::count_regions(std::size_t row, BrickCounts& counts) {
   std::int64_t across = 1;
   const auto extend = [&](int a, int brick) {
     const int first = brick * kernels::brick_side;
-    const int last = std::min(first + kernels::brick_side, kernel.axis[a].stops);
+    const int last = std::min(first + kernels::brick_side, kernel.axis[a].count);
     box.low[a] = pass.axis[a].position[first];
     box.high[a] = pass.axis[a].position[last - 1];
     return last - first;
@@ -241,21 +241,21 @@ void Binner::count_regions(std::size_t row, BrickCounts& counts) {
   across *= extend(kernel.major, layer);
   across *= extend(kernel.v, v);
   for (int u = 0; u < kept.u_bricks; ++u) {
-    const std::int64_t stops = across * extend(kernel.u, u);
+    const std::int64_t positions = across * extend(kernel.u, u);
     const std::size_t region = kept.region(layer * kernels::brick_side, v, u);
     const bool blank = kept.blank_regions[region] != 0 || kept.find_blank(layer, v, u);
     const Projected found = project_(pass, box, shared.reach);
     const bool unseen = found.seen.empty();
     if (!unseen && !(blank && found.whole)) continue;
     shared.done[region] = 1;
-    counts.samples += stops;
+    counts.samples += positions;
     if (unseen) {
-      counts.culled += stops;
+      counts.culled += positions;
       continue;
     }
-    if (kernel.has_lines != 0) counts.without_line += stops;
-    if (kernel.has_medium != 0) counts.without_splat += stops;
-    counts.without_both += stops;
+    if (kernel.has_lines != 0) counts.without_line += positions;
+    if (kernel.has_medium != 0) counts.without_splat += positions;
+    counts.without_both += positions;
   }
 }
 
@@ -296,9 +296,9 @@ void Binner::read_summary(const PassPlan& pass, const PassBins& shared, const Br
 void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from,
                        SheetBricks& out) {
   Brick brick = from;
-  const std::int64_t stops = static_cast<std::int64_t>(brick.u_count) * brick.v_count;
-  const Box box = stops_box(pass, brick);
-  out.counts.samples += stops;
+  const std::int64_t positions = static_cast<std::int64_t>(brick.u_count) * brick.v_count;
+  const Box box = positions_box(pass, brick);
+  out.counts.samples += positions;
   // A brick without summary is first culled by the longest line that the style allows, before any
   // sample is read; one with a summary by its actual contents.
   KeptSummary& kept = summary_at(pass, shared, brick);
@@ -308,7 +308,7 @@ void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from
   if (!known || found.seen.empty()) {
     const Projected most = project_(pass, box, shared.reach);
     if (most.seen.empty()) {
-      out.counts.culled += stops;
+      out.counts.culled += positions;
       return;
     }
     if (!kept.known()) read_summary(pass, shared, brick, kept);
@@ -320,8 +320,8 @@ void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from
     if (!known && kept.holds_any())
       found = project_(pass, box, reach_of(pass.kernel, shared, kept));
   }
-  if (pass.kernel.has_lines != 0) out.counts.without_line += stops - kept.lines;
-  if (pass.kernel.has_medium != 0) out.counts.without_splat += stops - kept.splats;
+  if (pass.kernel.has_lines != 0) out.counts.without_line += positions - kept.lines;
+  if (pass.kernel.has_medium != 0) out.counts.without_splat += positions - kept.splats;
   out.counts.without_both += kept.without_both;
   if (!kept.holds_any() || found.seen.empty()) return;
   brick.lines = kept.lines;

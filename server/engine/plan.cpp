@@ -73,11 +73,11 @@ void clear(AxisArrays& axis) {
   axis.bricks.clear();
 }
 
-void add_stop(const Scene& scene, int a, const Stop& stop, AxisArrays& axis) {
+void add_kernel(const Scene& scene, int a, const AxisKernel& kernel, AxisArrays& axis) {
   const Camera& camera = scene.camera;
-  axis.sample.push_back(stop.sample);
-  axis.group.push_back(stop.group);
-  const double position = scene.lattice.positions[a][stop.sample];
+  axis.sample.push_back(kernel.sample);
+  axis.group.push_back(kernel.group);
+  const double position = scene.lattice.positions[a][kernel.sample];
   const double from_eye = position - camera.eye[a];
   axis.position.push_back(position);
   axis.camera.push_back(from_eye * camera.right[a]);
@@ -85,30 +85,30 @@ void add_stop(const Scene& scene, int a, const Stop& stop, AxisArrays& axis) {
   axis.camera.push_back(from_eye * camera.forward[a]);
   axis.from_eye.push_back(static_cast<float>(from_eye));
   axis.world.push_back(static_cast<float>(position));
-  axis.cell.push_back(static_cast<float>(stop.cell));
+  axis.cell.push_back(static_cast<float>(kernel.cell));
   axis.inverse_cell.push_back(1.0F / axis.cell.back());
 }
 
 // A slice has one kernel position along its axis, independent of the stride.
-void add_stops(const Scene& scene, int a, int stride, AxisArrays& axis) {
+void add_kernels(const Scene& scene, int a, int stride, AxisArrays& axis) {
   const auto& spacing = scene.lattice.spacing[a];
   if (scene.slice && scene.slice->axis == a) {
     const int sample = scene.slice->sample;
     WINDSPLAT_CHECK(sample >= 0 && sample < scene.lattice.dims[a]);
-    add_stop(scene, a, {sample, 1, spacing[sample]}, axis);
+    add_kernel(scene, a, {sample, 1, spacing[sample]}, axis);
     return;
   }
   const int samples = static_cast<int>(spacing.size());
   for (int first = 0; first < samples; first += stride) {
-    add_stop(scene, a, kernel_stop(spacing, stride, first), axis);
+    add_kernel(scene, a, axis_kernel(spacing, stride, first), axis);
   }
 }
 
 void place_axis(const Scene& scene, int a, int stride, AxisArrays& axis) {
   clear(axis);
-  add_stops(scene, a, stride, axis);
+  add_kernels(scene, a, stride, axis);
   const int count = static_cast<int>(axis.sample.size());
-  visit_order(count, eye_stop(scene.camera, a, axis.position), axis.visit);
+  visit_order(count, eye_index(scene.camera, a, axis.position), axis.visit);
   for (int first = 0; first < count;) {
     const int brick = axis.visit[first] / kernels::brick_side;
     int last = first;
@@ -422,32 +422,32 @@ int major_axis(const Camera& camera, const Lattice& lattice) {
   return major;
 }
 
-Stop kernel_stop(const std::vector<double>& spacing, int stride, int first) {
+AxisKernel axis_kernel(const std::vector<double>& spacing, int stride, int first) {
   const int last = std::min(first + stride, static_cast<int>(spacing.size())) - 1;
   const double cell = std::accumulate(spacing.begin() + first, spacing.begin() + last + 1, 0.0);
   return {first + (last - first) / 2, last - first + 1, cell};
 }
 
-int eye_stop(const Camera& camera, int axis, const std::vector<double>& positions) {
+int eye_index(const Camera& camera, int axis, const std::vector<double>& positions) {
   const int last = static_cast<int>(positions.size()) - 1;
   if (!camera.perspective) return camera.forward[axis] >= 0 ? 0 : last;
-  int stop = 0;
-  while (stop < last && camera.eye[axis] >= 0.5 * (positions[stop] + positions[stop + 1])) {
-    ++stop;
+  int index = 0;
+  while (index < last && camera.eye[axis] >= 0.5 * (positions[index] + positions[index + 1])) {
+    ++index;
   }
-  return stop;
+  return index;
 }
 
-void visit_order(int stops, int eye, std::vector<int>& order) {
+void visit_order(int count, int eye, std::vector<int>& order) {
   order.clear();
   const auto visit_brick = [&](int brick) {
     const int first = brick * kernels::brick_side;
-    const int last = std::min(first + kernels::brick_side, stops) - 1;
+    const int last = std::min(first + kernels::brick_side, count) - 1;
     const int start = std::clamp(eye, first, last);
     for (int i = start; i <= last; ++i) order.push_back(i);
     for (int i = start - 1; i >= first; --i) order.push_back(i);
   };
-  const int bricks = (stops + kernels::brick_side - 1) / kernels::brick_side;
+  const int bricks = (count + kernels::brick_side - 1) / kernels::brick_side;
   const int own = eye / kernels::brick_side;
   for (int brick = own; brick < bricks; ++brick) visit_brick(brick);
   for (int brick = own - 1; brick >= 0; --brick) visit_brick(brick);
@@ -465,7 +465,7 @@ void make_plan(const Scene& scene, RenderPlan& plan) {
   plan.perspective_medium = scene.camera.perspective && !scene.scalars.empty();
   choose_passes(scene, plan.passes);
   const int major = major_axis(scene.camera, scene.lattice);
-  plan.eye_sample = eye_stop(scene.camera, major, scene.lattice.positions[major]);
+  plan.eye_sample = eye_index(scene.camera, major, scene.lattice.positions[major]);
   if (plan.curved) measure_ways(scene.lattice, plan.ways);
   for (PassPlan& pass : plan.passes) finish_pass(scene, major, plan.ways, pass);
   plan.slab_depth = 1;

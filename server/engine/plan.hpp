@@ -19,20 +19,20 @@ int major_axis(const scene::Camera& camera, const scene::Lattice& lattice);
 
 // A kernel position along one axis: it represents `stride` samples from `first` on, the last
 // position the remaining ones, and lies at the middle sample (the lower of two).
-struct Stop {
+struct AxisKernel {
   int sample = 0;
   int group = 1;    // number of samples represented
   double cell = 0;  // their extent in world units
 };
-Stop kernel_stop(const std::vector<double>& spacing, int stride, int first);
+AxisKernel axis_kernel(const std::vector<double>& spacing, int stride, int first);
 
 // Index of the kernel position whose cell (bounded midway between positions) contains the eye; in
 // orthographic views the end of the axis nearest to the viewer. Outward from it is front to back.
-int eye_stop(const scene::Camera& camera, int axis, const std::vector<double>& positions);
+int eye_index(const scene::Camera& camera, int axis, const std::vector<double>& positions);
 
 // Kernel positions in visibility order: bricks of brick_side consecutive positions outward from the
 // brick of the eye, and within each brick outward from the eye. Replaces the contents of `order`.
-void visit_order(int stops, int eye, std::vector<int>& order);
+void visit_order(int count, int eye, std::vector<int>& order);
 
 // Backing store of one kernels::Axis.
 struct AxisArrays {
@@ -79,7 +79,7 @@ struct RenderPlan {
   const scene::Camera* view = nullptr;
   kernels::Camera camera{};
   std::vector<PassPlan> passes;     // the one with lines first
-  int eye_sample = 0;               // eye_stop of the whole lattice along the major axis
+  int eye_sample = 0;               // eye_index of the whole lattice along the major axis
   bool perspective_medium = false;  // pixel rays are needed
   bool slabs = false;               // the slab method
   bool curved = false;              // visibility order by depth only

@@ -16,7 +16,7 @@ namespace windsplat::engine {
 namespace {
 
 using kernels::Brick;
-using kernels::brick_stops;
+using kernels::brick_kernels;
 using kernels::Hit;
 using kernels::MetLine;
 using kernels::RibbonRecord;
@@ -113,14 +113,14 @@ class Lines {
   [[nodiscard]] std::size_t count() const { return of_.count; }
   [[nodiscard]] const RibbonRecord* records() const { return of_.records.data(); }
 
-  // Reserves records for the lines of a brick; `slots` receives brick_stops free indices.
+  // Reserves records for the lines of a brick; `slots` receives brick_kernels free indices.
   RibbonRecord* make_room(std::uint32_t* slots) {
-    while (of_.free.size() < brick_stops) {
+    while (of_.free.size() < brick_kernels) {
       of_.free.push_back(static_cast<std::uint32_t>(of_.records.size()));
       of_.records.emplace_back();
       of_.waiting.push_back(0);
     }
-    std::copy_n(of_.free.rbegin(), brick_stops, slots);
+    std::copy_n(of_.free.rbegin(), brick_kernels, slots);
     return of_.records.data();
   }
 
@@ -274,13 +274,13 @@ class SlabSweep {
       }
       kernels::Prepared& prepared = *space_.prepared;
       table_.prepare(plan_.camera, plan_.passes[here.pass].kernel, here, tile_, prepared);
-      if (prepared.stops.splats != 0) add_splats(prepared);
-      if (prepared.stops.lines != 0) add_lines(prepared);
+      if (prepared.positions.splats != 0) add_splats(prepared);
+      if (prepared.positions.lines != 0) add_lines(prepared);
     }
   }
 
   void add_splats(const kernels::Prepared& prepared) {
-    SplatRecord splats[brick_stops];
+    SplatRecord splats[brick_kernels];
     const int count = table_.pack_splats(plan_.camera, prepared, splats);
     for (int n = 0; n < count; ++n) {
       const std::int64_t first = std::max(slab_of(splats[n].first), index_);
@@ -289,8 +289,8 @@ class SlabSweep {
   }
 
   void add_lines(const kernels::Prepared& prepared) {
-    std::uint32_t slots[brick_stops];
-    int counts[brick_stops];
+    std::uint32_t slots[brick_kernels];
+    int counts[brick_kernels];
     RibbonRecord* records = lines_.make_room(slots);
     const int lines =
         table_.pack_lines(plan_.camera, prepared, static_cast<float>(plan_.slab_depth), slots,

@@ -29,8 +29,8 @@ void write_key(const kernels::Pass& pass, std::vector<std::uint32_t>& key) {
     const kernels::Axis& axis = pass.axis[a];
     add(key, pass.dims[a]);
     add(key, pass.cell_max[a]);
-    add(key, axis.cell, axis.stops);
-    for (int s = 0; s < axis.stops; ++s) add(key, axis.sample[s]);
+    add(key, axis.cell, axis.count);
+    for (int s = 0; s < axis.count; ++s) add(key, axis.sample[s]);
   }
   add(key, pass.has_lines);
   if (pass.has_lines != 0) {
@@ -108,12 +108,12 @@ void SummaryCache::Entry::begin(const PassPlan& pass) {
     volumes.push_back(field.get());
   });
   const kernels::Pass& kernel = pass.kernel;
-  const auto bricks = [](int stops) {
-    return (stops + kernels::brick_side - 1) / kernels::brick_side;
+  const auto bricks = [](int positions) {
+    return (positions + kernels::brick_side - 1) / kernels::brick_side;
   };
-  kept.u_bricks = bricks(kernel.axis[kernel.u].stops);
-  kept.v_bricks = bricks(kernel.axis[kernel.v].stops);
-  kept.layers = kernel.axis[kernel.major].stops;
+  kept.u_bricks = bricks(kernel.axis[kernel.u].count);
+  kept.v_bricks = bricks(kernel.axis[kernel.v].count);
+  kept.layers = kernel.axis[kernel.major].count;
   kept.regions = bricks(kept.layers);
   const std::size_t rows = static_cast<std::size_t>(kept.u_bricks) * kept.v_bricks;
   kept.bricks.assign(rows * kept.layers, KeptSummary());
@@ -176,8 +176,8 @@ PassSummaries& SummaryCache::of(const PassPlan& pass, const kernels::Table& tabl
   entry.used = frame_;
   std::size_t bricks = 1;
   for (int a = 0; a < 3; ++a) {
-    const auto stops = static_cast<std::size_t>(pass.kernel.axis[a].stops);
-    bricks *= a == pass.kernel.major ? stops : (stops + kernels::brick_side - 1) / 8;
+    const auto positions = static_cast<std::size_t>(pass.kernel.axis[a].count);
+    bricks *= a == pass.kernel.major ? positions : (positions + kernels::brick_side - 1) / 8;
   }
   const std::size_t needed = bricks * sizeof(KeptSummary);
   // Release the storage of an entry that is far too large.

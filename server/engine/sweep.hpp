@@ -19,7 +19,7 @@ namespace windsplat::engine {
 struct DepthEntry {
   float depth = 0;
   std::int32_t slot = 0;
-  std::int32_t stop = 0;
+  std::int32_t position = 0;
 };
 
 // Splats that the sweep has reached and not yet passed: recycled records, and for each of the next

@@ -63,7 +63,7 @@ void open_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& t
   if (plan.perspective_medium) table.fill_rays(plan.camera, tile, space.rays.data());
 }
 
-std::int64_t stops_of(const Brick& brick) {
+std::int64_t positions_of(const Brick& brick) {
   return static_cast<std::int64_t>(brick.u_count) * brick.v_count;
 }
 
@@ -77,7 +77,7 @@ class OpenBricks {
     while (at_ < last_) {
       const Brick& brick = bins_.bricks[bins_.entries[at_++]];
       if (!all_closed(tile_, brick)) return &brick;
-      tile_.counters.occluded += stops_of(brick);
+      tile_.counters.occluded += positions_of(brick);
     }
     return nullptr;
   }

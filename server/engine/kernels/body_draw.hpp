@@ -56,7 +56,7 @@ inline Splat splat_at(const Prepared& p, int l) {
     out.dxy = s.dxy[l];
     out.dyy = s.dyy[l];
     out.d2_least = s.d2_least[l];
-    out.z = p.stops.z[l];
+    out.z = p.positions.z[l];
     out.near = p.near;
   }
   out.strength = s.strength[l];
@@ -167,7 +167,7 @@ template <bool Perspective>
 inline From from_of(const Prepared& p, int l) {
   if (!Perspective) return From::eye;
   const Splats& s = p.splats;
-  if (p.stops.z[l] - 2.0F * s.half_depth[l] < p.near) return From::near_plane;
+  if (p.positions.z[l] - 2.0F * s.half_depth[l] < p.near) return From::near_plane;
   return s.ex[l] == s.x[l] && s.ey[l] == s.y[l] ? From::eye_inside : From::eye;
 }
 
@@ -246,7 +246,7 @@ struct KernelDrawing {
 template <bool Perspective>
 void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
   const Footing& f = p.footing;
-  const bool lined = has(p.stops.lines, l);
+  const bool lined = has(p.positions.lines, l);
   KernelDrawing kernel = {
       with, tile, splat_at<Perspective>(p, l), {}, static_cast<int>(from_of<Perspective>(p, l))};
   if (lined) kernel.ribbon = ribbon_at(p.pass->line, p.ribbons, l);
@@ -275,9 +275,9 @@ void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
 }
 
 template <bool Perspective>
-KERNEL_INLINE void draw_stop(const Prepared& p, const Compositor& with, int style, int l,
-                             Tile& tile) {
-  if (has(p.stops.splats, l)) {
+KERNEL_INLINE void draw_position(const Prepared& p, const Compositor& with, int style, int l,
+                                 Tile& tile) {
+  if (has(p.positions.splats, l)) {
     draw_kernel<Perspective>(p, with, l, tile);
   } else {
     draw_styled<Perspective>(p, style, l, tile);
@@ -304,8 +304,8 @@ constexpr RowIndices row_indices = make_row_indices();
 
 // Lists the kernel positions of a brick in visibility order: rows outward from the eye, positions
 // outward in each. Returns their number. `order` must have room for brick_side more.
-inline int order_stops(const Brick& brick, const Pass& pass, std::uint64_t kept,
-                       std::uint8_t* order) {
+inline int order_positions(const Brick& brick, const Pass& pass, std::uint64_t kept,
+                           std::uint8_t* order) {
   const int* us = pass.axis[pass.u].visit + brick.u_first;
   const int* vs = pass.axis[pass.v].visit + brick.v_first;
   const int u_low = lowest(us);
@@ -335,10 +335,10 @@ template <bool Perspective>
 void draw_in_order(const Brick& brick, const Prepared& p, Tile& tile) {
   const Pass& pass = *p.pass;
   const int style = signature_of(pass.line);
-  std::uint8_t order[brick_stops + brick_side];
-  const int count = order_stops(brick, pass, p.stops.lines | p.stops.splats, order);
+  std::uint8_t order[brick_kernels + brick_side];
+  const int count = order_positions(brick, pass, p.positions.lines | p.positions.splats, order);
   const Compositor with = compositor_of<Perspective>(pass);
-  for (int i = 0; i < count; ++i) draw_stop<Perspective>(p, with, style, order[i], tile);
+  for (int i = 0; i < count; ++i) draw_position<Perspective>(p, with, style, order[i], tile);
 }
 
 // The samples of a row occupy one or two cache lines.
@@ -373,19 +373,19 @@ void prefetch_brick(const Pass& pass, const Brick& brick) {
   }
 }
 
-void draw_prepared(const Camera& camera, const Prepared& p, int stop, Tile& tile) {
+void draw_prepared(const Camera& camera, const Prepared& p, int position, Tile& tile) {
   const int style = signature_of(p.pass->line);
   if (camera.perspective != 0) {
-    draw_stop<true>(p, compositor_of<true>(*p.pass), style, stop, tile);
+    draw_position<true>(p, compositor_of<true>(*p.pass), style, position, tile);
   } else {
-    draw_stop<false>(p, compositor_of<false>(*p.pass), style, stop, tile);
+    draw_position<false>(p, compositor_of<false>(*p.pass), style, position, tile);
   }
 }
 
 void draw(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile) {
   Prepared prepared;
   prepare(camera, pass, brick, tile, prepared);
-  if (prepared.stops.count == 0) return;
+  if (prepared.positions.count == 0) return;
   if (camera.perspective != 0) {
     draw_in_order<true>(brick, prepared, tile);
   } else {

@@ -148,9 +148,9 @@ template <bool Perspective>
 int pack_splats_on(const Prepared& p, SplatRecord* out) {
   const Footing& f = p.footing;
   int n = 0;
-  for (std::uint64_t left = p.stops.splats; left != 0; left &= left - 1U) {
+  for (std::uint64_t left = p.positions.splats; left != 0; left &= left - 1U) {
     const int l = __builtin_ctzll(left);
-    const float middle = p.stops.depth[l];
+    const float middle = p.positions.depth[l];
     const float half = p.splats.half_depth[l];
     out[n++] = {p.pass->partial,
                 middle - half,

@@ -9,7 +9,7 @@ namespace {
 
 inline RibbonRecord ribbon_record(const LineStyle& line, const Prepared& p, int l) {
   RibbonRecord out = {ribbon_at(line, p.ribbons, l), line.moving, 0};
-  out.ribbon.depth += p.stops.depth[l];
+  out.ribbon.depth += p.positions.depth[l];
   out.bent = absolute(out.ribbon.bend) > series_bend_max ? 1 : 0;
   return out;
 }
@@ -75,7 +75,7 @@ int pack_lines_on(const Prepared& p, float slab_depth, const std::uint32_t* slot
                   RibbonRecord* records, Hit* hits, int* counts) {
   const float margin = 1e-4F * slab_depth;
   int n = 0;
-  for (std::uint64_t left = p.stops.lines; left != 0; left &= left - 1U) {
+  for (std::uint64_t left = p.positions.lines; left != 0; left &= left - 1U) {
     const int l = __builtin_ctzll(left);
     RibbonRecord& record = records[slots[n]];
     record = ribbon_record(p.pass->line, p, l);

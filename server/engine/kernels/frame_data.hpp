@@ -15,11 +15,11 @@ constexpr int block_floats = block_channels * block_pixels;
 constexpr int window_side = 8;             // blocks; 8 x 8 blocks are the bits of one word
 constexpr double footprint_radius = 1.37;  // of a splat, cells
 constexpr int brick_side = 8;              // kernel positions
-constexpr int brick_stops = brick_side * brick_side;
+constexpr int brick_kernels = brick_side * brick_side;
 
 // One axis of a pass: arrays with an entry per kernel position, in world order.
 struct Axis {
-  int stops;              // number of kernel positions
+  int count;              // number of kernel positions
   const double* camera;   // 3 each: contribution of this axis to (right, down, forward) of the eye
   const float* from_eye;  // world coordinate minus that of the eye
   const float* position;  // world coordinate

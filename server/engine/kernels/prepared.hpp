@@ -10,41 +10,41 @@ namespace windsplat::engine::kernels {
 
 // Kernel position l = brick_side j + i of a brick is the i-th along u and the j-th along v in world
 // order.
-struct Stops {
+struct KernelPositions {
   int count;            // positions with a line or a splat in the tile
   std::uint64_t lines;  // bit l set: position l has a line
   std::uint64_t splats;
-  alignas(64) float x[brick_stops];  // right, down and forward of the eye, world units
-  alignas(64) float y[brick_stops];
-  alignas(64) float z[brick_stops];
-  alignas(64) float depth[brick_stops];  // forward of the camera's depth origin
+  alignas(64) float x[brick_kernels];  // right, down and forward of the eye, world units
+  alignas(64) float y[brick_kernels];
+  alignas(64) float z[brick_kernels];
+  alignas(64) float depth[brick_kernels];  // forward of the camera's depth origin
 };
 
 // The position along a clipped ribbon is f in [0, 1] from its tail end to its head end; colour,
 // depth and phase are linear in f.
 struct Ribbons {
-  alignas(64) float x[brick_stops];  // f = 0, pixels
-  alignas(64) float y[brick_stops];
-  alignas(64) float ux[brick_stops];  // from f = 0 to 1, pixels
-  alignas(64) float uy[brick_stops];
-  alignas(64) float wx[brick_stops];  // u / |u|^2
-  alignas(64) float wy[brick_stops];
+  alignas(64) float x[brick_kernels];  // f = 0, pixels
+  alignas(64) float y[brick_kernels];
+  alignas(64) float ux[brick_kernels];  // from f = 0 to 1, pixels
+  alignas(64) float uy[brick_kernels];
+  alignas(64) float wx[brick_kernels];  // u / |u|^2
+  alignas(64) float wy[brick_kernels];
   // Position along the line that is nearest to its start: 0; for a line that projects to a dot 1/2.
-  alignas(64) float w0[brick_stops];
-  alignas(64) float depth_ratio[brick_stops];  // view depth at f = 0 over that at f = 1
-  alignas(64) float bend[brick_stops];         // depth_ratio - 1
-  alignas(64) float depth[brick_stops];        // view depth at f = 0 minus that of the centre
-  alignas(64) float depth_rise[brick_stops];
+  alignas(64) float w0[brick_kernels];
+  alignas(64) float depth_ratio[brick_kernels];  // view depth at f = 0 over that at f = 1
+  alignas(64) float bend[brick_kernels];         // depth_ratio - 1
+  alignas(64) float depth[brick_kernels];        // view depth at f = 0 minus that of the centre
+  alignas(64) float depth_rise[brick_kernels];
   // q + 3/2 - phase at f = 0, in [0, 2]; only with phase motion.
-  alignas(64) float phase[brick_stops];
-  alignas(64) float phase_rise[brick_stops];
-  alignas(64) float tail[brick_stops][color_floats];  // colour at f = 0
-  alignas(64) float rise[brick_stops][color_floats];  // colour at f = 1 minus tail
+  alignas(64) float phase[brick_kernels];
+  alignas(64) float phase_rise[brick_kernels];
+  alignas(64) float tail[brick_kernels][color_floats];  // colour at f = 0
+  alignas(64) float rise[brick_kernels][color_floats];  // colour at f = 1 minus tail
 };
 
 struct Densities {
-  alignas(64) float rho[brick_stops];  // per world length
-  float color[brick_stops][color_floats];
+  alignas(64) float rho[brick_kernels];  // per world length
+  float color[brick_kernels][color_floats];
 };
 
 // With p = (px, py) the pixel minus the projected centre and e = (ex, ey) the pixel minus a point
@@ -58,46 +58,47 @@ struct Densities {
 // The second point is the projected centre itself if that lies in the picture. Offsets from centres
 // far outside it (kernels that contain the eye) would lose all precision.
 struct Splats {
-  alignas(64) float x[brick_stops], y[brick_stops];    // projected centre, pixels
-  alignas(64) float ex[brick_stops], ey[brick_stops];  // the point of the picture near it, pixels
-  alignas(64) float xx[brick_stops], xy[brick_stops], yy[brick_stops];
-  alignas(64) float b0[brick_stops], bx[brick_stops], by[brick_stops];
-  alignas(64) float d0[brick_stops], dx[brick_stops], dy[brick_stops];
-  alignas(64) float dxx[brick_stops], dxy[brick_stops], dyy[brick_stops];
-  alignas(64) float d2_least[brick_stops];  // |d|^2 is never less
+  alignas(64) float x[brick_kernels], y[brick_kernels];  // projected centre, pixels
+  alignas(64) float ex[brick_kernels],
+      ey[brick_kernels];  // the point of the picture near it, pixels
+  alignas(64) float xx[brick_kernels], xy[brick_kernels], yy[brick_kernels];
+  alignas(64) float b0[brick_kernels], bx[brick_kernels], by[brick_kernels];
+  alignas(64) float d0[brick_kernels], dx[brick_kernels], dy[brick_kernels];
+  alignas(64) float dxx[brick_kernels], dxy[brick_kernels], dyy[brick_kernels];
+  alignas(64) float d2_least[brick_kernels];  // |d|^2 is never less
   // Optical depth at the centre; perspective: times |d|.
-  alignas(64) float strength[brick_stops];
-  alignas(64) float half_depth[brick_stops];  // of the silhouette along the view, world units
+  alignas(64) float strength[brick_kernels];
+  alignas(64) float half_depth[brick_kernels];  // of the silhouette along the view, world units
 };
 
 // Rows and columns of blocks of the tile that each line and splat may touch, both ends included;
 // none if last < first.
 struct Footing {
-  alignas(64) std::int32_t line_first[brick_stops];
-  alignas(64) std::int32_t line_last[brick_stops];
+  alignas(64) std::int32_t line_first[brick_kernels];
+  alignas(64) std::int32_t line_last[brick_kernels];
   // Bit set: the line may touch the column in its k-th row.
-  alignas(64) std::uint32_t line_columns[tile_blocks][brick_stops];
+  alignas(64) std::uint32_t line_columns[tile_blocks][brick_kernels];
   // The same for lines within window_side rows and columns: one byte per row, the first four in
   // `low`, columns relative to line_column.
   std::uint64_t windowed;  // bit l set: line l is within a window
-  alignas(64) std::int32_t line_column[brick_stops];
-  alignas(64) std::int32_t line_column_last[brick_stops];
-  alignas(64) std::uint32_t window_low[brick_stops];
-  alignas(64) std::uint32_t window_high[brick_stops];
+  alignas(64) std::int32_t line_column[brick_kernels];
+  alignas(64) std::int32_t line_column_last[brick_kernels];
+  alignas(64) std::uint32_t window_low[brick_kernels];
+  alignas(64) std::uint32_t window_high[brick_kernels];
   // The box of blocks of a splat and, if it fits a window, the blocks that its outline touches, in
   // the same format as for lines.
-  alignas(64) std::int32_t row_first[brick_stops];
-  alignas(64) std::int32_t row_last[brick_stops];
-  alignas(64) std::int32_t column_first[brick_stops];
-  alignas(64) std::int32_t column_last[brick_stops];
-  alignas(64) std::uint32_t splat_low[brick_stops];
-  alignas(64) std::uint32_t splat_high[brick_stops];
+  alignas(64) std::int32_t row_first[brick_kernels];
+  alignas(64) std::int32_t row_last[brick_kernels];
+  alignas(64) std::int32_t column_first[brick_kernels];
+  alignas(64) std::int32_t column_last[brick_kernels];
+  alignas(64) std::uint32_t splat_low[brick_kernels];
+  alignas(64) std::uint32_t splat_high[brick_kernels];
 };
 
 struct Prepared {
   const Pass* pass;
   float near;  // the camera's near plane, a view depth
-  Stops stops;
+  KernelPositions positions;
   Ribbons ribbons;
   Densities densities;
   Splats splats;
@@ -156,7 +157,7 @@ struct Hit {
   std::int32_t block;
   float first, last;
 };
-constexpr int hits_of_brick_max = brick_stops * tile_blocks * tile_blocks;
+constexpr int hits_of_brick_max = brick_kernels * tile_blocks * tile_blocks;
 
 // A line that a block may meet in the current slab.
 struct MetLine {

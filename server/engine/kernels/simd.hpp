@@ -22,15 +22,15 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Two consecutive rows of a brick, which are prepared together.
-constexpr int pair_stops = 2 * brick_side;
+constexpr int pair_kernels = 2 * brick_side;
 
-using StopTag = hn::CappedTag<float, pair_stops>;
+using KernelTag = hn::CappedTag<float, pair_kernels>;
 using PixelTag = hn::CappedTag<float, block_pixels>;
-using Stop = hn::Vec<StopTag>;    // a lane per kernel position
-using Pixel = hn::Vec<PixelTag>;  // a lane per pixel
-constexpr int stop_lanes = static_cast<int>(hn::MaxLanes(StopTag()));
+using Kernel = hn::Vec<KernelTag>;  // a lane per kernel position
+using Pixel = hn::Vec<PixelTag>;    // a lane per pixel
+constexpr int kernel_lanes = static_cast<int>(hn::MaxLanes(KernelTag()));
 constexpr int pixel_lanes = static_cast<int>(hn::MaxLanes(PixelTag()));
-static_assert(pair_stops % stop_lanes == 0 && block_pixels % pixel_lanes == 0);
+static_assert(pair_kernels % kernel_lanes == 0 && block_pixels % pixel_lanes == 0);
 
 template <class V>
 using TagOf = hn::DFromV<V>;

@@ -25,10 +25,10 @@ struct Table {
                   Prepared& prepared);
 
   // The second half, for one kernel position with a line or a splat.
-  void (*draw_prepared)(const Camera& camera, const Prepared& prepared, int stop, Tile& tile);
+  void (*draw_prepared)(const Camera& camera, const Prepared& prepared, int position, Tile& tile);
 
   // Slab method: copies the splats of a brick to records. Returns their number, at most
-  // brick_stops.
+  // brick_kernels.
   int (*pack_splats)(const Camera& camera, const Prepared& prepared, SplatRecord* out);
 
   // Copies the lines of a brick to records and lists their hits with open blocks of the tile, at

@@ -11,70 +11,70 @@ constexpr float magnitude_least = 1.17549435e-38F;  // denormal vectors count as
 
 // The vectors at kernel positions.
 struct Vectors {
-  Stop magnitude;         // of the raw data; negative: no line
-  Three<Stop> direction;  // a unit vector along the axes of the cell
+  Kernel magnitude;         // of the raw data; negative: no line
+  Three<Kernel> direction;  // a unit vector along the axes of the cell
 };
 
 // Lengths and their inverses; the inverse is finite but arbitrary below magnitude_least.
 struct Norm {
-  Stop length, inverse;
+  Kernel length, inverse;
 };
 
 // Avoids overflow and underflow by dividing by the largest component, unless that is zero or of
 // moderate size in every lane.
-KERNEL_INLINE Norm norm_of(const Three<Stop>& v) {
-  const Stop top = hn::Max(hn::Max(hn::Abs(v.x), hn::Abs(v.y)), hn::Abs(v.z));
-  const auto moderate = hn::And(hn::Ge(top, all<Stop>(1e-15F)), hn::Le(top, all<Stop>(1e15F)));
-  const auto nothing = hn::Le(top, hn::Zero(StopTag()));
-  if (HWY_LIKELY(hn::AllTrue(StopTag(), hn::Or(moderate, nothing)))) {
-    const Stop square = dot3(v, v);
-    const Stop inverse = inverse_root(hn::Max(square, all<Stop>(1e-30F)));
+KERNEL_INLINE Norm norm_of(const Three<Kernel>& v) {
+  const Kernel top = hn::Max(hn::Max(hn::Abs(v.x), hn::Abs(v.y)), hn::Abs(v.z));
+  const auto moderate = hn::And(hn::Ge(top, all<Kernel>(1e-15F)), hn::Le(top, all<Kernel>(1e15F)));
+  const auto nothing = hn::Le(top, hn::Zero(KernelTag()));
+  if (HWY_LIKELY(hn::AllTrue(KernelTag(), hn::Or(moderate, nothing)))) {
+    const Kernel square = dot3(v, v);
+    const Kernel inverse = inverse_root(hn::Max(square, all<Kernel>(1e-30F)));
     // One more Newton step: a vector whose length equals a tolerance must not fall below it.
-    const Stop length = square * inverse;
-    const Stop rest = hn::NegMulAdd(length, length, square);
-    return {hn::MulAdd(rest, all<Stop>(0.5F) * inverse, length), inverse};
+    const Kernel length = square * inverse;
+    const Kernel rest = hn::NegMulAdd(length, length, square);
+    return {hn::MulAdd(rest, all<Kernel>(0.5F) * inverse, length), inverse};
   }
-  const Stop least = all<Stop>(magnitude_least);
-  const Stop scale = inverse_of(hn::Max(top, least));
-  const Three<Stop> unit = {v.x * scale, v.y * scale, v.z * scale};
-  const Stop length = top * hn::Sqrt(dot3(unit, unit));
+  const Kernel least = all<Kernel>(magnitude_least);
+  const Kernel scale = inverse_of(hn::Max(top, least));
+  const Three<Kernel> unit = {v.x * scale, v.y * scale, v.z * scale};
+  const Kernel length = top * hn::Sqrt(dot3(unit, unit));
   return {length, inverse_of(hn::Max(length, least))};
 }
 
 // Vectors in the field; zero if masked (a masked sample is masked in every component).
-KERNEL_INLINE Three<Stop> fetch_vectors(const Pass& pass, const Rows& rows, int i) {
+KERNEL_INLINE Three<Kernel> fetch_vectors(const Pass& pass, const Rows& rows, int i) {
   const LineStyle& line = pass.line;
-  const Stop zero = hn::Zero(StopTag());
-  const Stop x = fetch(line.velocity[0], rows, i);
-  const Stop y = fetch(line.velocity[1], rows, i);
-  const Stop z = line.velocity[2] != nullptr ? fetch(line.velocity[2], rows, i) : zero;
+  const Kernel zero = hn::Zero(KernelTag());
+  const Kernel x = fetch(line.velocity[0], rows, i);
+  const Kernel y = fetch(line.velocity[1], rows, i);
+  const Kernel z = line.velocity[2] != nullptr ? fetch(line.velocity[2], rows, i) : zero;
   const auto masked = is_masked(x);
   return {hn::IfThenElse(masked, zero, x), hn::IfThenElse(masked, zero, y),
           hn::IfThenElse(masked, zero, z)};
 }
 
 // Scale factors from vectors of the field to those drawn.
-KERNEL_INLINE Stop rate_of(const float* rates, const Rows& rows, int a, int i) {
-  if (rates == nullptr) return all<Stop>(1.0F);
-  alignas(64) float lanes[pair_stops];
-  for (int k = 0; k < pair_stops; ++k) lanes[k] = rates[rows.sample[a][k]];
-  return load<Stop>(lanes + i);
+KERNEL_INLINE Kernel rate_of(const float* rates, const Rows& rows, int a, int i) {
+  if (rates == nullptr) return all<Kernel>(1.0F);
+  alignas(64) float lanes[pair_kernels];
+  for (int k = 0; k < pair_kernels; ++k) lanes[k] = rates[rows.sample[a][k]];
+  return load<Kernel>(lanes + i);
 }
 
 // Unit directions as drawn, and magnitudes; a masked sample or one without a direction gets a
 // negative magnitude.
 KERNEL_INLINE Vectors read_vectors(const Pass& pass, const Rows& rows, int i) {
   const LineStyle& line = pass.line;
-  const Three<Stop> v = fetch_vectors(pass, rows, i);
+  const Three<Kernel> v = fetch_vectors(pass, rows, i);
   const Norm raw = norm_of(v);
   // Scaled by 1/m first: the products stay finite for any data.
-  const Three<Stop> drawn = {
-      v.x * raw.inverse * all<Stop>(line.scale[0]) * rate_of(line.rate_x, rows, 1, i),
-      v.y * raw.inverse * all<Stop>(line.scale[1]) * all<Stop>(line.rate_y),
-      v.z * raw.inverse * all<Stop>(line.scale[2]) * rate_of(line.rate_z, rows, 2, i)};
+  const Three<Kernel> drawn = {
+      v.x * raw.inverse * all<Kernel>(line.scale[0]) * rate_of(line.rate_x, rows, 1, i),
+      v.y * raw.inverse * all<Kernel>(line.scale[1]) * all<Kernel>(line.rate_y),
+      v.z * raw.inverse * all<Kernel>(line.scale[2]) * rate_of(line.rate_z, rows, 2, i)};
   const Norm shown = norm_of(drawn);
-  const auto known = hn::Ge(shown.length, all<Stop>(magnitude_least));
-  return {hn::IfThenElse(known, raw.length, all<Stop>(-1.0F)),
+  const auto known = hn::Ge(shown.length, all<Kernel>(magnitude_least));
+  return {hn::IfThenElse(known, raw.length, all<Kernel>(-1.0F)),
           {drawn.x * shown.inverse, drawn.y * shown.inverse, drawn.z * shown.inverse}};
 }
 
@@ -83,38 +83,40 @@ inline float least_magnitude(const LineStyle& line) {
 }
 
 // Upper bound of the width of the cell over all view directions: its longest edge.
-KERNEL_INLINE Stop cell_longest(const Rows& rows, int i) {
-  const Stop x = load<Stop>(rows.cell[0] + i);
-  const Stop y = load<Stop>(rows.cell[1] + i);
-  return hn::Max(hn::Max(x, y), load<Stop>(rows.cell[2] + i));
+KERNEL_INLINE Kernel cell_longest(const Rows& rows, int i) {
+  const Kernel x = load<Kernel>(rows.cell[0] + i);
+  const Kernel y = load<Kernel>(rows.cell[1] + i);
+  return hn::Max(hn::Max(x, y), load<Kernel>(rows.cell[2] + i));
 }
 
 struct Extinctions {
-  Stop rho;           // per world unit, sum of all layers
-  MaskOf<Stop> kept;  // optical depth reaches the tolerance in at least one view direction
+  Kernel rho;           // per world unit, sum of all layers
+  MaskOf<Kernel> kept;  // optical depth reaches the tolerance in at least one view direction
 };
 
 KERNEL_INLINE Extinctions read_extinctions(const Pass& pass, const Rows& rows, int i) {
   const Medium& medium = pass.medium;
-  const Stop zero = hn::Zero(StopTag());
-  Stop total = zero;
+  const Kernel zero = hn::Zero(KernelTag());
+  Kernel total = zero;
   for (int k = 0; k < medium.layers; ++k) {
     const Extinction& extinction = medium.layer[k].extinction;
-    const Stop raw = fetch(medium.layer[k].values, rows, i);
+    const Kernel raw = fetch(medium.layer[k].values, rows, i);
     const auto masked = is_masked(raw);
     // The value of the first point extends below it. A masked sample lies below every point.
-    const Stop value = hn::IfThenElse(masked, all<Stop>(-3e38F), raw);
-    Stop rho = hn::IfThenElse(masked, zero, all<Stop>(extinction.y[0]));
+    const Kernel value = hn::IfThenElse(masked, all<Kernel>(-3e38F), raw);
+    Kernel rho = hn::IfThenElse(masked, zero, all<Kernel>(extinction.y[0]));
     for (int p = 0; p < extinction.points; ++p) {
-      const Stop x = all<Stop>(extinction.x[p]);
-      const Stop here = all<Stop>(extinction.y[p]) + all<Stop>(extinction.slope[p]) * (value - x);
+      const Kernel x = all<Kernel>(extinction.x[p]);
+      const Kernel here =
+          all<Kernel>(extinction.y[p]) + all<Kernel>(extinction.slope[p]) * (value - x);
       rho = hn::IfThenElse(hn::Ge(value, x), here, rho);
     }
     rho = hn::IfThenElse(masked, zero, rho);
     total = total + hn::Max(rho, zero);
   }
-  const Stop depth = total * cell_longest(rows, i) * all<Stop>(1.0F / footprint_integral);
-  return {total, hn::And(hn::Ge(depth, all<Stop>(medium.min_optical_depth)), hn::Gt(total, zero))};
+  const Kernel depth = total * cell_longest(rows, i) * all<Kernel>(1.0F / footprint_integral);
+  return {total,
+          hn::And(hn::Ge(depth, all<Kernel>(medium.min_optical_depth)), hn::Gt(total, zero))};
 }
 
 // The colour of all layers together, weighted by their extinctions.
@@ -162,17 +164,17 @@ inline float splat_cover(const Pass& pass, const Rows& rows, int i, float scale)
 
 // Adds the lines of a pair of rows to the summary. Returns the positions with a line.
 std::uint32_t summarise_lines(const Pass& pass, const Rows& rows, BrickSummary& summary) {
-  const Stop least = all<Stop>(least_magnitude(pass.line));
+  const Kernel least = all<Kernel>(least_magnitude(pass.line));
   std::uint32_t lines = 0;
-  for (int i = 0; i < pair_stops; i += stop_lanes) {
+  for (int i = 0; i < pair_kernels; i += kernel_lanes) {
     const std::uint32_t here = pair_bits(rows) >> static_cast<unsigned>(i);
     const Vectors vectors = read_vectors(pass, rows, i);
     const auto drawn = hn::Ge(vectors.magnitude, least);
-    const std::uint32_t bits = bits_of<Stop>(drawn) & here;
+    const std::uint32_t bits = bits_of<Kernel>(drawn) & here;
     lines |= bits << static_cast<unsigned>(i);
-    alignas(64) float magnitude[pair_stops];
+    alignas(64) float magnitude[pair_kernels];
     store(vectors.magnitude, magnitude);
-    for (int k = 0; k < stop_lanes; ++k) {
+    for (int k = 0; k < kernel_lanes; ++k) {
       if ((bits >> static_cast<unsigned>(k) & 1U) != 0) {
         summary.magnitude_max = larger(summary.magnitude_max, magnitude[k]);
       } else if ((here >> static_cast<unsigned>(k) & 1U) != 0 && magnitude[k] > 0) {
@@ -188,15 +190,15 @@ std::uint32_t summarise_lines(const Pass& pass, const Rows& rows, BrickSummary& 
 std::uint32_t summarise_splats(const Pass& pass, const Rows& rows, float scale,
                                BrickSummary& summary) {
   std::uint32_t splats = 0;
-  for (int i = 0; i < pair_stops; i += stop_lanes) {
+  for (int i = 0; i < pair_kernels; i += kernel_lanes) {
     const Extinctions found = read_extinctions(pass, rows, i);
     const std::uint32_t here = pair_bits(rows) >> static_cast<unsigned>(i);
-    const std::uint32_t kept = bits_of<Stop>(found.kept) & here;
+    const std::uint32_t kept = bits_of<Kernel>(found.kept) & here;
     splats |= kept << static_cast<unsigned>(i);
-    const auto there = hn::Gt(found.rho, hn::Zero(StopTag()));
-    std::uint32_t thin = bits_of<Stop>(there) & here & ~kept;
+    const auto there = hn::Gt(found.rho, hn::Zero(KernelTag()));
+    std::uint32_t thin = bits_of<Kernel>(there) & here & ~kept;
     if (thin == 0) continue;
-    alignas(64) float rho[pair_stops];
+    alignas(64) float rho[pair_kernels];
     store(found.rho, rho);
     for (; thin != 0; thin &= thin - 1U) {
       const int k = __builtin_ctz(thin);
@@ -219,9 +221,9 @@ void summarise(const Pass& pass, const Brick& brick, float scale, BrickSummary& 
     summary.splats += __builtin_popcount(splats);
     summary.without_both += __builtin_popcount(pair_bits(rows) & ~(lines | splats));
   }
-  const int stops = rows.u_count * rows.v_count;
-  summary.without_line = pass.has_lines != 0 ? stops - summary.lines : 0;
-  summary.without_splat = pass.has_medium != 0 ? stops - summary.splats : 0;
+  const int positions = rows.u_count * rows.v_count;
+  summary.without_line = pass.has_lines != 0 ? positions - summary.lines : 0;
+  summary.without_splat = pass.has_medium != 0 ? positions - summary.splats : 0;
 }
 
 }  // namespace
