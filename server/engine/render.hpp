@@ -15,7 +15,7 @@
 
 namespace windsplat::engine {
 
-// Linear premultiplied RGBA of the volume alone, row 0 on top, 4 floats a pixel.
+// Linear premultiplied RGBA of the volume alone, row 0 on top, 4 floats per pixel.
 struct Image {
   int width = 0;
   int height = 0;

@@ -35,7 +35,7 @@ struct Camera {
 // Curved (a globe, terrain): `places` holds the position of each sample. The edge of a cell along
 // axis a is half the vector from the previous sample to the next (at an end the vector to the only
 // neighbour; along an axis of one sample `spacing`, perpendicular to the other two), times the
-// stride. positions and spacing remain the unbent lattice: height, where a colour tells it, is
+// stride. positions and spacing remain those of the uncurved lattice; colours by height use
 // positions[2].
 struct Lattice {
   std::array<int, 3> dims{1, 1, 1};

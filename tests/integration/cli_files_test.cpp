@@ -196,7 +196,7 @@ TEST(CliFiles, SynthThatCannotWriteSaysSoLeavesNothingAndDoesNotCrash) {
   const Outcome nowhere =
       run({"synth", "tornado", "--dims", "8x8x8", "-o", folder.file("absent/x.nc")});
   EXPECT_EQ(nowhere.code, 1);
-  EXPECT_THAT(nowhere.err, HasSubstr("there is no folder"));
+  EXPECT_THAT(nowhere.err, HasSubstr("missing folder"));
 }
 
 TEST(CliFiles, LaterWordsChangeTheViewOfTheFile) {

@@ -44,8 +44,8 @@ struct FileContents {
   std::vector<FileVariable>
       variables;                    // of the root group; readers address a variable by its index
   std::vector<std::string> groups;  // names of groups below the root, which are not searched
-  std::vector<LeftOut> left_out;    // what the reader could not offer
-  std::vector<std::string> notes;   // what the reader did that a user should know
+  std::vector<LeftOut> left_out;    // variables that cannot be read
+  std::vector<std::string> notes;   // assumptions and conversions of the reader, for users
 };
 
 }  // namespace windsplat::data

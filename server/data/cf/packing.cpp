@@ -156,7 +156,7 @@ std::optional<FloatMask> float_mask(const Packing& packing) {
     const auto rounded = static_cast<float>(missing);
     if (static_cast<double>(rounded) == missing) mask.missing.push_back(rounded);
   }
-  // Of limits between two floats the inner one is as good; beyond all floats they say nothing.
+  // Limits between two floats are rounded inward; limits beyond all floats have no effect.
   const auto largest = static_cast<double>(std::numeric_limits<float>::max());
   if (std::isnan(packing.valid_min) || std::isnan(packing.valid_max)) return std::nullopt;
   if (packing.valid_min > largest || packing.valid_max < -largest) return std::nullopt;

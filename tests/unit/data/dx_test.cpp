@@ -251,7 +251,7 @@ TEST(DxStorm, WindIsTurnedUpright) {
   EXPECT_DOUBLE_EQ(info.grid.axes[0].coordinates[13], 13 * 4153.846);
   EXPECT_DOUBLE_EQ(info.grid.axes[1].coordinates[24], 24 * 4166.667);
   EXPECT_DOUBLE_EQ(info.grid.axes[2].coordinates[7], 7 * 2214.286);
-  EXPECT_THAT(info.notes, Contains(HasSubstr("y is taken for the vertical")));
+  EXPECT_THAT(info.notes, Contains(HasSubstr("y is interpreted as vertical")));
   const Volume wind = volume_of(*source, "wind");
   ASSERT_EQ(wind.components, 3);
   EXPECT_EQ(wind.masked, 0);

@@ -300,7 +300,7 @@ TEST(Groups, OfFourBareDimensionsTheFirstIsTime) {
   ASSERT_TRUE(source) << source.error().message;
   const DatasetInfo& info = (*source)->info();
   EXPECT_EQ(info.steps.size(), 6U);
-  EXPECT_TRUE(has_note(info, "of 'p' and others with four, the first is taken for time"));
+  EXPECT_TRUE(has_note(info, "of 'p' and others with four, the first is interpreted as time"));
   EXPECT_NE(info.find("p"), nullptr);
   const Volume field = volume_of(**source, "q", 4);
   EXPECT_EQ(field.dims, (std::array<int, 3>{5, 3, 2}));

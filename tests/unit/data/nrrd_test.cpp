@@ -364,7 +364,7 @@ INSTANTIATE_TEST_SUITE_P(
     All, NrrdRefusal,
     testing::Values(
         BadNrrdCase{"short", small + "encoding: raw\n", "abc",
-                    "has 3 bytes of data, its header says 4"},
+                    "has 3 bytes of data; its header requires 4"},
         BadNrrdCase{"huge", huge_sizes + "endian: big\nencoding: raw\n", "abcd", "2^62"},
         BadNrrdCase{
             "overflow",

@@ -158,7 +158,7 @@ TEST(VtkXmlFile, PiecesAreAssembledAndWhatNoneCoversIsMasked) {
     EXPECT_TRUE(std::isnan(volume.values[row * 6 + 5]));
   }
   EXPECT_EQ(volume.masked, 4);
-  EXPECT_THAT(all_notes(source->info()), HasSubstr("4 points of the whole extent lie in no piece"));
+  EXPECT_THAT(all_notes(source->info()), HasSubstr("4 points of the whole extent are in no piece"));
 }
 
 // Pieces of 0..2 and 3..4 along x have all points between them, but not the cells from 2 to 3.

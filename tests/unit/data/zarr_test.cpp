@@ -366,7 +366,7 @@ TEST(Zarr, BrokenMetadataIsRefused) {
               HasSubstr("at most 8"));
   EXPECT_THAT(fault_of(good.substr(0, 40)), HasSubstr("not valid JSON"));
   EXPECT_THAT(fault_of(good.substr(0, good.size() - 1) + R"(,"order":"C"})"),
-              HasSubstr("'order' twice"));
+              HasSubstr("duplicate key 'order'"));
   EXPECT_THAT(fault_of(std::string(100000, '[')), HasSubstr("32 levels"));
 }
 

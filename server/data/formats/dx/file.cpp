@@ -210,7 +210,7 @@ class Opener {
     }
     if (first.grid.y_up) {
       file_->add_note(
-          "the innermost index runs along y: y is taken for the vertical, and x, y, z of the file "
+          "the innermost index runs along y: y is interpreted as vertical, and x, y, z of the file "
           "are drawn as y, z, x");
     }
     if (first.grid.oblique) {

@@ -147,7 +147,7 @@ class Builder {
       }
     }
     if (changing != 1) {
-      return fault("a term's points do not lie on a line along an axis");
+      return fault("the points of a term are not on a line along an axis");
     }
     for (std::size_t i = 0; i < object.items; ++i) {
       line.along.push_back((*values)[i * width + line.place]);

@@ -304,7 +304,7 @@ class Parser {
     const std::size_t alias = name.find("=>");
     variable.name = alias == std::string::npos ? name : name.substr(alias + 2);
     if (line.words.size() < 3) {
-      complain(line, "a variable needs a name, its levels and its units");
+      complain(line, "a variable requires a name, levels and units");
       return;
     }
     const std::string_view levels = line.words[1].substr(0, line.words[1].find(','));

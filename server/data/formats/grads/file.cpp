@@ -89,7 +89,7 @@ class Opener {
     const std::uint64_t needed = ctl_.file_header + times * time_bytes_;
     if (file->size() < needed) {
       return file->fault("is cut short: it has " + std::to_string(file->size()) + " bytes, " +
-                         in_quotes(input_->name()) + " says " + std::to_string(needed));
+                         in_quotes(input_->name()) + " requires " + std::to_string(needed));
     }
     if (ctl_.sequential) {
       std::array<unsigned char, marker> raw{};
@@ -101,7 +101,7 @@ class Opener {
       const std::uint64_t grid = record_of(first) - 2 * marker;
       if (found != static_cast<double>(grid)) {
         return file->fault(
-            "is not sequential as its descriptor says: its first record does not "
+            "is not sequential as stated by its descriptor: its first record does not "
             "have " +
             std::to_string(grid) + " bytes in this byte order");
       }
@@ -174,11 +174,10 @@ class Opener {
           [](const Variable& variable) { return variable.type != bytes::Scalar::float32; });
       if (whole) {
         return input_->fault(
-            "names files that are not there, and of whole numbers none is free "
-            "to say so");
+            "names missing files, which cannot be masked because its variables are integers");
       }
       file_->add_note(std::to_string(absent) + " of " + std::to_string(pieces.size()) +
-                      " files of the template are not there: their steps are masked");
+                      " files of the template are missing: their steps are masked");
     }
     if (not_described_ > 0) {
       file_->add_note(std::to_string(not_described_) +
@@ -238,9 +237,9 @@ class Opener {
     const bool pressure = falls || ctl_.pascals;
     if (pressure) {
       file_->add_note(ctl_.pascals
-                          ? "levels are pressures in Pa, as the option pascals says"
-                          : "levels fall from 1100 or less: taken for pressures in hPa, as GrADS "
-                            "does");
+                          ? "levels are pressures in Pa by the option pascals"
+                          : "levels descend from 1100 or less: interpreted as pressures in hPa, as "
+                            "in GrADS");
     }
     if (ctl_.zrev) std::reverse(z.begin(), z.end());
     z_ = file_->add_dimension("lev", ctl_.z.count);

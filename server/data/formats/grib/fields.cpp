@@ -147,7 +147,7 @@ void find_coordinates(const Message& message, Grid& grid) {
            std::all_of(list.begin(), list.end(), [](double v) { return std::isfinite(v); });
   };
   if (!finite(grid.longitude) || !finite(grid.latitude)) {
-    grid.problem = "ecCodes finds no coordinates of its grid " + in_quotes(grid.type);
+    grid.problem = "ecCodes provides no coordinates for its grid " + in_quotes(grid.type);
   }
 }
 
@@ -248,10 +248,10 @@ Result<std::vector<float>> read_values(const std::vector<unsigned char>& bytes, 
   constexpr double missing = -1e300;
   if (message.whole("numberOfDataPoints", -1) != static_cast<long>(grid.rows * grid.columns) ||
       codes_set_double(message.handle(), "missingValue", missing) != CODES_SUCCESS) {
-    return broken("does not hold as many points as its grid");
+    return broken("has a number of values different from its grid");
   }
   const std::vector<double> values = message.numbers("values", grid.rows * grid.columns);
-  if (values.empty()) return broken("holds no values that ecCodes can decode");
+  if (values.empty()) return broken("has no values that ecCodes can decode");
   const bool by_columns = message.whole("jPointsAreConsecutive", 0) != 0;
   const bool alternating = message.whole("alternativeRowScanning", 0) != 0;
   const std::size_t run = by_columns ? grid.rows : grid.columns;

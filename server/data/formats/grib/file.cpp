@@ -251,7 +251,7 @@ void File::add_field(std::size_t g) {
   if (group.repeated > 0) {
     contents_.notes.push_back(in_quotes(variable.name) + ": " + std::to_string(group.repeated) +
                               " more messages of the same times and levels (ensemble members or "
-                              "the like) are left out; the first ones are taken");
+                              "the like) are omitted; the first ones are used");
   }
   if (header.relative_to_grid && grids_[group.grid].projected && tell_by_grid(variable)) {
     contents_.notes.push_back(in_quotes(variable.name) +

@@ -34,7 +34,7 @@ void name_steps_of_bare_arrays(FileContents& contents) {
       time.length = length;
       dimensions.push_back(std::move(time));
       contents.notes.push_back("dimensions have no names: of " + in_quotes(variable.name) +
-                               " and others with four, the first is taken for time");
+                               " and others with four, the first is interpreted as time");
     }
     variable.dims.front() = found->second;
   }

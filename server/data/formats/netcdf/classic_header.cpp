@@ -109,7 +109,7 @@ class Header {
       fail("has a list of an unknown kind");
     }
     if (multiply(elements, element_bytes) > file_bytes_) {
-      fail("announces a longer list than the file can hold");
+      fail("has a list longer than the file");
     }
     return fault_.empty() ? elements : 0;
   }

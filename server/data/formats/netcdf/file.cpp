@@ -178,14 +178,14 @@ Result<std::string> writable_path(const std::string& path) {
     plain = fs::absolute(plain);
   }
   if (!fs::is_directory(plain.parent_path(), fault)) {
-    return make_error(ErrorKind::not_found, in_quotes(path) + ": there is no folder " +
+    return make_error(ErrorKind::not_found, in_quotes(path) + ": missing folder " +
                                                 in_quotes(plain.parent_path().native()));
   }
   // The complete file is renamed to its name, which would replace a device or pipe.
   const fs::file_status status = fs::status(plain, fault);
   if (fs::exists(status) && !fs::is_regular_file(status)) {
     return make_error(ErrorKind::invalid,
-                      in_quotes(path) + " is not a regular file, which netCDF needs");
+                      in_quotes(path) + " is not a regular file, as required by netCDF");
   }
   // The library interprets '#' as the start of mode options and rewrites '\\' in names.
   if (plain.native().find_first_of("#\\") != std::string::npos ||
@@ -274,14 +274,14 @@ Result<void> File::open_library() {
   }
   if (!classic_) {
     hdf5_ = open_hdf5(*input_);
-    if (!hdf5_) return fault("cannot be opened by HDF5 beside the netCDF library");
+    if (!hdf5_) return fault("cannot be opened by HDF5 in addition to the netCDF library");
     netcdf4_ = H5Aexists(hdf5_.id(), "_NCProperties") > 0;
   }
   int model = 0;
   int mode = 0;
   if (nc_inq_format_extended(ncid_, &model, &mode) != NC_NOERR ||
       model != (classic_ ? NC_FORMATX_NC3 : NC_FORMATX_NC_HDF5)) {
-    return fault("is not of the format that its first bytes say");
+    return fault("does not have the format of its signature");
   }
   return {};
 }

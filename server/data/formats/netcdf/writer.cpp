@@ -189,7 +189,8 @@ class Writer {
       return done;
     }
     if (std::rename(part_.c_str(), path_.c_str()) != 0) {
-      return make_error(ErrorKind::internal, in_quotes(path_) + " cannot take its name: " +
+      return make_error(ErrorKind::internal, in_quotes(path_) +
+                                                 " cannot be renamed to its final name: " +
                                                  std::generic_category().message(errno));
     }
     is_part_ = false;

@@ -97,13 +97,13 @@ class Placer {
     if (is_free(0) && (directed || too_many) && (first == 2 || first == 3)) {
       out_.axes.front().use = Use::components;
       out_.notes.push_back("the fastest axis, of " + std::to_string(first) +
-                           ", is taken for a vector's components");
+                           ", is interpreted as vector components");
     }
     if (is_free(rank() - 1) && rank() > 1 &&
         ((directed && out_.axes.back().use == Use::space) || count(Use::space) > 3)) {
       out_.axes.back().use = Use::steps;
       out_.notes.push_back("the slowest axis, of " + std::to_string(header_.axes.back().size) +
-                           ", is taken for steps in time");
+                           ", is interpreted as time");
     }
   }
 

@@ -29,7 +29,7 @@ Result<std::uint64_t> skip_lines(const InputFile& file, std::uint64_t at, std::i
   while (lines > 0) {
     const std::uint64_t some =
         std::min<std::uint64_t>(block.size(), file.size() - std::min(at, file.size()));
-    if (some == 0) return file.fault("is cut short: it has fewer lines than 'line skip' says");
+    if (some == 0) return file.fault("is cut short: it has fewer lines than 'line skip'");
     if (auto done = file.read(at, block.data(), some); !done) return done.error();
     std::uint64_t used = 0;
     while (used < some && lines > 0) lines -= block[used++] == '\n' ? 1 : 0;
@@ -58,7 +58,7 @@ class Part {
                                                       : bytes::Encoding::text;
     auto skip = static_cast<std::uint64_t>(header_.byte_skip);
     std::uint64_t start = *from;
-    if (encoding != bytes::Encoding::gzip) {  // counts encoded bytes
+    if (encoding != bytes::Encoding::gzip) {  // applies to the bytes of the file
       start += std::min(skip, file->size());
       skip = 0;
     }
@@ -84,9 +84,9 @@ class Part {
     }
     if (start < from || start > size || size - start < bytes_) {
       return file->fault("is cut short: it has " + std::to_string(size - std::min(from, size)) +
-                         " bytes of data, its header says " + std::to_string(bytes_) +
+                         " bytes of data; its header requires " + std::to_string(bytes_) +
                          (header_.byte_skip > 0
-                              ? " behind " + std::to_string(header_.byte_skip) + " skipped ones"
+                              ? " after " + std::to_string(header_.byte_skip) + " skipped ones"
                               : ""));
     }
     rest += size - start - bytes_;

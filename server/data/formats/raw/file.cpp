@@ -173,7 +173,7 @@ class Opener {
       const std::uint64_t needed = skip + per_file * step_bytes;
       if ((*file)->size() < needed) {
         return (*file)->fault("is cut short: it has " + std::to_string((*file)->size()) +
-                              " bytes, " + in_quotes(input_->name()) + " says " +
+                              " bytes; " + in_quotes(input_->name()) + " requires " +
                               std::to_string(needed));
       }
       Extent& extent = extents_[*name];

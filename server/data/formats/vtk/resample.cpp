@@ -52,7 +52,7 @@ class Resampler {
     for (std::uint64_t c = 0; c < mesh_.cell_count(); ++c) {
       if (auto done = scan(c); !done) return done.error();
     }
-    if (out_.inside == 0) return refuse("has no cell that holds a sample of its bounding box");
+    if (out_.inside == 0) return refuse("has no cell that contains a sample of its bounding box");
     return std::move(out_);
   }
 
@@ -135,7 +135,7 @@ class Resampler {
     }
     rank_ = of_rank[3].cells > 0 ? 3 : 2;
     const Extents& sum = of_rank.at(rank_);
-    if (sum.cells == 0) return refuse("has no cells of a kind that is read");
+    if (sum.cells == 0) return refuse("has no cells of a supported kind");
     out_.other_rank = rank_ == 3 ? of_rank[2].cells : 0;
     box_ = sum.all;
     measure_extents(sum);
@@ -161,7 +161,7 @@ class Resampler {
       longest = std::max(longest, length);
     }
     if (box_.high[flat] - box_.low[flat] > 1e-6 * longest) {
-      return refuse("is a surface in space, which holds no volume");
+      return refuse("is a surface in space without volume");
     }
     order_ = {flat == 0 ? 1U : 0U, flat == 2 ? 1U : 2U, flat};
     const Box turned = box_;

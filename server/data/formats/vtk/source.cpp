@@ -161,7 +161,7 @@ class VtkSource final : public FileSource {
     const std::uint64_t count = uncovered(snapshot, of_cells_);
     if (count == 0) return;
     info_.notes.push_back(std::to_string(count) + (of_cells_ ? " cells" : " points") +
-                          " of the whole extent lie in no piece and are masked");
+                          " of the whole extent are in no piece and masked");
   }
 
   [[nodiscard]] const std::vector<StoredArray>& data_of(const Piece& piece) const {
@@ -194,7 +194,7 @@ class VtkSource final : public FileSource {
     mesh_digest_ = digest_of_mesh(*mesh);
     if (kind_ == Kind::structured) {
       if (auto grid = separable_grid(mesh->points, mesh->counts)) {
-        info_.notes.push_back("the structured grid's points lie on axes: shown as it is");
+        info_.notes.push_back("the structured grid is rectilinear: shown without resampling");
         return set_grid(std::move(*grid));
       }
     }

@@ -190,7 +190,7 @@ class ArrayReader::Stream {
       const std::uint64_t plain = b + 1 == count && last != 0 ? last : size;
       packed += *bytes;
       if (*bytes > capacity() || packed > capacity() || plain > *bytes * growth_max) {
-        return fault("has a block that the file cannot hold");
+        return fault("has a block that its compressed data cannot hold");
       }
       blocks_.push_back({*bytes, plain});
     }

@@ -181,7 +181,7 @@ class Document {
     return true;
   }
 
-  // The tag's own attributes, and where the data begin: behind the first '_'.
+  // Finds the attributes of the tag, and the start of the data after the first '_'.
   Result<void> find_appended() {
     const std::uint64_t tag_at = text_.text.size();
     std::string tag(static_cast<std::size_t>(std::min<std::uint64_t>(512, file_->size() - tag_at)),
@@ -231,7 +231,7 @@ class Document {
     return {};
   }
 
-  // Location of an array's values; nullopt, with the reason, where unsupported.
+  // Location of the values of an array; nullopt if unsupported, with a recorded reason.
   Result<std::optional<StoredArray>> array_of(const xml_node& node, std::uint64_t tuples,
                                               Snapshot& out) {
     StoredArray array;
@@ -339,7 +339,7 @@ class Document {
     return {};
   }
 
-  // Wrong extents give a wrong number here, and are refused in check_snapshot.
+  // Invalid extents yield a wrong number here and are rejected by check_snapshot.
   static std::uint64_t size_of(const std::array<std::int64_t, 3>& counts) {
     std::uint64_t all = 1;
     for (const std::int64_t count : counts) all *= static_cast<std::uint64_t>(count);

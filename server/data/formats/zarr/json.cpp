@@ -47,7 +47,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   bool key(string_t& name) override {
     Open& top = stack_.back();
     if (top.value.object.contains(name)) {
-      fault_ = "it has the key " + in_quotes(name) + " twice";
+      fault_ = "duplicate key " + in_quotes(name);
       return false;
     }
     top.key = std::move(name);
