@@ -6,6 +6,8 @@
 #include <map>
 #include <string>
 
+#include "server/base/error.hpp"
+
 namespace windsplat::data::netcdf {
 
 namespace {
