@@ -12,11 +12,11 @@
 #include <thread>
 #include <vector>
 
-#include "client.hpp"
 #include "server/data/formats/netcdf/writer.hpp"
 #include "server/data/resident/store.hpp"
 #include "server/data/samples/samples.hpp"
 #include "server/transport/server.hpp"
+#include "tests/integration/client.hpp"
 
 namespace net_test {
 

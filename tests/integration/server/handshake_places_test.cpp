@@ -21,12 +21,12 @@
 #include <thread>
 #include <utility>
 
-#include "certificate.hpp"
-#include "net_server.hpp"
 #include "server/api/router.hpp"
 #include "server/transport/connections.hpp"
 #include "server/transport/handshake.hpp"
 #include "server/transport/tls.hpp"
+#include "tests/integration/certificate.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

@@ -7,9 +7,9 @@
 #include <regex>
 #include <thread>
 
-#include "net_server.hpp"
-#include "prometheus_text.hpp"
 #include "protocol/frame_header.hpp"
+#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/prometheus_text.hpp"
 
 namespace net_test {
 namespace {

@@ -1,11 +1,12 @@
 // The same server in TLS: requests, streams, deadlines, and certificates that change while it runs.
+#include "server/transport/tls.hpp"
+
 #include <gmock/gmock.h>
 
 #include <chrono>
 
-#include "certificate.hpp"
-#include "net_server.hpp"
-#include "server/transport/tls.hpp"
+#include "tests/integration/certificate.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "net_server.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

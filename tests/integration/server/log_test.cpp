@@ -1,12 +1,13 @@
 // Request ids in responses and in the log, and data that must not be logged.
+#include "server/base/log.hpp"
+
 #include <gmock/gmock.h>
 
 #include <chrono>
 #include <sstream>
 #include <thread>
 
-#include "net_server.hpp"
-#include "server/base/log.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

@@ -1,5 +1,5 @@
 // One line after the other, then what histograms have to fulfil.
-#include "prometheus_text.hpp"
+#include "tests/integration/server/prometheus_text.hpp"
 
 #include <gtest/gtest.h>
 

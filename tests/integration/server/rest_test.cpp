@@ -6,8 +6,8 @@
 #include <string>
 #include <thread>
 
-#include "net_server.hpp"
 #include "server/transport/http_client.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

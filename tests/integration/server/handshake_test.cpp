@@ -13,10 +13,10 @@
 #include <functional>
 #include <memory>
 
-#include "certificate.hpp"
-#include "net_server.hpp"
 #include "server/access/auth.hpp"
 #include "server/transport/tls.hpp"
+#include "tests/integration/certificate.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

@@ -1,4 +1,6 @@
 // Jobs: states, limits, cancellation, and that an error of the work fails only its job.
+#include "server/work/jobs.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,8 +11,6 @@
 #include <mutex>
 #include <stdexcept>
 #include <thread>
-
-#include "server/work/jobs.hpp"
 
 namespace windsplat::net {
 namespace {

@@ -1,9 +1,9 @@
 // A server with a token: authentication over HTTP and WebSocket by each credential.
 #include <gmock/gmock.h>
 
-#include "net_server.hpp"
 #include "server/access/auth.hpp"
 #include "server/base/log.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

@@ -10,9 +10,9 @@
 #include <thread>
 #include <vector>
 
-#include "net_server.hpp"
 #include "server/api/services.hpp"
 #include "server/frame/frame.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

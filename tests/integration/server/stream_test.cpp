@@ -4,8 +4,8 @@
 #include <chrono>
 #include <thread>
 
-#include "net_server.hpp"
 #include "protocol/frame_header.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

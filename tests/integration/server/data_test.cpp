@@ -8,12 +8,12 @@
 #include <future>
 #include <thread>
 
-#include "net_server.hpp"
 #include "server/api/router.hpp"
 #include "server/data/open/open.hpp"
 #include "server/work/drawing.hpp"
 #include "server/work/viewer.hpp"
-#include "slow_source.hpp"
+#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/slow_source.hpp"
 
 namespace net_test {
 namespace {

@@ -8,10 +8,10 @@
 #include <cstring>
 #include <thread>
 
-#include "cli_program.hpp"
-#include "net_server.hpp"
 #include "server/base/trim_storage.hpp"
 #include "server/work/references.hpp"
+#include "tests/integration/cli_program.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

@@ -5,8 +5,8 @@
 #include <thread>
 #include <vector>
 
-#include "net_server.hpp"
 #include "protocol/frame_header.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "net_server.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

@@ -8,8 +8,8 @@
 #include <thread>
 #include <vector>
 
-#include "net_server.hpp"
 #include "protocol/saved_view.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {

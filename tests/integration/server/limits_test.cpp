@@ -6,11 +6,11 @@
 #include <memory>
 #include <thread>
 
-#include "net_server.hpp"
-#include "prometheus_text.hpp"
 #include "server/data/files/files.hpp"
 #include "server/data/open/open.hpp"
-#include "slow_source.hpp"
+#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/prometheus_text.hpp"
+#include "tests/integration/server/slow_source.hpp"
 
 namespace net_test {
 namespace {

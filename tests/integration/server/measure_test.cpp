@@ -9,7 +9,7 @@
 #include <numeric>
 #include <thread>
 
-#include "net_server.hpp"
+#include "tests/integration/server/net_server.hpp"
 
 namespace net_test {
 namespace {
