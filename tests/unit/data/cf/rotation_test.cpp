@@ -1,7 +1,7 @@
 // Winds on a Lambert conformal conic whose rows are turned by a further angle: with n the sine of
 // the tangent parallel, east lies at gamma = n (lambda - lambda_0) from the projection's x axis, so
 // that a wind from due west has the components (cos, sin)(gamma - turn) along the grid's axes.
-#include "server/data/cf/rotation.hpp"
+#include "server/data/cf/fields/rotation.hpp"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "server/data/cf/atmosphere.hpp"
+#include "server/data/cf/fields/atmosphere.hpp"
 #include "server/data/model/dataset_info.hpp"
 #include "server/data/model/volume.hpp"
 #include "server/data/open/open.hpp"

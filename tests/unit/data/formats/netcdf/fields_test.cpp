@@ -1,5 +1,5 @@
 // Which variables become fields, which become a vector together, and why the rest is left out.
-#include "server/data/cf/fields.hpp"
+#include "server/data/cf/fields/fields.hpp"
 
 #include <gtest/gtest.h>
 

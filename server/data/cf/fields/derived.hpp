@@ -10,19 +10,13 @@
 
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
-#include "server/data/cf/fields.hpp"
+#include "server/data/cf/fields/fields.hpp"
+#include "server/data/cf/grid/level_pressures.hpp"
 #include "server/data/cf/read_blocks.hpp"
-#include "server/data/cf/vertical.hpp"
 #include "server/data/model/dataset_info.hpp"
 #include "server/data/model/source.hpp"
 
 namespace windsplat::data::cf {
-
-// Source of the pressure of a sample, in Pa: fixed levels, or hybrid with surface pressure.
-struct PressureLevels {
-  std::vector<double> level;  // Pa, from below; empty where `hybrid` applies
-  std::optional<HybridLevels> hybrid;
-};
 
 struct DerivedField {
   enum class Rule {

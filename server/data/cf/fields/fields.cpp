@@ -1,5 +1,5 @@
 // Three ways to recognise the components of a vector, the most reliable first.
-#include "server/data/cf/fields.hpp"
+#include "server/data/cf/fields/fields.hpp"
 
 #include <algorithm>
 #include <array>

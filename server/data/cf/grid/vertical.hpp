@@ -8,7 +8,7 @@
 
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
-#include "server/data/cf/axes.hpp"
+#include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/read_blocks.hpp"
 
 namespace windsplat::data::cf {

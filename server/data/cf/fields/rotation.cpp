@@ -1,5 +1,5 @@
 // Tangents as differences of positions on the unit sphere, expressed along local east and north.
-#include "server/data/cf/rotation.hpp"
+#include "server/data/cf/fields/rotation.hpp"
 
 #include <array>
 #include <cmath>

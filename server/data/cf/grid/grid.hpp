@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "server/base/error.hpp"
-#include "server/data/cf/axes.hpp"
 #include "server/data/cf/contents.hpp"
+#include "server/data/cf/grid/axes.hpp"
 #include "server/data/model/dataset_info.hpp"
 
 namespace windsplat::data::cf {

@@ -1,5 +1,5 @@
 // Variables -> candidates by layout -> groups on one grid -> the best group.
-#include "server/data/cf/grid.hpp"
+#include "server/data/cf/grid/grid.hpp"
 
 #include <algorithm>
 #include <limits>

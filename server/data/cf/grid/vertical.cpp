@@ -1,5 +1,5 @@
 // Coefficients and the surface pressure by the terms of a formula.
-#include "server/data/cf/vertical.hpp"
+#include "server/data/cf/grid/vertical.hpp"
 
 #include <algorithm>
 #include <array>

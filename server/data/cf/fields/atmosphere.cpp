@@ -1,5 +1,5 @@
 // Layers of constant lapse rate, from the ground up.
-#include "server/data/cf/atmosphere.hpp"
+#include "server/data/cf/fields/atmosphere.hpp"
 
 #include <array>
 #include <cmath>

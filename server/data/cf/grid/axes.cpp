@@ -1,5 +1,5 @@
 // Evidence for an axis' role and kind, a variable's layout, and the turning of axes.
-#include "server/data/cf/axes.hpp"
+#include "server/data/cf/grid/axes.hpp"
 
 #include <algorithm>
 #include <cmath>

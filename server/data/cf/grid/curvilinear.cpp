@@ -1,6 +1,6 @@
 // Mean changes of longitude and latitude along two dimensions decide which is which; the values are
 // kept in the order of the volumes.
-#include "server/data/cf/curvilinear.hpp"
+#include "server/data/cf/grid/curvilinear.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // What can be made is found by standard names, units and usual names; rules run over some levels at
 // a time.
-#include "server/data/cf/derived.hpp"
+#include "server/data/cf/fields/derived.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "server/base/ascii.hpp"
-#include "server/data/cf/atmosphere.hpp"
+#include "server/data/cf/fields/atmosphere.hpp"
 #include "server/data/cf/units.hpp"
 
 namespace windsplat::data::cf {
