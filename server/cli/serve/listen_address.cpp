@@ -1,5 +1,5 @@
 // Splits at the last colon; inet_pton() parses the address.
-#include "server/cli/listen_address.hpp"
+#include "server/cli/serve/listen_address.hpp"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "server/base/error.hpp"
-#include "server/cli/serve_options.hpp"
+#include "server/cli/serve/options.hpp"
 #include "server/transport/server.hpp"
 
 namespace windsplat::cli {

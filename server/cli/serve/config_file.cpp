@@ -1,5 +1,5 @@
 // CLI11's own configuration files override the environment; these do not.
-#include "server/cli/config_file.hpp"
+#include "server/cli/serve/config_file.hpp"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // Validates settings before anything is opened or changed.
-#include "server/cli/serve_settings.hpp"
+#include "server/cli/serve/settings.hpp"
 
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -15,9 +15,9 @@
 
 #include "server/base/log.hpp"
 #include "server/cli/command.hpp"
-#include "server/cli/config_file.hpp"
-#include "server/cli/listen_address.hpp"
 #include "server/cli/open_store.hpp"
+#include "server/cli/serve/config_file.hpp"
+#include "server/cli/serve/listen_address.hpp"
 #include "server/cli/settings_file.hpp"
 
 namespace windsplat::cli {

@@ -1,5 +1,5 @@
 // Flags and environment of what one address, and all of them together, may take.
-#include "server/cli/serve_limits.hpp"
+#include "server/cli/serve/limits.hpp"
 
 #include <sstream>
 #include <string>

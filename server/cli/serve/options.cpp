@@ -1,9 +1,9 @@
 // Options may also come from the environment or the file of --config (config_file.hpp), so every
 // numeric option declares its range here.
-#include "server/cli/serve_options.hpp"
+#include "server/cli/serve/options.hpp"
 
 #include "server/cli/command.hpp"
-#include "server/cli/serve_limits.hpp"
+#include "server/cli/serve/limits.hpp"
 
 namespace windsplat::cli {
 namespace {
