@@ -22,6 +22,13 @@ inline Vec cross(const Vec& a, const Vec& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
+// a + f b.
+inline Vec plus(const Vec& a, double f, const Vec& b) {
+  return {a[0] + f * b[0], a[1] + f * b[1], a[2] + f * b[2]};
+}
+inline Vec scaled(const Vec& v, double f) { return {f * v[0], f * v[1], f * v[2]}; }
+inline double length(const Vec& v) { return std::hypot(v[0], v[1], v[2]); }
+
 // The splat's footprint (Max 1991): g and its integral over the plane, radii in cells.
 constexpr double footprint_s = 0.48;
 constexpr double footprint_t = 1.37;
@@ -36,6 +43,10 @@ struct View {
   bool perspective = true;
 };
 View make_view(const scene::Camera& camera);
+// Along right, down, forward.
+inline Vec to_camera(const View& view, const Vec& v) {
+  return {dot(view.right, v), dot(view.down, v), dot(view.forward, v)};
+}
 
 // A stop along one axis, for `samples` samples of which it has the middle one's place (the lower of
 // two); cell: their spacings together, world units. A slice has one stop along its axis.
@@ -138,6 +149,9 @@ struct Density {
   Vec color{};
 };
 Density make_density(const std::vector<const scene::ScalarLayer*>& layers, const Stop& stop);
+
+// The straight linear colour of a value.
+Vec table_color(const scene::ColorTable& table, double value);
 
 // Where on the screen something may be seen, pixels.
 struct ScreenBox {
