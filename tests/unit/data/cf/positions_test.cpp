@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -16,8 +15,6 @@
 
 namespace windsplat::data::test {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 int text_variable(NetcdfMaker& file, const char* name, const std::vector<int>& dims,
                   const std::vector<double>& values, const char* units, const char* standard) {

@@ -20,7 +20,6 @@
 namespace windsplat::data::test {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
 constexpr std::size_t width = 9;
 constexpr std::size_t height = 7;
 constexpr double parallel = 45 * degree;

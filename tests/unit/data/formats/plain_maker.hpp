@@ -61,21 +61,6 @@ inline std::string gzipped(const std::string& plain) {
   return out;
 }
 
-inline std::unique_ptr<Source> opened(const std::string& path) {
-  auto source = open_file(path);
-  EXPECT_TRUE(source) << (source ? "" : source.error().message);
-  return source ? std::move(*source) : nullptr;
-}
-
-// Why a file is refused.
-inline std::string refusal(const std::string& path) {
-  const auto source = open_file(path);
-  EXPECT_FALSE(source) << path << " was opened";
-  if (source) return {};
-  EXPECT_EQ(source.error().kind, ErrorKind::bad_data) << source.error().message;
-  return source.error().message;
-}
-
 inline std::vector<float> values_of(Source& source, const std::string& field,
                                     std::size_t step = 0) {
   const Volume volume = volume_of(source, field, step);

@@ -9,31 +9,11 @@
 #include "server/data/model/dataset_info.hpp"
 #include "server/data/model/source.hpp"
 #include "server/data/model/volume.hpp"
-#include "server/data/open/open.hpp"
+#include "tests/unit/data/dataset_probe.hpp"
 #include "tests/unit/data/netcdf_maker.hpp"
 
 namespace windsplat::data::test {
 namespace {
-
-std::unique_ptr<Source> open_good(const std::string& path) {
-  auto source = open_file(path);
-  EXPECT_TRUE(source) << source.error().message;
-  return source ? std::move(*source) : nullptr;
-}
-
-std::string refusal(const std::string& path) {
-  auto source = open_file(path);
-  EXPECT_FALSE(source);
-  EXPECT_EQ(source.error().kind, ErrorKind::bad_data);
-  return source ? "" : source.error().message;
-}
-
-const std::string& reason_for(const DatasetInfo& info, const std::string& name) {
-  static const std::string none = "(not left out)";
-  const auto at = std::find_if(info.left_out.begin(), info.left_out.end(),
-                               [&](const LeftOut& left) { return left.name == name; });
-  return at == info.left_out.end() ? none : at->reason;
-}
 
 // A value that encodes its position: the file contains f(x, y, z) = x + 1000 y + z / 16.
 float place_value(double x, double y, double z) {
@@ -99,7 +79,7 @@ TEST_P(AnyOrder, AndAnyDirectionGiveTheSameVolume) {
       }
       file.variable("f", NC_FLOAT, dims, values);
     }
-    auto source = open_good(folder / "order.nc");
+    auto source = opened(folder / "order.nc");
     ASSERT_NE(source, nullptr);
     const DatasetInfo& info = source->info();
     ASSERT_EQ(info.grid.dims(), (std::array<int, 3>{3, 4, 5}));
@@ -130,129 +110,6 @@ std::vector<std::array<int, 4>> every_order() {
 }
 INSTANTIATE_TEST_SUITE_P(NetcdfAxes, AnyOrder, testing::ValuesIn(every_order()));
 
-struct VerticalCase {
-  const char* name;
-  const char* units;
-  const char* standard_name;
-  const char* positive;
-  AxisKind kind;
-  bool falls;  // index 0, the bottom, has the largest coordinate
-};
-
-class Vertical : public testing::TestWithParam<VerticalCase> {};
-
-TEST_P(Vertical, KindAndDirection) {
-  const VerticalCase& expected = GetParam();
-  const Folder folder;
-  {
-    NetcdfMaker file(folder / "v.nc");
-    const int z = file.axis(expected.name, {1, 2, 4}, expected.units, expected.standard_name);
-    if (*expected.positive != '\0') {
-      file.text(file.variable_id(expected.name), "positive", expected.positive);
-    }
-    const int y = file.axis("lat", {0, 1}, "degrees_north");
-    const int x = file.axis("lon", {0, 1}, "degrees_east");
-    file.variable("f", NC_DOUBLE, {z, y, x}, counting(12));
-  }
-  auto source = open_good(folder / "v.nc");
-  ASSERT_NE(source, nullptr);
-  const Axis& axis = source->info().grid.axes[2];
-  EXPECT_EQ(axis.kind, expected.kind);
-  EXPECT_EQ(axis.name, expected.name);
-  EXPECT_EQ(axis.coordinates,
-            expected.falls ? (std::vector<double>{4, 2, 1}) : (std::vector<double>{1, 2, 4}));
-  auto volume = source->read(0, 0);
-  ASSERT_TRUE(volume);
-  EXPECT_EQ(volume->values[0], expected.falls ? 8.0F : 0.0F);
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    NetcdfAxes, Vertical,
-    testing::Values(VerticalCase{"lev", "hPa", "", "", AxisKind::pressure, true},
-                    VerticalCase{"p", "millibars", "", "down", AxisKind::pressure, true},
-                    VerticalCase{"foo", "Pa", "", "", AxisKind::pressure, true},
-                    VerticalCase{"plev", "", "air_pressure", "", AxisKind::pressure, true},
-                    VerticalCase{"lev", "mb", "", "up", AxisKind::pressure, true},
-                    VerticalCase{"height", "m", "height", "up", AxisKind::height, false},
-                    VerticalCase{"alt", "km", "", "", AxisKind::height, false},
-                    VerticalCase{"z", "m", "", "", AxisKind::height, false},
-                    VerticalCase{"z", "m", "", "down", AxisKind::depth, true},
-                    VerticalCase{"depth", "m", "depth", "down", AxisKind::depth, true},
-                    VerticalCase{"depth", "m", "", "", AxisKind::depth, true},
-                    VerticalCase{"depth", "m", "depth", "up", AxisKind::height, false},
-                    VerticalCase{"deptht", "m", "", "", AxisKind::depth, true},
-                    VerticalCase{"lev", "level", "", "", AxisKind::level, false},
-                    VerticalCase{"lev", "1", "", "down", AxisKind::level, true},
-                    VerticalCase{"lev", "1", "atmosphere_sigma_coordinate", "", AxisKind::level,
-                                 true},
-                    VerticalCase{"lev", "", "model_level_number", "", AxisKind::level, false},
-                    VerticalCase{"isobaric1", "", "", "", AxisKind::pressure, true},
-                    VerticalCase{"pres", "dbar", "", "", AxisKind::depth, true},
-                    VerticalCase{"pres", "Pa", "sea_water_pressure", "", AxisKind::depth, true},
-                    VerticalCase{"p", "decibar", "sea_water_pressure", "up", AxisKind::depth, true},
-                    VerticalCase{"p", "dbar", "air_pressure", "", AxisKind::pressure, true},
-                    VerticalCase{"sigma", "sigma_level", "", "", AxisKind::level, true},
-                    VerticalCase{"sigma", "sigma_level", "", "up", AxisKind::level, false},
-                    VerticalCase{"lev", "sigma_level", "", "", AxisKind::level, false}));
-
-TEST(NetcdfAxes, ValuesTellTheWayWherePositiveIsSilent) {
-  struct Case {
-    const char* name;
-    const char* units;
-    const char* standard_name;
-    const char* positive;
-    std::vector<double> stored;
-    AxisKind kind;
-    double lowest;
-  };
-  const std::vector<Case> cases{
-      {"depth", "m", "", "", {-5, -100, -500}, AxisKind::height, -500},
-      {"depth", "m", "depth", "", {-500, -100, 0}, AxisKind::height, -500},
-      {"depth", "m", "", "", {0, 100, 500}, AxisKind::depth, 500},
-      {"depth", "m", "", "", {-1, 100, 500}, AxisKind::depth, 500},
-      {"depth", "m", "", "down", {-500, -100, -5}, AxisKind::depth, -5},
-      {"lev", "sigma_level", "", "", {0.1, 0.5, 0.995}, AxisKind::level, 0.995},
-      {"sigma", "1", "", "", {0, -0.5, -1}, AxisKind::level, -1}};
-  for (const Case& c : cases) {
-    const Folder folder;
-    {
-      NetcdfMaker file(folder / "v.nc");
-      const int z = file.axis(c.name, c.stored, c.units, c.standard_name);
-      if (*c.positive != '\0') file.text(file.variable_id(c.name), "positive", c.positive);
-      const int y = file.axis("lat", {0, 1}, "degrees_north");
-      const int x = file.axis("lon", {0, 1}, "degrees_east");
-      file.variable("uo", NC_DOUBLE, {z, y, x}, counting(12));
-      file.variable("vo", NC_DOUBLE, {z, y, x}, counting(12));
-    }
-    auto source = open_good(folder / "v.nc");
-    ASSERT_NE(source, nullptr);
-    const Axis& axis = source->info().grid.axes[2];
-    EXPECT_EQ(axis.kind, c.kind) << c.name << c.stored[0];
-    EXPECT_EQ(axis.coordinates.front(), c.lowest) << c.name << c.stored[0];
-    const auto& notes = source->info().notes;
-    EXPECT_EQ(std::any_of(notes.begin(), notes.end(),
-                          [](const std::string& note) {
-                            return note.find("taken for heights") != std::string::npos;
-                          }),
-              c.kind == AxisKind::height);
-  }
-}
-
-TEST(NetcdfAxes, OceanPressureIsNoAir) {
-  const Folder folder;
-  {
-    NetcdfMaker file(folder / "o.nc");
-    const int z = file.axis("pres", {0, 10, 1000}, "dbar", "sea_water_pressure");
-    const int y = file.axis("lat", {0, 1}, "degrees_north");
-    const int x = file.axis("lon", {0, 1}, "degrees_east");
-    file.variable("t", NC_DOUBLE, {z, y, x}, counting(12));
-  }
-  auto source = open_good(folder / "o.nc");
-  ASSERT_NE(source, nullptr);
-  EXPECT_EQ(source->info().fields.size(), 1U);  // no height of the standard atmosphere
-  EXPECT_EQ(source->info().grid.axes[2].coordinates, (std::vector<double>{1000, 10, 0}));
-}
-
 // A second dimension of length 1 along one axis is ignored, at any position.
 TEST(NetcdfAxes, ASecondTimeOrLevelOfLengthOneIsPassedOver) {
   for (const int second : {0, 1, 2, 3}) {
@@ -270,7 +127,7 @@ TEST(NetcdfAxes, ASecondTimeOrLevelOfLengthOneIsPassedOver) {
       if (second >= 2) dims.insert(dims.begin() + second - 1, height);
       file.variable("f", NC_FLOAT, dims, counting(24));
     }
-    auto source = open_good(folder / "s.nc");
+    auto source = opened(folder / "s.nc");
     ASSERT_NE(source, nullptr) << second;
     EXPECT_EQ(source->info().grid.dims(), (std::array<int, 3>{2, 2, 3}));
     ASSERT_EQ(source->info().steps.size(), 2U);
@@ -284,7 +141,7 @@ TEST(NetcdfAxes, ASecondTimeOrLevelOfLengthOneIsPassedOver) {
                                 file.dimension("e", 4)};
     file.variable("f", NC_FLOAT, dims, counting(24));
   }
-  auto source = open_good(folder / "u.nc");
+  auto source = opened(folder / "u.nc");
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(source->info().grid.dims(), (std::array<int, 3>{4, 3, 2}));
 }
@@ -306,7 +163,7 @@ TEST(NetcdfAxes, TimesOutOfOrderAreNoted) {
       const int x = file.axis("x", {0, 1}, "m");
       file.variable("f", NC_FLOAT, {t, y, x}, counting(4 * c.times.size()));
     }
-    auto source = open_good(folder / "t.nc");
+    auto source = opened(folder / "t.nc");
     ASSERT_NE(source, nullptr);
     EXPECT_EQ(source->info().steps.size(), c.times.size());
     const auto& notes = source->info().notes;
@@ -326,7 +183,7 @@ TEST(NetcdfAxes, RecognisesAxesByTheAxisAttributeAgainstTheNames) {
     file.text(file.variable_id("x"), "axis", "Y");
     file.variable("f", NC_FLOAT, {a, b}, counting(6));
   }
-  auto source = open_good(folder / "a.nc");
+  auto source = opened(folder / "a.nc");
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(source->info().grid.axes[0].coordinates, (std::vector<double>{5, 6, 7}));
   EXPECT_EQ(source->info().grid.axes[1].coordinates, (std::vector<double>{1, 2}));
@@ -344,13 +201,13 @@ TEST(NetcdfAxes, UnknownNamesTakePlacesFromTheRight) {
     const int c = file.dimension("dim_2", 4);
     file.variable("f", NC_FLOAT, {a, b, c}, counting(24));
   }
-  auto source = open_good(folder / "plain.nc");
+  auto source = opened(folder / "plain.nc");
   ASSERT_NE(source, nullptr);
   const DatasetInfo& info = source->info();
   EXPECT_EQ(info.grid.dims(), (std::array<int, 3>{4, 3, 2}));
   EXPECT_EQ(info.grid.axes[0].coordinates, counting(4));
   EXPECT_EQ(info.grid.axes[0].kind, AxisKind::cartesian);
-  EXPECT_NE(reason_for(info, "dim_0").find("by index"), std::string::npos);
+  EXPECT_NE(reason_of(info, "dim_0").find("by index"), std::string::npos);
   auto volume = source->read(0, 0);
   ASSERT_TRUE(volume);
   EXPECT_EQ(volume->values[23], 23.0F);
@@ -366,7 +223,7 @@ TEST(NetcdfAxes, AnUnlimitedUnknownFirstDimensionIsTime) {
     const int x = file.dimension("b", 3);
     file.variable("f", NC_FLOAT, {t, y, x}, counting(18));
   }
-  auto source = open_good(folder / "u.nc");
+  auto source = opened(folder / "u.nc");
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(source->info().steps.size(), 3U);
   EXPECT_EQ(source->info().steps[2].text, "2");
@@ -383,7 +240,7 @@ TEST(NetcdfAxes, UnevenAxesAndWrappedLongitudesStayAsTheyAre) {
     const int x = file.axis("lon", {20.5, 180, 359, 379.5}, "degrees_east");
     file.variable("f", NC_FLOAT, {y, x}, counting(20));
   }
-  auto source = open_good(folder / "w.nc");
+  auto source = opened(folder / "w.nc");
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(source->info().grid.axes[0].coordinates, (std::vector<double>{20.5, 180, 359, 379.5}));
   EXPECT_EQ(source->info().grid.axes[1].coordinates, (std::vector<double>{-87.5, -30, 0, 1, 89}));
@@ -400,7 +257,7 @@ TEST(NetcdfAxes, DimensionsOfOne) {
     const int x = file.axis("lon", {0, 90}, "degrees_east");
     file.variable("f", NC_FLOAT, {t, m, z, y, x}, {3, 4});
   }
-  auto source = open_good(folder / "one.nc");
+  auto source = opened(folder / "one.nc");
   ASSERT_NE(source, nullptr);
   const DatasetInfo& info = source->info();
   EXPECT_EQ(info.grid.dims(), (std::array<int, 3>{2, 1, 1}));
@@ -423,7 +280,7 @@ TEST(NetcdfAxes, AFileWithoutTimeHasOneStepAndAScalarTimeNamesIt) {
         file.text(file.variable("time", NC_DOUBLE, {}, {36}), "units", "hours since 2001-01-01");
       }
     }
-    auto source = open_good(folder / "t.nc");
+    auto source = opened(folder / "t.nc");
     ASSERT_NE(source, nullptr);
     ASSERT_EQ(source->info().steps.size(), 1U);
     EXPECT_EQ(source->info().steps[0].text, timed ? "2001-01-02T12:00:00Z" : "0");
@@ -440,7 +297,7 @@ TEST(NetcdfAxes, TimeWithGapsIsCounted) {
     const int x = file.axis("x", {0, 1}, "m");
     file.variable("f", NC_FLOAT, {t, y, x}, counting(12));
   }
-  auto source = open_good(folder / "t.nc");
+  auto source = opened(folder / "t.nc");
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(source->info().steps.at(2).text, "2");
   EXPECT_TRUE(std::any_of(source->info().left_out.begin(), source->info().left_out.end(),
@@ -485,7 +342,7 @@ TEST(NetcdfAxes, CurvilinearCoordinatesTellWhichDimensionRunsWhere) {
     file.text(file.variable("lats", NC_DOUBLE, {a, b}, lat), "units", "degrees_north");
     file.text(file.variable("f", NC_FLOAT, {a, b}, counting(12)), "coordinates", "longs lats");
   }
-  auto source = open_good(folder / "c.nc");
+  auto source = opened(folder / "c.nc");
   ASSERT_NE(source, nullptr);
   const DatasetInfo& info = source->info();
   EXPECT_EQ(info.grid.dims(), (std::array<int, 3>{3, 4, 1}));
@@ -494,7 +351,7 @@ TEST(NetcdfAxes, CurvilinearCoordinatesTellWhichDimensionRunsWhere) {
   ASSERT_TRUE(volume);
   // South-west corner: i = 0, j = 3; then eastwards by i, northwards by falling j.
   EXPECT_EQ(volume->values, (std::vector<float>{3, 7, 11, 2, 6, 10, 1, 5, 9, 0, 4, 8}));
-  EXPECT_NE(reason_for(info, "longs").find("more than one dimension"), std::string::npos);
+  EXPECT_NE(reason_of(info, "longs").find("more than one dimension"), std::string::npos);
   // Every column stands where the file says, in the volume's order; the date line is no jump.
   ASSERT_NE(info.grid.columns, nullptr);
   const Columns& columns = *info.grid.columns;
@@ -522,7 +379,7 @@ TEST(NetcdfAxes, CurvilinearCoordinatesWithGapsTellDirectionsAlone) {
               "degrees_north");
     file.variable("f", NC_FLOAT, {y, x}, counting(6));
   }
-  auto source = open_good(folder / "g.nc");
+  auto source = opened(folder / "g.nc");
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(source->info().grid.dims(), (std::array<int, 3>{3, 2, 1}));
   EXPECT_EQ(source->info().grid.columns, nullptr);

@@ -2,152 +2,14 @@
 // the mesh's share of its box, smooth fields converge with the square of the cells' size.
 #include <gmock/gmock.h>
 
-#include <functional>
 #include <numbers>
 
-#include "tests/unit/data/formats/vtk/vtk_maker.hpp"
+#include "tests/unit/data/formats/vtk/test_mesh.hpp"
 
 namespace windsplat::data::vtk_test {
 namespace {
 
 using testing::HasSubstr;
-using Place = std::array<double, 3>;
-using Map = std::function<Place(const Place&)>;
-using Function = std::function<double(const Place&)>;
-
-struct TestMesh {
-  std::vector<double> points;
-  std::vector<double> connectivity;
-  std::vector<double> offsets;
-  std::vector<double> types;
-  void cell(int type, const std::vector<int>& corners) {
-    connectivity.insert(connectivity.end(), corners.begin(), corners.end());
-    offsets.push_back(static_cast<double>(connectivity.size()));
-    types.push_back(type);
-  }
-};
-
-// The unit cube in n^3 boxes, moved by `map`, each cut into what `cut` makes of its corners.
-TestMesh boxes(int n, const Map& map,
-               const std::function<void(TestMesh&, const std::array<int, 8>&)>& cut) {
-  TestMesh mesh;
-  for (int k = 0; k <= n; ++k) {
-    for (int j = 0; j <= n; ++j) {
-      for (int i = 0; i <= n; ++i) {
-        const Place p = map({i / double(n), j / double(n), k / double(n)});
-        mesh.points.insert(mesh.points.end(), p.begin(), p.end());
-      }
-    }
-  }
-  const auto at = [n](int i, int j, int k) { return (k * (n + 1) + j) * (n + 1) + i; };
-  for (int k = 0; k < n; ++k) {
-    for (int j = 0; j < n; ++j) {
-      for (int i = 0; i < n; ++i) {
-        cut(mesh,
-            {at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k), at(i, j, k + 1),
-             at(i + 1, j, k + 1), at(i + 1, j + 1, k + 1), at(i, j + 1, k + 1)});
-      }
-    }
-  }
-  return mesh;
-}
-
-void as_hexahedron(TestMesh& mesh, const std::array<int, 8>& c) {
-  mesh.cell(12, {c.begin(), c.end()});
-}
-void as_voxel(TestMesh& mesh, const std::array<int, 8>& c) {
-  mesh.cell(11, {c[0], c[1], c[3], c[2], c[4], c[5], c[7], c[6]});
-}
-void as_wedges(TestMesh& mesh, const std::array<int, 8>& c) {
-  mesh.cell(13, {c[0], c[1], c[2], c[4], c[5], c[6]});
-  mesh.cell(13, {c[0], c[2], c[3], c[4], c[6], c[7]});
-}
-void as_tetrahedra(TestMesh& mesh, const std::array<int, 8>& c) {
-  for (const auto& [a, b] : {std::pair(1, 2), {2, 3}, {3, 7}, {7, 4}, {4, 5}, {5, 1}}) {
-    mesh.cell(10, {c[0], c[static_cast<std::size_t>(a)], c[static_cast<std::size_t>(b)], c[6]});
-  }
-}
-// Three pyramids that share the corner 6.
-void as_pyramids(TestMesh& mesh, const std::array<int, 8>& c) {
-  mesh.cell(14, {c[0], c[1], c[2], c[3], c[6]});
-  mesh.cell(14, {c[0], c[4], c[5], c[1], c[6]});
-  mesh.cell(14, {c[0], c[3], c[7], c[4], c[6]});
-}
-
-std::string piece_of(const TestMesh& mesh, const std::string& point_data,
-                     const std::string& cell_data, VtkXml& xml) {
-  std::string inner = "<Piece NumberOfPoints=\"" + std::to_string(mesh.points.size() / 3);
-  inner += "\" NumberOfCells=\"" + std::to_string(mesh.types.size()) + "\"><PointData>";
-  inner += point_data + "</PointData><CellData>" + cell_data + "</CellData><Points>";
-  inner += xml.array("Float64", "Points", 3, mesh.points) + "</Points><Cells>";
-  inner += xml.array("Int64", "connectivity", 1, mesh.connectivity);
-  inner += xml.array("Int32", "offsets", 1, mesh.offsets);
-  return inner + xml.array("UInt8", "types", 1, mesh.types) + "</Cells></Piece>";
-}
-
-std::string vtu(const TestMesh& mesh, const std::string& point_data, const std::string& cell_data,
-                VtkXml& xml) {
-  const std::string inner = piece_of(mesh, point_data, cell_data, xml);
-  return xml.file("UnstructuredGrid", "", inner);
-}
-
-std::vector<double> at_points(const TestMesh& mesh, const Function& f) {
-  std::vector<double> out;
-  for (std::size_t p = 0; p < mesh.points.size(); p += 3) {
-    out.push_back(f({mesh.points[p], mesh.points[p + 1], mesh.points[p + 2]}));
-  }
-  return out;
-}
-
-struct Outcome {
-  double worst = 0;   // difference from the field itself, over the samples inside
-  double inside = 0;  // their share, those at the ends of an axis counted half
-  double volume = 0;  // what they stand for
-  std::string notes;
-};
-
-Outcome compare(Source& source, const Function& f) {
-  const auto& axes = source.info().grid.axes;
-  const Volume volume = volume_of(source, "a");
-  const auto end_weight = [](const Axis& axis, std::size_t i) {
-    return axis.coordinates.size() > 1 && (i == 0 || i + 1 == axis.coordinates.size()) ? 0.5 : 1.0;
-  };
-  Outcome out;
-  double all = 0;
-  std::size_t s = 0;
-  for (std::size_t k = 0; k < axes[2].coordinates.size(); ++k) {
-    for (std::size_t j = 0; j < axes[1].coordinates.size(); ++j) {
-      for (std::size_t i = 0; i < axes[0].coordinates.size(); ++i) {
-        const float value = volume.values[s++];
-        const double weight =
-            end_weight(axes[0], i) * end_weight(axes[1], j) * end_weight(axes[2], k);
-        all += weight;
-        if (std::isnan(value)) continue;
-        out.inside += weight;
-        const Place place{axes[0].coordinates[i], axes[1].coordinates[j], axes[2].coordinates[k]};
-        out.worst = std::max(out.worst, std::abs(value - f(place)));
-      }
-    }
-  }
-  out.volume = out.inside;
-  for (const Axis& axis : axes) {
-    if (axis.coordinates.size() > 1) out.volume *= axis.coordinates[1] - axis.coordinates[0];
-  }
-  out.inside /= all;
-  out.notes = all_notes(source.info());
-  return out;
-}
-
-class VtkResampling : public testing::Test {
- protected:
-  Outcome outcome(const TestMesh& mesh, const Function& f) {
-    VtkXml xml({"appended-raw", "", false, 8});
-    const auto data = xml.array("Float64", "a", 1, at_points(mesh, f));
-    const auto source = opened(folder_.write("a.vtu", vtu(mesh, data, "", xml)));
-    return source ? compare(*source, f) : Outcome();
-  }
-  VtkFolder folder_;
-};
 
 // Turned about z by up to a third of a right angle with height: the faces between are not flat.
 Place twist(const Place& p) {
@@ -157,8 +19,6 @@ Place twist(const Place& p) {
   return {x * std::cos(angle) - y * std::sin(angle), x * std::sin(angle) + y * std::cos(angle),
           2 * p[2]};
 }
-
-double linear(const Place& p) { return 3 * p[0] - 2 * p[1] + 0.5 * p[2] + 1; }
 
 TEST_F(VtkResampling, LinearFieldsComeBackOnTwistedCellsOfEveryShape) {
   // The twist keeps areas at each height, so the volume is 2.
@@ -247,113 +107,6 @@ TEST_F(VtkResampling, AFlatMeshIsAPlane) {
   const Outcome out = compare(*source, linear);
   EXPECT_LT(out.worst, 1e-5);
   EXPECT_NEAR(out.inside, 0.75, 0.03);
-}
-
-// A model's grid: `n` levels that follow a hill from the ground to a lid, over 24 x 20 columns.
-struct Terrain {
-  static constexpr int columns = 24;
-  static constexpr int rows = 20;
-  static constexpr double step = 20e3;
-  static constexpr double lid = 15e3;
-  int levels;
-  [[nodiscard]] Place at(int i, int j, int k) const {
-    const double ground = 1000 * std::exp(-(std::pow(i - 12, 2) + std::pow(j - 10, 2)) / 20.0);
-    return {i * step, j * step, ground + (lid - ground) * k / (levels - 1)};
-  }
-};
-
-std::string terrain_vts(const Terrain& terrain, VtkXml& xml) {
-  std::vector<double> points;
-  std::vector<double> height;
-  for (int k = 0; k < terrain.levels; ++k) {
-    for (int j = 0; j < Terrain::rows; ++j) {
-      for (int i = 0; i < Terrain::columns; ++i) {
-        const Place p = terrain.at(i, j, k);
-        points.insert(points.end(), p.begin(), p.end());
-        height.push_back(p[2]);
-      }
-    }
-  }
-  const std::string extent = "0 23 0 19 0 " + std::to_string(terrain.levels - 1);
-  std::string inner = "<Piece Extent=\"" + extent + "\"><PointData>";
-  inner += xml.array("Float64", "a", 1, height) + "</PointData><Points>";
-  inner += xml.array("Float64", "p", 3, points) + "</Points></Piece>";
-  return xml.file("StructuredGrid", "WholeExtent=\"" + extent + "\"", inner);
-}
-
-// 460 km long and 15 km high: a spacing of the same length along all axes has three samples above
-// each other. Half the points and cells are about as many samples as cells, so as many layers.
-TEST_F(VtkResampling, LayersOfAShallowGridStayResolved) {
-  const Terrain terrain{30};
-  VtkXml xml({"appended-raw", "", false, 8});
-  const auto source = opened(folder_.write("a.vts", terrain_vts(terrain, xml)));
-  ASSERT_TRUE(source);
-  const auto dims = source->info().grid.dims();
-  EXPECT_NEAR(dims[0], 24, 2);
-  EXPECT_NEAR(dims[1], 20, 2);
-  EXPECT_NEAR(dims[2], 30, 2);
-  EXPECT_NEAR(source->info().grid.axes[2].coordinates.back(), Terrain::lid, 1);
-  EXPECT_LT(source->info().grid.axes[2].coordinates.front(), Terrain::lid / 29);
-  const Outcome out = compare(*source, [](const Place& p) { return p[2]; });
-  EXPECT_LT(out.worst, 1e-2);  // of 15,000 m in single precision
-  EXPECT_THAT(out.notes, testing::Not(HasSubstr("fewer samples")));
-}
-
-TEST_F(VtkResampling, MoreLayersThanSamplesAreNoted) {
-  const Terrain terrain{400};
-  VtkXml xml({"appended-raw", "", false, 8});
-  const auto source = opened(folder_.write("a.vts", terrain_vts(terrain, xml)));
-  ASSERT_TRUE(source);
-  EXPECT_EQ(source->info().grid.dims()[2], 256);
-  EXPECT_GE(source->info().grid.dims()[0], 24);
-  EXPECT_THAT(all_notes(source->info()),
-              HasSubstr("along z fewer samples than cells: 256 for about 399"));
-}
-
-// Layers 0.1 thick that rise by 0.5 from column to column: boxes around the cells are 0.6 high.
-TEST_F(VtkResampling, SlopesDoNotThickenLayers) {
-  constexpr int n = 16;
-  std::vector<double> points;
-  std::vector<double> values;
-  for (int k = 0; k < n; ++k) {
-    for (int j = 0; j < n; ++j) {
-      for (int i = 0; i < n; ++i) {
-        const Place p{i * 1.0, j * 1.0, 0.1 * k + 0.5 * i};
-        points.insert(points.end(), p.begin(), p.end());
-        values.push_back(linear(p));
-      }
-    }
-  }
-  VtkXml xml;
-  std::string inner = "<Piece><PointData>" + xml.array("Float64", "a", 1, values);
-  inner += "</PointData><Points>" + xml.array("Float64", "p", 3, points) + "</Points></Piece>";
-  const auto source = opened(
-      folder_.write("a.vts", xml.file("StructuredGrid", "WholeExtent=\"0 15 0 15 0 15\"", inner)));
-  ASSERT_TRUE(source);
-  const auto& axes = source->info().grid.axes;
-  const auto spacing = [&](std::size_t a) {
-    return axes[a].coordinates[1] - axes[a].coordinates[0];
-  };
-  EXPECT_NEAR(spacing(2) / spacing(0), 0.1, 0.005);
-  EXPECT_LE(spacing(2), 0.1);
-  EXPECT_LT(compare(*source, linear).worst, 1e-5);
-}
-
-// The same of wedges without indices: what is known is their boxes.
-TEST_F(VtkResampling, SpacingFollowsTheCellsOfAMeshToo) {
-  const Map flat = [](const Place& p) { return Place{1000 * p[0], 400 * p[1], 10 * p[2]}; };
-  const TestMesh mesh = boxes(16, flat, as_wedges);
-  VtkXml xml({"appended-raw", "", false, 8});
-  const auto data = xml.array("Float64", "a", 1, at_points(mesh, linear));
-  const auto source = opened(folder_.write("a.vtu", vtu(mesh, data, "", xml)));
-  ASSERT_TRUE(source);
-  const auto dims = source->info().grid.dims();
-  EXPECT_EQ(dims[1], dims[0]);
-  EXPECT_EQ(dims[2], dims[0]);
-  EXPECT_GT(dims[0], 16);
-  const Outcome out = compare(*source, linear);
-  EXPECT_LT(out.worst, 1e-3);
-  EXPECT_EQ(out.inside, 1);
 }
 
 TEST_F(VtkResampling, CellDataAreThoseOfTheCellThatHoldsTheSample) {
