@@ -87,11 +87,15 @@ class PngWriter {
   }
 
   [[noreturn]] static void on_error(png_structp png, const char* message) {
-    auto& kept = static_cast<PngWriter*>(png_get_error_ptr(png))->message_;
-    kept[std::string_view(message).copy(kept.data(), kept.size() - 1)] = '\0';
+    keep(png, message);
     png_longjmp(png, 1);
   }
-  static void on_warning(png_structp /*png*/, const char* /*message*/) {}
+  // A library of another version than the headers' warns, and then makes nothing.
+  static void on_warning(png_structp png, const char* message) { keep(png, message); }
+  static void keep(png_structp png, const char* message) {
+    auto& kept = static_cast<PngWriter*>(png_get_error_ptr(png))->message_;
+    kept[std::string_view(message).copy(kept.data(), kept.size() - 1)] = '\0';
+  }
 
   Bytes bytes_;
   std::array<char, 128> message_{"out of memory"};  // for failures without a message

@@ -22,7 +22,14 @@ inline Vec cross(const Vec& a, const Vec& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-// The footprint g of a splat [Max91]: its radii in cells and its integral over the plane.
+// a + f b.
+inline Vec plus(const Vec& a, double f, const Vec& b) {
+  return {a[0] + f * b[0], a[1] + f * b[1], a[2] + f * b[2]};
+}
+inline Vec scaled(const Vec& v, double f) { return {f * v[0], f * v[1], f * v[2]}; }
+inline double length(const Vec& v) { return std::hypot(v[0], v[1], v[2]); }
+
+// The splat's footprint (Max 1991): g and its integral over the plane, radii in cells.
 constexpr double footprint_s = 0.48;
 constexpr double footprint_t = 1.37;
 constexpr double footprint_integral = 1.4476982547;
@@ -36,6 +43,10 @@ struct View {
   bool perspective = true;
 };
 View make_view(const scene::Camera& camera);
+// Along right, down, forward.
+inline Vec to_camera(const View& view, const Vec& v) {
+  return {dot(view.right, v), dot(view.down, v), dot(view.forward, v)};
+}
 
 // A kernel position along one axis: it represents `samples` samples and lies at the middle one (the
 // lower of two). cell: sum of their spacings, world units. A slice has one position along its axis.
@@ -140,7 +151,10 @@ struct Density {
 };
 Density make_density(const std::vector<const scene::ScalarLayer*>& layers, const Stop& stop);
 
-// Bounding box on the screen, in pixels.
+// The straight linear colour of a value.
+Vec table_color(const scene::ColorTable& table, double value);
+
+// Where on the screen something may be seen, pixels.
 struct ScreenBox {
   double x0 = 0, x1 = 0, y0 = 0, y1 = 0;
 };

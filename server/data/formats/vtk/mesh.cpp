@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "server/data/cf/grid.hpp"
+#include "server/data/cf/grid/grid.hpp"
 #include "server/data/model/digest.hpp"
 
 namespace windsplat::data::vtk {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "server/base/ascii.hpp"
-#include "server/data/cf/grid.hpp"
+#include "server/data/cf/grid/grid.hpp"
 
 namespace windsplat::data::vtk {
 

@@ -12,10 +12,11 @@
 
 #include "server/base/ascii.hpp"
 #include "server/base/check.hpp"
-#include "server/data/cf/grid.hpp"
+#include "server/data/cf/grid/grid.hpp"
 #include "server/data/cf/time.hpp"
 #include "server/data/formats/vtk/grid.hpp"
 #include "server/data/formats/vtk/mesh.hpp"
+#include "server/data/formats/vtk/piece_target.hpp"
 #include "server/data/formats/vtk/resample.hpp"
 #include "server/data/formats/vtk/snapshot.hpp"
 #include "server/data/model/digest.hpp"
@@ -364,41 +365,6 @@ class VtkSource final : public FileSource {
       return file_->fault("has changed since it was opened; open it again");
     }
     return array;
-  }
-
-  // Destination of the tuples of a piece: offsets from the first sample, in the order of the piece.
-  // along[a]: offset between neighbours along index axis a.
-  struct Target {
-    std::ptrdiff_t origin = 0;
-    std::array<std::ptrdiff_t, 3> along{};
-    std::array<std::int64_t, 3> counts{};
-
-    [[nodiscard]] std::size_t at(std::uint64_t tuple) const {
-      const auto t = static_cast<std::int64_t>(tuple);
-      return static_cast<std::size_t>(origin + t % counts[0] * along[0] +
-                                      t / counts[0] % counts[1] * along[1] +
-                                      t / (counts[0] * counts[1]) * along[2]);
-    }
-  };
-
-  // The destination of a piece. world: axis of the volume by index axis; likewise turned.
-  [[nodiscard]] static Target target_of(const Extent& whole, const Extent& piece, bool of_cells,
-                                        const std::array<std::size_t, 3>& world,
-                                        const std::array<bool, 3>& turned) {
-    const auto all = of_cells ? whole.cells() : whole.points();
-    Target out;
-    out.counts = of_cells ? piece.cells() : piece.points();
-    std::array<std::int64_t, 3> dims{};
-    for (std::size_t a = 0; a < 3; ++a) dims.at(world[a]) = all[a];
-    const std::array<std::int64_t, 3> stride{1, dims[0], dims[0] * dims[1]};
-    for (std::size_t a = 0; a < 3; ++a) {
-      // A piece of one layer of points at the end has its cells in the last layer.
-      const std::int64_t first = std::min(piece.first[a] - whole.first[a], all[a] - out.counts[a]);
-      const std::int64_t step = stride.at(world[a]);
-      out.along[a] = turned[a] ? -step : step;
-      out.origin += turned[a] ? (all[a] - 1 - first) * step : first * step;
-    }
-    return out;
   }
 
   Result<void> fill_regular(const Snapshot& snapshot, std::size_t field, float* out) {
