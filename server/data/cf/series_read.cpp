@@ -13,7 +13,7 @@ namespace windsplat::data::cf {
 
 namespace {
 
-// Every value of a block of one step, put where it belongs among those of all steps.
+// Scatters a block of one step into the array of all steps.
 template <class T>
 void interleave(const std::vector<std::size_t>& count, std::size_t axis, std::size_t step,
                 const std::vector<T>& block, T* out) {
@@ -47,7 +47,7 @@ std::size_t SeriesFile::chunk_cost_bytes(int variable) const {
   return in_first < 0 ? 0 : first_->chunk_cost_bytes(in_first);
 }
 
-// Of the first member, which stands for the others: they are not opened for it.
+// Examines the first member only, to avoid opening the others.
 Unwritten SeriesFile::unwritten(int variable, std::size_t most) const {
   const int in_first = variables_.at(at(variable)).in_first;
   if (in_first < 0) return {};
@@ -136,7 +136,7 @@ Result<void> SeriesFile::read_steps(int variable, const std::vector<std::size_t>
   std::vector<std::size_t> from = start;
   std::vector<std::size_t> here = count;
   here[axis] = 1;
-  if (time_ < 0) {  // the dimension that members lack
+  if (time_ < 0) {  // members have no time dimension
     from.erase(from.begin());
     here.erase(here.begin());
   }

@@ -138,7 +138,7 @@ class ArraySource final : public FileSource {
     return id < 0 ? -1 : roles_.at(at(id)).coordinate;
   }
 
-  // What has no coordinates in the file is counted, which takes memory for every entry.
+  // Dimensions without coordinates get counted ones, which need memory per entry.
   [[nodiscard]] Result<void> check_entries() const {
     const auto stored = file_->stored_bytes();
     for (const int id : {choice_.space[0], choice_.space[1], choice_.space[2], choice_.time}) {

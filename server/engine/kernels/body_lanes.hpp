@@ -7,22 +7,22 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// How a line looks along itself: of one colour, with a head, with a head and a moving texture.
+// Style of a line: uniform colour, with a head, or with a head and a moving texture.
 constexpr int style_plain = 0;
 constexpr int style_head = 1;
 constexpr int style_moving = 2;
 
-// Pixel centres of a block, from its corner.
+// Pixel centres of a block, relative to its corner.
 alignas(64) constexpr float lane_x[block_pixels] = {0.5F, 1.5F, 2.5F, 3.5F, 0.5F, 1.5F, 2.5F, 3.5F,
                                                     0.5F, 1.5F, 2.5F, 3.5F, 0.5F, 1.5F, 2.5F, 3.5F};
 alignas(64) constexpr float lane_y[block_pixels] = {0.5F, 0.5F, 0.5F, 0.5F, 1.5F, 1.5F, 1.5F, 1.5F,
                                                     2.5F, 2.5F, 2.5F, 2.5F, 3.5F, 3.5F, 3.5F, 3.5F};
 
-// A line's constants, each in every lane.
+// Constants of a line, broadcast to all lanes.
 struct RibbonLanes {
   Pixel x, y, ux, uy;
   Pixel wx, wy, w0;   // w = wx dx + wy dy + w0
-  Pixel ratio, bend;  // depth ratio, and that minus 1
+  Pixel ratio, bend;  // depth ratio, and depth ratio - 1
   Pixel tail[3], rise[3];
   Pixel phase, phase_rise;
   Pixel reach, steep, opacity;  // the ramp: clamp(reach - steep distance, 0, opacity)
@@ -48,7 +48,7 @@ KERNEL_INLINE RibbonLanes spread(const Ribbon& r) {
           lanes(r.opacity)};
 }
 
-// The same from a brick's arrays.
+// The same from the arrays of a brick.
 KERNEL_INLINE RibbonLanes spread(const LineStyle& line, const Ribbons& r, int l) {
   const auto lanes = [&](const float* v) { return all<Pixel>(v[l]); };
   const auto one = [](float v) { return all<Pixel>(v); };
@@ -84,8 +84,8 @@ struct RibbonLane {
   Pixel f;
 };
 
-// How f follows from w, the place along the line on the screen: 1/z is linear there. The series is
-// good to bend^2 / 6.
+// How f is computed from w, the position along the line on the screen, where 1/z is linear. The
+// error of the series is below bend^2 / 6.
 enum class Depth { flat, series, exact };
 constexpr float series_bend_max = 4e-3F;
 
@@ -99,7 +99,7 @@ KERNEL_INLINE Pixel along_ribbon(const RibbonLanes& r, Pixel w) {
   return w;
 }
 
-// dx, dy: pixels from the line's f = 0.
+// dx, dy: pixels from the point f = 0 of the line.
 template <Depth Along, int Style>
 KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
   const Pixel zero = hn::Zero(PixelTag());
@@ -120,7 +120,7 @@ KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
   return {cover, f};
 }
 
-// A splat's constants, each in every lane.
+// Constants of a splat, broadcast to all lanes.
 struct SplatLanes {
   Pixel x, y, ex, ey, xx, xy, yy;
   Pixel b0, bx, by, d0, dx, dy, dxx, dxy, dyy, d2_least;
@@ -140,17 +140,17 @@ KERNEL_INLINE SplatLanes spread(const Splat& s) {
       lanes(s.near), lanes(s.strength), {lanes(s.color[0]), lanes(s.color[1]), lanes(s.color[2])}};
 }
 
-// Where a pixel's ray passes a splat, see Splats.
+// A splat along the rays of pixels; see Splats.
 struct SplatLane {
   Pixel r2;      // squared distance from the centre, cells
   Pixel tau;     // optical depth of the whole splat
   Pixel cells;   // per unit of view depth along the ray
-  Pixel behind;  // how far beyond the centre's view depth the ray is closest to it
+  Pixel behind;  // view depth of the point closest to the centre minus that of the centre
 };
 
-// From: the rays' beginning. `eye`: far before the splat. `eye_inside`: the same, and the splat's
-// centre lies in the picture, so that (ex, ey) is (x, y). `near_plane`: the splat reaches it, and
-// the part of it that lies before counts no more, as if the splat were even over one cell.
+// Start of the rays. `eye`: the splat lies beyond the near plane. `eye_inside`: the same, and its
+// centre lies in the picture, so that (ex, ey) is (x, y). `near_plane`: the splat reaches the near
+// plane; the part before it is removed as if the splat were homogeneous over one cell.
 enum class From { eye, eye_inside, near_plane };
 
 template <bool Perspective, From Start>
@@ -158,7 +158,7 @@ KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixe
   const Pixel zero = hn::Zero(PixelTag());
   const Pixel dx = px - s.x;
   const Pixel dy = py - s.y;
-  // The quadratic form is never negative; its rounded sum may be.
+  // The quadratic form is non-negative, but its rounded sum may be negative.
   const Pixel slope = hn::MulAdd(s.xx, dx, s.xy * dy);
   const Pixel top = hn::Max(hn::MulAdd(slope, dx, s.yy * dy * dy), zero);
   if constexpr (Perspective) {

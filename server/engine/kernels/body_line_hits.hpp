@@ -8,19 +8,19 @@ namespace {
 
 inline RibbonRecord ribbon_record(const LineStyle& line, const Prepared& p, int l) {
   RibbonRecord out = {ribbon_at(line, p.ribbons, l), line.moving, 0};
-  out.ribbon.depth += p.stops.depth[l];
+  out.ribbon.depth += p.positions.depth[l];
   out.bent = absolute(out.ribbon.bend) > series_bend_max ? 1 : 0;
   return out;
 }
 
-// The depths between which a line passes the pixels of the blocks of one row, a lane a column.
+// The range of depths of a line at the pixels of the blocks of one row, one lane per column.
 struct DepthRange {
   Pixel first, last;
 };
 
 template <bool Perspective>
 KERNEL_INLINE DepthRange row_depths(const Ribbon& r, float margin, Pixel x, float y) {
-  constexpr float farthest = 0.5F * (block_side - 1);  // pixel centres from a block's middle
+  constexpr float farthest = 0.5F * (block_side - 1);  // of pixel centres from the block centre
   const auto depth_at = [&](Pixel along) {
     const Pixel w = clamped(along, 0.0F, 1.0F);
     const Pixel one = all<Pixel>(1.0F);
@@ -33,14 +33,14 @@ KERNEL_INLINE DepthRange row_depths(const Ribbon& r, float margin, Pixel x, floa
   const Pixel reach = all<Pixel>(farthest * (absolute(r.wx) + absolute(r.wy)));
   const Pixel a = depth_at(w - reach);
   const Pixel b = depth_at(w + reach);
-  // Beyond every rounding of the line's depth and of the slabs' faces.
+  // Margin for rounding of the depths of the line and of the slab faces.
   constexpr float rounding = 1e-6F;
   const Pixel slack =
       hn::MulAdd(hn::Max(hn::Abs(a), hn::Abs(b)), all<Pixel>(rounding), all<Pixel>(margin));
   return {hn::Min(a, b) - slack, hn::Max(a, b) + slack};
 }
 
-// Lists the open blocks that stop l's line may touch; how many.
+// Lists the open blocks that line l may touch. Returns their number.
 template <bool Perspective>
 KERNEL_INLINE int list_hits(const RibbonRecord& line, const Footing& f, int l, std::uint32_t slot,
                             float margin, const Tile& tile, Hit* hits) {
@@ -74,7 +74,7 @@ int pack_lines_on(const Prepared& p, float slab_depth, const std::uint32_t* slot
                   RibbonRecord* records, Hit* hits, int* counts) {
   const float margin = 1e-4F * slab_depth;
   int n = 0;
-  for (std::uint64_t left = p.stops.lines; left != 0; left &= left - 1U) {
+  for (std::uint64_t left = p.positions.lines; left != 0; left &= left - 1U) {
     const int l = __builtin_ctzll(left);
     RibbonRecord& record = records[slots[n]];
     record = ribbon_record(p.pass->line, p, l);

@@ -7,7 +7,7 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// A slab without a medium at hand: all ways of compositing are the same.
+// A block of a slab without medium: all compositing methods are equal.
 constexpr int compositing_no_medium = -1;
 
 // Light and transmittance of a vector of pixels within the current slab.

@@ -29,7 +29,7 @@ inline Vec plus(const Vec& a, double f, const Vec& b) {
 inline Vec scaled(const Vec& v, double f) { return {f * v[0], f * v[1], f * v[2]}; }
 inline double length(const Vec& v) { return std::hypot(v[0], v[1], v[2]); }
 
-// The splat's footprint (Max 1991): g and its integral over the plane, radii in cells.
+// The footprint g of a splat [Max91]: its radii in cells and its integral over the plane.
 constexpr double footprint_s = 0.48;
 constexpr double footprint_t = 1.37;
 constexpr double footprint_integral = 1.4476982547;
@@ -154,7 +154,7 @@ Density make_density(const std::vector<const scene::ScalarLayer*>& layers, const
 // The straight linear colour of a value.
 Vec table_color(const scene::ColorTable& table, double value);
 
-// Where on the screen something may be seen, pixels.
+// Bounding box on the screen, in pixels.
 struct ScreenBox {
   double x0 = 0, x1 = 0, y0 = 0, y1 = 0;
 };

@@ -56,25 +56,26 @@ Jitter jitter_of(const VectorLayer& layer, const std::array<int, 3>& sample) {
 
 // ---- lines ----
 
-// What a stop's vector draws: `unit` along the cell's axes (shorter where a slice dropped its
-// part), `extent` in the world from tail to head.
-struct Wind {
+// The vector at a kernel position as drawn: `unit` along the axes of the cell (shorter than 1 if a
+// slice removed a component), `extent` from tail to head in world units.
+struct DrawnVector {
   double magnitude = 0;  // of the data
   Vec unit{};
   Vec extent{};
 };
 
-std::optional<Wind> read_wind(const Scene& scene, const VectorLayer& layer, const Stop& stop) {
+std::optional<DrawnVector> read_vector(const Scene& scene, const VectorLayer& layer,
+                                       const Stop& stop) {
   Vec data{};
   for (int c = 0; c < layer.field->components; ++c) {
     data[c] = static_cast<double>(layer.field->component(c)[stop.index]);
   }
   if (std::isnan(data[0])) return {};
-  Wind wind;
-  wind.magnitude = length(data);
-  if (wind.magnitude < layer.min_magnitude || wind.magnitude == 0) return {};
+  DrawnVector drawn;
+  drawn.magnitude = length(data);
+  if (drawn.magnitude < layer.min_magnitude || drawn.magnitude == 0) return {};
   Vec d{};
-  for (int c = 0; c < 3; ++c) d[c] = data[c] / wind.magnitude * layer.scale[c];
+  for (int c = 0; c < 3; ++c) d[c] = data[c] / drawn.magnitude * layer.scale[c];
   if (!layer.rate_x.empty()) {
     d[0] *= layer.rate_x[stop.sample[1]];
     d[1] *= layer.rate_y;
@@ -82,26 +83,26 @@ std::optional<Wind> read_wind(const Scene& scene, const VectorLayer& layer, cons
   }
   const double norm = length(d);
   if (norm == 0) return {};
-  for (int c = 0; c < 3; ++c) wind.unit[c] = d[c] / norm;
-  if (scene.slice) wind.unit[scene.slice->axis] = 0;
+  for (int c = 0; c < 3; ++c) drawn.unit[c] = d[c] / norm;
+  if (scene.slice) drawn.unit[scene.slice->axis] = 0;
   const double full = layer.magnitude_range[1];
-  const double part = full > 0 ? std::clamp(wind.magnitude / full, 0.0, 1.0) : 1.0;
+  const double part = full > 0 ? std::clamp(drawn.magnitude / full, 0.0, 1.0) : 1.0;
   if (!scene.lattice.places) {
-    wind.extent = scaled(wind.unit, part * layer.length);
-    return wind;
+    drawn.extent = scaled(drawn.unit, part * layer.length);
+    return drawn;
   }
   Vec along{};
   for (int a = 0; a < 3; ++a) {
-    along = plus(along, wind.unit[a] / length(stop.edge[a]), stop.edge[a]);
+    along = plus(along, drawn.unit[a] / length(stop.edge[a]), stop.edge[a]);
   }
-  // Edges of a curved cell need not be at right angles: the drawn length is still the unit's.
+  // The edges of a curved cell need not be perpendicular; keep the length of `unit`.
   const double bent = length(along);
-  if (bent > 0) along = scaled(along, length(wind.unit) / bent);
-  wind.extent = scaled(along, part * layer.length);
-  return wind;
+  if (bent > 0) along = scaled(along, length(drawn.unit) / bent);
+  drawn.extent = scaled(along, part * layer.length);
+  return drawn;
 }
 
-// The part of a line, as q, within its kernel's box; empty if low > high. Liang-Barsky in cells.
+// The part of a line within its kernel box, as q; empty if low > high. Liang-Barsky in cells.
 struct Part {
   double low = -0.5;
   double high = 0.5;
@@ -132,12 +133,12 @@ double bearing(const Vec& v) {
 }
 
 struct Seen {
-  double z = 0;         // height in the unbent world
-  double distance = 0;  // along the view, of the line's middle
+  double z = 0;         // height on the uncurved lattice
+  double distance = 0;  // view depth of the middle of the line
 };
 
-Vec undimmed_color(const Scene& scene, const VectorLayer& layer, const Stop& stop, const Wind& wind,
-                   const Seen& seen) {
+Vec undimmed_color(const Scene& scene, const VectorLayer& layer, const Stop& stop,
+                   const DrawnVector& drawn, const Seen& seen) {
   const auto [low, high] = scene::height_range(scene.lattice);
   switch (layer.color_by) {
     case LineColor::world_z:
@@ -146,13 +147,13 @@ Vec undimmed_color(const Scene& scene, const VectorLayer& layer, const Stop& sto
       return table_color(layer.color, seen.distance);
     case LineColor::rise: {
       const double height = (seen.z - low) / (high - low);
-      const double rise = 0.5 + 0.5 * wind.unit[2];
+      const double rise = 0.5 + 0.5 * drawn.unit[2];
       return table_color(layer.color, (1 - layer.rise_weight) * height + layer.rise_weight * rise);
     }
     case LineColor::magnitude:
-      return table_color(layer.color, wind.magnitude);
+      return table_color(layer.color, drawn.magnitude);
     case LineColor::direction:
-      return table_color(layer.color, bearing(wind.unit));
+      return table_color(layer.color, bearing(drawn.unit));
     case LineColor::scalar: {
       const auto value = static_cast<double>(layer.color_field->values[stop.index]);
       return std::isnan(value) ? Vec{0.5, 0.5, 0.5} : table_color(layer.color, value);
@@ -174,7 +175,7 @@ void project(const View& view, const Vec& p, double& x, double& y) {
   y = view.half_height + p[1] / (z * view.pixel);
 }
 
-// Leaves out what is before the near plane; false if that is all.
+// Clips to the near plane. Returns false if nothing remains.
 bool clip_to_near(const View& view, const Vec& p, const Vec& v, Part& part) {
   if (!view.perspective) return part.low <= part.high;
   if (v[2] > 0) part.low = std::max(part.low, (view.near - p[2]) / v[2]);
@@ -186,18 +187,18 @@ bool clip_to_near(const View& view, const Vec& p, const Vec& v, Part& part) {
 
 std::optional<Ribbon> make_ribbon(const Scene& scene, const View& view, const VectorLayer& layer,
                                   const Stop& stop) {
-  const auto wind = read_wind(scene, layer, stop);
-  if (!wind) return {};
+  const auto drawn = read_vector(scene, layer, stop);
+  if (!drawn) return {};
   const Jitter jitter = jitter_of(layer, stop.sample);
-  Vec in_box{};  // of the line's centre in its kernel's box, cells
-  Vec offset{};  // of the line's centre from the stop, world units
+  Vec in_box{};  // centre of the line in its kernel box, cells
+  Vec offset{};  // centre of the line from the kernel position, world units
   for (int a = 0; a < 3; ++a) {
     in_box[a] = layer.jitter_center * jitter.centre[a];
     offset = plus(offset, in_box[a] + layer.jitter_stride * jitter.stride[a], stop.edge[a]);
   }
-  Part part = clip_to_box(layer, stop, in_box, wind->extent);
+  Part part = clip_to_box(layer, stop, in_box, drawn->extent);
   const Vec p = to_camera(view, plus(stop.from_eye, 1, offset));
-  const Vec v = to_camera(view, wind->extent);
+  const Vec v = to_camera(view, drawn->extent);
   if (!clip_to_near(view, p, v, part)) return {};
   Ribbon line;
   line.q0 = part.low;
@@ -218,14 +219,14 @@ std::optional<Ribbon> make_ribbon(const Scene& scene, const View& view, const Ve
   line.moving = layer.moving;
   const double lift = in_box[2] + layer.jitter_stride * jitter.stride[2];
   const Seen seen{scene.lattice.positions[2][stop.sample[2]] + lift * stop.cell[2], p[2]};
-  const double strong = ramp(wind->magnitude, layer.magnitude_range[0], layer.magnitude_range[1]);
+  const double strong = ramp(drawn->magnitude, layer.magnitude_range[0], layer.magnitude_range[1]);
   const double far = ramp(p[2], scene.depth_cue.near, scene.depth_cue.far);
   const double dim =
       (1 - layer.magnitude_intensity * (1 - strong)) * (1 - scene.depth_cue.strength * far);
-  line.color = scaled(undimmed_color(scene, layer, stop, *wind, seen), dim);
+  line.color = scaled(undimmed_color(scene, layer, stop, *drawn, seen), dim);
   if (layer.moving) {
     const double full = layer.magnitude_range[1];
-    const double speed = full > 0 ? std::min(wind->magnitude / full, 1.0) : 1.0;
+    const double speed = full > 0 ? std::min(drawn->magnitude / full, 1.0) : 1.0;
     line.phase = jitter.phase + layer.motion_cycles * speed;
   }
   return line;

@@ -21,12 +21,12 @@ std::size_t sample_index(const scene::Lattice& lattice, const std::array<int, 3>
          x * (static_cast<std::size_t>(sample[1]) + y * static_cast<std::size_t>(sample[2]));
 }
 
-Vec place_of(const scene::Lattice& lattice, const std::array<int, 3>& sample) {
+Vec position_of(const scene::Lattice& lattice, const std::array<int, 3>& sample) {
   const auto& at = (*lattice.places)[sample_index(lattice, sample)];
   return {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
 }
 
-// A unit vector at right angles to v; its sign is arbitrary but fixed.
+// A unit vector perpendicular to v; its sign is arbitrary but deterministic.
 Vec any_normal(const Vec& v) {
   int least = 0;
   for (int a = 1; a < 3; ++a) {
@@ -38,8 +38,7 @@ Vec any_normal(const Vec& v) {
   return scaled(n, 1 / length(n));
 }
 
-// Edges of a curved cell along the axes that have more than one sample; the others stand at right
-// angles to them.
+// Edges of a curved cell; those along axes of one sample are perpendicular to the others.
 std::array<Vec, 3> curved_edges(const scene::Lattice& lattice, const std::array<AxisStop, 3>& s) {
   const std::array<int, 3> sample{s[0].sample, s[1].sample, s[2].sample};
   std::array<Vec, 3> edge{};
@@ -50,8 +49,8 @@ std::array<Vec, 3> curved_edges(const scene::Lattice& lattice, const std::array<
     std::array<int, 3> after = sample;
     before[a] = std::max(sample[a] - 1, 0);
     after[a] = std::min(sample[a] + 1, lattice.dims[a] - 1);
-    const Vec way = plus(place_of(lattice, after), -1, place_of(lattice, before));
-    edge[a] = scaled(way, static_cast<double>(s[a].samples) / (after[a] - before[a]));
+    const Vec across = plus(position_of(lattice, after), -1, position_of(lattice, before));
+    edge[a] = scaled(across, static_cast<double>(s[a].samples) / (after[a] - before[a]));
     known[a] = true;
   }
   for (int a = 0; a < 3; ++a) {
@@ -73,7 +72,7 @@ std::array<Vec, 3> curved_edges(const scene::Lattice& lattice, const std::array<
   return edge;
 }
 
-// Less of a volume than this share of a right-angled cell's is none.
+// Smallest volume of a cell relative to that of a box with edges of the same lengths.
 constexpr double flattest = 1e-6;
 
 double volume_of(const std::array<Vec, 3>& edge) { return dot(edge[0], cross(edge[1], edge[2])); }
@@ -147,7 +146,7 @@ Stop make_stop(const Scene& scene, const View& view, const std::array<AxisStop, 
   }
   stop.index = sample_index(scene.lattice, stop.sample);
   if (scene.lattice.places) {
-    world = place_of(scene.lattice, stop.sample);
+    world = position_of(scene.lattice, stop.sample);
     stop.edge = curved_edges(scene.lattice, stops);
     stop.has_cell = spans_volume(stop.edge);
     if (stop.has_cell) stop.inverse = inverse_of(stop.edge);

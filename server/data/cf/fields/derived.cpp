@@ -1,5 +1,5 @@
-// What can be made is found by standard names, units and usual names; rules run over some levels at
-// a time.
+// Finds derivable fields by standard names, units and common names; computes them a few levels at a
+// time.
 #include "server/data/cf/fields/derived.hpp"
 
 #include <algorithm>

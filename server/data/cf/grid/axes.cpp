@@ -1,4 +1,4 @@
-// Evidence for an axis' role and kind, a variable's layout, and the turning of axes.
+// Evidence for the role and kind of axes, layout of variables, and orientation of axes.
 #include "server/data/cf/grid/axes.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Mean changes of longitude and latitude along two dimensions decide which is which; the values are
-// kept in the order of the volumes.
+// Identifies x and y by the mean changes of longitude and latitude along two dimensions, and stores
+// the values in the order of volumes.
 #include "server/data/cf/grid/curvilinear.hpp"
 
 #include <algorithm>

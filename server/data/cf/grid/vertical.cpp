@@ -1,4 +1,4 @@
-// Coefficients and the surface pressure by the terms of a formula.
+// Finds coefficients and surface pressure by formula terms or common names.
 #include "server/data/cf/grid/vertical.hpp"
 
 #include <algorithm>

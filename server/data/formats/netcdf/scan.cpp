@@ -20,8 +20,8 @@ namespace windsplat::data::netcdf {
 
 namespace {
 
-constexpr std::size_t text_max = 4096;      // bytes of a text attribute that are kept
-constexpr std::size_t numbers_max = 65536;  // values of a numeric attribute that are read
+constexpr std::size_t text_max = 4096;      // bytes of a text attribute; the rest is dropped
+constexpr std::size_t numbers_max = 65536;  // values of a numeric attribute
 constexpr int variables_max = 8192;
 constexpr std::size_t groups_max = 1024;
 constexpr int depth_max = 64;  // of groups within groups
@@ -276,7 +276,7 @@ Result<void> File::scan_variable(const Place& place, bool above) {
   variable.standard_name = text(place, "standard_name");
   variable.long_name = text(place, "long_name");
   variable.units = text(place, "units");
-  // Of the groups above only what places the variables counts.
+  // From parent groups only coordinates are used.
   if (above && rank > 1 &&
       (!(cf::is_position(variable) || cf::is_surface_pressure(variable)) ||
        cf::variable_named(contents_, variable.name) >= 0)) {
@@ -311,7 +311,7 @@ void File::look_at_storage(const Place& place, FileVariable& variable) {
       nc_inq_grpname_full(place.group, nullptr, path.data());
     }
     if (path == "/") path.clear();
-    // A variable that has a dimension's name and is no coordinate of it is stored under another.
+    // A variable with the name of a dimension that is not its coordinate has another name in HDF5.
     const std::string other = path + "/_nc4_non_coord_" + variable.name;
     path += '/' + variable.name;
     if (storage_.count(other) > 0) path = other;

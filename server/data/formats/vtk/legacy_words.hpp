@@ -13,7 +13,7 @@
 
 namespace windsplat::data::vtk {
 
-// Words and lines of a file, with the place where each begins.
+// Words and lines of a file with their offsets.
 class Scanner {
  public:
   explicit Scanner(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}
@@ -21,7 +21,7 @@ class Scanner {
   [[nodiscard]] std::uint64_t at() const { return at_; }
   [[nodiscard]] bool ended() const { return at_ >= file_->size(); }
 
-  // Up to the end of the line, which is passed over. Errors: a line beyond the limit.
+  // Reads to the end of the line and skips it. Errors: a line beyond the limit.
   Result<std::string> line();
   // Empty at the end of the file.
   Result<std::string> word();
@@ -43,7 +43,7 @@ class Scanner {
 // The type of an array's values by its name in the file, in lower case.
 std::optional<bytes::Scalar> type_named(const std::string& name);
 
-// Names are written with %20 for a blank and the like.
+// Decodes names with percent encoding.
 std::string decoded(const std::string& name);
 
 }  // namespace windsplat::data::vtk

@@ -115,7 +115,7 @@ TEST(NetcdfAxes, ValuesTellTheWayWherePositiveIsSilent) {
     const auto& notes = source->info().notes;
     EXPECT_EQ(std::any_of(notes.begin(), notes.end(),
                           [](const std::string& note) {
-                            return note.find("taken for heights") != std::string::npos;
+                            return note.find("interpreted as heights") != std::string::npos;
                           }),
               c.kind == AxisKind::height);
   }
