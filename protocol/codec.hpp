@@ -1,6 +1,6 @@
-// JSON in and out: the only place that knows the JSON library. Everything past it is typed.
-// Every parser refuses: over-long text, nesting beyond the limit, duplicate and unknown keys,
-// invalid UTF-8, numbers out of range or not finite; each with its JSON pointer.
+// Parsers and encoders of all JSON documents; other code uses typed values only. Parsers reject
+// oversized text, nesting beyond the limit, duplicate and unknown keys, invalid UTF-8, and numbers
+// out of range or not finite, each with its JSON pointer.
 #pragma once
 
 #include <cstdint>
@@ -16,19 +16,19 @@
 
 namespace windsplat::protocol {
 
-// A view as the user wrote it: any subset of its keys, already validated. Kept as text so that
-// what was said, and not what was defaulted, is what patches apply to.
+// A validated view as written by the user, with any subset of keys. Stored as text, so that patches
+// apply to the explicit keys only, not to defaults.
 class ViewDocument {
  public:
   ViewDocument() : json_("{}") {}
 
   static Result<ViewDocument> parse(std::string_view json);
 
-  // RFC 7396, with one exception that the schema's nullable keys need: null at /vector/field is
-  // kept as a value ("draw no lines"). Elsewhere null removes a key, which brings its default back.
+  // RFC 7396 with one exception: null at /vector/field is stored as a value ("no lines"). Elsewhere
+  // null removes a key, which restores its default.
   [[nodiscard]] Result<ViewDocument> patched(std::string_view patch_json) const;
 
-  // The typed view; absent keys take the schema's defaults.
+  // The typed view; absent keys have the defaults of the schema.
   [[nodiscard]] View view() const;
 
   [[nodiscard]] const std::string& canonical() const { return json_; }  // keys sorted, no spaces
@@ -37,11 +37,11 @@ class ViewDocument {
   std::string json_;
 };
 
-// render --set /pointer=value: the value is JSON, or a plain string where it does not parse.
+// render --set /pointer=value: the value is JSON, or a string if it is not valid JSON.
 Result<ViewDocument> set_at(const ViewDocument& document, std::string_view pointer,
                             std::string_view value);
 
-// Several of them, (pointer, value) in order; only what they make together is checked.
+// Several of them, (pointer, value) in order; only the final result is checked.
 Result<ViewDocument> set_all(const ViewDocument& document,
                              const std::vector<std::pair<std::string, std::string>>& changes);
 
@@ -49,8 +49,7 @@ std::string encode_view(const View& view);  // every key; canonical
 
 Result<ClientMessage> parse_client_message(std::string_view json);
 
-// What an ErrorMessage should name when parse_client_message refused: the id and rev that the
-// message bears, as far as they can be read.
+// The id and rev of a message that parse_client_message rejected, as far as they can be read.
 struct MessageTag {
   std::optional<std::uint32_t> id;
   std::optional<std::uint32_t> rev;

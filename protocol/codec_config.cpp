@@ -16,7 +16,7 @@ void read_text(const Json& value, const std::string& pointer, Faults& faults, Co
     faults.add(pointer, "must have at most " + std::to_string(config_text_bytes_max) + " bytes");
   } else if (std::any_of(text.begin(), text.end(),
                          [](unsigned char c) { return c < 0x20 || c == 0x7f; })) {
-    faults.add(pointer, "must have no control characters");
+    faults.add(pointer, "must not contain control characters");
   } else {
     entry.words.push_back(text);
   }
@@ -33,7 +33,7 @@ void read_list(const Json& value, const std::string& pointer, Faults& faults, Co
     if (value[i].is_string()) {
       read_text(value[i], at, faults, entry);
     } else {
-      faults.add(at, "must be a text, not " + described(value[i]));
+      faults.add(at, "must be a string, not " + described(value[i]));
     }
   }
 }
@@ -53,8 +53,8 @@ ConfigEntry read_entry(const std::string& key, const Json& value, Faults& faults
   } else if (value.is_array()) {
     read_list(value, pointer, faults, entry);
   } else {
-    faults.add(pointer,
-               "must be a text, a number, true, false or a list of texts, not " + described(value));
+    faults.add(pointer, "must be a string, a number, true, false or a list of strings, not " +
+                            described(value));
   }
   return entry;
 }

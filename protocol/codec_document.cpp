@@ -1,5 +1,5 @@
-// ViewDocument: a view as its user wrote it -> checked canonical text, and edits of that text by
-// merge patch or by pointer.
+// ViewDocument: a view as written by the user -> validated canonical text, edited by merge patch or
+// pointer.
 #include "protocol/codec.hpp"
 #include "protocol/codec_json.hpp"
 #include "protocol/limits.hpp"
@@ -16,7 +16,7 @@ bool keeps_null(const std::string& pointer, const std::string& key) {
   return key == kept_null_key && pointer == kept_null_parent;
 }
 
-// What says nothing is left out: nulls that mean a default, and objects with nothing in them.
+// Removes redundant parts: nulls that mean a default, and empty objects.
 void remove_unsaid(Json& value, const std::string& pointer) {
   if (value.is_array()) {
     for (Json& element : value) remove_unsaid(element, pointer + "/-");
@@ -31,7 +31,7 @@ void remove_unsaid(Json& value, const std::string& pointer) {
   }
 }
 
-// RFC 7396, section 2, but for the null that is kept. Depth is bounded by the parser.
+// RFC 7396, section 2, except for the stored null. Depth is bounded by the parser.
 void merge(Json& target, const Json& patch, const std::string& pointer) {
   if (!patch.is_object()) {
     target = patch;
@@ -51,8 +51,7 @@ void merge(Json& target, const Json& patch, const std::string& pointer) {
 Result<std::vector<std::string>> split_pointer(std::string_view pointer) {
   std::vector<std::string> tokens;
   if (!pointer.empty() && pointer[0] != '/') {
-    return make_error(ErrorKind::invalid,
-                      "a JSON pointer begins with /, not like " + printable(pointer));
+    return make_error(ErrorKind::invalid, "a JSON pointer begins with '/': " + printable(pointer));
   }
   for (std::size_t i = 0; i < pointer.size(); ++i) {
     if (pointer[i] == '/') {
@@ -62,8 +61,8 @@ Result<std::vector<std::string>> split_pointer(std::string_view pointer) {
     } else {
       const char escape = i + 1 < pointer.size() ? pointer[++i] : ' ';
       if (escape != '0' && escape != '1') {
-        return make_error(ErrorKind::invalid, "in the JSON pointer " + printable(pointer) +
-                                                  " a ~ is not followed by 0 or 1");
+        return make_error(ErrorKind::invalid, "JSON pointer " + printable(pointer) +
+                                                  ": '~' must be followed by 0 or 1");
       }
       tokens.back() += escape == '0' ? '~' : '/';
     }
@@ -76,7 +75,7 @@ Result<std::vector<std::string>> split_pointer(std::string_view pointer) {
   return tokens;
 }
 
-// The element of an array that a token names; one past the end, also written "-", is made.
+// The element of an array named by a token; one past the end, also written "-", is appended.
 Json* element_at(Json& array, const std::string& token) {
   if (token == "-") return &array.emplace_back();
   const bool digits = !token.empty() && token.size() <= 3 &&
@@ -91,7 +90,7 @@ Json* element_at(Json& array, const std::string& token) {
 Result<ViewDocument> checked_document(const Json& json) {
   try {
     return ViewDocument::parse(json.dump());
-  } catch (const Json::type_error&) {  // a string from the command line that is no UTF-8
+  } catch (const Json::type_error&) {  // a string of the command line with invalid UTF-8
     return make_error(ErrorKind::malformed, "a view's text must be valid UTF-8");
   }
 }
@@ -143,13 +142,13 @@ Result<void> put(Json& tree, std::string_view pointer, std::string_view value) {
       target = element_at(*target, token);
       if (target == nullptr) {
         return make_error_at(ErrorKind::invalid, join_pointer(at, token),
-                             "is neither an element of this array nor the place after its last");
+                             "is neither an element of this array nor the position after the last");
       }
     } else if (target->is_object()) {
       target = &(*target)[token];
     } else {
       return make_error_at(ErrorKind::invalid, join_pointer(at, token),
-                           "lies within " + described(*target) + ", which has no parts");
+                           "lies within " + described(*target) + ", which is not a container");
     }
     at = join_pointer(at, token);
   }

@@ -1,5 +1,5 @@
-// Text -> JSON tree: a SAX handler that stops at the first breach of the wire's limits, so that no
-// hostile text costs more than its own length.
+// Text -> JSON tree: a SAX handler that stops at the first violation of a limit, so that the cost
+// of untrusted text is bounded by its length.
 #include "protocol/codec_json.hpp"
 
 #include <algorithm>
@@ -12,11 +12,11 @@ namespace windsplat::protocol {
 
 namespace {
 
-constexpr int number_overflow_error = 406;  // the parser's code for a number no double holds
+constexpr int number_overflow_error = 406;  // of the parser: number exceeds double
 constexpr std::size_t token_bytes_max = 64;
 constexpr double exact_integer_max = 9007199254740992.0;  // 2^53
 
-// Cuts between code points, at most `bytes_max` bytes.
+// Truncates to at most `bytes_max` bytes at a code point boundary.
 std::string_view cut_utf8(std::string_view text, std::size_t bytes_max) {
   if (text.size() <= bytes_max) return text;
   std::size_t end = bytes_max;
@@ -24,8 +24,8 @@ std::string_view cut_utf8(std::string_view text, std::size_t bytes_max) {
   return text.substr(0, end);
 }
 
-// Builds the tree. Containers still open are on a stack; the pointer of the value being read
-// follows from it, so that every refusal can say where it happened.
+// Builds the tree. Open containers are on a stack, from which the pointer of the current value is
+// derived for error messages.
 class TreeBuilder : public nlohmann::json_sax<Json> {
  public:
   bool null() override { return put(Json(nullptr)); }
@@ -36,7 +36,7 @@ class TreeBuilder : public nlohmann::json_sax<Json> {
     return put(Json(value));
   }
   bool string(string_t& value) override { return put(Json(std::move(value))); }
-  bool binary(binary_t& /*value*/) override { return false; }  // no text holds one
+  bool binary(binary_t& /*value*/) override { return false; }  // does not occur in JSON text
 
   bool start_object(std::size_t /*count*/) override { return open(Json::object()); }
   bool start_array(std::size_t /*count*/) override { return open(Json::array()); }
@@ -48,7 +48,7 @@ class TreeBuilder : public nlohmann::json_sax<Json> {
     top.key = std::move(name);
     top.key_pending = true;
     if (top.value.contains(top.key)) {
-      return refuse(ErrorKind::malformed, "the key stands here twice; once is the limit");
+      return refuse(ErrorKind::malformed, "duplicate key");
     }
     return true;
   }
@@ -56,7 +56,7 @@ class TreeBuilder : public nlohmann::json_sax<Json> {
   bool parse_error(std::size_t position, const std::string& /*token*/,
                    const nlohmann::detail::exception& fault) override {
     if (fault.id == number_overflow_error) {
-      return refuse(ErrorKind::invalid, "must be finite: no double holds this number");
+      return refuse(ErrorKind::invalid, "number exceeds the range of a double");
     }
     return refuse(ErrorKind::malformed, "not valid JSON at byte " + std::to_string(position));
   }
@@ -67,8 +67,8 @@ class TreeBuilder : public nlohmann::json_sax<Json> {
  private:
   struct Open {
     Json value;
-    std::string key;           // of the member being read, objects only
-    bool key_pending = false;  // a key was read and its value was not
+    std::string key;           // of the current member, objects only
+    bool key_pending = false;  // a key without its value yet
   };
 
   [[nodiscard]] std::string pointer() const {
@@ -131,14 +131,13 @@ Result<Json> parse_json(std::string_view text) {
                                                 " bytes; the limit is " +
                                                 std::to_string(limits::message_bytes_max));
   }
-  // The parser takes a NUL for the end of its input and skips a byte order mark; neither is JSON.
+  // The parser would treat a NUL as the end of input and skip a byte order mark; both are invalid.
   if (const auto nul = text.find('\0'); nul != std::string_view::npos) {
     return make_error_at(ErrorKind::malformed, "",
-                         "not valid JSON: a NUL at byte " + std::to_string(nul + 1));
+                         "not valid JSON: NUL at byte " + std::to_string(nul + 1));
   }
   if (text.substr(0, 3) == "\xef\xbb\xbf") {
-    return make_error_at(ErrorKind::malformed, "",
-                         "not valid JSON: it begins with a byte order mark");
+    return make_error_at(ErrorKind::malformed, "", "not valid JSON: begins with a byte order mark");
   }
   TreeBuilder builder;
   if (!Json::sax_parse(text.begin(), text.end(), &builder)) return builder.take_error();

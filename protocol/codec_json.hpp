@@ -1,5 +1,5 @@
-// Inside the codec only: hostile text -> a JSON tree within the wire's limits, and readers that
-// take typed, range-checked values out of it. Faults are collected with their JSON pointers.
+// Internal to the codec: untrusted text -> a JSON tree within the limits of the protocol, and
+// readers that extract typed, range-checked values. Faults are collected with JSON pointers.
 #pragma once
 
 #include <array>
@@ -22,28 +22,29 @@ namespace windsplat::protocol {
 // nesting, duplicate keys), invalid (a number that no double holds).
 Result<Json> parse_json(std::string_view text);
 
-// No spaces, keys sorted, invalid UTF-8 replaced, numbers that are not finite as null.
+// Without spaces, keys sorted, invalid UTF-8 replaced, non-finite numbers as null.
 std::string dump(const Json& value);
 
-// The canonical form of a number: an integer where it is whole and exact, no minus zero.
+// The canonical form of a number: an integer if it is one exactly; no negative zero.
 Json canonical_number(double value);
 Json number_or_null(const std::optional<double>& value);
 Json numbers_json(const std::vector<double>& values);
 // Canonical numbers throughout a tree.
 void make_numbers_canonical(Json& value);
 
-// pointer + "/" + key, escaped as RFC 6901 says; a key of any length or content gives a short,
-// printable token.
+// pointer + "/" + key, escaped by RFC 6901; long or unprintable keys are shortened to a printable
+// token.
 std::string join_pointer(const std::string& pointer, std::string_view key);
 std::string join_pointer(const std::string& pointer, std::size_t index);
 
-// Values at fault, in the order they were found. One answer names problem_errors_max of them.
+// Invalid values in the order found. One answer lists at most problem_errors_max of them.
 class Faults {
  public:
   void add(std::string pointer, std::string detail, ErrorKind kind = ErrorKind::invalid);
   [[nodiscard]] bool empty() const { return count_ == 0; }
   [[nodiscard]] std::size_t count() const { return count_; }
-  // The first fault leads the message; `invalid` outweighs `too_large`. Only when not empty.
+  // The message is that of the first fault; kind `invalid` has precedence over `too_large`.
+  // Requires at least one fault.
   [[nodiscard]] Error error() const;
 
  private:
@@ -64,20 +65,20 @@ struct IntegerRange {
   std::int64_t max;
 };
 
-// Names of an enumeration's values on the wire.
+// Names of the values of an enumeration in JSON.
 template <class E>
 struct Name {
   E value;
   const char* text;
 };
 
-// One JSON object, read key by key. A value that breaks its limit is recorded and leaves `out` as
-// it was. finish() records unknown keys.
+// Reads one JSON object by key. An invalid value is recorded and leaves `out` unchanged. finish()
+// records unknown keys.
 class ObjectReader {
  public:
   ObjectReader(const Json& value, std::string pointer, Faults& faults);
 
-  // The value at `key`, or null if there is nothing to read.
+  // The value at `key`, or null if it is absent.
   const Json* child(const char* key, Presence presence = Presence::optional,
                     Null null = Null::refused);
 
@@ -156,17 +157,17 @@ class ObjectReader {
                                        std::size_t chars_min,
                                        std::size_t chars_max = limits::name_chars_max);
 
-  const Json* value_ = nullptr;  // null when there is no object to read
+  const Json* value_ = nullptr;  // null if the value is not an object
   std::string pointer_;
   Faults& faults_;
   std::vector<std::string_view> asked_;
 };
 
-// One number of an array or object: its value if it is within the range.
+// A number of an array or object, if it is within the range.
 std::optional<double> read_number(const Json& value, const std::string& pointer, NumberRange range,
                                   Faults& faults);
 
-// The wire name of an enumeration's value.
+// The JSON name of an enumeration value.
 template <class E, std::size_t N>
 const char* name_of(E value, const std::array<Name<E>, N>& names) {
   for (const Name<E>& name : names) {
@@ -175,10 +176,10 @@ const char* name_of(E value, const std::array<Name<E>, N>& names) {
   return "";
 }
 
-// What a value is, for messages: a number or word as it stands, else its kind.
+// Description of a value for error messages: a number or string itself, otherwise its type.
 std::string described(const Json& value);
 
-// Any document as a typed View, everything checked; `view` is meaningful only without faults.
+// Converts a document to a typed View with all checks; the result is valid only without faults.
 View read_view(const Json& document, Faults& faults);
 Json view_to_json(const View& view);  // every key
 

@@ -1,4 +1,4 @@
-// Measurements and jobs -> JSON; the request for a dataset -> its path.
+// Measurements and jobs -> JSON; dataset request -> its path.
 #include <cmath>
 
 #include "protocol/codec_json.hpp"

@@ -201,7 +201,7 @@ Result<ClientMessage> parse_client_message(std::string_view json) {
   if (reader.child("type", Presence::required) != nullptr) {
     reader.choice("type", kind, client_names);
   }
-  // What the other keys mean depends on the type: without one there is nothing more to say.
+  // The meaning of the other keys depends on the type.
   if (!faults.empty()) return faults.error();
   ClientMessage message = read_body(kind, reader);
   reader.finish();

@@ -32,7 +32,7 @@ bool is_color(std::string_view text) {
          text.substr(1).find_first_not_of(digits) == std::string_view::npos;
 }
 
-// A whole number, however it is written (12, 12.0, 1.2e1), that fits 64 bits.
+// An integer that fits 64 bits, in any notation (12, 12.0, 1.2e1).
 std::optional<std::int64_t> whole(const Json& value) {
   if (value.is_number_unsigned()) {
     const auto raw = value.get<std::uint64_t>();
@@ -178,7 +178,7 @@ std::optional<std::string> ObjectReader::read_text(const Json& value, const std:
     return std::nullopt;
   }
   if (has_control(text)) {
-    faults_.add(pointer, "must not hold control characters: " + described(value));
+    faults_.add(pointer, "must not contain control characters: " + described(value));
     return std::nullopt;
   }
   return text;
@@ -198,7 +198,7 @@ void ObjectReader::finish() {
   for (const auto& member : value_->items()) {
     const std::string& key = member.key();
     if (std::find(asked_.begin(), asked_.end(), key) == asked_.end()) {
-      faults_.add(join_pointer(pointer_, key), "is not known here; what is: " + known_keys());
+      faults_.add(join_pointer(pointer_, key), "unknown key; known keys: " + known_keys());
     }
   }
 }

@@ -47,9 +47,10 @@ Result<SavedView> parse_view_file(std::string_view json) {
   reader.text("created", saved.created, 1, Presence::required);
   const Json* view = reader.child("view", Presence::required);
   reader.finish();
-  if (faults.empty() && !is_view_id(saved.id)) faults.add("/id", "is no view's id");
+  if (faults.empty() && !is_view_id(saved.id))
+    faults.add("/id", "must be a view id: 10 characters from 0 to 9 and a to z without i, l, o, u");
   if (faults.empty() && !is_time(saved.created)) {
-    faults.add("/created", "is no time of the form 2001-01-01T03:00:00Z");
+    faults.add("/created", "must be a time of the form 2001-01-01T03:00:00Z");
   }
   if (!faults.empty()) return faults.error();
   auto document = ViewDocument::parse(view->dump());

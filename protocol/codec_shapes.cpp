@@ -1,4 +1,4 @@
-// Descriptions -> the JSON shapes of messages.schema.json that REST answers with.
+// Descriptions -> the JSON documents of messages.schema.json.
 #include "protocol/codec_shapes.hpp"
 
 #include <cstdio>
@@ -55,7 +55,7 @@ std::string color_text(const std::array<unsigned char, 3>& rgb) {
   return text.data();
 }
 
-// Reason phrases as RFC 9110 registers them; 499 and 507 are known by these names.
+// Reason phrases of RFC 9110, and the customary ones of 499 and 507.
 const char* status_title(int status) {
   switch (status) {
     case 400:

@@ -1,4 +1,4 @@
-// Inside the codec only: the shapes that REST, the stream and the command line share, as JSON
+// Internal to the codec: documents shared by the HTTP API, the stream and the command line, as JSON
 // trees.
 #pragma once
 
@@ -7,7 +7,7 @@
 
 namespace windsplat::protocol {
 
-// limits.hpp, in camel case; of a picture's pixels the server's own limit.
+// The limits of limits.hpp in camel case; for pixels of a picture the limit of the server.
 Json limits_json(std::int64_t image_pixels_max);
 Json problem_json(const Problem& problem);                     // RFC 9457
 Json frame_info_json(const FrameInfo& info);                   // Windsplat-Frame

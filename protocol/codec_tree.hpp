@@ -1,4 +1,4 @@
-// The codec's JSON tree, and how one is taken apart: without asking for memory.
+// The JSON tree of the codec, with a destructor that does not allocate.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace windsplat::protocol {
 
-// The system's allocator under a name of ours, which makes the tree a type of ours.
+// The standard allocator under another name, which makes the tree a distinct type.
 template <class T>
 struct TreeAllocator : std::allocator<T> {
   TreeAllocator() = default;
@@ -22,7 +22,7 @@ struct TreeAllocator : std::allocator<T> {
   };
 };
 
-// Objects are sorted by key, which is what makes text canonical.
+// Objects are sorted by key, as required by the canonical text.
 using Json = nlohmann::basic_json<std::map, std::vector, std::string, bool, std::int64_t,
                                   std::uint64_t, double, TreeAllocator>;
 
@@ -35,9 +35,9 @@ void free_node(T* node) {
 
 }  // namespace windsplat::protocol
 
-// The library's own (3.11) copies the children to a new vector first, so that deep trees do not use
-// the stack up; with no memory for that vector the destructor ends the program. Trees of the codec
-// are at most json_depth_max deep.
+// Replaces the destructor of the library (3.11), which moves children to a new vector to avoid deep
+// recursion; if that allocation fails, the program terminates. The trees of the codec are at most
+// json_depth_max deep, so recursion is safe.
 template <>
 inline void windsplat::protocol::Json::json_value::destroy(
     windsplat::protocol::Json::value_t type) {

@@ -1,4 +1,4 @@
-// JSON tree <-> View: the schema's keys, ranges and cross checks, one function an object.
+// JSON tree <-> View with the ranges and constraints of the schema; one function per object.
 #include <cmath>
 
 #include "protocol/codec.hpp"
@@ -112,7 +112,7 @@ GeometryView read_geometry(const Json& json, const std::string& pointer, Faults&
   return geometry;
 }
 
-// Either order, so that a map can be turned about, but not so close that its slope overflows.
+// Descending ranges reverse the map. The ends must differ enough that the slope is finite.
 void check_color_range(const std::optional<Range>& range, ObjectReader& reader) {
   if (range && !(std::abs((*range)[1] - (*range)[0]) >= limits::range_width_min)) {
     reader.faults().add(reader.at("range"), "must have ends that differ by at least " +
@@ -243,7 +243,7 @@ std::vector<std::array<double, 2>> read_extinction(const Json& json, const std::
         read_number(point[1], join_pointer(at, 1), {0, limits::extinction_max}, faults);
     if (!value || !extinction) continue;
     if (!points.empty() && *value < points.back()[0]) {
-      faults.add(join_pointer(at, 0), "must not be less than the point's before it: values ascend");
+      faults.add(join_pointer(at, 0), "must not be less than the value of the previous point");
     }
     points.push_back({*value, *extinction});
   }
@@ -380,7 +380,7 @@ Json vector_to_json(const VectorView& vector) {
              {"overlap", vector.jitter.overlap},
              {"seed", vector.jitter.seed},
              {"perStep", vector.jitter.per_step}}}};
-  // Null would say "no lines", so the dataset's default is told by the key's absence.
+  // Null means no lines, so the default of the dataset is expressed by omitting the key.
   if (vector.field.kind == FieldChoice::Kind::none) out["field"] = nullptr;
   if (vector.field.kind == FieldChoice::Kind::named) out["field"] = vector.field.name;
   return out;

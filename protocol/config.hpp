@@ -1,5 +1,5 @@
-// The configuration file: one JSON object whose keys are named as the options of `windsplat serve`,
-// without their dashes. What each may be is the options' to say; here is its form.
+// The configuration file: one JSON object with the options of `windsplat serve` as keys, without
+// dashes. Only the form is checked here; the options check their values.
 #pragma once
 
 #include <string>
@@ -15,21 +15,21 @@ struct ConfigEntry {
 
   std::string key;
   Kind kind = Kind::text;
-  // As the command line would have it: one word, "true" or "false", a number as JSON writes it, or
-  // the list's texts.
+  // As on the command line: one word, "true" or "false", a number as in JSON, or the strings of a
+  // list.
   std::vector<std::string> words;
 };
 
 struct Config {
-  std::vector<ConfigEntry> entries;  // by key, each once
+  std::vector<ConfigEntry> entries;  // unique, sorted by key
 };
 
-// Errors, with JSON pointers: too_large, malformed (as every document of the wire), invalid (no
-// object, a value that is no text, number, boolean or list of texts; a text with a control
-// character).
+// Errors, with JSON pointers: too_large, malformed (as for every document of the protocol), invalid
+// (not an object; a value that is not a string, number, boolean or list of strings; a string with a
+// control character).
 Result<Config> parse_config(std::string_view json);
 
-// A fault of one entry, found by whoever knows the option: invalid, at its pointer.
+// An error of kind invalid at the pointer of one entry, for checks by option.
 Error config_error(const std::string& key, std::string detail);
 
 }  // namespace windsplat::protocol

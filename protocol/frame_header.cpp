@@ -1,5 +1,5 @@
-// FrameHeader <-> 64 bytes. Offsets are written out, since they are the wire's and not the
-// compiler's; integers and floats go least byte first on any machine.
+// FrameHeader <-> 64 bytes. Explicit offsets and little-endian order, independent of compiler and
+// machine.
 #include "protocol/frame_header.hpp"
 
 #include <cstring>
@@ -85,11 +85,11 @@ std::array<std::uint8_t, frame_header_bytes> encode_frame_header(const FrameHead
 
 Result<FrameHeader> parse_frame_header(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < frame_header_bytes) {
-    return bad_header("it has " + std::to_string(bytes.size()) + " bytes, a header has 64");
+    return bad_header("has " + std::to_string(bytes.size()) + " bytes; a header has 64");
   }
   const std::uint8_t* at = bytes.data();
   if (std::memcmp(at, magic.data(), magic.size()) != 0) {
-    return bad_header("it does not begin with WSPL");
+    return bad_header("does not begin with WSPL");
   }
   if (at[4] != version_known) return bad_header("version " + std::to_string(at[4]) + ", not 1");
   if (at[5] != kind_frame) return bad_header("kind " + std::to_string(at[5]) + ", not 1");

@@ -1,5 +1,4 @@
-// The 64-byte little-endian header of a binary frame. Offsets are the wire's; see "The wire" in
-// docs/design/wire-format.md.
+// The 64-byte little-endian header of a binary frame; see docs/design/wire-format.md.
 #pragma once
 
 #include <array>
@@ -24,7 +23,7 @@ struct FrameHeader {
   std::uint8_t version = 1;
   std::uint8_t kind = 1;  // 1 frame
   std::uint32_t seq = 0;  // 4 + 4: from 1
-  std::uint32_t rev = 0;  // of the view drawn
+  std::uint32_t rev = 0;  // of the rendered view
   std::uint32_t step = 0;
   std::uint32_t flags = 0;
   std::uint16_t width = 0;
@@ -39,7 +38,7 @@ struct FrameHeader {
   std::uint32_t render_us = 0;
   std::uint32_t encode_us = 0;
   std::uint32_t payload_bytes = 0;
-  double t = 0;  // echo of the newest patch's t
+  double t = 0;  // echo of t of the newest patch
 };
 
 std::array<std::uint8_t, frame_header_bytes> encode_frame_header(const FrameHeader& header);

@@ -1,4 +1,4 @@
-// Every limit of the wire in one place. The schemas repeat the view's ranges; a test compares them.
+// All limits of the protocol. The schemas repeat those of the view; a test compares them.
 #pragma once
 
 #include <cstddef>
@@ -32,7 +32,7 @@ inline constexpr double geometry_scale_max = 1e3;
 inline constexpr double component_scale_max = 1e9;
 inline constexpr double line_length_max = 10;  // world units
 inline constexpr double span_min = 0.1;        // grid strides
-inline constexpr double value_max = 1e38;      // of a field; its square fits a double
+inline constexpr double value_max = 1e38;      // of a field
 inline constexpr double range_width_min = 1e-30;
 inline constexpr double motion_rate_max = 1e3;
 inline constexpr double motion_time_max = 1e6;      // steps
@@ -54,19 +54,19 @@ inline constexpr double fps_min = 0.1;
 inline constexpr double fps_max = 120;
 inline constexpr double still_scale_max = 4;
 inline constexpr double decode_ms_max = 1e9;
-inline constexpr std::size_t problem_errors_max = 16;  // values at fault that one answer names
+inline constexpr std::size_t problem_errors_max = 16;  // invalid values listed in one answer
 
 inline constexpr std::size_t path_chars_max = 4096;  // code points of a path below the data root
 inline constexpr int histogram_bins_max = 4096;
-inline constexpr double histogram_clip_max = 0.49;  // share of the values, at either end
-inline constexpr double coordinate_max = 1e30;      // of a probe, in the axes' own units
+inline constexpr double histogram_clip_max = 0.49;  // fraction of the values, at either end
+inline constexpr double coordinate_max = 1e30;      // of a probe, in the units of the axes
 inline constexpr int series_steps_max = 100000;
-inline constexpr int jobs_max = 64;  // known at a time, finished ones among them
+inline constexpr int jobs_max = 64;  // including finished ones
 inline constexpr int jobs_running_max = 2;
-inline constexpr int views_max = 10000;           // kept by a server
+inline constexpr int views_max = 10000;           // stored by a server
 inline constexpr int views_bytes_max = 16777216;  // of all of them as JSON
 
-inline constexpr int frames_in_flight_max = 2;  // unacknowledged, a session
+inline constexpr int frames_in_flight_max = 2;  // unacknowledged, per session
 inline constexpr int sessions_max_default = 64;
 
 }  // namespace windsplat::protocol::limits

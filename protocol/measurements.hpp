@@ -1,4 +1,4 @@
-// What REST answers about values and about work that takes a while, as typed values. Mirrors
+// Answers of the HTTP API about values, forecasts and jobs, as typed values. Mirrors
 // messages.schema.json.
 #pragma once
 
@@ -17,15 +17,15 @@
 
 namespace windsplat::protocol {
 
-// Of a field at a step; of a vector its magnitude.
+// Histogram of a field at a step; for vectors of the magnitude.
 struct HistogramDescription {
-  std::optional<Range> range;  // absent where there is no value to take it from
+  std::optional<Range> range;  // absent if there are no values
   std::vector<std::int64_t> counts;
   std::int64_t below = 0;
   std::int64_t above = 0;
   std::int64_t masked = 0;
   bool log = false;
-  std::vector<double> edges;  // told of logarithmic bins; even ones follow from the range
+  std::vector<double> edges;  // logarithmic bins only
 };
 
 // A sample of the grid.
@@ -35,76 +35,76 @@ struct PositionDescription {
   std::array<std::string, 3> units;
 };
 
-// A field at a place; one number of a scalar, the components of a vector; none where masked.
+// A field at one position: one number of a scalar, the components of a vector; empty if masked.
 using ProbedValue = std::optional<std::vector<double>>;
 
 struct ProbedField {
   std::string name;
   bool is_vector = false;
   std::string units;
-  std::vector<std::string> component_units;  // told where they differ
+  std::vector<std::string> component_units;  // only if they differ
 };
 
 struct ProbeDescription {
   PositionDescription position;
   int step = 0;
   std::vector<ProbedField> fields;
-  std::vector<ProbedValue> values;  // one a field
+  std::vector<ProbedValue> values;  // one per field
 };
 
 struct SeriesDescription {
   PositionDescription position;
   ProbedField field;
   std::vector<StepDescription> times;
-  std::vector<ProbedValue> values;  // one a time
+  std::vector<ProbedValue> values;  // one per time
 };
 
 struct RangeDescription {
-  std::optional<Range> range;  // absent where every sample is masked
+  std::optional<Range> range;  // absent if all samples are masked
   std::int64_t masked = 0;
   std::string range_of;  // "step" | "all"
 };
 
-// A view's truth, once it is drawn, and what the view's own picture errs against it.
+// The finished reference picture of a view, and the error of the rendered view.
 struct ReferenceDescription {
   std::string id;
-  std::string picture;  // where it is
+  std::string picture;  // path
   int width = 0;
   int height = 0;
-  // Of linear premultiplied light; psnr in dB against a peak of 1, infinite when nothing differs.
+  // In linear premultiplied RGBA; psnr in dB for a peak of 1, infinite for identical pictures.
   double rmse = 0;
   double max = 0;
   double psnr = 0;
   friend bool operator==(const ReferenceDescription&, const ReferenceDescription&) = default;
 };
 
-// Of kind dataset: its id.
+// A string is the id of an opened dataset.
 using JobResult = std::variant<std::string, ReferenceDescription>;
 
-// What a picture of a view is expected to take and to err at one of the settings that the server
-// may choose. Names as in FrameInfo.
+// Expected time and error of a picture at one of the settings that the server may choose. Names as
+// in FrameInfo.
 struct ForecastPoint {
   std::string method;
-  std::optional<double> slab_thickness;  // grid cells along the line of sight; none without slabs
+  std::optional<double> slab_thickness;  // grid cells along the view direction; method slab only
   int width = 0;                         // pixels, as it would be rendered
   int height = 0;
-  int coarser = 0;       // how often an axis of the data is halved more than the picture asks for
-  double ms = 0;         // of drawing
-  bool timed = false;    // else nothing of the kind was timed, and `ms` tells proportions only
-  double error = 0;      // linear RMSE, the expected one
-  double error_low = 0;  // 90 of 100 pictures err between these two
+  int coarser = 0;       // additional halvings of the axes of the data
+  double ms = 0;         // rendering time
+  bool timed = false;    // false: `ms` is only relative to other settings
+  double error = 0;      // expected linear RMSE
+  double error_low = 0;  // 5 % and 95 % quantiles
   double error_high = 0;
-  bool measured = false;  // from nearly the same view, else estimated
-  bool pareto = false;    // no other point is as good in both
+  bool measured = false;  // at nearly the same view; otherwise estimated
+  bool pareto = false;    // on the Pareto front of time and error
 };
 struct ForecastDescription {
   int width = 0;  // of the view, pixels
   int height = 0;
-  std::vector<ForecastPoint> points;  // the fastest first
-  std::optional<std::size_t> chosen;  // of `points`, where the view has a budget or an error
+  std::vector<ForecastPoint> points;  // fastest first
+  std::optional<std::size_t> chosen;  // index of `points`, if the view has a budget or error limit
 };
 
-// Work that a client asked for and does not wait for.
+// Asynchronous work requested by a client.
 struct JobDescription {
   std::string id;
   std::string kind;   // "dataset" | "reference"
@@ -123,7 +123,7 @@ std::string encode_forecast(const ForecastDescription& forecast);
 std::string encode_job(const JobDescription& job);
 std::string encode_jobs(const std::vector<JobDescription>& jobs);
 
-// The body of POST /v1/datasets: its path. Errors as for every parser, see codec.hpp.
+// Returns the path in the body of POST /v1/datasets. Errors of parsers: see codec.hpp.
 Result<std::string> parse_dataset_request(std::string_view json);
 
 }  // namespace windsplat::protocol

@@ -1,4 +1,5 @@
-// What client and server say to each other, as typed values. Mirrors messages.schema.json.
+// The messages of the stream and the documents of the HTTP API as typed values. Mirrors
+// messages.schema.json.
 #pragma once
 
 #include <array>
@@ -31,7 +32,7 @@ struct PatchMessage {
 };
 struct StillMessage {
   std::uint32_t id = 0;
-  std::optional<int> width;  // pixels; the view's when absent
+  std::optional<int> width;  // pixels; default: that of the view
   std::optional<int> height;
   std::string format = "png";  // png | jpeg
   double scale = 1;            // 1..4
@@ -41,7 +42,7 @@ struct PlayMessage {
   int to = 0;
   double fps = 10;
   bool loop = true;
-  bool drop = true;  // skip steps rather than fall behind
+  bool drop = true;  // skip steps to keep the rate
 };
 struct PauseMessage {};
 struct AckMessage {
@@ -63,10 +64,10 @@ struct FieldDescription {
   std::string units;
   std::string standard_name;
   std::string long_name;
-  std::optional<Range> range;  // absent until the step was loaded; of a vector: its magnitude
+  std::optional<Range> range;  // absent until loaded; for vectors of the magnitude
   std::optional<std::int64_t> masked;
-  std::string range_of;      // "step" | "all"; empty, told as null, while range is absent
-  double storage_error = 0;  // in units; 0: nothing of it is packed
+  std::string range_of;      // "step" | "all"; empty (null in JSON) while range is absent
+  double storage_error = 0;  // largest packing error in units; 0: not packed
   std::string dtype;
 };
 struct AxisDescription {
@@ -75,7 +76,7 @@ struct AxisDescription {
   std::string units;
   std::string kind;
   std::vector<double> coordinates;
-  std::vector<double> world;  // where each sample stands along its world axis
+  std::vector<double> world;  // position of each sample along its world axis
 };
 struct StepDescription {
   double value = 0;
@@ -91,18 +92,18 @@ struct DatasetDescription {
   std::array<AxisDescription, 3> axes;
   Vec3 world_min{};
   Vec3 world_max{};
-  std::vector<std::string> mappings;  // of /geometry/mapping, those that its grid can be bent to
+  std::vector<std::string> mappings;  // values of /geometry/mapping that its grid supports
   std::vector<FieldDescription> fields;
   std::vector<std::pair<std::string, std::string>> left_out;  // variable, reason
-  std::vector<std::string> notes;  // what was done to the data, what is wrong
+  std::vector<std::string> notes;  // conversions of the data, problems found
   std::vector<StepDescription> steps;
-  std::size_t step_count = 0;  // also where `steps` was left out
+  std::size_t step_count = 0;  // also if `steps` is omitted
   std::string time_units;
   std::uint64_t resident_bytes = 0;
   std::uint64_t bytes_when_resident = 0;  // every field at every step
-  View default_view;  // told only when it names its dataset: while nothing is read it does not
-  // The long form as JSON where it was made before, by a thread that had the time for it: then it
-  // is what is sent, and steps and axes may be left out.
+  View default_view;  // omitted while its dataset is empty, that is until data are loaded
+  // The long form as JSON if encoded in advance; it is then sent instead, and steps and axes may be
+  // omitted.
   std::shared_ptr<const std::string> encoded;
 };
 struct FrameInfo {
@@ -118,7 +119,7 @@ struct FrameInfo {
   std::int64_t samples = 0, culled = 0, skipped_vector = 0, skipped_scalar = 0, skipped_both = 0;
   std::int64_t occluded = 0, pixel_updates = 0, exponentials = 0;
   std::int64_t tiles = 0, tiles_stopped = 0;
-  double skipped_bound = 0, stop_bound = 0;  // linear; what is not finite is told as unknown
+  double skipped_bound = 0, stop_bound = 0;  // linear; null in JSON unless finite
   std::vector<std::string> fields;
   std::int64_t bytes = 0;
   std::string variant;
@@ -142,7 +143,7 @@ struct ServiceDescription {
   std::string name = "windsplat";
   std::string version;
   std::vector<std::pair<std::string, std::string>> links;
-  std::int64_t image_pixels_max = limits::image_pixels_max;  // what this server draws
+  std::int64_t image_pixels_max = limits::image_pixels_max;  // of this server
 };
 
 // --- server to client -------------------------------------------------------------------------
@@ -151,7 +152,7 @@ struct HelloMessage {
   std::string version;
   std::string session;
   std::vector<DatasetDescription> datasets;                  // short forms
-  std::int64_t image_pixels_max = limits::image_pixels_max;  // what this server draws
+  std::int64_t image_pixels_max = limits::image_pixels_max;  // of this server
 };
 struct OpenedMessage {
   std::uint32_t id = 0;
@@ -164,27 +165,27 @@ struct ProgressMessage {
   std::optional<double> eta_ms;
 };
 struct ChosenMessage {
-  std::uint32_t seq = 0;  // the frame it speaks of
+  std::uint32_t seq = 0;  // number of the frame
   FrameInfo info;
-  std::string view_json;  // the completed view that was drawn, canonical
+  std::string view_json;  // the completed view, canonical
 };
-// The patch was followed and no frame comes of it.
+// The patch was applied and causes no new frame.
 struct UnchangedMessage {
-  std::uint32_t rev = 0;  // of the patch, and of every one before it
-  std::uint32_t seq = 0;  // the frame that shows its view already
+  std::uint32_t rev = 0;  // of the patch; includes all earlier ones
+  std::uint32_t seq = 0;  // the frame that already shows the view
 };
 struct StatsMessage {
   std::uint64_t frames = 0;
   std::uint64_t dropped = 0;
   std::uint64_t cancelled = 0;
   std::uint64_t bytes = 0;
-  std::optional<double> play_fps;  // of the steps shown
+  std::optional<double> play_fps;  // of displayed steps
   std::uint64_t steps_dropped = 0;
   std::uint64_t steps_not_ready = 0;
 };
 struct ErrorMessage {
-  std::optional<std::uint32_t> id;   // of the message at fault, where it had one
-  std::optional<std::uint32_t> rev;  // of the patch at fault
+  std::optional<std::uint32_t> id;   // of the invalid message, if it had one
+  std::optional<std::uint32_t> rev;  // of the invalid patch
   Problem problem;
 };
 using ServerMessage = std::variant<HelloMessage, OpenedMessage, ProgressMessage, ChosenMessage,

@@ -1,4 +1,4 @@
-// A view under a short id, as a server keeps it and tells it. Mirrors messages.schema.json.
+// A view stored by the server under a short id. Mirrors messages.schema.json.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +10,8 @@
 
 namespace windsplat::protocol {
 
-// Five bits a character, without i, l, o and u (Crockford's base 32): fit for a URL, a file's name,
-// and to be read aloud. 50 bits of chance are not found by trying.
+// Crockford's base 32, without i, l, o and u: safe in URLs and file names, and unambiguous to read.
+// Ids have 50 random bits, too many to guess.
 inline constexpr std::string_view view_id_letters = "0123456789abcdefghjkmnpqrstvwxyz";
 inline constexpr std::size_t view_id_chars = 10;
 bool is_view_id(std::string_view text);
@@ -22,10 +22,10 @@ struct SavedView {
   ViewDocument view;
 };
 
-// What clients are told; `kept`: "memory" or "disk".
+// The answer to clients; `kept`: "memory" or "disk".
 std::string encode_saved_view(const SavedView& saved, std::string_view kept);
 
-// What is written to a file, and read back from one. Errors as for every parser, see codec.hpp.
+// The file format of saved views. Errors of parsers: see codec.hpp.
 std::string encode_view_file(const SavedView& saved);
 Result<SavedView> parse_view_file(std::string_view json);
 

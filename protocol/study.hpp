@@ -1,4 +1,5 @@
-// A study's report as typed values -> study.json. Numbers that are not finite become null.
+// The report of `windsplat study` as typed values -> study.json. Numbers that are not finite become
+// null.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +28,7 @@ struct StudyCurve {
   std::string compositing;
   std::string knob;
   double order = 0;                 // null below three stable points
-  std::vector<std::size_t> points;  // indices of the scene's points, in the knob's order
+  std::vector<std::size_t> points;  // indices into the points of the scene, ordered by the knob
 };
 
 struct StudyEncoding {
@@ -38,29 +39,29 @@ struct StudyEncoding {
 
 struct StudyReference {
   std::string kind;      // "integral", or "extrapolated" from method slab
-  double estimate = 0;   // RMS of an extrapolated reference's own error
-  double seconds = 0;    // that it took when it was made; null: unknown
+  double estimate = 0;   // RMS error of an extrapolated reference
+  double seconds = 0;    // rendering time; null: unknown
   double tolerance = 0;  // null: not an integral
   int width = 0, height = 0;
   std::int64_t pieces = 0, evaluations = 0;
 };
 
-// Of errors told and true ones: shares within a factor of 2, and within the bound promised.
+// Agreement of reported and true errors: fractions within a factor of 2, and within the bound.
 struct StudyAgreement {
   std::string of;
   std::size_t count = 0;
   double within_two = 0, median = 0, bounded = 0;
 };
 
-// Frames by what was chosen for an error.
+// Results of choosing settings for one error limit.
 struct StudyAim {
   double max_error = 0;
   std::size_t frames = 0;
-  std::size_t promised = 0, promised_kept = 0;  // forecast to keep it, and did
-  std::size_t possible = 0, possible_kept = 0;  // some setting keeps it, and the chosen one did
+  std::size_t promised = 0, promised_kept = 0;  // forecast to satisfy it; of these, did
+  std::size_t possible = 0, possible_kept = 0;  // some setting satisfies it; chosen one did
 };
 
-// One setting at one view that was held out.
+// One setting at one held-out view.
 struct StudyCompared {
   std::string look;
   std::size_t view = 0;
@@ -70,7 +71,7 @@ struct StudyCompared {
   double estimate = 0, spread = 0, prior = 0;
 };
 
-// The extrapolated truth against the integral.
+// Comparison of the extrapolated reference with the integral.
 struct StudyCheck {
   std::string look;
   double apart = 0, estimate = 0;
@@ -78,7 +79,7 @@ struct StudyCheck {
 
 struct StudyCalibration {
   int width = 0, height = 0;
-  int surveyed = 0, held_out = 0;  // views of each look
+  int surveyed = 0, held_out = 0;  // views per look for calibration and for testing
   double seconds = 0;
   std::vector<std::string> looks;
   std::vector<StudyAgreement> agreement;
@@ -93,7 +94,7 @@ struct StudyScene {
   StudyReference reference;
   std::vector<StudyPoint> points;
   std::vector<StudyCurve> curves;
-  double reconstruction_ripple = 0;  // null: bent lattice or slice
+  double reconstruction_ripple = 0;  // null: curved lattice or slice
   std::vector<StudyEncoding> jpeg;
   std::optional<StudyCalibration> calibration;
 };
@@ -112,13 +113,13 @@ struct StudyDocument {
   unsigned hardware_threads = 0, threads = 0;
   bool quick = false;
   double seconds = 0;
-  int runs = 0;  // timed, a point
+  int runs = 0;  // timed runs per point
   std::size_t measured = 0, skipped = 0;
   std::vector<StudyScene> scenes;
   std::vector<StudyStability> stability;
 };
 
-// Indented by two, for people too.
+// Indented by two spaces.
 std::string encode_study(const StudyDocument& study);
 
 }  // namespace windsplat::protocol

@@ -1,6 +1,6 @@
-// The view: everything that decides a picture except its pixels' encoding, as typed values. Mirrors
-// view.schema.json; defaults here and there are the same (a test compares them). An empty optional
-// means "the dataset's default": scene/complete fills it in.
+// The view: everything that determines a picture except its encoding, as typed values. Mirrors
+// view.schema.json with the same defaults (a test compares them). An empty optional means the
+// default of the dataset, which scene/complete resolves.
 #pragma once
 
 #include <array>
@@ -53,12 +53,12 @@ struct GeometryView {
   Vec3 scale{1, 1, 1};
   VerticalPlacement vertical = VerticalPlacement::automatic;
   GeometryMapping mapping = GeometryMapping::flat;
-  std::optional<std::string> height_field;  // empty: the vertical coordinate places the samples
+  std::optional<std::string> height_field;  // empty: use the vertical coordinate
   std::optional<SliceView> slice;           // empty: the whole grid
   bool operator==(const GeometryView&) const = default;
 };
 
-// A field chosen by name, by the dataset's default (key absent), or none at all (null).
+// A field by name, the default of the dataset (key absent), or none (null).
 struct FieldChoice {
   enum class Kind { dataset_default, none, named };
   Kind kind = Kind::dataset_default;
@@ -70,16 +70,16 @@ struct VectorColorView {
   std::optional<ColorBy> by;
   std::string map = "viridis";
   std::optional<std::string> field;  // `scalar` only
-  std::optional<Range> range;        // of what `by` measures
-  double rise_weight = 0.2;          // 0..1, `rise` only: 0 height alone, 1 rise alone
+  std::optional<Range> range;        // of the quantity `by`
+  double rise_weight = 0.2;          // 0..1, `rise` only: 0 height only, 1 rise only
   std::string constant = "#ffffff";  // sRGB, `constant` only
   bool operator==(const VectorColorView&) const = default;
 };
 
 struct JitterView {
-  double center = 0.5;  // of a stride: how far the line's centre may lie from the kernel's
-  double stride = 0.3;  // of a stride: how far the kernel itself may be moved
-  bool overlap = true;  // kernels as wide as `span`; false: no wider than the stride
+  double center = 0.5;  // displacement range of the line in its kernel, strides
+  double stride = 0.3;  // displacement range of the kernel, strides
+  bool overlap = true;  // kernels are `span` strides wide; false: one stride
   std::int64_t seed = 1;
   bool per_step = false;  // a new pattern for each time step
   bool operator==(const JitterView&) const = default;
@@ -102,7 +102,7 @@ struct VectorView {
   double magnitude_intensity =
       0.6;  // 0: every line equally bright; 1: brightness follows magnitude
   MotionMode motion = MotionMode::still;
-  double motion_rate = 1.0;  // cycles a step at the top of magnitude_range
+  double motion_rate = 1.0;  // cycles per step at the top of magnitude_range
   double motion_time = 0.0;  // steps, added to the step
   JitterView jitter;
   bool operator==(const VectorView&) const = default;
@@ -119,15 +119,15 @@ struct ScalarView {
   ScalarColorView color;
   // (value, extinction per world unit), ascending values, linear between, constant beyond.
   std::optional<std::vector<std::array<double, 2>>> extinction;
-  double min_optical_depth = 1e-4;  // splats below it are left out
+  double min_optical_depth = 1e-4;  // splats below it are skipped
   int stride = 1;
   bool operator==(const ScalarView&) const = default;
 };
 
 struct DepthCueView {
   double strength = 0.3;
-  double near = 0;  // 0: where the volume is nearest to the eye
-  double far = 1;   // 1: where it is farthest
+  double near = 0;  // 0: nearest point of the volume
+  double far = 1;   // 1: farthest point of the volume
   bool operator==(const DepthCueView&) const = default;
 };
 
@@ -136,13 +136,13 @@ struct MethodView {
   Compositing compositing = Compositing::analytic;
   double slab_thickness = 1;  // grid cells along the line of sight, `slab` only
   double stop_transmittance = 1.5e-4;
-  Detail detail = Detail::automatic;  // automatic: coarser where cells are below a pixel
+  Detail detail = Detail::automatic;  // automatic: coarser if cells are below a pixel
   bool operator==(const MethodView&) const = default;
 };
 
-// What the server may choose by itself: resolution, method and slabs of a frame that is not pure.
+// Limits within which the server chooses resolution, method and slab thickness.
 struct QualityView {
-  std::optional<double> budget_ms;  // milliseconds of drawing and encoding
+  std::optional<double> budget_ms;  // milliseconds of rendering and encoding
   std::optional<double> max_error;  // linear RMSE
   bool lossless = false;            // final frames of a stream as PNG
   bool operator==(const QualityView&) const = default;

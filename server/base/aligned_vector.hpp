@@ -1,4 +1,4 @@
-// A vector whose elements begin on a cache line, as the widest loads and stores want it.
+// A vector aligned to a cache line, as required by aligned SIMD loads and stores.
 #pragma once
 
 #include <cstddef>

@@ -11,7 +11,7 @@
 
 namespace windsplat {
 
-// ASCII lower case; other bytes stay.
+// ASCII lower case; other bytes are unchanged.
 inline std::string lower(std::string_view text) {
   std::string out(text);
   for (char& c : out) {

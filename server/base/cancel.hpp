@@ -1,5 +1,4 @@
-// A flag that one thread raises and the work polls: between tiles, and every few bricks in one.
-// Copies share the flag.
+// A cancellation flag that one thread sets and long-running work polls. Copies share the flag.
 #pragma once
 
 #include <atomic>
@@ -10,7 +9,7 @@ namespace windsplat {
 class CancelToken {
  public:
   CancelToken() : flag_(std::make_shared<std::atomic<bool>>(false)) {}
-  // Copying alone: a token that was moved from would have no flag to ask.
+  // Not movable: a moved-from token would have no flag.
   CancelToken(const CancelToken&) = default;
   CancelToken& operator=(const CancelToken&) = default;
   ~CancelToken() = default;

@@ -1,5 +1,5 @@
-// CHECK: an invariant whose failure is a bug in this program. It throws, so that a session can
-// catch it and close while the daemon keeps running.
+// WINDSPLAT_CHECK: an invariant whose violation is a bug. Throws, so that a session can close while
+// the daemon continues.
 #pragma once
 
 #include <stdexcept>

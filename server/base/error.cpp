@@ -1,4 +1,4 @@
-// Errors as values: construction and the one place where misuse of a Result becomes an exception.
+// Construction of errors, and the exception for misuse of a Result.
 #include "server/base/error.hpp"
 
 #include <array>
@@ -22,8 +22,8 @@ Error make_error_at(ErrorKind kind, std::string pointer, std::string detail) {
 
 namespace {
 
-// The bytes of the well-formed UTF-8 sequence (Unicode table 3-7) that `text` starts with and its
-// code point; 0 bytes if there is none.
+// Length and code point of the well-formed UTF-8 sequence (Unicode table 3-7) at the start of
+// `text`; length 0 if there is none.
 struct Sequence {
   std::size_t bytes = 0;
   char32_t code = 0;
@@ -73,7 +73,7 @@ std::string escaped(std::string_view bytes) {
 std::string printable(std::string_view text, std::size_t bytes_max) {
   constexpr std::string_view cut = "...";
   std::string out;
-  std::size_t fits = 0;  // of `out`, together with the mark of a cut
+  std::size_t fits = 0;  // length of `out` that leaves room for "..."
   while (!text.empty()) {
     const Sequence sequence = first_sequence(text);
     const std::string_view piece = text.substr(0, sequence.bytes == 0 ? 1 : sequence.bytes);

@@ -1,5 +1,5 @@
-// The one error type of the project: errors are values that travel up to the edge, where they
-// become problem+json, a WebSocket error message or a line on stderr.
+// The error type of the project: errors are values, returned to the outermost layer, which converts
+// them to problem+json, a WebSocket error message or a line on stderr.
 #pragma once
 
 #include <boost/assert/source_location.hpp>
@@ -12,12 +12,12 @@
 
 namespace windsplat {
 
-// What went wrong, in terms the edge can answer: HTTP status and exit code follow from it.
+// The kind of an error, which determines HTTP status and exit code.
 enum class ErrorKind {
-  malformed,      // 400, exit 2: not parseable at all (broken JSON, bad query)
-  invalid,        // 422, exit 2: parseable, but a value breaks its limit; `at` says which
+  malformed,      // 400, exit 2: not parseable (broken JSON, bad query)
+  invalid,        // 422, exit 2: parseable, but a value violates a limit; see `at`
   not_found,      // 404, exit 1
-  bad_data,       // 422 from a loader, exit 3: the file is not what it should be
+  bad_data,       // 422 from a loader, exit 3: invalid or unsupported file
   too_large,      // 413, exit 2: more pixels, bytes or work than the limit
   not_resident,   // 409, exit 1: the data are not in memory yet
   busy,           // 429, exit 1
@@ -27,7 +27,7 @@ enum class ErrorKind {
   internal,       // 500, exit 1: an internal error
 };
 
-// A value at fault: JSON pointer (RFC 6901) into the document, and what its limit is.
+// An invalid value: its JSON pointer (RFC 6901) in the document, and the violated constraint.
 struct FieldError {
   std::string pointer;
   std::string detail;
@@ -36,11 +36,11 @@ struct FieldError {
 struct Error {
   ErrorKind kind = ErrorKind::internal;
   std::string message;         // one sentence that names the place and the limit
-  std::vector<FieldError> at;  // empty unless a value of a document is at fault
-  int retry_after_s = 0;       // of busy, where it is known; 0: soon
+  std::vector<FieldError> at;  // the invalid values of a document, if any
+  int retry_after_s = 0;       // for busy; 0: unknown
 };
 
-// Asking a failed Result for its value is a bug in the caller.
+// Called by value() of a failed Result, which is a bug in the caller.
 [[noreturn]] void throw_exception_from_error(const Error& error,
                                              const boost::source_location& where);
 
@@ -51,17 +51,15 @@ inline Error make_error(ErrorKind kind, std::string message) {
   return Error{kind, std::move(message), {}};
 }
 
-// An error at one JSON pointer; the message repeats it, made printable, so that it reads well
-// alone.
+// An error at one JSON pointer; the message repeats the pointer in printable form.
 Error make_error_at(ErrorKind kind, std::string pointer, std::string detail);
 
-// Text that came from outside, made fit for a log line, message or terminal: valid UTF-8 of at most
-// `bytes_max` bytes. Control characters (C0, DEL, C1), what reorders or breaks lines (U+2028,
-// U+2029, bidirectional controls) and bytes that are not UTF-8 become \xNN; what is cut ends with
-// "...".
+// Escapes untrusted text for log lines, messages and terminals: valid UTF-8 of at most `bytes_max`
+// bytes. Control characters (C0, DEL, C1), line separators (U+2028, U+2029), bidirectional controls
+// and bytes that are not UTF-8 become \xNN. Truncated text ends with "...".
 std::string printable(std::string_view text, std::size_t bytes_max = 200);
 
-// The same between single quotes: a name from a file or a user, fit for a message.
+// The same in single quotes, for names from files or users in messages.
 std::string in_quotes(std::string_view name);
 
 }  // namespace windsplat

@@ -1,5 +1,5 @@
-// Events -> lines -> spdlog's stderr sink. Escaping is done here, so that no text from outside can
-// forge a line or reach a terminal.
+// Events -> lines -> the stderr sink of spdlog. Values are escaped, so that untrusted text cannot
+// forge lines or control a terminal.
 #include "server/base/log.hpp"
 
 #include <spdlog/logger.h>
@@ -74,7 +74,7 @@ std::string now_utc() {
   return text.data();
 }
 
-// `text` is printable already: quotes and backslashes are all that is left to escape.
+// Escapes quotes and backslashes; `text` is already printable.
 std::string quoted(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) {
@@ -158,7 +158,7 @@ void write(Level level, std::string_view message, Fields fields) {
     write_line(level, message, fields);
   } catch (const std::exception&) {
     // Allocation failed: logging an error must not itself throw.
-    constexpr std::string_view lost = "a line of the log is lost: no memory\n";
+    constexpr std::string_view lost = "log line lost: out of memory\n";
     (void)std::fwrite(lost.data(), 1, lost.size(), stderr);
   }
 }

@@ -1,5 +1,5 @@
-// The program's log: one line an event to stderr, for people (text) or for programs (JSON lines).
-// Message and values may hold anything: they are escaped and capped here. Thread-safe.
+// The log of the program: one line per event to stderr, as text or JSON lines. Messages and values
+// are escaped and truncated here. Thread-safe.
 #pragma once
 
 #include <concepts>
@@ -13,7 +13,7 @@ namespace windsplat::log {
 enum class Format { text, json };
 enum class Level { debug, info, warn, error, off };
 
-// A key of ours with a value: {"peer", address}, {"ms", 12.5}.
+// A key with a value: {"peer", address}, {"ms", 12.5}. Keys are trusted, values are not.
 struct Field {
   std::string_view key;
   std::string value;
@@ -27,7 +27,7 @@ struct Field {
   template <std::integral T>
   Field(std::string_view name, T number)
       : key(name), value(std::to_string(number)), quoted(false) {}
-  Field(std::string_view name, double number);  // quoted where JSON has no such number
+  Field(std::string_view name, double number);  // quoted if JSON cannot represent it
 };
 using Fields = std::initializer_list<Field>;
 
@@ -49,7 +49,7 @@ inline void error(std::string_view message, Fields fields = {}) {
   write(Level::error, message, fields);
 }
 
-// The line's own part of an event, as it is written after the time and level; for tests too.
+// The line of an event, in text format without time and level; also for tests.
 //   text: message key=value key="two words"
 //   JSON: {"time":"2026-01-02T03:04:05.678Z","level":"info","message":"...","key":"value"}
 std::string text_line(std::string_view message, Fields fields);

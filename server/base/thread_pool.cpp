@@ -1,6 +1,6 @@
-// A loop is a gate that is open while indices may be left: who finds it open goes in and draws
-// indices from one atomic counter; who comes too late finds it closed, so that short loops never
-// wait for threads that did nothing. Waiting is a short spin, then sleep on a condition variable.
+// A loop is a gate that is open while indices may remain. Workers that find it open enter and take
+// indices from an atomic counter; late workers find it closed, so that short loops do not wait for
+// idle threads. Threads wait by a short spin, then on a condition variable.
 #include "server/base/thread_pool.hpp"
 
 #include <algorithm>
@@ -24,8 +24,7 @@ namespace windsplat {
 
 namespace {
 
-// The gate's bits: whether it is open, whether the pool ends, how many workers are inside, and
-// which loop it belongs to.
+// The bits of the gate: open, pool stopping, number of workers inside, number of the loop.
 constexpr std::uint64_t open_bit = 1;
 constexpr std::uint64_t stop_bit = 2;
 constexpr std::uint64_t one_inside = 4;
@@ -34,7 +33,7 @@ constexpr std::uint64_t inside_mask = (std::uint64_t{1} << loop_shift) - one_ins
 
 std::uint64_t loop_of(std::uint64_t gate) { return gate >> loop_shift; }
 
-// The pool whose loop this thread is in: a loop started inside another would wait for itself.
+// The pool whose loop this thread runs, to detect nested loops, which would deadlock.
 thread_local const void* inside_pool = nullptr;
 
 void pause() {
@@ -50,11 +49,11 @@ struct ThreadPool::State {
 
   std::atomic<std::uint64_t> gate{0};
   std::atomic<std::size_t> next{0};
-  // Written while the gate is closed and nobody inside, read by those that went in.
+  // Written while the gate is closed and empty, read by workers inside.
   std::size_t count = 0;
   Loop loop;
 
-  std::mutex mutex;  // of those that sleep, and of `failure`
+  std::mutex mutex;  // guards sleeping and `failure`
   std::condition_variable wake;
   std::condition_variable idle;
   std::atomic<unsigned> asleep{0};  // workers
@@ -76,16 +75,16 @@ struct ThreadPool::State {
   void stop();
 };
 
-// True as soon as `done` is; false if it was not for too long.
+// Spins until `done` returns true; false after spin_us.
 template <class Done>
 bool ThreadPool::State::spin(const Done& done) const {
   using Clock = std::chrono::steady_clock;
-  constexpr int looks = 32;  // between looks at the clock
+  constexpr int polls = 32;  // between reads of the clock
   if (done()) return true;
   if (!spins) return false;
   const Clock::time_point end = Clock::now() + std::chrono::microseconds(spin_us);
   do {
-    for (int look = 0; look < looks; ++look) {
+    for (int poll = 0; poll < polls; ++poll) {
       pause();
       if (done()) return true;
     }
@@ -103,8 +102,8 @@ bool ThreadPool::State::enter(std::uint64_t& seen) {
   return false;
 }
 
-// Whoever goes to sleep says so and then looks at the gate once more; whoever changes the gate then
-// looks whether somebody sleeps. One of the two sees the other.
+// No lost wake-ups: a thread announces its sleep before it checks the gate again, and a thread that
+// changes the gate then checks for sleepers, so at least one of them sees the other.
 void ThreadPool::State::leave() {
   const std::uint64_t before = gate.fetch_sub(one_inside);
   if ((before & inside_mask) != one_inside || !caller_asleep.load()) return;
@@ -123,7 +122,7 @@ void ThreadPool::State::sleep(std::uint64_t seen) {
   asleep.fetch_add(1);
   const std::uint64_t now = gate.load();
   const bool due = (now & stop_bit) != 0 || ((now & open_bit) != 0 && loop_of(now) != seen);
-  // Once woken it spins again: who comes too late for one loop is there for the next.
+  // A worker that wakes too late for a loop spins for the next one.
   if (!due) wake.wait(lock);
   asleep.fetch_sub(1);
 }
@@ -206,7 +205,7 @@ void ThreadPool::run_loop(std::size_t count, Loop loop) {
   // The caller runs one index, so a single index needs no worker.
   const bool shared = count > 1 && !state.workers.empty();
   if (shared) {
-    // Closed and empty: only the loop's number and the open bit change.
+    // Closed and empty: only the loop number and the open bit change.
     state.gate.fetch_add((std::uint64_t{1} << loop_shift) | open_bit);
     state.wake_workers();
   }

@@ -8,7 +8,7 @@ namespace windsplat {
 
 class ThreadPool {
  public:
-  // `threads` counts the caller: 1 means no worker is started. 0 means one a hardware thread.
+  // `threads` includes the caller: 1 starts no worker. 0: one per hardware thread.
   // Throws std::system_error if the system cannot create a thread.
   explicit ThreadPool(unsigned threads);
   ~ThreadPool();
@@ -18,13 +18,13 @@ class ThreadPool {
   [[nodiscard]] unsigned size() const;
 
   // Calls body(index, worker) once for every index in [0, count), worker in [0, size()), and
-  // returns when all are done. Indices are handed out in ascending order. Loops of different
-  // callers run one after another; a loop must not start another in the same pool
-  // (std::logic_error). The first exception thrown by body is rethrown here once every worker has
-  // stopped; indices not yet handed out are then left. Nothing is allocated.
+  // returns when all calls have returned. Indices are assigned in ascending order. Loops of
+  // different callers are serialised; a loop must not start another in the same pool
+  // (std::logic_error). The first exception thrown by body is rethrown after every worker has
+  // stopped; remaining indices are skipped. Does not allocate.
   //
-  // Whoever waits (a worker for the next loop, the caller for the last worker) looks again and
-  // again for spin_us before it sleeps, unless the pool has more threads than the machine.
+  // Waiting threads (workers for the next loop, the caller for the last worker) spin for spin_us
+  // before they sleep, unless the pool has more threads than the machine.
   template <class Body>
   void run(std::size_t count, const Body& body) {
     run_loop(count, {&body, [](const void* called, std::size_t index, unsigned worker) {
@@ -35,7 +35,7 @@ class ThreadPool {
   static constexpr int spin_us = 100;
 
  private:
-  // A loop's body wherever the caller keeps it.
+  // A reference to the body of a loop, which the caller owns.
   struct Loop {
     const void* body = nullptr;
     void (*call)(const void* body, std::size_t index, unsigned worker) = nullptr;

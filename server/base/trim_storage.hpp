@@ -1,4 +1,4 @@
-// What a loop of frames keeps of one picture's storage for the next.
+// Limit of the storage kept between frames.
 #pragma once
 
 #include <algorithm>
@@ -7,14 +7,14 @@
 
 namespace windsplat {
 
-// A picture as large as this one, in whole MCUs, is kept; what a larger one needed is given back by
-// the next smaller one.
+// Storage up to this picture size (in whole MCUs) is kept; that of a larger picture is released
+// before the next smaller one.
 inline constexpr std::size_t retained_pixels = std::size_t{1920} * 1088;
 
-// Gives storage back that is larger than both, and with it what it holds.
+// Releases the storage and its contents if it is larger than both limits.
 template <class T>
 void trim_storage(std::vector<T>& storage, std::size_t needed, std::size_t kept) {
-  // Of `= {}` the capacity would stay.
+  // Assigning {} would keep the capacity.
   if (storage.capacity() > std::max(needed, kept)) storage = std::vector<T>();
 }
 

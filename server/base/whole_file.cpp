@@ -1,4 +1,4 @@
-// A part file with this process's number in its name, then a rename.
+// Writes a temporary file whose name contains the process id, then renames it.
 #include "server/base/whole_file.hpp"
 
 #include <fcntl.h>
@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr mode_t mode_of_new_files = 0666;  // less the umask
+constexpr mode_t mode_of_new_files = 0666;  // before umask
 
 Error file_error(const char* what, const fs::path& path, int fault) {
   std::string message = what;
@@ -28,7 +28,7 @@ Error file_error(const char* what, const fs::path& path, int fault) {
   return make_error(full ? ErrorKind::out_of_memory : ErrorKind::internal, std::move(message));
 }
 
-// 0, or the errno of what failed.
+// Returns 0 or the errno of the failed call.
 int write_and_close(int file, std::string_view bytes, Sync sync = Sync::later) {
   int fault = 0;
   for (std::size_t done = 0; done < bytes.size() && fault == 0;) {
@@ -44,10 +44,9 @@ int write_and_close(int file, std::string_view bytes, Sync sync = Sync::later) {
   return fault;
 }
 
-constexpr int links_max = 40;  // as the kernel's
+constexpr int links_max = 40;  // as in Linux
 
-// The number of a descriptor that a name such as /dev/stdout, /dev/fd/3 or a link to one of them
-// stands for; -1 if it is none.
+// The descriptor of a path such as /dev/stdout, /dev/fd/3 or a link to one of them; otherwise -1.
 int inherited_descriptor(fs::path path) {
   std::error_code fault;
   for (int i = 0; i < links_max; ++i) {
@@ -64,7 +63,7 @@ int inherited_descriptor(fs::path path) {
   return -1;
 }
 
-// What others write to the same descriptor stays: nothing is opened anew or cut off.
+// Writes to a descriptor without reopening or truncating it, so that other output is kept.
 Result<void> write_to_descriptor(int number, const fs::path& path, std::string_view bytes) {
   const int file = ::fcntl(number, F_DUPFD_CLOEXEC, 0);
   if (file < 0) return file_error("cannot write", path, errno);
@@ -81,7 +80,7 @@ Result<void> write_in_place(const fs::path& path, std::string_view bytes) {
   return {};
 }
 
-// A new file, replacing one left by an earlier process with the same id.
+// Creates a file, replacing one left by an earlier process with the same id.
 int create(const fs::path& path) {
   constexpr int flags = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW;
   const int file = ::open(path.c_str(), flags, mode_of_new_files);
@@ -100,7 +99,7 @@ fs::path end_of_links(fs::path path) {
   for (int i = 0; i < links_max && fs::is_symlink(fs::symlink_status(path, fault)); ++i) {
     const fs::path target = fs::read_symlink(path, fault);
     if (fault) break;
-    path = path.parent_path() / target;  // an absolute one stands for itself
+    path = path.parent_path() / target;  // an absolute target replaces the path
   }
   return path;
 }

@@ -1,4 +1,4 @@
-// Projects bricks, culls them and lists them by tile.
+// Projection and culling of bricks, and their lists by tile.
 #include "server/engine/bins.hpp"
 
 #include <algorithm>
@@ -17,10 +17,10 @@ namespace {
 using kernels::Brick;
 using kernels::Pass;
 
-// The first stop of the brick that holds a stop.
-int brick_start(int stop) { return stop / kernels::brick_side * kernels::brick_side; }
+// Index of the first kernel position of the brick that contains a position.
+int brick_start(int index) { return index / kernels::brick_side * kernels::brick_side; }
 
-// Of a curved lattice: from where its stops really are.
+// Curved lattices: the bounding box of the actual kernel positions.
 Box curved_box(const Pass& pass, const Brick& brick) {
   Box box;
   box.low.fill(1e300);
@@ -31,7 +31,7 @@ Box curved_box(const Pass& pass, const Brick& brick) {
   for (int v = 0; v < brick.v_count; ++v) {
     for (int u = 0; u < brick.u_count; ++u) {
       const float* place =
-          pass.places + 3 * (offset(pass.major, brick.slab) + offset(pass.v, brick.v_first + v) +
+          pass.places + 3 * (offset(pass.major, brick.sheet) + offset(pass.v, brick.v_first + v) +
                              offset(pass.u, brick.u_first + u));
       for (int c = 0; c < 3; ++c) {
         box.low[c] = std::min<double>(box.low[c], place[c]);
@@ -42,8 +42,8 @@ Box curved_box(const Pass& pass, const Brick& brick) {
   return box;
 }
 
-// The brick's stops stand one after another.
-Box stops_box(const PassPlan& plan, const Brick& brick) {
+// Bounding box of the kernel positions of a brick.
+Box positions_box(const PassPlan& plan, const Brick& brick) {
   const Pass& pass = plan.kernel;
   if (pass.places != nullptr) return curved_box(pass, brick);
   Box box;
@@ -53,19 +53,19 @@ Box stops_box(const PassPlan& plan, const Brick& brick) {
     box.low[a] = axis.position[low];
     box.high[a] = axis.position[low + count - 1];
   };
-  extend(pass.major, brick.slab, 1);
+  extend(pass.major, brick.sheet, 1);
   extend(pass.u, brick.u_first, brick.u_count);
   extend(pass.v, brick.v_first, brick.v_count);
   return box;
 }
 
-// How far kernels reach beyond their stops along each world axis.
+// Extent of kernels beyond their positions along each world axis.
 std::array<double, 3> kernel_reach(const Pass& pass, double line_reach, bool splats) {
   std::array<double, 3> reach{};
   for (int a = 0; a < 3; ++a) {
     const double cell = pass.cell_max[a];
     const double moved = 0.5 * (pass.line.jitter_center + pass.line.jitter_stride) * cell;
-    // No line leaves its kernel's box.
+    // Lines are clipped to the boxes of their kernels.
     const double inside = std::min<double>(line_reach, pass.line.half_span * cell);
     const double line = pass.has_lines != 0 && line_reach >= 0 ? inside + moved : 0;
     const double splat = splats ? kernels::footprint_radius * cell : 0;
@@ -74,17 +74,17 @@ std::array<double, 3> kernel_reach(const Pass& pass, double line_reach, bool spl
   return reach;
 }
 
-// Pixels a world unit at a view depth, or the nearest that is drawn.
+// Pixels per world unit at a view depth, clamped to the near plane.
 double scale_at(const kernels::Camera& camera, double depth) {
   if (camera.perspective == 0) return camera.inverse_pixel;
   return camera.inverse_pixel / std::max<double>(depth, camera.near);
 }
 
-// The sum over the picture of the alphas that a brick's weak lines and thin splats would have, at
-// most: a line covers its length times r1 + r2 and two half discs, a splat spreads its extinction
-// times its volume. All are taken at the brick's nearest, where there are `scale` pixels a world
-// unit. Pixels sample what they show: shapes that are no narrower than a pixel, and lines whose
-// ramp is not, add up to at most this many times their area, over all places and turns.
+// Upper bound of the alphas, summed over the picture, of the lines and splats of a brick that are
+// below tolerance: a line covers its length times r1 + r2 and two half discs, a splat its
+// extinction times its volume. All are assumed at the nearest depth of the brick, with `scale`
+// pixels per world unit. The sampling factors bound the ratio of the sum over pixels to the area,
+// over all positions and rotations, for shapes and line ramps no narrower than a pixel.
 double left_out(const RenderPlan& plan, const PassPlan& pass, const KeptSummary& summary,
                 double cover, double scale) {
   constexpr double line_sampling = 1.2;
@@ -93,7 +93,7 @@ double left_out(const RenderPlan& plan, const PassPlan& pass, const KeptSummary&
   const kernels::Camera& camera = plan.camera;
   const kernels::LineStyle& line = pass.kernel.line;
   const double pixels = static_cast<double>(camera.width) * camera.height;
-  double oblique = 1;  // a ray's length at unit depth, at most
+  double oblique = 1;  // longest ray at unit depth
   if (camera.perspective != 0) {
     oblique = std::hypot(1.0, std::hypot(camera.half_width_px, camera.half_height_px) *
                                   static_cast<double>(camera.pixel));
@@ -119,9 +119,9 @@ void set_blocks(const Rectangle& r, const kernels::Camera& camera, Brick& brick)
   brick.block_y_last = block(r.y1, camera.height);
 }
 
-// How many times more of the picture a brick's thin splats may cover, where there are `scale`
-// pixels a world unit, than at a scale of 0: see splat_cover of the kernels, whose largest of three
-// terms this is over the third. Of a brick of uneven cells the widest count.
+// Upper bound of the area that thin splats of a brick cover at `scale` pixels per world unit, as a
+// multiple of that at a scale of 0: the largest of the three terms of splat_cover of the kernels,
+// divided by the third. Uses the widest cells of the brick.
 double splat_cover(const Pass& pass, const Brick& brick, double scale) {
   std::array<double, 3> edge{};
   const auto widest = [&](int a, int first, int count) {
@@ -136,14 +136,14 @@ double splat_cover(const Pass& pass, const Brick& brick, double scale) {
     return std::max(
         {edge[0] * edge[1] * edge[2] / chord * scale * scale, section / chord * scale, 1.0});
   }
-  widest(pass.major, brick.slab, 1);
+  widest(pass.major, brick.sheet, 1);
   widest(pass.u, brick.u_first, brick.u_count);
   widest(pass.v, brick.v_first, brick.v_count);
   std::sort(edge.begin(), edge.end());
   return std::max({edge[0] * edge[1] * scale * scale, edge[1] * scale, 1.0});
 }
 
-// One frame's way from bricks of the lattice to those that are drawn.
+// Selects the bricks that a frame draws.
 class Binner {
  public:
   Binner(const RenderPlan& plan, const kernels::Table& table, BinSpace& space)
@@ -156,24 +156,24 @@ class Binner {
     for (std::size_t p = 0; p < count; ++p) {
       begin_pass(plan_.passes[p], space_.passes[p]);
     }
-    order_slabs();
+    order_sheets();
   }
 
-  // Regions of which every brick has the same fate: wholly in sight and blank, or out of sight.
-  // They are counted here and their bricks passed over. Row: of regions along u.
+  // Counts the regions of a row along u whose bricks need no individual test: blank and entirely
+  // visible, or entirely invisible.
   [[nodiscard]] std::size_t rows() const {
     std::size_t sum = 0;
     for (std::size_t p = 0; p < plan_.passes.size(); ++p) sum += rows_of(p);
     return sum;
   }
-  void look_at_row(std::size_t row, BrickCounts& counts);
+  void count_regions(std::size_t row, BrickCounts& counts);
 
-  void add_slab(const SlabKey& key, SlabBricks& out);
+  void add_sheet(const SheetKey& key, SheetBricks& out);
 
  private:
   void begin_pass(const PassPlan& pass, PassBins& to);
-  void order_slabs();
-  void add_brick(const PassPlan& pass, PassBins& shared, const Brick& brick, SlabBricks& out);
+  void order_sheets();
+  void add_brick(const PassPlan& pass, PassBins& shared, const Brick& brick, SheetBricks& out);
   void read_summary(const PassPlan& pass, const PassBins& shared, const Brick& brick,
                     KeptSummary& kept);
   [[nodiscard]] std::size_t rows_of(std::size_t p) const {
@@ -201,8 +201,8 @@ void Binner::begin_pass(const PassPlan& pass, PassBins& to) {
   to.done.assign(to.kept->blank_regions.size(), 0);
 }
 
-void Binner::order_slabs() {
-  std::vector<SlabKey>& keys = space_.slabs;
+void Binner::order_sheets() {
+  std::vector<SheetKey>& keys = space_.sheets;
   keys.clear();
   for (int p = 0; p < static_cast<int>(plan_.passes.size()); ++p) {
     const PassPlan& pass = plan_.passes[p];
@@ -212,15 +212,15 @@ void Binner::order_slabs() {
       keys.push_back({ahead >= 0 ? 0 : 1, std::abs(ahead), p, s});
     }
   }
-  // No two are alike.
-  std::sort(keys.begin(), keys.end(), [](const SlabKey& a, const SlabKey& b) {
+  // Keys are unique, so the order is deterministic.
+  std::sort(keys.begin(), keys.end(), [](const SheetKey& a, const SheetKey& b) {
     if (a.side != b.side) return a.side < b.side;
     if (a.distance != b.distance) return a.distance < b.distance;
     return a.pass < b.pass;
   });
 }
 
-void Binner::look_at_row(std::size_t row, BrickCounts& counts) {
+void Binner::count_regions(std::size_t row, BrickCounts& counts) {
   std::size_t p = 0;
   for (; row >= rows_of(p); ++p) row -= rows_of(p);
   const PassPlan& pass = plan_.passes[p];
@@ -233,7 +233,7 @@ void Binner::look_at_row(std::size_t row, BrickCounts& counts) {
   std::int64_t across = 1;
   const auto extend = [&](int a, int brick) {
     const int first = brick * kernels::brick_side;
-    const int last = std::min(first + kernels::brick_side, kernel.axis[a].stops);
+    const int last = std::min(first + kernels::brick_side, kernel.axis[a].count);
     box.low[a] = pass.axis[a].position[first];
     box.high[a] = pass.axis[a].position[last - 1];
     return last - first;
@@ -241,29 +241,29 @@ void Binner::look_at_row(std::size_t row, BrickCounts& counts) {
   across *= extend(kernel.major, layer);
   across *= extend(kernel.v, v);
   for (int u = 0; u < kept.u_bricks; ++u) {
-    const std::int64_t stops = across * extend(kernel.u, u);
+    const std::int64_t positions = across * extend(kernel.u, u);
     const std::size_t region = kept.region(layer * kernels::brick_side, v, u);
     const bool blank = kept.blank_regions[region] != 0 || kept.find_blank(layer, v, u);
     const Projected found = project_(pass, box, shared.reach);
     const bool unseen = found.seen.empty();
     if (!unseen && !(blank && found.whole)) continue;
     shared.done[region] = 1;
-    counts.samples += stops;
+    counts.samples += positions;
     if (unseen) {
-      counts.culled += stops;
+      counts.culled += positions;
       continue;
     }
-    if (kernel.has_lines != 0) counts.without_line += stops;
-    if (kernel.has_medium != 0) counts.without_splat += stops;
-    counts.without_both += stops;
+    if (kernel.has_lines != 0) counts.without_line += positions;
+    if (kernel.has_medium != 0) counts.without_splat += positions;
+    counts.without_both += positions;
   }
 }
 
-// A brick as it stands in the lattice.
+// The same brick with indices in lattice order instead of visit order.
 Brick in_lattice(const PassPlan& pass, const Brick& brick) {
   const Pass& kernel = pass.kernel;
   Brick own = brick;
-  own.slab = pass.axis[kernel.major].visit[brick.slab];
+  own.sheet = pass.axis[kernel.major].visit[brick.sheet];
   own.u_first = brick_start(pass.axis[kernel.u].visit[brick.u_first]);
   own.v_first = brick_start(pass.axis[kernel.v].visit[brick.v_first]);
   return own;
@@ -271,11 +271,11 @@ Brick in_lattice(const PassPlan& pass, const Brick& brick) {
 
 KeptSummary& summary_at(const PassPlan& pass, PassBins& shared, const Brick& brick) {
   const Brick own = in_lattice(pass, brick);
-  return shared.kept->bricks[shared.kept->brick(own.slab, own.v_first / kernels::brick_side,
+  return shared.kept->bricks[shared.kept->brick(own.sheet, own.v_first / kernels::brick_side,
                                                 own.u_first / kernels::brick_side)];
 }
 
-// Half the longest line of a brick, world units; negative if it has none.
+// Half the longest line of a brick in world units; negative if it has none.
 double line_reach(const Pass& pass, const PassBins& shared, const KeptSummary& kept) {
   if (kept.lines == 0) return -1;
   const double part = std::min(1.0F, kept.magnitude_max * pass.line.inverse_full_magnitude);
@@ -286,19 +286,21 @@ std::array<double, 3> reach_of(const Pass& pass, const PassBins& shared, const K
   return kernel_reach(pass, line_reach(pass, shared, kept), kept.splats > 0);
 }
 
-// Read in the lattice's own order, so that sums do not depend on where the first reader stood.
+// Reads in lattice order, so that floating-point sums do not depend on the camera of the first
+// frame.
 void Binner::read_summary(const PassPlan& pass, const PassBins& shared, const Brick& brick,
                           KeptSummary& kept) {
   kept = summarise(table_, shared.pass, in_lattice(pass, brick));
 }
 
-void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from, SlabBricks& out) {
+void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from,
+                       SheetBricks& out) {
   Brick brick = from;
-  const std::int64_t stops = static_cast<std::int64_t>(brick.u_count) * brick.v_count;
-  const Box box = stops_box(pass, brick);
-  out.counts.samples += stops;
-  // First by the longest line that the style allows: what is outside is not even read. A brick that
-  // is known is in sight if what it holds is.
+  const std::int64_t positions = static_cast<std::int64_t>(brick.u_count) * brick.v_count;
+  const Box box = positions_box(pass, brick);
+  out.counts.samples += positions;
+  // A brick without summary is first culled by the longest line that the style allows, before any
+  // sample is read; one with a summary by its actual contents.
   KeptSummary& kept = summary_at(pass, shared, brick);
   const bool known = kept.known() && !kept.left_out_any() && kept.holds_any();
   Projected found;
@@ -306,7 +308,7 @@ void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from
   if (!known || found.seen.empty()) {
     const Projected most = project_(pass, box, shared.reach);
     if (most.seen.empty()) {
-      out.counts.culled += stops;
+      out.counts.culled += positions;
       return;
     }
     if (!kept.known()) read_summary(pass, shared, brick, kept);
@@ -318,8 +320,8 @@ void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from
     if (!known && kept.holds_any())
       found = project_(pass, box, reach_of(pass.kernel, shared, kept));
   }
-  if (pass.kernel.has_lines != 0) out.counts.without_line += stops - kept.lines;
-  if (pass.kernel.has_medium != 0) out.counts.without_splat += stops - kept.splats;
+  if (pass.kernel.has_lines != 0) out.counts.without_line += positions - kept.lines;
+  if (pass.kernel.has_medium != 0) out.counts.without_splat += positions - kept.splats;
   out.counts.without_both += kept.without_both;
   if (!kept.holds_any() || found.seen.empty()) return;
   brick.lines = kept.lines;
@@ -332,14 +334,14 @@ void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from
   out.kernels.push_back(kept.lines + kept.splats);
 }
 
-void Binner::add_slab(const SlabKey& key, SlabBricks& out) {
+void Binner::add_sheet(const SheetKey& key, SheetBricks& out) {
   const PassPlan& pass = plan_.passes[key.pass];
   const Pass& kernel = pass.kernel;
   PassBins& shared = space_.passes[key.pass];
   out.bricks.clear();
   out.kernels.clear();
   out.counts = {};
-  const int layer = pass.axis[kernel.major].visit[key.slab];
+  const int layer = pass.axis[kernel.major].visit[key.sheet];
   const AxisArrays& along_u = pass.axis[kernel.u];
   const AxisArrays& along_v = pass.axis[kernel.v];
   for (const auto& v : along_v.bricks) {
@@ -349,7 +351,7 @@ void Binner::add_slab(const SlabKey& key, SlabBricks& out) {
       if (shared.done[shared.kept->region(layer, v_brick, u_brick)] != 0) continue;
       Brick brick{};
       brick.pass = key.pass;
-      brick.slab = key.slab;
+      brick.sheet = key.sheet;
       brick.u_first = u[0];
       brick.u_count = u[1];
       brick.v_first = v[0];
@@ -379,9 +381,9 @@ void each_tile(const Bins& bins, const TileRange& range, const Visit& visit) {
   }
 }
 
-// Worthless if cancelled.
+// The lists are invalid after cancellation.
 void list_by_tile(const RenderPlan& plan, const CancelToken& cancel, BinSpace& space) {
-  constexpr std::size_t bricks_between_looks = 1024;
+  constexpr std::size_t bricks_between_checks = 1024;
   Bins& bins = space.bins;
   const std::size_t tiles = static_cast<std::size_t>(bins.tiles_x) * bins.tiles_y;
   bins.first.assign(tiles + 1, 0);
@@ -392,25 +394,25 @@ void list_by_tile(const RenderPlan& plan, const CancelToken& cancel, BinSpace& s
   bins.entries.resize(bins.first[tiles]);
   space.next.assign(bins.first.begin(), bins.first.end() - 1);
   for (std::size_t b = 0; b < bins.bricks.size(); ++b) {
-    if (b % bricks_between_looks == 0 && cancel.cancelled()) return;
+    if (b % bricks_between_checks == 0 && cancel.cancelled()) return;
     each_tile(bins, tiles_of(plan, bins.bricks[b]), [&](std::size_t tile) {
       bins.entries[space.next[tile]++] = static_cast<std::uint32_t>(b);
     });
   }
 }
 
-void add_load(const RenderPlan& plan, Bins& bins, const SlabBricks& slab) {
-  constexpr std::int64_t of_a_brick = 8;
-  for (std::size_t b = 0; b < slab.bricks.size(); ++b) {
-    const Brick& brick = slab.bricks[b];
+void add_load(const RenderPlan& plan, Bins& bins, const SheetBricks& sheet) {
+  constexpr std::int64_t brick_overhead = 8;  // in kernels
+  for (std::size_t b = 0; b < sheet.bricks.size(); ++b) {
+    const Brick& brick = sheet.bricks[b];
     const TileRange range = tiles_of(plan, brick);
     const std::int64_t tiles = std::int64_t{range.x1 - range.x0 + 1} * (range.y1 - range.y0 + 1);
-    const std::int64_t load = of_a_brick + slab.kernels[b] / tiles;
+    const std::int64_t load = brick_overhead + sheet.kernels[b] / tiles;
     each_tile(bins, range, [&](std::size_t tile) { bins.load[tile] += load; });
   }
 }
 
-// Swept by depth: those that begin first come first, the others as they were.
+// Sorts bricks by their first depth; equal depths keep their order.
 void sort_by_depth(BinSpace& space) {
   std::vector<Brick>& bricks = space.bins.bricks;
   space.by_depth.resize(bricks.size());
@@ -421,7 +423,7 @@ void sort_by_depth(BinSpace& space) {
     return a.depth != b.depth ? a.depth < b.depth : a.brick < b.brick;
   });
   space.sorted.clear();
-  for (const auto& place : space.by_depth) space.sorted.push_back(bricks[place.brick]);
+  for (const auto& key : space.by_depth) space.sorted.push_back(bricks[key.brick]);
   bricks.swap(space.sorted);
 }
 
@@ -448,30 +450,30 @@ const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, Threa
   binner.begin();
   space.rows.assign(binner.rows(), BrickCounts());
   pool.run(space.rows.size(), [&](std::size_t row, unsigned) {
-    if (!cancel.cancelled()) binner.look_at_row(row, space.rows[row]);
+    if (!cancel.cancelled()) binner.count_regions(row, space.rows[row]);
   });
-  const std::size_t slabs = space.slabs.size();
-  if (space.found.size() < slabs) space.found.resize(slabs);
-  pool.run(slabs, [&](std::size_t i, unsigned) {
+  const std::size_t sheets = space.sheets.size();
+  if (space.found.size() < sheets) space.found.resize(sheets);
+  pool.run(sheets, [&](std::size_t i, unsigned) {
     if (cancel.cancelled()) return;
     const FlushDenormals flush;
-    binner.add_slab(space.slabs[i], space.found[i]);
+    binner.add_sheet(space.sheets[i], space.found[i]);
   });
   if (cancel.cancelled()) return bins;
   BrickCounts sum;
   for (const BrickCounts& row : space.rows) sum += row;
-  for (std::size_t i = 0; i < slabs && !cancel.cancelled(); ++i) {
-    const SlabBricks& slab = space.found[i];
-    bins.bricks.insert(bins.bricks.end(), slab.bricks.begin(), slab.bricks.end());
-    add_load(plan, bins, slab);
-    sum += slab.counts;
+  for (std::size_t i = 0; i < sheets && !cancel.cancelled(); ++i) {
+    const SheetBricks& sheet = space.found[i];
+    bins.bricks.insert(bins.bricks.end(), sheet.bricks.begin(), sheet.bricks.end());
+    add_load(plan, bins, sheet);
+    sum += sheet.counts;
   }
   work.samples += sum.samples;
   work.culled += sum.culled;
   work.skipped_vector += sum.without_line;
   work.skipped_scalar += sum.without_splat;
   work.skipped_both += sum.without_both;
-  // A pixel changes by no more than all of its light.
+  // The alpha of a pixel is at most 1.
   work.skipped_bound =
       std::min(1.0, sum.left_out / (static_cast<double>(plan.camera.width) * plan.camera.height));
   if (plan.slabs || plan.curved) sort_by_depth(space);

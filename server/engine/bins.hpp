@@ -1,5 +1,5 @@
-// RenderPlan -> Bins: bricks in visibility order, culled against the picture, emptied of what is
-// below tolerance, and listed for every tile that they may touch.
+// RenderPlan -> Bins: bricks in visibility order, culled against the picture and by tolerance, and
+// listed for every tile that they may touch.
 #pragma once
 
 #include <cstdint>
@@ -17,73 +17,74 @@ namespace windsplat::engine {
 struct Bins {
   int tiles_x = 0;
   int tiles_y = 0;
-  std::vector<kernels::Brick> bricks;  // that have something to draw, front to back
+  std::vector<kernels::Brick> bricks;  // those with something to draw, front to back
   // Tile t (row by row) draws bricks[entries[e]] for e in [first[t], first[t + 1]), ascending.
   std::vector<std::size_t> first;
   std::vector<std::uint32_t> entries;
-  // About how long tile t takes, in kernels: what its bricks draw, shared among the tiles that each
-  // may touch. Nought where there is no brick.
+  // Estimated cost of tile t in kernels: the kernels of each brick, divided among the tiles that
+  // the brick may touch. 0 for a tile without bricks.
   std::vector<std::int64_t> load;
 };
 
-// Some bricks' share of the report.
+// Counts of some bricks for the work report.
 struct BrickCounts {
   std::int64_t samples = 0;
   std::int64_t culled = 0;
   std::int64_t without_line = 0;
   std::int64_t without_splat = 0;
   std::int64_t without_both = 0;
-  double left_out = 0;  // alphas of what tolerances left out, summed over pixels, at most
+  double left_out = 0;  // upper bound of the alphas skipped by tolerances, summed over pixels
 
   BrickCounts& operator+=(const BrickCounts& other);
 };
 
-// Bricks of one slab of one pass.
-struct SlabBricks {
+// Bricks of one sheet of one pass.
+struct SheetBricks {
   std::vector<kernels::Brick> bricks;
-  std::vector<std::int32_t> kernels;  // of each: lines and splats
+  std::vector<std::int32_t> kernels;  // lines and splats of each brick
   BrickCounts counts;
 };
 
-// Slabs of all passes front to back: the eye's own and those above it upward, then those below it
-// downward. Passes of different strides are interleaved by distance, lines first.
-struct SlabKey {
-  int side;      // 0 upward, 1 downward
-  int distance;  // samples from the eye's
+// Sort key of the sheets of all passes, front to back: the sheet of the eye and those above it in
+// ascending order, then those below it in descending order. Passes of different strides are
+// interleaved by distance, lines first.
+struct SheetKey {
+  int side;      // 0: from the eye upward; 1: downward
+  int distance;  // in samples from the sample of the eye
   int pass;
-  int slab;
+  int sheet;
 };
 
-// What a pass' bricks share in one frame.
+// Data shared by the bricks of a pass during one frame.
 struct PassBins {
   PassSummaries* kept = nullptr;
-  std::array<std::vector<int>, 3> in_order;  // stops as they stand in the lattice
-  kernels::Pass pass{};                      // that visits them so
+  std::array<std::vector<int>, 3> in_order;  // kernel positions in lattice order
+  kernels::Pass pass{};                      // the pass with these visit lists
   double longest = 0;                        // half the longest line that the style allows
   std::array<double, 3> reach{};             // of kernels with that line
-  std::vector<std::uint8_t> done;  // of PassSummaries' regions: 1, counted whole in this frame
+  std::vector<std::uint8_t> done;            // by region of PassSummaries; 1: counted as a whole
 };
 
-// What make_bins needs and a caller keeps between frames: nothing is allocated once frames of the
-// same kind have been made.
+// Storage of make_bins that the caller keeps between frames: further frames of the same kind
+// allocate nothing.
 struct BinSpace {
   Bins bins;
   SummaryCache summaries;
   std::vector<PassBins> passes;
-  std::vector<SlabKey> slabs;
-  std::vector<SlabBricks> found;  // of each slab
-  std::vector<BrickCounts> rows;  // of the regions done, by row
-  struct Place {
+  std::vector<SheetKey> sheets;
+  std::vector<SheetBricks> found;  // by sheet
+  std::vector<BrickCounts> rows;   // of the regions counted as a whole, by row
+  struct DepthKey {
     float depth;
     std::uint32_t brick;
   };
-  std::vector<Place> by_depth;
+  std::vector<DepthKey> by_depth;
   std::vector<kernels::Brick> sorted;
   std::vector<std::size_t> next;
 };
 
-// Adds samples, culled and skipped counts to the report. The answer is space.bins; worthless if
-// cancelled.
+// Adds samples, culled and skipped counts to the report. Returns space.bins, which is invalid after
+// cancellation.
 const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, ThreadPool& pool,
                       const CancelToken& cancel, BinSpace& space, WorkReport& work);
 

@@ -1,5 +1,5 @@
-// Denormal numbers count as zero while one of these lives: they cost a hundred times as much, and
-// no picture shows them.
+// Treats denormal numbers as zero within a scope: they are some hundred times slower, and their
+// contribution is invisible.
 #pragma once
 
 #if defined(__SSE__)

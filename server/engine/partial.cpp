@@ -1,4 +1,4 @@
-// Tabulates partial footprints.
+// Tabulation of partial footprints.
 #include "server/engine/partial.hpp"
 
 #include <algorithm>
@@ -24,10 +24,10 @@ double kernel_at(double r) {
   return b / (s * t) + (t * std::log((t + a) / (s + b)) - (a - b)) / (t * (t - s));
 }
 
-// The integral of K from the ray's middle to each of `count` + 1 even steps of its half chord, by
-// Gauss's rule of two points on many pieces.
+// The integral of K from the middle of the ray to each of `count` + 1 equidistant points of its
+// half chord, by composite two-point Gauss quadrature.
 std::vector<double> integrals(double b2, int count) {
-  constexpr int pieces = 32;  // a step
+  constexpr int pieces = 32;  // per step
   const double chord = std::sqrt(std::max(t * t - b2, 0.0));
   const double h = chord / (count * pieces);
   const double node = 0.5 / std::sqrt(3.0);
@@ -48,7 +48,7 @@ std::vector<double> integrals(double b2, int count) {
   return sums;
 }
 
-// F at the columns of one row, in parts of partial_one.
+// F at the columns of one row, in units of 1 / partial_one.
 std::vector<std::uint32_t> row_of(double b2) {
   constexpr int half = (kernels::partial_columns - 1) / 2;
   const std::vector<double> sums = integrals(b2, half);
@@ -67,7 +67,7 @@ std::vector<std::int32_t> tabulate() {
   std::vector<std::int32_t> table;
   table.reserve(static_cast<std::size_t>(rows) * (kernels::partial_columns - 1));
   for (int r = 0; r < rows; ++r) {
-    // The last row is the limit of the rays that graze the kernel.
+    // The last row is the limit of rays tangent to the kernel.
     const double part = std::min(static_cast<double>(r) / (rows - 1), 1 - 1e-6);
     const std::vector<std::uint32_t> row = row_of(t * t * part);
     for (std::size_t c = 0; c + 1 < row.size(); ++c) {

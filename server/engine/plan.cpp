@@ -17,7 +17,7 @@ using scene::Camera;
 using scene::Lattice;
 using scene::Scene;
 
-// Optical depths stay finite in float: what is this dense is opaque over any distance.
+// Keeps optical depths finite in float; such a medium is opaque over any distance.
 constexpr double extinction_max = 1e30;
 
 float bounded(double v) {
@@ -25,7 +25,7 @@ float bounded(double v) {
   return static_cast<float>(std::clamp(v, -largest, largest));
 }
 
-// 1 / (high - low) for clamp((v - low) * scale): a step where both are the same.
+// 1 / (high - low) for clamp((v - low) * scale); a step where both are equal.
 float ramp_scale(double low, double high) {
   constexpr double steepest = 1e30;
   return high > low ? bounded(std::min(1.0 / (high - low), steepest)) : bounded(steepest);
@@ -73,11 +73,11 @@ void clear(AxisArrays& axis) {
   axis.bricks.clear();
 }
 
-void add_stop(const Scene& scene, int a, const Stop& stop, AxisArrays& axis) {
+void add_kernel(const Scene& scene, int a, const AxisKernel& kernel, AxisArrays& axis) {
   const Camera& camera = scene.camera;
-  axis.sample.push_back(stop.sample);
-  axis.group.push_back(stop.group);
-  const double position = scene.lattice.positions[a][stop.sample];
+  axis.sample.push_back(kernel.sample);
+  axis.group.push_back(kernel.group);
+  const double position = scene.lattice.positions[a][kernel.sample];
   const double from_eye = position - camera.eye[a];
   axis.position.push_back(position);
   axis.camera.push_back(from_eye * camera.right[a]);
@@ -85,30 +85,30 @@ void add_stop(const Scene& scene, int a, const Stop& stop, AxisArrays& axis) {
   axis.camera.push_back(from_eye * camera.forward[a]);
   axis.from_eye.push_back(static_cast<float>(from_eye));
   axis.world.push_back(static_cast<float>(position));
-  axis.cell.push_back(static_cast<float>(stop.cell));
+  axis.cell.push_back(static_cast<float>(kernel.cell));
   axis.inverse_cell.push_back(1.0F / axis.cell.back());
 }
 
-// A slice is one stop of its axis, whatever the stride.
-void add_stops(const Scene& scene, int a, int stride, AxisArrays& axis) {
+// A slice has one kernel position along its axis, independent of the stride.
+void add_kernels(const Scene& scene, int a, int stride, AxisArrays& axis) {
   const auto& spacing = scene.lattice.spacing[a];
   if (scene.slice && scene.slice->axis == a) {
     const int sample = scene.slice->sample;
     WINDSPLAT_CHECK(sample >= 0 && sample < scene.lattice.dims[a]);
-    add_stop(scene, a, {sample, 1, spacing[sample]}, axis);
+    add_kernel(scene, a, {sample, 1, spacing[sample]}, axis);
     return;
   }
   const int samples = static_cast<int>(spacing.size());
   for (int first = 0; first < samples; first += stride) {
-    add_stop(scene, a, kernel_stop(spacing, stride, first), axis);
+    add_kernel(scene, a, axis_kernel(spacing, stride, first), axis);
   }
 }
 
 void place_axis(const Scene& scene, int a, int stride, AxisArrays& axis) {
   clear(axis);
-  add_stops(scene, a, stride, axis);
+  add_kernels(scene, a, stride, axis);
   const int count = static_cast<int>(axis.sample.size());
-  visit_order(count, eye_stop(scene.camera, a, axis.position), axis.visit);
+  visit_order(count, eye_index(scene.camera, a, axis.position), axis.visit);
   for (int first = 0; first < count;) {
     const int brick = axis.visit[first] / kernels::brick_side;
     int last = first;
@@ -118,7 +118,7 @@ void place_axis(const Scene& scene, int a, int stride, AxisArrays& axis) {
   }
 }
 
-// As kernels::ColorTable wants it.
+// Converts to the layout of kernels::ColorTable.
 void flatten(const scene::ColorTable& table, std::vector<float>& rgb) {
   const std::size_t entries = table.entries.size();
   WINDSPLAT_CHECK(entries > 0);
@@ -152,7 +152,7 @@ void to_floats(const std::vector<double>& from, std::vector<float>& to) {
   for (const double v : from) to.push_back(bounded(v));
 }
 
-// Jitter, box and ink: what a line looks like.
+// Sets jitter, kernel box and appearance of lines.
 void style_lines(const Scene& scene, const scene::VectorLayer& from, kernels::LineStyle& to) {
   to.length = static_cast<float>(from.length);
   const double full = from.magnitude_range[1];
@@ -247,6 +247,8 @@ void add_medium(const Scene& scene, PassPlan& pass) {
   pass.kernel.has_medium = 1;
 }
 
+// Computes the largest distances between neighbouring samples unless those of the same lattice are
+// known.
 void measure_ways(const Lattice& lattice, SampleWays& ways) {
   const auto& places = *lattice.places;
   const auto& dims = lattice.dims;
@@ -269,14 +271,14 @@ void measure_ways(const Lattice& lattice, SampleWays& ways) {
   ways.dims = dims;
 }
 
-// How far any cell of a curved lattice reaches along each axis of the world, summed over its edges:
-// no edge is longer than the way between a sample's two neighbours, times the stride.
+// Bounds the extent of the cells of a curved lattice along each world axis, summed over their
+// edges: no edge exceeds the distance between neighbours of a sample times the stride.
 void bend_pass(const Scene& scene, const SampleWays& ways, PassPlan& pass) {
   kernels::Pass& to = pass.kernel;
   to.places = scene.lattice.places->front().data();
   std::array<float, 3> widest{};
   for (int a = 0; a < 3; ++a) {
-    // A cell squeezed to nothing is opened again by its unbent width.
+    // Along an axis of one sample the cell keeps its width on the uncurved lattice.
     for (int c = 0; c < 3; ++c) {
       widest[c] += scene.lattice.dims[a] > 1 ? ways.longest[a][c] * static_cast<float>(pass.stride)
                                              : to.cell_max[a];
@@ -298,8 +300,8 @@ double cell_along_view(const Scene& scene) {
   return 1.0 / std::sqrt(cells2);
 }
 
-// Slabs count in cells of the coarsest medium, or of the lines where there is none. However thin
-// cells are, there are at most slabs_max across the volume.
+// Sets the slab depth, a multiple of the cells of the coarsest medium (without a medium: of the
+// lines). There are at most slabs_max slabs across the volume.
 void plan_slabs(const Scene& scene, RenderPlan& plan) {
   constexpr double slabs_max = 16384;
   for (PassPlan& pass : plan.passes) pass.kernel.by_depth = 1;
@@ -352,8 +354,8 @@ void finish_pass(const Scene& scene, int major, const SampleWays& ways, PassPlan
   add_medium(scene, pass);
 }
 
-// A kernel is made ready once for every tile that it may touch: the fewer of those, the larger
-// tiles are. Small pictures take small ones, so that there are enough for all threads.
+// A kernel is prepared once for every tile that it may touch, so large tiles cost less. Small
+// pictures use small tiles, so that all threads have work.
 int tile_pixels(int width, int height) {
   const std::int64_t pixels = std::int64_t{width} * height;
   if (pixels >= 300'000) return kernels::tile_side;
@@ -373,7 +375,7 @@ Variant variant_of(const Scene& scene, const RenderPlan& plan) {
   return variant;
 }
 
-// Whose layers are those of the scene's that have its stride; nothing else is said of it yet.
+// Resets a pass to the given stride without layers.
 void begin_pass(int stride, PassPlan& pass) {
   pass.stride = stride;
   pass.vector = nullptr;
@@ -384,7 +386,7 @@ void begin_pass(int stride, PassPlan& pass) {
   pass.kernel = kernels::Pass{};
 }
 
-// One pass a stride, the lines' first.
+// One pass per stride, that of the lines first.
 void choose_passes(const Scene& scene, std::vector<PassPlan>& passes) {
   std::size_t used = 0;
   const auto with_stride = [&](int stride) -> PassPlan& {
@@ -420,32 +422,32 @@ int major_axis(const Camera& camera, const Lattice& lattice) {
   return major;
 }
 
-Stop kernel_stop(const std::vector<double>& spacing, int stride, int first) {
+AxisKernel axis_kernel(const std::vector<double>& spacing, int stride, int first) {
   const int last = std::min(first + stride, static_cast<int>(spacing.size())) - 1;
   const double cell = std::accumulate(spacing.begin() + first, spacing.begin() + last + 1, 0.0);
   return {first + (last - first) / 2, last - first + 1, cell};
 }
 
-int eye_stop(const Camera& camera, int axis, const std::vector<double>& positions) {
+int eye_index(const Camera& camera, int axis, const std::vector<double>& positions) {
   const int last = static_cast<int>(positions.size()) - 1;
   if (!camera.perspective) return camera.forward[axis] >= 0 ? 0 : last;
-  int stop = 0;
-  while (stop < last && camera.eye[axis] >= 0.5 * (positions[stop] + positions[stop + 1])) {
-    ++stop;
+  int index = 0;
+  while (index < last && camera.eye[axis] >= 0.5 * (positions[index] + positions[index + 1])) {
+    ++index;
   }
-  return stop;
+  return index;
 }
 
-void visit_order(int stops, int eye, std::vector<int>& order) {
+void visit_order(int count, int eye, std::vector<int>& order) {
   order.clear();
   const auto visit_brick = [&](int brick) {
     const int first = brick * kernels::brick_side;
-    const int last = std::min(first + kernels::brick_side, stops) - 1;
+    const int last = std::min(first + kernels::brick_side, count) - 1;
     const int start = std::clamp(eye, first, last);
     for (int i = start; i <= last; ++i) order.push_back(i);
     for (int i = start - 1; i >= first; --i) order.push_back(i);
   };
-  const int bricks = (stops + kernels::brick_side - 1) / kernels::brick_side;
+  const int bricks = (count + kernels::brick_side - 1) / kernels::brick_side;
   const int own = eye / kernels::brick_side;
   for (int brick = own; brick < bricks; ++brick) visit_brick(brick);
   for (int brick = own - 1; brick >= 0; --brick) visit_brick(brick);
@@ -463,7 +465,7 @@ void make_plan(const Scene& scene, RenderPlan& plan) {
   plan.perspective_medium = scene.camera.perspective && !scene.scalars.empty();
   choose_passes(scene, plan.passes);
   const int major = major_axis(scene.camera, scene.lattice);
-  plan.eye_sample = eye_stop(scene.camera, major, scene.lattice.positions[major]);
+  plan.eye_sample = eye_index(scene.camera, major, scene.lattice.positions[major]);
   if (plan.curved) measure_ways(scene.lattice, plan.ways);
   for (PassPlan& pass : plan.passes) finish_pass(scene, major, plan.ways, pass);
   plan.slab_depth = 1;

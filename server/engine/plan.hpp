@@ -1,5 +1,5 @@
-// Scene -> RenderPlan: everything that the kernels need, as plain data. What the scene lacks is
-// neither computed nor allocated; nor is what a plan made before has room for.
+// Scene -> RenderPlan: the input of the kernels as plain data. Storage of an earlier plan is
+// reused.
 #pragma once
 
 #include <array>
@@ -13,26 +13,26 @@
 
 namespace windsplat::engine {
 
-// The axis along which slabs of kernels are stacked: the one that the view crosses most cells
-// along, |forward_a| / mean spacing_a largest; the first of equals.
+// The axis along which sheets of kernels are stacked: the one along which the view direction
+// crosses most cells, |forward_a| / mean spacing_a largest; the first of equals.
 int major_axis(const scene::Camera& camera, const scene::Lattice& lattice);
 
-// One of an axis' kernel stops: it stands for `stride` samples from `first` on, the last one for
-// those that are left, and has the middle one's place (the lower of two).
-struct Stop {
+// A kernel position along one axis: it represents `stride` samples from `first` on, the last
+// position the remaining ones, and lies at the middle sample (the lower of two).
+struct AxisKernel {
   int sample = 0;
-  int group = 1;    // samples
-  double cell = 0;  // world units: what it stands for, from one end to the other
+  int group = 1;    // number of samples represented
+  double cell = 0;  // their extent in world units
 };
-Stop kernel_stop(const std::vector<double>& spacing, int stride, int first);
+AxisKernel axis_kernel(const std::vector<double>& spacing, int stride, int first);
 
-// The stop whose cell (bounded midway between stops) holds the eye; in orthographic views the end
-// of the axis that the view comes from. From it, outward is front to back.
-int eye_stop(const scene::Camera& camera, int axis, const std::vector<double>& positions);
+// Index of the kernel position whose cell (bounded midway between positions) contains the eye; in
+// orthographic views the end of the axis nearest to the viewer. Outward from it is front to back.
+int eye_index(const scene::Camera& camera, int axis, const std::vector<double>& positions);
 
-// Stops in visibility order: bricks of brick_side consecutive stops outward from the eye's, and
-// inside each brick stops outward from the eye's. Replaces what `order` held.
-void visit_order(int stops, int eye, std::vector<int>& order);
+// Kernel positions in visibility order: bricks of brick_side consecutive positions outward from the
+// brick of the eye, and within each brick outward from the eye. Replaces the contents of `order`.
+void visit_order(int count, int eye, std::vector<int>& order);
 
 // Backing store of one kernels::Axis.
 struct AxisArrays {
@@ -53,8 +53,8 @@ struct LayerArrays {
   std::vector<float> rgb;
 };
 
-// Layers that stop at the same samples share a pass: a line and a splat at one stop are composited
-// as one kernel. Layers of other strides have passes of their own, interleaved slab by slab.
+// Layers of equal stride share a pass: a line and a splat at one kernel position are composited as
+// one kernel. Layers of other strides have separate passes, interleaved sheet by sheet.
 struct PassPlan {
   int stride = 1;
   const scene::VectorLayer* vector = nullptr;
@@ -66,12 +66,12 @@ struct PassPlan {
   kernels::Pass kernel{};  // points into the arrays above
 };
 
-// How far a curved lattice's samples lie apart; to look at all of them takes as long as to draw
-// some.
+// Largest distances between neighbouring samples of a curved lattice. Kept between frames, because
+// computing them takes as long as rendering some.
 struct SampleWays {
-  std::weak_ptr<const std::vector<std::array<float, 3>>> places;  // whose they are
+  std::weak_ptr<const std::vector<std::array<float, 3>>> places;  // identity of the lattice
   std::array<int, 3> dims{};
-  // [a][c]: the longest way from a sample to the next one along axis a, in the world's direction c.
+  // [a][c]: largest distance along world axis c between neighbours along lattice axis a.
   std::array<std::array<float, 3>, 3> longest{};
 };
 
@@ -79,16 +79,16 @@ struct RenderPlan {
   const scene::Camera* view = nullptr;
   kernels::Camera camera{};
   std::vector<PassPlan> passes;     // the one with lines first
-  int eye_sample = 0;               // of the whole lattice along the major axis: see eye_stop
+  int eye_sample = 0;               // eye_index of the whole lattice along the major axis
   bool perspective_medium = false;  // pixel rays are needed
   bool slabs = false;               // the slab method
-  bool curved = false;              // visibility is told by depth alone
+  bool curved = false;              // visibility order by depth only
   int compositing = 0;              // scene::Compositing
   double slab_depth = 1;            // of a slab along the view, world units
   float stop_transmittance = 0;
   int tile_pixels = 0;  // along a tile's side, at most kernels::tile_side
   Variant variant;      // without its target and level
-  SampleWays ways;      // of the curved lattice that was planned last
+  SampleWays ways;      // of the last curved lattice
 
   RenderPlan() = default;
   RenderPlan(const RenderPlan&) = delete;  // passes point into themselves
@@ -98,8 +98,8 @@ struct RenderPlan {
   ~RenderPlan() = default;
 };
 
-// Replaces all that the plan says by this scene, which must outlive its use; of what it was before
-// only storage is kept, and what is known of a curved lattice that is still there.
+// Replaces the plan by that of `scene`, which must outlive it. Only the storage is reused, and
+// `ways` if the curved lattice is the same.
 void make_plan(const scene::Scene& scene, RenderPlan& plan);
 
 }  // namespace windsplat::engine

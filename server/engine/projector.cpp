@@ -1,4 +1,4 @@
-// Projects boxes.
+// Projection of boxes, conservative near the eye.
 #include "server/engine/projector.hpp"
 
 #include <algorithm>
@@ -9,19 +9,19 @@ namespace windsplat::engine {
 
 namespace {
 
-// One axis of the screen: which part of [0, size] pixels a box may cover, widened by margin. Corner
-// coordinates are (across, forward); with any corner behind `near` the planes through the eye and
-// the screen's two edges decide.
+// Interval of pixels that a box may cover along one axis of the screen, widened by a margin. If a
+// corner lies before the near plane, the box is tested against the planes through the eye and the
+// two edges of the screen instead.
 struct Span {
   double low = 0, high = -1;
   bool behind = false;
 };
 
-// A box' corners as the camera sees them, component by component: right, down, forward.
+// Corners of a box in camera space, by component: right, down, forward.
 struct Corners {
   std::array<std::array<double, 8>, 3> at;
-  std::array<double, 8> inverse_z;  // of `near` for those that are nearer; orthographic: 1
-  bool behind = false;              // any is nearer than `near`
+  std::array<double, 8> inverse_z;  // depths clamped to the near plane; orthographic: 1
+  bool behind = false;              // a corner lies before the near plane
 };
 
 Span screen_span(const Corners& corners, int across, const kernels::Camera& camera, double half,
@@ -38,7 +38,7 @@ Span screen_span(const Corners& corners, int across, const kernels::Camera& came
     const double scale = 1.0 / static_cast<double>(camera.pixel);
     return {half + low * scale - margin, half + high * scale + margin, false};
   }
-  // Outside one edge's plane with every corner: not seen at all; otherwise possibly everywhere.
+  // If all corners are outside one plane, the box is invisible; otherwise assume the whole axis.
   const double edge = (half + margin) * camera.pixel;
   bool left = true;
   bool right = true;

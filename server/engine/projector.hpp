@@ -1,4 +1,4 @@
-// Boxes of the world -> the part of the picture where what stands in them may be seen.
+// World-space boxes -> the rectangle of the picture that kernels within them may cover.
 #pragma once
 
 #include <array>
@@ -13,25 +13,25 @@ struct Rectangle {
   [[nodiscard]] bool empty() const { return x0 > x1 || y0 > y1; }
 };
 
-// A brick's stops as a box of the world.
+// World-space bounding box of the kernel positions of a brick.
 struct Box {
   std::array<double, 3> low{};
   std::array<double, 3> high{};
 };
 
-// Where kernels may be seen, and how far from the eye.
+// Rectangle of the picture and view depths of some kernels.
 struct Projected {
   Rectangle seen;
-  double depth_first = 0, depth_last = 0;  // view depths of the kernels' reach
-  bool whole = false;                      // no part of it lies outside the picture
+  double depth_first = 0, depth_last = 0;  // including the reach of the kernels
+  bool whole = false;                      // lies entirely within the picture
 };
 
 class Projector {
  public:
   explicit Projector(const RenderPlan& plan) : camera_(plan.camera), view_(*plan.view) {}
 
-  // Of a pass' kernels whose stops stand in `box` and that reach so far beyond them along the
-  // world's axes.
+  // Projects kernels of a pass whose positions lie in `box` and which extend by `reach` along the
+  // world axes.
   [[nodiscard]] Projected operator()(const PassPlan& plan, const Box& box,
                                      const std::array<double, 3>& reach) const;
 

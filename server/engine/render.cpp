@@ -14,7 +14,7 @@ namespace windsplat::engine {
 
 struct RenderSpace::Parts {
   Image image;
-  RenderPlan plan;  // of the frame drawn last, whose scene may be gone
+  RenderPlan plan;  // of the last frame; its scene may have been destroyed
   BinSpace bins;
   TileSpace tiles;
 };
@@ -37,9 +37,10 @@ void TileCopier::operator()(const TilePixels& tile) const {
 
 namespace {
 
-// A large picture takes its pages from the system here, which may take longer than some pictures.
+// Clears the image in parts with checks for cancellation: the pages of a large image are first
+// mapped here, which may take longer than rendering a small one.
 void clear_image(const scene::Camera& camera, const CancelToken& cancel, Image& image) {
-  constexpr std::size_t floats_between_looks = std::size_t{1} << 21;
+  constexpr std::size_t floats_between_checks = std::size_t{1} << 21;
 
   const std::size_t floats = 4 * static_cast<std::size_t>(camera.width) * camera.height;
   trim_storage(image.rgba, floats, 4 * retained_pixels);
@@ -48,7 +49,7 @@ void clear_image(const scene::Camera& camera, const CancelToken& cancel, Image& 
   image.rgba.clear();
   image.rgba.reserve(floats);
   while (image.rgba.size() < floats && !cancel.cancelled()) {
-    image.rgba.resize(std::min(floats, image.rgba.size() + floats_between_looks));
+    image.rgba.resize(std::min(floats, image.rgba.size() + floats_between_checks));
   }
 }
 
@@ -70,7 +71,7 @@ Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const Can
       draw_tiles(plan, bins, **table, pool, cancel, parts.tiles, sink, work);
     }
   }
-  if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "the frame was cancelled");
+  if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "frame cancelled");
   return work;
 }
 

@@ -15,31 +15,32 @@
 
 namespace windsplat::engine {
 
-// Linear premultiplied RGBA of the volume alone, row 0 on top, 4 floats a pixel.
+// Linear premultiplied RGBA of the volume alone, row 0 on top, 4 floats per pixel.
 struct Image {
   int width = 0;
   int height = 0;
   std::vector<float> rgba;
 };
 
-// Finished pixels of an image: as Image has them, but `stride` floats from row to row.
+// Finished pixels of an image in the format of Image, with `stride` floats from row to row.
 struct TilePixels {
   int x = 0;  // of the left upper pixel in the image; even
   int y = 0;
   int width = 0;
   int height = 0;
-  const float* rgba = nullptr;  // gone when the sink returns
+  const float* rgba = nullptr;  // valid until the sink returns
   std::size_t stride = 0;
 };
 
-// Where finished tiles go: anything that takes a TilePixels. Called from the pool's threads,
-// several at once, a few rows of a tile at a time; every pixel of a tile that has anything in it
-// comes once, and what never comes is clear. It only points at what it calls, which outlives it.
+// Receiver of finished tiles: any callable that takes a TilePixels. It is called concurrently from
+// the threads of the pool, with a few rows of a tile at a time. Every pixel of a tile that is not
+// empty is delivered once; pixels never delivered are transparent. A TileSink refers to its
+// callable, which must outlive it.
 class TileSink {
  public:
   template <class Call,
             class = std::enable_if_t<std::is_invocable_v<const Call&, const TilePixels&>>>
-  TileSink(const Call& call)  // NOLINT(google-explicit-constructor): a lambda is one
+  TileSink(const Call& call)  // NOLINT(google-explicit-constructor): accepts lambdas
       : called_(&call), call_([](const void* called, const TilePixels& tile) {
           (*static_cast<const Call*>(called))(tile);
         }) {}
@@ -51,7 +52,7 @@ class TileSink {
   void (*call_)(const void* called, const TilePixels& tile);
 };
 
-// Copies tiles to their places in `image`, which has its size and outlives the copier.
+// Copies tiles into `image`, which must have its final size and outlive the copier.
 class TileCopier {
  public:
   explicit TileCopier(Image& image) : image_(&image) {}
@@ -67,11 +68,10 @@ struct Rendered {
   WorkReport work;
 };
 
-// What frames need beside their scene, for a caller that draws one after another: frames of the
-// same kind then allocate nothing. One frame at a time. It holds the last plan, what bricks of the
-// last few scenes hold (summaries.hpp), each worker's tile, and the newest picture that was not
-// delivered to a sink; pixels that one frame needed beyond retained_pixels are given back by the
-// next smaller one.
+// Storage kept between frames, so that consecutive frames of the same kind allocate nothing. Used
+// by one frame at a time. Holds the last plan, the brick summaries of the last few scenes
+// (summaries.hpp), the tile of each worker and the last picture that was not delivered to a sink.
+// Memory for more than retained_pixels is released by the next smaller frame.
 class RenderSpace {
  public:
   RenderSpace();
@@ -81,7 +81,7 @@ class RenderSpace {
   RenderSpace(const RenderSpace&) = delete;
   RenderSpace& operator=(const RenderSpace&) = delete;
 
-  // Of the frame drawn last without a sink; the caller may take it away.
+  // Picture of the last frame drawn without a sink; the caller may move from it.
   [[nodiscard]] Image& image();
 
  private:
@@ -91,16 +91,16 @@ class RenderSpace {
   std::unique_ptr<Parts> parts_;
 };
 
-// Tiles go to `sink` as they are finished; no image is made. Errors: cancelled (what was delivered
-// is worthless); invalid (the environment forces a target that is not there).
+// Delivers tiles to `sink` as they are finished. Errors: cancelled (the delivered tiles are
+// invalid); invalid (the environment selects an instruction set that is not available).
 Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel,
                           RenderSpace& space, TileSink sink);
 
-// The picture is space.image().
+// Renders into space.image().
 Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel,
                           RenderSpace& space);
 
-// One frame by itself.
+// Renders a single frame.
 Result<Rendered> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel);
 
 }  // namespace windsplat::engine

@@ -1,5 +1,5 @@
-// Sweeps a tile front to back, slab by slab: splats gather their parts, lines are sorted by depth,
-// both are composited block by block.
+// Sweeps a tile front to back, slab by slab: accumulates the parts of splats, sorts lines by depth
+// and composites both block by block.
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -16,7 +16,7 @@ namespace windsplat::engine {
 namespace {
 
 using kernels::Brick;
-using kernels::brick_stops;
+using kernels::brick_kernels;
 using kernels::Hit;
 using kernels::MetLine;
 using kernels::RibbonRecord;
@@ -26,16 +26,16 @@ using kernels::SplatRecord;
 using kernels::Tile;
 using kernels::tile_blocks;
 
-constexpr std::size_t bricks_between_looks = 64;
+constexpr std::size_t bricks_between_checks = 64;
 constexpr std::size_t tile_block_count = std::size_t{tile_blocks} * tile_blocks;
 
-// The lists' place of a slab, which may be before the camera's depth origin.
+// Queue index of a slab; slab numbers before the camera's depth origin are negative.
 std::size_t modulo(std::int64_t slab, std::size_t slabs) {
   const auto count = static_cast<std::int64_t>(slabs);
   return static_cast<std::size_t>((slab % count + count) % count);
 }
 
-// The splats of a sweep, each waiting for the slab in which it is drawn next.
+// The splats of a sweep, each queued for the slab in which it is drawn next.
 class Splats {
  public:
   explicit Splats(WaitingSplats& of) : of_(of) {
@@ -68,7 +68,7 @@ class Splats {
     --of_.count;
   }
 
-  // Puts a record down for `wanted`, or as near to that as lists reach from slab `now`.
+  // Queues a record for slab `wanted`, or for the last slab that the queues cover from `now` on.
   void await(std::uint32_t record, std::int64_t wanted, std::int64_t now) {
     const auto reach = static_cast<std::int64_t>(WaitingSplats::slabs) - 1;
     const std::size_t slab = modulo(std::min(wanted, now + reach), WaitingSplats::slabs);
@@ -81,7 +81,7 @@ class Splats {
     of_.last[slab] = record;
   }
 
-  // Takes what waits for this slab.
+  // Moves the queue of a slab to `here`.
   void take(std::int64_t index, std::vector<std::uint32_t>& here) {
     const std::size_t slab = modulo(index, WaitingSplats::slabs);
     here.clear();
@@ -96,7 +96,7 @@ class Splats {
   WaitingSplats& of_;
 };
 
-// The lines of a sweep, each waiting in the blocks that it may touch.
+// The lines of a sweep, each queued for the blocks that it may touch.
 class Lines {
  public:
   explicit Lines(WaitingLines& of) : of_(of) {
@@ -113,18 +113,18 @@ class Lines {
   [[nodiscard]] std::size_t count() const { return of_.count; }
   [[nodiscard]] const RibbonRecord* records() const { return of_.records.data(); }
 
-  // Room for a brick's lines; `slots` are brick_stops places that are free.
+  // Reserves records for the lines of a brick; `slots` receives brick_kernels free indices.
   RibbonRecord* make_room(std::uint32_t* slots) {
-    while (of_.free.size() < brick_stops) {
+    while (of_.free.size() < brick_kernels) {
       of_.free.push_back(static_cast<std::uint32_t>(of_.records.size()));
       of_.records.emplace_back();
       of_.waiting.push_back(0);
     }
-    std::copy_n(of_.free.rbegin(), brick_stops, slots);
+    std::copy_n(of_.free.rbegin(), brick_kernels, slots);
     return of_.records.data();
   }
 
-  // The first `lines` of those places are taken, each by the next counts[n] hits.
+  // Marks the first `lines` of those records as used, record n with counts[n] hits.
   void take_room(const std::uint32_t* slots, int lines, const int* counts) {
     of_.free.resize(of_.free.size() - static_cast<std::size_t>(lines));
     for (int n = 0; n < lines; ++n) {
@@ -143,8 +143,8 @@ class Lines {
     chunk.hits[chunk.count++] = hit;
   }
 
-  // Calls visit(hit) for what waits for the slab. It returns the slab for which the hit waits next,
-  // `index` if for none.
+  // Calls visit(hit) for each hit queued for the slab. The callback returns the slab to queue it
+  // for next, or `index` to drop it.
   template <class Visit>
   void take(std::int64_t index, const Visit& visit) {
     const std::size_t slab = modulo(index, WaitingLines::slabs);
@@ -244,7 +244,7 @@ class SlabSweep {
     tile_.counters.occluded += static_cast<std::int64_t>(brick.u_count) * brick.v_count;
   }
 
-  // Bounded, so that a depth far beyond any slab still has a number.
+  // Clamped, so that the conversion to an integer is defined for any depth.
   [[nodiscard]] std::int64_t slab_of(float depth) const {
     constexpr double farthest = 1e15;
     const double slab = std::floor(static_cast<double>(depth) / plan_.slab_depth);
@@ -257,7 +257,7 @@ class SlabSweep {
 
   Slab& slab_at(std::int64_t index) { return slabs_[modulo(index, slabs_ahead)]; }
 
-  // The slab of those in the lists' reach where a line is met first.
+  // First slab of a hit, clamped to the slabs that the queues cover.
   std::int64_t slab_of(const Hit& hit) {
     constexpr auto farthest = static_cast<float>(WaitingLines::slabs - 1);
     const float slabs = (hit.first - slab_at(index_).front) * inverse_depth_;
@@ -266,7 +266,7 @@ class SlabSweep {
 
   void activate(const CancelToken& cancel) {
     for (; next_ < last_ && brick(next_).depth_first < slab_at(index_).back; ++next_) {
-      if (next_ % bricks_between_looks == 0 && cancel.cancelled()) return;
+      if (next_ % bricks_between_checks == 0 && cancel.cancelled()) return;
       const Brick& here = brick(next_);
       if (all_closed(tile_, here)) {
         count_occluded(here);
@@ -274,13 +274,13 @@ class SlabSweep {
       }
       kernels::Prepared& prepared = *space_.prepared;
       table_.prepare(plan_.camera, plan_.passes[here.pass].kernel, here, tile_, prepared);
-      if (prepared.stops.splats != 0) add_splats(prepared);
-      if (prepared.stops.lines != 0) add_lines(prepared);
+      if (prepared.positions.splats != 0) add_splats(prepared);
+      if (prepared.positions.lines != 0) add_lines(prepared);
     }
   }
 
   void add_splats(const kernels::Prepared& prepared) {
-    SplatRecord splats[brick_stops];
+    SplatRecord splats[brick_kernels];
     const int count = table_.pack_splats(plan_.camera, prepared, splats);
     for (int n = 0; n < count; ++n) {
       const std::int64_t first = std::max(slab_of(splats[n].first), index_);
@@ -289,8 +289,8 @@ class SlabSweep {
   }
 
   void add_lines(const kernels::Prepared& prepared) {
-    std::uint32_t slots[brick_stops];
-    int counts[brick_stops];
+    std::uint32_t slots[brick_kernels];
+    int counts[brick_kernels];
     RibbonRecord* records = lines_.make_room(slots);
     const int lines =
         table_.pack_lines(plan_.camera, prepared, static_cast<float>(plan_.slab_depth), slots,
@@ -302,7 +302,7 @@ class SlabSweep {
     }
   }
 
-  // Splats that begin here give their parts to this slab and those behind it.
+  // Accumulates the splats that begin in this slab into it and the following ones.
   void gather() {
     splats_.take(index_, space_.here);
     const std::int64_t farthest = index_ + slabs_ahead - 1;
@@ -344,8 +344,8 @@ class SlabSweep {
     }
   }
 
-  // Finds the lines that open blocks meet in the slab: space_.met, block by block, up to where
-  // met_until_ tells.
+  // Collects the lines that open blocks may meet in the slab in space_.met, grouped by block;
+  // met_until_ holds the end of each group.
   void meet(const Slab& slab) {
     std::vector<Hit>& hits = space_.hits;
     hits.clear();
@@ -368,7 +368,7 @@ class SlabSweep {
     }
   }
 
-  // A block's part of space_.met: first and end.
+  // Range of space_.met for a block.
   std::pair<std::size_t, std::size_t> lines_at(int block) {
     const std::size_t first = block == 0 ? 0 : met_until_[block - 1];
     const std::size_t last = met_until_[block];
@@ -387,7 +387,7 @@ class SlabSweep {
   Splats splats_;
   Lines lines_;
   Slab slabs_[slabs_ahead] = {};
-  std::uint32_t lined_[tile_blocks] = {};  // bit set: the block may meet lines in the slab at hand
+  std::uint32_t lined_[tile_blocks] = {};  // bit set: the block may meet lines in this slab
   std::uint32_t met_until_[tile_block_count] = {};
   float inverse_depth_ = static_cast<float>(1.0 / plan_.slab_depth);
   std::int64_t index_ = 0;

@@ -1,4 +1,4 @@
-// std::stable_sort with memory that the caller keeps: runs by insertion, then merged pairwise.
+// std::stable_sort with storage kept by the caller: insertion sort of runs, then pairwise merging.
 #pragma once
 
 #include <algorithm>
@@ -8,8 +8,8 @@
 
 namespace windsplat::engine {
 
-// Sorts items[first..last); what `less` does not tell apart keeps its order. `spare` grows to the
-// number of items.
+// Sorts items[first, last); equivalent items keep their order. `spare` grows to the number of
+// items.
 template <class T, class Less>
 void stable_sort(std::vector<T>& items, std::size_t first, std::size_t last, std::vector<T>& spare,
                  const Less& less) {

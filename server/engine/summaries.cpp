@@ -1,4 +1,4 @@
-// Keeps summaries by what they depend on.
+// The cache of brick summaries and its keys.
 #include "server/engine/summaries.hpp"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ void add(std::vector<std::uint32_t>& key, const float* values, int count) {
   for (int i = 0; values != nullptr && i < count; ++i) add(key, values[i]);
 }
 
-// Every number that Table::summarise reads besides the fields and the order of visit.
+// Writes every number that Table::summarise reads besides the fields and the visit order.
 void write_key(const kernels::Pass& pass, std::vector<std::uint32_t>& key) {
   key.clear();
   add(key, pass.major);
@@ -29,8 +29,8 @@ void write_key(const kernels::Pass& pass, std::vector<std::uint32_t>& key) {
     const kernels::Axis& axis = pass.axis[a];
     add(key, pass.dims[a]);
     add(key, pass.cell_max[a]);
-    add(key, axis.cell, axis.stops);
-    for (int s = 0; s < axis.stops; ++s) add(key, axis.sample[s]);
+    add(key, axis.cell, axis.count);
+    for (int s = 0; s < axis.count; ++s) add(key, axis.sample[s]);
   }
   add(key, pass.has_lines);
   if (pass.has_lines != 0) {
@@ -54,8 +54,8 @@ void write_key(const kernels::Pass& pass, std::vector<std::uint32_t>& key) {
   }
 }
 
-// The same field, not another one at the same address: a kept weak pointer holds its owner's place.
-// One that nobody owns is never known again.
+// Compares owners rather than addresses: a weak pointer keeps the control block of its owner from
+// being reused. A field without an owner never matches.
 bool same_field(const Field& kept, const std::shared_ptr<const data::Volume>& field) {
   return field.use_count() > 0 && !kept.owner_before(field) && !field.owner_before(kept);
 }
@@ -65,16 +65,16 @@ bool same_field(const Field& kept, const std::shared_ptr<const data::Volume>& fi
 struct SummaryCache::Entry {
   const kernels::Table* table = nullptr;
   std::vector<Field> fields;
-  std::vector<const data::Volume*> volumes;  // an owner may own more than one
+  std::vector<const data::Volume*> volumes;  // one owner may hold several volumes
   std::vector<std::uint32_t> key;
-  std::uint64_t used = 0;  // the frame
+  std::uint64_t used = 0;  // frame of the last use
   PassSummaries kept;
 
   [[nodiscard]] std::size_t bytes() const {
     return kept.bricks.capacity() * sizeof(KeptSummary) + kept.blank_regions.capacity();
   }
-  [[nodiscard]] bool shows(const PassPlan& pass) const;
-  void forget();
+  [[nodiscard]] bool has_fields_of(const PassPlan& pass) const;
+  void reset();
   void begin(const PassPlan& pass);
 };
 
@@ -88,7 +88,7 @@ void each_field(const PassPlan& pass, const Visit& visit) {
 
 }  // namespace
 
-bool SummaryCache::Entry::shows(const PassPlan& pass) const {
+bool SummaryCache::Entry::has_fields_of(const PassPlan& pass) const {
   std::size_t n = 0;
   bool same = true;
   each_field(pass, [&](const std::shared_ptr<const data::Volume>& field) {
@@ -98,7 +98,7 @@ bool SummaryCache::Entry::shows(const PassPlan& pass) const {
   return same && n == fields.size();
 }
 
-void SummaryCache::Entry::forget() { *this = Entry(); }
+void SummaryCache::Entry::reset() { *this = Entry(); }
 
 void SummaryCache::Entry::begin(const PassPlan& pass) {
   fields.clear();
@@ -108,12 +108,12 @@ void SummaryCache::Entry::begin(const PassPlan& pass) {
     volumes.push_back(field.get());
   });
   const kernels::Pass& kernel = pass.kernel;
-  const auto bricks = [](int stops) {
-    return (stops + kernels::brick_side - 1) / kernels::brick_side;
+  const auto bricks = [](int positions) {
+    return (positions + kernels::brick_side - 1) / kernels::brick_side;
   };
-  kept.u_bricks = bricks(kernel.axis[kernel.u].stops);
-  kept.v_bricks = bricks(kernel.axis[kernel.v].stops);
-  kept.layers = kernel.axis[kernel.major].stops;
+  kept.u_bricks = bricks(kernel.axis[kernel.u].count);
+  kept.v_bricks = bricks(kernel.axis[kernel.v].count);
+  kept.layers = kernel.axis[kernel.major].count;
   kept.regions = bricks(kept.layers);
   const std::size_t rows = static_cast<std::size_t>(kept.u_bricks) * kept.v_bricks;
   kept.bricks.assign(rows * kept.layers, KeptSummary());
@@ -139,7 +139,7 @@ std::size_t SummaryCache::bytes() const {
   return sum;
 }
 
-// An empty place, or the one used longest ago that this frame does not need.
+// Returns a new entry or, if the cache is full, the least recently used one not used by this frame.
 SummaryCache::Entry& SummaryCache::replaceable() {
   Entry* oldest = nullptr;
   for (const auto& entry : entries_) {
@@ -151,7 +151,7 @@ SummaryCache::Entry& SummaryCache::replaceable() {
   return *entries_.emplace_back(std::make_unique<Entry>());
 }
 
-// Until as many bytes more stay within the limit.
+// Resets the least recently used entries until `coming` more bytes stay within the limit.
 void SummaryCache::trim_storage(std::size_t coming) {
   while (bytes() + coming > bytes_max) {
     Entry* oldest = nullptr;
@@ -160,14 +160,14 @@ void SummaryCache::trim_storage(std::size_t coming) {
       if (held && (oldest == nullptr || entry->used < oldest->used)) oldest = entry.get();
     }
     if (oldest == nullptr) return;
-    oldest->forget();
+    oldest->reset();
   }
 }
 
 PassSummaries& SummaryCache::of(const PassPlan& pass, const kernels::Table& table) {
   write_key(pass.kernel, key_);
   for (const auto& entry : entries_) {
-    if (entry->table == &table && entry->key == key_ && entry->shows(pass)) {
+    if (entry->table == &table && entry->key == key_ && entry->has_fields_of(pass)) {
       entry->used = frame_;
       return entry->kept;
     }
@@ -176,13 +176,13 @@ PassSummaries& SummaryCache::of(const PassPlan& pass, const kernels::Table& tabl
   entry.used = frame_;
   std::size_t bricks = 1;
   for (int a = 0; a < 3; ++a) {
-    const auto stops = static_cast<std::size_t>(pass.kernel.axis[a].stops);
-    bricks *= a == pass.kernel.major ? stops : (stops + kernels::brick_side - 1) / 8;
+    const auto positions = static_cast<std::size_t>(pass.kernel.axis[a].count);
+    bricks *= a == pass.kernel.major ? positions : (positions + kernels::brick_side - 1) / 8;
   }
   const std::size_t needed = bricks * sizeof(KeptSummary);
-  // A place that held far more is not kept for so little.
+  // Release the storage of an entry that is far too large.
   if (entry.bytes() > 4 * needed + 65536) {
-    entry.forget();
+    entry.reset();
     entry.used = frame_;
   }
   trim_storage(needed > entry.bytes() ? needed - entry.bytes() : 0);

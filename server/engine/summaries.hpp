@@ -1,5 +1,6 @@
-// What bricks hold once samples below their tolerances are left out, kept between frames: no camera
-// changes it, so a view that turns need not read every sample again. 16 bytes a brick of 64 stops.
+// Contents of bricks after samples below the tolerances are removed. They do not depend on the
+// camera and are kept between frames, so that rotating a view does not read every sample again.
+// 16 bytes per brick of 64 kernel positions.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +14,7 @@
 namespace windsplat::engine {
 
 struct KeptSummary {
-  float weak_parts = 0;   // see kernels::BrickSummary
+  float weak_parts = 0;   // as in kernels::BrickSummary
   float thin_medium = 0;  // at a scale of 0
   float magnitude_max = 0;
   std::uint8_t lines = 0;
@@ -24,21 +25,21 @@ struct KeptSummary {
   static constexpr std::uint8_t unknown = 255;
   [[nodiscard]] bool known() const { return weak_lines != unknown; }
   [[nodiscard]] bool holds_any() const { return lines > 0 || splats > 0; }
-  // Something that a tolerance has to answer for.
+  // Whether a tolerance removed anything.
   [[nodiscard]] bool left_out_any() const { return weak_lines > 0 || thin_medium > 0; }
-  // Whether it neither draws nor leaves out anything that a tolerance would have to answer for.
+  // Whether the brick draws nothing and no tolerance removed anything.
   [[nodiscard]] bool blank() const { return known() && !holds_any() && !left_out_any(); }
 };
 
-// The summaries of one pass, by the places of bricks in the lattice, whatever the order of visit.
-// Frames fill in what they read. A region is a cube of 8 x 8 x 8 stops, 8 bricks deep.
+// The summaries of one pass by brick in lattice order, independent of the visit order. Each frame
+// adds those that it reads. A region is a cube of 8 x 8 x 8 kernel positions, 8 bricks deep.
 struct PassSummaries {
   int u_bricks = 0;
   int v_bricks = 0;
-  int layers = 0;   // stops along the major axis
+  int layers = 0;   // kernel positions along the major axis
   int regions = 0;  // along the major axis
   std::vector<KeptSummary> bricks;
-  std::vector<std::uint8_t> blank_regions;  // 1: every brick of it is known to be blank
+  std::vector<std::uint8_t> blank_regions;  // 1: every brick is known to be blank
 
   [[nodiscard]] std::size_t brick(int layer, int v, int u) const {
     return (static_cast<std::size_t>(layer) * v_bricks + v) * u_bricks + u;
@@ -46,16 +47,15 @@ struct PassSummaries {
   [[nodiscard]] std::size_t region(int layer, int v, int u) const {
     return brick(layer / kernels::brick_side, v, u);
   }
-  // Looks at the bricks of a region that was not blank so far.
+  // Tests the bricks of a region and records the result in blank_regions.
   bool find_blank(int region_layer, int v, int u);
 };
 
-// A few passes' summaries, those used longest ago replaced by new ones. A pass is known again by
-// its fields themselves (another one at the same address is another one) and by every number that a
-// summary depends on.
+// Least-recently-used cache of the summaries of a few passes. The key is the identity of the fields
+// (not merely their addresses, which may be reused) and every number that a summary depends on.
 class SummaryCache {
  public:
-  // At most this many passes, and no more than these bytes unless one frame alone needs more.
+  // The limit of bytes may be exceeded by the passes of a single frame.
   static constexpr std::size_t passes_max = 8;
   static constexpr std::size_t bytes_max = std::size_t{64} << 20U;
 
@@ -64,9 +64,9 @@ class SummaryCache {
   SummaryCache(const SummaryCache&) = delete;
   SummaryCache& operator=(const SummaryCache&) = delete;
 
-  // Before a frame's first pass.
+  // Call before the first pass of a frame.
   void begin_frame() { ++frame_; }
-  // Stays valid until the frame after.
+  // The reference is valid until the next frame begins.
   PassSummaries& of(const PassPlan& pass, const kernels::Table& table);
 
   [[nodiscard]] std::size_t bytes() const;
@@ -78,10 +78,10 @@ class SummaryCache {
 
   std::uint64_t frame_ = 0;
   std::vector<std::unique_ptr<Entry>> entries_;
-  std::vector<std::uint32_t> key_;  // of the pass looked for
+  std::vector<std::uint32_t> key_;  // of the requested pass
 };
 
-// The brick's summary, read from the fields.
+// Reads the fields of a brick and returns its summary.
 KeptSummary summarise(const kernels::Table& table, const kernels::Pass& in_order,
                       const kernels::Brick& brick);
 

@@ -15,7 +15,7 @@ using kernels::Brick;
 using kernels::Prepared;
 using kernels::Tile;
 
-// Of view depth, from the camera's depth origin.
+// View depths from the camera's depth origin.
 struct Interval {
   float front = 0, back = 0;
 };
@@ -80,8 +80,8 @@ class Sweep {
 
   void activate(const CancelToken& cancel) {
     for (; next_ < last_ && brick(next_).depth_first < slab_.back; ++next_) {
-      constexpr std::size_t bricks_between_looks = 64;
-      if (next_ % bricks_between_looks == 0 && cancel.cancelled()) return;
+      constexpr std::size_t bricks_between_checks = 64;
+      if (next_ % bricks_between_checks == 0 && cancel.cancelled()) return;
       const Brick& here = brick(next_);
       if (all_closed(tile_, here)) {
         count_occluded(here);
@@ -90,7 +90,7 @@ class Sweep {
       const std::int32_t slot = take_slot();
       table_.prepare(plan_.camera, plan_.passes[here.pass].kernel, here, tile_,
                      *space_.slots[slot]);
-      if (space_.slots[slot]->stops.count > 0) {
+      if (space_.slots[slot]->positions.count > 0) {
         space_.active.push_back({here.depth_last, slot, 0});
       } else {
         space_.free.push_back(slot);
@@ -107,14 +107,14 @@ class Sweep {
                         space_.active.end());
   }
 
-  // The kernels whose centres lie in the slab, one after the other.
+  // Draws the kernels whose centres lie in the slab, in order of depth.
   void draw_kernels() {
     space_.order.clear();
     for (const DepthEntry& entry : space_.active) {
-      const kernels::Stops& stops = space_.slots[entry.slot]->stops;
-      for (std::uint64_t left = stops.lines | stops.splats; left != 0; left &= left - 1U) {
+      const kernels::KernelPositions& positions = space_.slots[entry.slot]->positions;
+      for (std::uint64_t left = positions.lines | positions.splats; left != 0; left &= left - 1U) {
         const int l = std::countr_zero(left);
-        const float depth = stops.depth[l];
+        const float depth = positions.depth[l];
         if (depth >= slab_.front && depth < slab_.back) {
           space_.order.push_back({depth, entry.slot, l});
         }
@@ -123,7 +123,7 @@ class Sweep {
     stable_sort(space_.order, space_.spare,
                 [](const DepthEntry& a, const DepthEntry& b) { return a.depth < b.depth; });
     for (const DepthEntry& kernel : space_.order) {
-      table_.draw_prepared(plan_.camera, *space_.slots[kernel.slot], kernel.stop, tile_);
+      table_.draw_prepared(plan_.camera, *space_.slots[kernel.slot], kernel.position, tile_);
     }
   }
 

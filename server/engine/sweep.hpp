@@ -1,6 +1,6 @@
-// A tile's bricks by view depth: what the slab method does, and what a curved lattice needs, whose
-// samples no order of indexes puts front to back. Bricks are made ready when the sweep reaches them
-// and forgotten once it has passed them.
+// Composites the bricks of a tile in order of view depth: for the slab method, and for curved
+// lattices, whose samples have no front-to-back order by index. A brick is prepared when the sweep
+// reaches it and released once the sweep has passed it.
 #pragma once
 
 #include <array>
@@ -15,28 +15,28 @@
 
 namespace windsplat::engine {
 
-// A kernel by its place in depth.
+// A kernel and its view depth.
 struct DepthEntry {
   float depth = 0;
   std::int32_t slot = 0;
-  std::int32_t stop = 0;
+  std::int32_t position = 0;
 };
 
-// Splats that have been reached and not yet passed: records in memory that is used again, and for
-// each of the next slabs a list of those that wait for it, in order of arrival.
+// Splats that the sweep has reached and not yet passed: recycled records, and for each of the next
+// slabs a queue of the splats that start in it.
 struct WaitingSplats {
   static constexpr std::size_t slabs = 256;
   static constexpr std::uint32_t none = 0xFFFFFFFFU;
 
   std::vector<kernels::SplatRecord> records;
   std::vector<std::uint32_t> free;
-  std::vector<std::uint32_t> behind;       // of each record, who arrived after it
+  std::vector<std::uint32_t> behind;       // by record: the next one in its queue
   std::array<std::uint32_t, slabs> first;  // by slab, modulo
   std::array<std::uint32_t, slabs> last;
   std::size_t count = 0;
 };
 
-// Hits that wait for the same slab, and where more of them are.
+// Hits queued for the same slab, and the index of the next chunk of them.
 struct HitChunk {
   static constexpr std::uint32_t size = 63;
 
@@ -45,15 +45,14 @@ struct HitChunk {
   kernels::Hit hits[size];
 };
 
-// The same for lines, which wait block by block. A line's record is kept while it has hits that
-// wait.
+// The same for lines, which are queued by block. A record is kept while any of its hits is queued.
 struct WaitingLines {
   static constexpr std::size_t slabs = 32;
   static constexpr std::uint32_t none = 0xFFFFFFFFU;
 
   std::vector<kernels::RibbonRecord> records;
   std::vector<std::uint32_t> free;
-  std::vector<std::uint32_t> waiting;  // of each record, how many hits
+  std::vector<std::uint32_t> waiting;  // by record: number of queued hits
   std::vector<HitChunk> chunks;
   std::vector<std::uint32_t> free_chunks;
   std::array<std::uint32_t, slabs> first;  // by slab, modulo
@@ -61,27 +60,28 @@ struct WaitingLines {
   std::size_t count = 0;  // hits
 };
 
-// A worker's own memory, used for one tile after the other.
+// Storage of one worker, reused for every tile.
 struct SweepSpace {
-  // Curved lattices: bricks as they were made ready.
+  // Curved lattices: prepared bricks.
   std::vector<std::unique_ptr<kernels::Prepared>> slots;
   std::vector<std::int32_t> free;
-  std::vector<DepthEntry> active;  // a brick: its last depth and its slot
+  std::vector<DepthEntry> active;  // last depth and slot of each prepared brick
   std::vector<DepthEntry> order;
   std::vector<DepthEntry> spare;  // for sorting
   // Slabs.
   std::unique_ptr<kernels::Prepared> prepared;
   WaitingSplats splats;
   WaitingLines lines;
-  std::vector<std::uint32_t> here;          // splats in the slab at hand
+  std::vector<std::uint32_t> here;          // splats in the current slab
   AlignedVector<float> gathered;            // by slab, modulo
   std::vector<kernels::Hit> listed;         // of one brick
-  std::vector<kernels::Hit> hits;           // in the slab at hand
+  std::vector<kernels::Hit> hits;           // in the current slab
   std::vector<kernels::MetLine> met;        // the same by block
   std::vector<kernels::MetLine> spare_met;  // for sorting
 };
 
-// Calls visit(member) for the vectors that grow with what a tile holds, member(space) each.
+// Calls visit(member) for each vector that grows with the contents of a tile; member(space) returns
+// the vector.
 template <class Visit>
 void each_vector(const Visit& visit) {
   visit([](SweepSpace & s) -> auto& { return s.slots; });
@@ -105,14 +105,14 @@ void each_vector(const Visit& visit) {
   visit([](SweepSpace & s) -> auto& { return s.spare_met; });
 }
 
-// Between two checks of whether the tile is done or cancelled.
+// Slabs between two checks for opacity and cancellation.
 constexpr std::int64_t slabs_between_checks = 4;
 
-// True if every block of the tile that the brick may touch lets no light through any more.
+// True if every block of the tile that the brick may touch is opaque.
 bool all_closed(const kernels::Tile& tile, const kernels::Brick& brick);
 
-// Draws tile `index`; true if it ended early because it had become opaque. Cancelled, it returns
-// early and the tile is worthless. The bricks of the tile are sorted by their first depth.
+// Draws tile `index`, whose bricks must be sorted by their first depth. Returns true if it ended
+// early because the tile became opaque. After cancellation the tile is invalid.
 bool sweep_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
                 const CancelToken& cancel, std::size_t index, SweepSpace& space,
                 kernels::Tile& tile);

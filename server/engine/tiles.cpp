@@ -1,4 +1,4 @@
-// Draws tiles.
+// Scheduling, drawing and delivery of tiles.
 #include "server/engine/tiles.hpp"
 
 #include <algorithm>
@@ -20,9 +20,9 @@ using kernels::tile_blocks;
 
 constexpr std::size_t blocks_of_tile = static_cast<std::size_t>(tile_blocks) * tile_blocks;
 constexpr std::size_t row_floats = std::size_t{4} * kernels::tile_side;
-constexpr int rows_delivered = 8;  // at a time; even
+constexpr int rows_delivered = 8;  // per call of the sink; even
 
-// Every worker's, whichever of them come to draw a tile.
+// Reserves the storage of every worker, including those that draw no tile this time.
 void make_room(const RenderPlan& plan, std::vector<Workspace>& spaces) {
   for (Workspace& space : spaces) {
     space.blocks.resize(blocks_of_tile * block_floats);
@@ -34,7 +34,7 @@ void make_room(const RenderPlan& plan, std::vector<Workspace>& spaces) {
 // Blocks along a tile's width or height.
 int blocks_along(int pixels) { return (pixels + block_side - 1) / block_side; }
 
-// Every pixel of a row of blocks lets all light through.
+// Sets the pixels of a row of blocks to transparent black (transmittance 1).
 void clear_row(float* blocks, int count) {
   std::fill_n(blocks, static_cast<std::ptrdiff_t>(count) * block_floats, 0.0F);
   for (int b = 0; b < count; ++b) {
@@ -63,11 +63,11 @@ void open_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& t
   if (plan.perspective_medium) table.fill_rays(plan.camera, tile, space.rays.data());
 }
 
-std::int64_t stops_of(const Brick& brick) {
+std::int64_t positions_of(const Brick& brick) {
   return static_cast<std::int64_t>(brick.u_count) * brick.v_count;
 }
 
-// A tile's bricks in order, without those that touch closed blocks alone.
+// Iterates over the bricks of a tile in order, skipping those that touch closed blocks only.
 class OpenBricks {
  public:
   OpenBricks(const Bins& bins, std::size_t index, Tile& tile)
@@ -77,7 +77,7 @@ class OpenBricks {
     while (at_ < last_) {
       const Brick& brick = bins_.bricks[bins_.entries[at_++]];
       if (!all_closed(tile_, brick)) return &brick;
-      tile_.counters.occluded += stops_of(brick);
+      tile_.counters.occluded += positions_of(brick);
     }
     return nullptr;
   }
@@ -91,7 +91,6 @@ class OpenBricks {
 
 void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
                const CancelToken& cancel, std::size_t index, Tile& tile, TileWork& work) {
-  // Bricks between checks for cancellation.
   constexpr std::size_t bricks_between_checks = 16;
   OpenBricks bricks(bins, index, tile);
   const Brick* next = bricks.next();
@@ -105,7 +104,8 @@ void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& t
   work.stopped = table.count_open(tile) == 0;
 }
 
-// Block order -> rows, a few at a time, so that the sink finds them in the nearest cache.
+// Converts blocks to rows, a few at a time, so that they are still in the cache when the sink reads
+// them.
 void deliver_tile(const kernels::Table& table, const Tile& tile, AlignedVector<float>& rows,
                   TileSink sink) {
   for (int y = 0; y < tile.height; y += rows_delivered) {
@@ -117,7 +117,7 @@ void deliver_tile(const kernels::Table& table, const Tile& tile, AlignedVector<f
   }
 }
 
-// Longest first, so that no thread is left alone with a long tile at the end.
+// Tiles with bricks, most expensive first, so that the frame does not end with one long tile.
 void busy_tiles(const Bins& bins, std::vector<std::uint32_t>& order) {
   order.clear();
   for (std::size_t t = 0; t + 1 < bins.first.size(); ++t) {
@@ -128,8 +128,8 @@ void busy_tiles(const Bins& bins, std::vector<std::uint32_t>& order) {
   });
 }
 
-// Every worker's memory as large as the largest: which one meets the tile that needs most is a
-// matter of chance, and is not to decide when memory stops growing.
+// Grows the storage of every worker to that of the largest. Which worker draws the largest tile
+// depends on timing; without this, later frames of the same kind could still allocate.
 void level(std::vector<Workspace>& spaces) {
   if (spaces.size() < 2) return;
   const auto each = [&](const auto& member) {
@@ -203,7 +203,7 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
     work.pixel_updates += tile.counters.pixel_updates;
     work.exponentials += tile.counters.exponentials;
     work.tiles_stopped += tile.stopped ? 1 : 0;
-    // What is behind at most this much light is left out.
+    // Closed blocks omit only what lies behind at most this transmittance.
     if (tile.closed_blocks) work.stop_bound = static_cast<double>(plan.stop_transmittance);
   }
 }

@@ -1,5 +1,5 @@
-// Bins -> finished tiles: they are drawn on the pool, each by one thread, its bricks always in the
-// same order, so that the number of threads cannot change a bit of the picture.
+// Bins -> finished tiles, drawn by the thread pool: each tile by one thread and its bricks in a
+// fixed order, so that the picture does not depend on the number of threads.
 #pragma once
 
 #include "server/base/aligned_vector.hpp"
@@ -11,7 +11,7 @@
 
 namespace windsplat::engine {
 
-// A worker's own pixels, used for one tile after the other.
+// Pixels of one worker, reused for every tile.
 struct Workspace {
   AlignedVector<float> blocks;
   AlignedVector<float> rays;
@@ -19,22 +19,22 @@ struct Workspace {
   SweepSpace sweep;
 };
 
-// What a tile tells the report.
+// Results of a tile for the work report.
 struct TileWork {
   kernels::Counters counters{};
   bool stopped = false;
   bool closed_blocks = false;
 };
 
-// What draw_tiles needs and a caller keeps between frames.
+// Storage of draw_tiles that the caller keeps between frames.
 struct TileSpace {
   std::vector<std::uint32_t> order;
   std::vector<Workspace> workers;
   std::vector<TileWork> done;
 };
 
-// Every pixel of a tile with a brick goes to `sink` once. Counts go to `work`. Cancelled, it
-// returns early and what was delivered is worthless.
+// Delivers every pixel of a tile with bricks to `sink` once and adds the counts to `work`. After
+// cancellation the delivered pixels are invalid.
 void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
                 ThreadPool& pool, const CancelToken& cancel, TileSpace& space, TileSink sink,
                 WorkReport& work);

@@ -1,4 +1,4 @@
-// What the plan chose -> the words of the report.
+// Variant -> text of the report.
 #include "server/engine/work.hpp"
 
 namespace windsplat::engine {

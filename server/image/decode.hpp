@@ -1,4 +1,4 @@
-// JPEG bytes -> 8-bit sRGB, for measuring what an encoding costs.
+// JPEG bytes -> 8-bit sRGB, to measure the encoding error.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace windsplat::image {
 
-// 3 bytes a pixel, of a JPEG of that size. Errors: bad_data (no JPEG, or of another size).
+// 3 bytes per pixel. Errors: bad_data (not a JPEG, or not of this size).
 Result<Bytes> decode_jpeg(std::span<const std::uint8_t> jpeg, int width, int height);
 
-// What coding the picture cost: RMSE over linear R, G and B between its codes and the JPEG's
-// pixels. Chroma that the picture has halved already does not count. Errors: bad_data.
+// RMSE over linear R, G and B between the YCbCr codes of the picture and the pixels of its JPEG.
+// Does not include the error of chroma subsampling. Errors: bad_data.
 Result<double> encoding_error(const YccPicture& picture, std::span<const std::uint8_t> jpeg);
 
 }  // namespace windsplat::image

@@ -13,16 +13,16 @@ namespace windsplat::image {
 
 using Bytes = std::vector<std::uint8_t>;
 
-// 8-bit sRGB, 3 bytes a pixel, of the image over a linear background. Of what is cancelled not all.
+// 8-bit sRGB, 3 bytes per pixel, of the image over a linear background. Incomplete if cancelled.
 Bytes tone_map(std::span<const float> rgba, int width, int height,
                const std::array<float, 3>& background, const CancelToken& cancel = {});
 
 enum class Subsampling { s444, s420 };
 
-// quality 1..100. In one piece, from rounded codes.
+// quality 1..100. Not divided into strips; input is rounded to 8 bits.
 Result<Bytes> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height, int quality,
                           Subsampling subsampling);
-// Errors: cancelled, noticed within a few rows.
+// Errors: cancelled, checked every few rows.
 Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int height,
                          const CancelToken& cancel = {});
 // NPY 1.0, '<f4', shape (height, width, 4).

@@ -1,4 +1,4 @@
-// 8-bit RGB or planes of YCbCr -> JPEG by libjpeg-turbo; the only file that knows its compressor.
+// 8-bit RGB or planes of YCbCr -> JPEG by libjpeg-turbo.
 #include <turbojpeg.h>
 
 #include <algorithm>
@@ -55,7 +55,8 @@ Result<void> check(int width, int height, int quality) {
   return {};
 }
 
-// How a picture is cut, by its size alone: rows of MCUs a strip, the last one may have fewer.
+// Division of a picture into strips, by its size only: rows of MCUs per strip; the last strip may
+// have fewer.
 struct Cut {
   int mcu_columns = 0;
   int mcu_rows = 0;
@@ -64,7 +65,7 @@ struct Cut {
 };
 
 Cut cut_of(const YccPicture& picture) {
-  constexpr std::int64_t strip_pixels = 1 << 16;  // to begin a strip costs as much as a few hundred
+  constexpr std::int64_t strip_pixels = 1 << 16;  // overhead of a strip: a few hundred pixels
   constexpr int interval_max = 0xFFFF;            // MCUs
   Cut cut;
   cut.mcu_columns = picture.planes()[1].width / 8;
@@ -78,7 +79,7 @@ Cut cut_of(const YccPicture& picture) {
 }
 
 struct Strip {
-  std::unique_ptr<unsigned char[]> jpeg;  // left as it comes: what is not written is never resident
+  std::unique_ptr<unsigned char[]> jpeg;  // uninitialised: unused pages do not become resident
   std::size_t capacity = 0;
   std::size_t size = 0;
 };
@@ -86,14 +87,14 @@ struct Strip {
 }  // namespace
 
 struct JpegEncoder::State {
-  std::vector<Compressor> compressors;  // one a thread
+  std::vector<Compressor> compressors;  // by thread
   std::vector<Strip> strips;
   std::vector<std::span<const std::uint8_t>> pieces;
   std::vector<int> failed;  // by thread
 
-  // What the strips of one huge picture took is given back by the next smaller one.
+  // Releases the storage of a very large picture before a smaller one.
   void make_room(const Cut& cut, int mcu) {
-    // Of a picture of retained_pixels at 4:4:4, cut into as many strips as there may be.
+    // Storage of a picture of retained_pixels at 4:4:4 in the largest number of strips.
     const std::size_t kept = strips_max * tjBufSize(1920, 80, TJSAMP_444);
     const auto count = static_cast<std::size_t>(cut.strips);
     const std::size_t needed = count * tjBufSize(cut.mcu_columns * mcu, cut.strip_rows * mcu,
@@ -104,8 +105,8 @@ struct JpegEncoder::State {
     if (strips.size() < count) strips.resize(count);
   }
 
-  // The strip is told to be as wide as its MCUs, so that the library copies no row to pad it; but
-  // no edge longer than the library takes, which then repeats what the planes repeat.
+  // Passes the width in whole MCUs, so that the library does not copy rows for padding, up to its
+  // largest edge; beyond, its padding equals that of the planes.
   bool compress(const YccPicture& picture, const Cut& cut, int quality, int index,
                 const Compressor& compressor) {
     const int mcu = picture.mcu_side();

@@ -1,4 +1,4 @@
-// Planes of YCbCr -> one baseline JPEG, its strips coded side by side.
+// Planes of YCbCr -> one baseline JPEG, encoded as strips in parallel.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace windsplat::image {
 
-// Keeps compressors and buffers from one picture to the next. One picture at a time.
+// Keeps compressors and buffers between pictures. Not for concurrent use.
 class JpegEncoder {
  public:
   JpegEncoder();
@@ -18,9 +18,9 @@ class JpegEncoder {
   JpegEncoder(const JpegEncoder&) = delete;
   JpegEncoder& operator=(const JpegEncoder&) = delete;
 
-  // `bytes` is overwritten; its storage is used again. Strips follow from the picture's size alone,
-  // so that any number of threads gives the same bytes. quality 1..100. Errors: too_large, invalid,
-  // internal; cancelled, noticed between strips.
+  // Overwrites `bytes`, reusing its storage. The strips depend only on the picture size, so that
+  // the result is independent of the number of threads. quality 1..100. Errors: too_large, invalid,
+  // internal; cancelled, checked between strips.
   Result<void> encode(const YccPicture& picture, int quality, ThreadPool& pool, Bytes& bytes,
                       const CancelToken& cancel = {});
 

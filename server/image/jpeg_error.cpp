@@ -1,4 +1,4 @@
-// Codes as they went in against pixels as they come out, in linear light.
+// Comparison of encoded and decoded pixels in linear light.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-// JPEGs of strips -> one JPEG: segments are walked by their lengths, scans are copied as they are.
+// JPEGs of strips -> one JPEG: parses segments by their lengths and copies scans unchanged.
 #include "server/image/jpeg_parts.hpp"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ constexpr std::uint8_t huffman_tables = 0xC4;
 constexpr std::uint8_t start_of_scan = 0xDA;
 constexpr std::uint8_t quantization_tables = 0xDB;
 constexpr std::uint8_t restart_interval = 0xDD;
-constexpr std::uint8_t first_restart = 0xD0;  // of 8, in turn
+constexpr std::uint8_t first_restart = 0xD0;  // of 8, used cyclically
 constexpr std::uint8_t first_application = 0xE0;
 constexpr std::uint8_t last_application = 0xEF;
 
@@ -66,8 +66,8 @@ Result<Layout> layout_of(std::span<const std::uint8_t> jpeg) {
   return broken("has no scan");
 }
 
-// Up to their scans' data the strips differ in the frame's height alone: what one's tables code the
-// other's would not read.
+// Whether two strips have the same headers but for the height; different tables could not be
+// decoded in one scan.
 bool same_header(std::span<const std::uint8_t> first, const Layout& a,
                  std::span<const std::uint8_t> other, const Layout& b) {
   if (a.frame != b.frame || a.scan != b.scan || a.data != b.data) return false;

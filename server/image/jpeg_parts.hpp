@@ -15,11 +15,11 @@ struct Stitching {
   int strip_mcus = 0;  // of every strip but the last, which may be shorter; at most 65535
 };
 
-// Every strip is a baseline JPEG of one scan without restarts, all of the same tables, and as wide
-// as the picture in MCUs. The result begins with the first one's header, told the picture's size
-// and the restart interval, and has a restart marker between any two strips: there the prediction
-// of DC starts anew, as it did in each strip. Errors: internal (a strip is not such a JPEG,
-// or its header is not the first one's but for the height).
+// Each strip must be a baseline JPEG of one scan without restart intervals, with the same tables
+// and the width of the picture in MCUs. The result has the header of the first strip with the size
+// of the picture and the restart interval, and a restart marker between strips, where DC prediction
+// restarts. Errors: internal (a strip is not such a JPEG, or its header differs from the first by
+// more than the height).
 Result<void> stitch(std::span<const std::span<const std::uint8_t>> strips,
                     const Stitching& stitching, Bytes& bytes);
 

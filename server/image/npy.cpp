@@ -1,5 +1,5 @@
 // Linear RGBA -> NPY 1.0: magic and version, a Python dict padded so that the values start on a
-// multiple of 64 bytes, then the values as they are.
+// multiple of 64 bytes, then the values.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -11,7 +11,7 @@
 namespace windsplat::image {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "values are written as they stand");
+static_assert(std::endian::native == std::endian::little, "values are written without conversion");
 
 constexpr std::array<std::uint8_t, 8> magic_and_version{0x93, 'N', 'U', 'M', 'P', 'Y', 1, 0};
 constexpr std::size_t alignment = 64;

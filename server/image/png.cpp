@@ -1,4 +1,4 @@
-// 8-bit RGB -> PNG by libpng; the only file that knows it. Compression is set for speed.
+// 8-bit RGB -> PNG by libpng, with fast compression.
 #include <png.h>
 
 #include <array>
@@ -13,13 +13,13 @@
 namespace windsplat::image {
 namespace {
 
-constexpr int compression_level = 1;                        // zlib's
-constexpr std::size_t chunk_bytes = std::size_t{64} << 10;  // of an IDAT, at most
+constexpr int compression_level = 1;                        // of zlib
+constexpr std::size_t chunk_bytes = std::size_t{64} << 10;  // largest IDAT
 
 enum class Fate { done, cancelled, failed };
 
-// libpng reports an error by longjmp, which runs no destructors. Whatever it may leave, from
-// write() on, has no object with one; the PNG so far and the reason are kept here.
+// libpng reports errors by longjmp, which skips destructors. Functions from write() on therefore
+// have no objects with destructors; the output and the error message are members.
 class PngWriter {
  public:
   PngWriter()
@@ -46,8 +46,8 @@ class PngWriter {
     png_set_write_fn(png_, this, &append, nullptr);
     png_set_compression_level(png_, compression_level);
     png_set_compression_buffer_size(png_, chunk_bytes);
-    // Thin lines on an even ground: subtracting the left or upper pixel gains most of what trying
-    // every filter on every row would.
+    // For thin lines on a uniform background the sub and up filters are nearly as good as adaptive
+    // selection of all filters.
     png_set_filter(png_, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB | PNG_FILTER_UP);
     png_set_IHDR(png_, info_, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 8,
                  PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_BASE,
@@ -87,14 +87,18 @@ class PngWriter {
   }
 
   [[noreturn]] static void on_error(png_structp png, const char* message) {
-    auto& kept = static_cast<PngWriter*>(png_get_error_ptr(png))->message_;
-    kept[std::string_view(message).copy(kept.data(), kept.size() - 1)] = '\0';
+    keep(png, message);
     png_longjmp(png, 1);
   }
-  static void on_warning(png_structp /*png*/, const char* /*message*/) {}
+  // A library of another version than the headers' warns, and then makes nothing.
+  static void on_warning(png_structp png, const char* message) { keep(png, message); }
+  static void keep(png_structp png, const char* message) {
+    auto& kept = static_cast<PngWriter*>(png_get_error_ptr(png))->message_;
+    kept[std::string_view(message).copy(kept.data(), kept.size() - 1)] = '\0';
+  }
 
   Bytes bytes_;
-  std::array<char, 128> message_{"out of memory"};  // of what fails without a message
+  std::array<char, 128> message_{"out of memory"};  // for failures without a message
   bool out_of_memory_ = false;
   png_structp png_;
   png_infop info_;

@@ -1,5 +1,5 @@
-// Premultiplied linear RGBA over a linear background -> 8-bit sRGB, through a table that rounds as
-// the formula does.
+// Premultiplied linear RGBA over a linear background -> 8-bit sRGB, by a table with the exact
+// rounding of the formula.
 #include "server/image/tone_map.hpp"
 
 #include <array>
@@ -12,16 +12,16 @@
 namespace windsplat::image {
 namespace {
 
-constexpr double linear_end = 0.0031308;  // below it the curve is a line of slope 12.92
+constexpr double linear_end = 0.0031308;  // the curve is linear below, with slope 12.92
 
 double linear_from_srgb(double encoded) {
   const double linear = encoded / 12.92;
   return linear <= linear_end ? linear : std::pow((encoded + 0.055) / 1.055, 2.4);
 }
 
-// Linear values fall into even bins that are narrower than a code is anywhere (the curve is
-// steepest at 0: 12.92 * 255 = 3295 codes a unit). So a bin holds at most one border between two
-// codes, and one comparison finds the side.
+// Linear values are divided into uniform bins narrower than any code (the curve is steepest at 0:
+// 12.92 * 255 = 3295 codes per unit). A bin thus contains at most one border between codes, and one
+// comparison selects the code.
 class CodeTable {
  public:
   CodeTable() {
@@ -49,7 +49,7 @@ class CodeTable {
  private:
   static constexpr int bins = 4096;
 
-  std::array<float, 256> border_{};  // the least value of the next code
+  std::array<float, 256> border_{};  // smallest value of the next code
   std::array<std::uint8_t, bins + 1> code_at_start_{};
 };
 
@@ -58,7 +58,7 @@ const CodeTable& code_table() {
   return table;
 }
 
-constexpr std::size_t pixels_between_looks = 1U << 18;  // a millisecond or two
+constexpr std::size_t pixels_between_checks = 1U << 18;  // 1 to 2 ms
 
 }  // namespace
 
@@ -83,7 +83,7 @@ Bytes tone_map(std::span<const float> rgba, int width, int height,
   const float* in = rgba.data();
   std::uint8_t* out = rgb.data();
   for (std::size_t i = 0; i < pixels; ++i, in += 4, out += 3) {
-    if (i % pixels_between_looks == 0 && cancel.cancelled()) break;
+    if (i % pixels_between_checks == 0 && cancel.cancelled()) break;
     const float transmittance = 1.0F - in[3];
     out[0] = table(in[0] + transmittance * background[0]);
     out[1] = table(in[1] + transmittance * background[1]);

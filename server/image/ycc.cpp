@@ -1,4 +1,4 @@
-// Parts of a picture -> rows of codes -> planes, their edges repeated to whole MCUs.
+// Parts of a picture -> rows of codes -> planes, padded to whole MCUs.
 #include "server/image/ycc.hpp"
 
 #include <algorithm>
@@ -15,7 +15,7 @@ std::uint8_t* at(const YccPicture::Plane& plane, int x, int y) {
   return plane.samples + static_cast<std::ptrdiff_t>(y) * plane.width + x;
 }
 
-// row_pixels pixels of a row: where fewer are left, a copy that goes on with the last one.
+// Returns row_pixels pixels of a row; if fewer are left, a copy padded with the last one.
 class RowReader {
  public:
   const float* operator()(const float* row, int count) {
@@ -30,7 +30,7 @@ class RowReader {
   alignas(64) std::array<float, row_floats> filled_;
 };
 
-// Past the last code it is repeated: of chroma the last pair's mean, not the last pixel's.
+// Pads with the last code; for subsampled chroma that is the mean of the last pair.
 void store(const RowCodes& codes, int count, int stored, std::uint8_t* to) {
   std::copy_n(codes.data(), count, to);
   if (stored > count) std::fill_n(to + count, stored - count, codes[count - 1]);
@@ -73,7 +73,7 @@ void YccPicture::put(const Part& part) {
                    (part.height % 2 == 0 || bottom)));
   for (int x = 0; x < part.width; x += row_pixels) {
     const int count = std::min(row_pixels, part.width - x);
-    // The last pixels of a row fill its last MCU, which may begin before them.
+    // The last pixels of a row are padded to the end of their MCU.
     const bool last = right && x + count == part.width;
     const int stored = last ? planes_[0].width - (part.x + x) : count;
     if (subsampling_ == Subsampling::s420) {

@@ -1,4 +1,4 @@
-// Linear premultiplied RGBA, part by part -> planes of 8-bit YCbCr as a JPEG codes them.
+// Parts of linear premultiplied RGBA -> planes of 8-bit YCbCr for JPEG encoding.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace windsplat::image {
 
-// Pixels of a picture: linear premultiplied RGBA, 4 floats a pixel, `stride` floats a row.
+// Pixels of a picture: linear premultiplied RGBA, 4 floats per pixel, `stride` floats per row.
 struct Part {
   int x = 0;  // of its left upper pixel in the picture
   int y = 0;
@@ -31,12 +31,12 @@ class YccPicture {
     int height = 0;
   };
 
-  // Every pixel becomes the linear background. Storage is kept up to retained_pixels.
+  // Sets every pixel to the linear background. Keeps storage for up to retained_pixels.
   void reset(int width, int height, Subsampling subsampling,
              const std::array<float, 3>& background);
 
-  // Pixels over the background of reset(). Disjoint parts may come from several threads at once,
-  // cut at any column and row of 4:4:4, at even ones of 4:2:0.
+  // Composites pixels over the background of reset(). Disjoint parts may be written concurrently;
+  // with 4:2:0 they must begin at even columns and rows.
   void put(const Part& part);
 
   [[nodiscard]] int width() const { return width_; }
@@ -47,7 +47,7 @@ class YccPicture {
   [[nodiscard]] const std::array<Plane, 3>& planes() const { return planes_; }
 
  private:
-  // Pixels of `part` from its column x on: `count` are there, `stored` columns are written.
+  // Converts `count` pixels of `part` from its column x on, and writes `stored` columns.
   void put_full(const Part& part, int x, int count, int stored);
   void put_halved(const Part& part, int x, int count, int stored);
   void repeat_last_row(int x, int x_end);

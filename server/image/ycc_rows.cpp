@@ -1,5 +1,5 @@
-// Linear pixels over a background -> sRGB values -> luma and chroma, compiled once an instruction
-// set. Those with a fused multiply-add agree to the bit, the others within a code.
+// Linear pixels over a background -> sRGB values -> luma and chroma, compiled once per instruction
+// set. Targets with fused multiply-add agree exactly, the others within one code.
 #include "server/image/ycc_rows.hpp"
 
 #undef HWY_TARGET_INCLUDE
@@ -34,8 +34,8 @@ HWY_INLINE Floats times_plus(Floats a, Floats b, float c) {
 }
 
 // 255 times the encoded value, within 1/12 of a code of the formula (srgb_from_linear): the power
-// is a polynomial in the square root, of the least greatest error on [0.0031308, 1]. It is not
-// rounded to a code before luma and chroma are made of it.
+// is approximated by a minimax polynomial in the square root on [0.0031308, 1]. The value is not
+// rounded before luma and chroma are computed.
 HWY_INLINE Floats srgb_value(Floats linear) {
   const Floats zero = hn::Zero(tag);
   const Floats above_zero = hn::IfThenElseZero(hn::Gt(linear, zero), linear);  // also of NaN
@@ -75,7 +75,7 @@ HWY_INLINE Colours colours_at(const float* rgba, const Background& background) {
   Floats blue;
   Floats alpha;
   hn::LoadInterleaved4(tag, rgba, red, green, blue, alpha);
-  // Nothing is there: much of many tiles.
+  // Shortcut for empty pixels, which are frequent.
   const hn::RebindToUnsigned<Tag> bits;
   if (hn::AllTrue(bits, hn::Eq(hn::Or(hn::Or(hn::BitCast(bits, red), hn::BitCast(bits, green)),
                                       hn::Or(hn::BitCast(bits, blue), hn::BitCast(bits, alpha))),

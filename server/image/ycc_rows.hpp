@@ -1,4 +1,4 @@
-// Rows of linear pixels -> codes of YCbCr, as wide as the processor's vectors are.
+// Rows of linear pixels -> YCbCr codes, by SIMD in the width of the processor.
 #pragma once
 
 #include <array>
@@ -6,7 +6,7 @@
 
 namespace windsplat::image {
 
-constexpr int row_pixels = 64;  // worked on together
+constexpr int row_pixels = 64;  // converted together
 
 using RowCodes = std::array<std::uint8_t, row_pixels>;
 
@@ -25,8 +25,8 @@ struct YccRow {
 // `rgba`: row_pixels linear premultiplied pixels, put over the background.
 void convert_row(const float* rgba, const Background& background, YccRow& codes);
 
-// Two rows at a time; the chroma of 2 x 2 pixels is that of their mean sRGB value. Half of each
-// array of chroma is used.
+// Converts two rows; the chroma of 2 x 2 pixels is that of their mean sRGB value. Only the first
+// half of the chroma arrays is used.
 struct YccPair {
   alignas(64) RowCodes upper;
   alignas(64) RowCodes lower;

@@ -1,4 +1,4 @@
-// Forecasts of a view's settings in, its curve of error against time out.
+// Forecasts of the settings of a view -> its curve of error against time.
 #pragma once
 
 #include "protocol/measurements.hpp"
@@ -7,8 +7,8 @@
 
 namespace windsplat::quality {
 
-// A point for each setting that is allowed for the completed view, which is none of method
-// reference: the fastest first, and which of them its budget or error picks.
+// One point per setting allowed for the completed view, fastest first, and the one chosen by its
+// budget or error limit. The method of the view must not be reference.
 protocol::ForecastDescription curve(const protocol::View& completed, const Forecasts& forecasts);
 
 }  // namespace windsplat::quality

@@ -7,10 +7,11 @@
 namespace windsplat::quality {
 namespace {
 
-// Where the laws' factors stand: a picture 480 pixels high on which a line is a tenth as long as
-// the picture is high, heads of 1.4 pixels, a medium of optical depth 1 along a line's length.
+// The conditions at which the laws equal their factors: a picture 480 pixels high, lines a tenth of
+// its height long with a radius of 1.4 pixels, a medium of optical depth 1 along the length of a
+// line.
 constexpr double pixels_high_of_laws = 480;
-constexpr double height_of_laws = 10;  // lengths of a line
+constexpr double height_of_laws = 10;  // in lengths of a line
 constexpr double radius_of_laws = 1.4;
 
 // error = factor (height / length)^by_height (pixels high)^by_pixels.
@@ -72,7 +73,7 @@ Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoin
           law.scatter};
 }
 
-// In proportion to pixels and, with an equal part, to samples.
+// Proportional to pixels, with a constant share for samples.
 Expected expected_ms(const Kind&, const Setting& setting, const Viewpoint& viewpoint) {
   constexpr double us_per_pixel = 0.06;
   const double pixels = static_cast<double>(viewpoint.width) * viewpoint.pixels_high;

@@ -1,5 +1,5 @@
-// How errors and times of settings go with what a view shows and where it is seen from: the laws
-// behind priors and forecasts.
+// Fitted laws of the error and time of settings as functions of scene and viewpoint; the priors of
+// all forecasts.
 #pragma once
 
 #include "server/quality/setting.hpp"
@@ -7,7 +7,7 @@
 
 namespace windsplat::quality {
 
-// Standard deviations of the logarithm of what is measured over what is expected.
+// Standard deviations of the logarithm of measured over expected values.
 struct Scatter {
   double signature = 0;  // between scene signatures, the same at every viewpoint
   double viewpoint = 0;  // between viewpoints of one signature
@@ -19,14 +19,15 @@ struct Expected {
   Scatter scatter;
 };
 
-// Below it neither a picture's error nor its truth is known, for both are of single precision: what
-// is less is told as this.
+// Resolution of measured errors: pictures and references are of single precision. Smaller errors
+// are reported as this value.
 inline constexpr double error_least = 1e-5;
 
-// Whether the setting's picture is of the view's own size and data, but the view itself averages.
+// Whether the setting draws the view in its own size and level, but that level already averages
+// samples.
 bool is_averaged(const Setting& setting, const Viewpoint& viewpoint);
 
-// Linear RMSE, and milliseconds of drawing on the machine that the laws were fitted on.
+// Linear RMSE, and milliseconds of rendering on the machine on which the laws were fitted.
 Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
 Expected expected_ms(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
 

@@ -1,4 +1,4 @@
-// The front of error against time, asked for one point.
+// Selection of a setting from the trade-off of error against time.
 #include "server/quality/pick.hpp"
 
 #include <algorithm>
@@ -8,9 +8,9 @@
 namespace windsplat::quality {
 namespace {
 
-// Costs scatter: a setting fits where it is expected to take this share of the budget.
+// Times vary: a setting fits if its expected time is at most this share of the budget.
 constexpr double headroom = 0.92;
-constexpr double spreads = 1.65;  // of a normal distribution 95 of 100 lie below
+constexpr double spreads = 1.65;  // standard deviations to the 95 % quantile
 
 struct Candidate {
   std::size_t setting = 0;
@@ -44,8 +44,8 @@ Choice pick(const protocol::View& view, const Forecasts& forecasts,
     return is_allowed(setting, view) && pixels_at(view, setting) <= pixels_most;
   });
   Candidate keeps_both;
-  Candidate least_error;  // of those within the budget
-  Candidate fastest;      // of all
+  Candidate least_error;  // within the time budget
+  Candidate fastest;
   for (std::size_t i = 0; i < settings_count; ++i) {
     const bool large = pixels_at(view, settings[i]) > pixels_most;
     if (!is_allowed(settings[i], view) || (any_small && large)) continue;

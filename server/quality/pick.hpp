@@ -1,4 +1,4 @@
-// Forecasts and what is aimed at in, the setting to draw by out.
+// Forecasts and limits of time and error -> the setting to render with.
 #pragma once
 
 #include <array>
@@ -11,15 +11,14 @@
 
 namespace windsplat::quality {
 
-// With both: the fastest setting that keeps the error within the budget, else the one within the
-// budget that errs least.
+// With both limits: the fastest setting that satisfies both, otherwise the one within the time
+// budget that has the least error.
 struct Aim {
   std::optional<double> budget_ms;
   std::optional<double> max_error;  // linear RMSE
 };
 
-// An error that 95 of 100 frames keep, as far as errors scatter as forecast; and one that 5 of 100
-// stay below.
+// The 95 % and 5 % quantiles of the error by the forecast distribution.
 double error_bound(const Forecast& forecast);
 double error_low(const Forecast& forecast);
 
@@ -28,15 +27,15 @@ double pixels_at(const protocol::View& view, const Setting& setting);
 
 struct Choice {
   std::size_t setting = 0;
-  bool fits = false;  // the budget; else it is the fastest there is
+  bool fits = false;  // within the budget; otherwise the fastest setting was chosen
 };
 
-// Of the settings that are allowed for the view, and whose pictures have at most `pixels_most`
-// pixels unless none has. `ms`: what each is expected to take.
+// Chooses among the settings allowed for the view with at most `pixels_most` pixels, or among all
+// allowed ones if none is that small. `ms`: expected time of each setting.
 Choice pick(const protocol::View& view, const Forecasts& forecasts,
             const std::array<double, settings_count>& ms, const Aim& aim, double pixels_most);
 
-// By the forecasts' own times and without a limit of pixels.
+// The same with the forecast times and without a limit of pixels.
 Choice pick(const protocol::View& view, const Forecasts& forecasts, const Aim& aim);
 
 }  // namespace windsplat::quality

@@ -1,4 +1,4 @@
-// Settings by name, by size and by view.
+// Sizes and admissibility of settings.
 #include "server/quality/setting.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// The settings among which a frame's is chosen, and a view drawn at one of them.
+// The settings that the server may choose for a frame.
 #pragma once
 
 #include <array>
@@ -10,9 +10,9 @@
 
 namespace windsplat::quality {
 
-// How a frame is drawn where the server may choose. Widths and heights are the view's times
-// 2^(-half_level / 2); of the data an axis is halved `coarser` times more than the picture asks
-// for; slabs are as thick as the view's over `thinner`.
+// Width and height are those of the view times 2^(-half_level / 2); axes of the data are halved
+// `coarser` times more than the picture requires; slabs have the thickness of the view divided by
+// `thinner`.
 struct Setting {
   protocol::MethodName method = protocol::MethodName::kernel;
   int half_level = 0;
@@ -21,7 +21,7 @@ struct Setting {
   bool operator==(const Setting&) const = default;
 };
 
-// Strides and other stops are not among them: at equal time their error is larger
+// Strides and other stop transmittances are not included: at equal time their error is larger
 // (docs/benchmarks/error.md).
 inline constexpr std::array<Setting, 26> settings{{
     {protocol::MethodName::kernel, 0, 0},  {protocol::MethodName::kernel, 1, 0},
@@ -40,22 +40,22 @@ inline constexpr std::array<Setting, 26> settings{{
 }};
 inline constexpr std::size_t settings_count = settings.size();
 
-// An edge of the picture at a half level, at least one pixel.
+// Width or height of the picture at a half level, at least one pixel.
 int edge_at(int edge, int half_level);
-// The finest level of whole halvings that is not finer than a half level: the wire's.
+// The level in whole halvings, as transmitted in frame headers; rounded down.
 inline std::uint8_t wire_level(int half_level) { return static_cast<std::uint8_t>(half_level / 2); }
 
-// The view by the setting's method and slabs, unless it asks for the reference. Its picture's size
-// stays: that is the encoding's.
+// The view with the method and slab thickness of the setting, unless its method is reference. The
+// picture size is left to the encoder.
 protocol::View at_setting(protocol::View view, const Setting& setting);
 
-// The setting that draws the view as it stands: one of `settings`, method reference apart.
+// Index of the setting that renders the view unchanged; for method reference that of kernel.
 std::size_t own_setting(const protocol::View& view);
 std::optional<std::size_t> index_of(const Setting& setting);
 
-// Whether the server may draw the view so: a view that names method kernel is not drawn by slabs
-// unless it asks for an error; slabs thinner than the wire's limit are left out, and pictures with
-// an edge of less than 64 pixels unless it is the view's own.
+// Whether the server may use the setting for the view. A view of method kernel is rendered by slabs
+// only if it limits the error; slabs below the protocol's least thickness are excluded, as are
+// reduced pictures with an edge below 64 pixels, and coarser data if the view requires full detail.
 bool is_allowed(const Setting& setting, const protocol::View& view);
 
 }  // namespace windsplat::quality

@@ -12,18 +12,18 @@ namespace windsplat::quality {
 namespace {
 
 constexpr double ms_least = 1e-3;
-constexpr double near = 0.5;  // a study as near as this would tell nothing new
+constexpr double near = 0.5;  // distance below which a calibration run adds no information
 constexpr std::size_t nearest_max = 6;
 
 // Linear RMSE of a JPEG of quality 90, the median of the samples (docs/benchmarks/error.md).
 constexpr double encoding_error_of_lines = 9.5e-3;
 constexpr double encoding_error_of_media = 2.4e-3;
-// What halving the chroma adds to it, whatever the quality.
+// Additional error of chroma subsampling, independent of quality.
 constexpr double half_chroma = 0.95;
 
-// Of what quantisation loses at quality 90. Its steps follow libjpeg's rule: 50 / q below 50,
-// 2 - q / 50 above; what they lose saturates, for most of a picture's detail is gone at last.
-double quantised(int quality) {
+// Quantisation error relative to that at quality 90. Quantisation steps follow libjpeg: 50 / q
+// below 50, 2 - q / 50 above. The error saturates once most detail is lost.
+double relative_quantisation_error(int quality) {
   const auto lost = [](double q) {
     constexpr double saturation = 0.36;
     const double step = q >= 50 ? 2.02 - q / 50 : 50 / std::max(q, 1.0);
@@ -32,35 +32,36 @@ double quantised(int quality) {
   return lost(quality) / lost(90);
 }
 
-// The logarithm of a measured value over what was expected of it.
-struct Told {
+// The logarithm of a measured over an expected value.
+struct Observation {
   const Viewpoint* viewpoint = nullptr;
   double log_ratio = 0;
-  double apart = 0;  // from the sight that is asked for
+  double apart = 0;  // distance from the requested viewpoint
 };
 
 struct Kriged {
   double log_ratio = 0;
-  double variance = 0;  // of what would be measured
+  double variance = 0;  // of a new measurement
 };
 
 double squared(double x) { return x * x; }
 
-// C = style^2 + sight^2 exp(-distance) + noise^2 [the same measurement]; the mean is known to be 0.
-// Solves C w = c by Cholesky's factors, row by row, and the forward half of c along with it.
-Kriged krige(const std::vector<Told>& told, const Scatter& scatter) {
-  const double of_style = squared(scatter.signature);
-  const double of_sight = squared(scatter.viewpoint);
+// C = signature^2 + viewpoint^2 exp(-distance) + noise^2 [same measurement]; the mean is 0. Solves
+// C w = c by Cholesky factorisation, with the forward substitution of c row by row.
+Kriged krige(const std::vector<Observation>& observations, const Scatter& scatter) {
+  const double of_signature = squared(scatter.signature);
+  const double of_viewpoint = squared(scatter.viewpoint);
   std::array<std::array<double, nearest_max>, nearest_max> factor{};
   std::array<double, nearest_max> asked{};
   std::array<double, nearest_max> known{};
   Kriged out;
-  out.variance = of_style + of_sight + squared(scatter.noise);
-  for (std::size_t i = 0; i < told.size(); ++i) {
-    asked[i] = of_style + of_sight * std::exp(-told[i].apart);
-    known[i] = told[i].log_ratio;
+  out.variance = of_signature + of_viewpoint + squared(scatter.noise);
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    asked[i] = of_signature + of_viewpoint * std::exp(-observations[i].apart);
+    known[i] = observations[i].log_ratio;
     for (std::size_t j = 0; j <= i; ++j) {
-      double c = of_style + of_sight * std::exp(-distance(*told[i].viewpoint, *told[j].viewpoint));
+      double c = of_signature + of_viewpoint * std::exp(-distance(*observations[i].viewpoint,
+                                                                  *observations[j].viewpoint));
       if (i == j) c += squared(scatter.noise);
       for (std::size_t k = 0; k < j; ++k) c -= factor[i][k] * factor[j][k];
       factor[i][j] = i == j ? std::sqrt(c) : c / factor[j][j];
@@ -77,14 +78,14 @@ Kriged krige(const std::vector<Told>& told, const Scatter& scatter) {
   return out;
 }
 
-void keep_nearest(std::vector<Told>& told) {
-  if (told.size() <= nearest_max) return;
-  std::stable_sort(told.begin(), told.end(),
-                   [](const Told& a, const Told& b) { return a.apart < b.apart; });
-  told.resize(nearest_max);
+void keep_nearest(std::vector<Observation>& observations) {
+  if (observations.size() <= nearest_max) return;
+  std::stable_sort(observations.begin(), observations.end(),
+                   [](const Observation& a, const Observation& b) { return a.apart < b.apart; });
+  observations.resize(nearest_max);
 }
 
-// A picture is less to encode the farther away it is seen from.
+// Encoding error decreases with the distance of the eye.
 double encoded_detail(const Viewpoint& viewpoint) { return 1 / std::sqrt(viewpoint.height); }
 
 }  // namespace
@@ -116,7 +117,7 @@ void Table::add(std::size_t setting, const Viewpoint& viewpoint, const Measured&
   std::deque<Entry>& entries = entries_[setting];
   entries.push_back(entry);
   if (entries.size() <= measurements_max) return;
-  // Times come from calibration runs only: they outlast entries that have only an error.
+  // Times come from calibration runs only, so entries without one are removed first.
   const auto oldest = std::find_if(entries.begin(), entries.end() - 1,
                                    [](const Entry& kept) { return !kept.log_ms; });
   entries.erase(oldest == entries.end() - 1 ? entries.begin() : oldest);
@@ -126,19 +127,19 @@ Forecast Table::forecast(std::size_t setting, const Viewpoint& viewpoint) const 
   const Setting& how = settings[setting];
   const bool averaged = is_averaged(how, viewpoint);
   Forecast out = prior(kind_, how, viewpoint);
-  std::vector<Told> errors;
-  std::vector<Told> times;
+  std::vector<Observation> errors;
+  std::vector<Observation> times;
   for (const Entry& entry : entries_[setting]) {
     const double apart = distance(entry.viewpoint, viewpoint);
-    // Averages err by another law than what is drawn of every sample.
+    // Averaged data follow another law than data in full detail.
     if (entry.log_error && entry.averaged == averaged) {
       errors.push_back({&entry.viewpoint, *entry.log_error, apart});
     }
     if (entry.log_ms) times.push_back({&entry.viewpoint, *entry.log_ms, apart});
   }
   if (!errors.empty()) {
-    out.measured =
-        std::any_of(errors.begin(), errors.end(), [](const Told& t) { return t.apart < near; });
+    out.measured = std::any_of(errors.begin(), errors.end(),
+                               [](const Observation& o) { return o.apart < near; });
     keep_nearest(errors);
     const Kriged kriged = krige(errors, expected_error(kind_, how, viewpoint).scatter);
     out.error = std::max(error_least, out.error * std::exp(kriged.log_ratio));
@@ -187,7 +188,7 @@ void Table::end_study(bool complete) {
 }
 
 void Table::add_encoding(int quality, const Viewpoint& viewpoint, double error) {
-  const double known = error / (quantised(quality) * encoded_detail(viewpoint));
+  const double known = error / (relative_quantisation_error(quality) * encoded_detail(viewpoint));
   if (!(known > 0) || !std::isfinite(known)) return;
   encoding_error_ = encoding_error_ ? std::sqrt(*encoding_error_ * known) : known;
 }
@@ -195,7 +196,7 @@ void Table::add_encoding(int quality, const Viewpoint& viewpoint, double error) 
 double Table::encoding_error(int quality, bool full_chroma, const Viewpoint& viewpoint) const {
   const double prior = kind_.lines ? encoding_error_of_lines : encoding_error_of_media;
   const double at_90 = encoding_error_ ? *encoding_error_ * encoded_detail(viewpoint) : prior;
-  return at_90 * std::hypot(quantised(quality), full_chroma ? 0 : half_chroma);
+  return at_90 * std::hypot(relative_quantisation_error(quality), full_chroma ? 0 : half_chroma);
 }
 
 }  // namespace windsplat::quality

@@ -1,4 +1,4 @@
-// Error against time of the settings, for one style of picture: measurements in, forecasts out.
+// Error and time of the settings for one scene signature: measurements -> forecasts.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@
 
 namespace windsplat::quality {
 
-// Of one setting at one sight. Errors are linear RMSE over premultiplied RGBA at the view's size,
-// times milliseconds of drawing.
+// A measurement of one setting at one viewpoint. Errors are linear RMSE over premultiplied RGBA at
+// the size of the view, times are milliseconds of rendering.
 struct Measured {
   std::optional<double> error;
   std::optional<double> ms;
@@ -22,39 +22,38 @@ struct Forecast {
   double error = 0;   // the expected one, geometric mean
   double spread = 0;  // standard deviation of its logarithm
   double ms = 0;
-  bool timed = false;     // else `ms` is only in proportion to the other settings'
-  bool measured = false;  // the error was, at a sight so near that a study would tell nothing new
+  bool timed = false;     // false: `ms` is only relative to the other settings
+  bool measured = false;  // the error was measured at a viewpoint near enough
 };
 using Forecasts = std::array<Forecast, settings_count>;
 
-// What is told of a style that nothing was measured of: laws fitted to many views of the samples.
+// The forecast without measurements: laws fitted to many views of the samples.
 Forecast prior(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
 
-// Measurements of one style. The newest of each setting are kept.
+// Measurements of one scene signature; keeps the newest of each setting.
 class Table {
  public:
-  static constexpr std::size_t measurements_max = 24;  // of a setting
+  static constexpr std::size_t measurements_max = 24;  // per setting
   static constexpr std::size_t studies_max = 16;
 
   explicit Table(const Kind& kind) : kind_(kind) {}
 
   void add(std::size_t setting, const Viewpoint& viewpoint, const Measured& measured);
 
-  // Of all settings. Times that were not measured are guessed in proportion to those that were.
+  // Forecasts of all settings. Times without measurements are estimated from those with.
   [[nodiscard]] Forecasts forecasts(const Viewpoint& viewpoint) const;
-  // The prior, and how far from it the nearest measurements were: simple kriging of the logarithms'
-  // differences, which correlate by how near sights are, and beyond that by being of one style. The
-  // spread is the kriging's own.
+  // The prior corrected by the nearest measurements: simple kriging of the logarithms of measured
+  // over expected values, with a covariance that decays with the distance of viewpoints to a
+  // constant part of the signature. The spread is the kriging standard deviation.
   [[nodiscard]] Forecast forecast(std::size_t setting, const Viewpoint& viewpoint) const;
 
-  // A study of all settings at this sight: whether it would tell something new, and that it was
-  // begun.
+  // Whether a calibration run at this viewpoint would add information; begin and end of one.
   [[nodiscard]] bool wants_study(const Viewpoint& viewpoint) const;
   void begin_study(const Viewpoint& viewpoint);
   void end_study(bool complete);
 
-  // A JPEG's own error, linear RMSE: as image::encoding_error measures it, of quantisation alone;
-  // and what is told, with half the chroma that is lost before it.
+  // Error of JPEG encoding, linear RMSE. add_encoding takes the quantisation error measured by
+  // image::encoding_error; encoding_error adds that of chroma subsampling.
   void add_encoding(int quality, const Viewpoint& viewpoint, double error);
   [[nodiscard]] double encoding_error(int quality, bool full_chroma,
                                       const Viewpoint& viewpoint) const;
@@ -62,7 +61,7 @@ class Table {
  private:
   struct Entry {
     Viewpoint viewpoint;
-    // Logarithms of what was measured over what was expected.
+    // Logarithms of measured over expected values.
     std::optional<double> log_error;
     std::optional<double> log_ms;
     bool averaged = false;

@@ -1,4 +1,4 @@
-// Styles by their keys, the least recently used forgotten.
+// Least-recently-used cache of tables by scene signature.
 #include "server/quality/tables.hpp"
 
 #include <algorithm>
@@ -13,7 +13,7 @@ Table& Tables::table_of(const SceneSignature& signature) {
   return tables_.front().second;
 }
 
-// In front then.
+// Moves the table found to the front.
 const Table* Tables::find(const SceneSignature& signature) {
   const auto known = std::find_if(tables_.begin(), tables_.end(), [&](const auto& kept) {
     return kept.first.key == signature.key;

@@ -1,4 +1,4 @@
-// The tables of all styles that were looked at lately, shared by every session. Any thread.
+// The tables of recently used scene signatures, shared by all sessions. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -14,21 +14,21 @@ namespace windsplat::quality {
 
 class Tables {
  public:
-  static constexpr std::size_t styles_max = 64;  // the least recently used one goes first
+  static constexpr std::size_t styles_max = 64;  // scene signatures; least recently used go first
 
-  // A style without a key has the prior of its kind, and nothing is kept of it.
+  // A signature without a key yields the prior of its kind, and nothing is stored for it.
   Forecasts forecasts(const SceneSignature& signature, const Viewpoint& viewpoint);
   Forecast forecast(const SceneSignature& signature, std::size_t setting,
                     const Viewpoint& viewpoint);
   void add(const SceneSignature& signature, std::size_t setting, const Viewpoint& viewpoint,
            const Measured& measured);
 
-  // True once where a study of the style at this sight is wanted and none is under way: the caller
-  // then makes it, and says when it has ended.
+  // True if a calibration run at this viewpoint is due and none is in progress. The caller must
+  // then run it and call end_study.
   bool begin_study(const SceneSignature& signature, const Viewpoint& viewpoint);
   void end_study(const SceneSignature& signature, bool complete);
 
-  // Its data is another now.
+  // Removes the tables of a dataset whose data changed.
   void forget(const std::string& dataset);
 
   void add_encoding(const SceneSignature& signature, int quality, const Viewpoint& viewpoint,
@@ -37,12 +37,12 @@ class Tables {
                         const Viewpoint& viewpoint);
 
  private:
-  // Under the mutex. Looking makes no table: what is only looked at pushes none out.
+  // Require the mutex. Only table_of creates tables, so that queries evict none.
   Table& table_of(const SceneSignature& signature);
   [[nodiscard]] const Table* find(const SceneSignature& signature);
 
   std::mutex mutex_;
-  std::list<std::pair<SceneSignature, Table>> tables_;  // the one used last in front
+  std::list<std::pair<SceneSignature, Table>> tables_;  // most recently used first
 };
 
 }  // namespace windsplat::quality

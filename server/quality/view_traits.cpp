@@ -1,4 +1,4 @@
-// Views told apart by style and sight.
+// View -> scene signature and viewpoint.
 #include "server/quality/view_traits.hpp"
 
 #include <algorithm>
@@ -10,12 +10,12 @@ namespace windsplat::quality {
 namespace {
 
 constexpr double radians_per_degree = 0.017453292519943295;
-// Apart by this much, sights are at a distance of 1.
+// Differences that correspond to a distance of 1.
 constexpr double height_scale = 0.5;     // of the logarithm of heights
 constexpr double pixels_scale = 1;       // of the logarithm of pixels
 constexpr double direction_scale = 1.2;  // radians
 
-// Of a line's length of the densest medium; 0 where it is not known.
+// Optical depth of the densest medium along the length of a line; 0 if unknown.
 double depth_of(const protocol::View& view) {
   if (!view.scalars || !view.vector.length) return 0;
   double extinction = 0;
@@ -54,7 +54,7 @@ Viewpoint viewpoint_of(const protocol::View& view, const Viewpoint& otherwise) {
 
 namespace {
 
-// As the samples were found to err by each rule at stride 1.
+// Errors of the compositing methods, measured on the samples at stride 1.
 double error_of_rule(protocol::Compositing compositing) {
   switch (compositing) {
     case protocol::Compositing::analytic:
@@ -71,7 +71,7 @@ double error_of_rule(protocol::Compositing compositing) {
   return 0;
 }
 
-// By rays that stop while they still let T through: up to T times what would have shone there.
+// Rays that end at transmittance T miss up to T times the light behind.
 double error_of_stop(double transmittance) {
   constexpr double shine = 0.04;
   return shine * std::max(0.0, transmittance - stop_of_the_truth);

@@ -1,4 +1,4 @@
-// What angles are measured in: views and grids say degrees, functions take radians.
+// Conversion of degrees, used by views and grids, to radians.
 #pragma once
 
 #include <numbers>

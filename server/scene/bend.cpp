@@ -1,4 +1,4 @@
-// Columns and levels -> places; places -> mean cells and the box.
+// Columns and levels -> positions -> mean cells and the box.
 #include "server/scene/bend.hpp"
 
 #include <algorithm>
@@ -37,7 +37,7 @@ data::Columns columns_of(const data::Grid& grid) {
   return columns;
 }
 
-// As many even coordinates as the axis has, over what the columns span.
+// Uniform coordinates over the range of the columns, as many as the axis has.
 void span_evenly(const std::vector<double>& values, data::Axis& axis, AxisKind kind) {
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
   const std::size_t count = axis.coordinates.size();
@@ -48,7 +48,7 @@ void span_evenly(const std::vector<double>& values, data::Axis& axis, AxisKind k
   axis.kind = kind;
 }
 
-// World units per degree and the degree at the origin, along one axis of an even lattice.
+// World units per degree and the degree at the origin, along one axis of a uniform lattice.
 struct Affine {
   double scale = 0;
   double centre = 0;
@@ -63,7 +63,7 @@ Affine map_of(const data::Axis& axis, const std::vector<double>& world) {
   return map;
 }
 
-// What every sample's height is in the straight lattice's world, masked ones at their level's mean.
+// World height of every sample; masked heights are replaced by the mean of their level.
 class Elevations {
  public:
   Elevations(const Lattice& straight, const Heights* heights,
@@ -90,8 +90,8 @@ class Elevations {
   Affine map_;
 };
 
-// Bottom and top of the box, raw heights: half a mean cell beyond the extreme samples. Empty where
-// there is but one level at one height.
+// Bottom and top of the box as raw heights: half a mean cell beyond the extreme samples. Empty for
+// a single level at constant height.
 std::optional<std::array<double, 2>> extent_of(const Heights& heights, const data::Axis& means) {
   double low = static_cast<double>(heights.values->range[0]);
   double high = static_cast<double>(heights.values->range[1]);
@@ -104,7 +104,7 @@ std::optional<std::array<double, 2>> extent_of(const Heights& heights, const dat
   return std::array{low, high};
 }
 
-// Edge vectors of every sample's cell, as scene.hpp defines them.
+// Edge vectors of the cells of samples, as defined in scene.hpp.
 class Cells {
  public:
   explicit Cells(const Lattice& lattice) : lattice_(lattice) {
@@ -116,7 +116,7 @@ class Cells {
     const std::array<float, 3>& p = (*lattice_.places)[n];
     return {p[0], p[1], p[2]};
   }
-  // index: that of sample n along axis a, which has more than one sample.
+  // index: index of sample n along axis a, which must have more than one sample.
   [[nodiscard]] glm::dvec3 edge(std::size_t n, std::size_t a, int index) const {
     const bool first = index == 0;
     const bool last = index + 1 == lattice_.dims[a];
@@ -141,7 +141,7 @@ void for_samples(const std::array<int, 3>& dims, const Body& body) {
   }
 }
 
-// spacing[a]: the mean length of the cells' edges by their index along axis a; positions follow,
+// Sets spacing[a] to the mean edge lengths by index along axis a, and positions accordingly,
 // centred on 0.
 void measure(Lattice& lattice, std::size_t a) {
   const Cells cells(lattice);
@@ -164,7 +164,7 @@ void measure(Lattice& lattice, std::size_t a) {
   lattice.spacing[a] = std::move(sums);
 }
 
-// An axis of one sample is as thick as the thinnest of the others.
+// An axis of one sample gets the smallest thickness of the others.
 void thin_axes(Lattice& lattice) {
   double thinnest = std::numeric_limits<double>::infinity();
   for (std::size_t a = 0; a < 3; ++a) {
@@ -175,8 +175,8 @@ void thin_axes(Lattice& lattice) {
   }
 }
 
-// The box of all cells, each the parallelepiped of its edges. Along an axis of one sample a cell is
-// taken to reach as far in every direction.
+// The bounding box of all cells, each the parallelepiped of its edges. The edge along an axis of
+// one sample is extended in every direction.
 void set_box(Lattice& lattice) {
   const Cells cells(lattice);
   glm::dvec3 low(std::numeric_limits<double>::infinity());
@@ -197,7 +197,7 @@ void set_box(Lattice& lattice) {
   lattice.box_max = high;
 }
 
-// Moves and scales everything so that the box is centred on the origin and its longest edge is 2.
+// Translates and scales so that the box is centred on the origin and its longest edge is 2.
 void settle(Lattice& lattice, std::vector<std::array<float, 3>>& places) {
   const glm::dvec3 centre = 0.5 * (lattice.box_min + lattice.box_max);
   const glm::dvec3 edge = lattice.box_max - lattice.box_min;
@@ -216,13 +216,13 @@ void settle(Lattice& lattice, std::vector<std::array<float, 3>>& places) {
   lattice.box_max = 0.5 * scale * edge;
 }
 
-// Radii of a shell that ends at 1, by the share of its height.
+// Radii of a shell of outer radius 1, by relative height.
 struct Shell {
   double inner = 1;
   [[nodiscard]] double radius(double share) const { return inner + share * (1.0 - inner); }
 };
 
-// One level alone is as thick as its columns are apart, and no thicker than a shell of many.
+// A single level has the thickness of the distance of its columns, at most that of a full shell.
 Shell shell_of(const Lattice& straight, const data::Grid& even, double vertical_scale,
                bool one_height) {
   Shell shell{1.0 / (1.0 + shell_share * vertical_scale)};
@@ -262,7 +262,7 @@ Places on_sphere(const Lattice& straight, const data::Columns& columns,
   return places;
 }
 
-// columns: null where they stand along the axes.
+// columns: null if the columns lie along the axes.
 Places on_map(const Lattice& straight, const data::Grid& even, const data::Columns* columns,
               const Elevations& elevations) {
   Affine map_x = map_of(even.axes[0], straight.positions[0]);
@@ -286,7 +286,7 @@ Places on_map(const Lattice& straight, const data::Grid& even, const data::Colum
   return places;
 }
 
-// Levels as distances from the shell's middle.
+// Converts levels to distances from the middle of the shell.
 void set_radii(const Shell& shell, Lattice& lattice) {
   const double height = lattice.box_max.z - lattice.box_min.z;
   for (std::size_t k = 0; k < lattice.positions[2].size(); ++k) {
@@ -300,7 +300,7 @@ Result<void> check_cells(const Lattice& lattice) {
   for (const std::vector<double>& spacing : lattice.spacing) {
     for (const double width : spacing) {
       if (!(width > 0) || !std::isfinite(width)) {
-        return make_error(ErrorKind::bad_data, "neighbouring columns stand at the same place");
+        return make_error(ErrorKind::bad_data, "neighbouring columns have equal positions");
       }
     }
   }
@@ -316,9 +316,9 @@ Result<void> check_mapping(const data::Grid& grid, GeometryMapping mapping) {
   if (mapping == GeometryMapping::sphere && along_axes) return {};
   return make_error_at(ErrorKind::invalid, "/geometry/mapping",
                        mapping == GeometryMapping::sphere
-                           ? "sphere needs longitudes and latitudes, which this dataset lacks"
-                           : "curvilinear needs longitudes and latitudes that are 2-D and have no "
-                             "gaps, which this dataset lacks");
+                           ? "sphere requires longitudes and latitudes, which this dataset lacks"
+                           : "curvilinear requires 2-D longitudes and latitudes without gaps, "
+                             "which this dataset lacks");
 }
 
 Result<data::Grid> grid_with_heights(const data::Grid& grid, const Heights& heights) {
@@ -340,10 +340,11 @@ Result<data::Grid> grid_with_heights(const data::Grid& grid, const Heights& heig
       sum += value;
       ++count;
     }
-    if (count == 0) return no_heights("level " + std::to_string(k) + " has no heights");
+    if (count == 0) return no_heights("level " + std::to_string(k) + " has only masked heights");
     axis.coordinates[k] = sum / static_cast<double>(count);
     if (k > 0 && !(axis.coordinates[k] > axis.coordinates[k - 1])) {
-      return no_heights("level " + std::to_string(k) + " is on average not above the one below it");
+      return no_heights("level " + std::to_string(k) +
+                        " is not above the level below it on average");
     }
   }
   return out;

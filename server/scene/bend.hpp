@@ -1,5 +1,5 @@
-// Lattices whose samples do not stand in straight rows: terrain, curvilinear maps, the globe. Grid
-// and heights in, a place for every sample out.
+// Curved lattices: terrain, curvilinear maps and the globe. Grid and heights -> a position for
+// every sample.
 #pragma once
 
 #include <array>
@@ -13,8 +13,8 @@
 
 namespace windsplat::scene {
 
-// The rectilinear lattice of the axes alone. vertical_extent: raw coordinates of the bottom and top
-// of the box instead of the outermost cells' edges.
+// The rectilinear lattice of the axes. vertical_extent: raw coordinates of the bottom and top of
+// the box in place of the outermost cell edges.
 Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryView& geometry,
                                const std::optional<std::array<double, 2>>& vertical_extent);
 
@@ -25,7 +25,7 @@ Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryV
 Result<Lattice> bend_lattice(const data::Grid& grid, const protocol::GeometryView& geometry,
                              const Heights* heights);
 
-// Errors: invalid at /geometry/mapping when the grid lacks the longitudes and latitudes for it.
+// Errors: invalid at /geometry/mapping if the grid lacks the necessary longitudes and latitudes.
 Result<void> check_mapping(const data::Grid& grid, protocol::GeometryMapping mapping);
 
 // The grid with the mean heights of its levels as vertical axis. Errors: invalid at

@@ -1,4 +1,4 @@
-// View -> Camera, and the way back: from angles and zoom to an eye that frames the box.
+// View -> Camera; angles -> an eye position that frames the box.
 #include "server/scene/camera.hpp"
 
 #include <algorithm>
@@ -12,13 +12,13 @@ namespace windsplat::scene {
 
 namespace {
 
-constexpr double margin = 1.04;         // the picture is this much wider than the box
-constexpr double distance_max = 5e5;    // world units: well inside what a view may say
-constexpr double parallel_sine = 1e-6;  // smallest angle between up and the view, as its sine
+constexpr double margin = 1.04;         // size of the picture relative to the box
+constexpr double distance_max = 5e5;    // world units, well within the limits of a view
+constexpr double parallel_sine = 1e-6;  // sine of the least angle between up and view direction
 constexpr double near_min = 1e-4;
 constexpr double near_max = 1e-2;
-constexpr std::size_t outline_samples = 8192;  // of each end of a bent lattice
-constexpr double aside_min = 0.05;             // world units: nearer, a box is about the origin
+constexpr std::size_t outline_samples = 8192;  // of each end of a curved lattice
+constexpr double aside_min = 0.05;             // world units; nearer boxes count as centred
 
 glm::dvec3 to_glm(const protocol::Vec3& v) { return {v[0], v[1], v[2]}; }
 protocol::Vec3 from_glm(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
@@ -33,8 +33,8 @@ std::array<glm::dvec3, 8> corners(const Lattice& lattice) {
   return points;
 }
 
-// Calls visit(point) with what must be in the picture: the box's corners, of a bent lattice samples
-// all over it.
+// Calls visit(point) with the points to frame: the corners of the box, or samples of a curved
+// lattice.
 template <class Visit>
 void each_outline_point(const Lattice& lattice, const Visit& visit) {
   if (!lattice.places) {
@@ -44,7 +44,7 @@ void each_outline_point(const Lattice& lattice, const Visit& visit) {
   const auto& places = *lattice.places;
   const std::size_t layer =
       static_cast<std::size_t>(lattice.dims[0]) * static_cast<std::size_t>(lattice.dims[1]);
-  // Bottom and top level alone: what lies between them is seldom farther out.
+  // Only the bottom and top level; those between are rarely farther out.
   for (const std::size_t first : {std::size_t{0}, places.size() - layer}) {
     const std::size_t step = std::max<std::size_t>(1, layer / outline_samples);
     for (std::size_t n = 0; n < layer; n += step) {
@@ -54,7 +54,7 @@ void each_outline_point(const Lattice& lattice, const Visit& visit) {
   }
 }
 
-// Half a cell: how far beyond its samples a bent lattice reaches.
+// Half a cell, the extent of a curved lattice beyond its samples.
 double outline_reach(const Lattice& lattice) {
   double reach = 0;
   for (std::size_t a = 0; lattice.places && a < 3; ++a) {
@@ -63,7 +63,7 @@ double outline_reach(const Lattice& lattice) {
   return reach;
 }
 
-// Nothing nearer than half a cell is worth a line that fills the picture.
+// Near plane at half a cell: lines nearer than that would fill the picture.
 double near_plane(const Lattice& lattice) {
   double cell = near_max;
   for (int a = 0; a < 3; ++a) {
@@ -98,7 +98,7 @@ Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dv
     const double x = std::abs(glm::dot(p, frame.right)) + reach;
     const double y = std::abs(glm::dot(p, frame.up)) + reach;
     const double depth = glm::dot(p, frame.forward);
-    // The corner stands distance + depth before the eye and must lie within both slopes.
+    // The corner lies at view depth distance + depth and must be within both slopes.
     const double needed = std::max({x / slope_x, y / slope_y, 0.01 * diagonal}) - depth;
     framing.distance = std::max(framing.distance, needed);
     framing.height = std::max({framing.height, 2.0 * margin * y, 2.0 * margin * x / aspect});
@@ -135,18 +135,18 @@ Result<Camera> resolve_camera(const protocol::View& completed, const Lattice& la
   const glm::dvec3 view_line = to_glm(from.target.value()) - camera.eye;
   const double distance = glm::length(view_line);
   if (!(distance > 1e-9)) {
-    return make_error_at(ErrorKind::invalid, "/camera/eye", "lies on the target");
+    return make_error_at(ErrorKind::invalid, "/camera/eye", "equals the target");
   }
   camera.forward = view_line / distance;
   const glm::dvec3 up = to_glm(from.up);
   const double up_length = glm::length(up);
   if (!(up_length > 1e-9)) {
-    return make_error_at(ErrorKind::invalid, "/camera/up", "has no length");
+    return make_error_at(ErrorKind::invalid, "/camera/up", "is zero");
   }
   const glm::dvec3 right = glm::cross(camera.forward, up / up_length);
   const double sine = glm::length(right);
   if (!(sine > parallel_sine)) {
-    return make_error_at(ErrorKind::invalid, "/camera/up", "is parallel to the view");
+    return make_error_at(ErrorKind::invalid, "/camera/up", "is parallel to the view direction");
   }
   camera.right = right / sine;
   camera.up = glm::cross(camera.right, camera.forward);

@@ -1,4 +1,4 @@
-// Where the eye stands: framing a box, orbiting it, and the engine's camera from a view's.
+// Camera placement: framing a box, orbits, and the resolved camera of a view.
 #pragma once
 
 #include <array>
@@ -12,19 +12,19 @@ namespace windsplat::scene {
 inline constexpr double default_azimuth = 0;     // degrees: from the south, looking north
 inline constexpr double default_elevation = 35;  // degrees above the horizon
 
-// The azimuth from which a view begins: default_azimuth, or opposite a part of the globe.
+// The azimuth of default views: default_azimuth, or facing the region if it is part of a globe.
 double front_azimuth(const Lattice& lattice);
 
-// Right, up and forward of an orbit's eye; forward points at the target. Azimuth 0 looks north,
-// positive azimuth moves the eye eastward, elevation is above the horizon; degrees. Straight up or
-// down (within 0.1 degrees), up is where forward points at the same azimuth from the side.
+// Axes of an orbit camera; forward points at the target. Azimuth 0 looks north, positive azimuth
+// moves the eye eastward, elevation is above the horizon; degrees. Within 0.1 degrees of the
+// vertical, up is the horizontal forward direction of that azimuth.
 struct OrbitFrame {
   glm::dvec3 right, up, forward;
 };
 OrbitFrame orbit_frame(double azimuth, double elevation);
 
-// What shows the whole box (of a bent lattice: its samples) with a small margin when looking along
-// `frame` at `target`.
+// The distance and height that show the whole box (for a curved lattice: its samples) with a small
+// margin when looking along `frame` at `target`.
 struct Framing {
   double distance;  // from eye to target, world units
   double height;    // of the picture at the target, world units, orthographic
@@ -37,12 +37,12 @@ Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dv
 void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double elevation,
            double zoom);
 
-// A completed view's camera. Errors: invalid with a pointer (eye on the target; up parallel to the
-// view or without a length).
+// The camera of a completed view. Errors: invalid with a pointer (eye equal to target; up parallel
+// to the view direction or zero).
 Result<Camera> resolve_camera(const protocol::View& completed, const Lattice& lattice);
 
-// View distances, along forward, of the box's nearest and farthest corner; the nearest is at least
-// the near plane in perspective.
+// View depths of the nearest and farthest corner of the box; in perspective at least the near
+// plane.
 std::array<double, 2> view_depths(const Camera& camera, const Lattice& lattice);
 
 }  // namespace windsplat::scene

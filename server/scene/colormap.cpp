@@ -1,4 +1,5 @@
-// Colour maps: name -> sRGB stops -> entries interpolated in OKLab, linear or as sRGB codes.
+// Colour maps: name -> sRGB control points -> entries interpolated in OKLab, linear or as sRGB
+// codes.
 #include "server/scene/colormap.hpp"
 
 #include <algorithm>
@@ -22,13 +23,13 @@ struct Stops {
   std::vector<std::uint32_t> codes;  // 0xrrggbb
   Spacing spacing = Spacing::uniform;
   std::vector<Rgb> lab{};    // the same in OKLab
-  std::vector<double> at{};  // where each stands, 0 to 1
+  std::vector<double> at{};  // position of each, 0 to 1
 };
 
 // viridis, magma, inferno, plasma (S. van der Walt, N. Smith) and cividis (Nunez, Anderton,
-// Renslow) are in the public domain (CC0), here by their values at every tenth or ninth. The others
-// are windsplat's own; their stops are spaced by how far apart they look, so that equal differences
-// of values are equal differences of colour (the compass apart, whose quarters are the bearings').
+// Renslow) are in the public domain (CC0), sampled at every tenth or ninth. The others are original
+// to windsplat; their control points are spaced by perceptual distance, so that equal differences
+// of values are equal differences of colour (except compass, whose quarters are fixed bearings).
 std::vector<Stops> coded() {
   return {
       {"viridis",
@@ -114,7 +115,8 @@ double distance(const Rgb& a, const Rgb& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-// Evenly, or by the way through OKLab; of a diverging map its middle stays in the middle.
+// Positions of the control points: uniform, or by distance in OKLab; the centre of a diverging map
+// remains at 0.5.
 std::vector<double> places(const Stops& stops) {
   const std::size_t last = stops.lab.size() - 1;
   std::vector<double> at(last + 1);
@@ -156,7 +158,7 @@ const Stops* find_stops(std::string_view name) {
   return nullptr;
 }
 
-// Linear entries of a known map, each as `as_entry` makes it.
+// Entries of a known map, converted from linear by `as_entry`.
 template <class Entry>
 auto interpolate(std::string_view name, int count, const Entry& as_entry) {
   const Stops* stops = find_stops(name);

@@ -1,4 +1,4 @@
-// Colour maps by name: a few sRGB stops each, interpolated in OKLab.
+// Colour maps by name: a few sRGB control points each, interpolated in OKLab.
 #pragma once
 
 #include <array>

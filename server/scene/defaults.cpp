@@ -1,4 +1,4 @@
-// Fields -> ranges, maps and opacity for a first picture.
+// Fields -> default ranges, colour maps and extinctions.
 #include "server/scene/defaults.hpp"
 
 #include <algorithm>
@@ -17,12 +17,12 @@ namespace {
 
 constexpr std::size_t quantile_samples_max = std::size_t{1} << 15U;
 constexpr double length_spacings = 5.0;
-constexpr double coverage = 3.0;     // of the box's picture by lines
-constexpr double line_share = 0.75;  // of the full length, over the lines that are drawn
-constexpr double value_max = 1e38;   // a view's numbers end here
+constexpr double coverage = 3.0;     // of the projected box by lines
+constexpr double line_share = 0.75;  // mean length of the drawn lines relative to full length
+constexpr double value_max = 1e38;   // limit of numbers in a view
 
-// A kind of scalar: words that tell it, as part of its standard or long name or its own name, and
-// short names that must match whole. Earlier kinds are better media.
+// A kind of scalar: words that identify it as part of its names, and short names that must match
+// exactly. Earlier kinds are preferred as media.
 struct Kind {
   std::vector<std::string_view> words;
   std::vector<std::string_view> names;
@@ -63,8 +63,8 @@ bool is_body(const data::FieldInfo& field) {
   return std::find(names.begin(), names.end(), lower(field.name)) != names.end();
 }
 
-// Index of the field's kind; kinds().size() if it is of none. Thresholds of cloud cover and the
-// like in the sky are masses or shares: a temperature, height or wind in a cloud is not the cloud.
+// Index of the kind of a field; kinds().size() if none matches. Other quantities of clouds, such as
+// temperature, height or wind, are excluded.
 std::size_t kind_of(const data::FieldInfo& field) {
   const std::string name = lower(field.name);
   const std::string text = name + " " + lower(field.standard_name) + " " + lower(field.long_name);
@@ -82,7 +82,7 @@ std::size_t kind_of(const data::FieldInfo& field) {
   return kinds().size();
 }
 
-// The samples that are shown, by their place in the volume.
+// Indices of the samples that are shown.
 class SampleOrder {
  public:
   SampleOrder(const std::array<int, 3>& dims, const std::optional<Slice>& slice) {
@@ -100,7 +100,7 @@ class SampleOrder {
 
  private:
   std::size_t all_ = 1;
-  std::size_t length_ = 1;  // of the axis that the slice is across
+  std::size_t length_ = 1;  // of the axis normal to the slice
   std::size_t stride_ = 1;
   std::size_t sample_ = 0;
 };
@@ -114,7 +114,7 @@ void for_some_samples(const data::Volume& volume, const std::optional<Slice>& sl
   const std::size_t samples = order.count();
   const std::size_t count = std::min(samples, quantile_samples_max);
   for (std::size_t n = 0; n < count; ++n) {
-    // Steps of the golden ratio meet no period of the lattice.
+    // Golden-ratio steps avoid aliasing with periods of the lattice.
     const double turn = static_cast<double>(n) * 0.6180339887498949;
     const double share = turn - std::floor(turn);
     const std::size_t at =
@@ -143,10 +143,10 @@ protocol::Range pick(std::vector<double>& values, double low, double high) {
   return {lower, at(high)};
 }
 
-// Steps to round numbers to that a person will read, for values up to `most`, which is > 0.
+// Increment for rounding to readable numbers, for values up to `most` > 0.
 double readable_grain(double most) { return std::pow(10.0, std::floor(std::log10(most))) / 20.0; }
 
-// A range that a view may hold and a table may divide by.
+// A range within the limits of a view and of nonzero width.
 protocol::Range sound_range(double low, double high) {
   low = std::clamp(low, -value_max, value_max);
   high = std::clamp(high, -value_max, value_max);
@@ -183,7 +183,7 @@ protocol::Range height_range(const Lattice& lattice) {
 
 protocol::Range default_magnitude_range(const data::Volume& volume) {
   double top = quantiles(volume, 0.0, 0.98)[1];
-  // A flow that is still nearly everywhere is measured by its strongest part.
+  // For a flow that is almost zero nearly everywhere, use the maximum.
   if (!(top > 1e-3 * static_cast<double>(volume.range[1]))) {
     top = static_cast<double>(volume.range[1]);
   }
@@ -195,13 +195,13 @@ double default_min_magnitude(const protocol::VectorView& vector, const data::Vol
                              const Lattice& lattice, const std::optional<Slice>& slice) {
   const double top = (*vector.magnitude_range)[1];
   const double least = std::max(0.0, top) / 100.0;
-  // Seen from where a view begins, in a picture of the usual size.
+  // Projected from the default viewpoint in a picture of the default size.
   const OrbitFrame frame = orbit_frame(default_azimuth, default_elevation);
   const protocol::ImageView image;
   const Framing framing = frame_box(lattice, frame, {0, 0, 0}, 35, image);
   const double pixel = framing.height / image.height;
   const glm::dvec3 edge = lattice.box_max - lattice.box_min;
-  // A slice is looked at from where it is seen.
+  // A slice is assumed to be viewed along its normal.
   const std::array<double, 3> sides = {edge.y * edge.z, edge.x * edge.z, edge.x * edge.y};
   const double area =
       slice ? sides.at(static_cast<std::size_t>(slice->axis))
@@ -293,7 +293,7 @@ protocol::Range default_scalar_range(const data::FieldInfo& field, const data::V
     return sound_range(0, nice_above(top));
   }
   if (!(middle[1] > middle[0])) return sound_range(least, most);
-  // Both ends outward to a twentieth of the width's nice number.
+  // Round both ends outward to a readable increment of the width.
   const double grain = nice_above(middle[1] - middle[0]) / 20.0;
   return sound_range(std::floor(middle[0] / grain) * grain, std::ceil(middle[1] / grain) * grain);
 }
@@ -318,7 +318,7 @@ double default_length(const Lattice& lattice, int stride, const std::optional<Sl
   double sum = 0;
   int axes = 0;
   for (std::size_t a = 0; a < 3; ++a) {
-    const bool wanted = a < 2 || axes == 0;  // the vertical only where there is nothing else
+    const bool wanted = a < 2 || axes == 0;  // the vertical only if there is no other
     const bool across = slice && slice->axis == static_cast<int>(a);
     if (!wanted || across || lattice.dims[a] < 2) continue;
     sum += cell_size(lattice, a);

@@ -1,5 +1,5 @@
-// What a dataset's fields suggest for a first picture: robust ranges rounded to nice numbers, and
-// which scalar is a medium worth looking through.
+// Default ranges, colours and media of a view, derived from the fields of a dataset: robust
+// quantiles rounded to readable numbers, and the scalars to show as media.
 #pragma once
 
 #include <optional>
@@ -17,54 +17,55 @@ namespace windsplat::scene {
 // value > 0.
 double nice_above(double value);
 
-// Low and high quantiles (0..1) of a scalar's values or a vector's magnitude, masked samples left
-// out; from at most 2^15 samples spread evenly. {0, 0} when everything is masked.
+// Low and high quantiles (0..1) of the values of a scalar or the magnitudes of a vector without
+// masked samples, from at most 2^15 evenly distributed samples. {0, 0} if all are masked.
 protocol::Range quantiles(const data::Volume& volume, double low, double high,
                           const std::optional<Slice>& slice = std::nullopt);
 
-// [0, top]: top so that a few per cent of the lines reach their full length.
+// [0, top], with top such that about 2 % of the lines reach their full length.
 protocol::Range default_magnitude_range(const data::Volume& volume);
 
-// The magnitude that so many lines exceed as cover the box's picture about `coverage` times when
-// each is as long and wide as the view says: fewer leave it bare, more hide the flow behind their
-// nearest layer. At least a hundredth of the range's top. Of a slice only its own lines and
-// area count.
+// The magnitude exceeded by as many lines as cover the projected box about `coverage` times in the
+// length and width that the view sets: fewer leave gaps, more hide the flow behind the nearest
+// layer. At least a hundredth of the top of the range. For a slice, only its own lines and area
+// count.
 double default_min_magnitude(const protocol::VectorView& vector, const data::Volume& volume,
                              const Lattice& lattice, const std::optional<Slice>& slice);
 
-// Magnitudes from a little below the weakest line that is drawn to the range's top.
+// Magnitudes from slightly below the weakest line drawn to the top of the range.
 protocol::Range default_magnitude_colors(const protocol::VectorView& vector);
 
-// World heights between which most of the drawn lines lie, the lower end moved down so that no line
-// takes the darkest colours of a map.
+// World heights that contain most of the drawn lines, with the lower end extended so that no line
+// has the darkest colours of a map.
 protocol::Range default_height_range(const protocol::VectorView& vector, const data::Volume& volume,
                                      const Lattice& lattice);
 
-// How a kind of scalar is shown.
+// Default appearance of a kind of scalar.
 struct ScalarStyle {
   const char* map;
-  double clear_below;  // of the range: no extinction up to here
-  double opacity;      // optical depth of a full medium through the box's shortest edge
+  double clear_below;  // fraction of the range without extinction
+  double opacity;      // optical depth at the top of the range through the shortest edge of the box
   bool fraction;       // bounded by 0 and 1 or 100 %
 };
 ScalarStyle scalar_style(const data::FieldInfo& field);
 
-// Names of the scalars shown by default: the best cloud-like or density-like one, and bodies that
-// the flow goes round; without a vector field the first scalar if none is alike.
+// Names of the scalars shown by default: the best match of a cloud or density, and solid bodies in
+// the flow; in a dataset without vector field at least the first scalar.
 std::vector<std::string> default_scalars(const data::DatasetInfo& info);
 
 protocol::Range default_scalar_range(const data::FieldInfo& field, const data::Volume& volume);
 
-// Dense parts are nearly opaque through the box's shortest edge; a slice through itself.
+// Dense parts are nearly opaque through the shortest edge of the box; in a slice through its layer.
 std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& field,
                                                       const protocol::Range& range,
                                                       const Lattice& lattice,
                                                       const std::optional<Slice>& slice);
 
-// About five grid spacings a stride, in a slice of those within it.
+// About five grid spacings per stride; for a slice, of the axes in its plane.
 double default_length(const Lattice& lattice, int stride, const std::optional<Slice>& slice);
 
-// By height where the vertical is an axis of its own kind (winds in an atmosphere), else magnitude.
+// By height if the vertical axis has another unit than the horizontal ones (as in the atmosphere),
+// otherwise by magnitude.
 protocol::ColorBy default_color_by(const data::Grid& grid);
 
 }  // namespace windsplat::scene

@@ -61,8 +61,8 @@ protocol::FieldDescription describe_field(const data::FieldInfo& field) {
   return out;
 }
 
-// Range and masked count over `steps` steps from the first. A range stays absent when no sample
-// is unmasked.
+// Sets range and masked count over the first `steps` steps. The range is absent if all samples are
+// masked.
 Result<void> add_range(data::Dataset& dataset, std::size_t steps,
                        protocol::FieldDescription& field) {
   data::FieldRange over;
@@ -134,7 +134,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
   std::uint64_t components = 0;
   for (const data::FieldInfo& field : info.fields) {
     protocol::FieldDescription description = describe_field(field);
-    // What is made of other fields is made when it is looked at.
+    // Derived fields are computed only when they are shown.
     const bool all = ranges == RangesOf::first_step || ranges == RangesOf::all_steps;
     if (all && !field.derived) {
       description.range_of = ranges == RangesOf::all_steps ? "all" : "step";

@@ -1,4 +1,4 @@
-// Dataset -> the description that REST, the stream and `inspect` tell.
+// Dataset -> the description for the HTTP API, the stream and `inspect`.
 #pragma once
 
 #include "protocol/messages.hpp"
@@ -8,17 +8,17 @@
 namespace windsplat::scene {
 
 enum class RangesOf {
-  none,        // nothing is loaded; ranges, masked counts and defaultView are absent
-  seen,        // "rangeOf": "step"; the fields of defaultView are loaded, and ranges told of those
-               // that were ever loaded at the first step
+  none,        // loads nothing; no ranges, masked counts or defaultView
+  seen,        // "rangeOf": "step"; loads the fields of defaultView and adds the ranges of all
+               // fields that have been loaded at the first step
   first_step,  // "rangeOf": "step"
   all_steps,   // "rangeOf": "all"; reads the whole series once
 };
 
-// Ranges and masked counts of the first step of what was loaded since.
+// Adds ranges and masked counts of the first step for the fields loaded meanwhile.
 void add_seen_ranges(const data::Dataset& dataset, protocol::DatasetDescription& description);
 
-// What a list tells: fields and their kinds, the number of steps; no axes, steps or ranges.
+// Description for lists: fields with their kinds and the number of steps; no axes, steps or ranges.
 protocol::DatasetDescription describe_briefly(const data::Dataset& dataset);
 
 Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf ranges);

@@ -13,7 +13,7 @@ namespace windsplat::scene {
 
 namespace {
 
-// Calls visit(first, end) with the first and the past-the-end sample of every group of 2^halvings.
+// Calls visit(first, end) with the half-open range of every group of 2^halvings samples.
 template <class Visit>
 void each_group(std::size_t samples, int halvings, const Visit& visit) {
   const std::size_t size = std::size_t{1} << static_cast<unsigned>(halvings);
@@ -129,9 +129,9 @@ Lattice coarsen_lattice(const Lattice& lattice, const std::array<int, 3>& level)
 
 void merge_lines(const Lattice& fine, const std::array<int, 3>& level, double pixels_per_unit,
                  VectorLayer& layer) {
-  // The mean over groups, so that an odd last sample does not count as two.
+  // Mean over groups, so that an incomplete last group counts with its actual size.
   double lines = 1;
-  double apart_px = 0;  // from the first to the last of a group, where the box is nearest
+  double apart_px = 0;  // first to last sample of a group, at the nearest point of the box
   for (std::size_t a = 0; a < 3; ++a) {
     const double group = static_cast<double>(fine.dims[a]) / data::halved(fine.dims[a], level[a]);
     lines *= group;

@@ -1,5 +1,5 @@
-// Grid + geometry -> Lattice: coordinates become raw positions, raw positions cells, cells a box
-// whose longest edge is 2. What is bent goes on to bend.cpp.
+// Grid + geometry -> Lattice: coordinates -> raw positions -> cells -> a box whose longest edge is
+// 2. Curved lattices continue in bend.cpp.
 #include "server/scene/lattice.hpp"
 
 #include <algorithm>
@@ -18,8 +18,8 @@ using data::AxisKind;
 using protocol::VerticalPlacement;
 
 constexpr double box_edge = 2.0;         // of the longest edge, world units
-constexpr double cell_min = 1e-19;       // its square is a float still
-constexpr double vertical_share = 0.15;  // of the longest horizontal edge, for another unit
+constexpr double cell_min = 1e-19;       // its square is a normal float
+constexpr double vertical_share = 0.15;  // of the longest horizontal edge, if units differ
 
 bool all_positive(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return v > 0; });
@@ -34,9 +34,9 @@ bool same_unit(const Axis& a, const Axis& b) {
   return a.units == b.units;
 }
 
-// Positions before scaling, growing with the index. Auto: a pressure axis by log p (where every
-// level is above zero, as log p needs), any other by its own coordinate. Index 0 is the bottom, so
-// coordinates that descend (pressure, depth, model levels) are negated.
+// Positions before scaling, ascending. Auto: log p for a pressure axis with positive levels,
+// otherwise the coordinate. Index 0 is the bottom, so descending coordinates (pressure, depth,
+// model levels) are negated.
 Result<std::vector<double>> raw_positions(const Axis& axis, bool vertical,
                                           VerticalPlacement placement) {
   const std::vector<double>& at = axis.coordinates;
@@ -44,8 +44,8 @@ Result<std::vector<double>> raw_positions(const Axis& axis, bool vertical,
   const bool log_fits = axis.kind == AxisKind::pressure && all_positive(at);
   if (vertical && placement == VerticalPlacement::logp && !log_fits) {
     return make_error_at(ErrorKind::invalid, "/geometry/vertical",
-                         "logp needs a vertical axis of positive pressures; \"" +
-                             printable(axis.name) + "\" is none");
+                         "logp requires a vertical axis of positive pressures, not \"" +
+                             printable(axis.name) + "\"");
   }
   if (vertical && placement == VerticalPlacement::index) {
     for (std::size_t i = 0; i < raw.size(); ++i) raw[i] = static_cast<double>(i);
@@ -66,8 +66,8 @@ Result<std::vector<double>> raw_positions(const Axis& axis, bool vertical,
   return raw;
 }
 
-// Cell edges lie midway between samples; the first and last cell reach as far beyond their sample
-// as towards its neighbour. One sample: a cell of width 1, resized later.
+// Cell edges lie midway between samples; the first and last cell are symmetric about their sample.
+// One sample: a cell of width 1, resized later.
 std::vector<double> cell_edges(const std::vector<double>& raw) {
   if (raw.size() == 1) return {raw[0] - 0.5, raw[0] + 0.5};
   std::vector<double> edges(raw.size() + 1);
@@ -80,9 +80,9 @@ std::vector<double> cell_edges(const std::vector<double>& raw) {
 struct RawAxis {
   std::vector<double> positions;
   std::vector<double> edges;
-  std::array<double, 2> extent{0, 1};  // from the first edge to the last, or as the caller says
-  bool thin = false;                   // one sample, and nothing says how long it is
-  double length = 1;                   // after proportion, before the even scale
+  std::array<double, 2> extent{0, 1};  // first to last edge, or as given by the caller
+  bool thin = false;                   // one sample of unknown thickness
+  double length = 1;                   // after proportion, before the uniform scale
   [[nodiscard]] double raw_length() const { return extent[1] - extent[0]; }
 };
 
@@ -95,7 +95,7 @@ double smallest_cell(const RawAxis& axis) {
   return smallest * (axis.length / axis.raw_length());
 }
 
-// Lengths of the axes to one another; a dimension of 1 gets the smallest cell of the others.
+// Relative lengths of the axes; an axis of one sample gets the smallest cell of the others.
 void proportion(const data::Grid& grid, VerticalPlacement placement, std::array<RawAxis, 3>& axes) {
   const auto& [x, y, z] = grid.axes;
   for (RawAxis& axis : axes) axis.length = axis.raw_length();
@@ -104,7 +104,7 @@ void proportion(const data::Grid& grid, VerticalPlacement placement, std::array<
   for (std::size_t a = 0; a < 2; ++a) {
     if (!axes[a].thin) horizontal = std::max(horizontal, axes[a].length);
   }
-  // A vertical by index has no unit to share; log p has none either.
+  // Indices and log p have no unit in common with the horizontal axes.
   const Axis& reference = axes[0].thin ? y : x;
   const bool shared = same_unit(z, reference) && placement != VerticalPlacement::index &&
                       z.kind != AxisKind::pressure;
@@ -146,7 +146,7 @@ Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryV
     if (!raw) return raw.error();
     axes[a].positions = std::move(*raw);
     const bool stretched = a == 2 && vertical_extent.has_value();
-    // A single layer is centred wherever it stands: beyond 2^53 half a cell more is lost.
+    // A single layer is centred at 0: at coordinates beyond 2^53, half a cell would be rounded off.
     if (axes[a].positions.size() == 1 && !stretched) axes[a].positions = {0};
     axes[a].edges = cell_edges(axes[a].positions);
     axes[a].extent =
@@ -180,9 +180,9 @@ Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryV
     }
     const auto& spacing = lattice.spacing[a];
     if (*std::min_element(spacing.begin(), spacing.end()) < cell_min) {
-      return make_error(ErrorKind::bad_data, "the samples of axis \"" +
-                                                 printable(grid.axes[a].name) +
-                                                 "\" are too close together to be placed");
+      return make_error(
+          ErrorKind::bad_data,
+          "the samples of axis \"" + printable(grid.axes[a].name) + "\" are too close together");
     }
     lattice.box_min[index] = -0.5 * world_length;
     lattice.box_max[index] = 0.5 * world_length;

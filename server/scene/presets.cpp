@@ -29,7 +29,7 @@ Result<void> apply_preset(protocol::View& completed, const Lattice& lattice,
     orbit(completed, lattice, 0, 0, 1);
   } else {
     return make_error_at(ErrorKind::invalid, "/preset",
-                         "no preset is called \"" + printable(preset) + "\"");
+                         "unknown preset \"" + printable(preset) + "\"");
   }
   return {};
 }

@@ -1,4 +1,4 @@
-// Grid, units and placement -> rates of motion in the world.
+// Grid, units and placement -> rates in world units.
 #include "server/scene/rates.hpp"
 
 #include <algorithm>
@@ -20,22 +20,22 @@ constexpr double earth_radius_m = 6371000.0;
 constexpr double metres_per_degree = earth_radius_m * std::numbers::pi / 180.0;
 constexpr double scale_height_m = 7400.0;
 constexpr double ground_pressure_pa = 100000.0;
-constexpr double cosine_min = 1e-3;  // at the poles themselves a meridian has no width
+constexpr double cosine_min = 1e-3;  // avoids division by zero at the poles
 
 Error no_motion(const Axis& axis, std::string_view what) {
   return make_error_at(ErrorKind::invalid, "/vector/space",
-                       "world: no known motion along axis \"" + printable(axis.name) + "\" (" +
-                           printable(axis.units) + ") of " + printable(what));
+                       "world: no known rate along axis \"" + printable(axis.name) + "\" (" +
+                           printable(axis.units) + ") for " + printable(what));
 }
 
-// An axis of plain numbers is in metres; a unit that is no length has no answer.
+// Metres per unit. An axis without unit is in metres; empty for units that are not lengths.
 std::optional<double> metres(const Axis& axis) {
   if (axis.units.empty() && axis.kind == AxisKind::cartesian) return 1.0;
   return data::metres_in(axis.units);
 }
 
-// d(world)/d(coordinate) at each of at least two samples, across its neighbours: exact where the
-// world is linear in the coordinate or (by_log) in its logarithm.
+// d(world)/d(coordinate) at each of at least two samples by differences of neighbours; exact if the
+// world position is linear in the coordinate or (by_log) in its logarithm.
 std::vector<double> slopes(const Axis& axis, const std::vector<double>& world, bool by_log) {
   const std::vector<double>& at = axis.coordinates;
   const std::size_t count = at.size();
@@ -76,7 +76,7 @@ Result<double> vertical_speed(const Axis& axis, double coordinate, std::string_v
   return no_motion(axis, "a component in " + std::string(unit));
 }
 
-// How wide a degree of longitude is beside one of latitude.
+// Ratio of a degree of longitude to a degree of latitude.
 double row_width(double latitude) {
   return std::max(std::cos(latitude * std::numbers::pi / 180.0), cosine_min);
 }
@@ -116,7 +116,7 @@ void sphere_rates(const Lattice& lattice, Rates& rates) {
   rates.x.assign(static_cast<std::size_t>(lattice.dims[1]), rates.y);
 }
 
-// The scale of a map of degrees, from its first and last column.
+// World units per degree of a map, from its first and last column.
 void map_rates(const data::Grid& grid, const Lattice& lattice, Rates& rates) {
   const data::Columns& columns = *grid.columns;
   const auto width = static_cast<std::size_t>(lattice.dims[0]);

@@ -1,5 +1,5 @@
-// How fast a component of the wind moves a point of the picture: the map of positions,
-// differentiated. Needed when lines are to be tangent to trajectories as drawn (space = world).
+// The derivative of world positions by components of a vector, for lines tangent to trajectories in
+// the world (space = world).
 #pragma once
 
 #include <vector>
@@ -11,8 +11,9 @@
 
 namespace windsplat::scene {
 
-// Whether the third component is a change of pressure (omega): where it is negative air rises, and
-// up is up in the picture on axes of pressure and of height. On numbered levels nobody knows.
+// Whether the third component is a rate of pressure (omega) on an axis of pressure or height, such
+// that negative values point upward in the world. False on numbered levels, whose direction is
+// unknown.
 bool rises_where_negative(const data::Grid& grid, const data::FieldInfo& field);
 
 struct Rates {
@@ -25,12 +26,13 @@ struct Rates {
 // 1 / (R cos(latitude)) of longitude, 1 / R of latitude (R = 6371 km), or the axis' own length.
 // Vertical, with pressure p(z) = 1000 hPa exp(-z / H) and H = 7.4 km (an isothermal atmosphere
 // near 253 K): w in m/s moves dp/dt = -w p / H along a pressure axis; omega in Pa/s is dp/dt there
-// and dz/dt = -omega H / p along a height axis; depth falls as w rises. An axis of one sample has
-// no measure: nothing moves along it.
-// On the sphere a line's direction is told along the local east, north and up, so that a metre is
-// as long anywhere: the shell's middle radius over R; on a curvilinear map degrees are taken as on
-// a flat one, at each row's mean latitude. With heights the vertical axis is theirs (see Placed).
-// Errors: invalid at /vector/space when a third component has no known rate along its axis.
+// and dz/dt = -omega H / p along a height axis; depth decreases with positive w. The rate along an
+// axis of one sample is 0.
+// On the sphere, directions are along local east, north and up, so that the scale is uniform: the
+// middle radius of the shell over R. On a curvilinear map, degrees are scaled as on a flat one at
+// the mean latitude of each row. With a height field the vertical axis is that of the heights (see
+// Placed).
+// Errors: invalid at /vector/space if a third component has no known rate along its axis.
 Result<Rates> world_rates(const data::Grid& grid, const data::FieldInfo& field,
                           const protocol::GeometryView& geometry, const Lattice& lattice);
 

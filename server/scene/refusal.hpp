@@ -1,4 +1,4 @@
-// How a view is refused: an error at a JSON pointer, and what the user said in quotes.
+// Errors of invalid views: the JSON pointer and quoted user input.
 #pragma once
 
 #include <string>

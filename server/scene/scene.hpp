@@ -29,13 +29,13 @@ struct Camera {
   int height = 1;
 };
 
-// Where samples stand in the world. Rectilinear: positions[a][i] is the place of sample i along
-// axis a, ascending; spacing[a][i] the width of its cell. The box reaches half a cell beyond them.
+// World positions of samples. Rectilinear: positions[a][i] is the position of sample i along axis
+// a, ascending; spacing[a][i] the width of its cell. The box extends half a cell beyond them.
 //
-// Curved (a globe, terrain): `places` holds where each sample really stands. A cell's edge along
-// axis a is then half the way from the sample before to the one after (at an end the way to the one
-// neighbour; along an axis of one sample `spacing`, at right angles to the other two), times the
-// stride. positions and spacing remain the unbent lattice: height, where a colour tells it, is
+// Curved (a globe, terrain): `places` holds the position of each sample. The edge of a cell along
+// axis a is half the vector from the previous sample to the next (at an end the vector to the only
+// neighbour; along an axis of one sample `spacing`, perpendicular to the other two), times the
+// stride. positions and spacing remain those of the uncurved lattice; colours by height use
 // positions[2].
 struct Lattice {
   std::array<int, 3> dims{1, 1, 1};
@@ -63,13 +63,13 @@ enum class LineColor { world_z, screen_z, rise, magnitude, direction, scalar, co
 struct VectorLayer {
   std::shared_ptr<const data::Volume> field;
   glm::dvec3 scale{1, 1, 1};  // times each component before anything else
-  // When lines follow trajectories in the picture (space = world): world units per second per unit
-  // of each component, by y index for x (meridians converge), constant for y, by z index for z.
-  // Empty: components are drawn as they stand.
+  // For lines along trajectories in the world (space = world): world units per second per unit of
+  // each component, by y index for x (meridians converge), constant for y, by z index for z.
+  // Empty: components are not scaled.
   std::vector<double> rate_x;
   double rate_y = 1;
   std::vector<double> rate_z;
-  double length = 0.03;  // world units at magnitude_range[1]; magnitudes beyond are drawn no longer
+  double length = 0.03;  // world units at magnitude_range[1] and above
   double span = 7;
   int stride = 1;
   double r1 = 0.6;  // pixels of this picture (already scaled with its height)
@@ -89,7 +89,7 @@ struct VectorLayer {
   std::uint32_t seed = 1;
   std::uint32_t epoch = 0;
   // Phase motion: a line's opacity is multiplied by W(frac(q + 1/2 - phase)), W(p) = 1 - |2p - 1|,
-  // q from -1/2 at its tail to 1/2 at its head, phase = a hash of the stop + motion_cycles times
+  // q from -1/2 at its tail to 1/2 at its head, phase = a hash of the sample + motion_cycles times
   // min(|V| / magnitude_range[1], 1).
   bool moving = false;
   double motion_cycles = 0;
@@ -109,16 +109,16 @@ struct DepthCue {
   double far = 1;
 };
 
-// kernel: one kernel after another in visibility order (the paper). slab: slabs of constant view
-// depth that gather partial footprints (Mueller & Crawfis 1998). reference: the integral itself, in
-// double precision, pixel by pixel.
+// kernel: kernels one by one in visibility order [CM92]. slab: slabs of constant view depth that
+// accumulate partial footprints [MC98]. reference: the rendering integral per pixel in double
+// precision.
 enum class Method { kernel, slab, reference };
 
-// A line inside its homogeneous piece of medium (docs/design/rendering-model.md).
+// Compositing of a line in a homogeneous piece of medium (docs/design/rendering-model.md).
 enum class Compositing { simple, cd_naive, cd, analytic, cd_euler };
 
-// Only the samples of one layer are drawn, and of vectors the part within the layer's plane: the
-// paper's two-dimensional filter.
+// Draws only the samples of one layer, and of vectors the part within its plane: the
+// two-dimensional filter of [CM92].
 struct Slice {
   int axis = 2;
   int sample = 0;
@@ -126,7 +126,7 @@ struct Slice {
 
 struct Scene {
   Camera camera;
-  Lattice lattice;                    // of the level that is drawn
+  Lattice lattice;                    // of the drawn level
   std::array<int, 3> level{0, 0, 0};  // how often each axis of the data was halved
   std::optional<VectorLayer> vector;
   std::vector<ScalarLayer> scalars;

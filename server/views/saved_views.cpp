@@ -276,7 +276,7 @@ struct SavedViews::State {
 namespace {
 
 Error unknown(const std::string& id) {
-  return make_error(ErrorKind::not_found, "there is no view " + in_quotes(id));
+  return make_error(ErrorKind::not_found, "unknown view " + in_quotes(id));
 }
 
 }  // namespace

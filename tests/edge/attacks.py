@@ -19,10 +19,12 @@ import tempfile
 import threading
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "fuzz"))
-import mutate_files  # noqa: E402
-import seeds  # noqa: E402
+import checked_daemon  # noqa: E402
+import hdf5_bytes  # noqa: E402
+import seeds_escaping  # noqa: E402
 import strace_log  # noqa: E402
-from mutate_files import Failure, Refused  # noqa: E402
+from checked_daemon import Failure, Refused  # noqa: E402
+from seed_numbers import DIMS, floats, numbers  # noqa: E402
 from suite import KIB, Watched, parser_of, require  # noqa: E402
 from wire_client import Closed, Connection, Target, WebSocket, request  # noqa: E402
 
@@ -68,8 +70,8 @@ class Scene:
     def __init__(self, options, folder):
         self.folder, self.root, self.outside = folder, folder / "root", folder / "outside"
         self.root.mkdir()
-        seeds.write_outside(self.outside)
-        self.watch = mutate_files.Watch(self.outside)
+        seeds_escaping.write_outside(self.outside)
+        self.watch = checked_daemon.Watch(self.outside)
         (self.outside / "mark.txt").read_bytes()
         require(self.watch.seen(), "inotify sees nothing here")
         self.canary = Canary()
@@ -77,16 +79,16 @@ class Scene:
         self.program = options.program
         self.straced = options.strace == "yes" or (options.strace == "auto" and strace_works())
         started = argparse.Namespace(program=options.program, strace=self.straced, patience=60)
-        self.daemon = mutate_files.Daemon(started, self.root, folder)
+        self.daemon = checked_daemon.Daemon(started, self.root, folder)
         # What lies outside would be known, were it told.
-        mutate_files.check_controls(self.daemon, self.root, self.outside)
+        checked_daemon.check_controls(self.daemon, self.root, self.outside)
         self.watch.seen()
         self.watch.names.clear()
 
     def refuse(self, path):
         """Posted, that path must not load; the reason."""
         try:
-            mutate_files.try_file(self.daemon, path)
+            checked_daemon.try_file(self.daemon, path)
         except Refused as reason:
             return str(reason)
         raise Failure(f"{path} was loaded")
@@ -101,7 +103,7 @@ class Scene:
         if not self.straced:
             return "canaries alone, without strace"
         judge = strace_log.Judge([self.root, self.folder / "tmp"], self.outside,
-                                 mutate_files.LIBRARIES, pathlib.Path(self.program).resolve())
+                                 checked_daemon.LIBRARIES, pathlib.Path(self.program).resolve())
         judge.read(self.daemon.log)
         judge.report()
         require(not judge.faults, f"strace: {judge.faults[:5]}")
@@ -142,7 +144,7 @@ def external_files(options, folder):
     paths and by links, under the names of both formats that HDF5 is read by."""
     scene = Scene(options, folder)
     tried, refused = 0, 0
-    for seed in seeds.escape_seeds(scene.outside):
+    for seed in seeds_escaping.escape_seeds(scene.outside):
         if seed.kind != "hdf5":
             continue
         for ending in ("h5", "nc"):
@@ -154,8 +156,8 @@ def external_files(options, folder):
             links = {(name if name.startswith("link_") else name.replace(".h5", "." + ending)): to
                      for name, to in seed.links.items()}
             try:  # what the file holds itself may be shown
-                mutate_files.try_file(scene.daemon, mutate_files.write_case(place, path, renamed,
-                                                                            links))
+                checked_daemon.try_file(scene.daemon, checked_daemon.write_case(
+                    place, path, renamed, links))
             except Refused:
                 refused += 1
     require(tried >= 32 and refused >= 8, f"{tried} tried, {refused} refused")
@@ -214,15 +216,15 @@ def names_over_http(scene, path):
 def url_paths(options, folder):
     """Addresses, `#mode=` and ways out of the data root: by POST, as names, on the command line."""
     scene = Scene(options, folder)
-    file = seeds.hdf5_bytes.File()
-    file.add("u", seeds.DIMS[::-1], seeds.floats(seeds.numbers(0)))
+    file = hdf5_bytes.File()
+    file.add("u", DIMS[::-1], floats(numbers(0)))
     (scene.root / "good.h5").write_bytes(file.bytes())
     (scene.root / "deep").mkdir()
     (scene.root / "link.h5").symlink_to("../outside/mark.h5")
     (scene.root / "absolute.h5").symlink_to(scene.outside / "mark.h5")
     (scene.root / "folder").symlink_to("../outside")
     (scene.root / "self").symlink_to("/proc/self")
-    mutate_files.try_file(scene.daemon, "good.h5")
+    checked_daemon.try_file(scene.daemon, "good.h5")
     urls = list(addresses(scene.canary.port, scene.outside))
     near, out = list(near_addresses(scene.canary.port)), list(ways_out(scene.outside))
     for path in urls:
@@ -236,7 +238,7 @@ def url_paths(options, folder):
         for command in ("serve", "inspect", "render"):
             run_command(scene, command, path)
             commands += 1
-    mutate_files.try_file(scene.daemon, "good.h5")
+    checked_daemon.try_file(scene.daemon, "good.h5")
     return (f"{len(urls)} addresses, {len(near)} that look like some and {len(out)} ways out, each "
             f"refused; {commands} commands that failed; {scene.end()}")
 

@@ -41,8 +41,8 @@ import model as models  # noqa: E402
 import model_mutations  # noqa: E402
 import model_writers  # noqa: E402
 import mutations_values as formats  # noqa: E402
-from mutate_files import (Daemon, Failure, Refused, check_description, judged,  # noqa: E402
-                          open_dataset, plain, write_case)
+from checked_daemon import (Daemon, Failure, Refused, check_description, judged,  # noqa: E402
+                            open_dataset, plain, write_case)
 
 MEMORY_LIMIT = 512 << 20
 CPU_SECONDS_MAX = 20

@@ -10,6 +10,7 @@ import numpy as np
 import model as models
 import model_grib
 import seeds
+import seeds_vtk
 
 ORDERS = {"little": "<", "big": ">"}
 
@@ -302,7 +303,7 @@ VTK_TYPES = {"float32": "Float32", "float64": "Float64", "int8": "Int8", "uint8"
              "int16": "Int16", "uint16": "UInt16", "int32": "Int32", "uint32": "UInt32"}
 
 
-class VtkArrays(seeds.VtkXml):
+class VtkArrays(seeds_vtk.VtkXml):
     def array(self, name, values, components=1):
         tag = (f'<DataArray type="{VTK_TYPES[values.dtype.name]}" Name="{name}" '
                f'NumberOfComponents="{components}" ')
@@ -374,7 +375,7 @@ def vtk_legacy(model):
 
     nz, ny, nx = scalar.shape
     grid = model.options.get("grid", "STRUCTURED_POINTS")
-    out = seeds.LEGACY.format(coding="BINARY" if binary else "ASCII", kind=grid).encode()
+    out = seeds_vtk.LEGACY.format(coding="BINARY" if binary else "ASCII", kind=grid).encode()
     out += f"DIMENSIONS {nx} {ny} {nz}\n".encode()
     if grid == "STRUCTURED_POINTS":
         ends = [first_and_spacing(model.axes[a]) for a in "xyz"]

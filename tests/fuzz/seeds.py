@@ -1,11 +1,9 @@
 """Small files of every format that is read, as Seed objects: from plain python, and where the tools
-are there from nccopy, grib_filter and the real files in build/test-data. And seeds that try to
-lead a reader out of the data root."""
+are there from nccopy, grib_filter and the real files in build/test-data. VTK is in seeds_vtk.py,
+seeds that try to lead a reader out of the data root are in seeds_escaping.py."""
 
-import base64
 import gzip
 import json
-import math
 import pathlib
 import re
 import shutil
@@ -14,57 +12,10 @@ import subprocess
 import zlib
 
 import hdf5_bytes
+import seeds_vtk
+from seed_numbers import DIMS, Seed, as_text, floats, interleaved, lz4_block, numbers, winds
 
-DIMS = (8, 6, 4)  # x, y, z
-COUNT = math.prod(DIMS)
 REAL_BYTES_MAX = 300_000
-MARK_NUMBER = 31337.25  # what the files outside hold; exact in 32 bits
-MARK_TEXT = "5ENTINEL"
-
-
-class Seed:
-    """Files by name, the first of them the one that is asked for; links by name. `sure`: as it is
-    it must load. `escapes`: it asks for what lies outside."""
-
-    def __init__(self, kind, name, files, links=None, path=None, escapes=False, sure=True):
-        self.kind = kind
-        self.name = name
-        self.files = files
-        self.links = links or {}
-        self.path = path or next(iter(files))
-        self.escapes = escapes
-        self.sure = sure and not escapes
-
-
-def numbers(component, step=0):
-    nx, ny, nz = DIMS
-    return [math.sin(0.7 * x + component) + 0.5 * math.cos(0.9 * y - step) + 0.25 * z
-            for z in range(nz) for y in range(ny) for x in range(nx)]
-
-
-def floats(values, big=False):
-    return struct.pack(f"{'>' if big else '<'}{len(values)}f", *values)
-
-
-def as_text(values):
-    return " ".join(f"{v:.4f}" for v in values) + "\n"
-
-
-def winds(big=False, step=0):
-    """All u, all v, all w."""
-    return b"".join(floats(numbers(c, step), big) for c in range(3))
-
-
-def interleaved(step=0):
-    return [v for triple in zip(*(numbers(c, step) for c in range(3))) for v in triple]
-
-
-def lz4_block(data):
-    """Literals alone."""
-    if len(data) < 15:
-        return bytes([len(data) << 4]) + data
-    rest = len(data) - 15
-    return b"\xf0" + b"\xff" * (rest // 255) + bytes([rest % 255]) + data
 
 
 # --- NRRD, raw, GrADS, OpenDX --------------------------------------------------------------------
@@ -223,146 +174,6 @@ def zarr_seeds():
         yield Seed("zarr", compressor, zarr_files(compressor, compressor == "zlib"), path="s.zarr")
 
 
-# --- VTK -----------------------------------------------------------------------------------------
-
-class VtkXml:
-    """Arrays of one file in one way of coding them."""
-
-    def __init__(self, coding, compressor=""):
-        self.coding = coding
-        self.compressor = compressor
-        self.appended = b""
-
-    def encoded(self, data, text):
-        code = base64.b64encode if text else bytes
-        if not self.compressor:
-            head = struct.pack("<I", len(data))
-            return code(head + data)
-        block = zlib.compress(data) if self.compressor == "ZLib" else lz4_block(data)
-        return code(struct.pack("<4I", 1, len(data), len(data), len(block))) + code(block)
-
-    def array(self, name, values, components=1, kind="Float32"):
-        tag = f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" '
-        if self.coding == "ascii":
-            text = as_text(values) if kind == "Float32" else " ".join(map(str, values))
-            return tag + f'format="ascii">\n{text}</DataArray>\n'
-        letter = {"Float32": "f", "Int32": "i", "UInt8": "B"}[kind]
-        data = struct.pack(f"<{len(values)}{letter}", *values)
-        if self.coding == "base64":
-            return tag + f'format="binary">\n{self.encoded(data, True).decode()}\n</DataArray>\n'
-        tag += f'format="appended" offset="{len(self.appended)}"/>\n'
-        self.appended += self.encoded(data, self.coding == "appended-base64")
-        return tag
-
-    def file(self, kind, attributes, inner):
-        compressor = f' compressor="vtk{self.compressor}DataCompressor"' if self.compressor else ""
-        out = (f'<?xml version="1.0"?>\n<VTKFile type="{kind}" version="0.1" '
-               f'byte_order="LittleEndian" header_type="UInt32"{compressor}>\n'
-               f"<{kind} {attributes}>\n{inner}</{kind}>\n").encode()
-        if self.appended:
-            coding = "base64" if self.coding == "appended-base64" else "raw"
-            out += f'<AppendedData encoding="{coding}">\n_'.encode() + self.appended
-            out += b"\n</AppendedData>\n"
-        return out + b"</VTKFile>\n"
-
-
-def points_of_grid():
-    nx, ny, nz = DIMS
-    return [c for z in range(nz) for y in range(ny) for x in range(nx)
-            for c in (float(x), y + 0.1 * z, float(z))]
-
-
-def hexahedra():
-    nx, ny, nz = DIMS
-    out = []
-    for z in range(nz - 1):
-        for y in range(ny - 1):
-            for x in range(nx - 1):
-                a = x + nx * (y + ny * z)
-                b = a + nx * ny
-                out.append([a, a + 1, a + 1 + nx, a + nx, b, b + 1, b + 1 + nx, b + nx])
-    return out
-
-
-def vtk_xml(ending, coding, compressor="", extra=""):
-    xml = VtkXml(coding, compressor)
-    data = '<PointData Vectors="wind">\n' + xml.array("wind", interleaved(), 3)
-    data += extra + xml.array("heat", numbers(3)) + "</PointData>\n"
-    extent = "0 7 0 5 0 3"
-    if ending == "vti":
-        return xml.file("ImageData", f'WholeExtent="{extent}" Origin="0 0 0" Spacing="1 1 2"',
-                        f'<Piece Extent="{extent}">\n{data}</Piece>\n')
-    if ending == "vtr":
-        axes = "".join(xml.array(n, [float(i) ** 1.1 for i in range(c)])
-                       for n, c in zip("xyz", DIMS))
-        inner = f'<Piece Extent="{extent}">\n{data}<Coordinates>\n{axes}</Coordinates>\n</Piece>\n'
-        return xml.file("RectilinearGrid", f'WholeExtent="{extent}"', inner)
-    places = f"<Points>\n{xml.array('Points', points_of_grid(), 3)}</Points>\n"
-    if ending == "vts":
-        inner = f'<Piece Extent="{extent}">\n{data}{places}</Piece>\n'
-        return xml.file("StructuredGrid", f'WholeExtent="{extent}"', inner)
-    cells = hexahedra()
-    inner = (f'<Piece NumberOfPoints="{COUNT}" NumberOfCells="{len(cells)}">\n{data}{places}'
-             "<Cells>\n"
-             + xml.array("connectivity", [p for cell in cells for p in cell], 1, "Int32")
-             + xml.array("offsets", [8 * i + 8 for i in range(len(cells))], 1, "Int32")
-             + xml.array("types", [12] * len(cells), 1, "UInt8") + "</Cells>\n</Piece>\n")
-    return xml.file("UnstructuredGrid", "", inner)
-
-
-def pvd(names):
-    sets = "".join(f'<DataSet timestep="{i}" group="" part="0" file="{name}"/>\n'
-                   for i, name in enumerate(names))
-    return ('<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
-            f"{sets}</Collection>\n</VTKFile>\n").encode()
-
-
-LEGACY = "# vtk DataFile Version 3.0\nA storm\n{coding}\nDATASET {kind}\n"
-
-
-def vtk_legacy(kind, binary):
-    def arrays(values, letter="f"):
-        if not binary:
-            return as_text(values) if letter == "f" else " ".join(map(str, values)) + "\n"
-        return struct.pack(f">{len(values)}{letter}", *values).decode("latin-1") + "\n"
-    out = LEGACY.format(coding="BINARY" if binary else "ASCII", kind=kind)
-    if kind == "STRUCTURED_POINTS":
-        out += "DIMENSIONS 8 6 4\nORIGIN 0 0 0\nSPACING 1 1 2\n"
-    elif kind == "RECTILINEAR_GRID":
-        out += "DIMENSIONS 8 6 4\n"
-        for name, count in zip("XYZ", DIMS):
-            out += f"{name}_COORDINATES {count} float\n"
-            out += arrays([float(i) ** 1.1 for i in range(count)])
-    else:
-        if kind == "STRUCTURED_GRID":
-            out += "DIMENSIONS 8 6 4\n"
-        out += f"POINTS {COUNT} float\n" + arrays(points_of_grid())
-    if kind == "UNSTRUCTURED_GRID":
-        cells = hexahedra()
-        out += f"CELLS {len(cells)} {9 * len(cells)}\n"
-        out += arrays([v for cell in cells for v in [8, *cell]], "i")
-        out += f"CELL_TYPES {len(cells)}\n" + arrays([12] * len(cells), "i")
-    out += f"POINT_DATA {COUNT}\nVECTORS wind float\n" + arrays(interleaved())
-    out += "SCALARS heat float 1\nLOOKUP_TABLE default\n" + arrays(numbers(3))
-    return out.encode("latin-1")
-
-
-def vtk_seeds():
-    codings = (("ascii", ""), ("base64", ""), ("base64", "ZLib"), ("appended", ""),
-               ("appended", "ZLib"), ("appended", "LZ4"), ("appended-base64", "ZLib"))
-    for ending in ("vti", "vtr", "vts", "vtu"):
-        for coding, compressor in codings:
-            yield Seed(ending, f"{coding} {compressor}".rstrip(),
-                       {f"f.{ending}": vtk_xml(ending, coding, compressor)})
-    for ending in ("vti", "vtu"):
-        members = {f"m{i}.{ending}": vtk_xml(ending, "appended", "ZLib") for i in range(2)}
-        yield Seed("pvd", ending, {"s.pvd": pvd(members)} | members)
-    for kind in ("STRUCTURED_POINTS", "RECTILINEAR_GRID", "STRUCTURED_GRID", "UNSTRUCTURED_GRID"):
-        for binary in (False, True):
-            yield Seed("vtk binary" if binary else "vtk ascii", kind.lower(),
-                       {"f.vtk": vtk_legacy(kind, binary)})
-
-
 # --- HDF5, netCDF, GRIB, real files --------------------------------------------------------------
 
 def hdf5_seeds():
@@ -436,112 +247,7 @@ def real_seeds(folder):
             yield Seed(REAL_KINDS[path.suffix], path.name, {path.name: path.read_bytes()})
 
 
-# --- seeds that try to get out -------------------------------------------------------------------
-
-def write_outside(folder):
-    """Files that nobody may open, each fit for what the seeds below ask for."""
-    folder.mkdir()
-    mark = [MARK_NUMBER] * (3 * COUNT)
-    (folder / "mark.raw").write_bytes(floats(mark) * 2)
-    (folder / "mark.txt").write_text(MARK_TEXT + "\n")
-    (folder / "mark.vti").write_bytes(VtkXmlMark().file_of_marks())
-    (folder / "mark.dx").write_text(DX_GRID + DX_ARRAY + "data follows\n" + as_text(mark)
-                                    + DX_FIELD)
-    file = hdf5_bytes.File()
-    for name in "uvw":
-        file.add(name, DIMS[::-1], floats(mark[:COUNT]))
-    (folder / "mark.h5").write_bytes(file.bytes())
-    chunk = zlib.compress(floats(mark[:96]))
-    (folder / "0.0.0.0").write_bytes(chunk)
-
-
-class VtkXmlMark(VtkXml):
-    def __init__(self):
-        super().__init__("ascii")
-
-    def file_of_marks(self):
-        data = self.array("wind", [MARK_NUMBER] * (3 * COUNT), 3)
-        return self.file("ImageData",
-                         'WholeExtent="0 7 0 5 0 3" Origin="0 0 0" Spacing="1 1 2"',
-                         f'<Piece Extent="0 7 0 5 0 3">\n<PointData>\n{data}</PointData></Piece>\n')
-
-
-def escape_seeds(outside):
-    """Each by a path relative to its folder, by an absolute one, and by a link."""
-    vti = vtk_xml("vti", "ascii")
-    for how, away in (("relative", "../../" + outside.name), ("absolute", str(outside)),
-                      ("doubled", "./..//../" + outside.name), ("link", None)):
-        def to(name, away=away):
-            return f"{away}/{name}" if away else f"link_{name}"
-
-        def seed(kind, name, files, target, how=how, away=away):
-            links = {} if away else {f"link_{target}": f"../../{outside.name}/{target}"}
-            return Seed(kind, f"{name}, {how}", files, links, escapes=True)
-        yield seed("nrrd", "data file", {"a.nhdr": nrrd_header(
-            "raw", f"data file: {to('mark.raw')}\n")}, "mark.raw")
-        yield seed("nrrd", "not detached", {"a.nrrd": nrrd_header(
-            "raw", f"data file: {to('mark.raw')}\n")}, "mark.raw")
-        yield seed("raw+json", "file", {"s.json": raw_document(
-            file=to("mark.raw"), steps={"count": 1}).encode()}, "mark.raw")
-        yield seed("grads", "dset", {"g.ctl": GRADS.replace("^", "").format(
-            file=to("mark.raw"), options="little_endian").encode()}, "mark.raw")
-        yield seed("opendx", "data file", {"d.dx": (
-            DX_GRID + DX_ARRAY + f'lsb ieee data file "{to("mark.raw")}",0\n'
-            + DX_FIELD).encode()}, "mark.raw")
-        yield seed("opendx", "object", {"d.dx": (
-            DX_GRID + 'object "wind" class field\ncomponent "positions" value 1\ncomponent '
-            f'"connections" value 2\ncomponent "data" file "{to("mark.dx")}",3\nend\n'
-            ).encode()}, "mark.dx")
-        yield seed("pvd", "member", {"s.pvd": pvd(["m0.vti", to("mark.vti")]), "m0.vti": vti},
-                   "mark.vti")
-        yield from hdf5_escapes(seed, to)
-    entity = f'<!DOCTYPE VTKFile [<!ENTITY x SYSTEM "file://{outside}/mark.txt">]>\n<VTKFile'
-    text = vti.replace(b"<VTKFile", entity.encode(), 1).replace(b'"heat"', b'"&x;"')
-    yield Seed("vti", "entity", {"f.vti": text}, escapes=True)
-    yield from link_seeds(outside)
-
-
-def hdf5_escapes(seed, to):
-    for name in ("external link", "external storage", "virtual dataset", "all three"):
-        file = hdf5_bytes.File()
-        file.add("u", DIMS[::-1], floats(numbers(0)))
-        if name in ("external link", "all three"):
-            file.add_linked("v", to("mark.h5"), "/v")
-        if name in ("external storage", "all three"):
-            file.add_stored_elsewhere("w", DIMS[::-1], to("mark.raw"), 4 * COUNT)
-        if name in ("virtual dataset", "all three"):
-            file.add_virtual("t", DIMS[::-1], to("mark.h5"), "u")
-        target = "mark.raw" if name == "external storage" else "mark.h5"
-        yield seed("hdf5", name, {"h.h5": file.bytes()}, target)
-
-
-def link_seeds(outside):
-    """What is asked for, its folder, or a part of it is a link."""
-    away = f"../../{outside.name}"
-    yield Seed("vti", "file is a link", {"other": b"x"}, {"f.vti": f"{away}/mark.vti"}, "f.vti",
-               True)
-    yield Seed("hdf5", "file is an absolute link", {"other": b"x"},
-               {"h.h5": str(outside / "mark.h5")}, "h.h5", True)
-    yield Seed("vti", "folder is a link", {"other": b"x"}, {"deep": away}, "deep/mark.vti", True)
-    yield Seed("hdf5", "group behind a link", {"other": b"x"}, {"h.h5": f"{away}/mark.h5"},
-               "h.h5#/u", True)
-    yield Seed("vti", "pattern meets links", {"f0.txt": b"x"},
-               {"f1.vti": f"{away}/mark.vti", "f2.vti": str(outside / "mark.vti")}, "f*.vti", True)
-    yield Seed("vti", "dots", {"f.vti": vtk_xml("vti", "ascii")}, path=f"{away}/mark.vti",
-               escapes=True)
-    for kind in ("mark.raw", "mark.h5"):
-        inside = zarr_files("zlib")
-        del inside["s.zarr/u/0.1.0.0"]
-        yield Seed("zarr", f"chunk is a link to {kind}", inside,
-                   {"s.zarr/u/0.1.0.0": f"../../{away}/{kind}"}, "s.zarr", True)
-    whole = {name: data for name, data in zarr_files("zlib").items() if "/u/0." not in name}
-    yield Seed("zarr", "chunks are links", whole, {
-        "s.zarr/u/0.0.0.0": f"../../{away}/0.0.0.0",
-        "s.zarr/u/0.1.0.0": str(outside / "0.0.0.0")}, "s.zarr", True)
-
-
-def all_seeds(program, folder, real, outside):
-    plain = [*nrrd_seeds(), *raw_seeds(), *grads_seeds(), *dx_seeds(), *zarr_seeds(), *vtk_seeds(),
-             *hdf5_seeds(), *netcdf_seeds(program, folder), *grib_seeds(folder),
-             *real_seeds(real)]
-    return plain + list(escape_seeds(outside))
+def plain_seeds(program, folder, real):
+    return [*nrrd_seeds(), *raw_seeds(), *grads_seeds(), *dx_seeds(), *zarr_seeds(),
+            *seeds_vtk.vtk_seeds(), *hdf5_seeds(), *netcdf_seeds(program, folder),
+            *grib_seeds(folder), *real_seeds(real)]

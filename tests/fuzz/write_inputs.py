@@ -20,6 +20,7 @@ import loader_inputs  # noqa: E402
 import model_mutations  # noqa: E402
 import model_writers  # noqa: E402
 import seeds  # noqa: E402
+import seeds_vtk  # noqa: E402
 import sizes  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -117,7 +118,7 @@ def files(program):
         folder = pathlib.Path(folder)
         (folder / "made").mkdir()
         every = [*seeds.nrrd_seeds(), *seeds.raw_seeds(), *seeds.grads_seeds(), *seeds.dx_seeds(),
-                 *seeds.zarr_seeds(), *seeds.vtk_seeds(), *seeds.hdf5_seeds(),
+                 *seeds.zarr_seeds(), *seeds_vtk.vtk_seeds(), *seeds.hdf5_seeds(),
                  *seeds.grib_seeds(folder / "made")]
         if program:
             every += seeds.netcdf_seeds(program, folder)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""scripts/run --help changes nothing; scripts/setup names what stands in the way of a package.
+"""scripts/run --help changes nothing; scripts/setup names what stands in the way of a package, and
+refuses a node that is too old.
 
 apt and its helpers are stand-ins on the PATH, so that nothing is installed or asked for."""
 import os
@@ -38,11 +39,11 @@ esac""",
 }
 
 
-def run(script, *words):
-    """Runs the script; its outcome and what apt-get was called with."""
+def run(script, *words, more=None):
+    """Runs the script; its outcome and what apt-get was called with. more: further stand-ins."""
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        for program, text in STANDS_IN.items():
+        for program, text in (STANDS_IN | (more or {})).items():
             file = folder / program
             file.write_text("#!/bin/bash\n" + text + "\n")
             file.chmod(file.stat().st_mode | stat.S_IXUSR)
@@ -85,6 +86,15 @@ def conflicts_are_named():
     need(not changes, f"setup installs: {changes}")
 
 
+def an_old_node_is_refused():
+    for version in ("v16.20.2", "v18.14.2"):
+        done, calls = run("setup", "web", more={"node": f"echo {version}", "npm": "exit 1"})
+        need(done.returncode == 1 and not calls, f"setup web: {done.returncode}, {calls}")
+        need(f"node v18.15.0 or later and npm are needed; found: {version}\n" in done.stderr,
+             f"setup says of node {version}:\n{done.stderr}")
+
+
 if __name__ == "__main__":
     help_changes_nothing()
     conflicts_are_named()
+    an_old_node_is_refused()

@@ -16,7 +16,7 @@ using reference::Cell;
 using reference::CellLight;
 using reference::Light;
 using reference::Samples;
-using reference::Sheet;
+using reference::Surface;
 using scene::Compositing;
 
 // ---- a medium on [0, 1] with lines in it ----
@@ -42,7 +42,7 @@ struct Haze {
   }
 };
 
-std::vector<Sheet> some_lines() {
+std::vector<Surface> some_lines() {
   return {{0.1234, 0.4, {1, 0.2, 0}}, {0.3777, 0.7, {0, 1, 0.3}}, {0.7071, 0.5, {0.2, 0.4, 1}}};
 }
 
@@ -52,7 +52,7 @@ double distance(const Light& a, const Light& b) {
   return std::sqrt(square);
 }
 
-Light truth(const Haze& haze, const std::vector<Sheet>& lines) {
+Light truth(const Haze& haze, const std::vector<Surface>& lines) {
   reference::RayCount count;
   Haze medium = haze;
   const std::vector<double> breaks =
@@ -132,7 +132,7 @@ enum class Rule {
   split_at_lines  // midpoint cells that end at each line
 };
 
-CellLight haze_cell(const Haze& haze, Compositing by, double from, double to, const Sheet* line) {
+CellLight haze_cell(const Haze& haze, Compositing by, double from, double to, const Surface* line) {
   Cell cell;
   const double middle = 0.5 * (from + to);
   cell.tau = haze.rho(middle) * (to - from);
@@ -146,7 +146,7 @@ CellLight haze_cell(const Haze& haze, Compositing by, double from, double to, co
 }
 
 // One cell, all of it within the medium; at most one line in it.
-void add_cell(const Haze& haze, Rule rule, double from, double to, const Sheet* line,
+void add_cell(const Haze& haze, Rule rule, double from, double to, const Surface* line,
               Light& light) {
   switch (rule) {
     case Rule::euler:
@@ -164,7 +164,7 @@ void add_cell(const Haze& haze, Rule rule, double from, double to, const Sheet* 
     case Rule::split_at_lines:
       if (line != nullptr) {
         composite(haze_cell(haze, Compositing::analytic, from, line->depth, nullptr), light);
-        reference::cross_sheet(*line, light);
+        reference::cross_surface(*line, light);
         from = line->depth;
       }
       composite(haze_cell(haze, Compositing::analytic, from, to, nullptr), light);
@@ -173,7 +173,7 @@ void add_cell(const Haze& haze, Rule rule, double from, double to, const Sheet* 
 
 // Cells of width 1 / n whose borders lie at (i + phase) / n, cut off at the medium's ends (and at
 // its edge, if told).
-Light by_cells(const Haze& haze, const std::vector<Sheet>& lines, Rule rule, int n, double phase,
+Light by_cells(const Haze& haze, const std::vector<Surface>& lines, Rule rule, int n, double phase,
                bool split_at_edge) {
   std::vector<double> borders{0};
   for (int i = 0; i < n; ++i) borders.push_back((i + phase) / n);
@@ -186,8 +186,8 @@ Light by_cells(const Haze& haze, const std::vector<Sheet>& lines, Rule rule, int
     const double from = borders[i];
     const double to = borders[i + 1];
     if (!(to > from)) continue;
-    const Sheet* inside = nullptr;
-    for (const Sheet& line : lines) {
+    const Surface* inside = nullptr;
+    for (const Surface& line : lines) {
       if (line.depth >= from && line.depth < to) inside = &line;
     }
     add_cell(haze, rule, from, to, inside, light);
@@ -196,7 +196,7 @@ Light by_cells(const Haze& haze, const std::vector<Sheet>& lines, Rule rule, int
 }
 
 // Slope of the phase-averaged RMS error over the cell's width.
-double order(const Haze& haze, const std::vector<Sheet>& lines, Rule rule, bool split_at_edge) {
+double order(const Haze& haze, const std::vector<Surface>& lines, Rule rule, bool split_at_edge) {
   const Light exact = truth(haze, lines);
   std::mt19937 random(17);
   std::uniform_real_distribution<double> unit(0, 1);

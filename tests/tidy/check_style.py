@@ -78,12 +78,13 @@ def empty_test_folders(root, files):
     """CMake passes over a folder of tests without a source; nobody would miss it."""
     listing = root / "tests" / "CMakeLists.txt"
     if listing.exists():
-        for name, folder in re.findall(r"^windsplat_test\((\w+) (\S+)", listing.read_text(), re.M):
-            here = [file for path, file in files
-                    if re.fullmatch(rf"tests/{folder}/[^/]+\.cpp", path)]
-            if not any(re.search(r"^(TYPED_)?TEST(_[FP])?\(", tree.text(file) or "", re.M)
-                       for file in here):
-                yield f"tests/{folder}: no test in it ({name})"
+        for name, named in re.findall(r"^windsplat_test\((\w+) (\S+)", listing.read_text(), re.M):
+            for folder in named.strip('"').split(";"):
+                here = [file for path, file in files
+                        if re.fullmatch(rf"tests/{folder}/.+\.cpp", path)]
+                if not any(re.search(r"^(TYPED_)?TEST(_[FP])?\(", tree.text(file) or "", re.M)
+                           for file in here):
+                    yield f"tests/{folder}: no test in it ({name})"
     for folder in sorted((root / "tests").glob("**/")):
         inside = folder.relative_to(root).as_posix()
         if not tree.NOT_OURS & set(folder.parts[len(root.parts):]):

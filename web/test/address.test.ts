@@ -92,10 +92,10 @@ test("a stored view that does not come leaves the link until the view is edited"
   for (const later of [false, true]) {
     const visit = new Visit(later ? "" : short);
     if (later) visit.goTo(short);
-    visit.answer(Response.json({ title: "No", detail: "there is no view k7" }, { status: 404 }));
+    visit.answer(Response.json({ title: "No", detail: "unknown view k7" }, { status: 404 }));
     await settled();
     assert.deepEqual(visit.begun, [null]);
-    assert.match(visit.alert, /there is no view k7/);
+    assert.match(visit.alert, /unknown view k7/);
     assert.equal(visit.rests({ dataset: "gcm", step: 0 }), short, "what the page does by itself");
     visit.address.edited();
     assert.equal(visit.rests({ step: 3 }), hashOfView({ step: 3 }));

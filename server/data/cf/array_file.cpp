@@ -1,4 +1,4 @@
-// What every ArrayFile does alike.
+// Common implementation of ArrayFile.
 #include "server/data/cf/array_file.hpp"
 
 #include <algorithm>
@@ -32,7 +32,7 @@ Result<std::vector<double>> ArrayFile::read_all(int variable) const {
     if (auto done = read(variable, start, count, out.data()); !done) {
       return done.error();
     }
-    forget_chunks(variable);  // it is read once
+    forget_chunks(variable);  // read only once
   }
   return out;
 }

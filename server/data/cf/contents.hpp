@@ -1,5 +1,4 @@
-// What the header of a file of arrays says, as plain data: its reader fills it, the files beside
-// this one judge it.
+// The header of a file of arrays as plain data, filled by its reader.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +13,7 @@ struct FileDimension {
   std::string name;
   std::size_t length = 0;
   bool unlimited = false;
-  bool falls = false;  // indices run against the direction that the grid's vectors count
+  bool falls = false;  // indices run opposite to the direction of vector components
 };
 
 struct FileVariable {
@@ -31,10 +30,10 @@ struct FileVariable {
   std::string coordinates;
   std::string bounds;  // `bounds` or `climatology`
   std::string grid_mapping;
-  // "<vector's name> <component index>": our writer's own attribute, and how readers of formats
-  // that have vectors tell them.
+  // "<name of the vector> <component index>": attribute of the netCDF writer; also set by readers
+  // of formats with vectors.
   std::string vector_mark;
-  std::string unread;        // why it cannot be read although it is there; not `numeric` then
+  std::string unread;        // why a variable cannot be read; `numeric` is then false
   bool packed = false;       // has scale_factor or add_offset
   bool is_unsigned = false;  // _Unsigned = "true" on a signed integer type
 };
@@ -44,9 +43,9 @@ struct FileContents {
   std::vector<FileDimension> dimensions;
   std::vector<FileVariable>
       variables;                    // of the root group; readers address a variable by its index
-  std::vector<std::string> groups;  // names of groups below the root, not looked into
-  std::vector<LeftOut> left_out;    // what the reader could not offer
-  std::vector<std::string> notes;   // what the reader did that a user should know
+  std::vector<std::string> groups;  // names of groups below the root, which are not searched
+  std::vector<LeftOut> left_out;    // variables that cannot be read
+  std::vector<std::string> notes;   // assumptions and conversions of the reader, for users
 };
 
 }  // namespace windsplat::data

@@ -3,7 +3,7 @@
 
 #include <numbers>
 
-#include "server/data/cf/axes.hpp"
+#include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/packing.hpp"
 
 namespace windsplat::data::cf {

@@ -32,14 +32,14 @@ constexpr auto type_fills =
                              {"float32", static_cast<double>(NC_FILL_FLOAT), 0},
                              {"float64", NC_FILL_DOUBLE, 0}});
 
-// An attribute may be stored wider than its variable: compare what the variable could hold.
+// Rounds an attribute of a wider type to the type of the variable, for comparison.
 double as_stored(double value, bool is_float32) {
   return is_float32 && std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max())
              ? static_cast<double>(static_cast<float>(value))
              : value;
 }
 
-// As exact as single precision is.
+// With the digits of single precision.
 std::string short_text(double value) {
   std::array<char, 40> out{};
   const auto end =
@@ -88,8 +88,8 @@ Packing packing_of(const ArrayFile& file, int variable) {
     low = {{both.values[0]}, both.floating};
     high = {{both.values[1]}, both.floating};
   }
-  // Limits are stored numbers, unless they are fractions about packed integers, which can only be
-  // meant for what comes out (NetCDF User's Guide, attribute conventions).
+  // Limits apply to stored numbers, except floating-point limits of packed integers, which apply to
+  // unpacked values (NetCDF User's Guide, attribute conventions).
   packing.valid_is_unpacked = info.packed && is_integer && (low.floating || high.floating);
   const bool round = is_float32 && !packing.valid_is_unpacked;
   if (!low.values.empty()) {
@@ -138,7 +138,7 @@ double unpack_double(const Packing& packing, double stored) {
   }
   const double value = packing.packed ? stored * packing.scale + packing.offset : stored;
   const double judged = packing.valid_is_unpacked ? value : stored;
-  // Written so that NaN, which compares false, is masked.
+  // NaN compares false and is masked.
   return judged >= packing.valid_min && judged <= packing.valid_max ? value : masked_value;
 }
 
@@ -156,7 +156,7 @@ std::optional<FloatMask> float_mask(const Packing& packing) {
     const auto rounded = static_cast<float>(missing);
     if (static_cast<double>(rounded) == missing) mask.missing.push_back(rounded);
   }
-  // Of limits between two floats the inner one is as good; beyond all floats they say nothing.
+  // Limits between two floats are rounded inward; limits beyond all floats have no effect.
   const auto largest = static_cast<double>(std::numeric_limits<float>::max());
   if (std::isnan(packing.valid_min) || std::isnan(packing.valid_max)) return std::nullopt;
   if (packing.valid_min > largest || packing.valid_max < -largest) return std::nullopt;

@@ -1,5 +1,4 @@
-// Stored number -> physical value, or NaN where the file says there is none (CF 1.8, 2.5.1
-// and 8.1).
+// Stored number -> physical value, or NaN if missing or invalid (CF 1.8, 2.5.1 and 8.1).
 #pragma once
 
 #include <cstddef>
@@ -13,7 +12,7 @@
 namespace windsplat::data::cf {
 
 struct Packing {
-  bool packed = false;  // scale and offset apply; else a number passes untouched, -0 included
+  bool packed = false;  // scale and offset apply; otherwise numbers are unchanged, including -0
   double scale = 1;
   double offset = 0;
   double wrap = 0;              // added to negative stored numbers: a signed type that is unsigned
@@ -24,7 +23,8 @@ struct Packing {
 };
 
 // From _FillValue, missing_value, valid_min, valid_max, valid_range, scale_factor, add_offset and
-// _Unsigned. Without a _FillValue the type's default fill counts as missing, but for 8-bit types.
+// _Unsigned. Without _FillValue, the default fill value of the type is missing, except for 8-bit
+// types.
 Packing packing_of(const ArrayFile& file, int variable);
 
 // "-150 to 5000", "from 0", "up to 1": the valid values, unpacked; empty if all are.
@@ -35,13 +35,13 @@ float unpack(const Packing& packing, double stored);
 // The same in double, for coordinates.
 double unpack_double(const Packing& packing, double stored);
 
-// What is missing of numbers stored as float32 and not packed.
+// Mask of unpacked numbers stored as float32.
 struct FloatMask {
   std::vector<float> missing;
   float valid_min = -std::numeric_limits<float>::max();
   float valid_max = std::numeric_limits<float>::max();
 };
-// Nothing if the packing asks for more than that.
+// Empty if the packing requires more than that.
 std::optional<FloatMask> float_mask(const Packing& packing);
 // unpack() of every value, in place.
 void apply(const FloatMask& mask, float* values, std::size_t count);

@@ -1,4 +1,4 @@
-// Blocks are some MiB, and whole chunks where the file has chunks.
+// Reads in blocks of some MiB, in whole chunks if the file has chunks.
 #include "server/data/cf/read_blocks.hpp"
 
 #include <algorithm>
@@ -14,15 +14,15 @@ namespace {
 // Doubles read at a time: 32 MiB where whole chunks are needed, otherwise 2 MiB.
 constexpr std::size_t chunked_values = std::size_t{4} << 20;
 constexpr std::size_t plain_values = std::size_t{1} << 18;
-// One dimension of a variable on its way into the volume.
+// Mapping of one dimension of a variable to the volume.
 struct Way {
   std::size_t first = 0;      // index in the file where reading starts
   std::size_t length = 1;     // how many indices are read
   std::ptrdiff_t stride = 0;  // floats between neighbours in the volume, negative if turned
 };
 
-// Calls row(offset of the row's first value in the volume, row's values) for all rows of a block
-// (counts, last fastest).
+// Calls row(offset of its first value in the volume, its values) for all rows of a block (counts,
+// last fastest).
 template <class T, class Row>
 void for_rows(const T* block, const std::vector<std::size_t>& count, const std::vector<Way>& ways,
               const Row& row) {
@@ -77,7 +77,7 @@ void scatter(const FloatMask& mask, float* block, const std::vector<std::size_t>
   });
 }
 
-// Whether a block has the same order of samples in the volume and in the file.
+// Whether a block is contiguous in the volume, in the order of the file.
 bool in_one_piece(const std::vector<std::size_t>& count, const std::vector<Way>& ways) {
   std::ptrdiff_t values = 1;
   for (std::size_t d = ways.size(); d-- > 0;) {
@@ -87,7 +87,7 @@ bool in_one_piece(const std::vector<std::size_t>& count, const std::vector<Way>&
   return true;
 }
 
-// How much of each dimension a block spans: whole inner dimensions, some of one, single outer ones.
+// Extent of a block along each dimension: whole inner dimensions, part of one, 1 along outer ones.
 std::vector<std::size_t> block_counts(const std::vector<Way>& ways,
                                       const std::vector<std::size_t>& chunk) {
   const bool chunked = std::any_of(chunk.begin(), chunk.end(), [](auto n) { return n > 1; });
@@ -109,7 +109,7 @@ std::vector<std::size_t> block_counts(const std::vector<Way>& ways,
   return count;
 }
 
-// How each dimension of a variable is read, and where its index 0 lands in the volume.
+// Mapping of each dimension of a variable; sets `origin` to the offset of the first value.
 std::vector<Way> ways_of(const ArrayFile& file, const Placement& grid, int variable,
                          std::size_t step, const Levels& levels, std::ptrdiff_t& origin) {
   const std::array<std::ptrdiff_t, 3> strides{1, static_cast<std::ptrdiff_t>(grid.length[0]),
@@ -139,7 +139,7 @@ std::vector<Way> ways_of(const ArrayFile& file, const Placement& grid, int varia
   return ways;
 }
 
-// The next step may find what this one decompressed, and other levels what these did.
+// Whether the decoded chunks also contain other steps or levels, which are likely to be read next.
 bool hold_other_parts(const ArrayFile& file, const Placement& grid, int variable,
                       const Levels& levels, const std::vector<std::size_t>& chunk) {
   const auto& dims = file.contents().variables.at(static_cast<std::size_t>(variable)).dims;
@@ -148,12 +148,12 @@ bool hold_other_parts(const ArrayFile& file, const Placement& grid, int variable
          levels.first + levels.count < grid.length[2];
 }
 
-// The state of going through a variable block by block.
+// One block of a variable.
 struct Walk {
   std::vector<std::size_t> start;
   std::vector<std::size_t> count;
-  std::ptrdiff_t corner = 0;  // where the block's first value lands
-  std::size_t values = 1;     // in the block
+  std::ptrdiff_t corner = 0;  // offset of its first value in the volume
+  std::size_t values = 1;     // number of values
 };
 
 Walk block_at(const std::vector<Way>& ways, const std::vector<std::size_t>& block,
@@ -169,7 +169,7 @@ Walk block_at(const std::vector<Way>& ways, const std::vector<std::size_t>& bloc
   return walk;
 }
 
-// To the next block; false behind the last.
+// Advances to the next block; false after the last.
 bool advance(const std::vector<Way>& ways, const std::vector<std::size_t>& block,
              std::vector<std::size_t>& index) {
   for (std::size_t d = ways.size(); d > 0; --d) {
@@ -180,7 +180,7 @@ bool advance(const std::vector<Way>& ways, const std::vector<std::size_t>& block
   return false;
 }
 
-// Block after block of type T: read, then `rule` makes values of what is stored.
+// Reads all blocks as type T and converts stored numbers to values by `rule`.
 template <class T, class Rule>
 Result<void> read_blocks(const ArrayFile& file, int variable, const std::vector<Way>& ways,
                          std::ptrdiff_t origin, const Rule& rule, float* out,
@@ -190,7 +190,7 @@ Result<void> read_blocks(const ArrayFile& file, int variable, const std::vector<
   for (const Way& way : ways) all *= way.length;
   std::vector<T> buffer;
   std::size_t done = 0;
-  std::vector<std::size_t> index(ways.size(), 0);  // of the block's corner, from each way's first
+  std::vector<std::size_t> index(ways.size(), 0);  // of the block, relative to `first`
   do {
     const Walk walk = block_at(ways, block, index, origin);
     bool in_place = false;

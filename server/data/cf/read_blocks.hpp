@@ -1,5 +1,5 @@
-// One variable at one step -> a volume, x fastest: blocks of the file in its own order, unpacked,
-// scattered and turned.
+// One variable at one step -> a volume, x fastest: reads blocks in the order of the file, unpacks
+// and scatters them with reversed axes.
 #pragma once
 
 #include <array>
@@ -11,11 +11,11 @@
 
 namespace windsplat::data::cf {
 
-// Which dimensions of a file are a grid's axes, and how they lie in its volumes.
+// The dimensions of a grid in a file, and their orientation and lengths in volumes.
 struct Placement {
   std::array<int, 3> space{-1, -1, -1};             // dimension ids of x, y, z; -1: one sample
   int time = -1;                                    // -1: independent of time
-  std::array<bool, 3> turned{false, false, false};  // the file's order is the other way round
+  std::array<bool, 3> turned{false, false, false};  // the file has the reverse order
   std::array<std::size_t, 3> length{1, 1, 1};       // samples along x, y, z
   [[nodiscard]] std::size_t layer() const { return length[0] * length[1]; }
 };

@@ -1,5 +1,4 @@
-// Several files of one kind -> one, joined along time. Members and a way to open them in, an
-// ArrayFile out.
+// Several files of one kind -> one ArrayFile, joined along time.
 #pragma once
 
 #include <array>
@@ -17,15 +16,15 @@ namespace windsplat::data::cf {
 // Opens a member by its index.
 using OpenMember = std::function<Result<std::unique_ptr<ArrayFile>>(std::size_t member)>;
 
-// All members are looked into once, for their times; after that at most `open_max` are open at a
-// time. Steps are in the order of time, whatever the files' epochs; of two with the same time the
-// later file's counts. Files without a time dimension are one step each.
+// All members are opened once to read their times; afterwards at most `open_max` are open at a
+// time. Steps are sorted by time across epochs; of steps with equal times the one of the later file
+// is used. Files without a time dimension are one step each.
 class SeriesFile final : public ArrayFile {
  public:
   static constexpr std::size_t open_max = 32;
 
-  // `name`: what the series is called; `origin`: how its files are named together. Errors: bad_data
-  // naming the member that does not fit the first one, and what differs.
+  // `name`: name of the series; `origin`: pattern or folder of its files. Errors: bad_data, naming
+  // the member that does not match the first one and the difference.
   static Result<std::unique_ptr<SeriesFile>> open(std::string name, std::size_t members,
                                                   OpenMember open_member, std::string origin = "");
 
@@ -50,7 +49,7 @@ class SeriesFile final : public ArrayFile {
  private:
   struct Member {
     std::string identity;
-    std::vector<int> variables;  // its own index of each of the first's; empty: the very same
+    std::vector<int> variables;  // index of each variable of the first member; empty: identical
   };
   struct Step {
     std::size_t member = 0;
@@ -60,8 +59,8 @@ class SeriesFile final : public ArrayFile {
   // Parallel to contents_.variables.
   struct Variable {
     int in_first = -1;       // its index in the first member
-    int time_axis = -1;      // which of its dimensions is time; -1: the first member's, always
-    bool as_values = false;  // members store it in different ways: what is read is unpacked
+    int time_axis = -1;      // index of its time dimension; -1: always read from the first member
+    bool as_values = false;  // members store it differently: unpacked on reading
   };
   struct Opened {
     std::size_t member = 0;
@@ -96,15 +95,15 @@ class SeriesFile final : public ArrayFile {
   OpenMember open_member_;
   std::unique_ptr<ArrayFile> first_;
   std::array<int, 3> space_{-1, -1, -1};  // the first member's dimensions
-  int time_ = -1;                         // the same; -1: members are single steps
-  int time_coordinate_ = -1;              // the first member's variable; -1: steps are counted
-  std::vector<std::string> dropped_;      // why each of the first member's variables is left out
+  int time_ = -1;                         // time dimension; -1: members are single steps
+  int time_coordinate_ = -1;              // variable of the first member; -1: steps are counted
+  std::vector<std::string> dropped_;      // by variable: why it is omitted, or empty
   std::vector<bool> as_values_;           // of the first member's variables
   std::vector<Member> members_;
   std::vector<Step> steps_;
   FileContents contents_;
   std::vector<Variable> variables_;
-  mutable std::list<Opened> opened_;  // the one used last in front
+  mutable std::list<Opened> opened_;  // most recently used first
 };
 
 }  // namespace windsplat::data::cf

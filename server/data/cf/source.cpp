@@ -1,5 +1,5 @@
-// Puts together what the files beside this one find out, and reads one field at one step: blocks of
-// the file in its own order, unpacked and scattered into x-fastest volumes.
+// Combines grid, axes, times and fields into a dataset, and reads one field at one step into a
+// volume, x fastest.
 #include "server/data/cf/source.hpp"
 
 #include <algorithm>
@@ -16,18 +16,18 @@
 #include "server/base/ascii.hpp"
 #include "server/base/check.hpp"
 #include "server/data/bytes/decode_limits.hpp"
-#include "server/data/cf/axes.hpp"
 #include "server/data/cf/coordinates.hpp"
-#include "server/data/cf/curvilinear.hpp"
-#include "server/data/cf/derived.hpp"
-#include "server/data/cf/fields.hpp"
-#include "server/data/cf/grid.hpp"
+#include "server/data/cf/fields/derived.hpp"
+#include "server/data/cf/fields/fields.hpp"
+#include "server/data/cf/fields/rotation.hpp"
+#include "server/data/cf/grid/axes.hpp"
+#include "server/data/cf/grid/curvilinear.hpp"
+#include "server/data/cf/grid/grid.hpp"
+#include "server/data/cf/grid/level_pressures.hpp"
 #include "server/data/cf/packing.hpp"
 #include "server/data/cf/read_blocks.hpp"
-#include "server/data/cf/rotation.hpp"
-#include "server/data/cf/time.hpp"
+#include "server/data/cf/steps.hpp"
 #include "server/data/cf/units.hpp"
-#include "server/data/cf/vertical.hpp"
 #include "server/data/model/digest.hpp"
 
 namespace windsplat::data::cf {
@@ -55,17 +55,19 @@ class ArraySource final : public FileSource {
     if (auto done = find_axes(); !done) {
       return named(done.error());
     }
-    if (auto done = find_steps(); !done) {
+    if (auto done = find_steps(*file_, choice_.time, coordinate_of(choice_.time), info_); !done) {
       return named(done.error());
     }
-    if (auto done = find_pressures(); !done) {
-      return named(done.error());
+    auto pressures = find_pressures(*file_, coordinate_of(choice_.space[2]), placement_, info_);
+    if (!pressures) {
+      return named(pressures.error());
     }
+    pressures_ = std::move(*pressures);
     if (auto done = find_fields(); !done) {
       return named(done.error());
     }
     if (info_.fields.empty()) {
-      return named(make_error(ErrorKind::bad_data, "no field fits into the limit of 16 GiB"));
+      return named(make_error(ErrorKind::bad_data, "every field exceeds the limit of 16 GiB"));
     }
     tell_valid_values();
     tell_unwritten();
@@ -107,12 +109,12 @@ class ArraySource final : public FileSource {
   }
 
  private:
-  // How a field is made.
+  // How a field is read or derived.
   struct Plan {
     std::vector<int> variables;
     int derived = -1;           // index into derived_
-    bool rotated = false;       // from east and north to the axes
-    bool follows_rows = false;  // from the file's rows and columns to the axes
+    bool rotated = false;       // components from east and north to the axes
+    bool follows_rows = false;  // components from rows and columns of the file to the axes
   };
 
   // Directions of vector components given along the rows and columns of the file.
@@ -131,7 +133,12 @@ class ArraySource final : public FileSource {
     return file_->contents().dimensions.at(static_cast<std::size_t>(id));
   }
 
-  // What has no coordinates in the file is counted, which takes memory for every entry.
+  // The coordinate variable of a dimension; -1: there is none.
+  [[nodiscard]] int coordinate_of(int id) const {
+    return id < 0 ? -1 : roles_.at(at(id)).coordinate;
+  }
+
+  // Dimensions without coordinates get counted ones, which need memory per entry.
   [[nodiscard]] Result<void> check_entries() const {
     const auto stored = file_->stored_bytes();
     for (const int id : {choice_.space[0], choice_.space[1], choice_.space[2], choice_.time}) {
@@ -178,7 +185,7 @@ class ArraySource final : public FileSource {
     return bearing->is_curvilinear ? Result<void>() : find_projection();
   }
 
-  // Where axes with coordinates of their own are those of a map.
+  // Finds the projection of axes with 1-D coordinates.
   Result<void> find_projection() {
     const auto& [x, y, z] = info_.grid.axes;
     const int mapping = grid_mapping_of(*file_, choice_.variables);
@@ -209,7 +216,7 @@ class ArraySource final : public FileSource {
 
   [[nodiscard]] Levels all_levels() const { return {0, placement_.length[2]}; }
 
-  // The axis of a dimension that the data lack.
+  // The axis of a missing dimension.
   [[nodiscard]] Axis flat_axis(std::size_t which) const {
     constexpr std::array<const char*, 3> known_names{"x", "y", "z"};
     Axis axis;
@@ -252,161 +259,6 @@ class ArraySource final : public FileSource {
     info_.grid.axes.at(which) = std::move(oriented->axis);
     placement_.turned.at(which) = oriented->turned;
     if (!oriented->note.empty()) info_.notes.push_back(std::move(oriented->note));
-    return {};
-  }
-
-  Result<void> find_steps() {
-    const auto& variables = file_->contents().variables;
-    int coordinate = -1;
-    std::size_t count = 1;
-    if (choice_.time >= 0) {
-      count = dimension(choice_.time).length;
-      coordinate = roles_.at(static_cast<std::size_t>(choice_.time)).coordinate;
-    } else {
-      for (std::size_t v = 0; v < variables.size(); ++v) {
-        if (variables[v].dims.empty() && variables[v].numeric &&
-            (variables[v].standard_name == "time" || variables[v].name == "time")) {
-          coordinate = static_cast<int>(v);
-        }
-      }
-    }
-    std::vector<double> values;
-    if (coordinate >= 0) {
-      auto read = unpacked_values(*file_, coordinate);
-      if (!read) {
-        return read.error();
-      }
-      values = std::move(*read);
-    }
-    const bool complete = !values.empty() && std::all_of(values.begin(), values.end(),
-                                                         [](double v) { return std::isfinite(v); });
-    if (complete) {
-      const auto& variable = variables[static_cast<std::size_t>(coordinate)];
-      auto decoded = decode_time(values, variable.units, variable.calendar);
-      info_.steps = std::move(decoded.steps);
-      info_.time_units = variable.units;
-      info_.time_calendar = variable.calendar;
-      if (!decoded.reason.empty()) {
-        info_.left_out.push_back({variable.name, "time is shown as a number: " + decoded.reason});
-      }
-      note_disorder(variable.name, values);
-      return {};
-    }
-    if (choice_.time >= 0) {
-      info_.left_out.push_back({dimension(choice_.time).name,
-                                coordinate >= 0 ? "time has missing values: steps are counted"
-                                                : "dimension without a coordinate variable: steps "
-                                                  "are counted"});
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      info_.steps.push_back({static_cast<double>(i), std::to_string(i)});
-    }
-    return {};
-  }
-
-  // A series is sorted by time; a single file is shown in its own order.
-  void note_disorder(const std::string& name, const std::vector<double>& times) {
-    std::size_t falls = 0;
-    std::size_t repeats = 0;
-    for (std::size_t i = 1; i < times.size(); ++i) {
-      falls += times[i] < times[i - 1] ? 1U : 0U;
-      repeats += times[i] == times[i - 1] ? 1U : 0U;
-    }
-    if (falls + repeats == 0) return;
-    std::string note = in_quotes(name);
-    if (falls > 0) note += " goes back " + times_text(falls);
-    if (falls > 0 && repeats > 0) note += " and";
-    if (repeats > 0) note += " does not advance " + times_text(repeats);
-    note += ": steps are in the file's own order";
-    info_.notes.push_back(std::move(note));
-  }
-
-  static std::string times_text(std::size_t count) {
-    return count == 1 ? std::string("once") : std::to_string(count) + " times";
-  }
-
-  // Where levels follow the ground the vertical axis becomes that of mean pressures.
-  Result<void> find_pressures() {
-    Axis& axis = info_.grid.axes[2];
-    const int z = choice_.space[2];
-    const int coordinate = z < 0 ? -1 : roles_.at(static_cast<std::size_t>(z)).coordinate;
-    const bool by_pressure = axis.kind == AxisKind::pressure;
-    const auto unit = pascals_in(axis.units);
-    if (!by_pressure) {
-      auto hybrid = find_hybrid(*file_, placement_, coordinate);
-      if (!hybrid) return hybrid.error();
-      if (*hybrid) return place_by_pressure(std::move(**hybrid));
-    }
-    if (by_pressure && unit) {
-      for (const double p : axis.coordinates) pressures_.level.push_back(p * *unit);
-      const int surface = find_surface_pressure(file_->contents(), placement_);
-      if (surface >= 0) {
-        info_.notes.push_back(in_quotes(variable_name(surface)) +
-                              " is the surface pressure: what lies below it is shown as the file "
-                              "has it, unless it is marked as missing");
-      }
-    }
-    return {};
-  }
-
-  Result<void> place_by_pressure(HybridLevels hybrid) {
-    const double bytes = decoded_step_bytes(*file_, placement_, hybrid.surface, all_levels());
-    if (auto fine = file_->charge(hybrid.surface, bytes); !fine) {
-      info_.notes.push_back("levels follow the ground, but their pressures are not known (" +
-                            fine.error().message + "): the file's own coordinate is kept");
-      return {};
-    }
-    std::vector<float> surface(placement_.layer());
-    if (auto read = read_variable(*file_, placement_, hybrid.surface, 0, all_levels(),
-                                  surface.data(), [](double) {});
-        !read) {
-      return read;
-    }
-    double sum = 0;
-    double count = 0;
-    for (const float p : surface) {
-      if (!std::isfinite(p)) continue;
-      sum += static_cast<double>(p);
-      ++count;
-    }
-    const bool turned = placement_.turned[2];
-    Axis axis = info_.grid.axes[2];
-    const auto mean = [&](std::size_t k) {
-      return hybrid.a[k] / hybrid.unit_pa + hybrid.b[k] * sum / count;
-    };
-    // Levels may be counted from the top without the file saying so.
-    if (count > 0 && mean(0) < mean(axis.coordinates.size() - 1)) {
-      std::reverse(hybrid.a.begin(), hybrid.a.end());
-      std::reverse(hybrid.b.begin(), hybrid.b.end());
-      placement_.turned[2] = !placement_.turned[2];
-    }
-    bool falls = count > 0;
-    for (std::size_t k = 0; k < axis.coordinates.size(); ++k) {
-      axis.coordinates[k] = mean(k);
-      falls = falls && axis.coordinates[k] > 0 &&
-              (k == 0 || axis.coordinates[k] < axis.coordinates[k - 1]);
-    }
-    if (!falls) {
-      placement_.turned[2] = turned;
-      info_.notes.emplace_back(
-          "levels follow the ground, but their mean pressures do not fall from level to level: "
-          "the file's own coordinate is kept");
-      return {};
-    }
-    axis.kind = AxisKind::pressure;
-    axis.standard_name = "air_pressure";
-    axis.units = hybrid.units;
-    info_.grid.axes[2] = std::move(axis);
-    info_.notes.push_back(hybrid.note);
-    for (LeftOut& left : info_.left_out) {
-      if (left.name == variable_name(hybrid.surface)) {
-        left.reason = "surface pressure: gives the pressure of the levels";
-      }
-      for (const int v : hybrid.coefficients) {
-        if (left.name == variable_name(v)) left.reason = "coefficient of the levels' pressure";
-      }
-    }
-    pressures_.hybrid = std::move(hybrid);
     return {};
   }
 
@@ -490,7 +342,8 @@ class ArraySource final : public FileSource {
     plans_.push_back(std::move(plan));
   }
 
-  // How a vector is converted to the grid's axes, which need not run east and north.
+  // Determines how a vector is converted to the axes of the grid, which may differ from east and
+  // north.
   void find_turning(const FieldInfo& info, Plan& plan) {
     const auto& first =
         file_->contents().variables.at(static_cast<std::size_t>(plan.variables.front()));
@@ -507,13 +360,11 @@ class ArraySource final : public FileSource {
           " is given by east and north, but the grid's longitudes and latitudes have gaps or are "
           "not in the file: it is drawn as if rows ran east";
     } else if (!by_grid) {
-      note +=
-          " does not say which way its components point: taken to be along the axes as they are "
-          "drawn";
+      note += " does not specify the direction of its components: assumed to be along the axes";
     }
     if (by_earth || !by_grid) info_.notes.push_back(std::move(note));
     plan.rotated = by_earth && info_.grid.columns;
-    // u and v without a word mean east and north, or nearly, more often than indices.
+    // u and v without attributes more often mean east and north than rows and columns.
     plan.follows_rows = by_grid && to_axes_.any();
     if (!plan.follows_rows) return;
     note =
@@ -543,7 +394,7 @@ class ArraySource final : public FileSource {
   Placement placement_;
   DatasetInfo info_;
   PressureLevels pressures_;
-  bool follows_other_axes_ = false;  // rows need not run east
+  bool follows_other_axes_ = false;  // rows may not point east
   ToAxes to_axes_;
   std::optional<GridBearing> bearing_;
   std::vector<DerivedField> derived_;

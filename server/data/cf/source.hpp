@@ -1,4 +1,4 @@
-// Arrays with the conventions of CF -> a dataset: dimensions' roles -> grid -> fields -> volumes.
+// Arrays with CF conventions -> a dataset: roles of dimensions -> grid -> fields -> volumes.
 #pragma once
 
 #include <memory>

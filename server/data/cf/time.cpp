@@ -75,7 +75,7 @@ std::int64_t plain_day_number(const Date& date, Calendar calendar) {
 }
 
 Date plain_date_of(std::int64_t number, Calendar calendar) {
-  // A year is never shorter than 360 days nor longer than 366, so the guess is near; walk home.
+  // Start from an estimate by the mean length of a year, then correct it.
   Date date;
   date.year = static_cast<std::int64_t>(std::floor(
       static_cast<double>(number) / (static_cast<double>(days_before_year(400, calendar)) / 400)));
@@ -108,7 +108,7 @@ bool is_gregorian_part(const Date& date) {
          std::pair<std::int64_t, int>(1582, 1015);
 }
 
-// A reader of the epoch's text: digits and separators, left to right.
+// Reads the text of an epoch from left to right.
 class Cursor {
  public:
   explicit Cursor(std::string_view text) : rest_(text) {}
@@ -280,7 +280,7 @@ std::string iso_text(std::int64_t ms, Calendar calendar) {
   const std::int64_t day = floor_div(ms, ms_per_day);
   const std::int64_t in_day = ms - day * ms_per_day;
   const Date date = date_of(day, calendar);
-  // ISO 8601 wants a sign on years that four digits cannot hold.
+  // ISO 8601 requires a sign for years outside 0000 to 9999.
   const bool plain = date.year >= 0 && date.year <= 9999;
   std::array<char, 64> out{};
   std::snprintf(out.data(), out.size(),
@@ -306,12 +306,12 @@ int unit_months(std::string_view unit) {
 
 struct Scale {
   std::int64_t unit_ms = 0;
-  int unit_months = 0;  // else
+  int unit_months = 0;  // if unit_ms is 0
   std::int64_t epoch_ms = 0;
   Calendar calendar = Calendar::standard;
 };
 
-// What the unit text and the calendar mean, or why they cannot be used.
+// Parses units and calendar; otherwise sets the reason.
 std::optional<Scale> parse_scale(std::string_view units, std::string_view calendar,
                                  std::string& reason) {
   const std::string text = lower(trim(units));
@@ -335,7 +335,7 @@ std::optional<Scale> parse_scale(std::string_view units, std::string_view calend
     return std::nullopt;
   }
   scale.calendar = *known;
-  // The original text: an epoch's T and Z are upper case.
+  // From the original text, because T and Z are upper case.
   const auto epoch = parse_epoch(trim(units).substr(since + 7), scale.calendar);
   if (!epoch) {
     reason = "its epoch is not a date of the calendar";
@@ -345,8 +345,7 @@ std::optional<Scale> parse_scale(std::string_view units, std::string_view calend
   return scale;
 }
 
-// The same day of the month and time of day so many months on; the month's last day where it has
-// none such.
+// The same day and time `months` later, or the last day of that month if it is shorter.
 std::int64_t months_on(std::int64_t epoch_ms, std::int64_t months, Calendar calendar) {
   const std::int64_t epoch_day = floor_div(epoch_ms, ms_per_day);
   Date date = date_of(epoch_day, calendar);
@@ -357,7 +356,7 @@ std::int64_t months_on(std::int64_t epoch_ms, std::int64_t months, Calendar cale
   return day_number(date, calendar) * ms_per_day + (epoch_ms - epoch_day * ms_per_day);
 }
 
-// Whole months by the calendar, of a fraction its share of the month it lies in.
+// Whole calendar months; the fraction is relative to the length of its month.
 std::optional<std::int64_t> months_to_ms(double value, const Scale& scale) {
   const double months = value * scale.unit_months;
   const double whole = std::floor(months);
@@ -374,7 +373,7 @@ std::optional<std::int64_t> months_to_ms(double value, const Scale& scale) {
   return from + std::llround((months - whole) * static_cast<double>(to - from));
 }
 
-// Whole units exactly, the fraction rounded to the millisecond. Nothing beyond +-10^7 years.
+// Whole units are exact, the fraction is rounded to the millisecond. Empty beyond about 10^7 years.
 std::optional<std::int64_t> to_ms(double value, const Scale& scale) {
   if (scale.unit_months > 0) return months_to_ms(value, scale);
   const double whole = std::floor(value);
@@ -455,7 +454,7 @@ DecodedTime decode_time(const std::vector<double>& values, std::string_view unit
       if (const auto ms = to_ms(value, *scale)) {
         step.text = iso_text(*ms, scale->calendar);
       } else {
-        out.reason = "a value is out of the calendar's reach";
+        out.reason = "a value is outside the range of the calendar";
       }
     }
     out.steps.push_back(std::move(step));
@@ -470,7 +469,7 @@ std::optional<std::vector<double>> convert_times(const std::vector<double>& valu
   const auto source = parse_scale(from.units, from.calendar, ignored);
   const auto target = parse_scale(to.units, to.calendar, ignored);
   if (!source || !target || target->unit_months > 0) return std::nullopt;
-  // Both count the same days from the day that the Gregorian calendar begins.
+  // Both calendars agree from the first Gregorian day on.
   const auto gregorian = [](const Scale& scale) {
     return scale.calendar == Calendar::proleptic_gregorian || scale.calendar == Calendar::standard;
   };

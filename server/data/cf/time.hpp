@@ -37,9 +37,9 @@ struct DecodedTime {
   std::string reason;  // why the texts are plain numbers; empty if they are dates
 };
 
-// values: one a step, in `units` ("hours since 2001-01-01 00:00"). Texts are rounded to the
-// millisecond. Months and years are those of the calendar, a fraction its share of the month it
-// lies in. Where unit, epoch or calendar is not understood, the texts are the numbers.
+// values: one per step, in `units` ("hours since 2001-01-01 00:00"). Texts are rounded to the
+// millisecond. Months and years are calendar months and years; fractions are relative to the length
+// of their month. If unit, epoch or calendar is not supported, the texts are the numbers.
 DecodedTime decode_time(const std::vector<double>& values, std::string_view units,
                         std::string_view calendar);
 
@@ -48,8 +48,8 @@ struct TimeUnits {
   std::string calendar;
 };
 
-// The same moments in other units, to the millisecond. Empty where one of the units is not
-// understood, the calendars have different days, or `to` counts months.
+// Converts times to other units, to the millisecond. Empty if a unit is not supported, the
+// calendars have different days, or `to` counts months.
 std::optional<std::vector<double>> convert_times(const std::vector<double>& values,
                                                  const TimeUnits& from, const TimeUnits& to);
 

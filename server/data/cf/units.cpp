@@ -1,4 +1,4 @@
-// One table a quantity.
+// One table per quantity.
 #include "server/data/cf/units.hpp"
 
 #include <array>

@@ -1,5 +1,4 @@
-// Units of length and pressure as files write them -> SI. Case and surrounding blanks do not
-// matter.
+// Units of length and pressure in files -> SI; ignores case and surrounding blanks.
 #pragma once
 
 #include <optional>

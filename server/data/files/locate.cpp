@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "server/base/ascii.hpp"
 #include "server/data/files/files.hpp"
 #include "server/data/files/locate_parts.hpp"
 
@@ -22,13 +23,6 @@ namespace fs = std::filesystem;
 // Endings of formats whose header names files beside it.
 constexpr auto with_companions = std::to_array<std::string_view>(
     {".pvd", ".pvti", ".pvtr", ".pvts", ".pvtu", ".ctl", ".json", ".nhdr", ".dx"});
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  return text;
-}
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "server/data/cf/grid.hpp"
+#include "server/data/cf/grid/grid.hpp"
 #include "server/data/loader/bytes.hpp"
 #include "server/data/model/axis_check.hpp"
 

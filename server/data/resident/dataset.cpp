@@ -2,8 +2,6 @@
 #include "server/data/resident/dataset.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <condition_variable>
 #include <deque>
 #include <exception>
 #include <map>
@@ -16,13 +14,13 @@
 #include "server/data/bytes/decode_limits.hpp"
 #include "server/data/model/digest.hpp"
 #include "server/data/model/packed.hpp"
+#include "server/data/resident/turnstile.hpp"
 
 namespace windsplat::data {
 
 namespace {
 
 using VolumePtr = std::shared_ptr<const Volume>;
-using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t remembered_max = 256;
 
@@ -42,42 +40,6 @@ std::uint64_t bytes_of(const DatasetInfo& info) {
   for (const TimeStep& step : info.steps) bytes += sizeof step + step.text.capacity();
   return bytes;
 }
-
-// One reader at a time; demanded loads precede prefetches.
-class Turnstile {
- public:
-  void enter(Urgency urgency) {
-    std::unique_lock lock(mutex_);
-    const bool somebody_waits = urgency != Urgency::prefetch;
-    waiting_ += somebody_waits ? 1 : 0;
-    free_.wait(lock, [&] { return !taken_ && (somebody_waits || waiting_ == 0); });
-    waiting_ -= somebody_waits ? 1 : 0;
-    taken_ = true;
-  }
-  void leave() {
-    {
-      const std::lock_guard lock(mutex_);
-      taken_ = false;
-      used_at_ = Clock::now();
-    }
-    free_.notify_all();
-  }
-  // Enters if no reader is inside, waiting, or was inside within that time.
-  bool enter_if_idle(double idle_s) {
-    const std::lock_guard lock(mutex_);
-    const std::chrono::duration<double> rest = Clock::now() - used_at_;
-    if (taken_ || waiting_ > 0 || rest.count() < idle_s) return false;
-    taken_ = true;
-    return true;
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable free_;
-  Clock::time_point used_at_ = Clock::now();
-  bool taken_ = false;
-  int waiting_ = 0;
-};
 
 }  // namespace
 

@@ -17,6 +17,7 @@
 #include "server/data/files/locate_parts.hpp"
 #include "server/data/open/open.hpp"
 #include "server/data/resident/prefetcher.hpp"
+#include "server/data/resident/watched_files.hpp"
 #include "server/data/samples/samples.hpp"
 
 namespace windsplat::data {
@@ -25,67 +26,14 @@ namespace {
 
 using DatasetPtr = std::shared_ptr<Dataset>;
 
-// Files whose modification times are read in one scan; the newest of a longer series.
-constexpr std::size_t files_watched_max = 64;
-
 Result<std::unique_ptr<Source>> open_here(const Location& location) {
   auto source = open_dataset(direct_files(location));
   if (!source) return source.error();
   return std::unique_ptr<Source>(std::move(*source));
 }
 
-// The combined state of the watched files of a dataset.
-FileStamp stamp_of_all(const Location& location, const std::vector<Companion>& companions) {
-  std::vector<std::string> paths;
-  if (location.kind == Location::Kind::folder) {
-    for (const char* part : {"", "/.zmetadata", "/.zattrs", "/.zgroup"}) {
-      paths.push_back(location.folder + part);
-    }
-  }
-  const std::size_t count = location.members.size();
-  for (std::size_t i = count - std::min(count, files_watched_max); i < count; ++i) {
-    paths.push_back(location.members[i].path);
-  }
-  for (const Companion& companion : companions) paths.push_back(companion.path);
-  FileStamp out;
-  out.text = std::to_string(count);
-  for (const std::string& path : paths) {
-    const FileStamp one = stamp_of(path);
-    out.text += ';' + one.text;
-    out.changed_s = std::max(out.changed_s, one.changed_s);
-  }
-  return out;
-}
-
-// States at the time of opening: members as `before`, companions as read by the source.
-std::string stamp_as_opened(FileStamp before, const std::vector<Companion>& companions) {
-  for (const Companion& companion : companions) before.text += ';' + companion.stamp.text;
-  return std::move(before.text);
-}
-
-// Rescans a series whose folder has changed. False: no scan was needed.
-bool match_again(std::optional<Location>& location, std::string& listed) {
-  if (location->kind != Location::Kind::series) return false;
-  std::string now = stamp_of(location->folder).text;
-  if (now == listed) return false;
-  if (auto again = locate_again(*location)) location = std::move(*again);
-  listed = std::move(now);
-  return true;
-}
-
 double now_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
-// Same text, same files.
-std::string key_of(const Location& location) {
-  std::string key =
-      std::to_string(static_cast<int>(location.kind)) + location.folder + '#' + location.inside;
-  for (const Location::Member& member : location.members) {
-    key += '\n';
-    key += member.path;
-  }
-  return key;
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
 #include "server/data/model/volume.hpp"
 
 namespace windsplat::data {

@@ -1,10 +1,10 @@
-// The portable body of the kernels, compiled once a target: the including file names the target by
-// WINDSPLAT_KERNEL_TABLE. Everything here has internal linkage, so no function built for one
-// instruction set can stand in for another's.
+// The portable body of the kernels, compiled once per target; the including file names the target
+// by WINDSPLAT_KERNEL_TABLE. Everything here has internal linkage, so that the linker cannot merge
+// functions built for different instruction sets.
 //
-// A brick goes through three steps, the first two by pairs of rows with a lane a stop: its stops
-// are projected and culled, what is left is made ready as lines and splats, and these are
-// composited in visibility order, block by block with a lane a pixel.
+// A brick is processed in three steps, the first two by pairs of rows with one lane per kernel
+// position: its positions are projected and culled, the rest is prepared as lines and splats, and
+// these are composited in visibility order, block by block with one lane per pixel.
 #include <cstddef>
 #include <cstdint>
 

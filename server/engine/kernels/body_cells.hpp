@@ -1,19 +1,18 @@
-// Part of the kernel body: the cells that stops stand for, from grid strides to the world
-// and back.
+// Part of the kernel body: the cells of kernel positions, with transforms between grid and world.
 #pragma once
 
-#include "server/engine/kernels/body_stops.hpp"
+#include "server/engine/kernels/body_fields.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {
 
-// Of a curved lattice's pair of rows: world = sum over axes a of edge[a] * grid[a]; grid[a] =
-// inverse[a] . world. Components of the world come second, lanes last.
+// The cells of a pair of rows of a curved lattice: world = sum over axes a of edge[a] * grid[a];
+// grid[a] = inverse[a] . world. Indices: axis, world component, lane.
 struct Cells {
-  alignas(64) float edge[3][3][pair_stops];
-  alignas(64) float inverse[3][3][pair_stops];
-  alignas(64) float from_eye[3][pair_stops];  // of the stop, world units
-  std::uint32_t solid;                        // bit clear: the cell spans no volume
+  alignas(64) float edge[3][3][pair_kernels];
+  alignas(64) float inverse[3][3][pair_kernels];
+  alignas(64) float from_eye[3][pair_kernels];  // kernel position, world units
+  std::uint32_t solid;                          // bit clear: the cell has no volume
 };
 
 inline void cross3(const float a[3], const float b[3], float out[3]) {
@@ -26,9 +25,9 @@ inline float dot3(const float a[3], const float b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-// The edge of a curved cell along axis a: half the way from the sample before to the one after, at
-// an end the way to the one neighbour, times the samples that the stop stands for. False along an
-// axis of one sample.
+// The edge of a curved cell along axis a: half the vector from the previous sample to the next (at
+// an end, the vector to the only neighbour), times the number of samples that the position
+// represents. Returns false for an axis of one sample.
 inline bool edge_between(const Pass& pass, const Rows& rows, int a, int i, float edge[3]) {
   const int dim = pass.dims[a];
   if (dim == 1) return false;
@@ -43,7 +42,7 @@ inline bool edge_between(const Pass& pass, const Rows& rows, int a, int i, float
   return true;
 }
 
-// Along an axis of one sample a cell stands at right angles to its other two edges.
+// Along an axis of one sample the edge is perpendicular to the other two.
 inline void raise_edge(const float unbent, int a, float edge[3][3]) {
   float across[3];
   cross3(edge[(a + 1) % 3], edge[(a + 2) % 3], across);
@@ -52,7 +51,7 @@ inline void raise_edge(const float unbent, int a, float edge[3][3]) {
   for (int c = 0; c < 3; ++c) edge[a][c] = across[c] * (unbent / area);
 }
 
-// Where neighbours meet (at a pole) a cell spans no volume, and its stop shows nothing.
+// Where neighbours coincide (at a pole) the cell has no volume, and its kernel is not drawn.
 inline void fill_curved_cell(const Pass& pass, const Rows& rows, int i, Cells& cells) {
   constexpr float flattest = 1e-6F;
   float edge[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
@@ -84,7 +83,7 @@ inline void fill_curved_cell(const Pass& pass, const Rows& rows, int i, Cells& c
 
 void fill_cells(const Camera& camera, const Pass& pass, const Rows& rows, Cells& cells) {
   cells.solid = 0;
-  for (int i = 0; i < pair_stops; ++i) {
+  for (int i = 0; i < pair_kernels; ++i) {
     const float* place = pass.places + 3 * offset_of(rows, i);
     for (int c = 0; c < 3; ++c) {
       cells.from_eye[c][i] = static_cast<float>(static_cast<double>(place[c]) - camera.eye[c]);
@@ -93,100 +92,101 @@ void fill_cells(const Camera& camera, const Pass& pass, const Rows& rows, Cells&
   }
 }
 
-// The cells of a vector of stops. A rectilinear lattice has edges along the world's axes alone.
+// The cells of a vector of kernel positions. On a rectilinear lattice all edges are parallel to the
+// world axes.
 template <bool Curved>
 struct CellLanes;
 
 template <>
 struct CellLanes<false> {
-  Three<Stop> edge, inverse, from_eye;
+  Three<Kernel> edge, inverse, from_eye;
 
   KERNEL_INLINE CellLanes(const Rows& rows, const Cells& /*cells*/, int i)
-      : edge{load<Stop>(rows.cell[0] + i), load<Stop>(rows.cell[1] + i),
-             load<Stop>(rows.cell[2] + i)},
-        inverse{load<Stop>(rows.inverse_cell[0] + i), load<Stop>(rows.inverse_cell[1] + i),
-                load<Stop>(rows.inverse_cell[2] + i)},
-        from_eye{load<Stop>(rows.from_eye[0] + i), load<Stop>(rows.from_eye[1] + i),
-                 load<Stop>(rows.from_eye[2] + i)} {}
+      : edge{load<Kernel>(rows.cell[0] + i), load<Kernel>(rows.cell[1] + i),
+             load<Kernel>(rows.cell[2] + i)},
+        inverse{load<Kernel>(rows.inverse_cell[0] + i), load<Kernel>(rows.inverse_cell[1] + i),
+                load<Kernel>(rows.inverse_cell[2] + i)},
+        from_eye{load<Kernel>(rows.from_eye[0] + i), load<Kernel>(rows.from_eye[1] + i),
+                 load<Kernel>(rows.from_eye[2] + i)} {}
 
-  KERNEL_INLINE Three<Stop> to_world(const Three<Stop>& grid) const {
+  KERNEL_INLINE Three<Kernel> to_world(const Three<Kernel>& grid) const {
     return {edge.x * grid.x, edge.y * grid.y, edge.z * grid.z};
   }
-  KERNEL_INLINE Three<Stop> to_grid(const Three<Stop>& world) const {
+  KERNEL_INLINE Three<Kernel> to_grid(const Three<Kernel>& world) const {
     return {inverse.x * world.x, inverse.y * world.y, inverse.z * world.z};
   }
-  KERNEL_INLINE Three<Stop> to_grid(const float world[3]) const {
-    return {inverse.x * all<Stop>(world[0]), inverse.y * all<Stop>(world[1]),
-            inverse.z * all<Stop>(world[2])};
+  KERNEL_INLINE Three<Kernel> to_grid(const float world[3]) const {
+    return {inverse.x * all<Kernel>(world[0]), inverse.y * all<Kernel>(world[1]),
+            inverse.z * all<Kernel>(world[2])};
   }
-  // The edge along axis a, seen along a direction.
-  KERNEL_INLINE Stop edge_along(int a, const float direction[3]) const {
-    const Stop& width = a == 0 ? edge.x : a == 1 ? edge.y : edge.z;
-    return width * all<Stop>(direction[a]);
+  // Component of the edge along axis a in a world direction.
+  KERNEL_INLINE Kernel edge_along(int a, const float direction[3]) const {
+    const Kernel& width = a == 0 ? edge.x : a == 1 ? edge.y : edge.z;
+    return width * all<Kernel>(direction[a]);
   }
-  KERNEL_INLINE Stop edges2() const { return kernels::dot3(edge, edge); }
+  KERNEL_INLINE Kernel edges2() const { return kernels::dot3(edge, edge); }
 };
 
 template <>
 struct CellLanes<true> {
-  Three<Stop> edge[3];
-  Three<Stop> inverse[3];
-  Three<Stop> from_eye;
+  Three<Kernel> edge[3];
+  Three<Kernel> inverse[3];
+  Three<Kernel> from_eye;
 
   KERNEL_INLINE CellLanes(const Rows& /*rows*/, const Cells& cells, int i) {
     for (int a = 0; a < 3; ++a) {
-      edge[a] = {load<Stop>(cells.edge[a][0] + i), load<Stop>(cells.edge[a][1] + i),
-                 load<Stop>(cells.edge[a][2] + i)};
-      inverse[a] = {load<Stop>(cells.inverse[a][0] + i), load<Stop>(cells.inverse[a][1] + i),
-                    load<Stop>(cells.inverse[a][2] + i)};
+      edge[a] = {load<Kernel>(cells.edge[a][0] + i), load<Kernel>(cells.edge[a][1] + i),
+                 load<Kernel>(cells.edge[a][2] + i)};
+      inverse[a] = {load<Kernel>(cells.inverse[a][0] + i), load<Kernel>(cells.inverse[a][1] + i),
+                    load<Kernel>(cells.inverse[a][2] + i)};
     }
-    from_eye = {load<Stop>(cells.from_eye[0] + i), load<Stop>(cells.from_eye[1] + i),
-                load<Stop>(cells.from_eye[2] + i)};
+    from_eye = {load<Kernel>(cells.from_eye[0] + i), load<Kernel>(cells.from_eye[1] + i),
+                load<Kernel>(cells.from_eye[2] + i)};
   }
 
-  KERNEL_INLINE Three<Stop> to_world(const Three<Stop>& grid) const {
-    const auto sum = [&](Stop a, Stop b, Stop c) {
+  KERNEL_INLINE Three<Kernel> to_world(const Three<Kernel>& grid) const {
+    const auto sum = [&](Kernel a, Kernel b, Kernel c) {
       return hn::MulAdd(c, grid.z, hn::MulAdd(b, grid.y, a * grid.x));
     };
     return {sum(edge[0].x, edge[1].x, edge[2].x), sum(edge[0].y, edge[1].y, edge[2].y),
             sum(edge[0].z, edge[1].z, edge[2].z)};
   }
-  KERNEL_INLINE Three<Stop> to_grid(const Three<Stop>& world) const {
+  KERNEL_INLINE Three<Kernel> to_grid(const Three<Kernel>& world) const {
     return {kernels::dot3(inverse[0], world), kernels::dot3(inverse[1], world),
             kernels::dot3(inverse[2], world)};
   }
-  KERNEL_INLINE Three<Stop> to_grid(const float world[3]) const {
+  KERNEL_INLINE Three<Kernel> to_grid(const float world[3]) const {
     return {kernels::dot3(world, inverse[0]), kernels::dot3(world, inverse[1]),
             kernels::dot3(world, inverse[2])};
   }
-  KERNEL_INLINE Stop edge_along(int a, const float direction[3]) const {
+  KERNEL_INLINE Kernel edge_along(int a, const float direction[3]) const {
     return kernels::dot3(direction, edge[a]);
   }
-  KERNEL_INLINE Stop edges2() const {
+  KERNEL_INLINE Kernel edges2() const {
     return kernels::dot3(edge[0], edge[0]) + kernels::dot3(edge[1], edge[1]) +
            kernels::dot3(edge[2], edge[2]);
   }
 };
 
-// Directions along a curved cell's own east, north and up become the world's, of the same length:
-// of a slice's, what lies in its plane.
-KERNEL_INLINE Three<Stop> bent_direction(const LineStyle& line, const CellLanes<true>& cells,
-                                         const Three<Stop>& direction) {
-  const Stop kept[3] = {direction.x * all<Stop>(line.keep[0]),
-                        direction.y * all<Stop>(line.keep[1]),
-                        direction.z * all<Stop>(line.keep[2])};
-  const Stop least = all<Stop>(1e-30F);
-  const Stop zero = hn::Zero(StopTag());
-  Three<Stop> world = {zero, zero, zero};
-  Stop kept2 = zero;
+// Transforms directions along the edges of a curved cell to the world, keeping their lengths. For a
+// slice, only the part in its plane.
+KERNEL_INLINE Three<Kernel> bent_direction(const LineStyle& line, const CellLanes<true>& cells,
+                                           const Three<Kernel>& direction) {
+  const Kernel kept[3] = {direction.x * all<Kernel>(line.keep[0]),
+                          direction.y * all<Kernel>(line.keep[1]),
+                          direction.z * all<Kernel>(line.keep[2])};
+  const Kernel least = all<Kernel>(1e-30F);
+  const Kernel zero = hn::Zero(KernelTag());
+  Three<Kernel> world = {zero, zero, zero};
+  Kernel kept2 = zero;
   for (int a = 0; a < 3; ++a) {
-    const Three<Stop>& edge = cells.edge[a];
-    const Stop scale = kept[a] / hn::Max(hn::Sqrt(dot3(edge, edge)), least);
+    const Three<Kernel>& edge = cells.edge[a];
+    const Kernel scale = kept[a] / hn::Max(hn::Sqrt(dot3(edge, edge)), least);
     kept2 = hn::MulAdd(kept[a], kept[a], kept2);
     world = {hn::MulAdd(edge.x, scale, world.x), hn::MulAdd(edge.y, scale, world.y),
              hn::MulAdd(edge.z, scale, world.z)};
   }
-  const Stop unit = hn::Sqrt(kept2) / hn::Max(hn::Sqrt(dot3(world, world)), least);
+  const Kernel unit = hn::Sqrt(kept2) / hn::Max(hn::Sqrt(dot3(world, world)), least);
   return {world.x * unit, world.y * unit, world.z * unit};
 }
 

@@ -1,198 +1,17 @@
-// Part of the kernel body: one line, one splat or both composited into one block of pixels.
+// Part of the kernel body: composites a line, a splat or both into one block of pixels.
 #pragma once
 
-#include "server/engine/kernels/body_math.hpp"
-#include "server/engine/kernels/prepared.hpp"
+#include "server/engine/kernels/body_lanes.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {
 
-// scene::Compositing and scene::LineColor are told by their numbers.
+// The values of scene::Compositing, whose header is not included here.
 constexpr int compositing_simple = 0;
 constexpr int compositing_cd_naive = 1;
 constexpr int compositing_cd = 2;
 constexpr int compositing_analytic = 3;
 constexpr int compositing_cd_euler = 4;
-
-// How a line looks along itself: of one colour, with a head, with a head and a moving texture.
-constexpr int style_plain = 0;
-constexpr int style_head = 1;
-constexpr int style_moving = 2;
-
-// Pixel centres of a block, from its corner.
-alignas(64) constexpr float lane_x[block_pixels] = {0.5F, 1.5F, 2.5F, 3.5F, 0.5F, 1.5F, 2.5F, 3.5F,
-                                                    0.5F, 1.5F, 2.5F, 3.5F, 0.5F, 1.5F, 2.5F, 3.5F};
-alignas(64) constexpr float lane_y[block_pixels] = {0.5F, 0.5F, 0.5F, 0.5F, 1.5F, 1.5F, 1.5F, 1.5F,
-                                                    2.5F, 2.5F, 2.5F, 2.5F, 3.5F, 3.5F, 3.5F, 3.5F};
-
-// A line's constants, each in every lane.
-struct RibbonLanes {
-  Pixel x, y, ux, uy;
-  Pixel wx, wy, w0;   // w = wx dx + wy dy + w0
-  Pixel ratio, bend;  // depth ratio, and that minus 1
-  Pixel tail[3], rise[3];
-  Pixel phase, phase_rise;
-  Pixel reach, steep, opacity;  // the ramp: clamp(reach - steep distance, 0, opacity)
-};
-
-KERNEL_INLINE RibbonLanes spread(const Ribbon& r) {
-  const auto lanes = [](float v) { return all<Pixel>(v); };
-  return {lanes(r.x),
-          lanes(r.y),
-          lanes(r.ux),
-          lanes(r.uy),
-          lanes(r.wx),
-          lanes(r.wy),
-          lanes(r.w0),
-          lanes(r.depth_ratio),
-          lanes(r.bend),
-          {lanes(r.tail[0]), lanes(r.tail[1]), lanes(r.tail[2])},
-          {lanes(r.rise[0]), lanes(r.rise[1]), lanes(r.rise[2])},
-          lanes(r.phase),
-          lanes(r.phase_rise),
-          lanes(r.reach),
-          lanes(r.steep),
-          lanes(r.opacity)};
-}
-
-// The same from a brick's arrays.
-KERNEL_INLINE RibbonLanes spread(const LineStyle& line, const Ribbons& r, int l) {
-  const auto lanes = [&](const float* v) { return all<Pixel>(v[l]); };
-  const auto one = [](float v) { return all<Pixel>(v); };
-  const float* tail = r.tail[l];
-  const float* rise = r.rise[l];
-  RibbonLanes out;
-  out.x = lanes(r.x);
-  out.y = lanes(r.y);
-  out.ux = lanes(r.ux);
-  out.uy = lanes(r.uy);
-  out.wx = lanes(r.wx);
-  out.wy = lanes(r.wy);
-  out.w0 = lanes(r.w0);
-  out.ratio = lanes(r.depth_ratio);
-  out.bend = lanes(r.bend);
-  for (int c = 0; c < 3; ++c) {
-    out.tail[c] = one(tail[c]);
-    out.rise[c] = one(rise[c]);
-  }
-  out.phase = out.phase_rise = hn::Zero(PixelTag());
-  if (line.moving != 0) {
-    out.phase = lanes(r.phase);
-    out.phase_rise = lanes(r.phase_rise);
-  }
-  out.reach = one(line.reach);
-  out.steep = one(line.steep);
-  out.opacity = one(line.opacity);
-  return out;
-}
-
-struct RibbonLane {
-  Pixel opacity;
-  Pixel f;
-};
-
-// How f follows from w, the place along the line on the screen: 1/z is linear there. The series is
-// good to bend^2 / 6.
-enum class Depth { flat, series, exact };
-constexpr float series_bend_max = 4e-3F;
-
-template <Depth Along>
-KERNEL_INLINE Pixel along_ribbon(const RibbonLanes& r, Pixel w) {
-  const Pixel one = all<Pixel>(1.0F);
-  if (Along == Depth::exact) return w * r.ratio / hn::MulAdd(w, r.bend, one);
-  if (Along == Depth::series) {
-    return hn::MulAdd(hn::NegMulAdd(w, w, w), r.bend, w);
-  }
-  return w;
-}
-
-// dx, dy: pixels from the line's f = 0.
-template <Depth Along, int Style>
-KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
-  const Pixel zero = hn::Zero(PixelTag());
-  const Pixel w = clamped(hn::MulAdd(dx, r.wx, hn::MulAdd(dy, r.wy, r.w0)), zero, all<Pixel>(1.0F));
-  const Pixel ex = hn::NegMulAdd(w, r.ux, dx);
-  const Pixel ey = hn::NegMulAdd(w, r.uy, dy);
-  const Pixel distance = hn::Sqrt(hn::MulAdd(ex, ex, ey * ey));
-  const Pixel cover = clamped(hn::NegMulAdd(distance, r.steep, r.reach), zero, r.opacity);
-  if (Style == style_plain) return {cover, zero};
-  const Pixel f = along_ribbon<Along>(r, w);
-  if (Style == style_moving) {
-    // W(frac(q + 1/2 - phase)), W(p) = 1 - |2 p - 1|.
-    const Pixel one = all<Pixel>(1.0F);
-    const Pixel place = hn::MulAdd(f, r.phase_rise, r.phase);
-    const Pixel p = hn::IfThenElse(hn::Ge(place, one), place - one, place);
-    return {cover * (one - hn::Abs(hn::MulSub(all<Pixel>(2.0F), p, one))), f};
-  }
-  return {cover, f};
-}
-
-// A splat's constants, each in every lane.
-struct SplatLanes {
-  Pixel x, y, ex, ey, xx, xy, yy;
-  Pixel b0, bx, by, d0, dx, dy, dxx, dxy, dyy, d2_least;
-  Pixel z, near, strength;
-  Pixel color[3];
-};
-
-KERNEL_INLINE SplatLanes spread(const Splat& s) {
-  const auto lanes = [](float v) { return all<Pixel>(v); };
-  return {
-      lanes(s.x),    lanes(s.y),        lanes(s.ex),
-      lanes(s.ey),   lanes(s.xx),       lanes(s.xy),
-      lanes(s.yy),   lanes(s.b0),       lanes(s.bx),
-      lanes(s.by),   lanes(s.d0),       lanes(s.dx),
-      lanes(s.dy),   lanes(s.dxx),      lanes(s.dxy),
-      lanes(s.dyy),  lanes(s.d2_least), lanes(s.z),
-      lanes(s.near), lanes(s.strength), {lanes(s.color[0]), lanes(s.color[1]), lanes(s.color[2])}};
-}
-
-// Where a pixel's ray passes a splat, see Splats.
-struct SplatLane {
-  Pixel r2;      // squared distance from the centre, cells
-  Pixel tau;     // optical depth of the whole splat
-  Pixel cells;   // per unit of view depth along the ray
-  Pixel behind;  // how far beyond the centre's view depth the ray is closest to it
-};
-
-// From: the rays' beginning. `eye`: far before the splat. `eye_inside`: the same, and the splat's
-// centre lies in the picture, so that (ex, ey) is (x, y). `near_plane`: the splat reaches it, and
-// the part of it that lies before counts no more, as if the splat were even over one cell.
-enum class From { eye, eye_inside, near_plane };
-
-template <bool Perspective, From Start>
-KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixel ray) {
-  const Pixel zero = hn::Zero(PixelTag());
-  const Pixel dx = px - s.x;
-  const Pixel dy = py - s.y;
-  // The quadratic form is never negative; its rounded sum may be.
-  const Pixel slope = hn::MulAdd(s.xx, dx, s.xy * dy);
-  const Pixel top = hn::Max(hn::MulAdd(slope, dx, s.yy * dy * dy), zero);
-  if constexpr (Perspective) {
-    const Pixel ex = Start == From::eye_inside ? dx : px - s.ex;
-    const Pixel ey = Start == From::eye_inside ? dy : py - s.ey;
-    const Pixel across = hn::MulAdd(s.dxx, ex, s.dxy * ey);
-    const Pixel along = s.dyy * ey;
-    const Pixel bent = hn::MulAdd(across, ex, along * ey);
-    const Pixel length2 =
-        hn::Max(hn::MulAdd(s.dx + across, ex, hn::MulAdd(s.dy + along, ey, s.d0)), s.d2_least);
-    const Pixel inverse = inverse_root(length2);
-    const Pixel inverse2 = inverse * inverse;
-    const Pixel r2 = top * inverse2;
-    const Pixel tau = s.strength * footprint(r2) * (inverse * ray);
-    const Pixel cells = length2 * inverse;
-    const Pixel behind =
-        hn::NegMulAdd(s.z, bent, hn::MulAdd(s.bx, ex, hn::MulAdd(s.by, ey, s.b0))) * inverse2;
-    if (Start == From::near_plane) {
-      const Pixel beyond = hn::MulAdd((s.z - s.near) + behind, cells, all<Pixel>(0.5F));
-      return {r2, tau * clamped(beyond, 0.0F, 1.0F), cells, behind};
-    }
-    return {r2, tau, cells, behind};
-  } else {
-    const Pixel behind = hn::MulAdd(s.bx, dx, s.by * dy);
-    return {top, s.strength * footprint(top), hn::Sqrt(s.d0), behind};
-  }
-}
 
 struct Channels {
   float* transmittance;
@@ -212,12 +31,12 @@ KERNEL_INLINE void add_product(float* channel, Pixel a, Pixel b) {
   store(hn::MulAdd(a, b, load<Pixel>(channel)), channel);
 }
 
-// Whether a block's pixels let more than `stop` through: found out by whoever changes them.
+// Largest transmittance of the pixels of a block, collected while they are written.
 struct Light {
   Pixel most = hn::Zero(PixelTag());
 
   KERNEL_INLINE void see(Pixel transmittance) { see_positive(hn::Abs(transmittance)); }
-  // What no rule but forward Euler's makes negative.
+  // For all compositing methods but forward Euler.
   KERNEL_INLINE void see_positive(Pixel transmittance) {
     most = pixel_lanes == block_pixels ? transmittance : hn::Max(most, transmittance);
   }
@@ -226,8 +45,8 @@ struct Light {
   }
 };
 
-// Forward Euler takes the optical depth itself for the absorbed part: stable below 1 alone. Bounded
-// so that a picture that diverges stays a number.
+// Forward Euler uses the optical depth as the absorbed fraction, which is stable only below 1.
+// Clamped so that a diverging picture remains finite.
 KERNEL_INLINE Attenuation<Pixel> euler_attenuation(Pixel tau) {
   const Pixel bounded = hn::Min(tau, all<Pixel>(1e6F));
   return {bounded, all<Pixel>(1.0F) - bounded};
@@ -254,11 +73,11 @@ KERNEL_INLINE void see_light(Pixel transmittance, Light& light) {
   }
 }
 
-// What is left of a line's light in front of which the part `place` of the medium lies.
+// Transmittance of the medium in front of a line at relative position `place` in the cell.
 template <int Compositing>
 KERNEL_INLINE Pixel light_before(const Attenuation<Pixel>& medium, Pixel tau, Pixel place) {
   if (Compositing == compositing_simple) return medium.transmitted;
-  // tau is finite (the plan bounds extinctions), so that 0 times it is 0.
+  // tau is finite (the plan bounds extinctions), so that 0 * tau is 0.
   if (Compositing == compositing_analytic) return attenuation(tau * place).transmitted;
   return hn::NegMulAdd(place, medium.absorbed, all<Pixel>(1.0F));
 }
@@ -279,7 +98,7 @@ inline float top_of(const Tile& tile, int row) {
   return static_cast<float>(tile.y + row * block_side);
 }
 
-// A block that lets nothing through any more is closed for all that lies behind.
+// Closes an opaque block for everything behind it.
 inline void mark_closed(int row, std::uint32_t bit, Tile& tile) {
   tile.open[row] &= ~bit;
   tile.any_closed = 1;
@@ -295,7 +114,7 @@ struct Window {
   std::uint64_t blocks;
 };
 
-// Which of a window's blocks are open.
+// The open blocks of a window.
 inline std::uint64_t open_window(const Tile& tile, int row, int column) {
   std::uint64_t open = 0;
   for (int k = 0; k < window_side && row + k < tile_blocks; ++k) {
@@ -305,7 +124,7 @@ inline std::uint64_t open_window(const Tile& tile, int row, int column) {
   return open;
 }
 
-// Composites into each of a window's blocks what add(left, top, ray, block) does.
+// Calls add(left, top, ray, block) for each block of a window; add returns its Light.
 template <bool Perspective, class Add>
 KERNEL_INLINE void each_block(const Window& window, Tile& tile, const Add& add) {
   for (std::uint64_t blocks = window.blocks; blocks != 0; blocks &= blocks - 1U) {
@@ -367,8 +186,8 @@ KERNEL_INLINE Light splat_block(const SplatLanes& s, float x, float y,
   return light;
 }
 
-// The paper's first form: front part, line and back part one over the other, where the ray meets
-// the line at all.
+// The first form of [CM92]: the front part of the medium, the line and the back part composited one
+// over the other where the ray meets the line.
 KERNEL_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const RibbonLane& line,
                                 const Attenuation<Pixel>& medium, Pixel place, const Channels& to,
                                 int l) {
@@ -387,8 +206,9 @@ KERNEL_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const
   return t * (rest * (one - back));
 }
 
-// A line inside its homogeneous cell, at x = tf / tau of the way through it:
-// A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tf) (c_v - c_s).
+// A line in a homogeneous cell of optical depth tau, with optical depth tau_f in front of it
+// (x = tau_f / tau is its relative position):
+// A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tau_f) (c_v - c_s).
 template <bool Perspective, int Compositing, int Style, From Start>
 KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_rise,
                                const SplatLanes& s, float x, float y, const float* HWY_RESTRICT ray,
@@ -460,13 +280,13 @@ using BothFunction = void (*)(const Ribbon& r, const Splat& s, const Window& win
 
 constexpr int from_count = 3;
 
-// The functions that a pass composites kernels with a splat with, chosen once a brick. Splats by
-// where their rays begin.
+// The functions that composite the kernels of a pass, selected once per brick; those with a splat
+// by the start of the rays.
 struct Compositor {
   LineFunction line;
   SplatFunction splat[from_count];
   BothFunction both[from_count];
-  int splat_exponentials;  // a pixel
+  int splat_exponentials;  // per pixel
   int both_exponentials;
 };
 
@@ -491,7 +311,7 @@ inline Compositor compositor_with() {
           Compositing == compositing_analytic ? 2 : splat};
 }
 
-// A plain line is one whose head is like its tail.
+// A plain line is drawn as one whose head equals its tail.
 template <bool Perspective, int Compositing>
 inline Compositor compositor_with(int style) {
   return style == style_moving ? compositor_with<Perspective, Compositing, style_moving>()

@@ -1,5 +1,5 @@
-// Part of the kernel body: a brick's prepared lines and splats composited into a tile's blocks,
-// front to back.
+// Part of the kernel body: composites the prepared lines and splats of a brick into the blocks of a
+// tile, front to back.
 #pragma once
 
 #include "server/engine/kernels/body_composite.hpp"
@@ -56,7 +56,7 @@ inline Splat splat_at(const Prepared& p, int l) {
     out.dxy = s.dxy[l];
     out.dyy = s.dyy[l];
     out.d2_least = s.d2_least[l];
-    out.z = p.stops.z[l];
+    out.z = p.positions.z[l];
     out.near = p.near;
   }
   out.strength = s.strength[l];
@@ -64,7 +64,7 @@ inline Splat splat_at(const Prepared& p, int l) {
   return out;
 }
 
-// Pixels from a window's corner to each of its blocks.
+// Offsets of the blocks of a window from its corner, in pixels.
 struct WindowOffsets {
   float x[window_side * window_side];
   float y[window_side * window_side];
@@ -83,12 +83,12 @@ constexpr WindowOffsets window_offsets() {
 
 constexpr WindowOffsets offsets_in_window = window_offsets();
 
-// The two halves of a window's blocks, as Footing has them.
+// Joins the two halves of a window as stored in Footing.
 inline std::uint64_t joined(std::uint32_t high, std::uint32_t low) {
   return static_cast<std::uint64_t>(high) << 32U | low;
 }
 
-// Composites one line into its blocks; how many.
+// Composites one line into its blocks. Returns their number.
 template <Depth Along, int Style>
 KERNEL_INLINE int draw_windowed(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
   const int row = f.line_first[l];
@@ -115,7 +115,7 @@ KERNEL_INLINE int draw_windowed(const RibbonLanes& lanes, const Footing& f, int 
   return blocks;
 }
 
-// The same for one that reaches farther than a window does.
+// The same for a line larger than a window.
 template <Depth Along, int Style>
 int draw_ribbon(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
   int blocks = 0;
@@ -162,12 +162,12 @@ void draw_styled(const Prepared& p, int style, int l, Tile& tile) {
   }
 }
 
-// Where the rays that meet a kernel's splat begin.
+// Start of the rays through a splat.
 template <bool Perspective>
 inline From from_of(const Prepared& p, int l) {
   if (!Perspective) return From::eye;
   const Splats& s = p.splats;
-  if (p.stops.z[l] - 2.0F * s.half_depth[l] < p.near) return From::near_plane;
+  if (p.positions.z[l] - 2.0F * s.half_depth[l] < p.near) return From::near_plane;
   return s.ex[l] == s.x[l] && s.ey[l] == s.y[l] ? From::eye_inside : From::eye;
 }
 
@@ -194,14 +194,14 @@ inline bool within_window(const Box& box) {
   return box.row_last - box.row < window_side && box.column_last - box.column < window_side;
 }
 
-// A window's blocks as another window's, whose corner is not right of or below its own and which
-// holds them all.
+// Converts the blocks of a window to another window that contains them all; its corner must not lie
+// right of or below the first.
 inline std::uint64_t moved(std::uint64_t blocks, const Box& from, const Window& to) {
   return blocks << static_cast<unsigned>(window_side * (from.row - to.row) + from.column -
                                          to.column);
 }
 
-// The blocks of a window that row_of(row) has set, for what reaches beyond one.
+// The blocks of a window that are set in row_of(row), for outlines larger than a window.
 template <class RowOf>
 inline std::uint64_t in_window(const Box& box, const Window& window, const RowOf& row_of) {
   std::uint64_t blocks = 0;
@@ -214,7 +214,7 @@ inline std::uint64_t in_window(const Box& box, const Window& window, const RowOf
   return blocks;
 }
 
-// A kernel that has a splat, and perhaps a line.
+// A kernel with a splat and optionally a line.
 struct KernelDrawing {
   const Compositor& with;
   Tile& tile;
@@ -222,7 +222,7 @@ struct KernelDrawing {
   Ribbon ribbon;
   int from;
 
-  // `lines` and `splats`: the window's blocks that each may touch.
+  // `lines`, `splats`: blocks of the window that the line and the splat may touch.
   KERNEL_INLINE void draw(int row, int column, std::uint64_t lines, std::uint64_t splats) const {
     if (tile.any_closed != 0) {
       const std::uint64_t open = open_window(tile, row, column);
@@ -246,7 +246,7 @@ struct KernelDrawing {
 template <bool Perspective>
 void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
   const Footing& f = p.footing;
-  const bool lined = has(p.stops.lines, l);
+  const bool lined = has(p.positions.lines, l);
   KernelDrawing kernel = {
       with, tile, splat_at<Perspective>(p, l), {}, static_cast<int>(from_of<Perspective>(p, l))};
   if (lined) kernel.ribbon = ribbon_at(p.pass->line, p.ribbons, l);
@@ -275,37 +275,37 @@ void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
 }
 
 template <bool Perspective>
-KERNEL_INLINE void draw_stop(const Prepared& p, const Compositor& with, int style, int l,
-                             Tile& tile) {
-  if (has(p.stops.splats, l)) {
+KERNEL_INLINE void draw_position(const Prepared& p, const Compositor& with, int style, int l,
+                                 Tile& tile) {
+  if (has(p.positions.splats, l)) {
     draw_kernel<Perspective>(p, with, l, tile);
   } else {
     draw_styled<Perspective>(p, style, l, tile);
   }
 }
 
-// For each set of a row's stops: their places, one a byte, ascending.
-struct RowPlaces {
+// For each subset of a row: the indices of its members, one per byte, ascending.
+struct RowIndices {
   std::uint64_t of[256];
 };
 
-constexpr RowPlaces make_row_places() {
-  RowPlaces places = {};
+constexpr RowIndices make_row_indices() {
+  RowIndices indices = {};
   for (unsigned bits = 0; bits < 256; ++bits) {
     unsigned n = 0;
     for (unsigned i = 0; i < brick_side; ++i) {
-      if ((bits >> i & 1U) != 0) places.of[bits] |= std::uint64_t{i} << (8 * n++);
+      if ((bits >> i & 1U) != 0) indices.of[bits] |= std::uint64_t{i} << (8 * n++);
     }
   }
-  return places;
+  return indices;
 }
 
-constexpr RowPlaces row_places = make_row_places();
+constexpr RowIndices row_indices = make_row_indices();
 
-// A brick's stops in visibility order: rows outward from the eye's, stops outward in each; how
-// many. `order` has room for brick_side more.
-inline int order_stops(const Brick& brick, const Pass& pass, std::uint64_t kept,
-                       std::uint8_t* order) {
+// Lists the kernel positions of a brick in visibility order: rows outward from the eye, positions
+// outward in each. Returns their number. `order` must have room for brick_side more.
+inline int order_positions(const Brick& brick, const Pass& pass, std::uint64_t kept,
+                           std::uint8_t* order) {
   const int* us = pass.axis[pass.u].visit + brick.u_first;
   const int* vs = pass.axis[pass.v].visit + brick.v_first;
   const int u_low = lowest(us);
@@ -316,9 +316,9 @@ inline int order_stops(const Brick& brick, const Pass& pass, std::uint64_t kept,
     const std::uint32_t bits = row_at(kept, vs[j] - v_low);
     const int row = brick_side * (vs[j] - v_low);
     if (ascending) {
-      const std::uint64_t places =
-          row_places.of[bits] + static_cast<std::uint64_t>(row) * 0x0101010101010101U;
-      __builtin_memcpy(order + n, &places, sizeof places);
+      const std::uint64_t indices =
+          row_indices.of[bits] + static_cast<std::uint64_t>(row) * 0x0101010101010101U;
+      __builtin_memcpy(order + n, &indices, sizeof indices);
       n += __builtin_popcount(bits);
       continue;
     }
@@ -335,13 +335,13 @@ template <bool Perspective>
 void draw_in_order(const Brick& brick, const Prepared& p, Tile& tile) {
   const Pass& pass = *p.pass;
   const int style = signature_of(pass.line);
-  std::uint8_t order[brick_stops + brick_side];
-  const int count = order_stops(brick, pass, p.stops.lines | p.stops.splats, order);
+  std::uint8_t order[brick_kernels + brick_side];
+  const int count = order_positions(brick, pass, p.positions.lines | p.positions.splats, order);
   const Compositor with = compositor_of<Perspective>(pass);
-  for (int i = 0; i < count; ++i) draw_stop<Perspective>(p, with, style, order[i], tile);
+  for (int i = 0; i < count; ++i) draw_position<Perspective>(p, with, style, order[i], tile);
 }
 
-// A row's samples lie on one cache line or two.
+// The samples of a row occupy one or two cache lines.
 inline void prefetch_row(const float* from, std::int64_t length) {
   const float* last = from + length - 1;
   __builtin_prefetch(from);
@@ -352,14 +352,14 @@ inline void prefetch_row(const float* from, std::int64_t length) {
   }
 }
 
-// Brings a brick's samples closer while the one before it is drawn: rows of a brick are far apart
-// in memory, which no processor guesses.
+// Prefetches the samples of a brick while the one before it is drawn: its rows are far apart in
+// memory, so that hardware prefetching does not help.
 void prefetch_brick(const Pass& pass, const Brick& brick) {
   const Axis& u = pass.axis[pass.u];
   const Axis& v = pass.axis[pass.v];
   const Axis& major = pass.axis[pass.major];
-  const std::int64_t slab = pass.step[pass.major] * major.sample[major.visit[brick.slab]];
-  const std::int64_t first = slab + pass.step[pass.u] * u.sample[lowest(u.visit + brick.u_first)];
+  const std::int64_t sheet = pass.step[pass.major] * major.sample[major.visit[brick.sheet]];
+  const std::int64_t first = sheet + pass.step[pass.u] * u.sample[lowest(u.visit + brick.u_first)];
   for (int j = 0; j < brick.v_count; ++j) {
     const std::int64_t at = first + pass.step[pass.v] * v.sample[v.visit[brick.v_first + j]];
     if (brick.lines != 0) {
@@ -373,19 +373,19 @@ void prefetch_brick(const Pass& pass, const Brick& brick) {
   }
 }
 
-void draw_prepared(const Camera& camera, const Prepared& p, int stop, Tile& tile) {
+void draw_prepared(const Camera& camera, const Prepared& p, int position, Tile& tile) {
   const int style = signature_of(p.pass->line);
   if (camera.perspective != 0) {
-    draw_stop<true>(p, compositor_of<true>(*p.pass), style, stop, tile);
+    draw_position<true>(p, compositor_of<true>(*p.pass), style, position, tile);
   } else {
-    draw_stop<false>(p, compositor_of<false>(*p.pass), style, stop, tile);
+    draw_position<false>(p, compositor_of<false>(*p.pass), style, position, tile);
   }
 }
 
 void draw(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile) {
   Prepared prepared;
   prepare(camera, pass, brick, tile, prepared);
-  if (prepared.stops.count == 0) return;
+  if (prepared.positions.count == 0) return;
   if (camera.perspective != 0) {
     draw_in_order<true>(brick, prepared, tile);
   } else {
@@ -393,7 +393,7 @@ void draw(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile
   }
 }
 
-// Lengths of pixels' rays at unit depth.
+// Lengths of the rays of pixels at unit depth.
 void fill_rays(const Camera& camera, const Tile& tile, float* rays) {
   const Pixel pixel = all<Pixel>(camera.pixel);
   const Pixel one = all<Pixel>(1.0F);
@@ -411,8 +411,8 @@ void fill_rays(const Camera& camera, const Tile& tile, float* rays) {
   }
 }
 
-// Whatever is not let through is absorbed. Forward Euler may let less than nothing through: what
-// has diverged is to be seen.
+// alpha = 1 - transmittance. With forward Euler the transmittance may be negative; divergence is
+// shown, not clamped.
 void copy_row(const Tile& tile, int y, float* rgba) {
   const hn::CappedTag<float, block_side> tag;
   constexpr int lanes = static_cast<int>(hn::MaxLanes(tag));

@@ -1,4 +1,4 @@
-// Part of the kernel body: the blocks of a tile that a row's lines and splats may touch.
+// Part of the kernel body: the blocks of a tile that lines and splats may touch.
 #pragma once
 
 #include "server/engine/kernels/body_lines.hpp"
@@ -7,47 +7,47 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// What lies right of the widest tile begins at a block that no word has a bit for.
-KERNEL_INLINE UnsignedOf<Stop> shift_of(StopInteger first) {
-  const auto most = hn::Set(StopIntegers(), tile_blocks - 1);
-  return hn::BitCast(hn::RebindToUnsigned<StopTag>(), hn::Min(first, most));
+// Clamps the first column: for outlines right of the tile it exceeds the bits of a word.
+KERNEL_INLINE UnsignedOf<Kernel> shift_of(KernelInteger first) {
+  const auto most = hn::Set(KernelIntegers(), tile_blocks - 1);
+  return hn::BitCast(hn::RebindToUnsigned<KernelTag>(), hn::Min(first, most));
 }
 
 // The bits from first to last; none if last < first.
-KERNEL_INLINE UnsignedOf<Stop> range_masks(const Ranges& range) {
-  const hn::RebindToUnsigned<StopTag> tag;
+KERNEL_INLINE UnsignedOf<Kernel> range_masks(const Ranges& range) {
+  const hn::RebindToUnsigned<KernelTag> tag;
   const auto one = hn::Set(tag, 1U);
   const auto above =
-      hn::Shl(one + one, hn::BitCast(tag, hn::Max(range.last, hn::Zero(StopIntegers()))));
+      hn::Shl(one + one, hn::BitCast(tag, hn::Max(range.last, hn::Zero(KernelIntegers()))));
   const auto below = hn::Shl(one, shift_of(range.first));
   const auto bits = hn::AndNot(below - one, above - one);
   const auto none = hn::Gt(range.first, range.last);
   return hn::IfThenZeroElse(hn::RebindMask(tag, none), bits);
 }
 
-// The largest of the lanes that are among `bits`, at least 0.
-KERNEL_INLINE int most_of(StopInteger value, std::uint32_t bits) {
-  const auto among = hn::RebindMask(StopIntegers(), mask_of<Stop>(bits));
+// The largest of the lanes selected by `bits`, at least 0.
+KERNEL_INLINE int most_of(KernelInteger value, std::uint32_t bits) {
+  const auto among = hn::RebindMask(KernelIntegers(), mask_of<Kernel>(bits));
   return hn::GetLane(hn::MaxOfLanes(
-      StopIntegers(), hn::Max(hn::IfThenElseZero(among, value), hn::Zero(StopIntegers()))));
+      KernelIntegers(), hn::Max(hn::IfThenElseZero(among, value), hn::Zero(KernelIntegers()))));
 }
 
-// A row's lines from lane 0 of l on, as segments from the tile's corner.
+// The lines of a vector of kernel positions as segments relative to the corner of the tile.
 struct LineSpans {
-  Stop x, y, ux, uy;
+  Kernel x, y, ux, uy;
   Ranges rows, columns;
 };
 
 KERNEL_INLINE LineSpans line_spans(const LineStyle& line, const Ribbons& r, const Tile& tile,
                                    int l) {
-  const Stop radius = all<Stop>(line.r2);
+  const Kernel radius = all<Kernel>(line.r2);
   LineSpans s;
-  s.x = load<Stop>(r.x + l) - all<Stop>(static_cast<float>(tile.x));
-  s.y = load<Stop>(r.y + l) - all<Stop>(static_cast<float>(tile.y));
-  s.ux = load<Stop>(r.ux + l);
-  s.uy = load<Stop>(r.uy + l);
-  const Stop bottom = s.y + s.uy;
-  const Stop end = s.x + s.ux;
+  s.x = load<Kernel>(r.x + l) - all<Kernel>(static_cast<float>(tile.x));
+  s.y = load<Kernel>(r.y + l) - all<Kernel>(static_cast<float>(tile.y));
+  s.ux = load<Kernel>(r.ux + l);
+  s.uy = load<Kernel>(r.uy + l);
+  const Kernel bottom = s.y + s.uy;
+  const Kernel end = s.x + s.ux;
   s.rows = blocks_between(hn::Min(s.y, bottom) - radius, hn::Max(s.y, bottom) + radius,
                           blocks_of(tile.height));
   s.columns =
@@ -55,65 +55,65 @@ KERNEL_INLINE LineSpans line_spans(const LineStyle& line, const Ribbons& r, cons
   return s;
 }
 
-// The rows of blocks that a row's lines may touch; which of `bits` touch any. `most` becomes the
-// largest number of rows, beyond the first, of a line so far.
+// Computes the rows of blocks that lines may touch. Returns which of `bits` touch any. `most` is
+// updated to the largest number of rows after the first of any line.
 KERNEL_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons& r,
                                            const Tile& tile, int l, std::uint32_t bits,
-                                           StopInteger& most, Footing& f) {
+                                           KernelInteger& most, Footing& f) {
   const LineSpans s = line_spans(line, r, tile, l);
   const auto missing =
       hn::Or(hn::Gt(s.rows.first, s.rows.last), hn::Gt(s.columns.first, s.columns.last));
-  const StopInteger tall = s.rows.last - s.rows.first;
-  const auto within = hn::Set(StopIntegers(), window_side);
+  const KernelInteger tall = s.rows.last - s.rows.first;
+  const auto within = hn::Set(KernelIntegers(), window_side);
   const auto windowed =
       hn::And(hn::Lt(tall, within), hn::Lt(s.columns.last - s.columns.first, within));
-  const std::uint64_t small = bits_of<Stop>(hn::RebindMask(StopTag(), windowed));
+  const std::uint64_t small = bits_of<Kernel>(hn::RebindMask(KernelTag(), windowed));
   f.windowed |= small << static_cast<unsigned>(l);
   store(s.rows.first, f.line_first + l);
   store(s.rows.last, f.line_last + l);
   store(s.columns.first, f.line_column + l);
   store(s.columns.last, f.line_column_last + l);
-  const std::uint32_t touching = bits & ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
+  const std::uint32_t touching = bits & ~bits_of<Kernel>(hn::RebindMask(KernelTag(), missing));
   if (touching == 0) return 0;
-  // Lanes that are no lines may hold NaN, of which comparisons and clamping make anything.
-  const auto among = hn::RebindMask(StopIntegers(), mask_of<Stop>(touching));
+  // Lanes without a line may hold NaN, so their comparisons are meaningless.
+  const auto among = hn::RebindMask(KernelIntegers(), mask_of<Kernel>(touching));
   most = hn::Max(most, hn::IfThenElseZero(among, tall));
   return touching;
 }
 
-// The columns of blocks that a row's lines may touch in each of their rows, up to `most` beyond the
-// first: of the part of the segment within r2 of the row's pixel centres, widened by r2.
+// Computes the columns of blocks that lines may touch in each of their rows, up to `most` after the
+// first: those of the part of the segment within r2 of the pixel centres of the row, widened by r2.
 KERNEL_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, const Tile& tile,
                                      int l, int most, Footing& f) {
   const LineSpans s = line_spans(line, r, tile, l);
   const int columns = blocks_of(tile.width);
-  const Stop radius = all<Stop>(line.r2);
-  const Stop zero = hn::Zero(StopTag());
-  const Stop one = all<Stop>(1.0F);
-  // A level line's whole length counts in every row.
-  const auto level = hn::Le(hn::Abs(s.uy), all<Stop>(1e-3F));
-  const Stop inverse = inverse_of(hn::IfThenElse(level, one, s.uy));
-  const Stop widen = hn::IfThenElseZero(level, all<Stop>(1e6F));
-  const Stop first = from_integer<Stop>(s.rows.first);
-  const StopInteger tall = s.rows.last - s.rows.first;
-  const hn::RebindToUnsigned<StopTag> masks;
+  const Kernel radius = all<Kernel>(line.r2);
+  const Kernel zero = hn::Zero(KernelTag());
+  const Kernel one = all<Kernel>(1.0F);
+  // A horizontal line uses its whole length in every row.
+  const auto level = hn::Le(hn::Abs(s.uy), all<Kernel>(1e-3F));
+  const Kernel inverse = inverse_of(hn::IfThenElse(level, one, s.uy));
+  const Kernel widen = hn::IfThenElseZero(level, all<Kernel>(1e6F));
+  const Kernel first = from_integer<Kernel>(s.rows.first);
+  const KernelInteger tall = s.rows.last - s.rows.first;
+  const hn::RebindToUnsigned<KernelTag> masks;
   const auto column = shift_of(s.columns.first);
   auto low = hn::Zero(masks);
   auto high = hn::Zero(masks);
   for (int k = 0; k <= most; ++k) {
-    const Stop row = first + all<Stop>(static_cast<float>(k));
-    const Stop top = hn::MulAdd(row, all<Stop>(block_side), all<Stop>(0.5F)) - s.y;
-    const Stop a = (top - radius) * inverse;
-    const Stop b = (top + all<Stop>(block_side - 1) + radius) * inverse;
-    const Stop from = clamped(hn::Min(a, b) - widen, zero, one);
-    const Stop to = clamped(hn::Max(a, b) + widen, zero, one);
-    const Stop xa = hn::MulAdd(from, s.ux, s.x);
-    const Stop xb = hn::MulAdd(to, s.ux, s.x);
+    const Kernel row = first + all<Kernel>(static_cast<float>(k));
+    const Kernel top = hn::MulAdd(row, all<Kernel>(block_side), all<Kernel>(0.5F)) - s.y;
+    const Kernel a = (top - radius) * inverse;
+    const Kernel b = (top + all<Kernel>(block_side - 1) + radius) * inverse;
+    const Kernel from = clamped(hn::Min(a, b) - widen, zero, one);
+    const Kernel to = clamped(hn::Max(a, b) + widen, zero, one);
+    const Kernel xa = hn::MulAdd(from, s.ux, s.x);
+    const Kernel xb = hn::MulAdd(to, s.ux, s.x);
     const auto here =
         range_masks(blocks_between(hn::Min(xa, xb) - radius, hn::Max(xa, xb) + radius, columns));
     hn::Store(here, masks, f.line_columns[k] + l);
-    // Lines that end before row k may have bits here.
-    const auto ends = hn::Gt(hn::Set(StopIntegers(), k), tall);
+    // Discard the bits of lines that end before row k.
+    const auto ends = hn::Gt(hn::Set(KernelIntegers(), k), tall);
     const auto shifted = hn::IfThenZeroElse(hn::RebindMask(masks, ends), hn::Shr(here, column));
     if (k < window_side / 2) {
       low = low | hn::ShiftLeftSame(shifted, window_side * k);
@@ -125,41 +125,41 @@ KERNEL_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, co
   hn::Store(high, masks, f.window_high + l);
 }
 
-// What of an oval lies between two heights below its middle, as distances right of it. Its
+// Horizontal extent of an ellipse between two heights below its centre, relative to the centre. Its
 // rightmost and leftmost points are at heights `turn` and -turn.
-KERNEL_INLINE Extent oval_between(const Oval& o, Stop top, Stop bottom) {
-  const Stop turn = o.shear * o.half_width;
-  const auto chord = [&](Stop y, Stop side) {
-    const Stop half2 =
-        hn::Max(hn::NegMulAdd(o.narrowing, y * y, o.half_chord2), hn::Zero(StopTag()));
+KERNEL_INLINE Extent oval_between(const Oval& o, Kernel top, Kernel bottom) {
+  const Kernel turn = o.shear * o.half_width;
+  const auto chord = [&](Kernel y, Kernel side) {
+    const Kernel half2 =
+        hn::Max(hn::NegMulAdd(o.narrowing, y * y, o.half_chord2), hn::Zero(KernelTag()));
     return hn::MulAdd(side, hn::Sqrt(half2), o.lean * y);
   };
-  const Stop one = all<Stop>(1.0F);
+  const Kernel one = all<Kernel>(1.0F);
   return {chord(clamped(hn::Neg(turn), top, bottom), hn::Neg(one)),
           chord(clamped(turn, top, bottom), one)};
 }
 
-// Of each row of blocks of a splat's box: the columns that its oval meets.
+// Computes the columns that the ellipse of a splat touches in each row of its box of blocks.
 KERNEL_INLINE void find_splat_columns(const Outline& outline, const Ranges& across,
                                       const Ranges& down, const Tile& tile, int l, int most,
                                       Footing& f) {
-  const hn::RebindToUnsigned<StopTag> masks;
+  const hn::RebindToUnsigned<KernelTag> masks;
   const int columns = blocks_of(tile.width);
-  const Stop x = outline.oval.x - all<Stop>(static_cast<float>(tile.x));
-  const Stop from_middle = hn::MulAdd(from_integer<Stop>(down.first), all<Stop>(block_side),
-                                      all<Stop>(0.5F + static_cast<float>(tile.y))) -
-                           outline.oval.y;
-  const StopInteger tall = down.last - down.first;
+  const Kernel x = outline.oval.x - all<Kernel>(static_cast<float>(tile.x));
+  const Kernel from_middle = hn::MulAdd(from_integer<Kernel>(down.first), all<Kernel>(block_side),
+                                        all<Kernel>(0.5F + static_cast<float>(tile.y))) -
+                             outline.oval.y;
+  const KernelInteger tall = down.last - down.first;
   const auto column = shift_of(across.first);
   const auto box = range_masks(across);
   auto low = hn::Zero(masks);
   auto high = hn::Zero(masks);
   for (int k = 0; k <= most; ++k) {
-    const Stop top = from_middle + all<Stop>(static_cast<float>(k * block_side));
-    const Extent here = oval_between(outline.oval, top, top + all<Stop>(block_side - 1));
+    const Kernel top = from_middle + all<Kernel>(static_cast<float>(k * block_side));
+    const Extent here = oval_between(outline.oval, top, top + all<Kernel>(block_side - 1));
     const auto met = range_masks(blocks_between(x + here.low, x + here.high, columns));
     const auto kept = hn::IfThenElse(hn::RebindMask(masks, outline.oval.known), box & met, box);
-    const auto ends = hn::Gt(hn::Set(StopIntegers(), k), tall);
+    const auto ends = hn::Gt(hn::Set(KernelIntegers(), k), tall);
     const auto shifted = hn::IfThenZeroElse(hn::RebindMask(masks, ends), hn::Shr(kept, column));
     if (k < window_side / 2) {
       low = low | hn::ShiftLeftSame(shifted, window_side * k);
@@ -171,11 +171,11 @@ KERNEL_INLINE void find_splat_columns(const Outline& outline, const Ranges& acro
   hn::Store(high, masks, f.splat_high + l);
 }
 
-// The blocks that a row's splats may touch; which of `bits` touch any.
+// Computes the blocks that splats may touch. Returns which of `bits` touch any.
 KERNEL_INLINE std::uint32_t find_splat_blocks(const Outline& outline, const Tile& tile, int l,
                                               std::uint32_t bits, Footing& f) {
-  const Stop left = all<Stop>(static_cast<float>(tile.x));
-  const Stop top = all<Stop>(static_cast<float>(tile.y));
+  const Kernel left = all<Kernel>(static_cast<float>(tile.x));
+  const Kernel top = all<Kernel>(static_cast<float>(tile.y));
   const Ranges across =
       blocks_between(outline.x.low - left, outline.x.high - left, blocks_of(tile.width));
   const Ranges down =
@@ -185,12 +185,12 @@ KERNEL_INLINE std::uint32_t find_splat_blocks(const Outline& outline, const Tile
   store(down.first, f.row_first + l);
   store(down.last, f.row_last + l);
   const auto missing = hn::Or(hn::Gt(across.first, across.last), hn::Gt(down.first, down.last));
-  const std::uint32_t touching = bits & ~bits_of<Stop>(hn::RebindMask(StopTag(), missing));
+  const std::uint32_t touching = bits & ~bits_of<Kernel>(hn::RebindMask(KernelTag(), missing));
   if (touching == 0) return 0;
-  const auto within = hn::Set(StopIntegers(), window_side);
-  const StopInteger tall = down.last - down.first;
+  const auto within = hn::Set(KernelIntegers(), window_side);
+  const KernelInteger tall = down.last - down.first;
   const auto small = hn::And(hn::Lt(tall, within), hn::Lt(across.last - across.first, within));
-  const StopInteger rows = hn::IfThenElseZero(small, tall);
+  const KernelInteger rows = hn::IfThenElseZero(small, tall);
   find_splat_columns(outline, across, down, tile, l, most_of(rows, touching), f);
   return touching;
 }

@@ -1,4 +1,4 @@
-// Part of the kernel body: what of a splat lies in each slab of view depth, for the slab method.
+// Part of the kernel body: accumulation of splats into slabs of view depth, for the slab method.
 #pragma once
 
 #include "server/engine/kernels/body_draw.hpp"
@@ -6,7 +6,8 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// Rows of the table of partial footprints, and where between two of them a vector's rays pass.
+// Rows of the table of partial footprints for a vector of rays, and the weights between a row and
+// the next.
 struct PartialRows {
   SignedOf<Pixel> at;
   Pixel part;
@@ -20,7 +21,7 @@ KERNEL_INLINE PartialRows partial_rows_at(Pixel r2) {
   return {row * hn::Set(integers, partial_columns - 1), place - from_integer<Pixel>(row)};
 }
 
-// An entry's two neighbours in v, interpolated.
+// Interpolates between the two values of a table entry.
 KERNEL_INLINE Pixel between_columns(SignedOf<Pixel> entry, Pixel part) {
   const hn::RebindToSigned<PixelTag> integers;
   const hn::RebindToUnsigned<PixelTag> bits;
@@ -30,12 +31,12 @@ KERNEL_INLINE Pixel between_columns(SignedOf<Pixel> entry, Pixel part) {
   return hn::MulAdd(part, from_integer<Pixel>(high) - a, a);
 }
 
-// F(b^2, v) in parts of partial_one, by linear interpolation in both; v in [-1, 1].
+// F(b^2, v) in units of 1 / partial_one, bilinearly interpolated; v in [-1, 1].
 KERNEL_INLINE Pixel partial_at(const std::int32_t* HWY_RESTRICT partial, const PartialRows& rows,
                                Pixel v) {
   const hn::RebindToSigned<PixelTag> integers;
   const Pixel one = all<Pixel>(1.0F);
-  // Rays that the face passes before or behind altogether.
+  // The face lies entirely before or behind the splat on all rays.
   if (hn::AllTrue(PixelTag(), hn::Le(v, hn::Neg(one)))) return hn::Zero(PixelTag());
   if (hn::AllTrue(PixelTag(), hn::Ge(v, one))) return all<Pixel>(partial_one);
   const Pixel place = (v + one) * all<Pixel>(0.5F * (partial_columns - 1));
@@ -48,7 +49,7 @@ KERNEL_INLINE Pixel partial_at(const std::int32_t* HWY_RESTRICT partial, const P
   return hn::MulAdd(rows.part, lower - upper, upper);
 }
 
-// The block's gathered medium, emptied when it is first touched in this slab.
+// The accumulated medium of the block, cleared at its first use in this slab.
 KERNEL_INLINE float* touch(Slab& slab, int row, int column) {
   float* at =
       slab.gathered + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * gathered_floats;
@@ -60,14 +61,14 @@ KERNEL_INLINE float* touch(Slab& slab, int row, int column) {
   return at;
 }
 
-// A splat's way through the slabs in reach, depths given from its centre.
+// The faces of the slabs in reach, with depths relative to the centre of the splat.
 struct Faces {
   int count;                     // slabs
   float depth[slabs_ahead + 1];  // their faces, front to back
   Slab* slab[slabs_ahead];
 };
 
-// Adds to one block what of the splat lies in each slab; how many slabs get something.
+// Adds the part of the splat in each slab to one block. Returns the number of slabs changed.
 template <bool Perspective>
 KERNEL_INLINE int gather_block(const SplatLanes& s, const std::int32_t* HWY_RESTRICT partial,
                                const Faces& faces, const Tile& tile, int row, int column) {
@@ -80,7 +81,7 @@ KERNEL_INLINE int gather_block(const SplatLanes& s, const std::int32_t* HWY_REST
     const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
     const SplatLane lane = splat_lane<Perspective, From::eye>(s, px, py, length);
     if (hn::AllFalse(PixelTag(), hn::Lt(lane.r2, all<Pixel>(t2)))) continue;
-    // Half the chord in cells, and with it the slabs' faces in half chords from the middle.
+    // Half the chord in cells; converts the depths of faces to half chords from the middle.
     const Pixel chord2 = hn::Max(all<Pixel>(t2) - lane.r2, all<Pixel>(1e-6F));
     const Pixel scale = lane.cells / hn::Sqrt(chord2);
     const Pixel whole = lane.tau * all<Pixel>(1.0F / partial_one);
@@ -104,7 +105,7 @@ KERNEL_INLINE int gather_block(const SplatLanes& s, const std::int32_t* HWY_REST
   return __builtin_popcount(met);
 }
 
-// What lies before the near plane does not count.
+// The part before the near plane is ignored.
 template <bool Perspective>
 void gather_on(const Camera& camera, const SplatRecord& record, Slab* slabs, int first,
                Tile& tile) {
@@ -147,9 +148,9 @@ template <bool Perspective>
 int pack_splats_on(const Prepared& p, SplatRecord* out) {
   const Footing& f = p.footing;
   int n = 0;
-  for (std::uint64_t left = p.stops.splats; left != 0; left &= left - 1U) {
+  for (std::uint64_t left = p.positions.splats; left != 0; left &= left - 1U) {
     const int l = __builtin_ctzll(left);
-    const float middle = p.stops.depth[l];
+    const float middle = p.positions.depth[l];
     const float half = p.splats.half_depth[l];
     out[n++] = {p.pass->partial,
                 middle - half,

@@ -1,4 +1,4 @@
-// Part of the kernel body: oriented lines, from winds to ribbons on the screen.
+// Part of the kernel body: oriented lines, from vectors to ribbons on the screen.
 #pragma once
 
 #include "server/engine/kernels/body_cells.hpp"
@@ -6,40 +6,39 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// Where lines begin and end before they are projected. q runs from -1/2 at the tail to 1/2 at the
-// head; what is drawn lies in [low, high].
+// Lines before projection. q runs from -1/2 at the tail to 1/2 at the head; [low, high] is drawn.
 struct Segments {
-  Three<Stop> offset;  // of the line's centre from the stop, world units
-  Three<Stop> extent;  // tail to head, world units
-  Stop low, high;
-  Stop lift;   // of the line's centre from the stop along z, cells
-  Stop phase;  // of the texture's motion
+  Three<Kernel> offset;  // of the centre of the line from the kernel position, world units
+  Three<Kernel> extent;  // tail to head, world units
+  Kernel low, high;
+  Kernel lift;   // of the centre of the line from the kernel position along z, cells
+  Kernel phase;  // of the texture's motion
 };
 
-KERNEL_INLINE UnsignedOf<Stop> hashed_sample(const Rows& rows, int a, int i, std::uint32_t key) {
-  const hn::RebindToUnsigned<StopTag> tag;
-  const hn::RebindToSigned<StopTag> integers;
+KERNEL_INLINE UnsignedOf<Kernel> hashed_sample(const Rows& rows, int a, int i, std::uint32_t key) {
+  const hn::RebindToUnsigned<KernelTag> tag;
+  const hn::RebindToSigned<KernelTag> integers;
   return hn::BitCast(tag, hn::Load(integers, rows.sample[a] + i)) + hn::Set(tag, key);
 }
 
 // Liang-Barsky against the kernel box: per axis |in_box + q along| <= half the box.
-KERNEL_INLINE void clip_to_box(float half_span, const Three<Stop>& in_box, const Three<Stop>& along,
-                               Segments& s) {
-  s.low = all<Stop>(-0.5F);
-  s.high = all<Stop>(0.5F);
-  const Stop half = all<Stop>(half_span);
-  const auto reach = [&](Stop at, Stop way) {
-    return hn::MulAdd(hn::Abs(way), all<Stop>(0.5F), hn::Abs(at));
+KERNEL_INLINE void clip_to_box(float half_span, const Three<Kernel>& in_box,
+                               const Three<Kernel>& along, Segments& s) {
+  s.low = all<Kernel>(-0.5F);
+  s.high = all<Kernel>(0.5F);
+  const Kernel half = all<Kernel>(half_span);
+  const auto reach = [&](Kernel at, Kernel way) {
+    return hn::MulAdd(hn::Abs(way), all<Kernel>(0.5F), hn::Abs(at));
   };
-  const Stop most = hn::Max(hn::Max(reach(in_box.x, along.x), reach(in_box.y, along.y)),
-                            reach(in_box.z, along.z));
-  // Asked lane by lane: what a line is does not hang on its neighbours.
+  const Kernel most = hn::Max(hn::Max(reach(in_box.x, along.x), reach(in_box.y, along.y)),
+                              reach(in_box.z, along.z));
+  // Selected per lane, so that a line does not depend on its neighbours.
   const auto inside = hn::Le(most, half);
-  if (hn::AllTrue(StopTag(), inside)) return;
-  const auto clip = [&](Stop at, Stop way) {
-    const Stop inverse = inverse_of(divisor(way));
-    const Stop enter = (hn::Neg(half) - at) * inverse;
-    const Stop leave = (half - at) * inverse;
+  if (hn::AllTrue(KernelTag(), inside)) return;
+  const auto clip = [&](Kernel at, Kernel way) {
+    const Kernel inverse = inverse_of(divisor(way));
+    const Kernel enter = (hn::Neg(half) - at) * inverse;
+    const Kernel leave = (half - at) * inverse;
     s.low = hn::Max(s.low, hn::IfThenElse(inside, s.low, hn::Min(enter, leave)));
     s.high = hn::Min(s.high, hn::IfThenElse(inside, s.high, hn::Max(enter, leave)));
   };
@@ -48,123 +47,125 @@ KERNEL_INLINE void clip_to_box(float half_span, const Three<Stop>& in_box, const
   clip(in_box.z, along.z);
 }
 
-// The drawn vector, in the world; a slice keeps what lies in its plane.
+// The drawn vector in world units; for a slice, its part in the plane.
 template <bool Curved>
-KERNEL_INLINE Three<Stop> extent_of(const LineStyle& line, const CellLanes<Curved>& cells,
-                                    const Winds& winds) {
-  const Stop part = clamped(winds.magnitude * all<Stop>(line.inverse_full_magnitude), 0.0F, 1.0F);
-  const Stop length = all<Stop>(line.length) * part;
+KERNEL_INLINE Three<Kernel> extent_of(const LineStyle& line, const CellLanes<Curved>& cells,
+                                      const Vectors& vectors) {
+  const Kernel part =
+      clamped(vectors.magnitude * all<Kernel>(line.inverse_full_magnitude), 0.0F, 1.0F);
+  const Kernel length = all<Kernel>(line.length) * part;
   if constexpr (Curved) {
-    const Three<Stop> bent = bent_direction(line, cells, winds.direction);
+    const Three<Kernel> bent = bent_direction(line, cells, vectors.direction);
     return {bent.x * length, bent.y * length, bent.z * length};
   } else {
-    return {winds.direction.x * length * all<Stop>(line.keep[0]),
-            winds.direction.y * length * all<Stop>(line.keep[1]),
-            winds.direction.z * length * all<Stop>(line.keep[2])};
+    return {vectors.direction.x * length * all<Kernel>(line.keep[0]),
+            vectors.direction.y * length * all<Kernel>(line.keep[1]),
+            vectors.direction.z * length * all<Kernel>(line.keep[2])};
   }
 }
 
 template <bool Curved>
 KERNEL_INLINE Segments place_segments(const LineStyle& line, const Rows& rows,
-                                      const CellLanes<Curved>& cells, const Winds& winds,
+                                      const CellLanes<Curved>& cells, const Vectors& vectors,
                                       const Hash3<std::uint32_t>& key, int i) {
-  const Hash3<UnsignedOf<Stop>> kernel = pcg3d(
-      Hash3<UnsignedOf<Stop>>{hashed_sample(rows, 0, i, key.x), hashed_sample(rows, 1, i, key.y),
-                              hashed_sample(rows, 2, i, key.z)});
-  const Hash3<UnsignedOf<Stop>> centre = pcg3d(kernel);
-  const Stop half = all<Stop>(0.5F);
-  const Stop by_centre = all<Stop>(line.jitter_center);
-  const Stop by_stride = all<Stop>(line.jitter_stride);
-  const auto centred = [&](UnsignedOf<Stop> bits) { return unit_interval<Stop>(bits) - half; };
-  const Three<Stop> in_box = {by_centre * centred(centre.x), by_centre * centred(centre.y),
-                              by_centre * centred(centre.z)};
-  const Three<Stop> moved = {hn::MulAdd(by_stride, centred(kernel.x), in_box.x),
-                             hn::MulAdd(by_stride, centred(kernel.y), in_box.y),
-                             hn::MulAdd(by_stride, centred(kernel.z), in_box.z)};
+  const Hash3<UnsignedOf<Kernel>> kernel = pcg3d(
+      Hash3<UnsignedOf<Kernel>>{hashed_sample(rows, 0, i, key.x), hashed_sample(rows, 1, i, key.y),
+                                hashed_sample(rows, 2, i, key.z)});
+  const Hash3<UnsignedOf<Kernel>> centre = pcg3d(kernel);
+  const Kernel half = all<Kernel>(0.5F);
+  const Kernel by_centre = all<Kernel>(line.jitter_center);
+  const Kernel by_stride = all<Kernel>(line.jitter_stride);
+  const auto centred = [&](UnsignedOf<Kernel> bits) { return unit_interval<Kernel>(bits) - half; };
+  const Three<Kernel> in_box = {by_centre * centred(centre.x), by_centre * centred(centre.y),
+                                by_centre * centred(centre.z)};
+  const Three<Kernel> moved = {hn::MulAdd(by_stride, centred(kernel.x), in_box.x),
+                               hn::MulAdd(by_stride, centred(kernel.y), in_box.y),
+                               hn::MulAdd(by_stride, centred(kernel.z), in_box.z)};
   Segments s;
   s.offset = cells.to_world(moved);
-  s.extent = extent_of(line, cells, winds);
+  s.extent = extent_of(line, cells, vectors);
   s.lift = moved.z;
-  s.phase = hn::Zero(StopTag());
-  if (line.moving != 0) s.phase = unit_interval<Stop>(pcg3d(centre).x);
+  s.phase = hn::Zero(KernelTag());
+  if (line.moving != 0) s.phase = unit_interval<Kernel>(pcg3d(centre).x);
   clip_to_box(line.half_span, in_box, cells.to_grid(s.extent), s);
   return s;
 }
 
-// On the screen; which lanes have a line there.
+// Projects lines to the screen. Returns the lanes with a visible line.
 template <bool Perspective>
-KERNEL_INLINE MaskOf<Stop> project_segments(const Camera& camera, const LineStyle& line,
-                                            const Stops& stops, int l, const Winds& winds,
-                                            Segments& s, Ribbons& r) {
-  const Stop vx = dot3(camera.right, s.extent);
-  const Stop vy = dot3(camera.down, s.extent);
-  const Stop vz = dot3(camera.forward, s.extent);
-  const Stop px = load<Stop>(stops.x + l) + dot3(camera.right, s.offset);
-  const Stop py = load<Stop>(stops.y + l) + dot3(camera.down, s.offset);
-  const Stop dz = dot3(camera.forward, s.offset);
-  const Stop pz = load<Stop>(stops.z + l) + dz;
-  const Stop near = all<Stop>(camera.near);
-  const Stop one = all<Stop>(1.0F);
-  const Stop half_way = all<Stop>(0.5F) * hn::Abs(vz);
-  // Negative if there is no line, nothing of it in its box, or nothing beyond the near plane.
-  Stop shown = hn::Min(winds.magnitude, s.high - s.low);
-  Stop z0 = one;
-  Stop z1 = one;
+KERNEL_INLINE MaskOf<Kernel> project_segments(const Camera& camera, const LineStyle& line,
+                                              const KernelPositions& positions, int l,
+                                              const Vectors& vectors, Segments& s, Ribbons& r) {
+  const Kernel vx = dot3(camera.right, s.extent);
+  const Kernel vy = dot3(camera.down, s.extent);
+  const Kernel vz = dot3(camera.forward, s.extent);
+  const Kernel px = load<Kernel>(positions.x + l) + dot3(camera.right, s.offset);
+  const Kernel py = load<Kernel>(positions.y + l) + dot3(camera.down, s.offset);
+  const Kernel dz = dot3(camera.forward, s.offset);
+  const Kernel pz = load<Kernel>(positions.z + l) + dz;
+  const Kernel near = all<Kernel>(camera.near);
+  const Kernel one = all<Kernel>(1.0F);
+  const Kernel half_way = all<Kernel>(0.5F) * hn::Abs(vz);
+  // Negative without a line, or if no part lies in the kernel box or beyond the near plane.
+  Kernel shown = hn::Min(vectors.magnitude, s.high - s.low);
+  Kernel z0 = one;
+  Kernel z1 = one;
   if (Perspective) {
     const auto beyond = hn::Ge(pz - half_way, near);
-    if (!hn::AllTrue(StopTag(), beyond)) {
-      // The near plane takes off the end that is nearer to the eye.
-      const Stop q_near = (near - pz) / divisor(vz);
-      const Stop zero = hn::Zero(StopTag());
+    if (!hn::AllTrue(KernelTag(), beyond)) {
+      // The near plane clips the end nearer to the eye.
+      const Kernel q_near = (near - pz) / divisor(vz);
+      const Kernel zero = hn::Zero(KernelTag());
       const auto tail_off = hn::AndNot(beyond, hn::Gt(vz, zero));
       const auto head_off = hn::AndNot(beyond, hn::Lt(vz, zero));
-      s.low = hn::Max(s.low, hn::IfThenElse(tail_off, q_near, all<Stop>(-0.5F)));
-      s.high = hn::Min(s.high, hn::IfThenElse(head_off, q_near, all<Stop>(0.5F)));
-      shown = hn::Min(winds.magnitude, s.high - s.low);
+      s.low = hn::Max(s.low, hn::IfThenElse(tail_off, q_near, all<Kernel>(-0.5F)));
+      s.high = hn::Min(s.high, hn::IfThenElse(head_off, q_near, all<Kernel>(0.5F)));
+      shown = hn::Min(vectors.magnitude, s.high - s.low);
       shown = hn::Min(shown, pz + half_way - near);
     }
     z0 = hn::Max(hn::MulAdd(s.low, vz, pz), near);
     z1 = hn::Max(hn::MulAdd(s.high, vz, pz), near);
   }
-  const Stop scale = all<Stop>(camera.inverse_pixel);
-  const Stop k0 = Perspective ? scale / z0 : scale;
-  const Stop inverse_z1 = Perspective ? inverse_of(z1) : one;
-  const Stop ax = hn::MulAdd(s.low, vx, px);
-  const Stop ay = hn::MulAdd(s.low, vy, py);
-  const Stop x0 = ax * k0;
-  const Stop y0 = ay * k0;
-  // b / z1 - a / z0 with b = a + l v and z1 = z0 + l v_z is l (v z0 - a v_z) / (z0 z1): what is
-  // left of a line seen end-on has the digits that it has in the world, not those of two pixels.
-  const Stop part = (s.high - s.low) * k0;
-  const Stop ux = Perspective ? hn::MulSub(vx, z0, ax * vz) * (part * inverse_z1) : vx * part;
-  const Stop uy = Perspective ? hn::MulSub(vy, z0, ay * vz) * (part * inverse_z1) : vy * part;
+  const Kernel scale = all<Kernel>(camera.inverse_pixel);
+  const Kernel k0 = Perspective ? scale / z0 : scale;
+  const Kernel inverse_z1 = Perspective ? inverse_of(z1) : one;
+  const Kernel ax = hn::MulAdd(s.low, vx, px);
+  const Kernel ay = hn::MulAdd(s.low, vy, py);
+  const Kernel x0 = ax * k0;
+  const Kernel y0 = ay * k0;
+  // b / z1 - a / z0 with b = a + l v and z1 = z0 + l v_z is l (v z0 - a v_z) / (z0 z1): avoids the
+  // cancellation of pixel coordinates for lines seen end-on.
+  const Kernel part = (s.high - s.low) * k0;
+  const Kernel ux = Perspective ? hn::MulSub(vx, z0, ax * vz) * (part * inverse_z1) : vx * part;
+  const Kernel uy = Perspective ? hn::MulSub(vy, z0, ay * vz) * (part * inverse_z1) : vy * part;
   const float least = 1e-6F * line.r2;
-  const Stop u2 = hn::MulAdd(ux, ux, uy * uy);
-  const Stop inverse_u2 = inverse_of(hn::Max(u2, all<Stop>(least * least)));
-  store(x0 + all<Stop>(camera.half_width_px), r.x + l);
-  store(y0 + all<Stop>(camera.half_height_px), r.y + l);
+  const Kernel u2 = hn::MulAdd(ux, ux, uy * uy);
+  const Kernel inverse_u2 = inverse_of(hn::Max(u2, all<Kernel>(least * least)));
+  store(x0 + all<Kernel>(camera.half_width_px), r.x + l);
+  store(y0 + all<Kernel>(camera.half_height_px), r.y + l);
   store(ux, r.ux + l);
   store(uy, r.uy + l);
   store(ux * inverse_u2, r.wx + l);
   store(uy * inverse_u2, r.wy + l);
-  store(hn::NegMulAdd(all<Stop>(0.5F), u2 * inverse_u2, all<Stop>(0.5F)), r.w0 + l);
-  const Stop ratio = Perspective ? z0 * inverse_z1 : one;
+  store(hn::NegMulAdd(all<Kernel>(0.5F), u2 * inverse_u2, all<Kernel>(0.5F)), r.w0 + l);
+  const Kernel ratio = Perspective ? z0 * inverse_z1 : one;
   store(ratio, r.depth_ratio + l);
   store(ratio - one, r.bend + l);
   store(hn::MulAdd(s.low, vz, dz), r.depth + l);
   store((s.high - s.low) * vz, r.depth_rise + l);
-  return hn::Ge(shown, hn::Zero(StopTag()));
+  return hn::Ge(shown, hn::Zero(KernelTag()));
 }
 
-// Where along its texture each line begins: a line at full magnitude runs through motion_cycles.
-void phase_ribbons(const LineStyle& line, const Winds& winds, const Segments& s, int l,
+// Phase of the texture of each line; at full magnitude it advances by motion_cycles.
+void phase_ribbons(const LineStyle& line, const Vectors& vectors, const Segments& s, int l,
                    Ribbons& r) {
-  alignas(64) float magnitude[pair_stops], phase[pair_stops], low[pair_stops], high[pair_stops];
-  store(winds.magnitude, magnitude);
+  alignas(64) float magnitude[pair_kernels], phase[pair_kernels], low[pair_kernels],
+      high[pair_kernels];
+  store(vectors.magnitude, magnitude);
   store(s.phase, phase);
   store(s.low, low);
   store(s.high, high);
-  for (int k = 0; k < stop_lanes; ++k) {
+  for (int k = 0; k < kernel_lanes; ++k) {
     const float part = limited(magnitude[k] * line.inverse_full_magnitude, 0.0F, 1.0F);
     const double cycles = static_cast<double>(phase[k]) + line.motion_cycles * part;
     const double rest = cycles - static_cast<double>(static_cast<std::int64_t>(cycles));
@@ -176,50 +177,53 @@ void phase_ribbons(const LineStyle& line, const Winds& winds, const Segments& s,
 
 // The compass bearing of a vector in degrees, 0 along y, 90 along x, in [0, 360). atan on [0, 1] by
 // a polynomial (1e-6 radians).
-KERNEL_INLINE Stop bearing(Stop x, Stop y) {
-  const Stop ax = hn::Abs(x);
-  const Stop ay = hn::Abs(y);
-  const Stop t = hn::Min(ax, ay) / hn::Max(hn::Max(ax, ay), all<Stop>(1e-30F));
-  const Stop t2 = t * t;
-  Stop p = all<Stop>(-0.0117212F);
-  p = hn::MulAdd(p, t2, all<Stop>(0.05265332F));
-  p = hn::MulAdd(p, t2, all<Stop>(-0.11643287F));
-  p = hn::MulAdd(p, t2, all<Stop>(0.19354346F));
-  p = hn::MulAdd(p, t2, all<Stop>(-0.33262347F));
-  p = hn::MulAdd(p, t2, all<Stop>(0.99997726F));
-  const Stop zero = hn::Zero(StopTag());
-  const Stop from_axis = p * t * all<Stop>(57.29577951F);  // 0 .. 45 degrees
-  // From north towards east.
-  const Stop first = hn::IfThenElse(hn::Gt(ax, ay), all<Stop>(90.0F) - from_axis, from_axis);
-  const Stop half = hn::IfThenElse(hn::Lt(y, zero), all<Stop>(180.0F) - first, first);
-  const Stop whole = hn::IfThenElse(hn::Lt(x, zero), all<Stop>(360.0F) - half, half);
-  return hn::IfThenElse(hn::Lt(whole, all<Stop>(360.0F)), whole, zero);
+KERNEL_INLINE Kernel bearing(Kernel x, Kernel y) {
+  const Kernel ax = hn::Abs(x);
+  const Kernel ay = hn::Abs(y);
+  const Kernel t = hn::Min(ax, ay) / hn::Max(hn::Max(ax, ay), all<Kernel>(1e-30F));
+  const Kernel t2 = t * t;
+  Kernel p = all<Kernel>(-0.0117212F);
+  p = hn::MulAdd(p, t2, all<Kernel>(0.05265332F));
+  p = hn::MulAdd(p, t2, all<Kernel>(-0.11643287F));
+  p = hn::MulAdd(p, t2, all<Kernel>(0.19354346F));
+  p = hn::MulAdd(p, t2, all<Kernel>(-0.33262347F));
+  p = hn::MulAdd(p, t2, all<Kernel>(0.99997726F));
+  const Kernel zero = hn::Zero(KernelTag());
+  const Kernel from_axis = p * t * all<Kernel>(57.29577951F);  // 0 .. 45 degrees
+  // Clockwise from north.
+  const Kernel first = hn::IfThenElse(hn::Gt(ax, ay), all<Kernel>(90.0F) - from_axis, from_axis);
+  const Kernel half = hn::IfThenElse(hn::Lt(y, zero), all<Kernel>(180.0F) - first, first);
+  const Kernel whole = hn::IfThenElse(hn::Lt(x, zero), all<Kernel>(360.0F) - half, half);
+  return hn::IfThenElse(hn::Lt(whole, all<Kernel>(360.0F)), whole, zero);
 }
 
-// What the colour tells. Height is that of the unbent lattice on a curved one.
-KERNEL_INLINE Stop color_value(const LineStyle& line, const Rows& rows, const Winds& winds,
-                               const Segments& s, Stop view_distance, int i) {
-  const Stop z = hn::MulAdd(s.lift, load<Stop>(rows.cell[2] + i), load<Stop>(rows.height + i));
+// The quantity that determines the colour. On a curved lattice, heights are those of the uncurved
+// one.
+KERNEL_INLINE Kernel color_value(const LineStyle& line, const Rows& rows, const Vectors& vectors,
+                                 const Segments& s, Kernel view_distance, int i) {
+  const Kernel z =
+      hn::MulAdd(s.lift, load<Kernel>(rows.cell[2] + i), load<Kernel>(rows.height + i));
   switch (line.color_by) {
     case 0:
       return z;
     case 1:
       return view_distance;
     case 2: {
-      const Stop height = (z - all<Stop>(line.box_low_z)) * all<Stop>(line.inverse_box_height);
-      const Stop half = all<Stop>(0.5F);
-      const Stop rise = hn::MulAdd(winds.direction.z * all<Stop>(line.keep[2]), half, half);
-      return all<Stop>(1.0F - line.rise_weight) * height + all<Stop>(line.rise_weight) * rise;
+      const Kernel height =
+          (z - all<Kernel>(line.box_low_z)) * all<Kernel>(line.inverse_box_height);
+      const Kernel half = all<Kernel>(0.5F);
+      const Kernel rise = hn::MulAdd(vectors.direction.z * all<Kernel>(line.keep[2]), half, half);
+      return all<Kernel>(1.0F - line.rise_weight) * height + all<Kernel>(line.rise_weight) * rise;
     }
     case 3:
-      return winds.magnitude;
+      return vectors.magnitude;
     case 4:
-      return bearing(winds.direction.x * all<Stop>(line.keep[0]),
-                     winds.direction.y * all<Stop>(line.keep[1]));
+      return bearing(vectors.direction.x * all<Kernel>(line.keep[0]),
+                     vectors.direction.y * all<Kernel>(line.keep[1]));
     case 5:
       return fetch(line.color_values, rows, i);
     default:
-      return hn::Zero(StopTag());
+      return hn::Zero(KernelTag());
   }
 }
 
@@ -235,8 +239,8 @@ KERNEL_INLINE void blend(const float* entry, float part, float* rgb) {
   }
 }
 
-// One line's colours: `tail` holds its table's. It is dimmed, and towards the head it turns grey by
-// `grey` at its start and by `more` on the way.
+// Colours of one line from that of its table in `tail`: dimmed, and desaturated by `grey` at the
+// tail and a further `more` at the head.
 KERNEL_INLINE void shade(float dim, float grey, float more, float* tail, float* rise) {
   const ColorTag tag;
   const float top = dim * larger(larger(tail[0], tail[1]), tail[2]);
@@ -248,46 +252,46 @@ KERNEL_INLINE void shade(float dim, float grey, float more, float* tail, float* 
   }
 }
 
-// What of the lines' colours is told by all stops of a vector together.
+// Inputs of the colours of lines, computed for a vector of kernel positions at a time.
 struct Shades {
-  alignas(64) std::int32_t entry[brick_stops];  // of the table, and the way to the next
-  alignas(64) float part[brick_stops];
-  alignas(64) float dim[brick_stops];
-  alignas(64) float grey[brick_stops];
-  alignas(64) float more[brick_stops];
-  std::uint64_t unknown;  // bit l set: stop l has no value there
+  alignas(64) std::int32_t entry[brick_kernels];  // of the table; `part`: weight of the next entry
+  alignas(64) float part[brick_kernels];
+  alignas(64) float dim[brick_kernels];
+  alignas(64) float grey[brick_kernels];
+  alignas(64) float more[brick_kernels];
+  std::uint64_t unknown;  // bit l set: the field that determines the colour is masked
 };
 
-// Colour by the table, dimmed by magnitude and by view distance.
+// Table position and dimming by magnitude and view distance.
 KERNEL_INLINE void shade_ribbons(const Camera& camera, const LineStyle& line, const Rows& rows,
-                                 const Stops& stops, const Winds& winds, const Segments& s, int i,
-                                 int l, Shades& shades) {
-  const Stop distance = load<Stop>(stops.z + l) + dot3(camera.forward, s.offset);
-  const Stop one = all<Stop>(1.0F);
-  const Stop strong =
-      clamped((winds.magnitude - all<Stop>(line.intensity_low)) * all<Stop>(line.intensity_scale),
-              0.0F, 1.0F);
-  const Stop far =
-      clamped((distance - all<Stop>(line.cue_near)) * all<Stop>(line.cue_scale), 0.0F, 1.0F);
-  const Stop dim = hn::NegMulAdd(all<Stop>(line.intensity), one - strong, one) *
-                   hn::NegMulAdd(all<Stop>(line.cue_strength), far, one);
-  const Stop value = color_value(line, rows, winds, s, distance, i);
+                                 const KernelPositions& positions, const Vectors& vectors,
+                                 const Segments& s, int i, int l, Shades& shades) {
+  const Kernel distance = load<Kernel>(positions.z + l) + dot3(camera.forward, s.offset);
+  const Kernel one = all<Kernel>(1.0F);
+  const Kernel strong = clamped(
+      (vectors.magnitude - all<Kernel>(line.intensity_low)) * all<Kernel>(line.intensity_scale),
+      0.0F, 1.0F);
+  const Kernel far =
+      clamped((distance - all<Kernel>(line.cue_near)) * all<Kernel>(line.cue_scale), 0.0F, 1.0F);
+  const Kernel dim = hn::NegMulAdd(all<Kernel>(line.intensity), one - strong, one) *
+                     hn::NegMulAdd(all<Kernel>(line.cue_strength), far, one);
+  const Kernel value = color_value(line, rows, vectors, s, distance, i);
   const auto masked = is_masked(value);
   const ColorTable& table = line.color;
-  const Stop known = hn::IfThenElse(masked, all<Stop>(table.low), value);
-  const Stop place = clamped((known - all<Stop>(table.low)) * all<Stop>(table.scale), 0.0F,
-                             static_cast<float>(table.entries - 1));
-  const SignedOf<Stop> entry = truncated(place);
-  hn::Store(entry, hn::RebindToSigned<StopTag>(), shades.entry + l);
-  store(place - from_integer<Stop>(entry), shades.part + l);
+  const Kernel known = hn::IfThenElse(masked, all<Kernel>(table.low), value);
+  const Kernel place = clamped((known - all<Kernel>(table.low)) * all<Kernel>(table.scale), 0.0F,
+                               static_cast<float>(table.entries - 1));
+  const SignedOf<Kernel> entry = truncated(place);
+  hn::Store(entry, hn::RebindToSigned<KernelTag>(), shades.entry + l);
+  store(place - from_integer<Kernel>(entry), shades.part + l);
   store(dim, shades.dim + l);
-  const Stop desaturation = all<Stop>(line.head_desaturation);
-  store(desaturation * (s.low + all<Stop>(0.5F)), shades.grey + l);
+  const Kernel desaturation = all<Kernel>(line.head_desaturation);
+  store(desaturation * (s.low + all<Kernel>(0.5F)), shades.grey + l);
   store(desaturation * (s.high - s.low), shades.more + l);
-  shades.unknown |= static_cast<std::uint64_t>(bits_of<Stop>(masked)) << static_cast<unsigned>(l);
+  shades.unknown |= static_cast<std::uint64_t>(bits_of<Kernel>(masked)) << static_cast<unsigned>(l);
 }
 
-// The colours of the lines that are left.
+// Computes the colours of the remaining lines.
 inline void color_ribbons(const ColorTable& table, const Shades& shades, std::uint64_t lines,
                           Ribbons& r) {
   for (std::uint64_t left = lines; left != 0; left &= left - 1U) {
@@ -296,7 +300,7 @@ inline void color_ribbons(const ColorTable& table, const Shades& shades, std::ui
           r.tail[l]);
     shade(shades.dim[l], shades.grey[l], shades.more[l], r.tail[l], r.rise[l]);
   }
-  // Where the field that tells the colour is masked: mid-grey.
+  // Mid-grey where the field that determines the colour is masked.
   for (std::uint64_t left = lines & shades.unknown; left != 0; left &= left - 1U) {
     const int l = __builtin_ctzll(left);
     for (float& c : r.tail[l]) c = 0.5F;
@@ -304,18 +308,19 @@ inline void color_ribbons(const ColorTable& table, const Shades& shades, std::ui
   }
 }
 
-// A vector of lines made ready; which lanes have one on the screen.
+// Prepares a vector of lines. Returns the lanes with a visible line.
 template <bool Perspective, bool Curved>
 KERNEL_INLINE std::uint32_t prepare_ribbons(const Camera& camera, const Pass& pass,
-                                            const Rows& rows, const Stops& stops,
-                                            const CellLanes<Curved>& cells, const Winds& winds,
+                                            const Rows& rows, const KernelPositions& positions,
+                                            const CellLanes<Curved>& cells, const Vectors& vectors,
                                             const Hash3<std::uint32_t>& key, int i, int l,
                                             Shades& shades, Ribbons& ribbons) {
-  Segments s = place_segments<Curved>(pass.line, rows, cells, winds, key, i);
-  const auto shown = project_segments<Perspective>(camera, pass.line, stops, l, winds, s, ribbons);
-  shade_ribbons(camera, pass.line, rows, stops, winds, s, i, l, shades);
-  if (pass.line.moving != 0) phase_ribbons(pass.line, winds, s, l, ribbons);
-  return bits_of<Stop>(shown);
+  Segments s = place_segments<Curved>(pass.line, rows, cells, vectors, key, i);
+  const auto shown =
+      project_segments<Perspective>(camera, pass.line, positions, l, vectors, s, ribbons);
+  shade_ribbons(camera, pass.line, rows, positions, vectors, s, i, l, shades);
+  if (pass.line.moving != 0) phase_ribbons(pass.line, vectors, s, l, ribbons);
+  return bits_of<Kernel>(shown);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Part of the kernel body: small functions of one lane, or of as many as a vector has.
+// Part of the kernel body: small scalar and vector functions.
 #pragma once
 
 #include "server/engine/kernels/simd.hpp"
@@ -33,9 +33,9 @@ KERNEL_INLINE V short_absorbed(V t) {
   return hn::NegMulAdd(t, t * p, t);
 }
 
-// tau = n ln2 + r, |r| <= ln2 / 2. With n = 0 nothing is subtracted from 1, so tau = 1e-30 absorbs
-// 1e-30; from tau = 17 on exactly 1 is absorbed. Most splats are thin in every pixel: for them n is
-// 0 without looking, to the same bits.
+// tau = n ln2 + r, |r| <= ln2 / 2. For n = 0 there is no cancellation, so tau = 1e-30 absorbs
+// 1e-30; from tau = 17 on exactly 1 is absorbed. Most splats are thin in every pixel; the shortcut
+// for n = 0 gives identical bits.
 template <class V>
 KERNEL_INLINE Attenuation<V> attenuation(V tau) {
   const V one = all<V>(1.0F);
@@ -44,8 +44,8 @@ KERNEL_INLINE Attenuation<V> attenuation(V tau) {
     const V absorbed = short_absorbed(tau);
     return {absorbed, one - absorbed};
   }
-  const V t = clamped(tau, 0.0F, 88.0F);  // there 2^-n is 0
-  // Never negative: truncation rounds to the nearest.
+  const V t = clamped(tau, 0.0F, 88.0F);  // 2^-n is 0 from there on
+  // Non-negative, so truncation of x + 0.5 rounds to nearest.
   const auto n = truncated(hn::MulAdd(t, all<V>(1.44269504F), all<V>(0.5F)));
   const V whole = from_integer<V>(n);
   const V r =
@@ -56,7 +56,7 @@ KERNEL_INLINE Attenuation<V> attenuation(V tau) {
   return {hn::MulAdd(scale, short_part, one - scale), hn::NegMulAdd(scale, short_part, scale)};
 }
 
-// The splat's footprint (Max 1991) in strides, normalised by its integral over the plane.
+// The footprint of a splat [Max91] in strides, not normalised; its integral over the plane.
 constexpr float footprint_s = 0.48F;
 constexpr float footprint_t = static_cast<float>(footprint_radius);
 constexpr float footprint_integral = 1.4476982547F;
@@ -70,7 +70,7 @@ KERNEL_INLINE V footprint(V r2) {
   return hn::IfThenElse(hn::Lt(r, all<V>(footprint_s)), inner, outer);
 }
 
-// pcg3d (Jarzynski & Olano 2020), of one key or of as many as there are lanes.
+// pcg3d (Jarzynski & Olano 2020), scalar or per lane.
 template <class U>
 struct Hash3 {
   U x, y, z;
@@ -106,7 +106,7 @@ KERNEL_INLINE Hash3<U> pcg3d(Hash3<U> v) {
   return v;
 }
 
-// Seed and epoch go through the hash first: neighbouring seeds then share nothing.
+// Seed and epoch are hashed first, so that neighbouring seeds are uncorrelated.
 inline Hash3<std::uint32_t> hash_key(std::uint32_t seed, std::uint32_t epoch) {
   return pcg3d(Hash3<std::uint32_t>{seed, epoch, 0x9e3779b9U});
 }

@@ -1,5 +1,5 @@
-// Part of the kernel body: a brick made ready for a tile. Each stage goes through all rows before
-// the next begins, so that rows do not wait for each other's branches.
+// Part of the kernel body: prepares a brick for a tile. Each stage processes all rows before the
+// next begins, so that a mispredicted branch of one row does not delay the others.
 #pragma once
 
 #include "server/engine/kernels/body_footing.hpp"
@@ -9,9 +9,9 @@ namespace {
 
 inline bool has(std::uint64_t bits, int l) { return (bits >> static_cast<unsigned>(l) & 1U) != 0; }
 
-// The bits of the vector of stops that begins at l.
+// The bits of the vector of kernel positions that begins at l.
 inline std::uint32_t lanes_at(std::uint64_t bits, int l) {
-  constexpr std::uint64_t lanes = (std::uint64_t{2} << (stop_lanes - 1)) - 1U;
+  constexpr std::uint64_t lanes = (std::uint64_t{2} << (kernel_lanes - 1)) - 1U;
   return static_cast<std::uint32_t>(bits >> static_cast<unsigned>(l) & lanes);
 }
 
@@ -20,7 +20,7 @@ inline std::uint32_t row_at(std::uint64_t bits, int j) {
 }
 
 inline std::uint32_t pair_at(std::uint64_t bits, int pair) {
-  return static_cast<std::uint32_t>(bits >> static_cast<unsigned>(pair_stops * pair) & 0xffffU);
+  return static_cast<std::uint32_t>(bits >> static_cast<unsigned>(pair_kernels * pair) & 0xffffU);
 }
 
 // 0xff in each byte whose bit is set.
@@ -30,32 +30,35 @@ inline std::uint64_t bytes_of(std::uint32_t bits) {
   return lowest * 0xffU;
 }
 
-// The stops of a brick that are there at all.
+// The valid positions of a brick.
 inline std::uint64_t brick_bits(const Rows& rows) {
   const std::uint64_t row = row_bits(rows);
   const std::uint64_t all = row * 0x0101010101010101U;
   return all >> static_cast<unsigned>(brick_side * (brick_side - rows.v_count));
 }
 
-// Places a brick's stops; those whose kernel may touch an open block of the tile.
+// Computes the kernel positions of a brick. Returns those whose kernels may touch an open block of
+// the tile.
 template <bool Perspective, bool Curved>
-std::uint64_t place_stops(const Camera& camera, const Pass& pass, const Brick& brick,
-                          const Frustum& frustum, Rows& rows, Tile& tile, Stops& stops) {
+std::uint64_t compute_positions(const Camera& camera, const Pass& pass, const Brick& brick,
+                                const Frustum& frustum, Rows& rows, Tile& tile,
+                                KernelPositions& positions) {
   const bool partly = partly_closed(tile, brick);
   std::uint64_t seen = 0;
   for (int pair = 0; pair < rows.pairs; ++pair) {
     if (Curved) {
       set_pair(pass, pair, rows);
-      place_curved_pair(camera, pass, pair, rows, stops);
+      place_curved_pair(camera, pass, pair, rows, positions);
     } else {
-      place_pair(camera, pass, pair, rows, stops);
+      place_pair(camera, pass, pair, rows, positions);
     }
-    const std::uint64_t bits = seen_in_pair<Perspective>(camera, frustum, stops, pair);
-    seen |= bits << static_cast<unsigned>(pair_stops * pair);
+    const std::uint64_t bits = seen_in_pair<Perspective>(camera, frustum, positions, pair);
+    seen |= bits << static_cast<unsigned>(pair_kernels * pair);
   }
   seen &= brick_bits(rows);
   if (!partly || seen == 0) return seen;
-  const std::uint32_t open = rows_to_see<Perspective>(camera, frustum, stops, rows, !Curved, tile);
+  const std::uint32_t open =
+      rows_to_see<Perspective>(camera, frustum, positions, rows, !Curved, tile);
   const std::uint64_t kept = seen & bytes_of(open);
   tile.counters.occluded += __builtin_popcountll(seen & ~kept);
   return kept;
@@ -68,7 +71,7 @@ struct BrickMaker {
   Tile& tile;
   Prepared& out;
   Hash3<std::uint32_t> key;
-  Rows rows;  // the two are filled pair by pair
+  Rows rows;  // rows and cells hold one pair at a time
   Cells cells;
   Shades shades;
 
@@ -79,25 +82,25 @@ struct BrickMaker {
         out(into),
         key(hash_key(of_pass.line.seed, of_pass.line.epoch)) {}
 
-  // The lines of a vector of stops; which of `bits` have one.
+  // Prepares the lines of a vector of kernel positions. Returns which of `bits` have one.
   KERNEL_INLINE std::uint32_t make_lines(const CellLanes<Curved>& cell, int i, int l,
                                          std::uint32_t bits) {
-    const Winds winds = read_winds(pass, rows, i);
-    const Stop least = all<Stop>(least_magnitude(pass.line));
-    const std::uint32_t lines = bits & bits_of<Stop>(hn::Ge(winds.magnitude, least));
+    const Vectors vectors = read_vectors(pass, rows, i);
+    const Kernel least = all<Kernel>(least_magnitude(pass.line));
+    const std::uint32_t lines = bits & bits_of<Kernel>(hn::Ge(vectors.magnitude, least));
     if (lines == 0) return 0;
-    return lines & prepare_ribbons<Perspective, Curved>(camera, pass, rows, out.stops, cell, winds,
-                                                        key, i, l, shades, out.ribbons);
+    return lines & prepare_ribbons<Perspective, Curved>(camera, pass, rows, out.positions, cell,
+                                                        vectors, key, i, l, shades, out.ribbons);
   }
 
   KERNEL_INLINE std::uint32_t make_splats(const CellLanes<Curved>& cell, int i, int l,
                                           std::uint32_t bits) {
     const Extinctions found = read_extinctions(pass, rows, i);
-    const std::uint32_t splats = bits & bits_of<Stop>(found.kept);
+    const std::uint32_t splats = bits & bits_of<Kernel>(found.kept);
     if (splats == 0) return 0;
     store(found.rho, out.densities.rho + l);
     const Outline outline =
-        prepare_splats<Perspective, Curved>(camera, out.stops, cell, l, found.rho, out.splats);
+        prepare_splats<Perspective, Curved>(camera, out.positions, cell, l, found.rho, out.splats);
     return find_splat_blocks(outline, tile, l, splats, out.footing);
   }
 
@@ -107,18 +110,18 @@ struct BrickMaker {
       fill_cells(camera, pass, rows, cells);
       bits &= cells.solid;
     }
-    for (int i = 0; i < pair_stops; i += stop_lanes) {
-      const int l = pair_stops * pair + i;
+    for (int i = 0; i < pair_kernels; i += kernel_lanes) {
+      const int l = pair_kernels * pair + i;
       const std::uint32_t here = lanes_at(bits, i);
       if (here == 0) continue;
       const CellLanes<Curved> cell(rows, cells, i);
       if (Lines) {
         const std::uint64_t lines = make_lines(cell, i, l, here);
-        out.stops.lines |= lines << static_cast<unsigned>(l);
+        out.positions.lines |= lines << static_cast<unsigned>(l);
       }
       if (Medium) {
         const std::uint64_t splats = make_splats(cell, i, l, here);
-        out.stops.splats |= splats << static_cast<unsigned>(l);
+        out.positions.splats |= splats << static_cast<unsigned>(l);
         color_splats(splats, i, l);
       }
     }
@@ -132,18 +135,18 @@ struct BrickMaker {
   }
 
   void find_lines() {
-    StopInteger most = hn::Zero(StopIntegers());
+    KernelInteger most = hn::Zero(KernelIntegers());
     std::uint64_t touching = 0;
-    for (int l = 0; l < brick_stops; l += stop_lanes) {
-      const std::uint32_t bits = lanes_at(out.stops.lines, l);
+    for (int l = 0; l < brick_kernels; l += kernel_lanes) {
+      const std::uint32_t bits = lanes_at(out.positions.lines, l);
       if (bits == 0) continue;
       const std::uint64_t here =
           find_line_rows(pass.line, out.ribbons, tile, l, bits, most, out.footing);
       touching |= here << static_cast<unsigned>(l);
     }
-    out.stops.lines = touching;
-    const int rows_most = hn::GetLane(hn::MaxOfLanes(StopIntegers(), most));
-    for (int l = 0; l < brick_stops; l += stop_lanes) {
+    out.positions.lines = touching;
+    const int rows_most = hn::GetLane(hn::MaxOfLanes(KernelIntegers(), most));
+    for (int l = 0; l < brick_kernels; l += kernel_lanes) {
       if (lanes_at(touching, l) == 0) continue;
       find_line_columns(pass.line, out.ribbons, tile, l, rows_most, out.footing);
     }
@@ -151,27 +154,27 @@ struct BrickMaker {
   }
 };
 
-// Everything up to the pixels: what of a brick may touch the tile's open blocks, made ready.
+// Prepares the lines and splats of a brick that may touch open blocks of the tile.
 template <bool Lines, bool Medium, bool Perspective, bool Curved>
 void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
                    Prepared& out) {
   BrickMaker<Lines, Medium, Perspective, Curved> maker(camera, pass, tile, out);
-  Stops& stops = out.stops;
-  stops.lines = stops.splats = out.footing.windowed = 0;
+  KernelPositions& positions = out.positions;
+  positions.lines = positions.splats = out.footing.windowed = 0;
   out.pass = &pass;
   out.near = camera.near;
   open_rows(pass, brick, maker.rows);
   float reach[3];
   brick_reach(camera, pass, brick, maker.rows, reach);
   const Frustum frustum = frustum_of<Perspective>(camera, tile, reach, Lines ? pass.line.r2 : 0.0F);
-  const std::uint64_t seen =
-      place_stops<Perspective, Curved>(camera, pass, brick, frustum, maker.rows, tile, stops);
+  const std::uint64_t seen = compute_positions<Perspective, Curved>(camera, pass, brick, frustum,
+                                                                    maker.rows, tile, positions);
   maker.shades.unknown = 0;
   for (int pair = 0; pair < maker.rows.pairs; ++pair) {
     if (pair_at(seen, pair) != 0) maker.make_pair(pair, pair_at(seen, pair));
   }
-  if (Lines && stops.lines != 0) maker.find_lines();
-  stops.count = __builtin_popcountll(stops.lines | stops.splats);
+  if (Lines && positions.lines != 0) maker.find_lines();
+  positions.count = __builtin_popcountll(positions.lines | positions.splats);
 }
 
 template <bool Lines, bool Medium, bool Perspective>

@@ -1,5 +1,5 @@
-// Part of the kernel body: a brick's stops two rows at a time, one lane a stop: where they stand,
-// and which of them the tile can show.
+// Part of the kernel body: computes and culls the kernel positions of a brick, two rows at a time
+// with one lane per position.
 #pragma once
 
 #include "server/engine/kernels/body_math.hpp"
@@ -8,36 +8,37 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// A brick's rows run along u; two neighbours are a pair. Each entry [axis][i] holds what the axis
-// has at the pair's i-th stop, brick_side of the first row and then those of the second: along u
-// they differ, along v by row, along the third they are all the same. What lies beyond a row's last
-// stop repeats it, and so does a row beyond the last.
+// The rows of a brick run along u; two consecutive rows are a pair. Entry [axis][i] is the value of
+// the axis at the i-th kernel position of the pair: brick_side values of the first row, then those
+// of the second. Along u the values differ by column, along v by row; along the major axis all are
+// equal. Lanes beyond the end of a row repeat its last position, and a missing second row repeats
+// the first.
 struct Rows {
-  alignas(64) double across[3][brick_side];  // right, down, forward: the part of u
-  alignas(64) float cell[3][pair_stops];
-  alignas(64) float inverse_cell[3][pair_stops];
-  alignas(64) float from_eye[3][pair_stops];
-  alignas(64) float height[pair_stops];
-  alignas(64) std::int32_t sample[3][pair_stops];
-  std::int32_t group[3][pair_stops];
+  alignas(64) double across[3][brick_side];  // right, down, forward: contribution of u
+  alignas(64) float cell[3][pair_kernels];
+  alignas(64) float inverse_cell[3][pair_kernels];
+  alignas(64) float from_eye[3][pair_kernels];
+  alignas(64) float height[pair_kernels];
+  alignas(64) std::int32_t sample[3][pair_kernels];
+  std::int32_t group[3][pair_kernels];
   std::int64_t along_u[brick_side];
-  std::int64_t offset[2];  // of each row's first sample in the fields
+  std::int64_t offset[2];  // of the first sample of each row in the fields
   int u_count, v_count, pairs;
-  int there;        // rows of the pair that are there
-  int first[3];     // of the brick's stops along each axis
-  int consecutive;  // a row's samples are neighbours in memory, and there are brick_side of them
+  int there;        // number of valid rows of the pair
+  int first[3];     // kernel position of the brick along each axis
+  int consecutive;  // rows are full, and their samples are consecutive in memory
 };
 
-// What one stop of an axis has, in a row's lanes from First on.
+// Broadcasts the values of one kernel position of an axis to the row of lanes from First on.
 template <int First>
-KERNEL_INLINE void fill_row(const Pass& pass, int a, int stop, Rows& rows) {
+KERNEL_INLINE void fill_row(const Pass& pass, int a, int index, Rows& rows) {
   const Axis& axis = pass.axis[a];
-  const std::int32_t sample = axis.sample[stop];
-  const std::int32_t group = axis.group[stop];
-  const float cell = axis.cell[stop];
-  const float inverse_cell = axis.inverse_cell[stop];
-  const float from_eye = axis.from_eye[stop];
-  const float height = axis.position[stop];
+  const std::int32_t sample = axis.sample[index];
+  const std::int32_t group = axis.group[index];
+  const float cell = axis.cell[index];
+  const float inverse_cell = axis.inverse_cell[index];
+  const float from_eye = axis.from_eye[index];
+  const float height = axis.position[index];
   constexpr int last = First + brick_side;
   for (int i = First; i < last; ++i) rows.sample[a][i] = sample;
   for (int i = First; i < last; ++i) rows.group[a][i] = group;
@@ -47,21 +48,23 @@ KERNEL_INLINE void fill_row(const Pass& pass, int a, int stop, Rows& rows) {
   for (int i = First; a == 2 && i < last; ++i) rows.height[i] = height;
 }
 
-// What the stops of a row have along it; stop_of(i): the one in lane i.
-template <class StopOf>
-KERNEL_INLINE void fill_along(const Pass& pass, Rows& rows, const StopOf& stop_of) {
+// Fills the values along u; index_of(i) returns the kernel position of lane i.
+template <class IndexOf>
+KERNEL_INLINE void fill_along(const Pass& pass, Rows& rows, const IndexOf& index_of) {
   const int a = pass.u;
   const Axis& axis = pass.axis[a];
   const auto both = [](auto* to, int i, auto value) { to[i] = to[brick_side + i] = value; };
-  for (int i = 0; i < brick_side; ++i) both(rows.sample[a], i, axis.sample[stop_of(i)]);
-  for (int i = 0; i < brick_side; ++i) both(rows.group[a], i, axis.group[stop_of(i)]);
-  for (int i = 0; i < brick_side; ++i) both(rows.cell[a], i, axis.cell[stop_of(i)]);
-  for (int i = 0; i < brick_side; ++i) both(rows.inverse_cell[a], i, axis.inverse_cell[stop_of(i)]);
-  for (int i = 0; i < brick_side; ++i) both(rows.from_eye[a], i, axis.from_eye[stop_of(i)]);
-  for (int i = 0; a == 2 && i < brick_side; ++i) both(rows.height, i, axis.position[stop_of(i)]);
+  for (int i = 0; i < brick_side; ++i) both(rows.sample[a], i, axis.sample[index_of(i)]);
+  for (int i = 0; i < brick_side; ++i) both(rows.group[a], i, axis.group[index_of(i)]);
+  for (int i = 0; i < brick_side; ++i) both(rows.cell[a], i, axis.cell[index_of(i)]);
+  for (int i = 0; i < brick_side; ++i)
+    both(rows.inverse_cell[a], i, axis.inverse_cell[index_of(i)]);
+  for (int i = 0; i < brick_side; ++i) both(rows.from_eye[a], i, axis.from_eye[index_of(i)]);
+  for (int i = 0; a == 2 && i < brick_side; ++i) both(rows.height, i, axis.position[index_of(i)]);
 }
 
-// Visiting lists name a brick's stops outward from the eye; its rows hold them in world order.
+// The first kernel position of a brick in world order; visit lists are ordered outward from the
+// eye.
 inline int lowest(const int* visit) { return visit[0] / brick_side * brick_side; }
 
 void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
@@ -72,7 +75,7 @@ void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
   rows.pairs = (brick.v_count + 1) / 2;
   rows.first[pass.u] = lowest(u.visit + brick.u_first);
   rows.first[pass.v] = lowest(pass.axis[pass.v].visit + brick.v_first);
-  rows.first[pass.major] = pass.axis[pass.major].visit[brick.slab];
+  rows.first[pass.major] = pass.axis[pass.major].visit[brick.sheet];
   const int first = rows.first[pass.u];
   if (count == brick_side) {
     fill_along(pass, rows, [first](int i) { return first + i; });
@@ -93,7 +96,7 @@ void open_rows(const Pass& pass, const Brick& brick, Rows& rows) {
   rows.consecutive = full && rows.along_u[brick_side - 1] == brick_side - 1 ? 1 : 0;
 }
 
-// A pair's second row, or its first where that is the brick's last.
+// The second row of a pair, or the first if that is the last row of the brick.
 inline int second_row(const Rows& rows, int pair) {
   return 2 * pair + 1 < rows.v_count ? 2 * pair + 1 : 2 * pair;
 }
@@ -110,84 +113,85 @@ void set_pair(const Pass& pass, int pair, Rows& rows) {
   }
 }
 
-// Where a pair's i-th stop has its sample in the fields.
+// Offset of the i-th sample of a pair in the fields.
 inline std::int64_t offset_of(const Rows& rows, int i) {
   return rows.offset[i / brick_side] + rows.along_u[i % brick_side];
 }
 
-// Camera coordinates of a row, as row `to_row`, summed in double so that an eye far away or close
-// by loses nothing.
+// Camera coordinates of row j, stored as row `to_row`. Summed in double, so that a distant eye
+// costs no precision.
 void place_row(const Camera& camera, const Pass& pass, int j, int to_row, const Rows& rows,
-               Stops& stops) {
-  const double* from_slab =
+               KernelPositions& positions) {
+  const double* from_sheet =
       pass.axis[pass.major].camera + 3 * static_cast<std::ptrdiff_t>(rows.first[pass.major]);
   const double* from_v =
       pass.axis[pass.v].camera + 3 * static_cast<std::ptrdiff_t>(rows.first[pass.v] + j);
   const std::ptrdiff_t row = std::ptrdiff_t{brick_side} * to_row;
-  float* const to[3] = {stops.x + row, stops.y + row, stops.z + row};
+  float* const to[3] = {positions.x + row, positions.y + row, positions.z + row};
   for (int c = 0; c < 3; ++c) {
-    const double base = from_slab[c] + from_v[c];
+    const double base = from_sheet[c] + from_v[c];
     for (int i = 0; i < brick_side; ++i) to[c][i] = static_cast<float>(base + rows.across[c][i]);
   }
   if (pass.by_depth == 0) return;
-  const double middle = from_slab[2] + from_v[2] - camera.depth_origin;
+  const double middle = from_sheet[2] + from_v[2] - camera.depth_origin;
   for (int i = 0; i < brick_side; ++i) {
-    stops.depth[row + i] = static_cast<float>(middle + rows.across[2][i]);
+    positions.depth[row + i] = static_cast<float>(middle + rows.across[2][i]);
   }
 }
 
-void place_pair(const Camera& camera, const Pass& pass, int pair, const Rows& rows, Stops& stops) {
-  place_row(camera, pass, 2 * pair, 2 * pair, rows, stops);
-  place_row(camera, pass, second_row(rows, pair), 2 * pair + 1, rows, stops);
+void place_pair(const Camera& camera, const Pass& pass, int pair, const Rows& rows,
+                KernelPositions& positions) {
+  place_row(camera, pass, 2 * pair, 2 * pair, rows, positions);
+  place_row(camera, pass, second_row(rows, pair), 2 * pair + 1, rows, positions);
 }
 
 inline double dot3(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-// The same for stops that stand where the field says.
+// The same for a curved lattice, whose positions are stored by sample.
 void place_curved_pair(const Camera& camera, const Pass& pass, int pair, const Rows& rows,
-                       Stops& stops) {
-  for (int i = 0; i < pair_stops; ++i) {
+                       KernelPositions& positions) {
+  for (int i = 0; i < pair_kernels; ++i) {
     const float* place = pass.places + 3 * offset_of(rows, i);
     double at[3];
     for (int c = 0; c < 3; ++c) at[c] = static_cast<double>(place[c]) - camera.eye[c];
     const double z = dot3(camera.world_forward, at);
-    const int l = pair_stops * pair + i;
-    stops.x[l] = static_cast<float>(dot3(camera.world_right, at));
-    stops.y[l] = static_cast<float>(dot3(camera.world_down, at));
-    stops.z[l] = static_cast<float>(z);
-    stops.depth[l] = static_cast<float>(z - camera.depth_origin);
+    const int l = pair_kernels * pair + i;
+    positions.x[l] = static_cast<float>(dot3(camera.world_right, at));
+    positions.y[l] = static_cast<float>(dot3(camera.world_down, at));
+    positions.z[l] = static_cast<float>(z);
+    positions.depth[l] = static_cast<float>(z - camera.depth_origin);
   }
 }
 
-// Values at a pair's consecutive samples from lane i on.
-KERNEL_INLINE Stop fetch_consecutive(const float* values, const Rows& rows, int i) {
+// Values at the samples of a pair of consecutive rows from lane i on.
+KERNEL_INLINE Kernel fetch_consecutive(const float* values, const Rows& rows, int i) {
 #if HWY_TARGET != HWY_SCALAR
-  if constexpr (stop_lanes == pair_stops) {
-    const hn::Half<StopTag> half;
-    return hn::Combine(StopTag(), hn::LoadU(half, values + rows.offset[1]),
+  if constexpr (kernel_lanes == pair_kernels) {
+    const hn::Half<KernelTag> half;
+    return hn::Combine(KernelTag(), hn::LoadU(half, values + rows.offset[1]),
                        hn::LoadU(half, values + rows.offset[0]));
   }
 #endif
-  return load_unaligned<Stop>(values + rows.offset[i / brick_side] + i % brick_side);
+  return load_unaligned<Kernel>(values + rows.offset[i / brick_side] + i % brick_side);
 }
 
-// A field's values at a pair's stops from lane i on.
-KERNEL_INLINE Stop fetch(const float* values, const Rows& rows, int i) {
+// Values of a field at the kernel positions of a pair from lane i on.
+KERNEL_INLINE Kernel fetch(const float* values, const Rows& rows, int i) {
   if (rows.consecutive != 0) return fetch_consecutive(values, rows, i);
-  alignas(64) float lanes[pair_stops];
-  for (int k = 0; k < pair_stops; ++k) lanes[k] = values[offset_of(rows, k)];
-  return load<Stop>(lanes + i);
+  alignas(64) float lanes[pair_kernels];
+  for (int k = 0; k < pair_kernels; ++k) lanes[k] = values[offset_of(rows, k)];
+  return load<Kernel>(lanes + i);
 }
 
-// The stops of a row that are there at all, and those of a pair.
+// The valid positions of a row and of a pair.
 inline std::uint32_t row_bits(const Rows& rows) { return (2U << (rows.u_count - 1)) - 1U; }
 inline std::uint32_t pair_bits(const Rows& rows) {
   return rows.there == 2 ? row_bits(rows) | row_bits(rows) << brick_side : row_bits(rows);
 }
 
-// How far a brick's kernels reach beyond their stops along right, down and forward.
+// Extent of the kernels of a brick beyond their positions along right, down and forward.
 void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, const Rows& rows,
                  float reach[3]) {
   float cell[3];
@@ -213,7 +217,7 @@ void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, con
   }
   const float* const frame[3] = {camera.right, camera.down, camera.forward};
   for (int c = 0; c < 3; ++c) {
-    float box = 0;    // half the kernel's, along this axis of the camera
+    float box = 0;    // half the kernel box along this camera axis
     float shift = 0;  // of its centre
     float square = 0;
     for (int a = 0; a < 3; ++a) {
@@ -228,9 +232,9 @@ void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, con
   }
 }
 
-// Planes through the tile's edges, moved outward by what a kernel reaches.
+// Planes through the edges of the tile, moved outward by the extent of a kernel.
 struct Frustum {
-  float x0, x1, y0, y1;  // the tile's edges at unit depth, widened by `margin` pixels
+  float x0, x1, y0, y1;  // edges of the tile at unit depth, widened by `margin` pixels
   float left, right, top, bottom;
   float reach[3];
   float margin;
@@ -253,24 +257,25 @@ Frustum frustum_of(const Camera& camera, const Tile& tile, const float reach[3],
   return f;
 }
 
-// The stops of a pair that are not nearer than the near plane and whose kernel may touch the tile.
+// The positions of a pair that lie beyond the near plane and whose kernels may touch the tile.
 template <bool Perspective>
-std::uint32_t seen_in_pair(const Camera& camera, const Frustum& f, const Stops& stops, int pair) {
+std::uint32_t seen_in_pair(const Camera& camera, const Frustum& f, const KernelPositions& positions,
+                           int pair) {
   std::uint32_t bits = 0;
-  for (int i = 0; i < pair_stops; i += stop_lanes) {
-    const int l = pair_stops * pair + i;
-    const Stop x = load<Stop>(stops.x + l);
-    const Stop y = load<Stop>(stops.y + l);
-    const Stop depth = load<Stop>(stops.z + l);
-    const Stop z = Perspective ? depth : all<Stop>(1.0F);
-    // The largest of how far it lies outside any plane.
-    Stop outside = hn::MulSub(all<Stop>(f.x0), z, x) - all<Stop>(f.left);
-    outside = hn::Max(outside, hn::NegMulAdd(all<Stop>(f.x1), z, x) - all<Stop>(f.right));
-    outside = hn::Max(outside, hn::MulSub(all<Stop>(f.y0), z, y) - all<Stop>(f.top));
-    outside = hn::Max(outside, hn::NegMulAdd(all<Stop>(f.y1), z, y) - all<Stop>(f.bottom));
-    auto inside = hn::Le(outside, hn::Zero(StopTag()));
-    if (Perspective) inside = hn::And(inside, hn::Ge(z, all<Stop>(camera.near)));
-    bits |= bits_of<Stop>(inside) << static_cast<unsigned>(i);
+  for (int i = 0; i < pair_kernels; i += kernel_lanes) {
+    const int l = pair_kernels * pair + i;
+    const Kernel x = load<Kernel>(positions.x + l);
+    const Kernel y = load<Kernel>(positions.y + l);
+    const Kernel depth = load<Kernel>(positions.z + l);
+    const Kernel z = Perspective ? depth : all<Kernel>(1.0F);
+    // Largest distance outside any plane.
+    Kernel outside = hn::MulSub(all<Kernel>(f.x0), z, x) - all<Kernel>(f.left);
+    outside = hn::Max(outside, hn::NegMulAdd(all<Kernel>(f.x1), z, x) - all<Kernel>(f.right));
+    outside = hn::Max(outside, hn::MulSub(all<Kernel>(f.y0), z, y) - all<Kernel>(f.top));
+    outside = hn::Max(outside, hn::NegMulAdd(all<Kernel>(f.y1), z, y) - all<Kernel>(f.bottom));
+    auto inside = hn::Le(outside, hn::Zero(KernelTag()));
+    if (Perspective) inside = hn::And(inside, hn::Ge(z, all<Kernel>(camera.near)));
+    bits |= bits_of<Kernel>(inside) << static_cast<unsigned>(i);
   }
   return bits;
 }
@@ -280,29 +285,30 @@ struct Range {
   int first, last;
 };
 
-using StopIntegers = hn::RebindToSigned<StopTag>;
-using StopInteger = hn::Vec<StopIntegers>;
+using KernelIntegers = hn::RebindToSigned<KernelTag>;
+using KernelInteger = hn::Vec<KernelIntegers>;
 
-// The same for a vector of them.
+// The same with one lane per outline.
 struct Ranges {
-  StopInteger first, last;
+  KernelInteger first, last;
 };
 
-// Blocks of the tile whose pixel centres may lie between two coordinates in pixels from the tile's
-// edge. Block b holds the centres 4 b + 0.5 to 4 b + 3.5.
-KERNEL_INLINE Ranges blocks_between(Stop low, Stop high, int blocks) {
+// Blocks of the tile with pixel centres between two coordinates in pixels from the edge of the
+// tile. Block b has the centres 4 b + 0.5 to 4 b + 3.5.
+KERNEL_INLINE Ranges blocks_between(Kernel low, Kernel high, int blocks) {
   constexpr float per_block = 1.0F / block_side;
   constexpr float slack = 1e-3F;
   const float bound = static_cast<float>(blocks);
-  // Truncation rounds down because nothing below zero is truncated.
-  const Stop first = clamped((low + all<Stop>(0.5F - slack)) * all<Stop>(per_block), 0.0F, bound);
-  const Stop last =
-      clamped((high + all<Stop>(slack - 0.5F)) * all<Stop>(per_block), -1.0F, bound - 0.5F);
-  return {truncated(first), truncated(last + all<Stop>(1.0F)) - hn::Set(StopIntegers(), 1)};
+  // Truncation rounds down because the values are not negative.
+  const Kernel first =
+      clamped((low + all<Kernel>(0.5F - slack)) * all<Kernel>(per_block), 0.0F, bound);
+  const Kernel last =
+      clamped((high + all<Kernel>(slack - 0.5F)) * all<Kernel>(per_block), -1.0F, bound - 0.5F);
+  return {truncated(first), truncated(last + all<Kernel>(1.0F)) - hn::Set(KernelIntegers(), 1)};
 }
 
-KERNEL_INLINE void store(StopInteger value, std::int32_t* to) {
-  hn::Store(value, StopIntegers(), to);
+KERNEL_INLINE void store(KernelInteger value, std::int32_t* to) {
+  hn::Store(value, KernelIntegers(), to);
 }
 
 inline int blocks_of(int pixels) { return (pixels + block_side - 1) / block_side; }
@@ -313,15 +319,15 @@ inline std::uint32_t range_mask(Range range) {
          << static_cast<unsigned>(range.first);
 }
 
-// Where on the screen boxes about points may lie, in pixels along one axis.
+// Bounds of projected boxes about points along one axis of the screen.
 struct Shadow {
-  Stop low, high;
+  Kernel low, high;
 
-  // Widened by a box as far as `reach` about `at`; near, far: the inverse depths of its ends, one
-  // of which widens it most, on either side of the middle.
-  KERNEL_INLINE void add(Stop at, float reach, Stop near, Stop far) {
-    const Stop from = at - all<Stop>(reach);
-    const Stop to = at + all<Stop>(reach);
+  // Extends the bounds by a box of half width `reach` about `at`. near, far: inverse depths of its
+  // ends; one of them is extreme on either side of the centre.
+  KERNEL_INLINE void add(Kernel at, float reach, Kernel near, Kernel far) {
+    const Kernel from = at - all<Kernel>(reach);
+    const Kernel to = at + all<Kernel>(reach);
     low = hn::Min(low, hn::Min(from * near, from * far));
     high = hn::Max(high, hn::Max(to * near, to * far));
   }
@@ -344,7 +350,7 @@ inline Under under(const Tile& tile, const Brick& brick) {
       range_mask({within(brick.block_x - left, wide), within(brick.block_x_last - left, wide)})};
 }
 
-// Whether any block there lets no more light through.
+// Whether any of these blocks is closed.
 inline bool partly_closed(const Tile& tile, const Brick& brick) {
   if (tile.any_closed == 0) return false;
   const Under blocks = under(tile, brick);
@@ -353,49 +359,50 @@ inline bool partly_closed(const Tile& tile, const Brick& brick) {
   return (open & blocks.columns) != blocks.columns;
 }
 
-// The i-th stops of a brick's rows from row j on, a lane a row; lanes beyond the last repeat it.
-KERNEL_INLINE Stop across_rows(const float* stops, int i, int j, int v_count) {
-  alignas(64) float lanes[stop_lanes];
-  for (int k = 0; k < stop_lanes; ++k) {
-    lanes[k] = stops[brick_side * (j + k < v_count ? j + k : v_count - 1) + i];
+// The i-th position of the rows from row j on, one lane per row; lanes beyond the last repeat it.
+KERNEL_INLINE Kernel across_rows(const float* positions, int i, int j, int v_count) {
+  alignas(64) float lanes[kernel_lanes];
+  for (int k = 0; k < kernel_lanes; ++k) {
+    lanes[k] = positions[brick_side * (j + k < v_count ? j + k : v_count - 1) + i];
   }
-  return load<Stop>(lanes);
+  return load<Kernel>(lanes);
 }
 
-// The blocks that rows' kernels may touch, a lane a row.
+// The blocks that the kernels of rows may touch, one lane per row.
 struct Footprints {
   Ranges rows, columns;
 };
 
-// On straight rows the ends reach as far as any stop between them; of curved ones every stop is
-// asked. A kernel that reaches behind the near plane casts a shadow without an end there.
+// On straight rows the two ends bound all positions between them; on curved rows every position is
+// tested. A kernel that extends beyond the near plane is unbounded on the screen.
 template <bool Perspective>
-KERNEL_INLINE Footprints footprints_of(const Camera& camera, const Frustum& f, const Stops& stops,
-                                       int j, const Rows& rows, bool straight, const Tile& tile) {
-  Shadow across = {all<Stop>(3e38F), all<Stop>(-3e38F)};
+KERNEL_INLINE Footprints footprints_of(const Camera& camera, const Frustum& f,
+                                       const KernelPositions& positions, int j, const Rows& rows,
+                                       bool straight, const Tile& tile) {
+  Shadow across = {all<Kernel>(3e38F), all<Kernel>(-3e38F)};
   Shadow down = across;
-  Stop nearest = all<Stop>(3e38F);
+  Kernel nearest = all<Kernel>(3e38F);
   const int step = straight && rows.u_count > 1 ? rows.u_count - 1 : 1;
   for (int i = 0; i < rows.u_count; i += step) {
-    const Stop z = across_rows(stops.z, i, j, rows.v_count);
-    const Stop least = all<Stop>(camera.near);
-    const Stop one = all<Stop>(1.0F);
+    const Kernel z = across_rows(positions.z, i, j, rows.v_count);
+    const Kernel least = all<Kernel>(camera.near);
+    const Kernel one = all<Kernel>(1.0F);
     nearest = hn::Min(nearest, z);
-    const Stop reach = all<Stop>(f.reach[2]);
-    const Stop near = Perspective ? inverse_of(hn::Max(z - reach, least)) : one;
-    const Stop far = Perspective ? inverse_of(z + reach) : one;
-    across.add(across_rows(stops.x, i, j, rows.v_count), f.reach[0], near, far);
-    down.add(across_rows(stops.y, i, j, rows.v_count), f.reach[1], near, far);
+    const Kernel reach = all<Kernel>(f.reach[2]);
+    const Kernel near = Perspective ? inverse_of(hn::Max(z - reach, least)) : one;
+    const Kernel far = Perspective ? inverse_of(z + reach) : one;
+    across.add(across_rows(positions.x, i, j, rows.v_count), f.reach[0], near, far);
+    down.add(across_rows(positions.y, i, j, rows.v_count), f.reach[1], near, far);
   }
-  const Stop scale = all<Stop>(camera.inverse_pixel);
+  const Kernel scale = all<Kernel>(camera.inverse_pixel);
   const auto blocks = [&](const Shadow& shadow, float middle, int first, int pixels) {
     const float offset = middle - static_cast<float>(first);
-    Stop low = hn::MulAdd(shadow.low, scale, all<Stop>(offset - f.margin));
-    Stop high = hn::MulAdd(shadow.high, scale, all<Stop>(offset + f.margin));
+    Kernel low = hn::MulAdd(shadow.low, scale, all<Kernel>(offset - f.margin));
+    Kernel high = hn::MulAdd(shadow.high, scale, all<Kernel>(offset + f.margin));
     if (Perspective) {
-      const auto endless = hn::Lt(nearest, all<Stop>(camera.near + f.reach[2]));
-      low = hn::IfThenElse(endless, all<Stop>(-1e6F), low);
-      high = hn::IfThenElse(endless, all<Stop>(1e6F), high);
+      const auto endless = hn::Lt(nearest, all<Kernel>(camera.near + f.reach[2]));
+      low = hn::IfThenElse(endless, all<Kernel>(-1e6F), low);
+      high = hn::IfThenElse(endless, all<Kernel>(1e6F), high);
     }
     return blocks_between(low, high, blocks_of(pixels));
   };
@@ -403,20 +410,21 @@ KERNEL_INLINE Footprints footprints_of(const Camera& camera, const Frustum& f, c
           blocks(across, camera.half_width_px, tile.x, tile.width)};
 }
 
-// The rows of a brick whose kernels may touch a block that still lets light through: bit j set.
+// The rows of a brick whose kernels may touch an open block, as bits.
 template <bool Perspective>
-std::uint32_t rows_to_see(const Camera& camera, const Frustum& f, const Stops& stops,
+std::uint32_t rows_to_see(const Camera& camera, const Frustum& f, const KernelPositions& positions,
                           const Rows& rows, bool straight, const Tile& tile) {
   std::uint32_t seen = 0;
-  for (int j = 0; j < rows.v_count; j += stop_lanes) {
-    const Footprints under = footprints_of<Perspective>(camera, f, stops, j, rows, straight, tile);
-    alignas(64) std::int32_t first[stop_lanes], last[stop_lanes], left[stop_lanes],
-        right[stop_lanes];
+  for (int j = 0; j < rows.v_count; j += kernel_lanes) {
+    const Footprints under =
+        footprints_of<Perspective>(camera, f, positions, j, rows, straight, tile);
+    alignas(64) std::int32_t first[kernel_lanes], last[kernel_lanes], left[kernel_lanes],
+        right[kernel_lanes];
     store(under.rows.first, first);
     store(under.rows.last, last);
     store(under.columns.first, left);
     store(under.columns.last, right);
-    for (int k = 0; k < stop_lanes && j + k < rows.v_count; ++k) {
+    for (int k = 0; k < kernel_lanes && j + k < rows.v_count; ++k) {
       std::uint32_t open = 0;
       for (int row = first[k]; row <= last[k]; ++row) open |= tile.open[row];
       if ((open & range_mask({left[k], right[k]})) != 0) seen |= 1U << static_cast<unsigned>(j + k);

@@ -1,121 +1,33 @@
-// Part of the kernel body: the slab method's second half. Lines are put down for the blocks that
-// they pass, then a slab's gathered medium and the lines in it are composited, block by block.
+// Part of the kernel body: a slab's gathered medium and the lines in it are composited, block by
+// block.
 #pragma once
 
-#include "server/engine/kernels/body_gather.hpp"
+#include "server/engine/kernels/body_line_hits.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {
 
-inline RibbonRecord ribbon_record(const LineStyle& line, const Prepared& p, int l) {
-  RibbonRecord out = {ribbon_at(line, p.ribbons, l), line.moving, 0};
-  out.ribbon.depth += p.stops.depth[l];
-  out.bent = absolute(out.ribbon.bend) > series_bend_max ? 1 : 0;
-  return out;
-}
-
-// The depths between which a line passes the pixels of the blocks of one row, a lane a column.
-struct DepthRange {
-  Pixel first, last;
-};
-
-template <bool Perspective>
-KERNEL_INLINE DepthRange row_depths(const Ribbon& r, float margin, Pixel x, float y) {
-  constexpr float farthest = 0.5F * (block_side - 1);  // pixel centres from a block's middle
-  const auto depth_at = [&](Pixel along) {
-    const Pixel w = clamped(along, 0.0F, 1.0F);
-    const Pixel one = all<Pixel>(1.0F);
-    const Pixel f =
-        Perspective ? w * all<Pixel>(r.depth_ratio) / hn::MulAdd(w, all<Pixel>(r.bend), one) : w;
-    return hn::MulAdd(f, all<Pixel>(r.depth_rise), all<Pixel>(r.depth));
-  };
-  const Pixel w =
-      hn::MulAdd(x - all<Pixel>(r.x), all<Pixel>(r.wx), all<Pixel>((y - r.y) * r.wy + r.w0));
-  const Pixel reach = all<Pixel>(farthest * (absolute(r.wx) + absolute(r.wy)));
-  const Pixel a = depth_at(w - reach);
-  const Pixel b = depth_at(w + reach);
-  // Beyond every rounding of the line's depth and of the slabs' faces.
-  constexpr float rounding = 1e-6F;
-  const Pixel slack =
-      hn::MulAdd(hn::Max(hn::Abs(a), hn::Abs(b)), all<Pixel>(rounding), all<Pixel>(margin));
-  return {hn::Min(a, b) - slack, hn::Max(a, b) + slack};
-}
-
-// Lists the open blocks that stop l's line may touch; how many.
-template <bool Perspective>
-KERNEL_INLINE int list_hits(const RibbonRecord& line, const Footing& f, int l, std::uint32_t slot,
-                            float margin, const Tile& tile, Hit* hits) {
-  constexpr float middle = 0.5F * block_side;
-  int n = 0;
-  for (int row = f.line_first[l], k = 0; row <= f.line_last[l]; ++row, ++k) {
-    std::uint32_t left = f.line_columns[k][l] & tile.open[row];
-    while (left != 0) {
-      const int from = __builtin_ctz(left);
-      const Pixel x = hn::MulAdd(hn::Iota(PixelTag(), 0), all<Pixel>(block_side),
-                                 all<Pixel>(left_of(tile, from) + middle));
-      const DepthRange range =
-          row_depths<Perspective>(line.ribbon, margin, x, top_of(tile, row) + middle);
-      alignas(64) float first[block_pixels];
-      alignas(64) float last[block_pixels];
-      store(range.first, first);
-      store(range.last, last);
-      std::uint32_t here = left >> static_cast<unsigned>(from) & ((2U << (pixel_lanes - 1)) - 1U);
-      left &= ~(here << static_cast<unsigned>(from));
-      for (; here != 0; here &= here - 1U) {
-        const int c = __builtin_ctz(here);
-        hits[n++] = {slot, row * tile_blocks + from + c, first[c], last[c]};
-      }
-    }
-  }
-  return n;
-}
-
-template <bool Perspective>
-int pack_lines_on(const Prepared& p, float slab_depth, const std::uint32_t* slots, const Tile& tile,
-                  RibbonRecord* records, Hit* hits, int* counts) {
-  const float margin = 1e-4F * slab_depth;
-  int n = 0;
-  for (std::uint64_t left = p.stops.lines; left != 0; left &= left - 1U) {
-    const int l = __builtin_ctzll(left);
-    RibbonRecord& record = records[slots[n]];
-    record = ribbon_record(p.pass->line, p, l);
-    const int count = list_hits<Perspective>(record, p.footing, l, slots[n], margin, tile, hits);
-    if (count == 0) continue;
-    hits += count;
-    counts[n++] = count;
-  }
-  return n;
-}
-
-int pack_lines(const Camera& camera, const Prepared& p, float slab_depth,
-               const std::uint32_t* slots, const Tile& tile, RibbonRecord* records, Hit* hits,
-               int* counts) {
-  return camera.perspective != 0
-             ? pack_lines_on<true>(p, slab_depth, slots, tile, records, hits, counts)
-             : pack_lines_on<false>(p, slab_depth, slots, tile, records, hits, counts);
-}
-
-// A slab without a medium at hand: all ways of compositing are the same.
+// A block of a slab without medium: all compositing methods are equal.
 constexpr int compositing_no_medium = -1;
 
-// Light and transmittance of a vector of a block's pixels within the current slab.
+// Light and transmittance of a vector of pixels within the current slab.
 struct Passage {
   Pixel tau;
   Attenuation<Pixel> medium;
   Pixel color[3];  // of the medium
-  Pixel rgb[3];    // added by lines, minus the medium's behind them
+  Pixel rgb[3];    // added by lines, minus that of the medium behind them
   Pixel through;   // product of 1 - opacity of the lines so far
-  Pixel reached;   // cd-naive: how far through the slab the light was followed
-  Pixel left;      // cd-naive: light left there
+  Pixel reached;   // cd-naive: relative position in the slab up to which light is composited
+  Pixel left;      // cd-naive: transmittance up to there
 };
 
-// A line as a block's pixels meet it; a pixel that does not has opacity 0.
+// A line at the pixels of a block; opacity 0 where a pixel does not meet it.
 struct Meeting {
   alignas(64) float place[block_pixels];  // through the slab, 0 to 1
   alignas(64) float opacity[block_pixels];
   alignas(64) float color[3][block_pixels];
 };
-constexpr int meetings_max = 64;  // put in order together; a line moves by half of that at most
+constexpr int meetings_max = 64;  // sorted together; exact if no line is displaced by over half
 
 template <int Compositing>
 KERNEL_INLINE Passage open_passage(const float* gathered, int l) {
@@ -133,7 +45,7 @@ KERNEL_INLINE Passage open_passage(const float* gathered, int l) {
   return p;
 }
 
-// A line as a vector of a block's pixels meets it within the slab.
+// A line at a vector of pixels within the slab.
 struct Met {
   MaskOf<Pixel> here;  // the line covers the pixel, in this slab
   Pixel opacity;       // elsewhere 0
@@ -152,7 +64,7 @@ KERNEL_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pix
       hn::MulAdd(f, all<Pixel>(line.ribbon.depth_rise), all<Pixel>(line.ribbon.depth));
   const auto inside =
       hn::And(hn::Ge(depth, all<Pixel>(slab.front)), hn::Lt(depth, all<Pixel>(slab.back)));
-  // Most lines that may be met are not: they pass the block in another slab.
+  // Early exit: most candidates pass the block in another slab.
   if (hn::AllFalse(PixelTag(), inside)) return {inside, zero, depth, f};
   const Pixel opacity = ribbon_lane<Along, Style>(r, px - r.x, py - r.y).opacity;
   const auto here = hn::And(inside, hn::Gt(opacity, zero));
@@ -178,7 +90,7 @@ KERNEL_INLINE Pixel place_in(const Slab& slab, Pixel depth) {
   return clamped((depth - all<Pixel>(slab.front)) * inverse, 0.0F, 1.0F);
 }
 
-// Whether any pixel meets the line at all.
+// Returns whether any pixel meets the line.
 template <bool Perspective>
 KERNEL_INLINE bool meet_line(const RibbonRecord& line, const Slab& slab, float x, float y,
                              Meeting& m) {
@@ -198,7 +110,7 @@ KERNEL_INLINE bool meet_line(const RibbonRecord& line, const Slab& slab, float x
   return met;
 }
 
-// Puts two neighbours in order, each pixel by itself; whether any pixel had them the other way.
+// Sorts two neighbours per pixel. Returns whether any pixel swapped them.
 KERNEL_INLINE bool put_in_order(Meeting& first, Meeting& second) {
   bool swapped = false;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
@@ -218,8 +130,8 @@ KERNEL_INLINE bool put_in_order(Meeting& first, Meeting& second) {
   return swapped;
 }
 
-// Front to back in every pixel, by insertion. The lines come nearly sorted, by their depth at the
-// block's middle, so that few pairs are exchanged.
+// Insertion sort front to back in every pixel. The input is nearly sorted, by depth at the centre
+// of the block.
 inline void sort_meetings(Meeting* m, int count) {
   for (int n = 1; n < count; ++n) {
     for (int k = n; k > 0 && put_in_order(m[k - 1], m[k]); --k) continue;
@@ -230,7 +142,7 @@ template <int Compositing>
 KERNEL_INLINE void pass_line(Pixel opacity, Pixel place, const Pixel color[3], Passage& p) {
   const Pixel one = all<Pixel>(1.0F);
   if (Compositing == compositing_cd_naive) {
-    // Only a pixel that the line covers is followed up to it.
+    // Composite the medium up to the line only in pixels that the line covers.
     const Pixel next =
         hn::IfThenElse(hn::Gt(opacity, hn::Zero(PixelTag())), hn::Max(place, p.reached), p.reached);
     const Pixel part = (next - p.reached) * p.medium.absorbed;
@@ -261,7 +173,7 @@ KERNEL_INLINE void pass_line(const Meeting& m, int l, Passage& p) {
 }
 
 // I = c_s (1 - P exp(-tau)) + sum_k prod_(j<k) (1 - a_j) a_k exp(-tau x_k) (c_k - c_s).
-// Returns the light that is left.
+// Returns the remaining transmittance.
 template <int Compositing>
 KERNEL_INLINE Pixel close_passage(const Passage& p, int l, float* block) {
   const Channels to = channels_of(block);
@@ -292,7 +204,7 @@ KERNEL_INLINE Pixel close_passage(const Passage& p, int l, float* block) {
 
 constexpr int block_vectors = block_pixels / pixel_lanes;
 
-// Whether so little light is left in every pixel that what lies behind may be left out.
+// Whether the transmittance of every pixel is so low that everything behind can be skipped.
 inline bool is_dark(const float* transmittance, const Passage* p, float stop) {
   Light light;
   for (int v = 0; v < block_vectors; ++v) {
@@ -311,7 +223,7 @@ KERNEL_INLINE void pass_lines(const Meeting* m, int count, Passage* p) {
   }
 }
 
-// What a block of the slab is closed with.
+// Input for compositing a block of the slab.
 struct Closing {
   const Slab& slab;
   const RibbonRecord* lines;
@@ -322,8 +234,7 @@ struct Closing {
   const float* transmittance;  // before the slab
 };
 
-// Sorts a few lines by depth: each goes where as many others are as come before it. Equals keep
-// their order.
+// Stable rank sort of a few lines by depth: the number of predecessors is the index.
 inline void sort_met(const MetLine* met, int count, MetLine* sorted) {
   alignas(64) float depth[met_lines_sorted_max];
   int filled = 0;
@@ -343,8 +254,8 @@ inline void sort_met(const MetLine* met, int count, MetLine* sorted) {
   }
 }
 
-// Whether all lines from `from` on lie behind a depth: then, if it is dark there, they do not
-// count.
+// Whether all lines from `from` on lie behind a depth, so that they can be skipped if the
+// transmittance there is low enough.
 inline bool rest_is_behind(const Closing& with, int from, float depth) {
   for (int h = from; h < with.count; ++h) {
     if (with.met[h].first < depth) return false;
@@ -356,15 +267,15 @@ KERNEL_INLINE float largest_of(Pixel v) { return hn::GetLane(hn::MaxOfLanes(Pixe
 
 enum class Outcome { done, dark, out_of_order };
 
-// Composites the lines as they come. They come by their depth in the middle of the block; where
-// that is not the order in some pixel the passage is worth nothing.
+// Composites the lines in order of their depth at the centre of the block. If that is not the order
+// in some pixel, returns out_of_order and the passage is invalid.
 template <bool Perspective, int Compositing>
 KERNEL_INLINE Outcome pass_in_order(const Closing& with, Passage* passage) {
-  constexpr int between_looks = 16;
+  constexpr int between_checks = 16;
   Pixel farthest[block_vectors];
   for (Pixel& depth : farthest) depth = all<Pixel>(with.slab.front);
-  for (int from = 0; from < with.count; from += between_looks) {
-    const int to = from + between_looks < with.count ? from + between_looks : with.count;
+  for (int from = 0; from < with.count; from += between_checks) {
+    const int to = from + between_checks < with.count ? from + between_checks : with.count;
     for (int v = 0, l = 0; v < block_vectors; ++v, l += pixel_lanes) {
       const Pixel px = all<Pixel>(with.x) + load<Pixel>(lane_x + l);
       const Pixel py = all<Pixel>(with.y) + load<Pixel>(lane_y + l);
@@ -404,7 +315,7 @@ inline float farthest_place(const Meeting& m) {
   return largest_of(most);
 }
 
-// The same, the lines put in order in every pixel first.
+// The same after sorting the lines in every pixel.
 template <bool Perspective, int Compositing>
 Outcome pass_sorted(const Closing& with, Passage* passage) {
   Meeting meetings[meetings_max];
@@ -413,7 +324,7 @@ Outcome pass_sorted(const Closing& with, Passage* passage) {
     const RibbonRecord& line = with.lines[with.met[h].line];
     if (!meet_line<Perspective>(line, with.slab, with.x, with.y, meetings[held])) continue;
     if (++held < meetings_max) continue;
-    // The nearer half passes, the farther one may still be met by lines to come.
+    // Composite the nearer half; later lines may still precede lines of the farther half.
     sort_meetings(meetings, held);
     held = meetings_max / 2;
     pass_lines<Compositing>(meetings, held, passage);
@@ -443,7 +354,7 @@ void close_block(const Closing& with, const float* gathered, int row, int column
     open();
     outcome = pass_sorted<Perspective, Compositing>(with, passage);
   }
-  if (outcome == Outcome::dark) tile.any_closed = 1;  // what is behind was left out
+  if (outcome == Outcome::dark) tile.any_closed = 1;  // lines behind were skipped
   float* block = block_at(tile, row, column);
   Light light;
   for (int v = 0; v < block_vectors; ++v) {

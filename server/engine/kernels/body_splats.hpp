@@ -10,71 +10,71 @@ namespace {
 // distance, from M = v v^T - t^2 A A^T; unbounded when the splat reaches the eye's plane. The
 // discriminant M13^2 - M11 M33 is written out so that v's own squares never cancel.
 struct Extent {
-  Stop low, high;
+  Kernel low, high;
 };
 
-KERNEL_INLINE Extent silhouette(Stop v, Stop z, Stop s11, Stop s13, Stop s33) {
-  const Stop z2 = z * z;
-  const Stop m33 = z2 - s33;
-  const Stop inner =
-      (z2 * s11 - all<Stop>(2.0F) * v * z * s13 + v * v * s33) - (s11 * s33 - s13 * s13);
-  const Stop root = hn::Sqrt(hn::Max(inner, hn::Zero(StopTag())));
-  const Stop middle = v * z - s13;
-  const auto bounded = hn::Gt(m33, all<Stop>(1e-6F) * z2);
-  const Stop inverse = inverse_of(hn::IfThenElse(bounded, m33, all<Stop>(1.0F)));
-  return {hn::IfThenElse(bounded, (middle - root) * inverse, all<Stop>(-1e30F)),
-          hn::IfThenElse(bounded, (middle + root) * inverse, all<Stop>(1e30F))};
+KERNEL_INLINE Extent silhouette(Kernel v, Kernel z, Kernel s11, Kernel s13, Kernel s33) {
+  const Kernel z2 = z * z;
+  const Kernel m33 = z2 - s33;
+  const Kernel inner =
+      (z2 * s11 - all<Kernel>(2.0F) * v * z * s13 + v * v * s33) - (s11 * s33 - s13 * s13);
+  const Kernel root = hn::Sqrt(hn::Max(inner, hn::Zero(KernelTag())));
+  const Kernel middle = v * z - s13;
+  const auto bounded = hn::Gt(m33, all<Kernel>(1e-6F) * z2);
+  const Kernel inverse = inverse_of(hn::IfThenElse(bounded, m33, all<Kernel>(1.0F)));
+  return {hn::IfThenElse(bounded, (middle - root) * inverse, all<Kernel>(-1e30F)),
+          hn::IfThenElse(bounded, (middle + root) * inverse, all<Kernel>(1e30F))};
 }
 
-// What of the cell a view direction meets: its squares along the camera's axes times t^2, and the
-// screen's axes in cells a pixel.
+// The cell in camera space: squares and products of its extents along the camera axes times t^2,
+// and the axes of the screen in cells per pixel.
 struct Facing {
-  Stop s11, s22, s33, s13, s23;
-  Three<Stop> right, down;  // cells per pixel
+  Kernel s11, s22, s33, s13, s23;
+  Three<Kernel> right, down;  // cells per pixel
 };
 
 template <bool Curved>
 KERNEL_INLINE Facing face(const Camera& camera, const CellLanes<Curved>& cells) {
-  const Stop zero = hn::Zero(StopTag());
+  const Kernel zero = hn::Zero(KernelTag());
   Facing f = {zero, zero, zero, zero, zero, {}, {}};
   for (int a = 0; a < 3; ++a) {
-    const Stop t = all<Stop>(footprint_t);
-    const Stop r = t * cells.edge_along(a, camera.right);
-    const Stop d = t * cells.edge_along(a, camera.down);
-    const Stop w = t * cells.edge_along(a, camera.forward);
+    const Kernel t = all<Kernel>(footprint_t);
+    const Kernel r = t * cells.edge_along(a, camera.right);
+    const Kernel d = t * cells.edge_along(a, camera.down);
+    const Kernel w = t * cells.edge_along(a, camera.forward);
     f.s11 = hn::MulAdd(r, r, f.s11);
     f.s22 = hn::MulAdd(d, d, f.s22);
     f.s33 = hn::MulAdd(w, w, f.s33);
     f.s13 = hn::MulAdd(r, w, f.s13);
     f.s23 = hn::MulAdd(d, w, f.s23);
   }
-  const Stop pixel = all<Stop>(camera.pixel);
-  const Three<Stop> right = cells.to_grid(camera.right);
-  const Three<Stop> down = cells.to_grid(camera.down);
+  const Kernel pixel = all<Kernel>(camera.pixel);
+  const Three<Kernel> right = cells.to_grid(camera.right);
+  const Three<Kernel> down = cells.to_grid(camera.down);
   f.right = {right.x * pixel, right.y * pixel, right.z * pixel};
   f.down = {down.x * pixel, down.y * pixel, down.z * pixel};
   return f;
 }
 
-// An ellipse about a splat's projected centre, pixels: what lies at height y below its middle is
-// within sqrt(half_chord2 - narrowing y^2) of lean y; its rightmost point lies half_width right and
-// shear half_width below the middle. Not known: where the picture shows no ellipse, or not from
-// near its middle.
+// An ellipse about the projected centre of a splat, in pixels: at distance y below its centre it
+// spans lean y +- sqrt(half_chord2 - narrowing y^2); its rightmost point lies half_width right of
+// and shear half_width below the centre. Not known where the outline is no ellipse, or too large.
 struct Oval {
-  MaskOf<Stop> known;
-  Stop x, y;
-  Stop half_chord2, narrowing, lean, half_width, shear;
+  MaskOf<Kernel> known;
+  Kernel x, y;
+  Kernel half_chord2, narrowing, lean, half_width, shear;
 };
 
-// xx dx^2 + xy dx dy + yy dy^2, and det = xx yy - xy^2 / 4, told apart so that it never cancels.
+// xx dx^2 + xy dx dy + yy dy^2, and det = xx yy - xy^2 / 4, computed separately to avoid
+// cancellation.
 struct Form {
-  Stop xx, xy, yy, det;
+  Kernel xx, xy, yy, det;
 };
 
 // |dx a + dy b|^2 scale.
-KERNEL_INLINE Form form_of(const Three<Stop>& a, const Three<Stop>& b, Stop scale) {
-  const Three<Stop> normal = cross3(a, b);
-  return {dot3(a, a) * scale, all<Stop>(2.0F) * dot3(a, b) * scale, dot3(b, b) * scale,
+KERNEL_INLINE Form form_of(const Three<Kernel>& a, const Three<Kernel>& b, Kernel scale) {
+  const Three<Kernel> normal = cross3(a, b);
+  return {dot3(a, a) * scale, all<Kernel>(2.0F) * dot3(a, b) * scale, dot3(b, b) * scale,
           dot3(normal, normal) * scale * scale};
 }
 
@@ -84,15 +84,15 @@ KERNEL_INLINE void store_form(const Form& form, int l, Splats& s) {
   store(form.yy, s.yy + l);
 }
 
-// t^2, and room for rounding.
+// t^2 with a margin for rounding.
 constexpr float oval_limit = 1.002F * footprint_t * footprint_t;
 
-// Where the form is at most `limit`.
-KERNEL_INLINE Oval oval_of(const Form& form, Stop limit) {
+// The ellipse on which the form equals `limit`.
+KERNEL_INLINE Oval oval_of(const Form& form, Kernel limit) {
   Oval o;
-  const Stop least = all<Stop>(1e-36F);
-  const Stop inverse = inverse_of(hn::Max(form.xx, least));
-  const Stop half = all<Stop>(-0.5F) * form.xy;
+  const Kernel least = all<Kernel>(1e-36F);
+  const Kernel inverse = inverse_of(hn::Max(form.xx, least));
+  const Kernel half = all<Kernel>(-0.5F) * form.xy;
   o.half_chord2 = limit * inverse;
   o.narrowing = form.det * inverse * inverse;
   o.lean = half * inverse;
@@ -102,19 +102,19 @@ KERNEL_INLINE Oval oval_of(const Form& form, Stop limit) {
   return o;
 }
 
-// Where on the picture the silhouette lies, pixels: its box, and an ellipse that it lies in.
+// Bounding box and bounding ellipse of the silhouette, in pixels.
 struct Outline {
   Extent x, y;
   Oval oval;
 };
 
-// |d|^2 about a point of the picture, see Splats.
+// |d|^2 as a function of the offset from a point of the picture; see Splats.
 struct RaySquares {
-  Stop d0, dx, dy, dxx, dxy, dyy, least;
+  Kernel d0, dx, dy, dxx, dxy, dyy, least;
 
-  // At most so far from the point.
-  KERNEL_INLINE Stop most(Stop w, Stop h) const {
-    const Stop bent = hn::MulAdd(dxx, w * w, hn::MulAdd(hn::Abs(dxy), w * h, dyy * h * h));
+  // Upper bound within w and h pixels of the point.
+  KERNEL_INLINE Kernel most(Kernel w, Kernel h) const {
+    const Kernel bent = hn::MulAdd(dxx, w * w, hn::MulAdd(hn::Abs(dxy), w * h, dyy * h * h));
     return hn::Max(d0 + hn::MulAdd(hn::Abs(dx), w, hn::MulAdd(hn::Abs(dy), h, bent)), least);
   }
 };
@@ -129,60 +129,61 @@ KERNEL_INLINE void store_squares(const RaySquares& r, int l, Splats& s) {
   store(r.least, s.d2_least + l);
 }
 
-// The outline of splats whose projected centres are (px, py). The ellipse is where the form is at
+// The outline of splats whose projected centres are (px, py). Within the ellipse the form is at
 // most t^2 times the largest |d|^2 of the box.
-KERNEL_INLINE Outline perspective_outline(const Camera& camera, const Stops& stops, int l,
-                                          const Facing& f, const Form& form, const RaySquares& rays,
-                                          Stop px, Stop py, MaskOf<Stop> inside) {
-  const Stop z = load<Stop>(stops.z + l);
-  const auto span = [&](const float* at, Stop s11, Stop s13, float half) {
-    const Extent e = silhouette(load<Stop>(at + l), z, s11, s13, f.s33);
-    const Stop scale = all<Stop>(camera.inverse_pixel);
-    return Extent{hn::MulAdd(e.low, scale, all<Stop>(half)),
-                  hn::MulAdd(e.high, scale, all<Stop>(half))};
+KERNEL_INLINE Outline perspective_outline(const Camera& camera, const KernelPositions& positions,
+                                          int l, const Facing& f, const Form& form,
+                                          const RaySquares& rays, Kernel px, Kernel py,
+                                          MaskOf<Kernel> inside) {
+  const Kernel z = load<Kernel>(positions.z + l);
+  const auto span = [&](const float* at, Kernel s11, Kernel s13, float half) {
+    const Extent e = silhouette(load<Kernel>(at + l), z, s11, s13, f.s33);
+    const Kernel scale = all<Kernel>(camera.inverse_pixel);
+    return Extent{hn::MulAdd(e.low, scale, all<Kernel>(half)),
+                  hn::MulAdd(e.high, scale, all<Kernel>(half))};
   };
-  const Extent across = span(stops.x, f.s11, f.s13, camera.half_width_px);
-  const Extent along = span(stops.y, f.s22, f.s23, camera.half_height_px);
-  const Stop w = hn::Max(px - across.low, across.high - px);
-  const Stop h = hn::Max(py - along.low, along.high - py);
-  Oval oval = oval_of(form, all<Stop>(oval_limit) * rays.most(w, h));
+  const Extent across = span(positions.x, f.s11, f.s13, camera.half_width_px);
+  const Extent along = span(positions.y, f.s22, f.s23, camera.half_height_px);
+  const Kernel w = hn::Max(px - across.low, across.high - px);
+  const Kernel h = hn::Max(py - along.low, along.high - py);
+  Oval oval = oval_of(form, all<Kernel>(oval_limit) * rays.most(w, h));
   oval.x = px;
   oval.y = py;
-  const auto bounded = hn::Lt(hn::Max(w, h), all<Stop>(1e4F));
+  const auto bounded = hn::Lt(hn::Max(w, h), all<Kernel>(1e4F));
   oval.known = hn::And(oval.known, hn::And(inside, bounded));
   return {across, along, oval};
 }
 
 template <bool Curved>
-KERNEL_INLINE Outline perspective_splats(const Camera& camera, const Stops& stops,
-                                         const CellLanes<Curved>& cells, int l, Stop rho,
+KERNEL_INLINE Outline perspective_splats(const Camera& camera, const KernelPositions& positions,
+                                         const CellLanes<Curved>& cells, int l, Kernel rho,
                                          Splats& s) {
   const Facing f = face<Curved>(camera, cells);
-  const Stop z = load<Stop>(stops.z + l);
-  const Stop two = all<Stop>(2.0F);
-  const Three<Stop> o = cells.to_grid(cells.from_eye);
-  const Form form = form_of(cross3(o, f.right), cross3(o, f.down), all<Stop>(1.0F));
+  const Kernel z = load<Kernel>(positions.z + l);
+  const Kernel two = all<Kernel>(2.0F);
+  const Three<Kernel> o = cells.to_grid(cells.from_eye);
+  const Form form = form_of(cross3(o, f.right), cross3(o, f.down), all<Kernel>(1.0F));
   store_form(form, l, s);
-  const Stop half_width = all<Stop>(camera.half_width_px);
-  const Stop half_height = all<Stop>(camera.half_height_px);
-  const Stop inverse_z = inverse_of(z);
-  const Stop scale = all<Stop>(camera.inverse_pixel) * inverse_z;
-  const Stop px = hn::MulAdd(load<Stop>(stops.x + l), scale, half_width);
-  const Stop py = hn::MulAdd(load<Stop>(stops.y + l), scale, half_height);
-  // The nearest point of the picture; its ray, forward component 1, in cells.
-  const Stop ex = clamped(px, hn::Zero(StopTag()), two * half_width);
-  const Stop ey = clamped(py, hn::Zero(StopTag()), two * half_height);
+  const Kernel half_width = all<Kernel>(camera.half_width_px);
+  const Kernel half_height = all<Kernel>(camera.half_height_px);
+  const Kernel inverse_z = inverse_of(z);
+  const Kernel scale = all<Kernel>(camera.inverse_pixel) * inverse_z;
+  const Kernel px = hn::MulAdd(load<Kernel>(positions.x + l), scale, half_width);
+  const Kernel py = hn::MulAdd(load<Kernel>(positions.y + l), scale, half_height);
+  // The nearest point of the picture, and its ray in cells with forward component 1.
+  const Kernel ex = clamped(px, hn::Zero(KernelTag()), two * half_width);
+  const Kernel ey = clamped(py, hn::Zero(KernelTag()), two * half_height);
   const auto inside = hn::And(hn::Eq(ex, px), hn::Eq(ey, py));
-  const Three<Stop> forward = cells.to_grid(camera.forward);
-  const Stop from_middle_x = ex - half_width;
-  const Stop from_middle_y = ey - half_height;
-  const auto ray = [&](Stop own, Stop ahead, Stop right, Stop down) {
-    const Stop there = ahead + from_middle_x * right + from_middle_y * down;
+  const Three<Kernel> forward = cells.to_grid(camera.forward);
+  const Kernel from_middle_x = ex - half_width;
+  const Kernel from_middle_y = ey - half_height;
+  const auto ray = [&](Kernel own, Kernel ahead, Kernel right, Kernel down) {
+    const Kernel there = ahead + from_middle_x * right + from_middle_y * down;
     return hn::IfThenElse(inside, own * inverse_z, there);
   };
-  const Three<Stop> d = {ray(o.x, forward.x, f.right.x, f.down.x),
-                         ray(o.y, forward.y, f.right.y, f.down.y),
-                         ray(o.z, forward.z, f.right.z, f.down.z)};
+  const Three<Kernel> d = {ray(o.x, forward.x, f.right.x, f.down.x),
+                           ray(o.y, forward.y, f.right.y, f.down.y),
+                           ray(o.z, forward.z, f.right.z, f.down.z)};
   const RaySquares rays = {dot3(d, d),
                            two * dot3(d, f.right),
                            two * dot3(d, f.down),
@@ -195,48 +196,50 @@ KERNEL_INLINE Outline perspective_splats(const Camera& camera, const Stops& stop
   store(py, s.y + l);
   store(ex, s.ex + l);
   store(ey, s.ey + l);
-  store(hn::IfThenElse(inside, hn::Zero(StopTag()), dot3(o, d) - z * rays.d0), s.b0 + l);
+  store(hn::IfThenElse(inside, hn::Zero(KernelTag()), dot3(o, d) - z * rays.d0), s.b0 + l);
   store(dot3(o, f.right) - z * rays.dx, s.bx + l);
   store(dot3(o, f.down) - z * rays.dy, s.by + l);
   store(hn::Sqrt(f.s33), s.half_depth + l);
-  store(rho * all<Stop>(1.0F / footprint_integral), s.strength + l);
-  return perspective_outline(camera, stops, l, f, form, rays, px, py, inside);
+  store(rho * all<Kernel>(1.0F / footprint_integral), s.strength + l);
+  return perspective_outline(camera, positions, l, f, form, rays, px, py, inside);
 }
 
 template <bool Curved>
-KERNEL_INLINE Outline orthographic_splats(const Camera& camera, const Stops& stops,
-                                          const CellLanes<Curved>& cells, int l, Stop rho,
+KERNEL_INLINE Outline orthographic_splats(const Camera& camera, const KernelPositions& positions,
+                                          const CellLanes<Curved>& cells, int l, Kernel rho,
                                           Splats& s) {
   const Facing f = face<Curved>(camera, cells);
-  const Three<Stop> forward = cells.to_grid(camera.forward);
-  const Stop length2 = dot3(forward, forward);
-  const Stop inverse2 = inverse_of(length2);
+  const Three<Kernel> forward = cells.to_grid(camera.forward);
+  const Kernel length2 = dot3(forward, forward);
+  const Kernel inverse2 = inverse_of(length2);
   const Form form = form_of(cross3(f.right, forward), cross3(f.down, forward), inverse2);
   store_form(form, l, s);
   store(length2, s.d0 + l);
   store(hn::Neg(dot3(f.right, forward)) * inverse2, s.bx + l);
   store(hn::Neg(dot3(f.down, forward)) * inverse2, s.by + l);
   store(hn::Sqrt(f.s33), s.half_depth + l);
-  store(rho * all<Stop>(1.0F / footprint_integral) / hn::Sqrt(length2), s.strength + l);
-  const Stop scale = all<Stop>(camera.inverse_pixel);
-  const Stop x = hn::MulAdd(load<Stop>(stops.x + l), scale, all<Stop>(camera.half_width_px));
-  const Stop y = hn::MulAdd(load<Stop>(stops.y + l), scale, all<Stop>(camera.half_height_px));
+  store(rho * all<Kernel>(1.0F / footprint_integral) / hn::Sqrt(length2), s.strength + l);
+  const Kernel scale = all<Kernel>(camera.inverse_pixel);
+  const Kernel x =
+      hn::MulAdd(load<Kernel>(positions.x + l), scale, all<Kernel>(camera.half_width_px));
+  const Kernel y =
+      hn::MulAdd(load<Kernel>(positions.y + l), scale, all<Kernel>(camera.half_height_px));
   store(x, s.x + l);
   store(y, s.y + l);
-  const Stop wide = hn::Sqrt(f.s11) * scale;
-  const Stop tall = hn::Sqrt(f.s22) * scale;
-  Oval oval = oval_of(form, all<Stop>(oval_limit));
+  const Kernel wide = hn::Sqrt(f.s11) * scale;
+  const Kernel tall = hn::Sqrt(f.s22) * scale;
+  Oval oval = oval_of(form, all<Kernel>(oval_limit));
   oval.x = x;
   oval.y = y;
   return {{x - wide, x + wide}, {y - tall, y + tall}, oval};
 }
 
-// A row's splats from lane i on, made ready.
+// Prepares the splats of a vector of kernel positions.
 template <bool Perspective, bool Curved>
-KERNEL_INLINE Outline prepare_splats(const Camera& camera, const Stops& stops,
-                                     const CellLanes<Curved>& cells, int l, Stop rho, Splats& s) {
-  if (Perspective) return perspective_splats<Curved>(camera, stops, cells, l, rho, s);
-  return orthographic_splats<Curved>(camera, stops, cells, l, rho, s);
+KERNEL_INLINE Outline prepare_splats(const Camera& camera, const KernelPositions& positions,
+                                     const CellLanes<Curved>& cells, int l, Kernel rho, Splats& s) {
+  if (Perspective) return perspective_splats<Curved>(camera, positions, cells, l, rho, s);
+  return orthographic_splats<Curved>(camera, positions, cells, l, rho, s);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Which instruction set's kernels this process uses.
+// Selection of the kernels by CPU features and environment.
 #include "server/engine/kernels/dispatch.hpp"
 
 #include <cstdlib>

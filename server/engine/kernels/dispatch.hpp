@@ -1,4 +1,4 @@
-// Which instruction set's kernels this process uses.
+// Selection of the kernels by instruction set.
 #pragma once
 
 #include <vector>
@@ -8,11 +8,12 @@
 
 namespace windsplat::engine::kernels {
 
-// The tables that this processor can run, portable first, widest last.
+// The tables that this processor supports, from portable to the widest.
 std::vector<const Table*> usable_tables();
 
-// The widest usable one, or what the environment's WINDSPLAT_TARGET (portable or avx2) names;
-// decided once. Errors: invalid, if that is no target or not one of this processor.
+// The widest usable table, or the one named by the environment variable WINDSPLAT_TARGET (portable,
+// sse4, avx2 or avx512). Selected once per process. Errors: invalid, if the named target is unknown
+// or not supported by this processor.
 Result<const Table*> chosen_table();
 
 }  // namespace windsplat::engine::kernels

@@ -1,5 +1,5 @@
-// What the kernels read and write: plain arrays and numbers, no functions, so that nothing shared
-// is ever compiled for one instruction set and linked into another.
+// Input and output of the kernels: plain arrays and numbers without functions, so that no shared
+// function is compiled for one instruction set and linked into code for another.
 #pragma once
 
 #include <cstdint>
@@ -7,33 +7,33 @@
 namespace windsplat::engine::kernels {
 
 constexpr int block_side = 4;                          // pixels
-constexpr int block_pixels = block_side * block_side;  // lanes of one update
+constexpr int block_pixels = block_side * block_side;  // updated together
 constexpr int tile_side = 128;                         // pixels, at most
 constexpr int tile_blocks = tile_side / block_side;    // blocks along a tile's side
 constexpr int block_channels = 4;                      // transmittance, red, green, blue
 constexpr int block_floats = block_channels * block_pixels;
-constexpr int window_side = 8;             // blocks that are handled by one word's bits
+constexpr int window_side = 8;             // blocks; 8 x 8 blocks are the bits of one word
 constexpr double footprint_radius = 1.37;  // of a splat, cells
-constexpr int brick_side = 8;              // stops
-constexpr int brick_stops = brick_side * brick_side;
+constexpr int brick_side = 8;              // kernel positions
+constexpr int brick_kernels = brick_side * brick_side;
 
-// One axis of a pass: its kernel stops, in world order.
+// One axis of a pass: arrays with an entry per kernel position, in world order.
 struct Axis {
-  int stops;
-  const double* camera;   // 3 a stop: what this axis adds to (right, down, forward) from the eye
-  const float* from_eye;  // a stop: world coordinate minus the eye's
-  const float* position;  // a stop: world coordinate
-  const float* cell;      // a stop: stride times spacing, world units
+  int count;              // number of kernel positions
+  const double* camera;   // 3 each: contribution of this axis to (right, down, forward) of the eye
+  const float* from_eye;  // world coordinate minus that of the eye
+  const float* position;  // world coordinate
+  const float* cell;      // stride times spacing, world units
   const float* inverse_cell;
-  const int* sample;  // a stop: index of its sample in the field
-  const int* group;   // a stop: samples that it stands for
-  const int* visit;   // stops in visibility order: bricks outward from the eye's cell
+  const int* sample;  // index of its sample in the field
+  const int* group;   // number of samples that it represents
+  const int* visit;   // positions in visibility order: bricks outward from the cell of the eye
 };
 
 constexpr int color_floats = 4;
 
 struct ColorTable {
-  const float* rgb;  // color_floats an entry, the fourth 0; the last entry stands there twice
+  const float* rgb;  // color_floats per entry, the fourth 0; the last entry is repeated
   int entries;
   float low;
   float scale;  // entries - 1 over the range
@@ -42,7 +42,7 @@ struct ColorTable {
 struct LineStyle {
   const float* velocity[3];  // third null for a horizontal field
   float scale[3];
-  const float* rate_x;  // by sample index along y; null: components are drawn as they stand
+  const float* rate_x;  // by sample index along y; null: components are not scaled
   float rate_y;
   const float* rate_z;  // by sample index along z
   float length;         // world units at full magnitude
@@ -58,7 +58,7 @@ struct LineStyle {
   float cue_near, cue_scale, cue_strength;
   int color_by;  // scene::LineColor
   ColorTable color;
-  const float* color_values;  // of the field that the colour tells; null: another measure does
+  const float* color_values;  // of the field that determines the colour, or null
   float rise_weight;
   float box_low_z, inverse_box_height;
   float jitter_center, jitter_stride;
@@ -103,38 +103,38 @@ struct Camera {
   double depth_origin;  // view depth of the volume's middle, from which slabs count
 };
 
-// Kernel stops of one stride, with what is drawn at them.
+// Kernel positions of one stride, with their lines and media.
 struct Pass {
   Axis axis[3];
-  int major, u, v;       // slabs are stacked along major; u is innermost
+  int major, u, v;       // sheets are stacked along major; u is innermost
   std::int64_t step[3];  // of a sample index along each axis, in samples
   int has_lines;
   int has_medium;
   LineStyle line;
   Medium medium;
-  float cell_max[3];            // the widest cell along each axis; curved: the farthest any reaches
+  float cell_max[3];            // widest cell along each axis; curved: largest extent of a cell
   int dims[3];                  // of the fields
-  const float* places;          // 3 a sample, world units, where the lattice is curved; else null
+  const float* places;          // curved lattices: 3 per sample, world units; otherwise null
   int compositing;              // scene::Compositing
-  int by_depth;                 // stops' depths are wanted
-  const std::int32_t* partial;  // see partial.hpp; the slab method only
+  int by_depth;                 // depths of kernel positions are required
+  const std::int32_t* partial;  // see partial.hpp; slab method only
 };
 
-// F(b^2, v): the part of a splat's footprint that lies before v half chords beyond its middle, on a
-// ray that passes at b strides. Rows: b^2 from 0 to t^2; columns: v from -1 to 1.
+// F(b^2, v): fraction of a splat's footprint before the point v half chords beyond the middle of a
+// ray that passes the centre at b strides. Rows: b^2 from 0 to t^2; columns: v from -1 to 1.
 constexpr int partial_rows = 33;
 constexpr int partial_columns = 65;
-constexpr float partial_one = 65535;  // the table's 1
+constexpr float partial_one = 65535;  // table value of 1
 
-// A brick of 8 x 8 x 1 stops, as ranges of the visit lists.
+// A brick of 8 x 8 x 1 kernel positions, as ranges of the visit lists.
 struct Brick {
-  std::int32_t slab;  // position along the major axis' visit list
+  std::int32_t sheet;  // index in the major axis' visit list
   std::int32_t u_first, u_count;
   std::int32_t v_first, v_count;
   std::int32_t pass;
-  std::int32_t lines, splats;     // stops that have one; of neither kind more than the pass has
+  std::int32_t lines, splats;     // numbers of them
   float line_reach;               // half the longest line here, world units
-  float depth_first, depth_last;  // of its kernels from the camera's depth origin, world units
+  float depth_first, depth_last;  // including kernels; from the camera's depth origin, world units
   std::int16_t block_x, block_y;  // blocks of the picture that it may touch, both ends included
   std::int16_t block_x_last, block_y_last;
 };
@@ -143,13 +143,13 @@ struct BrickSummary {
   std::int64_t without_line;
   std::int64_t without_splat;
   std::int64_t without_both;
-  // Left out by tolerance alone: lines, the parts of full length that they would have together, and
-  // the optical depths of the splats summed over pixels, at most.
+  // Skipped by tolerance: the number of lines, the sum of their lengths relative to full length,
+  // and an upper bound of the optical depths of the splats summed over pixels.
   int weak_lines;
   float weak_parts;
   float thin_medium;
   float magnitude_max;  // of the lines that are drawn
-  int lines;            // stops that have one
+  int lines;            // number of lines and splats that are drawn
   int splats;
 };
 
@@ -159,15 +159,15 @@ struct Counters {
   std::int64_t occluded;
 };
 
-// One tile's pixels as blocks of 4 x 4: see block_channels. Rays, for perspective media: the length
-// of each pixel's ray at unit view depth.
+// Pixels of one tile as blocks of 4 x 4; see block_channels. Rays, for perspective media: the
+// length of the ray of each pixel at unit view depth.
 struct Tile {
   int x, y;           // of its first pixel
   int width, height;  // pixels inside the picture
   float* blocks;
   const float* rays;
-  float stop;                       // a block whose pixels let no more than this through is closed
-  std::uint32_t open[tile_blocks];  // bit set: the block still lets light through
+  float stop;                       // a block is closed when no transmittance exceeds this
+  std::uint32_t open[tile_blocks];  // bit set: the block is open
   int any_closed;
   Counters counters;
 };

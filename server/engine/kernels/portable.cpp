@@ -1,4 +1,4 @@
-// The kernels compiled for any processor, lane by lane: what the others are held against.
+// The kernels for any processor, without SIMD; tests compare the other targets with it.
 #define HWY_COMPILE_ONLY_SCALAR
 #define WINDSPLAT_KERNEL_TABLE portable_table
 #define WINDSPLAT_KERNEL_NAME "portable"

@@ -1,5 +1,5 @@
-// A brick made ready for one tile: its stops with what is drawn at them, as arrays of one entry a
-// stop. Plain data, written and read by the kernels, kept by whoever sweeps a tile by depth.
+// A brick prepared for one tile: its kernel positions with their lines and splats, as arrays with
+// one entry per position. Plain data, written and read by the kernels; a sweep by depth keeps it.
 #pragma once
 
 #include <cstdint>
@@ -8,42 +8,43 @@
 
 namespace windsplat::engine::kernels {
 
-// Stop l = brick_side j + i of a brick is the i-th along u and the j-th along v in world order.
-struct Stops {
-  int count;            // that have a line or a splat here
-  std::uint64_t lines;  // bit l set: which
+// Kernel position l = brick_side j + i of a brick is the i-th along u and the j-th along v in world
+// order.
+struct KernelPositions {
+  int count;            // positions with a line or a splat in the tile
+  std::uint64_t lines;  // bit l set: position l has a line
   std::uint64_t splats;
-  alignas(64) float x[brick_stops];  // right, down and forward of the eye, world units
-  alignas(64) float y[brick_stops];
-  alignas(64) float z[brick_stops];
-  alignas(64) float depth[brick_stops];  // forward of the camera's depth origin
+  alignas(64) float x[brick_kernels];  // right, down and forward of the eye, world units
+  alignas(64) float y[brick_kernels];
+  alignas(64) float z[brick_kernels];
+  alignas(64) float depth[brick_kernels];  // forward of the camera's depth origin
 };
 
-// A ribbon's place along it is f in [0, 1] from its tail end to its head end, as clipped; colour,
+// The position along a clipped ribbon is f in [0, 1] from its tail end to its head end; colour,
 // depth and phase are linear in f.
 struct Ribbons {
-  alignas(64) float x[brick_stops];  // f = 0, pixels
-  alignas(64) float y[brick_stops];
-  alignas(64) float ux[brick_stops];  // from f = 0 to 1, pixels
-  alignas(64) float uy[brick_stops];
-  alignas(64) float wx[brick_stops];  // u / |u|^2
-  alignas(64) float wy[brick_stops];
-  // Where along itself a line is met at its start: 0; a dot everywhere: 1/2.
-  alignas(64) float w0[brick_stops];
-  alignas(64) float depth_ratio[brick_stops];  // view distance at f = 0 over that at f = 1
-  alignas(64) float bend[brick_stops];         // that minus 1
-  alignas(64) float depth[brick_stops];        // view distance at f = 0 minus the kernel's centre's
-  alignas(64) float depth_rise[brick_stops];
-  // q + 3/2 - phase at f = 0, in [0, 2]; only where lines move.
-  alignas(64) float phase[brick_stops];
-  alignas(64) float phase_rise[brick_stops];
-  alignas(64) float tail[brick_stops][color_floats];  // colour at f = 0
-  alignas(64) float rise[brick_stops][color_floats];  // colour at f = 1 minus that
+  alignas(64) float x[brick_kernels];  // f = 0, pixels
+  alignas(64) float y[brick_kernels];
+  alignas(64) float ux[brick_kernels];  // from f = 0 to 1, pixels
+  alignas(64) float uy[brick_kernels];
+  alignas(64) float wx[brick_kernels];  // u / |u|^2
+  alignas(64) float wy[brick_kernels];
+  // Position along the line that is nearest to its start: 0; for a line that projects to a dot 1/2.
+  alignas(64) float w0[brick_kernels];
+  alignas(64) float depth_ratio[brick_kernels];  // view depth at f = 0 over that at f = 1
+  alignas(64) float bend[brick_kernels];         // depth_ratio - 1
+  alignas(64) float depth[brick_kernels];        // view depth at f = 0 minus that of the centre
+  alignas(64) float depth_rise[brick_kernels];
+  // q + 3/2 - phase at f = 0, in [0, 2]; only with phase motion.
+  alignas(64) float phase[brick_kernels];
+  alignas(64) float phase_rise[brick_kernels];
+  alignas(64) float tail[brick_kernels][color_floats];  // colour at f = 0
+  alignas(64) float rise[brick_kernels][color_floats];  // colour at f = 1 minus tail
 };
 
 struct Densities {
-  alignas(64) float rho[brick_stops];  // per world length
-  float color[brick_stops][color_floats];
+  alignas(64) float rho[brick_kernels];  // per world length
+  float color[brick_kernels][color_floats];
 };
 
 // With p = (px, py) the pixel minus the projected centre and e = (ex, ey) the pixel minus a point
@@ -54,69 +55,70 @@ struct Densities {
 //                 beyond the centre's
 //   orthographic  the same with the constant |d|^2 = d0 divided out of xx, xy, yy, and the closest
 //                 point bx ex + by ey beyond the centre.
-// The second point is the centre itself wherever that is in the picture. Centres far outside it (of
-// kernels that the eye stands in) would cost every digit.
+// The second point is the projected centre itself if that lies in the picture. Offsets from centres
+// far outside it (kernels that contain the eye) would lose all precision.
 struct Splats {
-  alignas(64) float x[brick_stops], y[brick_stops];    // projected centre, pixels
-  alignas(64) float ex[brick_stops], ey[brick_stops];  // the point of the picture near it, pixels
-  alignas(64) float xx[brick_stops], xy[brick_stops], yy[brick_stops];
-  alignas(64) float b0[brick_stops], bx[brick_stops], by[brick_stops];
-  alignas(64) float d0[brick_stops], dx[brick_stops], dy[brick_stops];
-  alignas(64) float dxx[brick_stops], dxy[brick_stops], dyy[brick_stops];
-  alignas(64) float d2_least[brick_stops];  // |d|^2 is never less
+  alignas(64) float x[brick_kernels], y[brick_kernels];  // projected centre, pixels
+  alignas(64) float ex[brick_kernels],
+      ey[brick_kernels];  // the point of the picture near it, pixels
+  alignas(64) float xx[brick_kernels], xy[brick_kernels], yy[brick_kernels];
+  alignas(64) float b0[brick_kernels], bx[brick_kernels], by[brick_kernels];
+  alignas(64) float d0[brick_kernels], dx[brick_kernels], dy[brick_kernels];
+  alignas(64) float dxx[brick_kernels], dxy[brick_kernels], dyy[brick_kernels];
+  alignas(64) float d2_least[brick_kernels];  // |d|^2 is never less
   // Optical depth at the centre; perspective: times |d|.
-  alignas(64) float strength[brick_stops];
-  alignas(64) float half_depth[brick_stops];  // of the silhouette along the view, world units
+  alignas(64) float strength[brick_kernels];
+  alignas(64) float half_depth[brick_kernels];  // of the silhouette along the view, world units
 };
 
-// Rows and columns of the tile's blocks that each stop's line and splat may touch, both ends
-// included; none if last < first.
+// Rows and columns of blocks of the tile that each line and splat may touch, both ends included;
+// none if last < first.
 struct Footing {
-  alignas(64) std::int32_t line_first[brick_stops];
-  alignas(64) std::int32_t line_last[brick_stops];
-  // Bit set: the column of the line's k-th row.
-  alignas(64) std::uint32_t line_columns[tile_blocks][brick_stops];
-  // The same of lines that stay within window_side rows and columns: rows are bytes, the first four
-  // in `low`, columns count from line_column.
-  std::uint64_t windowed;  // bit l set: stop l's line does
-  alignas(64) std::int32_t line_column[brick_stops];
-  alignas(64) std::int32_t line_column_last[brick_stops];
-  alignas(64) std::uint32_t window_low[brick_stops];
-  alignas(64) std::uint32_t window_high[brick_stops];
-  // A splat's box of blocks, and the blocks of it that its outline meets as a window, as lines have
-  // them: of a box that is no larger than one.
-  alignas(64) std::int32_t row_first[brick_stops];
-  alignas(64) std::int32_t row_last[brick_stops];
-  alignas(64) std::int32_t column_first[brick_stops];
-  alignas(64) std::int32_t column_last[brick_stops];
-  alignas(64) std::uint32_t splat_low[brick_stops];
-  alignas(64) std::uint32_t splat_high[brick_stops];
+  alignas(64) std::int32_t line_first[brick_kernels];
+  alignas(64) std::int32_t line_last[brick_kernels];
+  // Bit set: the line may touch the column in its k-th row.
+  alignas(64) std::uint32_t line_columns[tile_blocks][brick_kernels];
+  // The same for lines within window_side rows and columns: one byte per row, the first four in
+  // `low`, columns relative to line_column.
+  std::uint64_t windowed;  // bit l set: line l is within a window
+  alignas(64) std::int32_t line_column[brick_kernels];
+  alignas(64) std::int32_t line_column_last[brick_kernels];
+  alignas(64) std::uint32_t window_low[brick_kernels];
+  alignas(64) std::uint32_t window_high[brick_kernels];
+  // The box of blocks of a splat and, if it fits a window, the blocks that its outline touches, in
+  // the same format as for lines.
+  alignas(64) std::int32_t row_first[brick_kernels];
+  alignas(64) std::int32_t row_last[brick_kernels];
+  alignas(64) std::int32_t column_first[brick_kernels];
+  alignas(64) std::int32_t column_last[brick_kernels];
+  alignas(64) std::uint32_t splat_low[brick_kernels];
+  alignas(64) std::uint32_t splat_high[brick_kernels];
 };
 
 struct Prepared {
   const Pass* pass;
   float near;  // the camera's near plane, a view depth
-  Stops stops;
+  KernelPositions positions;
   Ribbons ribbons;
   Densities densities;
   Splats splats;
   Footing footing;
 };
 
-// Slabs that a splat gives its parts to in one go.
+// Number of slabs into which a splat is accumulated at a time.
 constexpr int slabs_ahead = 8;
 
-// One slab of view depth and what its medium has gathered in a tile: optical depth, then colour
-// weighted by it, 4 floats a pixel in blocks as the tile's are.
+// One slab of view depth and its medium accumulated so far in a tile: optical depth and colour
+// weighted by it, 4 floats per pixel in the block layout of the tile.
 struct Slab {
   float front, back;  // view depths from the camera's depth origin, world units
   float* gathered;
-  std::uint32_t touched[tile_blocks];  // bit set: the block holds something
+  std::uint32_t touched[tile_blocks];  // bit set: the block contains medium
 };
 
 constexpr int gathered_floats = 4 * block_pixels;
 
-// One line's constants, see Ribbons.
+// Constants of one line; see Ribbons.
 struct Ribbon {
   float x, y, ux, uy, wx, wy, w0, depth_ratio, bend;
   float tail[3], rise[3];
@@ -125,7 +127,7 @@ struct Ribbon {
   float reach, steep, opacity;
 };
 
-// One splat's constants, see Splats.
+// Constants of one splat; see Splats.
 struct Splat {
   float x, y, ex, ey, xx, xy, yy;
   float b0, bx, by, d0, dx, dy, dxx, dxy, dyy, d2_least;
@@ -133,12 +135,11 @@ struct Splat {
   float color[3];
 };
 
-// A splat and a line by themselves, for a sweep that meets them when it comes to their depths,
-// which are from the camera's depth origin; rows and columns are the tile's blocks, both ends
-// included.
+// A splat and a line as separate records for the sweep by depth. Depths are from the camera's depth
+// origin; rows and columns are blocks of the tile, both ends included.
 struct SplatRecord {
   const std::int32_t* partial;
-  float first, last;  // where it begins and ends
+  float first, last;  // depths at which it begins and ends
   float middle;
   Splat splat;
   std::int16_t row_first, row_last, column_first, column_last;
@@ -147,21 +148,21 @@ struct SplatRecord {
 struct RibbonRecord {
   Ribbon ribbon;  // its depth from the camera's depth origin
   int moving;
-  int bent;  // perspective bends it along the view by more than a series can tell
+  int bent;  // too much perspective for the series approximation of depth
 };
 
-// One line's meeting with one block: between which depths its pixels may meet it.
+// A line that may touch a block, with the range of depths of its pixels there.
 struct Hit {
-  std::uint32_t line;  // its record
+  std::uint32_t line;  // index of its record
   std::int32_t block;
   float first, last;
 };
-constexpr int hits_of_brick_max = brick_stops * tile_blocks * tile_blocks;
+constexpr int hits_of_brick_max = brick_kernels * tile_blocks * tile_blocks;
 
-// A line that a block may meet in the slab at hand.
+// A line that a block may meet in the current slab.
 struct MetLine {
-  float depth;  // where, about
-  float first;  // nowhere before
+  float depth;  // approximate
+  float first;  // lower bound
   std::uint32_t line;
 };
 constexpr int met_lines_sorted_max = 64;

@@ -1,5 +1,5 @@
-// Part of the kernel body: Highway's vectors, as wide as the target has them. One lane is either a
-// stop of a brick or a pixel of a block.
+// Part of the kernel body: Highway vectors in the width of the target. A lane is either a kernel
+// position of a brick or a pixel of a block.
 #pragma once
 
 #include <hwy/highway.h>
@@ -8,8 +8,8 @@
 
 #include "server/engine/kernels/frame_data.hpp"
 
-// What hot loops are made of: never called, but built into their loops. Sanitizers' builds leave
-// that to the compiler, which would take minutes over what it becomes with all their checks.
+// Functions of hot loops, always inlined. Sanitizer builds leave inlining to the compiler: with
+// their checks, forced inlining makes compilation take minutes.
 #if defined(WINDSPLAT_SANITIZED)
 #define KERNEL_INLINE inline
 #else
@@ -21,16 +21,16 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Two rows of a brick, one after the other: what is prepared together.
-constexpr int pair_stops = 2 * brick_side;
+// Two consecutive rows of a brick, which are prepared together.
+constexpr int pair_kernels = 2 * brick_side;
 
-using StopTag = hn::CappedTag<float, pair_stops>;
+using KernelTag = hn::CappedTag<float, pair_kernels>;
 using PixelTag = hn::CappedTag<float, block_pixels>;
-using Stop = hn::Vec<StopTag>;    // lanes of stops
-using Pixel = hn::Vec<PixelTag>;  // lanes of pixels
-constexpr int stop_lanes = static_cast<int>(hn::MaxLanes(StopTag()));
+using Kernel = hn::Vec<KernelTag>;  // a lane per kernel position
+using Pixel = hn::Vec<PixelTag>;    // a lane per pixel
+constexpr int kernel_lanes = static_cast<int>(hn::MaxLanes(KernelTag()));
 constexpr int pixel_lanes = static_cast<int>(hn::MaxLanes(PixelTag()));
-static_assert(pair_stops % stop_lanes == 0 && block_pixels % pixel_lanes == 0);
+static_assert(pair_kernels % kernel_lanes == 0 && block_pixels % pixel_lanes == 0);
 
 template <class V>
 using TagOf = hn::DFromV<V>;
@@ -81,7 +81,7 @@ KERNEL_INLINE V from_integer(SignedOf<V> v) {
   return hn::ConvertTo(TagOf<V>(), v);
 }
 
-// The lanes of a mask as the lowest bits of a number.
+// The lanes of a mask as the lowest bits of an integer.
 template <class V>
 KERNEL_INLINE std::uint32_t bits_of(MaskOf<V> mask) {
   std::uint8_t bytes[8] = {0};
@@ -98,7 +98,7 @@ KERNEL_INLINE MaskOf<V> mask_of(std::uint32_t bits) {
   return hn::LoadMaskBits(TagOf<V>(), bytes);
 }
 
-// Masked samples are NaN, recognised by their bits: the same test as of one lane (body_math.hpp).
+// Masked samples are NaN, tested by their bits as in the scalar version (body_math.hpp).
 template <class V>
 KERNEL_INLINE MaskOf<V> is_masked(V v) {
   const hn::RebindToSigned<TagOf<V>> integers;
@@ -106,7 +106,7 @@ KERNEL_INLINE MaskOf<V> is_masked(V v) {
   return hn::RebindMask(TagOf<V>(), hn::Gt(magnitude, hn::Set(integers, 0x7f800000)));
 }
 
-// A divisor that is never zero, its sign kept.
+// Keeps the sign of a divisor and bounds its magnitude away from zero.
 template <class V>
 KERNEL_INLINE V divisor(V v) {
   const V least = all<V>(1e-30F);
@@ -118,7 +118,8 @@ KERNEL_INLINE V inverse_of(V v) {
   return hn::Div(all<V>(1.0F), v);
 }
 
-// 1 / sqrt(v) of positive, normal numbers, to 3e-7: the processor's guess and one step of Newton's.
+// 1 / sqrt(v) of positive, normal numbers, relative error 3e-7: the approximation of the processor
+// and one Newton step.
 template <class V>
 KERNEL_INLINE V inverse_root(V v) {
 #if HWY_TARGET == HWY_SCALAR

@@ -1,6 +1,6 @@
 // The hot loops of one instruction set as a table of functions. They take plain data and cannot
-// fail. Targets differ by roundings alone: those without fused multiply-add round twice. Plain
-// includes only: see frame_data.hpp.
+// fail. Targets differ only by rounding: those without fused multiply-add round twice. No other
+// includes; see frame_data.hpp.
 #pragma once
 
 #include <cstdint>
@@ -13,59 +13,60 @@ namespace windsplat::engine::kernels {
 struct Table {
   const char* name;  // "portable", "sse4", "avx2" or "avx512"
 
-  // What a brick holds once samples below their tolerances are left out.
-  // scale: pixels a world unit where the brick is nearest.
+  // Summarises the contents of a brick without samples below the tolerances.
+  // scale: pixels per world unit at the nearest depth of the brick.
   void (*summarise)(const Pass& pass, const Brick& brick, float scale, BrickSummary& summary);
 
-  // Composites a brick's kernels into the tile's blocks that are still open, front to back.
+  // Composites the kernels of a brick into the open blocks of the tile, front to back.
   void (*draw)(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile);
 
-  // The first half of draw: what of the brick may touch the tile's open blocks.
+  // The first half of draw: prepares the kernels that may touch open blocks of the tile.
   void (*prepare)(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile,
                   Prepared& prepared);
 
-  // The second half, for one stop that has a line or a splat.
-  void (*draw_prepared)(const Camera& camera, const Prepared& prepared, int stop, Tile& tile);
+  // The second half, for one kernel position with a line or a splat.
+  void (*draw_prepared)(const Camera& camera, const Prepared& prepared, int position, Tile& tile);
 
-  // The slab method: a brick's splats by themselves, at most brick_stops; how many.
+  // Slab method: copies the splats of a brick to records. Returns their number, at most
+  // brick_kernels.
   int (*pack_splats)(const Camera& camera, const Prepared& prepared, SplatRecord* out);
 
-  // A brick's lines by themselves and their meetings with the tile's open blocks, at most
-  // hits_of_brick_max; how many lines there are. The n-th becomes records[slots[n]] and has the
-  // next counts[n] of the hits; slab_depth, world units, is what roundings are measured against.
+  // Copies the lines of a brick to records and lists their hits with open blocks of the tile, at
+  // most hits_of_brick_max. Returns the number of lines. Line n becomes records[slots[n]] and has
+  // the next counts[n] hits. slab_depth, in world units, scales the margin for rounding.
   int (*pack_lines)(const Camera& camera, const Prepared& prepared, float slab_depth,
                     const std::uint32_t* slots, const Tile& tile, RibbonRecord* records, Hit* hits,
                     int* counts);
 
-  // Adds to each of slabs_ahead slabs the part of the splat that lies in it. The nearest is
-  // slabs[first], those behind it follow, modulo slabs_ahead.
+  // Adds to each of slabs_ahead slabs the part of the splat that lies in it. The nearest slab is
+  // slabs[first]; the others follow, modulo slabs_ahead.
   void (*gather)(const Camera& camera, const SplatRecord& record, Slab* slabs, int first,
                  Tile& tile);
 
-  // Composites one open block of the slab: its gathered medium with `count` lines, in any order if
-  // they are at most met_lines_sorted_max, else by their depths. compositing is scene::Compositing.
+  // Composites one open block of the slab: its accumulated medium with `count` lines, which must be
+  // sorted by depth if there are more than met_lines_sorted_max. compositing: scene::Compositing.
   void (*close_slab)(const Camera& camera, int compositing, const Slab& slab,
                      const RibbonRecord* lines, const MetLine* met, int count, int block,
                      Tile& tile);
 
-  // Tells the processor that this brick's samples are wanted soon.
+  // Prefetches the samples of a brick into the cache.
   void (*prefetch)(const Pass& pass, const Brick& brick);
 
-  // The length of each pixel's ray whose forward component is 1, in blocks as the tile's are.
+  // The length of the ray of each pixel at forward component 1, in the block layout of the tile.
   void (*fill_rays)(const Camera& camera, const Tile& tile, float* rays);
 
-  // A row of the tile's pixels as linear premultiplied RGBA, 4 floats each, up to a multiple of
-  // block_side pixels.
+  // A row of pixels of the tile as linear premultiplied RGBA, 4 floats each, rounded up to a
+  // multiple of block_side pixels.
   void (*copy_row)(const Tile& tile, int y, float* rgba);
 
-  // How many of the tile's blocks are still open.
+  // Number of open blocks of the tile.
   int (*count_open)(const Tile& tile);
 
-  // absorbed = -expm1(-tau) and transmitted = exp(-tau), tau in [0, inf], to about 1e-7.
+  // absorbed = -expm1(-tau) and transmitted = exp(-tau), tau in [0, inf], error about 1e-7.
   void (*attenuate)(int count, const float* tau, float* absorbed, float* transmitted);
 
-  // Six numbers in [0, 1) for the stop at sample (i, j, k): how its kernel is moved along x, y, z,
-  // then how its line's centre is (Jarzynski & Olano 2020: pcg3d).
+  // Six random numbers in [0, 1) for the kernel at sample (i, j, k): the displacement of the kernel
+  // along x, y, z, then that of the centre of its line (pcg3d, Jarzynski & Olano 2020).
   void (*jitter)(std::uint32_t seed, std::uint32_t epoch, int i, int j, int k, float* six);
 };
 

@@ -1,8 +1,8 @@
-# The kernels, one translation unit an instruction set, chosen at run time (kernels/dispatch.cpp).
-# Of Highway's vectors only the headers: the flags choose their target. Fused multiply-adds stand
-# where the source says so: no contraction, no reassociation. Neither errno nor floating-point traps
-# nor the sign of zero are read: minima, maxima, square roots and selections can be vectorised. NaN
-# keep their meaning (no -ffinite-math-only): masked samples are NaN.
+# The kernels, one translation unit per instruction set, selected at run time
+# (kernels/dispatch.cpp). Only the headers of Highway are used; the flags select its target. Fused
+# multiply-add is used only where the source requests it: no contraction, no reassociation. errno,
+# floating-point traps and the sign of zero are not used, so that minima, maxima, square roots and
+# selections vectorise. NaN must be preserved (no -ffinite-math-only): masked samples are NaN.
 set(kernel_dir ${CMAKE_CURRENT_LIST_DIR})
 set(kernel_speed -O3)
 if(WINDSPLAT_SANITIZE)

@@ -1,5 +1,5 @@
-// What each compositing makes of one homogeneous cell with a line in it, in double precision: the
-// formulas whose orders are proven in one dimension, and which the engine's kernels are held to.
+// The compositing formulas for one homogeneous cell with a line in it, in double precision. Tests
+// verify their convergence orders in one dimension and compare the engine with them.
 #pragma once
 
 #include <array>
@@ -10,7 +10,8 @@
 
 namespace windsplat::engine::reference {
 
-// tau: the cell's optical depth; x in [0, 1]: where along it the line lies; colours straight.
+// tau: optical depth of the cell; x in [0, 1]: position of the line in it; colours not
+// premultiplied.
 struct Cell {
   double tau = 0;
   double x = 0.5;
@@ -32,7 +33,7 @@ inline CellLight cell_light(scene::Compositing compositing, const Cell& cell) {
   const double passed = euler ? 1 - cell.tau : std::exp(-cell.tau);
   CellLight light;
   light.alpha = absorbed + cell.opacity * passed;
-  // How much of the line's light leaves the cell's front.
+  // Transmittance in front of the line.
   double before = 1 - cell.x * absorbed;
   if (compositing == Compositing::analytic) {
     before = cell.x > 0 ? std::exp(-cell.tau * cell.x) : 1;
@@ -42,7 +43,7 @@ inline CellLight cell_light(scene::Compositing compositing, const Cell& cell) {
     const double own = cell.opacity * before;
     light.rgb[c] = cell.medium[c] * light.alpha + own * (cell.line[c] - cell.medium[c]);
     if (compositing == Compositing::cd_naive) {
-      // The front's share of the cell's light attenuates the back's share once more.
+      // The front part of the cell attenuates the line and the back part.
       const double glow = absorbed * cell.medium[c];
       const double behind = cell.opacity * cell.line[c] + (1 - cell.opacity) * (1 - cell.x) * glow;
       light.rgb[c] = cell.x * glow + before * behind;

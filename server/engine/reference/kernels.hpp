@@ -1,5 +1,5 @@
-// Scene -> where kernels stop, and the line and the splat of each stop, in double precision. The
-// reference and the naive renderer of the tests both draw these.
+// Scene -> kernel positions with their lines and splats, in double precision; input of the
+// reference and of the naive renderer of the tests.
 #pragma once
 
 #include <algorithm>
@@ -22,12 +22,19 @@ inline Vec cross(const Vec& a, const Vec& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-// The splat's footprint (Max 1991): g and its integral over the plane, radii in cells.
+// a + f b.
+inline Vec plus(const Vec& a, double f, const Vec& b) {
+  return {a[0] + f * b[0], a[1] + f * b[1], a[2] + f * b[2]};
+}
+inline Vec scaled(const Vec& v, double f) { return {f * v[0], f * v[1], f * v[2]}; }
+inline double length(const Vec& v) { return std::hypot(v[0], v[1], v[2]); }
+
+// The footprint g of a splat [Max91]: its radii in cells and its integral over the plane.
 constexpr double footprint_s = 0.48;
 constexpr double footprint_t = 1.37;
 constexpr double footprint_integral = 1.4476982547;
 
-// The camera's axes in the world; pixel: a pixel's size, at unit distance in perspective.
+// Camera axes in world space; pixel: size of a pixel, in perspective at unit depth.
 struct View {
   Vec eye{}, right{}, down{}, forward{};
   double pixel = 1;
@@ -36,9 +43,13 @@ struct View {
   bool perspective = true;
 };
 View make_view(const scene::Camera& camera);
+// Along right, down, forward.
+inline Vec to_camera(const View& view, const Vec& v) {
+  return {dot(view.right, v), dot(view.down, v), dot(view.forward, v)};
+}
 
-// A stop along one axis, for `samples` samples of which it has the middle one's place (the lower of
-// two); cell: their spacings together, world units. A slice has one stop along its axis.
+// A kernel position along one axis: it represents `samples` samples and lies at the middle one (the
+// lower of two). cell: sum of their spacings, world units. A slice has one position along its axis.
 struct AxisStop {
   int sample = 0;
   int samples = 1;
@@ -46,7 +57,7 @@ struct AxisStop {
 };
 std::vector<AxisStop> axis_stops(const scene::Scene& scene, int axis, int stride);
 
-// Layers of one stride share their stops.
+// Layers of one stride share their kernel positions.
 struct LayerGroup {
   int stride = 1;
   const scene::VectorLayer* lines = nullptr;
@@ -55,6 +66,7 @@ struct LayerGroup {
 };
 std::vector<LayerGroup> group_layers(const scene::Scene& scene);  // the one with lines first
 
+// A kernel position.
 struct Stop {
   std::array<int, 3> sample{};
   std::size_t index = 0;         // of its sample in a field
@@ -62,18 +74,18 @@ struct Stop {
   Vec centre{};                  // the same along right, down, forward
   std::array<Vec, 3> edge{};     // of its cell: the columns of A, world units
   std::array<Vec, 3> inverse{};  // the rows of A^-1
-  Vec cell{};                    // of the unbent lattice
-  bool has_cell = true;          // its edges span a volume: not so at a globe's pole
+  Vec cell{};                    // of the uncurved lattice
+  bool has_cell = true;          // false if the cell has no volume (at the pole of a globe)
 
   [[nodiscard]] Vec to_cells(const Vec& v) const {
     return {dot(inverse[0], v), dot(inverse[1], v), dot(inverse[2], v)};
   }
 };
-// A stop without a cell has neither line nor splat.
+// A position without a cell has neither line nor splat.
 Stop make_stop(const scene::Scene& scene, const View& view, const std::array<AxisStop, 3>& stops);
 
-// A line as it is seen: ends in camera axes (right, down, forward) and on the screen in pixels, q
-// at both ends (from -1/2 at the whole line's tail to 1/2 at its head), straight linear colour.
+// A projected line: ends in camera space (right, down, forward) and in pixels, q at both ends (-1/2
+// at the tail of the unclipped line, 1/2 at its head), linear colour, not premultiplied.
 template <class Real>
 struct BasicRibbon {
   std::array<Real, 3> a{}, b{};
@@ -87,7 +99,7 @@ struct BasicRibbon {
 };
 using Ribbon = BasicRibbon<double>;
 
-// What a pixel at (x, y) sees of a ribbon; opacity 0: nothing.
+// A ribbon at pixel (x, y); opacity 0 if it does not cover the pixel.
 template <class Real>
 struct RibbonHit {
   Real opacity = 0;
@@ -127,28 +139,31 @@ RibbonHit<Real> hit_ribbon(const BasicRibbon<Real>& line, Real x, Real y) {
   return hit;
 }
 
-// Empty: masked, below min_magnitude, without a direction, outside its box or before the near
-// plane. On a curved lattice a vector's components are along its cell's edges.
+// Empty if masked, below min_magnitude, without direction, outside the kernel box or before the
+// near plane. On a curved lattice the components of a vector are along the edges of the cell.
 std::optional<Ribbon> make_ribbon(const scene::Scene& scene, const View& view,
                                   const scene::VectorLayer& layer, const Stop& stop);
 
-// rho per world unit and straight linear colour, of all layers together; rho 0: no splat.
+// rho per world unit and linear colour, not premultiplied, of all layers together; rho 0: no splat.
 struct Density {
   double rho = 0;
   Vec color{};
 };
 Density make_density(const std::vector<const scene::ScalarLayer*>& layers, const Stop& stop);
 
-// Where on the screen something may be seen, pixels.
+// The straight linear colour of a value.
+Vec table_color(const scene::ColorTable& table, double value);
+
+// Bounding box on the screen, in pixels.
 struct ScreenBox {
   double x0 = 0, x1 = 0, y0 = 0, y1 = 0;
 };
-// The silhouette of a splat: of the ellipsoid whose radius is 1.37 cells. All of the screen if it
-// reaches the eye's plane.
+// Bounding box of the silhouette of a splat, the ellipsoid of radius 1.37 cells; the whole screen
+// if it reaches the plane of the eye.
 ScreenBox splat_box(const View& view, const Stop& stop);
 ScreenBox ribbon_box(const Ribbon& line);
 
-// A splat along rays.
+// A splat in the form that rays are intersected with.
 struct Splat {
   Vec from_eye{};
   std::array<Vec, 3> inverse{};
@@ -161,12 +176,12 @@ struct Kernels {
   std::vector<ScreenBox> splat_boxes;
   std::vector<Ribbon> ribbons;
 };
-// Cancelled: not all of them.
+// The list is incomplete after cancellation.
 Kernels list_kernels(const scene::Scene& scene, const View& view, const CancelToken& cancel = {});
-// The same, added to what there is; no vector grows that has room.
+// The same, appended to `kernels`; vectors with sufficient capacity do not reallocate.
 void list_kernels(const scene::Scene& scene, const View& view, const CancelToken& cancel,
                   Kernels& kernels);
-// The most kernels that the scene may list, seen from anywhere.
+// Upper bounds of the numbers of kernels of a scene, from any viewpoint.
 struct KernelBounds {
   std::uint64_t splats = 0;
   std::uint64_t ribbons = 0;

@@ -1,4 +1,4 @@
-// K by its formula, and by table.
+// K by its formula, and its tabulation.
 #include "server/engine/reference/profile.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr double s = footprint_s;
 constexpr double t = footprint_t;
-// The ends of a = sqrt(t^2 - r^2) for r from t down to s.
+// Upper end of a = sqrt(t^2 - r^2) for r in [s, t].
 const double outer_end = std::sqrt(t * t - s * s);
 
 double inner_by(double b) {
@@ -25,12 +25,12 @@ double inner_by(double b) {
          std::numbers::pi;
 }
 
-// t ln((t + a) / r) = t atanh(a / t), which keeps its digits towards r = t.
+// t ln((t + a) / r) = t atanh(a / t), which is accurate near r = t.
 double outer_by(double a) {
   return 2 / (std::numbers::pi * t * (t - s)) * (t * std::atanh(a / t) - a);
 }
 
-// Newton's divided differences through Chebyshev nodes of x in [0, 1], then powers of x.
+// Newton interpolation at Chebyshev nodes of x in [0, 1], converted to powers of x.
 template <std::size_t N, class F>
 void fit(const F& f, double from, double width, double (&power)[N]) {
   std::array<double, N> x{};

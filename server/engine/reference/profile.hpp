@@ -1,4 +1,4 @@
-// The splat's kernel in space, K, for many evaluations: a table of polynomials.
+// The 3-D kernel K of a splat as a piecewise polynomial, for fast evaluation.
 #pragma once
 
 #include <algorithm>
@@ -9,14 +9,14 @@
 
 namespace windsplat::engine::reference {
 
-// K is smooth in b = sqrt(s^2 - r^2) inside s and in a = sqrt(t^2 - r^2) outside of it, so each has
-// cells of equal width there, with a polynomial through Chebyshev nodes in each. Absolute error
-// below 1e-12 (proven by a test).
+// K is smooth in b = sqrt(s^2 - r^2) for r < s and in a = sqrt(t^2 - r^2) beyond, so each range is
+// divided into intervals of equal width in that variable, with a polynomial through Chebyshev nodes
+// in each. Absolute error below 1e-12 (verified by a test).
 class Profile {
  public:
   Profile();
 
-  // r2: the square of a distance in cells, not negative.
+  // r2: squared distance in cells, not negative.
   [[nodiscard]] double operator()(double r2) const {
     constexpr double s2 = footprint_s * footprint_s;
     constexpr double t2 = footprint_t * footprint_t;

@@ -1,4 +1,4 @@
-// The rule on one piece: samples -> light and a bound of its error.
+// The quadrature of one piece: samples -> light and its error bound.
 #include "server/engine/reference/ray.hpp"
 
 #include <numbers>
@@ -27,13 +27,13 @@ Legendre legendre(int n, double x) {
   return {here, n * (x * here - before) / (x * x - 1)};
 }
 
-// How w in [0, 1] becomes a place in the piece: x^(3/2) at a graded end becomes smooth in w.
-struct Place {
+// Maps w in [0, 1] to a position in the piece, such that x^(3/2) at a break becomes smooth in w.
+struct Grading {
   double at = 0;
   double slope = 0;
 };
 
-Place graded(double w, unsigned breaks) {
+Grading graded(double w, unsigned breaks) {
   if (breaks == (break_before | break_after)) return {w * w * (3 - 2 * w), 6 * w * (1 - w)};
   if (breaks == break_before) return {w * w, 2 * w};
   if (breaks == break_after) return {w * (2 - w), 2 * (1 - w)};
@@ -58,8 +58,9 @@ Rule make_rule(int nodes, unsigned breaks) {
     rule.weight[j] = gauss[j] * graded(w, breaks).slope;
   }
   for (int k = 0; k < nodes; ++k) {
-    // The interpolant through node k alone is gauss_k sum_n (2 n + 1) P_n(x_k) P_n, and the
-    // integral of (2 n + 1) P_n up to x is P_{n+1} - P_{n-1}.
+    // The interpolant that is 1 at node k and 0 at the others is
+    // gauss_k sum_n (2 n + 1) P_n(x_k) P_n; the integral of (2 n + 1) P_n up to x is
+    // P_{n+1} - P_{n-1}.
     for (int j = 0; j < nodes; ++j) {
       double sum = 0.5 * (1 + x[j]);
       for (int n = 1; n < nodes; ++n) {
@@ -76,9 +77,10 @@ Rule make_rule(int nodes, unsigned breaks) {
   return rule;
 }
 
-// Gauss' rule sees twice the degree that its nodes interpolate, so where coefficients decay
-// geometrically its error is the square of the interpolant's; where they do not, as large as it.
-double unseen(const Rule& rule, const std::array<double, rule_nodes_max>& f) {
+// Error bound of the quadrature of f. Gauss quadrature is exact up to twice the degree of
+// interpolation, so its error is the square of the interpolation error where the coefficients decay
+// geometrically, and otherwise of the same size.
+double quadrature_error(const Rule& rule, const std::array<double, rule_nodes_max>& f) {
   constexpr double safety = 8;
   double last = 0;
   double before = 0;
@@ -104,7 +106,7 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
   std::array<double, rule_nodes_max> seen{};  // transmittance down to each node
   double tau = 0;
   double densest = 0;
-  int thick = 0;  // the node that gives the piece its colour
+  int thick = 0;  // the node whose colour is taken as that of the piece
   for (int j = 0; j < rule.nodes; ++j) {
     tau += rule.weight[j] * samples.extinction[j];
     double front = 0;
@@ -119,18 +121,18 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
   tau *= length;
   piece.transmitted = std::exp(-tau);
   piece.alpha = -std::expm1(-tau);
-  // What the rule does not see of tau changes the absorbed part by e^-tau times as much.
-  const double tau_error = length * unseen(rule, samples.extinction);
-  // Light that is absorbed between the nodes, where the rule does not look.
-  double looked_at = 0;
+  // An error of tau changes the absorbed fraction by e^-tau times as much.
+  const double tau_error = length * quadrature_error(rule, samples.extinction);
+  // Absorption between the nodes that the rule misses.
+  double absorbed_at_nodes = 0;
   for (int j = 0; j < rule.nodes; ++j) {
-    looked_at += length * rule.weight[j] * samples.extinction[j] * seen[j];
+    absorbed_at_nodes += length * rule.weight[j] * samples.extinction[j] * seen[j];
   }
-  const double overlooked = std::abs(looked_at - piece.alpha);
-  const bool resolved = overlooked < 0.1 * piece.alpha;
+  const double missed = std::abs(absorbed_at_nodes - piece.alpha);
+  const bool resolved = missed < 0.1 * piece.alpha;
   const double absorbed_error = std::min(piece.transmitted * tau_error, 1.0);
   double brightest = 0;
-  // The light of one colour is exact; only what departs from it is left to the rule.
+  // Light of uniform colour is integrated exactly; the rule integrates only deviations from it.
   for (int c = 0; c < 3; ++c) {
     const auto& emission = samples.emission[c];
     const double dense = samples.extinction[thick];
@@ -138,21 +140,21 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
     std::array<double, rule_nodes_max> rest{};
     double sum = 0;
     double own_brightest = std::abs(color);
-    double spread = 0;  // no mixture of the colours here is farther from this one
+    double spread = 0;  // largest deviation of the colours of the piece from this one
     for (int j = 0; j < rule.nodes; ++j) {
       const double rho = samples.extinction[j];
-      const double departs = emission[j] - color * rho;
-      rest[j] = departs * seen[j];
+      const double deviation = emission[j] - color * rho;
+      rest[j] = deviation * seen[j];
       sum += rule.weight[j] * rest[j];
       if (rho > 0) {
-        spread = std::max(spread, std::abs(departs) / rho);
+        spread = std::max(spread, std::abs(deviation) / rho);
         own_brightest = std::max(own_brightest, std::abs(emission[j]) / rho);
       }
     }
-    // The transmittances under the integral err with tau, too.
+    // Errors of tau also change the transmittances under the integral.
     const double by_tau = spread * piece.alpha * std::min(tau_error, 1.0);
-    const double by_rule = length * unseen(rule, rest) + by_tau + spread * overlooked;
-    // Where the nodes do see the light, no mixture of theirs is farther from the truth than this.
+    const double by_rule = length * quadrature_error(rule, rest) + by_tau + spread * missed;
+    // Bound by the colours: where the nodes resolve the light, no mixture of them deviates more.
     const double by_color = (resolved ? 2.5 : 1) * spread * piece.alpha;
     piece.rgb[c] = color * piece.alpha + (resolved ? length * sum : 0);
     piece.error =
@@ -160,7 +162,7 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
     brightest = std::max(brightest, own_brightest);
   }
   piece.error = std::max(piece.error, absorbed_error);
-  // Below the rounding of its own light a piece cannot be better: bisecting it would never end.
+  // The error cannot fall below rounding; bisection would not terminate.
   constexpr double rounding = 1e-15;
   if (piece.error <= rounding * piece.alpha * std::max(brightest, 1.0)) piece.error = 0;
   return piece;

@@ -1,8 +1,9 @@
-// The light along one ray: a medium given as a function of depth, and sheets (lines) in it.
+// Integrates the light along one ray: a medium given as a function of depth, with surfaces (lines).
 //
-// A piece of the ray is integrated by Gauss' rule; optical depths at its nodes come from the same
-// nodes (collocation). Towards a break of the medium nodes crowd quadratically, because the splat
-// kernel ends like distance^(3/2). A piece whose error bound is too large is bisected.
+// A piece of the ray is integrated by Gauss quadrature; the optical depths at its nodes are
+// computed from the same nodes (collocation). Nodes are graded quadratically towards breaks of the
+// medium, because the splat kernel vanishes like distance^(3/2). A piece whose error bound is too
+// large is bisected.
 #pragma once
 
 #include <algorithm>
@@ -15,14 +16,14 @@ namespace windsplat::engine::reference {
 
 constexpr int rule_nodes_max = 8;
 
-// Nodes in (0, 1) of a piece, none at its ends; weights sum to 1.
+// Nodes are in (0, 1) of a piece, excluding the ends; weights sum to 1.
 struct Rule {
   int nodes = 0;
   std::array<double, rule_nodes_max> node{};
   std::array<double, rule_nodes_max> weight{};
-  // The share of node k in the integral up to node j.
+  // [j][k]: weight of node k in the integral up to node j.
   std::array<std::array<double, rule_nodes_max>, rule_nodes_max> before{};
-  // The integrand's last two Legendre coefficients: their size bounds what the rule cannot see.
+  // Weights of the last two Legendre coefficients of the integrand, which bound the error.
   std::array<std::array<double, rule_nodes_max>, 2> highest{};
 };
 
@@ -30,29 +31,29 @@ struct Rule {
 constexpr unsigned break_before = 1;
 constexpr unsigned break_after = 2;
 
-// The rule for each combination of ends.
+// The rule for each combination of breaks.
 using Rules = std::array<Rule, 4>;
 
-// 2 to 8 nodes; to bisect by the error bound, at least 4. With n of them and no breaks the global
-// error of a smooth medium is of order 2 n.
+// 2 to 8 nodes; bisection by the error bound requires at least 4. With n nodes and no breaks the
+// global error for a smooth medium is of order 2 n.
 Rules make_rules(int nodes = 8);
 
-// A medium at the nodes of a piece: extinction and emission (extinction times straight colour) per
-// unit of depth.
+// A medium at the nodes of a piece: extinction and emission (extinction times colour) per unit of
+// depth.
 struct Samples {
   std::array<double, rule_nodes_max> extinction{};
   std::array<std::array<double, rule_nodes_max>, 3> emission{};
 };
 
-// What has come together so far, front to back: premultiplied colour.
+// The light accumulated so far, front to back; premultiplied colour.
 struct Light {
   std::array<double, 3> rgb{};
   double alpha = 0;
   double transmittance = 1;
 };
 
-// A sheet across the ray.
-struct Sheet {
+// An infinitely thin, partly opaque surface across the ray: a line.
+struct Surface {
   double depth = 0;
   double opacity = 0;
   std::array<double, 3> color{};
@@ -63,7 +64,7 @@ struct RayCount {
   std::int64_t evaluations = 0;
 };
 
-// One piece of the medium alone, in front of a black background. error: a bound of |dI| + |dA|.
+// One piece of the medium before a black background. error: upper bound of |dI| + |dA|.
 struct PieceLight {
   double alpha = 0;
   double transmitted = 1;
@@ -72,18 +73,18 @@ struct PieceLight {
 };
 PieceLight piece_light(const Rule& rule, double length, const Samples& samples);
 
-// Behind this much of nothing, nothing is seen.
+// Transmittance below which the rest of a ray is ignored.
 constexpr double transmittance_least = 1e-16;
 
-inline void cross_sheet(const Sheet& sheet, Light& light) {
-  const double seen = light.transmittance * sheet.opacity;
-  for (int c = 0; c < 3; ++c) light.rgb[c] += seen * sheet.color[c];
+inline void cross_surface(const Surface& surface, Light& light) {
+  const double seen = light.transmittance * surface.opacity;
+  for (int c = 0; c < 3; ++c) light.rgb[c] += seen * surface.color[c];
   light.alpha += seen;
-  light.transmittance *= 1 - sheet.opacity;
+  light.transmittance *= 1 - surface.opacity;
 }
 
-// From `from` to `to`, to an error of about `tolerance`; infinite: one piece, never bisected.
-// medium(const double* depth, int count, Samples&) fills the first `count` of each.
+// Integrates [from, to] with an error of about `tolerance`; if infinite, as one piece without
+// bisection. medium(const double* depth, int count, Samples&) fills the first `count` samples.
 template <class Medium>
 void integrate_piece(const Rules& rules, const Medium& medium, double from, double to,
                      unsigned breaks, double tolerance, Light& light, RayCount& count) {
@@ -96,7 +97,7 @@ void integrate_piece(const Rules& rules, const Medium& medium, double from, doub
   count.evaluations += rule.nodes;
   const PieceLight piece = piece_light(rule, to - from, samples);
   const double middle = 0.5 * (from + to);
-  // No shorter than depths can be told apart.
+  // Stops at the resolution of depths.
   const bool divisible = middle > from && middle < to;
   if (light.transmittance * piece.error > tolerance && divisible) {
     integrate_piece(rules, medium, from, middle, breaks & break_before, 0.5 * tolerance, light,
@@ -110,34 +111,36 @@ void integrate_piece(const Rules& rules, const Medium& medium, double from, doub
   light.transmittance *= piece.transmitted;
 }
 
-// A whole ray: `breaks` are the depths where the medium begins, ends or is not smooth, `sheets` cut
-// it too; both ascend. medium.begin(from, to) is called before each piece, in ascending order.
+// Integrates a whole ray, divided at `breaks` (depths where the medium begins, ends or is not
+// smooth) and at `surfaces`; both ascend. medium.begin(from, to) is called before each piece, in
+// ascending order.
 template <class Medium>
 Light integrate_ray(const Rules& rules, Medium& medium, const std::vector<double>& breaks,
-                    const std::vector<Sheet>& sheets, double tolerance, RayCount& count) {
+                    const std::vector<Surface>& surfaces, double tolerance, RayCount& count) {
   Light light;
-  const std::size_t cuts = breaks.size() + sheets.size();
+  const std::size_t cuts = breaks.size() + surfaces.size();
   const double share = tolerance / static_cast<double>(std::max<std::size_t>(cuts, 1));
   std::size_t b = 0;
   std::size_t s = 0;
   double from = 0;
-  bool after_sheet = false;
+  bool after_surface = false;
   for (std::size_t done = 0; done < cuts; ++done) {
-    const bool sheet = s < sheets.size() && (b == breaks.size() || sheets[s].depth <= breaks[b]);
-    const double to = sheet ? sheets[s].depth : breaks[b];
-    // Before the first break and after the last one there is no medium.
+    const bool surface =
+        s < surfaces.size() && (b == breaks.size() || surfaces[s].depth <= breaks[b]);
+    const double to = surface ? surfaces[s].depth : breaks[b];
+    // There is no medium before the first break or after the last one.
     if (b > 0 && b < breaks.size() && to > from) {
       medium.begin(from, to);
-      const unsigned ends = (after_sheet ? 0 : break_before) | (sheet ? 0 : break_after);
+      const unsigned ends = (after_surface ? 0 : break_before) | (surface ? 0 : break_after);
       integrate_piece(rules, medium, from, to, ends, share, light, count);
     }
     if (light.transmittance < transmittance_least) break;
-    if (sheet) {
-      cross_sheet(sheets[s++], light);
+    if (surface) {
+      cross_surface(surfaces[s++], light);
     } else {
       ++b;
     }
-    after_sheet = sheet;
+    after_surface = surface;
     from = to;
   }
   return light;

@@ -1,4 +1,4 @@
-// Scene -> kernels -> by pixel: which of them its ray meets -> the light along it.
+// Scene -> kernels -> kernels by pixel -> the integral along each ray.
 #include "server/engine/reference/reference.hpp"
 
 #include <algorithm>
@@ -24,13 +24,13 @@ struct Ray {
   double length = 1;
 };
 
-// A splat's stretch of a ray: r^2 = least2 + (cells (z - middle))^2.
+// The interval of a ray within a splat: r^2 = least2 + (cells (z - middle))^2.
 struct Stretch {
   double entry = 0, exit = 0;
   double middle = 0;
   double cells2 = 0;  // cells per depth, squared
   double least2 = 0;
-  double rho = 0;  // per depth, over the footprint's integral
+  double rho = 0;  // per unit of depth, divided by the integral of the footprint
   Vec color{};
 };
 
@@ -38,7 +38,7 @@ class SplatMedium {
  public:
   explicit SplatMedium(const Profile& profile) : profile_(profile) {}
 
-  // Of `splats` on one ray.
+  // Storage for `splats` splats on one ray.
   static std::uint64_t bytes_for(std::uint64_t splats) {
     return splats * (2 * sizeof(Stretch) + breaks_each * sizeof(double));
   }
@@ -67,7 +67,8 @@ class SplatMedium {
     Stretch stretch;
     stretch.cells2 = dot(d, d);
     stretch.middle = dot(o, d) / stretch.cells2;
-    // The nearest point of the ray, not a difference of squares: far eyes would cancel all.
+    // Computed at the nearest point of the ray; a difference of squares would cancel for distant
+    // eyes.
     const Vec off{o[0] - stretch.middle * d[0], o[1] - stretch.middle * d[1],
                   o[2] - stretch.middle * d[2]};
     stretch.least2 = dot(off, off);
@@ -90,7 +91,7 @@ class SplatMedium {
     }
   }
 
-  // Where a ray is to be cut, ascending.
+  // Depths at which to divide the ray, ascending.
   const std::vector<double>& finish() {
     std::sort(breaks_.begin(), breaks_.end());
     std::sort(stretches_.begin(), stretches_.end(),
@@ -148,13 +149,13 @@ class Painter {
  public:
   Painter(const Frame& frame, const Profile& profile) : frame_(frame), medium_(profile) {}
 
-  // For a pixel that so many may cover; sorting takes as much again for sheets.
+  // Storage for a pixel that so many kernels may cover; sorting surfaces needs a second copy.
   static std::uint64_t bytes_for(std::uint64_t splats, std::uint64_t ribbons) {
-    return SplatMedium::bytes_for(splats) + 2 * ribbons * sizeof(Sheet);
+    return SplatMedium::bytes_for(splats) + 2 * ribbons * sizeof(Surface);
   }
   void make_room(std::size_t splats, std::size_t ribbons) {
     medium_.make_room(splats);
-    sheets_.reserve(ribbons);
+    surfaces_.reserve(ribbons);
   }
 
   Light pixel(int x, int y, RayCount& count) {
@@ -164,8 +165,8 @@ class Painter {
     medium_.start(make_ray(px, py), view.perspective ? view.near : lowest);
     for (const std::uint32_t id : frame_.splats.at(x, y)) medium_.add(frame_.kernels.splats[id]);
     const std::vector<double>& breaks = medium_.finish();
-    gather_sheets(x, y, px, py);
-    return integrate_ray(frame_.rules, medium_, breaks, sheets_, frame_.tolerance, count);
+    gather_surfaces(x, y, px, py);
+    return integrate_ray(frame_.rules, medium_, breaks, surfaces_, frame_.tolerance, count);
   }
 
  private:
@@ -183,23 +184,23 @@ class Painter {
     return ray;
   }
 
-  void gather_sheets(int x, int y, double px, double py) {
-    sheets_.clear();
+  void gather_surfaces(int x, int y, double px, double py) {
+    surfaces_.clear();
     for (const std::uint32_t id : frame_.ribbons.at(x, y)) {
       const auto hit = hit_ribbon(frame_.kernels.ribbons[id], px, py);
-      if (hit.opacity > 0) sheets_.push_back({hit.depth, hit.opacity, hit.color});
+      if (hit.opacity > 0) surfaces_.push_back({hit.depth, hit.opacity, hit.color});
     }
-    // Ids ascend already.
-    std::stable_sort(sheets_.begin(), sheets_.end(),
-                     [](const Sheet& a, const Sheet& b) { return a.depth < b.depth; });
+    // Stable: equal depths stay in order of id.
+    std::stable_sort(surfaces_.begin(), surfaces_.end(),
+                     [](const Surface& a, const Surface& b) { return a.depth < b.depth; });
   }
 
   const Frame& frame_;
   SplatMedium medium_;
-  std::vector<Sheet> sheets_;
+  std::vector<Surface> surfaces_;
 };
 
-Error unwanted() { return make_error(ErrorKind::cancelled, "the reference was cancelled"); }
+Error cancelled_error() { return make_error(ErrorKind::cancelled, "reference cancelled"); }
 
 }  // namespace
 
@@ -218,8 +219,8 @@ struct Painting::State {
     return {};
   }
 
-  // Room for all that there may be, so that nothing grows beyond what was counted. Of what is not
-  // used, nothing becomes resident.
+  // Allocates for the upper bounds, so that no vector grows beyond the reserved bytes. Unused pages
+  // do not become resident.
   Result<void> make_room_for_kernels(const scene::Scene& scene, const Reserve& reserve) {
     const KernelBounds bounds = kernel_bounds(scene);
     const std::uint64_t bytes =
@@ -231,13 +232,13 @@ struct Painting::State {
     return {};
   }
 
-  Result<void> list_by_tiles(unsigned workers, const CancelToken& cancel, const Reserve& reserve) {
+  Result<void> list_by_tile(unsigned workers, const CancelToken& cancel, const Reserve& reserve) {
     const auto splat = [this](std::size_t id) { return kernels.splat_boxes[id]; };
     const auto ribbon = [this](std::size_t id) { return ribbon_box(kernels.ribbons[id]); };
     const std::size_t splats_all = kernels.splats.size();
     const std::size_t ribbons_all = kernels.ribbons.size();
     if (!splats.count(splats_all, splat, cancel) || !ribbons.count(ribbons_all, ribbon, cancel)) {
-      return unwanted();
+      return cancelled_error();
     }
     if (reserve) {
       const std::uint64_t work = workers * Painter::bytes_for(splats.longest(), ribbons.longest());
@@ -245,13 +246,13 @@ struct Painting::State {
       if (!held) return held;
     }
     if (!splats.fill(splats_all, splat, cancel) || !ribbons.fill(ribbons_all, ribbon, cancel)) {
-      return unwanted();
+      return cancelled_error();
     }
     kernels.splat_boxes = std::vector<ScreenBox>();
     return {};
   }
 
-  std::vector<std::shared_ptr<const void>> reserved;  // given back last
+  std::vector<std::shared_ptr<const void>> reserved;  // declared first: released last
   View view;
   Kernels kernels;
   ScreenGrid splats, ribbons;
@@ -267,14 +268,14 @@ Painting::Painting(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Result<std::unique_ptr<Painting>> Painting::begin(const scene::Scene& scene, unsigned workers,
                                                   const CancelToken& cancel, const Options& options,
                                                   const Reserve& reserve) {
-  if (cancel.cancelled()) return unwanted();
+  if (cancel.cancelled()) return cancelled_error();
   auto state = std::make_unique<State>(scene, options);
   if (reserve) {
     if (auto room = state->make_room_for_kernels(scene, reserve); !room) return room.error();
   }
   list_kernels(scene, state->view, cancel, state->kernels);
-  if (cancel.cancelled()) return unwanted();
-  if (auto listed = state->list_by_tiles(workers, cancel, reserve); !listed) return listed.error();
+  if (cancel.cancelled()) return cancelled_error();
+  if (auto listed = state->list_by_tile(workers, cancel, reserve); !listed) return listed.error();
   state->counts.resize(workers);
   state->painters.reserve(workers);
   for (unsigned worker = 0; worker < workers; ++worker) {
@@ -329,7 +330,7 @@ Result<Picture> render(const scene::Scene& scene, ThreadPool& pool, const Cancel
     const bool done = painting.draw(static_cast<int>(row), 0, picture.width, worker, cancel, to);
     if (done && progress) progress(++rows_done);
   });
-  if (cancel.cancelled()) return unwanted();
+  if (cancel.cancelled()) return cancelled_error();
   picture.pieces = painting.pieces();
   picture.evaluations = painting.evaluations();
   return picture;

@@ -1,4 +1,4 @@
-// Counted by differences, which takes no longer for large boxes than for small ones, then listed.
+// Counts by 2-D differences, which costs the same for large boxes as for small ones, then fills.
 #include "server/engine/reference/screen_grid.hpp"
 
 #include <algorithm>
@@ -10,7 +10,7 @@ namespace {
 
 constexpr int tile_side = 8;  // pixels
 
-// Pixels of [0, size) whose middle may lie within [low, high], both ends included.
+// Pixels of [0, size) whose centres may lie within [low, high], both ends included.
 std::pair<int, int> pixels_between(double low, double high, int size) {
   const double first = std::clamp(std::floor(low - 0.5), 0.0, static_cast<double>(size));
   const double last = std::clamp(std::ceil(high - 0.5), -1.0, size - 1.0);
@@ -23,7 +23,7 @@ std::size_t tiles_along(int pixels) {
 
 }  // namespace
 
-// The ends are not included; none: both are 0.
+// Half-open ranges; empty: all 0.
 struct ScreenGrid::Tiles {
   std::size_t x0 = 0, x1 = 0, y0 = 0, y1 = 0;
 };
@@ -40,8 +40,7 @@ ScreenGrid::Tiles ScreenGrid::tiles_of(const ScreenBox& box) const {
 }
 
 bool ScreenGrid::count(std::size_t boxes, const BoxOf& box_of, const CancelToken& cancel) {
-  // By how much a tile's list is longer than those before it; sums are right although what is
-  // below 0 wraps.
+  // 2-D differences of the list lengths. Unsigned wrap-around cancels in the sums.
   const std::size_t stride = columns_ + 1;
   std::vector<std::uint64_t> lengths(stride * (rows_ + 1));
   for (std::size_t id = 0; id < boxes; ++id) {
@@ -74,7 +73,7 @@ bool ScreenGrid::fill(std::size_t boxes, const BoxOf& box_of, const CancelToken&
   ids_ = std::make_unique_for_overwrite<std::uint32_t[]>(total_);
   std::vector<std::uint64_t> next = starts_;
   for (std::size_t id = 0; id < boxes; ++id) {
-    // A box may be the whole screen, so before each.
+    // Checked for each box, because one may cover the whole screen.
     if (cancel.cancelled()) return false;
     const Tiles tiles = tiles_of(box_of(id));
     for (std::size_t y = tiles.y0; y < tiles.y1; ++y) {

@@ -1,5 +1,5 @@
-// Boxes on the screen -> which of them may cover a pixel: lists by tile, in one block whose size is
-// known before there is any of it.
+// Screen-space boxes -> lists by tile of the boxes that may cover a pixel, in one array whose size
+// is computed before allocation.
 #pragma once
 
 #include <cstddef>
@@ -20,25 +20,25 @@ class ScreenGrid {
 
   ScreenGrid(int width, int height);
 
-  // Both false where they were cancelled. First this, with the ids below `boxes`: how long the
-  // lists will be.
+  // Both return false if cancelled. First step: computes the lengths of the lists for the ids below
+  // `boxes`.
   bool count(std::size_t boxes, const BoxOf& box_of, const CancelToken& cancel);
-  // Then this, of the same boxes.
+  // Second step: fills the lists with the same boxes.
   bool fill(std::size_t boxes, const BoxOf& box_of, const CancelToken& cancel);
 
-  // Counted: what the lists take.
+  // Size of the lists; valid after count.
   [[nodiscard]] std::uint64_t bytes() const { return total_ * sizeof(std::uint32_t); }
   [[nodiscard]] std::size_t longest() const { return longest_; }
-  // Filled: the boxes that may cover a pixel, ascending.
+  // Ids of the boxes that may cover a pixel, ascending; valid after fill.
   [[nodiscard]] std::span<const std::uint32_t> at(int x, int y) const;
 
  private:
-  struct Tiles;  // of a box
+  struct Tiles;  // range of tiles of a box
   [[nodiscard]] Tiles tiles_of(const ScreenBox& box) const;
 
   int width_, height_;
   std::size_t columns_, rows_;
-  std::vector<std::uint64_t> starts_;  // of a tile's list in ids_, and the last one's end
+  std::vector<std::uint64_t> starts_;  // of the list of each tile in ids_, then the end
   std::unique_ptr<std::uint32_t[]> ids_;
   std::uint64_t total_ = 0;
   std::size_t longest_ = 0;

@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-#include "server/data/cf/grid.hpp"
+#include "server/data/cf/grid/grid.hpp"
 #include "server/data/loader/channel.hpp"
 #include "server/data/loader/messages.hpp"
 #include "tests/fuzz/support/check.hpp"

@@ -4,13 +4,33 @@
 #include <gtest/gtest.h>
 
 #include <cstddef>
+#include <memory>
+#include <numbers>
 #include <string>
 
 #include "server/data/model/dataset_info.hpp"
 #include "server/data/model/source.hpp"
 #include "server/data/model/volume.hpp"
+#include "server/data/open/open.hpp"
 
 namespace windsplat::data::test {
+
+inline constexpr double degree = std::numbers::pi / 180;  // in radians
+
+inline std::unique_ptr<Source> opened(const std::string& path) {
+  auto source = open_file(path);
+  EXPECT_TRUE(source) << (source ? "" : source.error().message);
+  return source ? std::move(*source) : nullptr;
+}
+
+// Why a file is refused.
+inline std::string refusal(const std::string& path) {
+  const auto source = open_file(path);
+  EXPECT_FALSE(source) << path << " was opened";
+  if (source) return {};
+  EXPECT_EQ(source.error().kind, ErrorKind::bad_data) << source.error().message;
+  return source.error().message;
+}
 
 inline Volume volume_of(Source& source, const std::string& name, std::size_t step = 0) {
   const FieldInfo* field = source.info().find(name);

@@ -21,14 +21,14 @@ namespace {
 
 using bytes::PlacedFile;
 
-// One field at all its steps.
+// One field at all steps.
 struct Sequence {
   std::string name;
   std::string units;
   Grid grid;
   std::vector<double> positions;  // in the series
   std::vector<std::uint64_t> shape;
-  std::string type;  // as the file declares it
+  std::string type;  // as in the file
   std::vector<bytes::Placement> steps;
   bool cells = false;
 };
@@ -210,7 +210,7 @@ class Opener {
     }
     if (first.grid.y_up) {
       file_->add_note(
-          "the innermost index runs along y: y is taken for the vertical, and x, y, z of the file "
+          "the innermost index runs along y: y is interpreted as vertical, and x, y, z of the file "
           "are drawn as y, z, x");
     }
     if (first.grid.oblique) {
@@ -221,7 +221,7 @@ class Opener {
     if (first.cells) file_->add_note("values belong to cells: they are placed at cell centres");
   }
 
-  // The steps of a series one after another.
+  // Concatenates the steps of a series.
   static std::shared_ptr<bytes::ByteStore> joined(const Sequence& sequence, std::uint64_t bytes) {
     if (sequence.steps.size() == 1) return sequence.steps.front().store;
     std::vector<bytes::Piece> pieces;

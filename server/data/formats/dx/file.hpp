@@ -1,5 +1,5 @@
-// OpenDX files in its native format: fields, series of fields, groups of either. Files -> objects
-// -> arrays of cf.
+// OpenDX files in native format: fields, series of fields, groups of either. Files -> objects ->
+// arrays of cf.
 #pragma once
 
 #include <memory>
@@ -11,10 +11,10 @@
 
 namespace windsplat::data::dx {
 
-// Whether a text that begins so has a line with a DX object.
+// Whether the first bytes contain a line with a DX object.
 bool looks_like(std::string_view head);
 
-// A series' members are steps in time, a group's members fields on one grid. Errors: bad_data.
+// Members of a series are time steps, members of a group are fields on one grid. Errors: bad_data.
 Result<std::unique_ptr<cf::ArrayFile>> open(const std::shared_ptr<Files>& files,
                                             std::shared_ptr<const InputFile> input);
 

@@ -1,4 +1,4 @@
-// Each term of the positions is a line along one component; their origins add up.
+// Each term of the positions is a line along one component; their origins are added.
 #include "server/data/formats/dx/grid.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ constexpr std::uint64_t items_max = std::uint64_t{1} << 40;
 // Points along one index, still with the constant part of their other components.
 struct Line {
   std::size_t place = 0;
-  std::vector<double> along;      // the component that grows
+  std::vector<double> along;      // values of the component that varies
   std::array<double, 3> first{};  // the first point
 };
 
@@ -47,8 +47,8 @@ class Builder {
       for (double& value : axis.coordinates) value += others;
       out_.axes.push_back(std::move(axis));
     }
-    // Layers are what a model writes last or first; a file whose innermost index runs along y has
-    // been turned for a viewer that looks along z.
+    // Vertical layers are normally the outermost or innermost index; an innermost index along y
+    // indicates data arranged for a viewer that looks along z.
     out_.y_up = lines_.size() == 3 && lines_.back().place == 1;
     return std::move(out_);
   }
@@ -120,7 +120,7 @@ class Builder {
     return {};
   }
 
-  // A list of points, of which one component alone may change.
+  // A list of points in which only one component varies.
   Result<void> add_listed(const Found& term) {
     const Object& object = *term.object;
     if (term.object == positions_.object) {
@@ -147,7 +147,7 @@ class Builder {
       }
     }
     if (changing != 1) {
-      return fault("a term's points do not lie on a line along an axis");
+      return fault("the points of a term are not on a line along an axis");
     }
     for (std::size_t i = 0; i < object.items; ++i) {
       line.along.push_back((*values)[i * width + line.place]);

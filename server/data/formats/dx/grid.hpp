@@ -1,4 +1,4 @@
-// Positions of a DX field -> where each index runs in the world.
+// Positions of a DX field -> the world axis and coordinates of each index.
 #pragma once
 
 #include <array>
@@ -12,27 +12,27 @@
 namespace windsplat::data::dx {
 
 struct GridAxis {
-  std::size_t place = 0;            // which component of a position grows: 0 x, 1 y, 2 z
+  std::size_t place = 0;            // component of positions that varies: 0 x, 1 y, 2 z
   std::vector<double> coordinates;  // of that component
   bool operator==(const GridAxis&) const = default;
 };
 
 struct Grid {
   std::vector<GridAxis> axes;  // slowest index first, as in the file
-  bool oblique = false;        // drawn along the nearest straight axes
+  bool oblique = false;        // approximated by the nearest coordinate axes
   bool y_up = false;           // the second component of positions is vertical
   bool operator==(const Grid&) const = default;
 };
 
-// The world axis (0 x, 1 y, 2 z) of a component of positions or of vectors. With y up the three
-// turn in a circle (z, x, y), which keeps the picture from being mirrored.
+// The world axis (0 x, 1 y, 2 z) of a component of positions or vectors. With y up the axes are
+// permuted cyclically (z, x, y), which preserves handedness.
 std::size_t world_of(const Grid& grid, std::size_t place);
 
-// Positions as a regular grid or as a product of lines; others are refused. Errors: bad_data.
-// `items`: how many values stand on it, which bounds the counts.
+// Accepts positions as a regular grid or as a product of lines. `items`: number of values, which
+// bounds the counts. Errors: bad_data.
 Result<Grid> grid_of(Library& library, const Found& positions, std::uint64_t items);
 
-// The same grid by the middles of its cells: what depends on connections lies there.
+// The grid of cell centres, for data that depend on connections.
 Grid middles(const Grid& grid);
 
 }  // namespace windsplat::data::dx

@@ -1,4 +1,4 @@
-// References -> objects; arrays -> stores, every size checked against the file.
+// References -> objects; arrays -> byte stores, with sizes checked against the file.
 #include "server/data/formats/dx/library.hpp"
 
 #include <bit>

@@ -1,4 +1,4 @@
-// The files that a DX file refers to, each parsed once, and where the numbers of an array lie.
+// The files referenced by a DX file, each parsed once, and the locations of array data.
 #pragma once
 
 #include <map>
@@ -14,7 +14,7 @@
 
 namespace windsplat::data::dx {
 
-// An object and the file it is of.
+// An object and its file.
 struct Found {
   const Module* module = nullptr;
   const Object* object = nullptr;
@@ -28,11 +28,11 @@ class Library {
   // Errors: bad_data, not_found.
   Result<Found> find(const Found& from, const Reference& reference);
 
-  // The numbers of an array, as many as `items` and `shape` say; strides are left to the caller.
+  // Location of the numbers of an array by its `items` and `shape`; the caller sets the strides.
   Result<bytes::Placement> place(const Found& array);
   // All numbers of a small array.
   Result<std::vector<double>> numbers(const Found& array, std::uint64_t count_max);
-  // Of all files that were opened.
+  // Identity of all opened files.
   [[nodiscard]] std::string identity() const { return identity_; }
 
  private:

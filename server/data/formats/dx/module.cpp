@@ -1,4 +1,4 @@
-// Words of the header, one clause after another; numbers in between are stepped over.
+// Parses the clauses of the header and skips the numbers in between.
 #include "server/data/formats/dx/module.hpp"
 
 #include <algorithm>
@@ -28,12 +28,12 @@ struct Word {
   [[nodiscard]] bool is(std::string_view wanted) const { return !quoted && lower(text) == wanted; }
 };
 
-// The file word by word, a window of it in memory.
+// Words of the file, read through a buffer.
 class Words {
  public:
   explicit Words(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}
 
-  // Empty and unquoted at the end.
+  // Returns an empty, unquoted word at the end.
   Word next() {
     if (held_) {
       Word word = std::move(*held_);
@@ -59,7 +59,7 @@ class Words {
   }
   void put_back(Word word) { held_ = std::move(word); }
 
-  // Behind the line of the last word.
+  // Offset after the line of the last word.
   std::uint64_t next_line() {
     if (held_) at_ = before_;
     held_.reset();
@@ -69,7 +69,7 @@ class Words {
     }
     return at_;
   }
-  // Goes on from here; what lies before does not count as header.
+  // Continues at an offset; the skipped part does not count as header.
   void jump(std::uint64_t to) {
     skipped_ += to - std::min(to, at_);
     at_ = to;
@@ -195,7 +195,7 @@ class Parser {
     if (object.kind == Class::array && array_clause(object, word)) return;
     if (grid && grid_clause(object, word)) return;
     if (word.is("component") || word.is("member") || word.is("term")) return member(object, word);
-    // Of a kind that is not known words mean nothing here.
+    // Ignore the words of unknown kinds.
     if (object.kind != Class::other && !word.is("number") && !word.is("of")) {
       complain(in_quotes(word.text) + " is not understood in an object of class " +
                printable(object.class_name, 40));
@@ -223,7 +223,7 @@ class Parser {
     if (value.is("string") || value.is("number")) {
       value = words_.next();
     } else if (value.is("value")) {
-      value = words_.next();  // an object: nothing that is used here
+      value = words_.next();  // an object, which is not used
       if (value.is("file")) {
         words_.next();
         words_.next();
@@ -304,7 +304,7 @@ class Parser {
     if (without_sign || word.is("signed")) word = words_.next();
     const auto* at = std::find_if(type_names.begin(), type_names.end(),
                                   [&](const TypeName& known) { return word.is(known.name); });
-    // Bytes are without a sign unless they say so.
+    // Bytes are unsigned unless stated otherwise.
     if (at == type_names.end()) {
       object.numbers = false;
     } else if (at->name == "byte" && !signed_) {
@@ -349,7 +349,7 @@ class Parser {
 
   void data_clause(Object& object) {
     const Word where = words_.next();
-    if (where.is("mode")) {  // msb, ieee, ... follow as words of their own
+    if (where.is("mode")) {  // msb, ieee, ... follow as separate words
       return;
     }
     object.has_data = true;
@@ -375,7 +375,7 @@ class Parser {
     const std::uint64_t left = out_.file->size() - from;
     if (!object.numbers) return complain("text in place of numbers is not read");
     if (!size || *size > left) {
-      return complain("is cut short: the array needs more numbers than the file has bytes");
+      return complain("is cut short: the array has more numbers than the file has bytes");
     }
     if (!object.text) return words_.jump(from + *size);
     const auto end = bytes::end_of_text(out_.file, from, *size);
@@ -424,7 +424,7 @@ class Parser {
         bytes::to_double(member.name).value_or(static_cast<double>(object.members.size()));
     position(member);
     member.value = reference();
-    position(member);  // the format's own samples have it here
+    position(member);  // written here by the samples of the format
     object.members.push_back(std::move(member));
   }
 

@@ -1,5 +1,4 @@
-// One OpenDX file (native format): its objects as plain data. Objects of other files are only
-// named here.
+// The objects of one OpenDX file (native format) as plain data, with references to other files.
 #pragma once
 
 #include <cstdint>
@@ -17,12 +16,12 @@ namespace windsplat::data::dx {
 
 // An object by its name or number, in this file or in another one.
 struct Reference {
-  std::string file;  // empty: the same
-  std::string name;  // empty: the file's last object
+  std::string file;  // empty: the same file
+  std::string name;  // empty: the last object of the file
 };
 
 struct Member {
-  std::string name;     // of a component or of a group's member
+  std::string name;     // of a component or of a member of a group
   double position = 0;  // in a series
   Reference value;
 };
@@ -52,9 +51,9 @@ struct Object {
   bool has_data = false;
   bool text = true;
   bool big_endian = false;
-  bool follows = false;  // data lie at `data_at` of this file, else behind its last line
+  bool follows = false;  // true: data at `data_at` of this file; false: after its last line
   std::uint64_t data_at = 0;
-  std::string data_file;  // where data lie that are in no DX file
+  std::string data_file;  // file of external data
   // grids and regular arrays
   std::vector<std::uint64_t> counts;
   std::vector<double> origin;
@@ -66,13 +65,13 @@ struct Object {
 struct Module {
   std::shared_ptr<const InputFile> file;
   std::vector<Object> objects;
-  std::string chosen;            // the object that `default` names; empty: the last one
-  std::uint64_t data_begin = 0;  // behind the line `end`
+  std::string chosen;            // the object named by `default`; empty: the last one
+  std::uint64_t data_begin = 0;  // after the line `end`
 
   [[nodiscard]] const Object* find(const std::string& name) const;  // null if there is none
 };
 
-// Errors: bad_data with the byte.
+// Errors: bad_data with the byte offset.
 Result<Module> parse_module(const std::shared_ptr<const InputFile>& file);
 
 }  // namespace windsplat::data::dx

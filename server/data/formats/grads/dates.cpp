@@ -1,4 +1,4 @@
-// Days are counted with std::chrono, or with years of 365 days.
+// Date arithmetic by std::chrono, or with years of 365 days.
 #include "server/data/formats/grads/dates.hpp"
 
 #include <algorithm>
@@ -50,7 +50,7 @@ std::int64_t minutes_of(const Date& date, bool no_leap) {
   return (day_number(date, no_leap) * 24 + date.hour) * 60 + date.minute;
 }
 
-// Digits from the front, at most `most` of them; -1 if there are none.
+// Takes at most `most` digits from the front; -1 if there are none.
 int take_digits(std::string_view& text, std::size_t most) {
   std::size_t end = 0;
   while (end < text.size() && end < most && text[end] >= '0' && text[end] <= '9') ++end;
@@ -85,7 +85,7 @@ constexpr auto date_parts = std::to_array<Part>({
     {"n2", [](const Date& d) { return digits(d.minute, 2); }},
 });
 
-// One part behind a '%', taken from the front of `rest`.
+// Expands one part after a '%', taken from the front of `rest`.
 std::optional<std::string> expand_part(std::string_view& rest, const Clock& clock, const Date& now,
                                        std::int64_t step) {
   const auto takes = [&](std::string_view mark) {
@@ -176,7 +176,7 @@ std::optional<Date> date_of(const Clock& clock, std::int64_t step) {
     if (year > year_max) return std::nullopt;
     date.year = static_cast<int>(year);
     date.month = static_cast<int>(month % 12) + 1;
-    // The 31st of a month that has fewer days is its last.
+    // The 31st of a shorter month is its last day.
     const bool leap = !clock.no_leap && std::chrono::year(date.year).is_leap();
     const auto at = static_cast<std::size_t>(date.month);
     const int length = days_before.at(at) - days_before.at(at - 1) + (leap && at == 2 ? 1 : 0);

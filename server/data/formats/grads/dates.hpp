@@ -1,5 +1,5 @@
-// GrADS' clock: initial time and increment of tdef -> the date of each step, and file names that
-// are templates of dates.
+// Times of GrADS: initial time and increment of tdef -> date of each step and file names by
+// template.
 #pragma once
 
 #include <cstdint>
@@ -29,15 +29,15 @@ std::optional<Date> parse_date(std::string_view text);
 // "6hr" into the increment and unit of a clock.
 bool parse_increment(std::string_view text, Clock& clock);
 
-// step counts from 0. Nothing beyond the year 9999.
+// step counts from 0. nullopt after the year 9999.
 std::optional<Date> date_of(const Clock& clock, std::int64_t step);
 // Minutes between the first step and a date.
 std::int64_t minutes_since_first(const Clock& clock, const Date& date);
 // "1999-03-05 12:30:00"
 std::string text_of(const Date& date);
 
-// The name of the file that contains a step. nullopt where the template has an unknown part;
-// `problem` then names it.
+// The name of the file that contains a step. nullopt if the template has an unknown part, which is
+// then stored in `problem`.
 std::optional<std::string> expand(std::string_view name, const Clock& clock, std::int64_t step,
                                   std::string& problem);
 

@@ -1,4 +1,4 @@
-// Records by their first word, as GrADS takes them: any case, lists of levels over many lines.
+// Parses records by their first word, with the rules of GrADS: any case, lists over several lines.
 #include "server/data/formats/grads/descriptor.hpp"
 
 #include <algorithm>
@@ -21,7 +21,7 @@ constexpr std::int64_t times_max = 10'000'000;
 constexpr std::size_t variables_max = 8192;
 constexpr std::int64_t header_max = std::int64_t{1} << 40;
 
-// What gaussian axes are called, and how many latitudes they have from pole to pole.
+// Names of Gaussian axes, and their numbers of latitudes from pole to pole.
 struct Gaussian {
   std::string_view name;
   int latitudes;
@@ -33,8 +33,8 @@ constexpr auto gaussians = std::to_array<Gaussian>({{"gaust62", 94},
                                                     {"gausr30", 80},
                                                     {"gausr40", 102}});
 
-// Units at the end of a description: "wind [m/s]", "heat flux (cal/cm**2/s)". In parentheses a
-// number is rather a place: "wind (10 m)".
+// Units at the end of a description: "wind [m/s]", "heat flux (cal/cm**2/s)". A number in
+// parentheses is a height instead: "wind (10 m)".
 std::string units_in(std::string_view description) {
   if (description.empty()) return {};
   const bool brackets = description.back() == ']';
@@ -92,7 +92,7 @@ class Parser {
     }
   }
 
-  // What follows the first `words` words of a line.
+  // The rest of a line after the first `words` words.
   static std::string rest(const Line& line, std::size_t words) {
     if (line.words.size() <= words) return {};
     return std::string(
@@ -225,7 +225,7 @@ class Parser {
     return out;
   }
 
-  // Numbers of this line and those below, as many as are needed.
+  // Reads `count` numbers from this line and the following ones.
   std::vector<double> levels(const Line& line, std::size_t count) {
     std::vector<double> out;
     std::vector<std::string_view> words(line.words.begin() + 3, line.words.end());
@@ -304,7 +304,7 @@ class Parser {
     const std::size_t alias = name.find("=>");
     variable.name = alias == std::string::npos ? name : name.substr(alias + 2);
     if (line.words.size() < 3) {
-      complain(line, "a variable needs a name, its levels and its units");
+      complain(line, "a variable requires a name, levels and units");
       return;
     }
     const std::string_view levels = line.words[1].substr(0, line.words[1].find(','));
@@ -323,8 +323,7 @@ class Parser {
     out_.variables.push_back(std::move(variable));
   }
 
-  // "-1,20", "-1,40,2,-1": where and what the numbers are. Whatever else stands there tells nothing
-  // of raw data.
+  // "-1,20", "-1,40,2,-1": layout and type of the numbers. Other codes do not apply to raw data.
   void set_structure(const Line& line, Variable& variable) {
     std::vector<std::int64_t> numbers;
     std::string_view text = line.words[2];

@@ -14,16 +14,16 @@ namespace windsplat::data::grads {
 
 struct Variable {
   std::string name;
-  std::size_t levels = 0;  // 0: on no level
+  std::size_t levels = 0;  // 0: not on a level
   std::string description;
-  std::string units;  // out of the description or the attributes; may be empty
+  std::string units;  // from the description or attributes; may be empty
   bytes::Scalar type = bytes::Scalar::float32;
   bool times_inside = false;  // -1,20: all times of this variable, then the next variable
   bool transposed = false;    // -1,30: y fastest
 };
 
 struct Descriptor {
-  std::string dset;  // relative to the descriptor's folder
+  std::string dset;  // relative to the folder of the descriptor
   std::string title;
   double undef = 0;
   bool has_undef = false;
@@ -33,12 +33,12 @@ struct Descriptor {
   bool sequential = false;
   bool is_template = false;
   bool pascals = false;
-  std::uint64_t file_header = 0;  // bytes in front of a file, a time, a horizontal grid; behind
+  std::uint64_t file_header = 0;  // bytes before a file, a time and a grid; bytes after
   std::uint64_t time_header = 0;  // a time and a grid
   std::uint64_t time_trailer = 0;
   std::uint64_t grid_header = 0;
   std::uint64_t grid_trailer = 0;
-  bytes::Spaced x;  // as xdef, ydef, zdef have them
+  bytes::Spaced x;  // as in xdef, ydef, zdef
   bytes::Spaced y;
   bytes::Spaced z;
   std::size_t times = 0;

@@ -1,4 +1,4 @@
-// Descriptor -> axes, the order of records within a time, the files of a template.
+// Descriptor -> axes, order of records within a time, files of a template.
 #include "server/data/formats/grads/file.hpp"
 
 #include <algorithm>
@@ -21,7 +21,7 @@ using bytes::ByteStore;
 using bytes::PlacedFile;
 
 constexpr std::size_t pieces_max = 100'000;
-constexpr std::uint64_t marker = 4;  // bytes of Fortran's count in front of a record and behind it
+constexpr std::uint64_t marker = 4;  // bytes of the Fortran record marker before and after a record
 
 class Opener {
  public:
@@ -55,9 +55,9 @@ class Opener {
            ctl_.grid_trailer + (ctl_.sequential ? 2 * marker : 0);
   }
 
-  // Bytes of a time; all products below are smaller than that of a whole file.
+  // Computes the bytes of a time; all products below are smaller than that of a whole file.
   Result<void> measure() {
-    // Among Fortran's records the header of a time is one of its own.
+    // With Fortran records, the header of a time is a separate record.
     if (ctl_.sequential && ctl_.time_header > 0) ctl_.time_header += 2 * marker;
     time_bytes_ = ctl_.time_header + ctl_.time_trailer;
     bool times_inside = false;
@@ -83,13 +83,13 @@ class Opener {
     return {};
   }
 
-  // A file that holds `times` times.
+  // Opens a file with `times` times.
   [[nodiscard]] Result<std::shared_ptr<ByteStore>> part_of(
       const std::shared_ptr<const InputFile>& file, std::size_t times) const {
     const std::uint64_t needed = ctl_.file_header + times * time_bytes_;
     if (file->size() < needed) {
       return file->fault("is cut short: it has " + std::to_string(file->size()) + " bytes, " +
-                         in_quotes(input_->name()) + " says " + std::to_string(needed));
+                         in_quotes(input_->name()) + " requires " + std::to_string(needed));
     }
     if (ctl_.sequential) {
       std::array<unsigned char, marker> raw{};
@@ -101,7 +101,7 @@ class Opener {
       const std::uint64_t grid = record_of(first) - 2 * marker;
       if (found != static_cast<double>(grid)) {
         return file->fault(
-            "is not sequential as its descriptor says: its first record does not "
+            "is not sequential as stated by its descriptor: its first record does not "
             "have " +
             std::to_string(grid) + " bytes in this byte order");
       }
@@ -119,8 +119,8 @@ class Opener {
     return part;
   }
 
-  // Bytes that the descriptor does not describe are a sign of wrong counts, unless they are times
-  // that are not shown. Fortran's records were checked by their markers.
+  // Undescribed bytes indicate wrong counts, unless they are further times. Fortran records have
+  // been checked by their markers.
   Result<void> account_for_rest(const InputFile& file) {
     const std::uint64_t described = ctl_.file_header + ctl_.times * time_bytes_;
     const std::uint64_t rest = file.size() - described;
@@ -141,7 +141,7 @@ class Opener {
     return {};
   }
 
-  // Steps that follow one another with the same name lie in one file.
+  // Consecutive steps with the same name are in one file.
   Result<std::shared_ptr<ByteStore>> open_template() {
     std::vector<std::pair<std::string, std::size_t>> parts;  // name, times
     std::string problem;
@@ -174,11 +174,10 @@ class Opener {
           [](const Variable& variable) { return variable.type != bytes::Scalar::float32; });
       if (whole) {
         return input_->fault(
-            "names files that are not there, and of whole numbers none is free "
-            "to say so");
+            "names missing files, which cannot be masked because its variables are integers");
       }
       file_->add_note(std::to_string(absent) + " of " + std::to_string(pieces.size()) +
-                      " files of the template are not there: their steps are masked");
+                      " files of the template are missing: their steps are masked");
     }
     if (not_described_ > 0) {
       file_->add_note(std::to_string(not_described_) +
@@ -206,7 +205,7 @@ class Opener {
     return piece;
   }
 
-  // GrADS' axes are longitude and latitude; what cannot be is taken for plain distances.
+  // The axes of GrADS are longitude and latitude; impossible values are treated as distances.
   void add_horizontal() {
     std::vector<double> x = ctl_.x.coordinates();
     std::vector<double> y = ctl_.y.coordinates();
@@ -238,9 +237,9 @@ class Opener {
     const bool pressure = falls || ctl_.pascals;
     if (pressure) {
       file_->add_note(ctl_.pascals
-                          ? "levels are pressures in Pa, as the option pascals says"
-                          : "levels fall from 1100 or less: taken for pressures in hPa, as GrADS "
-                            "does");
+                          ? "levels are pressures in Pa by the option pascals"
+                          : "levels descend from 1100 or less: interpreted as pressures in hPa, as "
+                            "in GrADS");
     }
     if (ctl_.zrev) std::reverse(z.begin(), z.end());
     z_ = file_->add_dimension("lev", ctl_.z.count);
@@ -261,7 +260,7 @@ class Opener {
   }
 
   void add_variables() {
-    std::uint64_t before = ctl_.time_header;  // bytes of the variables in front
+    std::uint64_t before = ctl_.time_header;  // bytes of the preceding variables
     for (const Variable& variable : ctl_.variables) {
       const std::uint64_t record = record_of(variable);
       const std::uint64_t all = grids_of(variable) * record;
@@ -299,7 +298,7 @@ class Opener {
       }
       before += variable.times_inside ? all * ctl_.times : all;
       if (ctl_.has_undef) {
-        // As GrADS does: what was rounded on its way is undefined too.
+        // Rounded values of undef are undefined too, as in GrADS.
         const double width = std::abs(ctl_.undef) / 1e5;
         place.masked = {ctl_.undef - width, ctl_.undef + width};
       }
@@ -313,7 +312,7 @@ class Opener {
   std::unique_ptr<PlacedFile> file_;
   std::shared_ptr<ByteStore> store_;
   std::uint64_t time_bytes_ = 0;
-  std::uint64_t not_described_ = 0;  // bytes of a template's files behind their last steps
+  std::uint64_t not_described_ = 0;  // bytes of files of a template after their last steps
   int time_ = 0;
   int z_ = 0;
   int y_ = 0;

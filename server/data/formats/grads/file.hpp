@@ -1,4 +1,4 @@
-// GrADS descriptors (.ctl) of raw gridded data, and the data files that they name.
+// GrADS descriptors (.ctl) of raw gridded data, and their data files.
 #pragma once
 
 #include <memory>
@@ -10,11 +10,11 @@
 
 namespace windsplat::data::grads {
 
-// Whether a text that begins so is a descriptor: records by GrADS' keywords and nothing binary.
+// Whether the first bytes are those of a descriptor: records with GrADS keywords, no binary data.
 bool looks_like(std::string_view head);
 
-// Levels that fall from 1100 or less are pressures in hPa, as GrADS takes them. Files of a template
-// that are not there are masked. Errors: bad_data.
+// Levels that descend from 1100 or less are pressures in hPa, as in GrADS. Steps of missing files
+// of a template are masked. Errors: bad_data.
 Result<std::unique_ptr<cf::ArrayFile>> open(const std::shared_ptr<Files>& files,
                                             std::shared_ptr<const InputFile> descriptor_file);
 

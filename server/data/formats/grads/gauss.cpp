@@ -1,4 +1,4 @@
-// Newton's method on the three-term recurrence.
+// Newton's method with the three-term recurrence of Legendre polynomials.
 #include "server/data/formats/grads/gauss.hpp"
 
 #include <cmath>

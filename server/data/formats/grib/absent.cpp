@@ -1,4 +1,4 @@
-// Built without ecCodes: GRIB is recognised and refused.
+// Without ecCodes: GRIB is detected and rejected.
 #include "server/data/formats/grib/open.hpp"
 
 namespace windsplat::data::grib {

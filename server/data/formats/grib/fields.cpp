@@ -1,4 +1,4 @@
-// Keys of ecCodes -> Header, Grid and values; scanning modes are put right here.
+// Keys of ecCodes -> Header, Grid and values, reordered by scanning mode.
 #include "server/data/formats/grib/fields.hpp"
 
 #include <eccodes.h>
@@ -81,7 +81,7 @@ class Message {
   codes_handle* handle_;
 };
 
-// Longitudes go on beyond 360 rather than back to 0.
+// Longitudes ascend beyond 360 instead of wrapping to 0.
 std::vector<double> longitudes(const Message& message, std::size_t count) {
   const double first = message.number("longitudeOfFirstGridPointInDegrees");
   const double last = message.number("longitudeOfLastGridPointInDegrees");
@@ -106,7 +106,7 @@ std::vector<double> even_latitudes(const Message& message, std::size_t count) {
   return out;
 }
 
-// A run of the Gaussian latitudes, of which the file tells the first and last to a thousandth.
+// A contiguous range of Gaussian latitudes, whose ends are stored to a thousandth of a degree.
 std::vector<double> gaussian_latitudes(const Message& message, std::size_t count) {
   const long number = message.whole("N", 0);
   if (number < 1 || number > 20000 || count > static_cast<std::size_t>(2 * number)) return {};
@@ -147,11 +147,11 @@ void find_coordinates(const Message& message, Grid& grid) {
            std::all_of(list.begin(), list.end(), [](double v) { return std::isfinite(v); });
   };
   if (!finite(grid.longitude) || !finite(grid.latitude)) {
-    grid.problem = "ecCodes finds no coordinates of its grid " + in_quotes(grid.type);
+    grid.problem = "ecCodes provides no coordinates for its grid " + in_quotes(grid.type);
   }
 }
 
-// ecCodes divides by the length of the unit, and knows none of others than these.
+// ecCodes divides by the length of the time unit, which it defines for these units only.
 bool has_known_time_unit(const Message& message) {
   constexpr auto units = std::to_array<long>({-1, 0, 1, 2, 3, 10, 11, 12, 13, 14, 254});
   const long unit = message.whole("indicatorOfUnitOfTimeRange", -1);
@@ -173,8 +173,8 @@ double hours_of_validity(const Message& message) {
   return static_cast<double>(days) * 24 + static_cast<double>(minutes) / 60;
 }
 
-// Flag table 3.3, bit 5 (edition 1: table 7): components along the rows and columns. Of some
-// templates ecCodes has no key of its own for it, but the octet.
+// Flag table 3.3, bit 5 (edition 1: table 7): components along rows and columns. For some templates
+// ecCodes has only the octet instead of a key.
 bool is_along_grid(const Message& message) {
   const long along = message.whole("uvRelativeToGrid", -1);
   if (along >= 0) return along != 0;
@@ -248,10 +248,10 @@ Result<std::vector<float>> read_values(const std::vector<unsigned char>& bytes, 
   constexpr double missing = -1e300;
   if (message.whole("numberOfDataPoints", -1) != static_cast<long>(grid.rows * grid.columns) ||
       codes_set_double(message.handle(), "missingValue", missing) != CODES_SUCCESS) {
-    return broken("does not hold as many points as its grid");
+    return broken("has a number of values different from its grid");
   }
   const std::vector<double> values = message.numbers("values", grid.rows * grid.columns);
-  if (values.empty()) return broken("holds no values that ecCodes can decode");
+  if (values.empty()) return broken("has no values that ecCodes can decode");
   const bool by_columns = message.whole("jPointsAreConsecutive", 0) != 0;
   const bool alternating = message.whole("alternativeRowScanning", 0) != 0;
   const std::size_t run = by_columns ? grid.rows : grid.columns;

@@ -1,5 +1,5 @@
-// Metadata of one GRIB message, and its values in the order of rows and columns.
-// Everything of ecCodes happens here, under one lock.
+// Metadata of one GRIB message, and its values in the order of rows and columns. All calls of
+// ecCodes are made here, under one lock.
 #pragma once
 
 #include <cstddef>
@@ -12,13 +12,13 @@
 namespace windsplat::data::grib {
 
 struct Grid {
-  std::string type;     // ecCodes' gridType
-  std::string problem;  // why it is not read; empty if it is
+  std::string type;     // gridType of ecCodes
+  std::string problem;  // why it cannot be read; empty if it can
   std::size_t columns = 0;
   std::size_t rows = 0;
-  bool projected = false;     // then one longitude and latitude a point, otherwise an axis each
-  bool columns_fall = false;  // of a projected grid: scanned against growing i
-  bool rows_fall = false;     // against growing j
+  bool projected = false;     // true: longitude and latitude per point; false: per axis
+  bool columns_fall = false;  // of a projected grid: scanned toward smaller i
+  bool rows_fall = false;     // toward smaller j
   std::vector<double> longitude;
   std::vector<double> latitude;
 };
@@ -35,10 +35,10 @@ struct Header {
   std::string grid_key;  // equal for fields whose grid definitions have the same bytes
 };
 
-// Errors: bad_data, a clause without a subject.
+// Errors: bad_data; the message is a predicate without subject.
 Result<Header> read_header(const std::vector<unsigned char>& message);
 Result<Grid> read_grid(const std::vector<unsigned char>& message);
-// rows x columns, the columns fastest, in the order of the grid's coordinates; NaN where missing.
+// rows x columns, columns fastest, in the order of the coordinates of the grid; NaN if missing.
 Result<std::vector<float>> read_values(const std::vector<unsigned char>& message, const Grid& grid);
 
 }  // namespace windsplat::data::grib

@@ -1,4 +1,4 @@
-// Messages -> groups -> variables whose dimensions are shared where their coordinates agree.
+// Messages -> groups -> variables, which share dimensions with equal coordinates.
 #include "server/data/formats/grib/file.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t groups_max = 8192;
 constexpr std::size_t grids_max = 256;
 
-// Edition 1 writes thousandths of a degree where edition 2 writes millionths.
+// Tolerates rounding: edition 1 stores thousandths of a degree, edition 2 millionths.
 bool is_same(const Grid& a, const Grid& b) {
   const auto close = [](const std::vector<double>& left, const std::vector<double>& right) {
     return std::equal(left.begin(), left.end(), right.begin(), right.end(),
@@ -46,8 +46,8 @@ FileVariable level_axis(const std::string& type) {
   return out;
 }
 
-// The library names winds eastward and northward whatever the message's flag says; of those along
-// the grid's rows and columns CF says x and y, and nobody turns them then.
+// The library names winds eastward and northward regardless of the flag of the message. Winds along
+// the rows and columns of the grid are x and y in CF, and must not be rotated.
 bool tell_by_grid(FileVariable& variable) {
   constexpr std::string_view eastward = "eastward_";
   constexpr std::string_view northward = "northward_";
@@ -130,7 +130,7 @@ Result<void> File::scan() {
   return {};
 }
 
-// Where every field is unread, the reason is worth more than that there is none.
+// If no field can be read, returns the reason instead of a missing field.
 Result<void> File::check_any_field() const {
   for (const Content& held : held_) {
     if (!held.numbers.empty()) return {};
@@ -148,7 +148,7 @@ void File::add_variables() {
   for (std::size_t g = 0; g < groups_.size(); ++g) add_field(g);
 }
 
-// A dimension with its coordinates, shared by all that have the same ones.
+// Returns the dimension with these coordinates, adding it if necessary.
 int File::axis(const std::string& name, const std::vector<double>& values,
                const FileVariable& like) {
   std::string free = name;
@@ -173,7 +173,7 @@ int File::axis(const std::string& name, const std::vector<double>& values,
   return static_cast<int>(contents_.dimensions.size()) - 1;
 }
 
-// Latitude and longitude, or rows and columns with both as variables of two dimensions.
+// Latitude and longitude, or rows and columns with 2-D latitudes and longitudes.
 std::vector<int> File::grid_dimensions(std::size_t g) {
   if (const auto known = grid_dims_.find(g); known != grid_dims_.end()) return known->second;
   const Grid& grid = grids_[g];
@@ -251,7 +251,7 @@ void File::add_field(std::size_t g) {
   if (group.repeated > 0) {
     contents_.notes.push_back(in_quotes(variable.name) + ": " + std::to_string(group.repeated) +
                               " more messages of the same times and levels (ensemble members or "
-                              "the like) are left out; the first ones are taken");
+                              "the like) are omitted; the first ones are used");
   }
   if (header.relative_to_grid && grids_[group.grid].projected && tell_by_grid(variable)) {
     contents_.notes.push_back(in_quotes(variable.name) +

@@ -1,4 +1,4 @@
-// The fields of a GRIB file put together to arrays over time, level, row and column.
+// The fields of a GRIB file combined to arrays over time, level, row and column.
 #pragma once
 
 #include <map>
@@ -33,14 +33,14 @@ class File final : public cf::ArrayFile {
   void forget_chunks(int variable) const override;
 
  private:
-  // A quantity on one kind of level and one grid: time and level -> field.
+  // The fields of one quantity, kind of level and grid, by time and level.
   struct Group {
     Header header;  // of its first field
     std::size_t grid = 0;
     std::map<std::pair<double, double>, std::size_t> fields;
     std::size_t repeated = 0;
   };
-  // What the variable of the same index holds: numbers, or a group's fields.
+  // Content of a variable: numbers, or the fields of a group.
   struct Content {
     std::vector<double> numbers;
     int group = -1;
@@ -66,13 +66,13 @@ class File final : public cf::ArrayFile {
   std::vector<FieldPlace> places_;
   std::vector<Grid> grids_;
   std::map<std::string, std::size_t>
-      grid_keys_;  // by their bytes; several keys may describe one grid
+      grid_keys_;  // by the bytes of the grid definition; several keys may describe one grid
   std::vector<Group> groups_;
   std::map<std::size_t, std::vector<int>> grid_dims_;
   std::vector<Content> held_;  // parallel to the variables
   FileContents contents_;
 
-  mutable std::mutex mutex_;  // of the field decoded last
+  mutable std::mutex mutex_;  // guards the last decoded field
   mutable std::size_t last_field_ = 0;
   mutable std::vector<float> last_values_;
 };

@@ -1,4 +1,4 @@
-// Total lengths lead from message to message, section lengths from section to section.
+// Iterates over messages by total length, and over sections by section length.
 #include "server/data/formats/grib/index.hpp"
 
 #include <algorithm>
@@ -24,7 +24,8 @@ std::uint64_t big_endian(const unsigned char* at, std::size_t bytes) {
   return value;
 }
 
-// The next "GRIB" at or after an offset; the file's size where there is none within reach.
+// Offset of the next "GRIB" at or after an offset; the size of the file if there is none within
+// gap_max.
 Result<std::uint64_t> next_message(const InputFile& input, std::uint64_t offset) {
   const std::uint64_t rest = input.size() - offset;
   // Most messages follow each other without a gap.
@@ -38,7 +39,7 @@ Result<std::uint64_t> next_message(const InputFile& input, std::uint64_t offset)
   return input.size();
 }
 
-// The sections of a message of edition 2; a field ends with each section 7.
+// Splits a message of edition 2 into fields; each ends with a section 7.
 Result<void> split(const InputFile& input, const Part& message, std::vector<FieldPlace>& out) {
   std::array<Part, 8> known{};
   std::vector<FieldPlace> found;
@@ -139,7 +140,7 @@ Result<std::vector<unsigned char>> read_message(const InputFile& input, const Fi
     at += part.bytes;
   }
   if (field.split) {
-    // The discipline is that of the message the sections come from, which section 0 begins.
+    // Section 0 has the discipline of the original message.
     std::memcpy(out.data(), "GRIB\xff\xff", 6);
     if (auto done = input.read(field.parts.front().offset - 10, out.data() + 6, 2); !done) {
       return done.error();

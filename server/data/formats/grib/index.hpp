@@ -14,17 +14,17 @@ struct Part {
   std::uint64_t bytes = 0;
 };
 
-// One field: a whole message, or the sections of one that holds several (edition 2).
+// One field: a whole message, or sections of a message with several fields (edition 2).
 struct FieldPlace {
   int edition = 0;
-  std::vector<Part> parts;  // without section 0 and the end marker where it is `split`
+  std::vector<Part> parts;  // if `split`, without section 0 and the end marker
   bool split = false;
 };
 
-// Errors: bad_data for messages cut short, or of a length the file cannot hold.
+// Errors: bad_data for truncated messages, or lengths beyond the end of the file.
 Result<std::vector<FieldPlace>> find_fields(const InputFile& input);
 
-// The field as a message of its own.
+// The field as a separate message.
 Result<std::vector<unsigned char>> read_message(const InputFile& input, const FieldPlace& field);
 
 }  // namespace windsplat::data::grib

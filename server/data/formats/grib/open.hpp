@@ -1,4 +1,4 @@
-// GRIB 1 and 2 by way of ecCodes, where windsplat was built with it. InputFile -> arrays.
+// GRIB 1 and 2 by ecCodes, if windsplat was built with it. InputFile -> arrays.
 #pragma once
 
 #include <memory>
@@ -10,14 +10,13 @@
 
 namespace windsplat::data::grib {
 
-// Whether a file begins with a GRIB message, or with a WMO heading and one.
+// Whether a file begins with a GRIB message, optionally after a WMO heading.
 bool is_grib(const InputFile& input);
 
-// The folder of tables that ecCodes reads at run time, by names of its own; several are separated
-// by ':'. Empty without ecCodes.
+// The folders of tables that ecCodes reads at run time, separated by ':'. Empty without ecCodes.
 std::string definitions_folder();
 
-// Errors: bad_data; also where windsplat was built without ecCodes.
+// Errors: bad_data, also if windsplat was built without ecCodes.
 Result<std::unique_ptr<cf::ArrayFile>> open(std::shared_ptr<const InputFile> input);
 
 }  // namespace windsplat::data::grib

@@ -1,10 +1,12 @@
-// A new dimension is made: the library gives one dimension to all arrays of a length, so that the
-// steps of one may be the rows of another.
+// Adds a new dimension, because the library assigns one dimension to all arrays of equal length, so
+// that the steps of one array may share a dimension with the rows of another.
 #include "server/data/formats/netcdf/bare.hpp"
 
 #include <algorithm>
 #include <map>
 #include <string>
+
+#include "server/base/error.hpp"
 
 namespace windsplat::data::netcdf {
 
@@ -34,7 +36,7 @@ void name_steps_of_bare_arrays(FileContents& contents) {
       time.length = length;
       dimensions.push_back(std::move(time));
       contents.notes.push_back("dimensions have no names: of " + in_quotes(variable.name) +
-                               " and others with four, the first is taken for time");
+                               " and others with four, the first is interpreted as time");
     }
     variable.dims.front() = found->second;
   }

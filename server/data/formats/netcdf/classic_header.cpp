@@ -1,5 +1,5 @@
-// A walk through the classic header: dimensions, attributes, variables; every count is checked
-// against what the file can hold before it is believed.
+// Parses dimensions, attributes and variables of the classic header; every count is checked against
+// the size of the file before use.
 #include "server/data/formats/netcdf/classic_header.hpp"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ constexpr std::uint64_t variable_tag = 0x0B;
 constexpr std::uint64_t attribute_tag = 0x0C;
 constexpr std::uint64_t rank_max = 1024;
 
-// Sums and products that stick at the top instead of wrapping.
+// Saturating sums and products.
 std::uint64_t add(std::uint64_t a, std::uint64_t b) {
   return a > saturated - b ? saturated : a + b;
 }
@@ -27,7 +27,7 @@ std::uint64_t multiply(std::uint64_t a, std::uint64_t b) {
 }
 std::uint64_t padded(std::uint64_t bytes) { return add(bytes, 3) / 4 * 4; }
 
-// Bytes of one value of an external type; 0 if there is no such type.
+// Bytes of one value of an external type; 0 for unknown types.
 std::uint64_t type_bytes(std::uint64_t type, int version) {
   constexpr std::array<std::uint64_t, 12> type_bytes{0, 1, 1, 2, 4, 4, 8, 1, 2, 4, 8, 8};
   const std::uint64_t last = version == 5 ? 11 : 6;
@@ -101,7 +101,7 @@ class Header {
   }
   void skip_name() { skip(padded(count())); }
 
-  // The tag and length of a list whose elements take at least `element_bytes` each.
+  // Reads the tag and length of a list whose elements have at least `element_bytes` each.
   std::uint64_t list(std::uint64_t tag, std::uint64_t element_bytes) {
     const std::uint64_t found = word();
     const std::uint64_t elements = count();
@@ -109,7 +109,7 @@ class Header {
       fail("has a list of an unknown kind");
     }
     if (multiply(elements, element_bytes) > file_bytes_) {
-      fail("announces a longer list than the file can hold");
+      fail("has a list longer than the file");
     }
     return fault_.empty() ? elements : 0;
   }
@@ -174,7 +174,7 @@ class Header {
   }
 
   [[nodiscard]] std::uint64_t end_of_data(std::uint64_t records) const {
-    // Records of all record variables lie interleaved; a lone record variable is not padded.
+    // Records of all record variables are interleaved; a single record variable is not padded.
     std::uint64_t record_bytes = 0;
     std::size_t record_variables = 0;
     for (const VariableExtent& extent : extents_) {

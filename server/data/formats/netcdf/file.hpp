@@ -1,5 +1,5 @@
-// One open netCDF file: the C library behind RAII, checked before the library sees it.
-// InputFile -> checks of our own -> nc_open -> FileContents and numbers.
+// One open netCDF file, by the C library with RAII. InputFile -> validation -> nc_open ->
+// FileContents and numbers.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@
 
 namespace windsplat::data::netcdf {
 
-// The library is not thread-safe: every call of it, on whatever file, is made under this lock.
+// The library is not thread-safe: every call on any file requires this lock.
 class LibraryLock {
  public:
   LibraryLock();
@@ -26,16 +26,16 @@ class LibraryLock {
   LibraryLock& operator=(const LibraryLock&) = delete;
 };
 
-// Where a file may be written: absolute, links resolved, without the marks by which the library
-// recognises URLs and mode fragments. Errors: not_found, bad_data.
+// The absolute output path with links resolved; must not contain the characters by which the
+// library recognises URLs and mode fragments. Errors: not_found, bad_data.
 Result<std::string> writable_path(const std::string& path);
 
 class File final : public cf::ArrayFile {
  public:
-  // Errors: bad_data for what is not netCDF (classic, 64-bit or on HDF5) or cut short.
-  // `group`: the path of a group whose variables are meant ("a/b"); coordinates of the groups above
-  // it belong to them. Empty: the root, or the first group (breadth first) that has a field if the
-  // root has none. Errors also: not_found for a group that is not there.
+  // `group`: path of the group to read ("a/b"), with the coordinates of its parents. Empty: the
+  // root, or, if that has no fields, the first group (breadth first) with fields. Errors: bad_data
+  // if the file is not netCDF (classic, 64-bit or HDF5) or truncated; not_found for an unknown
+  // group.
   static Result<std::unique_ptr<File>> open(std::shared_ptr<const InputFile> input,
                                             const std::string& group = "");
   ~File() override;
@@ -62,7 +62,7 @@ class File final : public cf::ArrayFile {
 
  private:
   explicit File(std::shared_ptr<const InputFile> input) : input_(std::move(input)) {}
-  // A variable as the library knows it.
+  // Ids of a variable in the library.
   struct Place {
     int group = 0;
     int id = 0;
@@ -92,15 +92,15 @@ class File final : public cf::ArrayFile {
   std::shared_ptr<const InputFile> input_;
   int ncid_ = -1;
   bool classic_ = false;
-  bool netcdf4_ = false;  // not HDF5 by itself
+  bool netcdf4_ = false;  // false: plain HDF5
   std::string group_;     // "" or "/a/b"
   std::vector<int> dimension_ids_;
   std::vector<Place> places_;                      // parallel to contents_.variables
-  Handle hdf5_;                                    // beside the netCDF library's own
+  Handle hdf5_;                                    // in addition to that of the netCDF library
   std::map<std::string, DatasetStorage> storage_;  // of HDF5, by path
-  std::vector<std::string> paths_;                 // likewise parallel
+  std::vector<std::string> paths_;                 // parallel to contents_.variables
   // Under the LibraryLock: absent chunks by object, and the variables whose chunks the library
-  // keeps, with the bytes it may keep of each, the last read first.
+  // caches with their cache sizes, most recently read first.
   mutable std::map<haddr_t, AbsentChunks> absent_;
   mutable std::list<std::pair<int, std::size_t>> kept_;
   FileContents contents_;

@@ -1,4 +1,4 @@
-// One pass over all links before the netCDF library sees the file, then questions about chunks.
+// Visits all links before the netCDF library opens the file; later examines chunks.
 #include "server/data/formats/netcdf/hdf5_storage.hpp"
 
 #include <algorithm>
@@ -17,8 +17,8 @@ namespace {
 
 constexpr std::size_t nesting_max = 64;  // of groups within groups
 
-// Objects that a file of so many bytes may have: the smallest takes some 300, but a link to one
-// that is there already only some 20, and the netCDF library keeps some kB of each.
+// Largest number of objects of a file by its size: the smallest object has about 300 bytes, but a
+// link only about 20, and the netCDF library uses some kB for each.
 std::size_t objects_max(const InputFile& input) { return 8192 + input.size() / 128; }
 
 std::string bytes_text(std::size_t bytes) { return std::to_string(bytes) + " bytes"; }
@@ -43,7 +43,7 @@ std::string external_problem(hid_t plan) {
   return text + ", which is not read";
 }
 
-// The first filter that this build of the library cannot undo; empty if there is none.
+// The first filter that this build of the library cannot decode; empty if there is none.
 std::string filter_problem(hid_t plan) {
   const int filters = H5Pget_nfilters(plan);
   for (int i = 0; i < filters; ++i) {
@@ -119,7 +119,7 @@ DatasetStorage storage_of(hid_t dataset) {
   return out;
 }
 
-// Depth first, as the netCDF library goes: an object is visited once for each link to it.
+// Depth first, like the netCDF library: an object is visited once per link.
 class Survey {
  public:
   explicit Survey(const InputFile& input) : input_(input), objects_left_(objects_max(input)) {}
@@ -224,15 +224,15 @@ class Survey {
   std::size_t objects_left_;
   std::string fault_;
   bool out_of_memory_ = false;
-  std::string path_;            // of the group that is visited
-  std::vector<haddr_t> above_;  // it and the groups that it is in
+  std::string path_;            // of the current group
+  std::vector<haddr_t> above_;  // the current group and its parents
   std::unordered_map<haddr_t, DatasetStorage> by_address_;
   std::map<std::string, DatasetStorage> found_;
 };
 
 enum class ChunkState { present, absent, broken };
 
-// NaN in a box of a block.
+// Sets a box of a block to NaN.
 template <class T>
 void fill_box(const Block& block, const std::vector<std::size_t>& first,
               const std::vector<std::size_t>& end, T* out) {
@@ -271,8 +271,8 @@ Result<std::map<std::string, DatasetStorage>> survey_storage(const InputFile& in
   return Survey(input).take();
 }
 
-// With the close degree that the netCDF library leaves to HDF5: another one could not open a file
-// that is open already.
+// Uses the same close degree as the netCDF library; HDF5 rejects opening a file with different
+// ones.
 Handle open_hdf5(const InputFile& input) {
   return {H5Fopen(input.library_path().c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose};
 }
@@ -284,8 +284,8 @@ OpenDataset::OpenDataset(const Handle& file, const std::string& path, const Data
   dataset_ = Handle(H5Dopen2(file.id(), path.c_str(), H5P_DEFAULT), H5Dclose);
 }
 
-// Visits the boxes of a block that were never written: whatever lies beyond the extent, and the
-// chunks of which chunk(their first item) says so. False where chunk() says that one is broken.
+// Visits the unwritten boxes of a block: everything beyond the extent, and the chunks that
+// chunk(first item) reports as absent. Returns false if chunk() reports one as broken.
 template <class Absent, class Chunk>
 bool OpenDataset::walk(const Block& block, const Absent& absent, const Chunk& chunk) const {
   const std::size_t rank = storage_.extent.size();
@@ -348,12 +348,12 @@ std::uint64_t OpenDataset::number_of(const std::vector<hsize_t>& at) const {
   return number;
 }
 
-// 0 of a chunk that was never written, which is remembered.
+// Returns 0 for an unwritten chunk and records it.
 hsize_t OpenDataset::stored_bytes(const std::vector<hsize_t>& at) {
   const std::uint64_t number = number_of(at);
   if (absent_.count(number) > 0) return 0;
   hsize_t bytes = 0;
-  // The library calls it an error that a chunk is not there; damage is found by the read.
+  // The library reports an absent chunk as an error; corruption is detected by the read.
   if (H5Dget_chunk_storage_size(dataset_.id(), at.data(), &bytes) < 0 || bytes == 0) {
     absent_.insert(number);
     return 0;
@@ -373,7 +373,7 @@ cf::Unwritten OpenDataset::count_absent(std::size_t most) {
   out.is_all = walk_chunks(
       all, [](const Box&) {},
       [&](const std::vector<hsize_t>& at) {
-        if (out.looked_at == most) return ChunkState::broken;  // which ends the walk
+        if (out.looked_at == most) return ChunkState::broken;  // ends the traversal
         ++out.looked_at;
         if (stored_bytes(at) > 0) return ChunkState::present;
         ++out.chunks;

@@ -1,5 +1,5 @@
-// What HDF5 knows of a file's datasets and the netCDF library does not report: where their data lie
-// and what of them was written. InputFile -> DatasetStorage by path; blocks -> the same, masked.
+// Storage of datasets in HDF5 files, which the netCDF library does not report: layout and unwritten
+// chunks. InputFile -> DatasetStorage by path; masks unwritten parts of blocks.
 #pragma once
 
 #include <hdf5.h>
@@ -38,46 +38,45 @@ class Handle {
 
 struct DatasetStorage {
   haddr_t object = 0;           // in the file; links to one dataset share it
-  std::string problem;          // why its numbers cannot be read; empty if they can
-  std::vector<hsize_t> extent;  // as written; a netCDF dimension may be longer
+  std::string problem;          // why it cannot be read; empty if it can
+  std::vector<hsize_t> extent;  // current size; a netCDF dimension may be longer
   std::vector<hsize_t> chunk;   // empty: not chunked
   std::size_t item_bytes = 0;
-  bool written = true;    // of what is not chunked
+  bool written = true;    // for unchunked datasets
   bool filtered = false;  // chunks are compressed
 };
 
-// The datasets of an HDF5 file by path ("/group/name"). Nothing is decoded. Errors: bad_data for
-// what the netCDF library would refuse without a reason, or follow without end: external and
-// dangling links, groups that contain themselves, more objects than the file can hold.
-// Callers hold the LibraryLock.
+// The datasets of an HDF5 file by path ("/group/name"), without decoding. Errors: bad_data for
+// files on which the netCDF library would fail without a reason or not terminate: external and
+// dangling links, cyclic groups, more objects than the file can contain. Requires the LibraryLock.
 Result<std::map<std::string, DatasetStorage>> survey_storage(const InputFile& input);
 
-// A block of a dataset: one start and count a dimension.
+// A block of a dataset: one start and count per dimension.
 struct Block {
   const std::vector<std::size_t>& start;
   const std::vector<std::size_t>& count;
 };
 
-// The HDF5 handle of the file; nullopt if it cannot be opened. Callers hold the LibraryLock.
+// Opens the file in HDF5; the handle is invalid on failure. Requires the LibraryLock.
 Handle open_hdf5(const InputFile& input);
 
 // Chunks of a dataset that were found absent, by number.
 using AbsentChunks = std::unordered_set<std::uint64_t>;
 
-// One dataset, open for questions about its chunks. Callers hold the LibraryLock.
+// One open dataset, to examine its chunks. Requires the LibraryLock.
 class OpenDataset {
  public:
-  // `absent` is kept by the caller from block to block: once the library has read an absent chunk
-  // it says that there is one.
+  // The caller keeps `absent` between blocks, because the library reports an absent chunk as
+  // present once it has been read.
   OpenDataset(const Handle& file, const std::string& path, const DatasetStorage& storage,
               AbsentChunks& absent);
 
-  // How many of the first `most` chunks were never written. Reads no data.
+  // Counts the unwritten chunks among the first `most`, without reading data.
   [[nodiscard]] cf::Unwritten count_absent(std::size_t most);
-  // Before a block is read. Errors: bad_data where a stored chunk is larger than its array needs.
+  // Call before reading a block. Errors: bad_data if a stored chunk is larger than possible.
   Result<void> check(const Block& block);
-  // After it: what check() found was never written, chunks and what lies beyond the extent, becomes
-  // NaN. HDF5 has its fill value there, which need not be the variable's _FillValue.
+  // Call after reading: sets unwritten chunks and everything beyond the extent to NaN. HDF5 returns
+  // its fill value there, which may differ from _FillValue of the variable.
   template <class T>
   void mask(const Block& block, T* out) const;
 

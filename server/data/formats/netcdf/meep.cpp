@@ -1,4 +1,4 @@
-// Recognised by the names of all arrays together: meep writes no attributes.
+// Identifies meep by the names of all arrays, since it writes no attributes.
 #include "server/data/formats/netcdf/meep.hpp"
 
 #include <algorithm>
@@ -45,9 +45,9 @@ void name_axes_of_meep(FileContents& contents) {
     dimensions.at(at).name = in_time && i + 1 == order.size() ? "t" : names.at(i);
   }
   contents.notes.emplace_back(
-      "dimensions have no names, but arrays have those of the solver meep: the first index is "
-      "taken "
-      "for x, as meep writes it");
+      "dimensions have no names, but arrays have those of the solver meep: the first index is x, "
+      "as "
+      "written by meep");
 }
 
 }  // namespace windsplat::data::netcdf

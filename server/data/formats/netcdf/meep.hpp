@@ -1,5 +1,5 @@
-// Axes of plain HDF5 by the field solver meep, whose arrays have bare dimensions: FileContents ->
-// the same with dimensions named x, y, z, t.
+// HDF5 files of the field solver meep, whose dimensions have no names: names them x, y, z, t in
+// FileContents.
 #pragma once
 
 #include "server/data/cf/contents.hpp"

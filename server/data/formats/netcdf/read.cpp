@@ -1,4 +1,4 @@
-// Blocks of numbers through the netCDF library, with what HDF5 says of their chunks.
+// Reads blocks by the netCDF library, and masks unwritten chunks reported by HDF5.
 #include <netcdf.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace windsplat::data::netcdf {
 
 namespace {
 
-// Of all variables together, or one chunk (resident.cpp estimates with it).
+// Cache limit of all variables together, but at least one chunk; resident.cpp accounts for it.
 constexpr double kept_bytes_max = 128 << 20;
 
 // A scalar has no extent, but the library requires a valid pointer.
@@ -56,14 +56,14 @@ void File::free_chunks(int variable) const {
   std::size_t size = 0;
   std::size_t slots = 0;
   float preemption = 0;
-  // To be told the size of its cache, even the same, the library opens the variable anew. Where it
-  // refuses, memory is all that is lost.
+  // Setting the cache size, even to the same value, makes the library reopen the variable, which
+  // frees its chunks. A failure only leaves memory in use.
   if (nc_get_var_chunk_cache(group, id, &size, &slots, &preemption) == NC_NOERR) {
     nc_set_var_chunk_cache(group, id, size, slots, preemption);
   }
 }
 
-// Chunks that one block after another needs are decoded once, as far as they fit.
+// Caches chunks shared by consecutive blocks within the limit, so that they are decoded once.
 void File::keep_chunks(int variable, const Block& block) const {
   const DatasetStorage& storage = storage_.at(paths_.at(cf::at(variable)));
   if (storage.chunk.empty()) return;
@@ -91,7 +91,7 @@ void File::keep_chunks(int variable, const Block& block) const {
   forget_others(variable, size);
 }
 
-// Until what is kept of all variables fits together, those that were read longest ago first.
+// Frees the caches of the least recently read variables until all fit the limit.
 void File::forget_others(int variable, std::size_t bytes) const {
   kept_.remove_if([variable](const auto& kept) { return kept.first == variable; });
   auto total = static_cast<double>(bytes);
@@ -115,7 +115,7 @@ cf::Unwritten File::unwritten(int variable, std::size_t most) const {
 template <class T, class Get>
 Result<void> File::read_block(int variable, const Block& block, T* out, const Get& get) const {
   const LibraryLock lock;
-  // A file cut while it is open would yield zeros, not an error.
+  // A file truncated while open would yield zeros instead of an error.
   if (auto same = input_->check_unchanged(); !same) {
     return same;
   }
@@ -124,7 +124,7 @@ Result<void> File::read_block(int variable, const Block& block, T* out, const Ge
   if (!classic_) {
     const std::string& path = paths_.at(cf::at(variable));
     const DatasetStorage& storage = storage_.at(path);
-    keep_chunks(variable, block);  // first: an open dataset keeps the size of its cache
+    keep_chunks(variable, block);  // first: the cache size of an open dataset is fixed
     dataset.emplace(hdf5_, path, storage, absent_[storage.object]);
     if (auto fine = dataset->check(block); !fine) {
       return fault("is damaged: " + in_quotes(name) + ' ' + fine.error().message);

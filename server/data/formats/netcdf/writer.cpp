@@ -1,5 +1,5 @@
-// Source -> CF 1.8 netCDF-4. Every field and step goes to a neighbouring temporary name first and
-// takes its own name when it is whole.
+// Source -> CF 1.8 netCDF-4. Writes every field and step to a temporary file in the same folder and
+// renames it when complete.
 #include "server/data/formats/netcdf/writer.hpp"
 
 #include <netcdf.h>
@@ -27,7 +27,7 @@ namespace windsplat::data {
 
 namespace {
 
-constexpr int deflate_level = 1;  // most of the gain at a fraction of the time
+constexpr int deflate_level = 1;  // higher levels are much slower for little gain
 constexpr std::size_t chunk_bytes = std::size_t{4} << 20;
 constexpr float fill_value = NC_FILL_FLOAT;
 
@@ -38,7 +38,7 @@ struct OutVariable {
   int id = -1;
 };
 
-// One call of the library under its lock.
+// Calls the library under its lock.
 template <class Call>
 Result<void> call(const char* what, Call&& library_call) {
   const netcdf::LibraryLock lock;
@@ -119,7 +119,7 @@ std::string component_standard_name(const DatasetInfo& info, const FieldInfo& fi
   return std::string(is_omega ? omega_name : "upward_air_velocity");
 }
 
-// Every variable of every field once: components of vectors, then the remaining scalars.
+// Lists every variable of every field once: components of vectors, then the remaining scalars.
 std::vector<OutVariable> plan_variables(const DatasetInfo& info) {
   std::vector<OutVariable> out;
   for (const FieldKind kind : {FieldKind::vector, FieldKind::scalar}) {
@@ -140,7 +140,7 @@ std::vector<OutVariable> plan_variables(const DatasetInfo& info) {
   return out;
 }
 
-// The library reports "HDF error" where the disk is full.
+// Replaces "HDF error" by an error of a full disk if there is no space left.
 Error with_room_left(Error error, const std::string& path) {
   std::error_code fault;
   const auto room = std::filesystem::space(std::filesystem::path(path).parent_path(), fault);
@@ -167,7 +167,7 @@ class Writer {
   }
 
   Result<void> write() {
-    std::remove(part_.c_str());  // of a process that had this one's number and was killed
+    std::remove(part_.c_str());  // left by a killed process with the same id
     if (auto done =
             call("creating the file",
                  [&] { return nc_create(part_.c_str(), NC_NETCDF4 | NC_NOCLOBBER, &ncid_); });
@@ -189,7 +189,8 @@ class Writer {
       return done;
     }
     if (std::rename(part_.c_str(), path_.c_str()) != 0) {
-      return make_error(ErrorKind::internal, in_quotes(path_) + " cannot take its name: " +
+      return make_error(ErrorKind::internal, in_quotes(path_) +
+                                                 " cannot be renamed to its final name: " +
                                                  std::generic_category().message(errno));
     }
     is_part_ = false;
@@ -208,7 +209,7 @@ class Writer {
     close_library();
   }
 
-  // The first failure of a row of calls is remembered, and the rest are skipped.
+  // Records the first failure of a sequence of calls and skips the rest.
   template <class Call>
   void then(Call&& next) {
     if (status_ == NC_NOERR) {
@@ -235,7 +236,7 @@ class Writer {
     return status_;
   }
 
-  // A time dimension is written only where the data have times.
+  // A time dimension is written only if the data have times.
   void define_time() {
     if (info_.steps.size() < 2 && info_.time_units.empty()) {
       return;
@@ -266,7 +267,7 @@ class Writer {
     dimensions_.push_back(dimension);
   }
 
-  // One step, as many levels as fit: a step is read at a time.
+  // One step and as many levels as fit, because data are read step by step.
   [[nodiscard]] std::vector<std::size_t> chunk() const {
     const auto dims = info_.grid.dims();
     const std::size_t row = static_cast<std::size_t>(dims[0]) * sizeof(float);
@@ -365,8 +366,7 @@ class Writer {
     return {};
   }
 
-  // As many levels at a time as a chunk has: compressing them takes moments, so that who cancels
-  // does not wait for the rest.
+  // Writes the levels of one chunk at a time, so that cancellation is checked often.
   Result<void> write_levels(const OutVariable& variable, std::size_t step, const float* values) {
     const auto dims = info_.grid.dims();
     const auto layer = static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]);
@@ -406,7 +406,7 @@ class Writer {
   std::string part_;
   std::string path_;
   CancelToken cancel_;
-  bool is_part_ = false;  // a file of the name part_ is there
+  bool is_part_ = false;  // the temporary file exists
   int ncid_ = -1;
   int status_ = NC_NOERR;
   int time_ = -1;

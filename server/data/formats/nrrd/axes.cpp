@@ -1,4 +1,4 @@
-// Kinds -> uses; directions, spacings, ends -> coordinates.
+// Kinds -> roles of axes; directions, spacings and ends -> coordinates.
 #include "server/data/formats/nrrd/axes.hpp"
 
 #include <algorithm>
@@ -85,8 +85,8 @@ class Placer {
     return {};
   }
 
-  // Without kinds: a fastest axis of 2 or 3 in front of space is a vector's, a slowest one that is
-  // too many counts steps.
+  // Without kinds: a fastest axis of length 2 or 3 before the space axes has the components of a
+  // vector, and a surplus slowest axis is time.
   void guess_uses(const std::vector<bool>& known) {
     const bool directed = has_directions();
     const auto is_free = [&](std::size_t a) {
@@ -97,13 +97,13 @@ class Placer {
     if (is_free(0) && (directed || too_many) && (first == 2 || first == 3)) {
       out_.axes.front().use = Use::components;
       out_.notes.push_back("the fastest axis, of " + std::to_string(first) +
-                           ", is taken for a vector's components");
+                           ", is interpreted as vector components");
     }
     if (is_free(rank() - 1) && rank() > 1 &&
         ((directed && out_.axes.back().use == Use::space) || count(Use::space) > 3)) {
       out_.axes.back().use = Use::steps;
       out_.notes.push_back("the slowest axis, of " + std::to_string(header_.axes.back().size) +
-                           ", is taken for steps in time");
+                           ", is interpreted as time");
     }
   }
 
@@ -133,7 +133,7 @@ class Placer {
     return {};
   }
 
-  // Which world axes the space's name counts the other way: left, posterior, inferior.
+  // World axes that the space counts in reverse: left, posterior, inferior.
   void find_turned() {
     constexpr std::array<std::string_view, 3> other_way{"left", "posterior", "inferior"};
     std::string_view space = header_.space;
@@ -169,8 +169,8 @@ class Placer {
     return {};
   }
 
-  // spacings, axis mins and axis maxs. Where the header does not say, samples are centered in
-  // cells, as teem has it.
+  // spacings, axis mins and axis maxs. Samples are cell-centred unless stated otherwise, as in
+  // teem.
   void fill_undirected(std::size_t a) {
     const HeaderAxis& axis = header_.axes[a];
     const auto n = static_cast<double>(axis.size);
@@ -195,7 +195,7 @@ class Placer {
     }
   }
 
-  // The world axis along which each direction runs mostly, if they are all different.
+  // The dominant world axis of each direction, if they are all different.
   [[nodiscard]] std::optional<std::vector<int>> main_axes(const std::vector<std::size_t>& axes) {
     std::vector<int> out;
     for (const std::size_t a : axes) {
@@ -276,7 +276,7 @@ class Placer {
                        [&](const PlacedAxis& axis) { return axis.name == name; });
   }
 
-  // Labels where they are distinct, else x, y, z in the order of the file or of space.
+  // Labels if they are distinct, otherwise x, y, z in the order of the file or of space.
   void name_axes() {
     std::size_t next = 0;
     for (std::size_t a = 0; a < rank(); ++a) {

@@ -1,4 +1,4 @@
-// What each axis of a NRRD is for, and where its samples lie in the world.
+// Roles of the axes of a NRRD file, and the coordinates of their samples.
 #pragma once
 
 #include <array>
@@ -15,19 +15,19 @@ enum class Use { space, steps, components, single };
 
 struct PlacedAxis {
   Use use = Use::space;
-  int world = -1;    // of a space axis 0 x, 1 y, 2 z; -1: by name and order
+  int world = -1;    // world axis of a space axis: 0 x, 1 y, 2 z; -1: by name and order
   std::string name;  // unique within the file
   std::string units;
   std::vector<double> coordinates;  // empty: placed by index
 };
 
 struct Placing {
-  std::vector<PlacedAxis> axes;                     // parallel to the header's
-  std::array<bool, 3> turned{false, false, false};  // world axes that the space names the other way
+  std::vector<PlacedAxis> axes;                     // parallel to those of the header
+  std::array<bool, 3> turned{false, false, false};  // world axes reversed by the space
   std::vector<std::string> notes;
 };
 
-// Errors: bad_data as a plain sentence, without the file's name.
+// Errors: bad_data, without the file name in the message.
 Result<Placing> place_axes(const Header& header);
 
 }  // namespace windsplat::data::nrrd

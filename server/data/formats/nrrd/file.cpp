@@ -1,4 +1,5 @@
-// Where the samples lie (behind the header, in one file, in many), and one variable a component.
+// Locates the samples (after the header, in one data file or in several); one variable per
+// component.
 #include "server/data/formats/nrrd/file.hpp"
 
 #include <algorithm>
@@ -22,13 +23,13 @@ namespace {
 using bytes::ByteStore;
 using bytes::PlacedFile;
 
-// Where the line behind the next `lines` ones begins.
+// Offset after the next `lines` lines.
 Result<std::uint64_t> skip_lines(const InputFile& file, std::uint64_t at, std::int64_t lines) {
   std::vector<char> block(std::size_t{1} << 16);
   while (lines > 0) {
     const std::uint64_t some =
         std::min<std::uint64_t>(block.size(), file.size() - std::min(at, file.size()));
-    if (some == 0) return file.fault("is cut short: it has fewer lines than 'line skip' says");
+    if (some == 0) return file.fault("is cut short: it has fewer lines than 'line skip'");
     if (auto done = file.read(at, block.data(), some); !done) return done.error();
     std::uint64_t used = 0;
     while (used < some && lines > 0) lines -= block[used++] == '\n' ? 1 : 0;
@@ -37,13 +38,13 @@ Result<std::uint64_t> skip_lines(const InputFile& file, std::uint64_t at, std::i
   return at;
 }
 
-// The part of the samples that a file holds.
+// The part of the samples in one file.
 class Part {
  public:
   Part(const Header& header, std::uint64_t begin, std::uint64_t bytes)
       : header_(header), begin_(begin), bytes_(bytes) {}
 
-  // `rest`: grows by the bytes behind the samples, where the encoding lets them be told.
+  // Adds the bytes after the samples to `rest`, if the encoding permits to count them.
   [[nodiscard]] Result<std::shared_ptr<ByteStore>> in(const std::shared_ptr<const InputFile>& file,
                                                       std::uint64_t& rest) const {
     const auto from = skip_lines(*file, begin_, header_.line_skip);
@@ -57,7 +58,7 @@ class Part {
                                                       : bytes::Encoding::text;
     auto skip = static_cast<std::uint64_t>(header_.byte_skip);
     std::uint64_t start = *from;
-    if (encoding != bytes::Encoding::gzip) {  // bytes of the file, not of what it means
+    if (encoding != bytes::Encoding::gzip) {  // applies to the bytes of the file
       start += std::min(skip, file->size());
       skip = 0;
     }
@@ -83,9 +84,9 @@ class Part {
     }
     if (start < from || start > size || size - start < bytes_) {
       return file->fault("is cut short: it has " + std::to_string(size - std::min(from, size)) +
-                         " bytes of data, its header says " + std::to_string(bytes_) +
+                         " bytes of data; its header requires " + std::to_string(bytes_) +
                          (header_.byte_skip > 0
-                              ? " behind " + std::to_string(header_.byte_skip) + " skipped ones"
+                              ? " after " + std::to_string(header_.byte_skip) + " skipped ones"
                               : ""));
     }
     rest += size - start - bytes_;
@@ -124,7 +125,7 @@ class Opener {
   }
 
  private:
-  // Text is unrolled to float64.
+  // Text is converted to float64.
   [[nodiscard]] bool is_text() const { return header_.encoding == "text"; }
   [[nodiscard]] bytes::Scalar stored() const {
     return is_text() ? bytes::Scalar::float64 : header_.type;
@@ -139,7 +140,7 @@ class Opener {
     return find_parts(*total);
   }
 
-  // All data files hold as much; how much follows from their count.
+  // All data files have equal size, which follows from their number.
   Result<std::shared_ptr<ByteStore>> find_parts(std::uint64_t total) {
     const std::size_t count = header_.data_files.size();
     if (total % count != 0 || (count > 1 && !count_fits(count))) {
@@ -168,8 +169,8 @@ class Opener {
     return bytes::joined_store(std::move(pieces));
   }
 
-  // A file of `file_dimension` dimensions is a slab: their number is that of the slower axes'
-  // sizes.
+  // With `file_dimension` dimensions per file, the number of files is the product of the sizes of
+  // the slower axes.
   [[nodiscard]] bool count_fits(std::size_t count) const {
     const std::size_t rank = header_.axes.size();
     const std::size_t dimension = header_.file_dimension == 0 ? rank - 1 : header_.file_dimension;
@@ -247,7 +248,7 @@ class Opener {
   Header header_;
   Placing placing_;
   std::unique_ptr<PlacedFile> file_;
-  std::uint64_t rest_ = 0;  // bytes behind the samples
+  std::uint64_t rest_ = 0;  // bytes after the samples
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// NRRD files, header and data in one file or apart. Files -> header -> arrays of cf.
+// NRRD files with attached or detached headers. Files -> header -> arrays of cf.
 #pragma once
 
 #include <memory>
@@ -10,11 +10,11 @@
 
 namespace windsplat::data::nrrd {
 
-// Whether a file that begins so is NRRD.
+// Whether the first bytes of a file are those of NRRD.
 bool looks_like(std::string_view head);
 
-// Axes are turned to run left to right, posterior to anterior, inferior to superior where the
-// header names such a space; a vector's components turn with them. Errors: bad_data.
+// If the header names an anatomical space, axes are reversed to run left to right, posterior to
+// anterior, inferior to superior, together with vector components. Errors: bad_data.
 Result<std::unique_ptr<cf::ArrayFile>> open(const std::shared_ptr<Files>& files,
                                             std::shared_ptr<const InputFile> header_file);
 

@@ -71,7 +71,7 @@ constexpr auto type_names = std::to_array<TypeName>({
     {"double", bytes::Scalar::float64},
 });
 
-// Fields without effect on position and meaning of the samples.
+// Fields without effect on positions and values of samples.
 constexpr auto ignored_fields = std::to_array<std::string_view>(
     {"number", "min", "max", "old min", "oldmin", "old max", "oldmax", "thicknesses"});
 
@@ -193,7 +193,7 @@ class Parser {
     }
   }
 
-  // One word an axis.
+  // One word per axis.
   std::vector<std::string_view> one_each(const Line& line) {
     auto words = bytes::words_of(line.value);
     if (words.size() != header_.axes.size()) {

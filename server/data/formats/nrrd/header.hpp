@@ -1,5 +1,4 @@
-// The text of a NRRD header (teem's format, versions 1 to 5) -> plain data. What it says is not yet
-// judged beyond its own grammar.
+// The text of a NRRD header (format of teem, versions 1 to 5) -> plain data; checks syntax only.
 #pragma once
 
 #include <cstdint>
@@ -43,8 +42,8 @@ struct Header {
   std::int64_t line_skip = 0;
   std::int64_t byte_skip = 0;
   std::vector<std::string> data_files;  // of a detached header
-  std::size_t file_dimension = 0;       // how many dimensions a data file has; 0: the usual
-  std::uint64_t end = 0;                // where an attached header's data begin
+  std::size_t file_dimension = 0;       // dimensions of a data file; 0: default
+  std::uint64_t end = 0;                // offset of the data after an attached header
   std::vector<std::string> notes;
 };
 

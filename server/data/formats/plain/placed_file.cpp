@@ -1,4 +1,4 @@
-// Blocks of an array -> runs of bytes at even distances -> numbers.
+// Blocks of an array -> runs of bytes with constant stride -> numbers.
 #include "server/data/formats/plain/placed_file.hpp"
 
 #include <algorithm>
@@ -117,7 +117,7 @@ Result<void> PlacedFile::read_any(int variable, const std::vector<std::size_t>& 
   }
   const Placement& placement = *entry.placement;
   if (auto fine = placement.store->check_unchanged(); !fine) return fine;
-  // Trailing dimensions that follow each other at even distances are one run.
+  // Trailing dimensions with a common constant stride are one run.
   std::size_t rank = count.size();
   std::size_t run = count[rank - 1];
   const std::uint64_t stride = placement.strides[rank - 1];

@@ -1,5 +1,5 @@
-// Arrays that lie in bytes at even distances: what NRRD, GrADS, OpenDX and raw files with a
-// description come down to. Their readers fill a PlacedFile, cf/source.hpp makes the dataset.
+// Arrays stored in bytes with constant strides: the common representation of NRRD, GrADS, OpenDX
+// and raw files. Their readers fill a PlacedFile; cf/source.hpp converts it to a dataset.
 #pragma once
 
 #include <array>
@@ -15,25 +15,25 @@
 
 namespace windsplat::data::bytes {
 
-// The indices of a dimension for which numbers are stored, from the first to behind the last.
+// Half-open range of the indices of a dimension for which numbers are stored.
 struct Stored {
   std::size_t begin = 0;
   std::size_t end = 0;
 };
 
-// Where a variable's numbers lie. A store is shared by the variables in it.
+// Location of the numbers of a variable. Variables may share a store.
 struct Placement {
   std::shared_ptr<ByteStore> store;
-  std::uint64_t offset = 0;  // of the first number, that of the first stored indices
+  std::uint64_t offset = 0;  // of the number at the first stored indices
   Scalar type = Scalar::float32;
   bool big_endian = false;
-  std::vector<std::uint64_t> strides;           // bytes from one index to the next, one a dimension
-  std::vector<Stored> present;                  // one a dimension; what is not stored is masked
-  bool negated = false;                         // components of axes that were turned round
+  std::vector<std::uint64_t> strides;           // bytes between neighbours, one per dimension
+  std::vector<Stored> present;                  // one per dimension; the rest is masked
+  bool negated = false;                         // vector components of reversed axes
   std::optional<std::array<double, 2>> masked;  // stored numbers from the first to the second
 };
 
-// What a coordinate is called and how it runs.
+// Attributes of a coordinate.
 struct AxisLabel {
   std::string units;
   std::string axis;      // "X", "Y", "Z", "T" or empty: by name and units
@@ -50,9 +50,9 @@ class PlacedFile final : public cf::ArrayFile {
   void add_note(std::string note) { contents_.notes.push_back(std::move(note)); }
   void add_identity(const std::string& identity) { identity_ += identity + '\n'; }
   int add_dimension(std::string name, std::size_t length);
-  // The coordinates of a dimension, one an index.
+  // Adds the coordinates of a dimension, one per index.
   void add_axis(int dimension, const AxisLabel& label, std::vector<double> coordinates);
-  // A field's numbers; the variable's type is that of the placement. `missing`: as stored.
+  // Adds the numbers of a field; the type is that of the placement. `missing`: stored numbers.
   void add_array(FileVariable variable, Placement placement, std::vector<double> missing);
 
   [[nodiscard]] const FileContents& contents() const override { return contents_; }
@@ -84,7 +84,7 @@ class PlacedFile final : public cf::ArrayFile {
   std::string format_;
   std::string identity_;
   FileContents contents_;
-  std::vector<Entry> entries_;  // one a variable
+  std::vector<Entry> entries_;  // one per variable
 };
 
 }  // namespace windsplat::data::bytes

@@ -1,5 +1,4 @@
-// JSON with limits: size, depth, no key twice, no unknown key, every number checked before it is
-// taken.
+// JSON with limits of size and depth; rejects duplicate and unknown keys and checks every number.
 #include "server/data/formats/raw/document.hpp"
 
 #include <algorithm>
@@ -210,7 +209,7 @@ Field field_of(const json& value, const std::string& pointer, const Field& defau
     out.files = files_of(object.at("file"), object.below("file"));
     out.offset = static_cast<std::uint64_t>(object.integer("offset", 0, offset_max, 0));
   } else if (object.has("offset")) {
-    refuse(object.below("offset"), "only a field with a file of its own has an offset");
+    refuse(object.below("offset"), "an offset requires a separate file for the field");
   }
   return out;
 }
@@ -262,7 +261,7 @@ void set_axes(const Object& root, Document& out) {
   const Object axes(root.at("axes"), root.below("axes"), {"x", "y", "z"});
   for (std::size_t a = 0; a < 3; ++a) {
     if (!axes.has(letters.at(a))) continue;
-    if (!out.has.at(a)) refuse(axes.below(letters.at(a)), "there is no such dimension");
+    if (!out.has.at(a)) refuse(axes.below(letters.at(a)), "unknown dimension");
     out.axes.at(a) = axis_of(axes.at(letters.at(a)), axes.below(letters.at(a)), out.dims.at(a));
   }
 }

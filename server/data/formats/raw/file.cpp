@@ -45,22 +45,21 @@ class Opener {
   }
 
  private:
-  // Fields that follow one another within a step, and the bytes of a step.
+  // Consecutive fields within a step, and the bytes of a step.
   struct Group {
     std::vector<const Field*> fields;
     std::shared_ptr<ByteStore> store;
     std::uint64_t step_bytes;
   };
 
-  // Layout that the description declares for a file, over all its fields.
+  // Layout of a file by the description of all its fields.
   struct Extent {
     std::uint64_t size = 0;
-    std::uint64_t described = 0;                 // bytes up to the end of the last step
+    std::uint64_t described = 0;                 // end of the last step, bytes
     std::vector<std::uint64_t> step_bytes = {};  // of each group of fields in it
   };
 
-  // Bytes that nothing describes are a sign of wrong dimensions, unless they are steps that are not
-  // shown.
+  // Undescribed bytes indicate wrong dimensions, unless they are further steps.
   Result<void> account_for_rests() {
     std::size_t longer = 0;
     std::string first;
@@ -105,7 +104,7 @@ class Opener {
     }
   }
 
-  // Fields that share the document's file follow one another within a step.
+  // Fields that share the file of the document are consecutive within a step.
   Result<void> open_groups() {
     std::vector<const Field*> together;
     for (const Field& field : doc_.fields) {
@@ -174,7 +173,7 @@ class Opener {
       const std::uint64_t needed = skip + per_file * step_bytes;
       if ((*file)->size() < needed) {
         return (*file)->fault("is cut short: it has " + std::to_string((*file)->size()) +
-                              " bytes, " + in_quotes(input_->name()) + " says " +
+                              " bytes; " + in_quotes(input_->name()) + " requires " +
                               std::to_string(needed));
       }
       Extent& extent = extents_[*name];
@@ -245,7 +244,7 @@ class Opener {
   std::vector<int> space_;
   std::vector<std::uint64_t> lengths_;
   std::vector<Group> groups_;
-  std::map<std::string, Extent> extents_;  // by the files' names
+  std::map<std::string, Extent> extents_;  // by file name
 };
 
 }  // namespace

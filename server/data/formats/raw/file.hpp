@@ -10,10 +10,10 @@
 
 namespace windsplat::data::raw {
 
-// Whether a text that begins so is a JSON object with our key near its beginning.
+// Whether the first bytes are a JSON object with the key of the format near its beginning.
 bool looks_like(std::string_view head);
 
-// Whether it begins as any JSON object does.
+// Whether the first bytes are those of a JSON object.
 bool is_json(std::string_view head);
 
 // Errors: bad_data; not_found for files that the description names.

@@ -1,4 +1,4 @@
-// Newton's method for the shape functions' inverse, simplices where it fails.
+// Inverts shape functions by Newton's method, or by simplices if that fails.
 #include "server/data/formats/vtk/cells.hpp"
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr int newton_steps = 16;
 constexpr double tolerance = 1e-6;
-// What slabs are widened by: more than a millionth in each of three coordinates moves a place.
+// Margin of the bounding slabs, larger than the tolerance of find_in_cell in three coordinates.
 constexpr double slab_slack = 1e-5;
 constexpr double rounding_slack = 64 * std::numeric_limits<double>::epsilon();
 
@@ -206,7 +206,7 @@ Found by_newton(Shape shape, const Corners& corners, const Point& place, CellPla
   return Found::unknown;
 }
 
-// A simplex of a cell as a cell of its own.
+// A simplex of a cell as a separate cell.
 Corners corners_of_simplex(const Simplex& simplex, const Corners& corners) {
   Corners out{};
   for (std::size_t i = 0; i < 4; ++i) out[i] = corners[simplex[i]];
@@ -229,7 +229,7 @@ SlantedBox::SlantedBox(Shape shape, const Corners& corners)
     : origin_(corners[0]), count_(static_cast<std::size_t>(dimension_of(shape))) {
   const auto corner_count = static_cast<std::size_t>(corners_of(shape));
   const bool flat = count_ == 2;
-  // The map's slopes in the middle: the mean edges.
+  // The derivatives at the centre are the mean edges.
   const Basis basis = basis_at(shape, {0.5, 0.5, flat ? 0.0 : 0.5});
   std::array<Point, 3> edges{};
   for (std::size_t i = 0; i < corner_count; ++i) {
@@ -241,7 +241,7 @@ SlantedBox::SlantedBox(Shape shape, const Corners& corners)
     edges[0][2] = edges[1][2] = 0;
     edges[2] = {0, 0, 1};
   }
-  // Only the directions matter; products of long vectors might overflow.
+  // Normalised, because products of long vectors could overflow.
   for (Point& edge : edges) {
     const double most = std::max({std::abs(edge[0]), std::abs(edge[1]), std::abs(edge[2])});
     for (double& part : edge) part = most > 0 ? part / most : 0;
@@ -258,7 +258,7 @@ SlantedBox::SlantedBox(Shape shape, const Corners& corners)
       slab.low = std::min(slab.low, at);
       slab.high = std::max(slab.high, at);
     }
-    // And by what rounding moves a place far from 0, or in a long thin cell.
+    // Margin for rounding at large coordinates and in elongated cells.
     const double slack =
         slab_slack * (slab.high - slab.low) +
         rounding_slack *

@@ -1,4 +1,4 @@
-// Coordinates along i, j, k -> turned to ascend along x, y, z.
+// Coordinates along i, j, k -> ascending coordinates along x, y, z.
 #include "server/data/formats/vtk/grid.hpp"
 
 #include <algorithm>
@@ -63,8 +63,7 @@ Result<RegularGrid> image_grid(const InputFile& file, const Snapshot& snapshot) 
     taken.at(world) = true;
     grid.world[a] = world;
     const double step = snapshot.spacing[a] * (along < 0 ? -1.0 : 1.0);
-    // Index 0 lies at the origin, whatever the extent begins with: along every axis on its own,
-    // as the axes are those of the world.
+    // Index 0 is at the origin even if the extent does not begin there; axes are independent.
     for (std::int64_t i = 0; i < counts[a]; ++i) {
       by_index[a].push_back(snapshot.origin.at(world) +
                             step * static_cast<double>(snapshot.whole.first[a] + i));
@@ -115,8 +114,7 @@ std::optional<RegularGrid> separable_grid(const std::vector<double>& points,
   RegularGrid grid;
   std::array<double, 3> tolerance{};
   std::array<bool, 3> given{};
-  // Index axes longer than one take the world axis along which they change most; the others what
-  // is left.
+  // Index axes longer than 1 get the world axis along which they change most, the others the rest.
   for (std::size_t w = 0; w < 3; ++w) {
     double low = at(0, w);
     double high = low;

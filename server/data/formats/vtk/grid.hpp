@@ -1,5 +1,5 @@
-// Grids whose points lie on axes: images, rectilinear grids, and structured grids that turn out to
-// be such. Snapshot -> coordinates along each world axis, and how indices run along them.
+// Rectilinear grids: images, rectilinear grids, and structured grids that are rectilinear. Snapshot
+// -> coordinates along each world axis, and the mapping of index axes to them.
 #pragma once
 
 #include <array>
@@ -15,24 +15,24 @@ namespace windsplat::data::vtk {
 struct RegularGrid {
   // By world axis x, y, z; ascending.
   std::array<std::vector<double>, 3> coordinates;
-  // By index axis i, j, k: which world axis it runs along, and whether against it.
+  // By index axis i, j, k: its world axis, and whether it is reversed.
   std::array<std::size_t, 3> world{0, 1, 2};
   std::array<bool, 3> turned{false, false, false};
 
   bool operator==(const RegularGrid&) const = default;
 };
 
-// Of an image or a rectilinear grid. Errors: bad_data, also for an image whose axes are not those
-// of the world in any order.
+// For an image or a rectilinear grid. Errors: bad_data, also for an image whose axes are not
+// parallel to those of the world.
 Result<RegularGrid> regular_grid(const std::shared_ptr<const InputFile>& file,
                                  const Snapshot& snapshot);
 
-// Of a structured grid (points: x y z of each, i fastest) whose x, y and z change along one index
-// each; nothing if it is curved or sheared. counts: points along i, j, k.
+// For a structured grid (points: x y z of each, i fastest) whose x, y and z depend on one index
+// each; nullopt if it is curved or sheared. counts: points along i, j, k.
 std::optional<RegularGrid> separable_grid(const std::vector<double>& points,
                                           const std::array<std::int64_t, 3>& counts);
 
-// The grid of the cells' centres; where there is one point, it stays.
+// The grid of cell centres; an axis of one point is unchanged.
 RegularGrid cell_centres(const RegularGrid& points);
 
 }  // namespace windsplat::data::vtk

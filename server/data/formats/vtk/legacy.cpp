@@ -1,5 +1,5 @@
-// Legacy VTK files ("# vtk DataFile Version"), ASCII or BINARY. Words of the file, one after
-// another -> Snapshot; the arrays' values are passed over and noted by where they lie.
+// Legacy VTK files ("# vtk DataFile Version"), ASCII or BINARY. Words of the file -> Snapshot;
+// values of arrays are skipped, and their locations recorded.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,147 +8,15 @@
 
 #include "server/base/ascii.hpp"
 #include "server/data/bytes/text.hpp"
-#include "server/data/cf/grid.hpp"
+#include "server/data/cf/grid/grid.hpp"
+#include "server/data/formats/vtk/legacy_words.hpp"
 #include "server/data/formats/vtk/snapshot.hpp"
 
 namespace windsplat::data::vtk {
 
 namespace {
 
-constexpr std::size_t text_buffer_bytes = std::size_t{1} << 18;
-constexpr std::size_t line_max = 4096;
 constexpr std::size_t arrays_max = 10'000;
-
-// Words and lines of a file, with the place where each begins.
-class Scanner {
- public:
-  explicit Scanner(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}
-
-  [[nodiscard]] std::uint64_t at() const { return at_; }
-  [[nodiscard]] bool ended() const { return at_ >= file_->size(); }
-
-  // Up to the end of the line, which is passed over. Errors: a line beyond the limit.
-  Result<std::string> line() {
-    std::string out;
-    while (!ended()) {
-      const auto byte = next();
-      if (!byte) return byte.error();
-      if (*byte == '\n') break;
-      out += *byte;
-      if (out.size() > line_max) return fault("a line longer than 4096 bytes");
-    }
-    return std::string(trim(out));
-  }
-
-  // Empty at the end of the file.
-  Result<std::string> word() {
-    std::string out;
-    while (!ended()) {
-      const auto byte = next();
-      if (!byte) return byte.error();
-      if (is_blank(*byte)) {
-        if (out.empty()) continue;
-        --at_;
-        break;
-      }
-      out += *byte;
-      if (out.size() > line_max) return fault("a word longer than 4096 bytes");
-    }
-    return out;
-  }
-
-  Result<void> skip_words(std::uint64_t count) {
-    bool within = false;
-    std::uint64_t seen = 0;
-    while (!ended()) {
-      const auto byte = next();
-      if (!byte) return byte.error();
-      const bool blank = is_blank(*byte);
-      if (blank && within && seen == count) {
-        --at_;
-        return {};
-      }
-      if (!blank && !within) {
-        if (seen == count) {
-          --at_;
-          return {};
-        }
-        ++seen;
-      }
-      within = !blank;
-    }
-    return seen == count ? Result<void>() : Result<void>(fault("fewer values than are due"));
-  }
-
-  Result<void> skip_bytes(std::uint64_t count) {
-    if (count > file_->size() - at_) return fault("fewer bytes than are due");
-    at_ += count;
-    return {};
-  }
-
-  void back_to(std::uint64_t place) { at_ = place; }
-
-  [[nodiscard]] Error fault(const std::string& what) const {
-    return file_->fault("is broken: " + what + " at byte " + std::to_string(at_));
-  }
-
- private:
-  Result<char> next() {
-    if (at_ < start_ || at_ >= start_ + buffer_.size()) {
-      buffer_.resize(static_cast<std::size_t>(
-          std::min<std::uint64_t>(text_buffer_bytes, file_->size() - at_)));
-      start_ = at_;
-      if (auto done = file_->read(start_, buffer_.data(), buffer_.size()); !done) {
-        return done.error();
-      }
-    }
-    return buffer_[static_cast<std::size_t>(at_++ - start_)];
-  }
-
-  std::shared_ptr<const InputFile> file_;
-  std::uint64_t at_ = 0;
-  std::uint64_t start_ = 0;
-  std::vector<char> buffer_;
-};
-
-std::optional<bytes::Scalar> type_named(const std::string& name) {
-  constexpr std::array<std::pair<std::string_view, bytes::Scalar>, 14> names{{
-      {"char", bytes::Scalar::int8},
-      {"signed_char", bytes::Scalar::int8},
-      {"unsigned_char", bytes::Scalar::uint8},
-      {"short", bytes::Scalar::int16},
-      {"unsigned_short", bytes::Scalar::uint16},
-      {"int", bytes::Scalar::int32},
-      {"unsigned_int", bytes::Scalar::uint32},
-      {"long", bytes::Scalar::int64},
-      {"unsigned_long", bytes::Scalar::uint64},
-      {"vtktypeint64", bytes::Scalar::int64},
-      {"vtktypeuint64", bytes::Scalar::uint64},
-      {"vtkidtype", bytes::Scalar::int32},
-      {"float", bytes::Scalar::float32},
-      {"double", bytes::Scalar::float64},
-  }};
-  const auto* at =
-      std::find_if(names.begin(), names.end(), [&](const auto& n) { return n.first == name; });
-  if (at == names.end()) return {};
-  return at->second;
-}
-
-// Names are written with %20 for a blank and the like.
-std::string decoded(const std::string& name) {
-  std::string out;
-  for (std::size_t i = 0; i < name.size(); ++i) {
-    const bool escaped = name[i] == '%' && i + 2 < name.size() &&
-                         bytes::hex_digit(name[i + 1]) >= 0 && bytes::hex_digit(name[i + 2]) >= 0;
-    if (escaped) {
-      out += static_cast<char>(bytes::hex_digit(name[i + 1]) * 16 + bytes::hex_digit(name[i + 2]));
-      i += 2;
-    } else {
-      out += name[i];
-    }
-  }
-  return out;
-}
 
 class Reader {
  public:
@@ -275,7 +143,7 @@ class Reader {
     return fault(in_quotes(key) + " where a section is due");
   }
 
-  // Passes over the values that follow the line, and notes where they are.
+  // Skips the values after the line and records their location.
   Result<void> take(StoredArray& array, bool known_bits = false, std::uint64_t value_bits = 0) {
     array.coding = {.big_endian = true, .has_header = false};
     array.encoding = binary_ ? Encoding::raw : Encoding::text;
@@ -291,7 +159,7 @@ class Reader {
     return done;
   }
 
-  // The rest of a line whose words are told, then the values. type: as the file calls it.
+  // Reads the values after a line. type: its name in the file.
   Result<bool> take_typed(StoredArray& array, const std::string& type) {
     const auto known = type_named(lower(type));
     if (known) {
@@ -308,6 +176,16 @@ class Reader {
     return false;
   }
 
+  // The same where the type ends the line and no bits will do.
+  Result<void> take_numbers(StoredArray& array, std::string what) {
+    const auto type = scan_.line();
+    if (!type) return type.error();
+    const auto taken = take_typed(array, *type);
+    if (!taken) return taken.error();
+    if (!*taken) return fault(what += " of the type bit");
+    return {};
+  }
+
   Result<void> read_points() {
     StoredArray array;
     array.name = "points";
@@ -315,11 +193,7 @@ class Reader {
     const auto n = count();
     if (!n) return n.error();
     array.tuples = *n;
-    const auto type = scan_.line();
-    if (!type) return type.error();
-    const auto taken = take_typed(array, *type);
-    if (!taken) return taken.error();
-    if (!*taken) return fault("points of the type bit");
+    if (auto done = take_numbers(array, "points"); !done) return done;
     if (out_.kind == Kind::unstructured) piece_.points = *n;
     piece_.coordinates = {std::move(array)};
     return {};
@@ -332,17 +206,13 @@ class Reader {
     const auto n = count();
     if (!n) return n.error();
     array.tuples = *n;
-    const auto type = scan_.line();
-    if (!type) return type.error();
-    const auto taken = take_typed(array, *type);
-    if (!taken) return taken.error();
-    if (!*taken) return fault("coordinates of the type bit");
+    if (auto done = take_numbers(array, "coordinates"); !done) return done;
     piece_.coordinates.at(axis) = std::move(array);
     return {};
   }
 
-  // Before version 5: cells and numbers, then each cell's count and indices. Since: one more than
-  // cells and indices, then OFFSETS and CONNECTIVITY.
+  // Before version 5: numbers of cells and entries, then count and indices of each cell. Since: the
+  // number of cells plus one and of indices, then OFFSETS and CONNECTIVITY.
   Result<void> read_cells() {
     const auto first = count();
     if (!first) return first.error();
@@ -375,11 +245,7 @@ class Reader {
       StoredArray array;
       array.name = is_first ? "offsets" : "connectivity";
       array.tuples = is_first ? offsets : indices;
-      const auto type = scan_.line();
-      if (!type) return type.error();
-      const auto taken = take_typed(array, *type);
-      if (!taken) return taken.error();
-      if (!*taken) return fault("cells of the type bit");
+      if (auto done = take_numbers(array, "cells"); !done) return done;
       (is_first ? piece_.offsets : piece_.connectivity) = std::move(array);
     }
     piece_.cells = offsets - 1;
@@ -400,7 +266,7 @@ class Reader {
     return {};
   }
 
-  // What POINT_DATA and CELL_DATA hold.
+  // Reads an attribute of POINT_DATA or CELL_DATA.
   Result<void> read_attribute(const std::string& key) {
     const auto line = scan_.line();
     if (!line) return line.error();
@@ -516,7 +382,7 @@ class Reader {
     return {};
   }
 
-  // Of the arrays that belong to the whole file only the time is of use.
+  // Of the field data of the file, only the time is used.
   Result<void> take_time(const StoredArray& array) {
     const std::string name = lower(array.name);
     if ((name != "time" && name != "timevalue") || array.values() != 1) return {};
@@ -526,7 +392,7 @@ class Reader {
     return {};
   }
 
-  // Lines up to an empty one; COMPONENT_NAMES are those of the array before.
+  // Reads lines up to an empty one; COMPONENT_NAMES refers to the previous array.
   Result<void> read_metadata() {
     if (auto rest = scan_.line(); !rest) return rest.error();
     StoredArray* last = into_ == nullptr || into_->empty() ? nullptr : &into_->back();

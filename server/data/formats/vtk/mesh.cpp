@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "server/data/cf/grid.hpp"
+#include "server/data/cf/grid/grid.hpp"
 #include "server/data/model/digest.hpp"
 
 namespace windsplat::data::vtk {
@@ -22,7 +22,7 @@ constexpr std::size_t block_values = std::size_t{1} << 16;
 struct CellType {
   Shape shape = Shape::none;
   std::uint64_t corners = 0;
-  bool swaps = false;  // VTK's pixel and voxel count their corners row by row
+  bool swaps = false;  // pixel and voxel of VTK order their corners row by row
 };
 
 CellType cell_type(int type) {
@@ -48,7 +48,7 @@ CellType cell_type(int type) {
   }
 }
 
-// Values one after another that are whole numbers from 0 on.
+// A sequence of non-negative integers.
 class Counts {
  public:
   Counts(FilePtr file, const StoredArray& array) : file_(std::move(file)), array_(array) {}
@@ -99,7 +99,7 @@ const StoredArray* ghosts_of(const std::vector<StoredArray>& arrays) {
   return at == arrays.end() ? nullptr : &*at;
 }
 
-// A piece's points, hidden ones NaN.
+// The points of a piece; hidden ones are NaN.
 Result<std::vector<double>> read_points(const FilePtr& file, const Piece& piece) {
   auto points = read_all(file, piece.coordinates.front());
   if (!points) return points.error();

@@ -16,21 +16,21 @@
 namespace windsplat::data::vtk {
 
 struct Mesh {
-  std::vector<double> points;  // x y z of each; NaN where a point is hidden or missing
+  std::vector<double> points;  // x y z of each; NaN if a point is hidden or missing
   // Structured: points along i, j, k, cells in the same order. All zero: unstructured.
   std::array<std::int64_t, 3> counts{0, 0, 0};
   std::vector<bool> hidden;  // structured: cells not shown; empty: none
-  // Unstructured: one a cell; Shape::none is passed over. Indices begin at `first` in `corners`.
+  // Unstructured: one per cell; Shape::none is skipped. Indices begin at `first` in `corners`.
   std::vector<Shape> shapes;
   std::vector<std::uint32_t> first;
   std::vector<std::uint32_t> corners;
-  std::map<int, std::uint64_t> unread;  // how many cells of each of VTK's types are passed over
+  std::map<int, std::uint64_t> unread;  // number of skipped cells by VTK type
 
   [[nodiscard]] std::uint64_t point_count() const { return points_read; }
   [[nodiscard]] std::uint64_t cell_count() const;
-  // A cell's shape, and its corners' points.
+  // The shape of a cell, and the points of its corners.
   Shape cell(std::uint64_t index, std::array<std::uint32_t, 8>& out) const;
-  // Frees what is only needed to find places in cells.
+  // Frees data that are only needed to locate positions in cells.
   void forget_points();
 
   std::uint64_t points_read = 0;
@@ -39,24 +39,24 @@ struct Mesh {
 // Errors: bad_data.
 Result<Mesh> read_mesh(const std::shared_ptr<const InputFile>& file, const Snapshot& snapshot);
 
-// Differs if points or cells do; before forget_points().
+// A digest of points and cells; call before forget_points().
 std::string digest_of_mesh(const Mesh& mesh);
 
-// Content of the ghost array among a piece's point or cell data; empty if absent.
+// The ghost array of the point or cell data of a piece; empty if absent.
 Result<std::vector<double>> read_ghosts(const std::shared_ptr<const InputFile>& file,
                                         const std::vector<StoredArray>& arrays);
-// Whether one of its values has one of these bits.
+// Whether a value of the ghost array has any of these bits.
 bool has_bit(double ghost, unsigned bits);
 
-// Where a piece's points (of_cells: cells) lie in the whole: calls row(i j k in the whole, how
-// many) for each row along i, in the piece's order. Errors: those of row.
+// Maps the points (of_cells: cells) of a piece to the whole: calls row(i j k in the whole, count)
+// for each row along i, in the order of the piece. Errors: those of row.
 template <class Row>
 Result<void> for_rows(const Extent& whole, const Extent& piece, bool of_cells, const Row& row) {
   const auto all = of_cells ? whole.cells() : whole.points();
   const auto part = of_cells ? piece.cells() : piece.points();
   std::array<std::int64_t, 3> from{};
   for (std::size_t a = 0; a < 3; ++a) {
-    // A piece of one layer of points at the whole's end has no cells of its own.
+    // A piece of one layer of points at the end of the whole has no own cells.
     from[a] = std::min(piece.first[a] - whole.first[a], all[a] - part[a]);
   }
   for (std::int64_t k = 0; k < part[2]; ++k) {
@@ -68,7 +68,7 @@ Result<void> for_rows(const Extent& whole, const Extent& piece, bool of_cells, c
   return {};
 }
 
-// How many points (of_cells: cells) of the whole lie in no piece. Not of unstructured grids.
+// Number of points (of_cells: cells) of the whole in no piece. Not for unstructured grids.
 std::uint64_t uncovered(const Snapshot& snapshot, bool of_cells);
 
 }  // namespace windsplat::data::vtk

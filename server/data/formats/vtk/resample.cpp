@@ -1,4 +1,4 @@
-// Bounding box and volume -> spacing -> every cell's box over the lattice.
+// Bounding box and volume -> spacing -> samples within the bounding box of every cell.
 #include "server/data/formats/vtk/resample.hpp"
 
 #include <algorithm>
@@ -10,16 +10,16 @@ namespace windsplat::data::vtk {
 
 namespace {
 
-// What may be done over all cells, counted in rows of samples that cells' boxes span and in linear
-// systems solved to find a sample in a cell: a mesh whose cells overlap so much that it takes more
-// is refused. For each sample that lies in a cell if none overlap (meshes of simulations were seen
-// to take 3 to 12), so that a small file cannot ask for much; and in all (minutes).
-constexpr double work_a_sample = 128;
-constexpr std::uint64_t looks_a_work = 32;  // at samples of a row that are in a cell already
+// Limits of the work over all cells, in rows of samples within bounding boxes plus linear systems
+// solved; meshes with too many overlapping cells are rejected. Per sample that would lie in a cell
+// without overlap (typical simulation meshes need 3 to 12), so that small files cannot cause much
+// work; and in total (minutes).
+constexpr double work_per_sample = 128;
+constexpr std::uint64_t visits_per_work = 32;  // of samples that already have a cell
 constexpr std::uint64_t work_max = std::uint64_t{1} << 31;
 constexpr double samples_min_3d = 4096;
 constexpr double samples_min_2d = 1024;
-// Cells whose mean extents differ by less are as long as wide and high: one spacing.
+// Mean extents that differ by a smaller ratio get the same spacing.
 constexpr double even_ratio = 1.25;
 constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
 
@@ -52,14 +52,15 @@ class Resampler {
     for (std::uint64_t c = 0; c < mesh_.cell_count(); ++c) {
       if (auto done = scan(c); !done) return done.error();
     }
-    if (out_.inside == 0) return refuse("has no cell that holds a sample of its bounding box");
+    if (out_.inside == 0) return refuse("has no cell that contains a sample of its bounding box");
     return std::move(out_);
   }
 
  private:
   static Error refuse(const std::string& what) { return make_error(ErrorKind::bad_data, what); }
 
-  // A cell's corners, turned so that a plane's own axes come first. None if it is passed over.
+  // The corners of a cell, permuted such that the axes of a plane come first; Shape::none if
+  // skipped.
   Shape corners_of_cell(std::uint64_t cell, Corners& out) const {
     std::array<std::uint32_t, 8> index{};
     const Shape shape = mesh_.cell(cell, index);
@@ -72,11 +73,11 @@ class Resampler {
     return shape;
   }
 
-  // What cells of one rank extend along the axes of the world, summed up.
+  // Sums of the extents of cells of one rank along the world axes.
   struct Extents {
     std::uint64_t cells = 0;
     Box all;
-    Point across{0, 0, 0};               // their boxes
+    Point across{0, 0, 0};               // of bounding boxes
     std::array<Point, 3> along_index{};  // of hexahedra: edges along i, j, k
   };
 
@@ -94,9 +95,9 @@ class Resampler {
     }
   }
 
-  // The cells' mean extent along each axis, and how many stand one behind the other. Where each
-  // index of a structured grid runs along an axis of its own its steps tell better than boxes,
-  // which slopes make higher than the layers are thick.
+  // Computes the mean extent of cells and the number of layers along each axis. For a structured
+  // grid aligned with the axes, index steps are more accurate than bounding boxes, which are higher
+  // than sloping layers are thick.
   void measure_extents(const Extents& sum) {
     const auto cells = static_cast<double>(sum.cells);
     std::array<std::size_t, 3> index_of{3, 3, 3};
@@ -118,7 +119,7 @@ class Resampler {
     }
   }
 
-  // The bounding box of the cells of the highest rank, and what they measure together.
+  // Computes the bounding box and total volume (or area) of the cells of the highest rank.
   Result<void> measure_all() {
     std::array<Extents, 4> of_rank{};
     Corners corners{};
@@ -134,7 +135,7 @@ class Resampler {
     }
     rank_ = of_rank[3].cells > 0 ? 3 : 2;
     const Extents& sum = of_rank.at(rank_);
-    if (sum.cells == 0) return refuse("has no cells of a kind that is read");
+    if (sum.cells == 0) return refuse("has no cells of a supported kind");
     out_.other_rank = rank_ == 3 ? of_rank[2].cells : 0;
     box_ = sum.all;
     measure_extents(sum);
@@ -150,7 +151,7 @@ class Resampler {
     return {};
   }
 
-  // Cells in a plane x, y or z = constant: its axes come first from here on.
+  // For cells in a plane x, y or z = constant, puts the axes of the plane first.
   Result<void> find_plane() {
     std::size_t flat = 0;
     double longest = 0;
@@ -160,7 +161,7 @@ class Resampler {
       longest = std::max(longest, length);
     }
     if (box_.high[flat] - box_.low[flat] > 1e-6 * longest) {
-      return refuse("is a surface in space, which holds no volume");
+      return refuse("is a surface in space without volume");
     }
     order_ = {flat == 0 ? 1U : 0U, flat == 2 ? 1U : 2U, flat};
     const Box turned = box_;
@@ -173,18 +174,18 @@ class Resampler {
     return {};
   }
 
-  // How many samples shall lie in the cells.
+  // Desired number of samples within cells.
   [[nodiscard]] double wanted_samples() const {
     return std::max(rank_ == 3 ? samples_min_3d : samples_min_2d,
                     0.5 * static_cast<double>(mesh_.point_count() + mesh_.cell_count()));
   }
 
   [[nodiscard]] std::uint64_t work_allowed() const {
-    const double share = work_a_sample * wanted_samples();
+    const double share = work_per_sample * wanted_samples();
     return share < static_cast<double>(work_max) ? static_cast<std::uint64_t>(share) : work_max;
   }
 
-  // The distance of samples along each axis, not yet fitted to the box. Errors: no volume.
+  // Spacing of samples along each axis, before fitting to the box. Errors: no volume.
   Result<Point> wanted_spacing(const Point& length) const {
     double volume = 1;
     double of_cell = 1;
@@ -228,8 +229,8 @@ class Resampler {
         axis = {box_.low[d]};
         continue;
       }
-      // The rest of the box lies half on either side; a box thinner than a step has its two ends,
-      // and so has one with more steps than are allowed.
+      // The remainder of the box is divided between both sides. A box thinner than a step, or with
+      // more steps than allowed, is sampled from end to end.
       const double fitting = std::floor(length[d] / (*spacing)[d] * (1 + 1e-9));
       const double count = std::clamp(fitting, 1.0, lattice_axis_max - 1.0);
       spacing_[d] = count == fitting ? (*spacing)[d] : length[d] / count;
@@ -248,7 +249,7 @@ class Resampler {
     return {};
   }
 
-  // The samples from `low` to `high` along one axis: first and one past the last.
+  // Half-open range of the samples from `low` to `high` along one axis.
   [[nodiscard]] std::array<std::size_t, 2> range(std::size_t d, double low, double high) const {
     if (d >= rank_) return {0, 1};
     constexpr double slack = 1e-6;
@@ -287,19 +288,19 @@ class Resampler {
     return {};
   }
 
-  // The place of a sample, its indices and coordinates in the order of the axes.
+  // Position of a sample; indices and coordinates in the order of the axes.
   [[nodiscard]] Point place_of(const std::array<std::size_t, 3>& index) const {
     Point out{};
     for (std::size_t d = 0; d < 3; ++d) out[d] = out_.coordinates.at(order_[d])[index[d]];
     return out;
   }
 
-  // Seeks `count` samples from `index` on along the first axis, those that are in no cell yet.
+  // Tests `count` samples from `index` on along the first axis that have no cell yet.
   void scan_row(std::uint64_t cell, Shape shape, const Corners& corners, const SlantedBox& slanted,
                 std::array<std::size_t, 3> index, std::size_t count) {
     const auto [from, to] = slanted.along_row(place_of(index), spacing_[0], count);
     const std::size_t begin = index[0];
-    work_ += 1 + (to - from) / looks_a_work;
+    work_ += 1 + (to - from) / visits_per_work;
     for (index[0] = begin + from; index[0] < begin + to; ++index[0]) {
       const std::size_t sample =
           index[0] * stride_[0] + index[1] * stride_[1] + index[2] * stride_[2];
@@ -313,7 +314,7 @@ class Resampler {
   const Mesh& mesh_;
   Resampling out_;
   std::size_t rank_ = 3;
-  std::array<std::size_t, 3> order_{0, 1, 2};  // which axes of the world come first, second, third
+  std::array<std::size_t, 3> order_{0, 1, 2};  // world axes in the order used here
   Box box_;
   double volume_ = 0;
   Point cell_{0, 0, 0};  // mean extents
@@ -339,7 +340,7 @@ void gather_points(const Mesh& mesh, const Resampling& where, const float* value
     const auto weights = corner_weights(shape, where.places[s]);
     double sum = 0;
     for (std::size_t i = 0; i < static_cast<std::size_t>(corners_of(shape)); ++i) {
-      // What has no weight has no say, even where it is missing.
+      // Corners of weight 0 are ignored, even if missing.
       if (weights[i] != 0) sum += weights[i] * static_cast<double>(values[index[i]]);
     }
     out[s] = static_cast<float>(sum);

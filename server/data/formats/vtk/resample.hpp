@@ -1,4 +1,4 @@
-// Meshes of any shape -> an even lattice: the cell containing each sample, found once.
+// Meshes -> a uniform lattice: the cell that contains each sample, computed once.
 #pragma once
 
 #include <array>
@@ -12,33 +12,33 @@
 
 namespace windsplat::data::vtk {
 
-// Samples along one axis and in all, at most.
+// Limits of samples along one axis and in total.
 inline constexpr int lattice_axis_max = 256;
 
 struct Resampling {
   std::array<std::vector<double>, 3> coordinates;
-  // One a sample, x fastest: the cell, or no_cell; and where in it.
+  // Per sample, x fastest: the cell or no_cell, and the position in it.
   std::vector<std::uint32_t> cells;
   std::vector<CellPlace> places;
   std::uint64_t inside = 0;      // samples in a cell
-  std::uint64_t shown = 0;       // cells that were looked through
-  std::uint64_t broken = 0;      // cells without a volume, or with points hidden or not finite
-  std::uint64_t other_rank = 0;  // surfaces where there are volumes
-  // By world axis, how many cells stand one behind the other: of a structured grid whose indices
-  // run along the axes its own number, otherwise from the cells' mean extent.
+  std::uint64_t shown = 0;       // cells examined
+  std::uint64_t broken = 0;      // cells without volume, or with hidden or non-finite points
+  std::uint64_t other_rank = 0;  // surface cells in a mesh with volumes
+  // Number of cells along each world axis: that of the index for a structured grid aligned with the
+  // axes, otherwise by the mean extent of cells.
   std::array<double, 3> layers{0, 0, 0};
 };
 inline constexpr std::uint32_t no_cell = 0xffffffffU;
 
-// The lattice fills the bounding box with even spacing along each axis: the cells' mean extent
-// along it (of a structured grid whose indices run along the axes: the mean step of that index),
-// all scaled by one factor, so that within the cells lie about half as many samples as there are
-// points and cells together, but at least 4096 (in a plane: 1024). Cells whose extents differ by
-// less than a quarter get one spacing. Errors: bad_data, the message without the file's name.
+// The lattice covers the bounding box with uniform spacing along each axis: the mean extent of
+// cells along it (for a structured grid aligned with the axes: the mean step of that index), scaled
+// by one factor such that about half as many samples as points and cells together lie within cells,
+// but at least 4096 (in a plane: 1024). If the extents differ by less than a quarter, all axes have
+// the same spacing. Errors: bad_data, without the file name in the message.
 Result<Resampling> resample(const Mesh& mesh);
 
-// One component on the lattice; samples outside all cells are NaN. values: one a point, which are
-// interpolated, or one a cell.
+// One component on the lattice; samples outside all cells are NaN. values: one per point, which are
+// interpolated, or one per cell.
 void gather_points(const Mesh& mesh, const Resampling& where, const float* values, float* out);
 void gather_cells(const Resampling& where, const float* values, float* out);
 

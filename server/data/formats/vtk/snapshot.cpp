@@ -1,18 +1,18 @@
-// What both kinds of headers must satisfy: extents within limits, arrays that the file can hold.
+// Validation of both kinds of headers: extents within limits, arrays within the file.
 #include "server/data/formats/vtk/snapshot.hpp"
 
 #include <algorithm>
 #include <utility>
 
 #include "server/base/ascii.hpp"
-#include "server/data/cf/grid.hpp"
+#include "server/data/cf/grid/grid.hpp"
 
 namespace windsplat::data::vtk {
 
 namespace {
 
 constexpr auto count_max = static_cast<std::int64_t>(cf::samples_max);
-// Pieces of one cell share each point with seven others, and may have layers of ghosts besides.
+// Pieces of one cell share each point with seven others, and may have ghost layers.
 constexpr std::uint64_t overlap_max = 64;
 
 // The product, or nullopt beyond the supported size.
@@ -35,8 +35,7 @@ std::string text_of(const Extent& extent) {
   return out;
 }
 
-// What is taken to memory is as large as the whole extent: the pieces must be able to fill it, and
-// not many times over.
+// Memory is allocated for the whole extent, so the pieces must cover it, without excessive overlap.
 Result<void> check_cover(const InputFile& file, const Snapshot& snapshot) {
   const std::uint64_t whole = *product(snapshot.whole.points());
   std::uint64_t sum = 0;
@@ -72,7 +71,7 @@ Result<void> check_extents(const InputFile& file, Snapshot& snapshot) {
   return check_cover(file, snapshot);
 }
 
-// Keeps the arrays that fit; the others are left out with the reason. Errors: what is cut short.
+// Keeps the valid arrays and omits the others with a reason. Errors: truncated files.
 Result<void> check_data(const std::shared_ptr<const InputFile>& file, Snapshot& snapshot,
                         std::vector<StoredArray>& arrays, std::uint64_t tuples) {
   std::vector<StoredArray> kept;
@@ -94,7 +93,7 @@ Result<void> check_data(const std::shared_ptr<const InputFile>& file, Snapshot& 
   return {};
 }
 
-// Coordinates and cells that the kind requires.
+// Checks the coordinates and cells required by the kind of grid.
 Result<void> check_geometry(const std::shared_ptr<const InputFile>& file, const Snapshot& snapshot,
                             const Piece& piece) {
   const auto counts = piece.extent.points();
@@ -156,7 +155,7 @@ Result<void> check_snapshot(const std::shared_ptr<const InputFile>& file, Snapsh
     if (auto done = check_geometry(file, snapshot, piece); !done) return done;
     if (auto done = check_data(file, snapshot, piece.point_data, piece.points); !done) return done;
     if (auto done = check_data(file, snapshot, piece.cell_data, piece.cells); !done) return done;
-    // Where nothing was read, nothing shows that the file holds what its extents claim.
+    // Without arrays there is no evidence that the extents match the file.
     if (piece.point_data.empty() && piece.cell_data.empty()) {
       return file->fault("has a piece without an array of as many tuples as points or cells");
     }

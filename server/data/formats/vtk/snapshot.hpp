@@ -1,5 +1,5 @@
-// What the header of one VTK file says, as plain data: xml.cpp and legacy.cpp fill it, grid.cpp and
-// mesh.cpp make places of it.
+// The header of one VTK file as plain data, filled by xml.cpp and legacy.cpp, and converted to
+// positions by grid.cpp and mesh.cpp.
 #pragma once
 
 #include <array>
@@ -19,29 +19,29 @@ namespace windsplat::data::vtk {
 
 enum class Kind { image, rectilinear, structured, unstructured };
 
-// First and last index of points along i, j, k, both within.
+// First and last index of points along i, j, k, inclusive.
 struct Extent {
   std::array<std::int64_t, 3> first{0, 0, 0};
   std::array<std::int64_t, 3> last{0, 0, 0};
 
   [[nodiscard]] std::array<std::int64_t, 3> points() const;  // along each, at least 1
-  // Along each; where there is one point, one layer of cells.
+  // Along each; one layer of cells if there is one point.
   [[nodiscard]] std::array<std::int64_t, 3> cells() const;
   [[nodiscard]] bool holds(const Extent& other) const;
   bool operator==(const Extent&) const = default;
 };
 
 struct Piece {
-  Extent extent;  // all but unstructured
+  Extent extent;  // unused for unstructured grids
   std::uint64_t points = 0;
   std::uint64_t cells = 0;
-  // Of a rectilinear grid x, y, z, one component; of the other kinds one array of 3 components.
+  // For a rectilinear grid x, y and z with one component each; otherwise one array of 3 components.
   std::vector<StoredArray> coordinates;
   std::optional<StoredArray> connectivity;  // unstructured: indices of points
-  std::optional<StoredArray> offsets;       // where each cell's indices end; with offsets_from_zero
-  std::optional<StoredArray> types;         // VTK's cell types
-  bool offsets_from_zero = false;           // one more than cells, the first is 0
-  bool counts_inside = false;               // no offsets: each cell's indices follow their number
+  std::optional<StoredArray> offsets;       // ends of the indices of cells; see offsets_from_zero
+  std::optional<StoredArray> types;         // VTK cell types
+  bool offsets_from_zero = false;           // one more offset than cells; the first is 0
+  bool counts_inside = false;               // no offsets: indices of a cell follow their count
   std::vector<StoredArray> point_data;
   std::vector<StoredArray> cell_data;
 };
@@ -61,13 +61,13 @@ struct Snapshot {
 
 // The name of the array that masks points or cells.
 inline constexpr const char* ghost_name = "vtkGhostType";
-// Its bits.
+// Bits of its values.
 inline constexpr unsigned hidden_point = 2;
 inline constexpr unsigned hidden_cell = 32;
 inline constexpr unsigned refined_cell = 8;
 inline constexpr unsigned duplicate_cell = 1;
 
-// Whether a file beginning so is one of these.
+// Whether the first bytes of a file are those of the format.
 bool is_xml(std::string_view head);
 bool is_legacy(std::string_view head);
 inline constexpr std::size_t head_bytes = 4096;
@@ -76,7 +76,7 @@ inline constexpr std::size_t head_bytes = 4096;
 Result<Snapshot> read_xml(const std::shared_ptr<const InputFile>& file);
 Result<Snapshot> read_legacy(const std::shared_ptr<const InputFile>& file);
 
-// A .pvd file's data sets in the order of their times.
+// The data sets of a .pvd file in the order of their times.
 struct Collection {
   struct Member {
     double time = 0;
@@ -87,8 +87,8 @@ struct Collection {
 // nullopt if the file is not a collection. Errors: bad_data.
 Result<std::optional<Collection>> read_collection(const std::shared_ptr<const InputFile>& file);
 
-// Sets the counts of a piece's points and cells from its extent, and checks every array against
-// them and against the file. Errors: bad_data.
+// Sets the numbers of points and cells of each piece from its extent, and checks every array
+// against them and against the file. Errors: bad_data.
 Result<void> check_snapshot(const std::shared_ptr<const InputFile>& file, Snapshot& snapshot);
 
 }  // namespace windsplat::data::vtk

@@ -1,4 +1,4 @@
-// Steps' files -> one grid, on axes or resampled -> fields that all steps have -> volumes.
+// Files of steps -> one grid, rectilinear or resampled -> fields common to all steps -> volumes.
 #include "server/data/formats/vtk/source.hpp"
 
 #include <algorithm>
@@ -12,10 +12,11 @@
 
 #include "server/base/ascii.hpp"
 #include "server/base/check.hpp"
-#include "server/data/cf/grid.hpp"
+#include "server/data/cf/grid/grid.hpp"
 #include "server/data/cf/time.hpp"
 #include "server/data/formats/vtk/grid.hpp"
 #include "server/data/formats/vtk/mesh.hpp"
+#include "server/data/formats/vtk/piece_target.hpp"
 #include "server/data/formats/vtk/resample.hpp"
 #include "server/data/formats/vtk/snapshot.hpp"
 #include "server/data/model/digest.hpp"
@@ -98,7 +99,7 @@ class VtkSource final : public FileSource {
   }
 
  private:
-  // Which files, and what times a collection gives them.
+  // Finds the files of the steps, and their times in a collection.
   Result<void> find_steps() {
     for (const auto& member : files_->location().members) {
       steps_.push_back({member.name, {}, {}});
@@ -125,7 +126,7 @@ class VtkSource final : public FileSource {
     return {};
   }
 
-  // Opens the file of a step as file_, and notes its identity.
+  // Opens the file of a step as file_ and records its identity.
   Result<Snapshot> open_step(std::size_t step) {
     auto file = files_->open(steps_[step].name);
     if (!file) return file.error();
@@ -161,14 +162,14 @@ class VtkSource final : public FileSource {
     const std::uint64_t count = uncovered(snapshot, of_cells_);
     if (count == 0) return;
     info_.notes.push_back(std::to_string(count) + (of_cells_ ? " cells" : " points") +
-                          " of the whole extent lie in no piece and are masked");
+                          " of the whole extent are in no piece and masked");
   }
 
   [[nodiscard]] const std::vector<StoredArray>& data_of(const Piece& piece) const {
     return of_cells_ ? piece.cell_data : piece.point_data;
   }
 
-  // Points or cells: whichever has more fields, points of equals. The others are left out.
+  // Chooses point or cell data, whichever has more fields, points if equal; omits the other.
   void choose_data(const Snapshot& snapshot) {
     const Piece& piece = snapshot.pieces.front();
     const auto fields = [](const std::vector<StoredArray>& arrays) {
@@ -194,7 +195,7 @@ class VtkSource final : public FileSource {
     mesh_digest_ = digest_of_mesh(*mesh);
     if (kind_ == Kind::structured) {
       if (auto grid = separable_grid(mesh->points, mesh->counts)) {
-        info_.notes.push_back("the structured grid's points lie on axes: shown as it is");
+        info_.notes.push_back("the structured grid is rectilinear: shown without resampling");
         return set_grid(std::move(*grid));
       }
     }
@@ -291,7 +292,7 @@ class VtkSource final : public FileSource {
     return {};
   }
 
-  // Leaves out the fields that a piece lacks.
+  // Omits fields that are missing in a piece.
   void keep_common_fields(const Snapshot& snapshot) {
     std::erase_if(info_.fields, [&](const FieldInfo& field) {
       const bool common =
@@ -322,7 +323,7 @@ class VtkSource final : public FileSource {
     return {};
   }
 
-  // The files' own times if all have one and they ascend; otherwise steps are counted.
+  // Uses the times of the files if all have one and they ascend; otherwise counts steps.
   void set_times() {
     bool timed = true;
     for (std::size_t s = 0; s < steps_.size(); ++s) {
@@ -338,7 +339,7 @@ class VtkSource final : public FileSource {
     }
   }
 
-  // Calls take(tuples, how many) for blocks of a piece's array, in order.
+  // Calls take(tuples, count) for blocks of an array of a piece, in order.
   template <class Take>
   Result<void> read_tuples(const StoredArray& array, const Take& take) {
     auto reader = ArrayReader::open(file_, array);
@@ -364,41 +365,6 @@ class VtkSource final : public FileSource {
       return file_->fault("has changed since it was opened; open it again");
     }
     return array;
-  }
-
-  // Where the tuples of a piece go: offsets from the first sample, in the piece's order.
-  // along[a]: how far neighbours along index axis a lie apart.
-  struct Target {
-    std::ptrdiff_t origin = 0;
-    std::array<std::ptrdiff_t, 3> along{};
-    std::array<std::int64_t, 3> counts{};
-
-    [[nodiscard]] std::size_t at(std::uint64_t tuple) const {
-      const auto t = static_cast<std::int64_t>(tuple);
-      return static_cast<std::size_t>(origin + t % counts[0] * along[0] +
-                                      t / counts[0] % counts[1] * along[1] +
-                                      t / (counts[0] * counts[1]) * along[2]);
-    }
-  };
-
-  // The same grid for a piece of it. world: by index axis the axis of the volume; turned likewise.
-  [[nodiscard]] static Target target_of(const Extent& whole, const Extent& piece, bool of_cells,
-                                        const std::array<std::size_t, 3>& world,
-                                        const std::array<bool, 3>& turned) {
-    const auto all = of_cells ? whole.cells() : whole.points();
-    Target out;
-    out.counts = of_cells ? piece.cells() : piece.points();
-    std::array<std::int64_t, 3> dims{};
-    for (std::size_t a = 0; a < 3; ++a) dims.at(world[a]) = all[a];
-    const std::array<std::int64_t, 3> stride{1, dims[0], dims[0] * dims[1]};
-    for (std::size_t a = 0; a < 3; ++a) {
-      // A piece of one layer of points at the end has its cells in the last layer.
-      const std::int64_t first = std::min(piece.first[a] - whole.first[a], all[a] - out.counts[a]);
-      const std::int64_t step = stride.at(world[a]);
-      out.along[a] = turned[a] ? -step : step;
-      out.origin += turned[a] ? (all[a] - 1 - first) * step : first * step;
-    }
-    return out;
   }
 
   Result<void> fill_regular(const Snapshot& snapshot, std::size_t field, float* out) {
@@ -477,7 +443,7 @@ class VtkSource final : public FileSource {
   }
 
   std::shared_ptr<Files> files_;
-  FilePtr file_;  // of the step read last
+  FilePtr file_;  // of the last step read
   std::vector<StepFile> steps_;
   DatasetInfo info_;
   Kind kind_ = Kind::image;
@@ -485,7 +451,7 @@ class VtkSource final : public FileSource {
   std::optional<double> time_;
   bool of_cells_ = false;
   RegularGrid points_grid_;
-  RegularGrid grid_;          // of what is shown, unless resampled
+  RegularGrid grid_;          // of the shown data, unless resampled
   std::optional<Mesh> mesh_;  // if resampled, without its points
   Resampling resampling_;
   std::string mesh_digest_;

@@ -10,7 +10,7 @@
 
 namespace windsplat::data::vtk {
 
-// Whether the first bytes of a file are those of VTK's formats.
+// Whether the first bytes of a file are those of a VTK format.
 bool is_vtk(std::string_view head);
 
 // Errors: bad_data, not_found.

@@ -1,5 +1,5 @@
-// Bytes of a file, plain or in base64 -> blocks, inflated where they are compressed -> numbers of
-// either byte order; or numbers written as text.
+// Bytes of a file, plain or base64 -> blocks, decompressed if necessary -> numbers of either byte
+// order; or numbers as text.
 #include "server/data/formats/vtk/stored_array.hpp"
 
 #include <lz4.h>
@@ -20,11 +20,11 @@ namespace {
 
 constexpr std::size_t part_bytes_max = std::size_t{1} << 18;
 constexpr std::uint64_t block_bytes_max = std::uint64_t{256} << 20;
-// What a byte of compressed data can at most become: deflate 1032, LZ4 255.
+// Upper bound of the compression ratio: deflate 1032, LZ4 255.
 constexpr std::uint64_t growth_max = 1040;
 constexpr std::size_t token_max = 128;
 
-// 0 to 63; 64 padding, 65 none of base64.
+// 0 to 63; 64: padding; 65: invalid.
 constexpr std::array<unsigned char, 256> base64_values = [] {
   std::array<unsigned char, 256> table{};
   table.fill(65);
@@ -37,13 +37,13 @@ constexpr std::array<unsigned char, 256> base64_values = [] {
   return table;
 }();
 
-// The bytes of a file from an offset on, a buffer at a time.
+// Buffered reader of the bytes of a file from an offset on.
 class FileBytes {
  public:
   FileBytes(std::shared_ptr<const InputFile> file, std::uint64_t offset, std::uint64_t room)
       : file_(std::move(file)), at_(offset), left_(room) {}
 
-  // The next byte; -1 where the room ends. `bad` is set where the file cannot be read.
+  // The next byte; -1 at the end of the array. Sets `bad` if the file cannot be read.
   int next(Result<void>& bad) {
     if (used_ == buffer_.size() && !refill(bad)) return -1;
     return buffer_[used_++];
@@ -166,7 +166,7 @@ class ArrayReader::Stream {
     return {};
   }
 
-  // The table: number of blocks, bytes of each and of the last, compressed bytes of each.
+  // Reads the table: number of blocks, bytes of each and of the last, compressed bytes of each.
   Result<void> begin_blocks(std::uint64_t wanted) {
     std::array<std::uint64_t, 3> head{};
     for (std::uint64_t& number : head) {
@@ -190,14 +190,14 @@ class ArrayReader::Stream {
       const std::uint64_t plain = b + 1 == count && last != 0 ? last : size;
       packed += *bytes;
       if (*bytes > capacity() || packed > capacity() || plain > *bytes * growth_max) {
-        return fault("has a block that the file cannot hold");
+        return fault("has a block that its compressed data cannot hold");
       }
       blocks_.push_back({*bytes, plain});
     }
     return {};
   }
 
-  // Bytes as the file holds them, base64 undone. Padding ends a unit; another may follow.
+  // Reads stored bytes after base64 decoding. Padding ends a unit; another may follow.
   Result<void> stored(unsigned char* out, std::size_t count) {
     if (array_.encoding == Encoding::raw) return bytes_.read(out, count);
     while (count > 0) {
@@ -233,7 +233,7 @@ class ArrayReader::Stream {
     return {};
   }
 
-  // The array's own bytes, in order.
+  // Reads the bytes of the array after decompression.
   Result<void> payload(unsigned char* out, std::size_t count) {
     if (!array_.coding.has_header || array_.coding.compressor == Compressor::none) {
       return stored(out, count);

@@ -1,5 +1,5 @@
-// VTK's XML files (.vti .vtr .vts .vtu .pvd). The text before appended data -> pugixml -> Snapshot;
-// inline arrays are noted by where they lie in the file, and read from there later.
+// XML files of VTK (.vti .vtr .vts .vtu .pvd). The text before appended data -> pugixml ->
+// Snapshot; the locations of inline arrays are recorded for later reading.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -23,16 +23,17 @@ constexpr std::size_t attributes_max = 4'000'000;
 constexpr std::size_t block_bytes = std::size_t{4} << 20;
 constexpr std::string_view appended_tag = "<AppendedData";
 
-// No change of line ends, so that a text's place and length in memory are those in the file.
+// Without normalisation of line ends, so that offsets and lengths in memory equal those in the
+// file.
 constexpr unsigned parse_flags =
     pugi::parse_escapes | pugi::parse_wconv_attribute | pugi::parse_cdata;
 
 struct Text {
-  std::string text;           // what is XML, without appended data
-  bool has_appended = false;  // then the tag begins at text.size()
+  std::string text;           // the XML part, without appended data
+  bool has_appended = false;  // the tag of appended data begins at text.size()
 };
 
-// The file up to its appended data. Errors: bad_data beyond the limit.
+// Reads the file up to its appended data. Errors: bad_data beyond the limit.
 Result<Text> xml_part(const InputFile& file) {
   Text out;
   std::size_t searched = 0;
@@ -113,7 +114,7 @@ class Document {
     if (text_.has_appended) {
       if (auto done = find_appended(); !done) return done;
     }
-    // What is cut before its appended data lacks the root's end.
+    // The text before appended data lacks the end tag of the root.
     if (text_.has_appended) text_.text += "</VTKFile>";
     // In place, so that offsets are those of the file.
     const auto parsed = document_.load_buffer_inplace(text_.text.data(), text_.text.size(),
@@ -168,7 +169,7 @@ class Document {
   static bool extent_of(std::string_view text, Extent& out) {
     std::array<std::int64_t, 6> numbers{};
     if (!parse_list(text, numbers, bytes::to_integer)) return false;
-    // Within what differences of them can be counted in.
+    // Bounded so that differences do not overflow.
     constexpr std::int64_t index_max = std::int64_t{1} << 31;
     for (const std::int64_t number : numbers) {
       if (number < -index_max || number > index_max) return false;
@@ -180,7 +181,7 @@ class Document {
     return true;
   }
 
-  // The tag's own attributes, and where the data begin: behind the first '_'.
+  // Finds the attributes of the tag, and the start of the data after the first '_'.
   Result<void> find_appended() {
     const std::uint64_t tag_at = text_.text.size();
     std::string tag(static_cast<std::size_t>(std::min<std::uint64_t>(512, file_->size() - tag_at)),
@@ -230,7 +231,7 @@ class Document {
     return {};
   }
 
-  // Location of an array's values; nullopt, with the reason, where unsupported.
+  // Location of the values of an array; nullopt if unsupported, with a recorded reason.
   Result<std::optional<StoredArray>> array_of(const xml_node& node, std::uint64_t tuples,
                                               Snapshot& out) {
     StoredArray array;
@@ -338,7 +339,7 @@ class Document {
     return {};
   }
 
-  // Wrong extents give a wrong number here, and are refused in check_snapshot.
+  // Invalid extents yield a wrong number here and are rejected by check_snapshot.
   static std::uint64_t size_of(const std::array<std::int64_t, 3>& counts) {
     std::uint64_t all = 1;
     for (const std::int64_t count : counts) all *= static_cast<std::uint64_t>(count);

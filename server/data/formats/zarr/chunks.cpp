@@ -1,4 +1,4 @@
-// Blocks of numbers out of chunks: those that a block needs are decoded once and kept for the next.
+// Reads blocks from chunks; decoded chunks are cached for the next block.
 #include "server/data/formats/zarr/chunks.hpp"
 
 #include <algorithm>
@@ -16,10 +16,10 @@ namespace windsplat::data::zarr {
 
 namespace {
 
-// Chunks kept: at least so many bytes, and those of one block up to the second figure.
+// Cache limits: the first always, the second for the chunks of one block.
 constexpr std::size_t kept_bytes_least = std::size_t{64} << 20;
 constexpr std::size_t kept_bytes_most = std::size_t{512} << 20;
-constexpr std::size_t bookkeeping_bytes = 256;  // of a chunk kept, however small
+constexpr std::size_t bookkeeping_bytes = 256;  // overhead of a cached chunk
 
 std::uint64_t chunks_along(const ArrayMetadata& array, std::size_t d) {
   return array.shape[d] / array.chunks[d] + (array.shape[d] % array.chunks[d] != 0 ? 1 : 0);
@@ -86,7 +86,7 @@ CopyRow<Out> copier(const Dtype& type) {
   }
 }
 
-// Counts up a place within lengths, the last dimension fastest; false after the last place.
+// Advances an index within lengths, last dimension fastest; false after the last index.
 bool advance(std::vector<std::size_t>& place, const std::vector<std::size_t>& first,
              const std::vector<std::size_t>& last, std::size_t dimensions) {
   for (std::size_t d = dimensions; d-- > 0;) {
@@ -130,7 +130,7 @@ std::vector<std::size_t> strides_of(const std::vector<std::size_t>& lengths, boo
   return out;
 }
 
-// NaN, which is masked, where what an absent chunk holds is undefined or no float holds it.
+// The value of absent chunks; NaN (masked) if undefined or not representable as float.
 double absent_value(const ArrayMetadata& array, bool as_float) {
   constexpr double masked = std::numeric_limits<double>::quiet_NaN();
   const double fill = array.fill_value.value_or(masked);
@@ -138,7 +138,7 @@ double absent_value(const ArrayMetadata& array, bool as_float) {
   return as_float && !fits ? masked : fill;
 }
 
-// Copies (or where bytes are absent fills) row after row of an overlap into the block.
+// Copies an overlap into the block row by row, or fills it if the chunk is absent.
 template <class Out>
 void copy_overlap(const ArrayMetadata& array, const std::vector<unsigned char>& bytes,
                   const Overlap& part, const std::vector<std::size_t>& block, Out* out) {

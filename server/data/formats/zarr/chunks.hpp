@@ -1,4 +1,4 @@
-// Where the chunks of an array lie, in the store and in the array.
+// Numbering of the chunks of an array and their keys in the store.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace windsplat::data::zarr {
 
-// How many chunks an array has; at least one unless a dimension is empty.
+// Number of chunks of an array; at least one unless a dimension is empty.
 std::uint64_t chunk_count(const ArrayMetadata& array);
 
 // The file of a chunk within its array's folder; `number` counts with the last dimension fastest.

@@ -1,4 +1,4 @@
-// Decompression by the C libraries into a buffer of known size, then the filters backwards.
+// Decompression by C libraries into a buffer of known size, then the filters in reverse order.
 #include "server/data/formats/zarr/codec.hpp"
 
 #include <blosc.h>
@@ -57,7 +57,7 @@ bool decompress_blosc(const Bytes& stored, std::size_t bytes, Bytes& out) {
          static_cast<int>(out.size());
 }
 
-// numcodecs puts the length before the block.
+// numcodecs stores the length before the block.
 bool decompress_lz4(const Bytes& stored, std::size_t bytes, Bytes& out) {
   if (stored.size() < 4 || stored.size() > INT_MAX) return false;
   const std::uint64_t claimed = stored[0] | std::uint64_t{stored[1]} << 8U |
@@ -105,7 +105,7 @@ Bytes unshuffle(const Bytes& in, std::size_t element_bytes) {
   return out;
 }
 
-// Calls use(T{}) with the type of the items; false where there is none such.
+// Calls use(T{}) with the type of the items; false for unsupported types.
 template <class Use>
 void with_type(const Dtype& type, const Use& use) {
   const bool is_signed = type.kind == 'i';
@@ -132,7 +132,7 @@ T load(const unsigned char* at) {
   return value;
 }
 
-// Running sums; integers wrap round as NumPy's do.
+// Cumulative sums; integers wrap around as in NumPy.
 template <class T>
 void sum_up(Bytes& bytes) {
   if constexpr (std::is_floating_point_v<T>) {
@@ -177,7 +177,7 @@ void turn_bytes(Bytes& bytes, std::size_t item) {
   }
 }
 
-// Bytes of an item as the compressor saw it.
+// Bytes of an item before compression.
 std::size_t encoded_item_bytes(const ArrayMetadata& array) {
   std::size_t bytes = array.dtype.bytes;
   for (const Filter& filter : array.filters) {

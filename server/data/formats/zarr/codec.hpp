@@ -1,4 +1,4 @@
-// The bytes of a chunk as stored -> those of its items, little-endian, in the chunk's own order.
+// Stored bytes of a chunk -> bytes of its items, little-endian, in the order of the chunk.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +10,11 @@
 
 namespace windsplat::data::zarr {
 
-// The most bytes that a stored chunk of this array may have; longer ones are not even read.
+// Largest size of a stored chunk of this array; larger ones are rejected before reading.
 std::size_t stored_bytes_max(const ArrayMetadata& array);
 
-// chunk_items() items. What the bytes claim of themselves is checked against the array's metadata
-// before anything is written. Errors: bad_data, a clause without a subject.
+// Returns chunk_items() items. Sizes in the stored bytes are checked against the metadata before
+// use. Errors: bad_data; the message is a predicate without subject.
 Result<std::vector<unsigned char>> decode_chunk(const ArrayMetadata& array,
                                                 std::vector<unsigned char> stored);
 

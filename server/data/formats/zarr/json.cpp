@@ -1,4 +1,4 @@
-// A SAX handler that builds the tree and stops at the first breach of a limit.
+// A SAX handler that builds the tree and stops at the first violation of a limit.
 #include "server/data/formats/zarr/json.hpp"
 
 #include <limits>
@@ -37,7 +37,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
     out.text = std::move(value);
     return put(std::move(out));
   }
-  bool binary(binary_t& /*value*/) override { return false; }  // no text holds one
+  bool binary(binary_t& /*value*/) override { return false; }  // does not occur in JSON text
 
   bool start_object(std::size_t /*count*/) override { return open(Json::Kind::object); }
   bool start_array(std::size_t /*count*/) override { return open(Json::Kind::list); }
@@ -47,7 +47,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   bool key(string_t& name) override {
     Open& top = stack_.back();
     if (top.value.object.contains(name)) {
-      fault_ = "it has the key " + in_quotes(name) + " twice";
+      fault_ = "duplicate key " + in_quotes(name);
       return false;
     }
     top.key = std::move(name);
@@ -110,7 +110,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   std::string fault_ = "it is not valid JSON";
 };
 
-// Puts the three bare words between quotes.
+// Quotes the three unquoted words.
 std::string quote_bare_words(std::string_view text) {
   std::string out;
   out.reserve(text.size() + 64);
@@ -146,7 +146,7 @@ const Json* Json::find(std::string_view key) const {
 }
 
 Result<Json> parse_json(std::string_view text) {
-  // The parser takes a NUL for the end of its input.
+  // The parser would treat a NUL as the end of its input.
   if (text.find('\0') != std::string_view::npos) {
     return make_error(ErrorKind::bad_data, "it is not valid JSON: it contains a NUL");
   }

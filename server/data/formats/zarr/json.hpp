@@ -1,4 +1,4 @@
-// JSON as a Zarr store has it: text of bounded depth -> a plain tree.
+// JSON of a Zarr store: text of bounded depth -> a tree.
 #pragma once
 
 #include <cstdint>
@@ -21,12 +21,12 @@ struct Json {
   std::vector<Json> list;
   std::map<std::string, Json, std::less<>> object;
 
-  // A member of an object; null where there is none, or where this is no object.
+  // A member of an object; null if it is absent or this is not an object.
   [[nodiscard]] const Json* find(std::string_view key) const;
 };
 
-// Python writes NaN, Infinity and -Infinity bare, which JSON has not: they become texts. Errors:
-// bad_data for what else is no JSON, repeats a key or is nested more than 32 levels deep.
+// Accepts the unquoted NaN, Infinity and -Infinity of Python as strings. Errors: bad_data for other
+// invalid JSON, duplicate keys, or more than 32 levels of nesting.
 Result<Json> parse_json(std::string_view text);
 
 }  // namespace windsplat::data::zarr

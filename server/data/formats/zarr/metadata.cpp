@@ -1,4 +1,4 @@
-// Every member of .zarray is validated before memory is reserved for it.
+// Validates every member of .zarray before memory is allocated for it.
 #include "server/data/formats/zarr/metadata.hpp"
 
 #include <algorithm>
@@ -44,7 +44,7 @@ Result<std::vector<std::size_t>> lengths(const Json& json, const char* key, std:
   return out;
 }
 
-// nullopt for anything but a plain number.
+// nullopt for types other than plain numbers.
 std::optional<Dtype> parse_dtype(const Json* json) {
   if (json == nullptr || json->kind != Json::Kind::text || json->text.size() != 3) return {};
   const std::string_view text = json->text;

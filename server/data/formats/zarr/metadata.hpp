@@ -19,7 +19,7 @@ struct Dtype {
 
 enum class Compressor { none, zlib, gzip, zstd, lz4, blosc };
 
-// numcodecs' filters, undone in the reverse of their order.
+// Filters of numcodecs, decoded in reverse order.
 struct Filter {
   enum class Kind { shuffle, delta, fixed_scale_offset };
   Kind kind = Kind::shuffle;
@@ -38,16 +38,16 @@ struct ArrayMetadata {
   char separator = '.';
   Compressor compressor = Compressor::none;
   std::vector<Filter> filters;
-  std::optional<double> fill_value;  // none: what an absent chunk holds is undefined
-  std::string problem;               // why its numbers cannot be read; empty if they can
+  std::optional<double> fill_value;  // empty: the values of absent chunks are undefined
+  std::string problem;               // why the array cannot be read; empty if it can
 
   [[nodiscard]] std::size_t chunk_items() const;
 };
 
-// Errors: bad_data for what no Zarr v2 array may say; what we do not read is a `problem`.
+// Errors: bad_data for invalid Zarr v2 metadata; unsupported features set `problem`.
 Result<ArrayMetadata> parse_array(const Json& json);
 
-// The number an attribute or fill_value means, texts NaN, Infinity and -Infinity among them.
+// The number of an attribute or fill_value, including the strings NaN, Infinity and -Infinity.
 std::optional<double> as_number(const Json& json);
 
 }  // namespace windsplat::data::zarr

@@ -159,7 +159,7 @@ Result<void> Store::find_below_root() {
 
 Result<void> Store::add_array(const std::string& name, const std::string& path, const Json& json,
                               Json attributes) {
-  if (!is_plain_name(name)) return broken_store(name, "no name of an array");
+  if (!is_plain_name(name)) return broken_store(name, "is not a valid array name");
   if (found_.size() >= arrays_max) {
     return make_error(ErrorKind::bad_data,
                       "it has more than " + std::to_string(arrays_max) + " arrays");
@@ -172,14 +172,14 @@ Result<void> Store::add_array(const std::string& name, const std::string& path, 
   array.attributes = std::move(attributes);
   array.metadata = std::move(*metadata);
   if (array.metadata.problem.empty() && !path.empty() && !files_->exists(path)) {
-    array.metadata.problem = "the store has no folder of it";
+    array.metadata.problem = "its folder is missing in the store";
   }
   name_dimensions(array);
   found_.push_back(std::move(array));
   return {};
 }
 
-// Without names, arrays of the same lengths in the same places share their dimensions.
+// Without names, arrays share dimensions of equal length at equal positions.
 void Store::name_dimensions(Array& array) const {
   const auto& shape = array.metadata.shape;
   const Json* names = array.attributes.find("_ARRAY_DIMENSIONS");
@@ -201,7 +201,7 @@ void Store::name_dimensions(Array& array) const {
   }
 }
 
-// Coordinates first: where two arrays disagree on a dimension's length, they are right.
+// Coordinates first: their lengths have precedence over those of other arrays.
 void Store::describe_all() {
   contents_.title = text_in(attributes_, "title");
   const auto is_coordinate = [](const Array& array) {
@@ -212,7 +212,7 @@ void Store::describe_all() {
   for (const Array& array : arrays_) describe(array, is_coordinate(array));
 }
 
-// Where every possible field is unread, the reason is worth more than that there is none.
+// If no field can be read, returns the reason instead of a missing field.
 Result<void> Store::check_any_field() const {
   const FileVariable* unread = nullptr;
   for (const FileVariable& variable : contents_.variables) {
@@ -264,12 +264,12 @@ void Store::describe(const Array& array, bool coordinate) {
   contents_.variables.push_back(std::move(variable));
   if (!coordinate && array.metadata.problem.empty() && is_fill_a_number(array)) {
     contents_.notes.push_back(in_quotes(array.name) +
-                              " has the fill_value 0 and no names of dimensions: its zeros are "
-                              "taken for numbers, also where a chunk is absent");
+                              " has fill_value 0 and no dimension names: zeros are shown as "
+                              "values, also in absent chunks");
   }
 }
 
-// Zarr's own default fill_value is 0: only xarray means missing values by it.
+// The default fill_value of Zarr is 0; only xarray uses it for missing values.
 bool Store::is_fill_a_number(const Array& array) const {
   const auto& fill = array.metadata.fill_value;
   return fill && *fill == 0 && !array.named_dimensions;
@@ -314,11 +314,11 @@ cf::Numbers Store::numbers(int variable, const char* attribute) const {
   const auto& fill = array.metadata.fill_value;
   const std::string_view name = attribute;
   const FileVariable& info = contents_.variables.at(static_cast<std::size_t>(variable));
-  // A coordinate has no missing values: there a fill_value is what a writer's defaults left.
+  // Coordinates have no missing values; their fill_value is a default of the writer.
   const bool coordinate = array.dimensions.size() == 1 && array.dimensions[0] == info.name;
   const bool masks = fill && !coordinate && !is_fill_a_number(array);
   if (name == "_FillValue" && out.values.empty()) {
-    // NaN equals nothing: netCDF's default fill values are none of Zarr's.
+    // NaN matches no value, which disables the default fill values of netCDF.
     out.values.push_back(masks ? *fill : std::numeric_limits<double>::quiet_NaN());
     out.floating = array.metadata.dtype.kind == 'f';
   } else if (name == "missing_value" && masks) {

@@ -17,11 +17,11 @@
 
 namespace windsplat::data::zarr {
 
-// Whether a folder has the marks of a Zarr store, of whatever version.
+// Whether a folder is a Zarr store of any version.
 bool is_store(Files& files);
 
-// Conventions are those of xarray: `_ARRAY_DIMENSIONS` names the dimensions, and a fill_value is
-// the array's _FillValue. https://zarr-specs.readthedocs.io/en/latest/v2/v2.0.html
+// Conventions of xarray: `_ARRAY_DIMENSIONS` names the dimensions, and fill_value is _FillValue.
+// https://zarr-specs.readthedocs.io/en/latest/v2/v2.0.html
 class Store final : public cf::ArrayFile {
  public:
   // Errors: bad_data, also for version 3.
@@ -30,7 +30,7 @@ class Store final : public cf::ArrayFile {
   [[nodiscard]] const FileContents& contents() const override { return contents_; }
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] std::string format() const override { return "Zarr v2"; }
-  // Of the metadata and of all chunks, or of 4096 evenly spread over all where there are more.
+  // By the metadata and all chunks, or 4096 evenly distributed ones if there are more.
   [[nodiscard]] std::string identity() const override { return identity_; }
 
   [[nodiscard]] cf::Numbers numbers(int variable, const char* attribute) const override;
@@ -55,7 +55,7 @@ class Store final : public cf::ArrayFile {
     std::vector<std::string> dimensions;
     bool named_dimensions = false;  // by _ARRAY_DIMENSIONS
   };
-  // A decoded chunk; no bytes: it is absent.
+  // A decoded chunk; without bytes if absent.
   struct Chunk {
     std::uint64_t number = 0;
     std::vector<unsigned char> bytes;
@@ -93,10 +93,10 @@ class Store final : public cf::ArrayFile {
   std::vector<Array> arrays_;  // parallel to the variables
   FileContents contents_;
 
-  mutable std::mutex mutex_;  // of the chunks kept
+  mutable std::mutex mutex_;  // guards the cached chunks
   mutable int kept_variable_ = -1;
   mutable std::size_t kept_bytes_ = 0;
-  mutable std::list<Chunk> kept_;  // the one used last in front
+  mutable std::list<Chunk> kept_;  // most recently used first
   mutable std::unordered_map<std::uint64_t, std::list<Chunk>::iterator> kept_by_number_;
 };
 

@@ -1,0 +1,130 @@
+// Options may also come from the environment or the file of --config (config_file.hpp), so every
+// numeric option declares its range here.
+#include "server/cli/serve/options.hpp"
+
+#include "server/cli/command.hpp"
+#include "server/cli/serve/limits.hpp"
+
+namespace windsplat::cli {
+namespace {
+
+constexpr int sessions_max = 100000;
+constexpr int idle_timeout_s_max = 7 * 24 * 3600;
+
+void add_network_options(CLI::App& command, ServeArguments& arguments) {
+  command.add_option("--listen", arguments.listen, "Address and port; port 0: any free port")
+      ->envname("WINDSPLAT_LISTEN")
+      ->type_name("HOST:PORT")
+      ->capture_default_str();
+  command
+      .add_flag("--allow-remote", arguments.allow_remote,
+                "Allow an address reachable from other machines without a token. Clients are not "
+                "authenticated: use an authenticating proxy")
+      ->envname("WINDSPLAT_ALLOW_REMOTE");
+  command
+      .add_flag(
+          "--allow-root", arguments.allow_root,
+          "Allow an address reachable from other machines when running as root. Root is needed "
+          "only to read files restricted to root")
+      ->envname("WINDSPLAT_ALLOW_ROOT");
+  command
+      .add_option("--base-path", arguments.base_path,
+                  "Path below which a proxy forwards to the server")
+      ->envname("WINDSPLAT_BASE_PATH")
+      ->type_name("PATH")
+      ->capture_default_str();
+  command
+      .add_option("--allow-origin", arguments.origins,
+                  "Additional web origin whose pages may connect; may be repeated")
+      ->envname("WINDSPLAT_ALLOW_ORIGIN")
+      ->allow_extra_args(false)
+      ->delimiter(',')
+      ->type_name("ORIGIN");
+  command
+      .add_option(
+          "--allow-host", arguments.hosts,
+          "Additional name accepted in Host. Without a token: loopback names, "
+          "numeric addresses and the hosts of --allow-origin; with a token: all, unless this "
+          "is given. May be repeated")
+      ->envname("WINDSPLAT_ALLOW_HOST")
+      ->allow_extra_args(false)
+      ->delimiter(',')
+      ->type_name("NAME");
+  command.add_option("--max-sessions", arguments.sessions, "Limit of open sessions")
+      ->envname("WINDSPLAT_MAX_SESSIONS")
+      ->check(CLI::Range(1, sessions_max))
+      ->type_name("N")
+      ->capture_default_str();
+  command.add_option("--idle-timeout", arguments.idle_timeout_s, "Close an inactive session after")
+      ->envname("WINDSPLAT_IDLE_TIMEOUT")
+      ->check(CLI::Range(1, idle_timeout_s_max))
+      ->type_name("SECONDS")
+      ->capture_default_str();
+}
+
+void add_access_options(CLI::App& command, ServeArguments& arguments) {
+  command
+      .add_option("--token-file", arguments.token_file,
+                  "Require the token in this file: one line of 16 to 512 letters, "
+                  "digits and -._~+/. Read again on SIGHUP")
+      ->envname("WINDSPLAT_TOKEN_FILE")
+      ->type_name("FILE");
+  command
+      .add_option("--tls-cert", arguments.tls_cert,
+                  "Use TLS with this certificate and its chain (PEM). Read again on SIGHUP")
+      ->envname("WINDSPLAT_TLS_CERT")
+      ->type_name("FILE");
+  command.add_option("--tls-key", arguments.tls_key, "Private key of the certificate (PEM)")
+      ->envname("WINDSPLAT_TLS_KEY")
+      ->type_name("FILE");
+}
+
+void add_data_options(CLI::App& command, ServeArguments& arguments) {
+  command
+      .add_option("--data-root", arguments.data_root,
+                  "Let clients open files below this folder by POST /v1/datasets")
+      ->envname("WINDSPLAT_DATA_ROOT")
+      ->type_name("DIR");
+  command
+      .add_option("--state-dir", arguments.state_dir,
+                  "Store saved views in this folder; default: in memory only")
+      ->envname("WINDSPLAT_STATE_DIR")
+      ->type_name("DIR");
+  add_memory_option(command, arguments.memory_limit);
+  command
+      .add_option("--storage", arguments.storage,
+                  "Of resident data; the error of 16 bits is at most 1/131068 of a field's range")
+      ->envname("WINDSPLAT_STORAGE")
+      ->check(CLI::IsMember({"float32", "packed16"}))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_serve_options(CLI::App& command, ServeArguments& arguments) {
+  command
+      .add_option("datasets", arguments.datasets,
+                  "Names of samples, or files; default: all built-in samples")
+      ->type_name("DATASET");
+  command
+      .add_option("--config", arguments.config,
+                  "JSON file with these options, without dashes. The command line and the "
+                  "environment take precedence. Read again on SIGHUP")
+      ->envname("WINDSPLAT_CONFIG")
+      ->type_name("FILE");
+  add_network_options(command, arguments);
+  add_access_options(command, arguments);
+  add_limit_options(command, arguments.limits);
+  add_data_options(command, arguments);
+  add_threads_option(command, arguments.threads);
+  command.add_option("--log-format", arguments.log_format, "Format of the log on stderr")
+      ->envname("WINDSPLAT_LOG_FORMAT")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
+  command.add_option("--log-level", arguments.log_level, "Lowest level that is logged")
+      ->envname("WINDSPLAT_LOG_LEVEL")
+      ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
+      ->capture_default_str();
+}
+
+}  // namespace windsplat::cli

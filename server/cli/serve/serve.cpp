@@ -1,0 +1,240 @@
+// windsplat serve: opens datasets, then runs the daemon until SIGTERM or SIGINT; SIGHUP reloads
+// configuration, token and certificate, and retries failed datasets.
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "server/base/log.hpp"
+#include "server/base/thread_pool.hpp"
+#include "server/cli/command.hpp"
+#include "server/cli/open_store.hpp"
+#include "server/cli/serve/config_file.hpp"
+#include "server/cli/serve/settings.hpp"
+#include "server/cli/signals.hpp"
+#include "server/data/resident/store.hpp"
+#include "server/data/samples/samples.hpp"
+#include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
+#include "server/transport/server.hpp"
+#include "server/views/saved_views.hpp"
+
+namespace windsplat::cli {
+namespace {
+
+// Options applied at a reload; others require a restart.
+constexpr std::array<std::string_view, 9> live_options{"token-file",   "tls-cert",   "tls-key",
+                                                       "allow-origin", "allow-host", "allow-remote",
+                                                       "allow-root",   "log-format", "log-level"};
+
+// Limit of the wait for a reload at shutdown: a disk may hang.
+constexpr std::chrono::seconds reload_patience{1};
+
+void configure_log(const ServeArguments& arguments) {
+  log::configure(arguments.log_format == "json" ? log::Format::json : log::Format::text,
+                 log::parse_level(arguments.log_level).value_or(log::Level::info));
+}
+
+// Signal handling of the daemon. The watching thread starts before the server, which exists only
+// when the datasets are open.
+class Control {
+ public:
+  explicit Control(const CLI::App& given) : given_(given) {}
+
+  // Applies requests received before the server existed.
+  void arm(net::Server& server, std::shared_ptr<data::Store> store,
+           std::unique_ptr<ServeSettings> started) {
+    store_ = std::move(store);
+    started_ = std::move(started);
+    tls_ = started_->options.tls;
+    while (true) {
+      {
+        const std::lock_guard lock(mutex_);
+        if (!reload_wanted_) {
+          server_ = &server;
+          return;
+        }
+        reload_wanted_ = false;
+      }
+      reload_now([&server](net::Access access) { server.change(std::move(access)); });
+    }
+  }
+  void disarm() {
+    const std::lock_guard lock(mutex_);
+    server_ = nullptr;
+  }
+
+  // Before the server exists the process exits without waiting for a reload.
+  void drain() {
+    const std::lock_guard lock(mutex_);
+    if (server_ == nullptr) _exit(exit_ok);
+    log::info("draining");  // log it before the drain can complete
+    server_->drain();
+  }
+
+  // Called on one thread. Deferred until the server exists.
+  void reload() {
+    {
+      const std::lock_guard lock(mutex_);
+      reload_wanted_ = server_ == nullptr;
+      if (reload_wanted_) return;
+    }
+    reload_now([this](net::Access access) {
+      const std::lock_guard lock(mutex_);
+      if (server_ != nullptr) server_->change(std::move(access));
+    });
+  }
+
+ private:
+  // All or nothing, also when memory or threads are short.
+  void reload_now(const std::function<void(net::Access)>& change) {
+    try {
+      take_over(change);
+    } catch (const std::exception& fault) {
+      log::error("the configuration is unchanged", {{"fault", fault.what()}});
+    }
+  }
+
+  // May block on a disk, so only `change` takes the lock.
+  void take_over(const std::function<void(net::Access)>& change) {
+    const auto fresh = read_settings(given_);
+    if (!fresh) return refuse(fresh.error());
+    const ServeSettings& settings = **fresh;
+    // The address does not change at a reload, so check the rule for the current one.
+    const auto exposed = check_exposure(settings.arguments, started_->options.local_hosts_only);
+    if (!exposed) return refuse(exposed.error());
+    for (const std::string& name : changed_options(started_->command, settings.command)) {
+      if (std::find(live_options.begin(), live_options.end(), name) == live_options.end()) {
+        log::warn("a changed option requires a restart", {{"option", name}});
+      }
+    }
+    const net::ServerOptions& options = settings.options;
+    auto tls = tls_;
+    if ((tls != nullptr) != (options.tls != nullptr)) {
+      log::warn("enabling or disabling TLS requires a restart", {{"option", "tls-cert"}});
+    } else {
+      tls = options.tls;
+    }
+    warn_of(settings);
+    change(
+        {options.allow_origins, options.token, tls, options.known_hosts_only, options.allow_hosts});
+    tls_ = std::move(tls);
+    configure_log(settings.arguments);
+    store_->try_failed_again();
+    log::info("configuration reloaded");
+  }
+
+  static void refuse(const Error& error) {
+    log::error("the configuration is unchanged", {{"fault", error.message}});
+  }
+
+  const CLI::App& given_;
+  std::shared_ptr<data::Store> store_;
+  std::unique_ptr<ServeSettings> started_;
+  std::shared_ptr<net::TlsContext> tls_;  // the newest
+  std::mutex mutex_;                      // guards the members below, held briefly
+  net::Server* server_ = nullptr;
+  bool reload_wanted_ = false;
+};
+
+// Reject a dataset whose default fields cannot be loaded: every frame of it would fail.
+Result<void> check_first_view(const data::Dataset& dataset) {
+  return dataset.check_room(scene::fields_of({}, dataset.info()));
+}
+
+// One bad file does not prevent serving the others: it is listed as failed. The value is the exit
+// code if nothing can be served (that of bad data if any file is bad), else exit_ok.
+int open_datasets(const std::vector<std::string>& named, data::Store& store) {
+  int code = exit_ok;
+  for (const std::string& name : named.empty() ? data::sample_names() : named) {
+    const auto dataset = store.add(name);
+    if (!dataset) {
+      const Error& error = dataset.error();
+      code = code == exit_bad_data ? code : exit_code(error.kind);
+      log::warn("cannot open a dataset", {{"dataset", name}, {"fault", error.message}});
+      store.list_failed(name, error);
+      continue;
+    }
+    const data::DatasetInfo& info = (*dataset)->info();
+    log::info("opened", {{"dataset", info.id},
+                         {"format", info.format},
+                         {"samples", info.grid.samples()},
+                         {"fields", info.fields.size()},
+                         {"steps", info.steps.size()}});
+    const std::string beyond = (*dataset)->beyond_limit(scene::fields_of({}, info));
+    if (!beyond.empty()) {
+      log::warn("the memory limit may be too small for a dataset's first view",
+                {{"dataset", info.id}, {"fault", beyond.substr(2)}});
+    }
+  }
+  if (store.all().empty()) return code;
+  if (code != exit_ok) {
+    log::warn("datasets that cannot be opened are listed as failed",
+              {{"datasets", store.failed().size()}});
+  }
+  return exit_ok;
+}
+
+int serve(const CLI::App& given) {
+  const auto control = std::make_shared<Control>(given);
+  SignalWatch signals([control] { control->drain(); }, [control] { control->reload(); });
+  auto settings = read_settings(given);
+  if (!settings) return answer(settings.error());
+  const ServeArguments arguments = (*settings)->arguments;
+  configure_log(arguments);
+  net::ServerOptions options = (*settings)->options;
+  warn_of(**settings);
+
+  data::StoreOptions stored = store_options(
+      parse_bytes(arguments.memory_limit).value_or(0),
+      arguments.storage == "packed16" ? data::Storage::packed16 : data::Storage::float32);
+  stored.check = check_first_view;
+  const auto store = std::make_shared<data::Store>(std::move(stored));
+  if (const int code = open_datasets(arguments.datasets, *store); code != exit_ok) {
+    for (const data::Store::Failed& failed : store->failed())
+      complain(printable(failed.problem, 2000));
+    return code;
+  }
+  auto views = views::SavedViews::open({arguments.state_dir});
+  if (!views) return answer(views.error());
+  options.views = std::move(*views);
+  net::Server server(std::move(options), store, std::make_shared<ThreadPool>(arguments.threads));
+  if (const auto ok = server.listen(); !ok) return answer(ok.error());
+  const std::string url = server.url();
+  control->arm(server, store, std::move(*settings));
+  int code = exit_ok;
+  if (const auto ok = write_stdout(url + "\n"); !ok) {
+    code = answer(ok.error());
+  } else {
+    server.run();
+    log::info("drained");
+  }
+  control->disarm();  // from here on a signal ends the process
+  if (!signals.settle(reload_patience)) {
+    log::warn("reload did not finish before shutdown");
+    _exit(code);
+  }
+  return code;
+}
+
+}  // namespace
+
+void add_serve(CLI::App& app, Action& chosen) {
+  CLI::App* command =
+      app.add_subcommand("serve", "Serve datasets to browsers; prints the URL to open");
+  const auto arguments = std::make_shared<ServeArguments>();
+  add_serve_options(*command, *arguments);
+  command->callback(
+      [&chosen, arguments, command] { chosen = [arguments, command] { return serve(*command); }; });
+}
+
+}  // namespace windsplat::cli

@@ -1,0 +1,209 @@
+// Validates settings before anything is opened or changed.
+#include "server/cli/serve/settings.hpp"
+
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <ctime>
+#include <filesystem>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "server/base/log.hpp"
+#include "server/cli/command.hpp"
+#include "server/cli/open_store.hpp"
+#include "server/cli/serve/config_file.hpp"
+#include "server/cli/serve/listen_address.hpp"
+#include "server/cli/settings_file.hpp"
+
+namespace windsplat::cli {
+namespace {
+
+constexpr std::size_t token_file_bytes_max = 1024;
+
+// Characters that need no escape in a URL, in segments between single slashes.
+bool is_base_path(const std::string& path) {
+  if (path.empty() || path.front() != '/' || path.find("//") != std::string::npos) return false;
+  return std::all_of(path.begin(), path.end(), [](unsigned char c) {
+    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    return letter || c == '/' || c == '-' || c == '_' || c == '.' || c == '~';
+  });
+}
+
+// Absolute path with links resolved now: later changes of links have no effect.
+Result<std::string> plain_folder(const std::string& folder) {
+  if (folder.empty()) return std::string();
+  std::error_code fault;
+  const std::filesystem::path plain = std::filesystem::canonical(folder, fault);
+  if (fault || !std::filesystem::is_directory(plain, fault)) {
+    return make_error(ErrorKind::invalid,
+                      "--data-root '" + printable(folder) + "' is not an accessible folder");
+  }
+  return plain.native();
+}
+
+bool others_read(const std::string& path) {
+  struct stat facts {};
+  constexpr mode_t others = S_IRGRP | S_IROTH;
+  return ::stat(path.c_str(), &facts) == 0 && (facts.st_mode & others) != 0;
+}
+
+Error of_file(const char* option, const std::string& path, Error error) {
+  error.message = std::string(option) + " '" + printable(path) + "': " + error.message;
+  return error;
+}
+
+Result<std::shared_ptr<const net::Token>> read_token(const std::string& path) {
+  if (path.empty()) return std::shared_ptr<const net::Token>();
+  auto text = read_settings_file(path, token_file_bytes_max);
+  if (!text) return of_file("--token-file", path, text.error());
+  auto token = net::Token::parse(*text);
+  net::wipe(*text);
+  if (!token) return of_file("--token-file", path, token.error());
+  return std::make_shared<const net::Token>(*token);
+}
+
+Result<std::shared_ptr<net::TlsContext>> read_tls(const ServeArguments& arguments) {
+  if (arguments.tls_cert.empty() && arguments.tls_key.empty()) {
+    return std::shared_ptr<net::TlsContext>();
+  }
+  if (arguments.tls_cert.empty() || arguments.tls_key.empty()) {
+    return make_error(ErrorKind::invalid, "--tls-cert and --tls-key must be given together");
+  }
+  const auto chain = read_settings_file(arguments.tls_cert, net::pem_bytes_max);
+  if (!chain) return of_file("--tls-cert", arguments.tls_cert, chain.error());
+  auto key = read_settings_file(arguments.tls_key, net::pem_bytes_max);
+  if (!key) return of_file("--tls-key", arguments.tls_key, key.error());
+  auto tls = net::make_tls(*chain, *key);
+  net::wipe(*key);
+  if (!tls) {
+    return of_file("--tls-cert and --tls-key", arguments.tls_cert + "', '" + arguments.tls_key,
+                   tls.error());
+  }
+  return tls;
+}
+
+// A core dump would contain the secrets. 1 rather than 0: with 0 the kernel still passes a dump to
+// a collecting program (core(5)).
+Result<void> forbid_dumps() {
+  const rlimit one{1, 1};
+  rlimit now{};
+  if (::getrlimit(RLIMIT_CORE, &now) == 0 && now.rlim_cur <= 1 && now.rlim_max <= 1) return {};
+  if (::setrlimit(RLIMIT_CORE, &one) == 0) return {};
+  return make_error(ErrorKind::internal,
+                    "cannot disable core dumps, which would contain secrets: " +
+                        std::generic_category().message(errno));
+}
+
+bool is_host_name(const std::string& name) {
+  return !name.empty() && std::all_of(name.begin(), name.end(), [](unsigned char c) {
+    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    return letter || c == '-' || c == '.' || c == '_';
+  });
+}
+
+Result<void> check_host_names(const std::vector<std::string>& names) {
+  const auto bad = std::find_if_not(names.begin(), names.end(), is_host_name);
+  if (bad == names.end()) return {};
+  return make_error(ErrorKind::malformed, "--allow-host '" + printable(*bad) +
+                                              "' is not a host name such as winds.example");
+}
+
+Result<net::ServerOptions> server_options(const ServeArguments& arguments) {
+  const auto listen = parse_listen_address(arguments.listen);
+  if (!listen) return listen.error();
+  if (const auto ok = check_exposure(arguments, listen->loopback); !ok) return ok.error();
+  if (const auto ok = check_host_names(arguments.hosts); !ok) return ok.error();
+  if (!is_base_path(arguments.base_path)) {
+    return make_error(ErrorKind::malformed, "--base-path '" + printable(arguments.base_path) +
+                                                "' is not of the form /windsplat/");
+  }
+  if (const auto limit = memory_limit(arguments.memory_limit); !limit) return limit.error();
+  auto data_root = plain_folder(arguments.data_root);
+  if (!data_root) return data_root.error();
+  auto token = read_token(arguments.token_file);
+  if (!token) return token.error();
+  auto tls = read_tls(arguments);
+  if (!tls) return tls.error();
+  if (*token != nullptr || *tls != nullptr) {
+    if (const auto ok = forbid_dumps(); !ok) return ok.error();
+  }
+  net::ServerOptions options;
+  options.token = std::move(*token);
+  options.tls = std::move(*tls);
+  options.data_root = std::move(*data_root);
+  options.address = listen->address;
+  options.port = listen->port;
+  options.local_hosts_only = listen->loopback;
+  // Without a token, a page whose name was rebound to this machine could connect.
+  options.known_hosts_only = options.token == nullptr || !arguments.hosts.empty();
+  options.allow_hosts = arguments.hosts;
+  options.base_path = arguments.base_path;
+  options.sessions_max = arguments.sessions;
+  options.idle_timeout_s = arguments.idle_timeout_s;
+  options.limits = arguments.limits;
+  options.allow_origins = arguments.origins;
+  return options;
+}
+
+}  // namespace
+
+Result<void> check_exposure(const ServeArguments& arguments, bool loopback) {
+  if (loopback) return {};
+  const std::string reached =
+      "--listen '" + printable(arguments.listen) + "' is reachable from other machines, and ";
+  if (!arguments.allow_remote && arguments.token_file.empty()) {
+    return make_error(ErrorKind::invalid, reached +
+                                              "clients are not authenticated: use --token-file, or "
+                                              "--allow-remote if this is intended");
+  }
+  if (::geteuid() == 0 && !arguments.allow_root) {
+    return make_error(ErrorKind::invalid,
+                      reached +
+                          "this process runs as root: start it as another user (as "
+                          "deploy/windsplat.service and the Dockerfile do), or use --allow-root if "
+                          "this is intended");
+  }
+  return {};
+}
+
+void warn_of(const ServeSettings& settings) {
+  const ServeArguments& arguments = settings.arguments;
+  const net::ServerOptions& options = settings.options;
+  for (const std::string* secret : {&arguments.token_file, &arguments.tls_key}) {
+    if (!secret->empty() && others_read(*secret)) {
+      log::warn("a secret is readable by other users", {{"file", *secret}});
+    }
+  }
+  if (options.tls != nullptr && net::certificate_ends(*options.tls) < std::time(nullptr)) {
+    log::warn("the certificate has expired", {{"file", arguments.tls_cert}});
+  }
+  const std::string expensive =
+      options.tls != nullptr ? net::expensive_handshakes(*options.tls) : "";
+  if (!expensive.empty()) {
+    log::warn("TLS handshakes are expensive", {{"file", arguments.tls_cert}, {"fault", expensive}});
+  }
+  if (!options.local_hosts_only && options.token != nullptr && options.tls == nullptr) {
+    log::warn("the token is sent unencrypted: use --tls-cert or a proxy with TLS",
+              {{"listen", arguments.listen}});
+  }
+}
+
+Result<std::unique_ptr<ServeSettings>> read_settings(const CLI::App& given) {
+  auto settings = std::make_unique<ServeSettings>();
+  add_serve_options(settings->command, settings->arguments);
+  give_again(given, settings->command);
+  if (const std::string& path = settings->arguments.config; !path.empty()) {
+    if (const auto ok = apply_config(settings->command, path); !ok) return ok.error();
+  }
+  auto options = server_options(settings->arguments);
+  if (!options) return options.error();
+  settings->options = std::move(*options);
+  return settings;
+}
+
+}  // namespace windsplat::cli

@@ -1,0 +1,25 @@
+// Variables on one grid -> fields: vectors composed of their components, then every variable as a
+// scalar.
+#pragma once
+
+#include <vector>
+
+#include "server/data/cf/contents.hpp"
+#include "server/data/model/dataset_info.hpp"
+
+namespace windsplat::data::cf {
+
+struct FieldPlan {
+  FieldInfo info;
+  std::vector<int> variables;  // one per component, indices into FileContents::variables
+};
+
+// variables: those on the chosen grid. vertical: the kind of its z axis (with a depth axis, u and v
+// are a current). Components are identified by the attribute of the netCDF writer, then by
+// standard_name (eastward_, northward_, upward_...), then by common names (u v w, ua va wap, ugrd
+// vgrd, Ex Ey Ez, b_x b_y b_z, ...). They must have the same dimensions in any order, and the first
+// two the same units.
+std::vector<FieldPlan> find_fields(const FileContents& contents, const std::vector<int>& variables,
+                                   AxisKind vertical);
+
+}  // namespace windsplat::data::cf

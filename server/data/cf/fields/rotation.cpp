@@ -1,0 +1,95 @@
+// Tangents as differences of positions on the unit sphere, expressed along local east and north.
+#include "server/data/cf/fields/rotation.hpp"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace windsplat::data::cf {
+
+namespace {
+
+struct Plane {
+  double east = 0;
+  double north = 0;
+};
+
+class Tangents {
+ public:
+  explicit Tangents(const Columns& columns) : columns_(columns) {}
+
+  // From one column to another, as seen from a third.
+  [[nodiscard]] Plane between(std::size_t from, std::size_t to, std::size_t seen_from) const {
+    const auto a = place(from);
+    const auto b = place(to);
+    const double longitude = columns_.longitude[seen_from] * degree;
+    const double latitude = columns_.latitude[seen_from] * degree;
+    const std::array<double, 3> way{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    const double outward = std::cos(longitude) * way[0] + std::sin(longitude) * way[1];
+    Plane plane{-std::sin(longitude) * way[0] + std::cos(longitude) * way[1],
+                -std::sin(latitude) * outward + std::cos(latitude) * way[2]};
+    const double length = std::hypot(plane.east, plane.north);
+    if (length > 0) {
+      plane.east /= length;
+      plane.north /= length;
+    }
+    return plane;
+  }
+
+ private:
+  static constexpr double degree = std::numbers::pi / 180.0;
+  [[nodiscard]] std::array<double, 3> place(std::size_t n) const {
+    const double longitude = columns_.longitude[n] * degree;
+    const double latitude = columns_.latitude[n] * degree;
+    return {std::cos(latitude) * std::cos(longitude), std::cos(latitude) * std::sin(longitude),
+            std::sin(latitude)};
+  }
+  const Columns& columns_;
+};
+
+}  // namespace
+
+GridBearing bearing_of(const Columns& columns, std::size_t width) {
+  const Tangents tangents(columns);
+  const std::size_t count = columns.longitude.size();
+  const std::size_t height = count / width;
+  std::vector<Plane> x(count);
+  std::vector<Plane> y(count);
+  double turning = 0;  // positive if y is to the left of x
+  for (std::size_t n = 0; n < count; ++n) {
+    const std::size_t i = n % width;
+    const std::size_t j = n / width;
+    x[n] = tangents.between(n - (i > 0 ? 1 : 0), n + (i + 1 < width ? 1 : 0), n);
+    y[n] = tangents.between(n - (j > 0 ? width : 0), n + (j + 1 < height ? width : 0), n);
+    turning += x[n].east * y[n].north - x[n].north * y[n].east;
+  }
+  GridBearing bearing;
+  bearing.side = turning < 0 ? -1.0F : 1.0F;
+  const double side = turning < 0 ? -1 : 1;
+  for (std::size_t n = 0; n < count; ++n) {
+    double east = x[n].east + side * y[n].north;
+    double north = x[n].north - side * y[n].east;
+    const double length = std::hypot(east, north);
+    east = length > 0 ? east / length : 1;
+    north = length > 0 ? north / length : 0;
+    bearing.east.push_back(static_cast<float>(east));
+    bearing.north.push_back(static_cast<float>(north));
+  }
+  return bearing;
+}
+
+void rotate(const GridBearing& bearing, std::size_t levels, float* east, float* north) {
+  const std::size_t layer = bearing.east.size();
+  for (std::size_t k = 0; k < levels; ++k) {
+    for (std::size_t n = 0; n < layer; ++n) {
+      float& u = east[k * layer + n];
+      float& v = north[k * layer + n];
+      const float along_x = u * bearing.east[n] + v * bearing.north[n];
+      const float along_y = bearing.side * (v * bearing.east[n] - u * bearing.north[n]);
+      u = along_x;
+      v = along_y;
+    }
+  }
+}
+
+}  // namespace windsplat::data::cf

@@ -1,0 +1,27 @@
+// Rotates vectors given by east and north to the axes of the grid, from the longitudes and
+// latitudes of its columns.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "server/data/model/dataset_info.hpp"
+
+namespace windsplat::data::cf {
+
+// Direction of the x axis at each column. The y axis is perpendicular to it, on the left, or on the
+// right for a left-handed grid (side = -1).
+struct GridBearing {
+  std::vector<float> east;  // components of the unit vector along x
+  std::vector<float> north;
+  float side = 1;
+};
+
+// width: columns along x. Computed from neighbours on the sphere; if the axes are not
+// perpendicular, the mean direction of both.
+GridBearing bearing_of(const Columns& columns, std::size_t width);
+
+// Converts components along east and north to those along x and y in place, for `levels` layers.
+void rotate(const GridBearing& bearing, std::size_t levels, float* east, float* north);
+
+}  // namespace windsplat::data::cf

@@ -1,0 +1,111 @@
+#include "server/data/cf/grid/level_pressures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/data/cf/units.hpp"
+
+namespace windsplat::data::cf {
+
+namespace {
+
+const std::string& variable_name(const ArrayFile& file, int variable) {
+  return file.contents().variables.at(at(variable)).name;
+}
+
+Result<void> place_by_pressure(const ArrayFile& file, HybridLevels hybrid, Placement& grid,
+                               DatasetInfo& info, PressureLevels& pressures) {
+  const Levels all{0, grid.length[2]};
+  const double bytes = decoded_step_bytes(file, grid, hybrid.surface, all);
+  if (auto fine = file.charge(hybrid.surface, bytes); !fine) {
+    info.notes.push_back("levels follow the ground, but their pressures are not known (" +
+                         fine.error().message + "): the file's own coordinate is kept");
+    return {};
+  }
+  std::vector<float> surface(grid.layer());
+  if (auto read = read_variable(file, grid, hybrid.surface, 0, all, surface.data(), [](double) {});
+      !read) {
+    return read;
+  }
+  double sum = 0;
+  double count = 0;
+  for (const float p : surface) {
+    if (!std::isfinite(p)) continue;
+    sum += static_cast<double>(p);
+    ++count;
+  }
+  const bool turned = grid.turned[2];
+  Axis axis = info.grid.axes[2];
+  const auto mean = [&](std::size_t k) {
+    return hybrid.a[k] / hybrid.unit_pa + hybrid.b[k] * sum / count;
+  };
+  // Levels may be counted from the top without the file saying so.
+  if (count > 0 && mean(0) < mean(axis.coordinates.size() - 1)) {
+    std::reverse(hybrid.a.begin(), hybrid.a.end());
+    std::reverse(hybrid.b.begin(), hybrid.b.end());
+    grid.turned[2] = !grid.turned[2];
+  }
+  bool falls = count > 0;
+  for (std::size_t k = 0; k < axis.coordinates.size(); ++k) {
+    axis.coordinates[k] = mean(k);
+    falls = falls && axis.coordinates[k] > 0 &&
+            (k == 0 || axis.coordinates[k] < axis.coordinates[k - 1]);
+  }
+  if (!falls) {
+    grid.turned[2] = turned;
+    info.notes.emplace_back(
+        "levels follow the ground, but their mean pressures do not fall from level to level: "
+        "the file's own coordinate is kept");
+    return {};
+  }
+  axis.kind = AxisKind::pressure;
+  axis.standard_name = "air_pressure";
+  axis.units = hybrid.units;
+  info.grid.axes[2] = std::move(axis);
+  info.notes.push_back(hybrid.note);
+  for (LeftOut& left : info.left_out) {
+    if (left.name == variable_name(file, hybrid.surface)) {
+      left.reason = "surface pressure: gives the pressure of the levels";
+    }
+    for (const int v : hybrid.coefficients) {
+      if (left.name == variable_name(file, v)) left.reason = "coefficient of the levels' pressure";
+    }
+  }
+  pressures.hybrid = std::move(hybrid);
+  return {};
+}
+
+}  // namespace
+
+Result<PressureLevels> find_pressures(const ArrayFile& file, int coordinate, Placement& grid,
+                                      DatasetInfo& info) {
+  PressureLevels pressures;
+  Axis& axis = info.grid.axes[2];
+  const bool by_pressure = axis.kind == AxisKind::pressure;
+  const auto unit = pascals_in(axis.units);
+  if (!by_pressure) {
+    auto hybrid = find_hybrid(file, grid, coordinate);
+    if (!hybrid) return hybrid.error();
+    if (*hybrid) {
+      auto placed = place_by_pressure(file, std::move(**hybrid), grid, info, pressures);
+      if (!placed) return placed.error();
+      return pressures;
+    }
+  }
+  if (by_pressure && unit) {
+    for (const double p : axis.coordinates) pressures.level.push_back(p * *unit);
+    const int surface = find_surface_pressure(file.contents(), grid);
+    if (surface >= 0) {
+      info.notes.push_back(in_quotes(variable_name(file, surface)) +
+                           " is the surface pressure: what lies below it is shown as the file "
+                           "has it, unless it is marked as missing");
+    }
+  }
+  return pressures;
+}
+
+}  // namespace windsplat::data::cf

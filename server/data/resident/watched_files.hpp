@@ -1,0 +1,23 @@
+// Which files a dataset was opened from, and whether they have changed since.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/data/files/files.hpp"
+#include "server/data/files/stamp.hpp"
+#include "server/data/model/source.hpp"
+
+namespace windsplat::data {
+
+// The combined state of the watched files of a dataset.
+FileStamp stamp_of_all(const Location& location, const std::vector<Companion>& companions);
+// States at the time of opening: members as `before`, companions as read by the source.
+std::string stamp_as_opened(FileStamp before, const std::vector<Companion>& companions);
+// Rescans a series whose folder has changed. False: no scan was needed.
+bool match_again(std::optional<Location>& location, std::string& listed);
+// Same text, same files.
+std::string key_of(const Location& location);
+
+}  // namespace windsplat::data

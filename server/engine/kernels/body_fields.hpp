@@ -1,0 +1,230 @@
+// Part of the kernel body: magnitudes and extinctions at the kernel positions of a brick, read from
+// the fields.
+#pragma once
+
+#include "server/engine/kernels/body_rows.hpp"
+
+namespace windsplat::engine::kernels {
+namespace {
+
+constexpr float magnitude_least = 1.17549435e-38F;  // denormal vectors count as zero
+
+// The vectors at kernel positions.
+struct Vectors {
+  Kernel magnitude;         // of the raw data; negative: no line
+  Three<Kernel> direction;  // a unit vector along the axes of the cell
+};
+
+// Lengths and their inverses; the inverse is finite but arbitrary below magnitude_least.
+struct Norm {
+  Kernel length, inverse;
+};
+
+// Avoids overflow and underflow by dividing by the largest component, unless that is zero or of
+// moderate size in every lane.
+KERNEL_INLINE Norm norm_of(const Three<Kernel>& v) {
+  const Kernel top = hn::Max(hn::Max(hn::Abs(v.x), hn::Abs(v.y)), hn::Abs(v.z));
+  const auto moderate = hn::And(hn::Ge(top, all<Kernel>(1e-15F)), hn::Le(top, all<Kernel>(1e15F)));
+  const auto nothing = hn::Le(top, hn::Zero(KernelTag()));
+  if (HWY_LIKELY(hn::AllTrue(KernelTag(), hn::Or(moderate, nothing)))) {
+    const Kernel square = dot3(v, v);
+    const Kernel inverse = inverse_root(hn::Max(square, all<Kernel>(1e-30F)));
+    // One more Newton step: a vector whose length equals a tolerance must not fall below it.
+    const Kernel length = square * inverse;
+    const Kernel rest = hn::NegMulAdd(length, length, square);
+    return {hn::MulAdd(rest, all<Kernel>(0.5F) * inverse, length), inverse};
+  }
+  const Kernel least = all<Kernel>(magnitude_least);
+  const Kernel scale = inverse_of(hn::Max(top, least));
+  const Three<Kernel> unit = {v.x * scale, v.y * scale, v.z * scale};
+  const Kernel length = top * hn::Sqrt(dot3(unit, unit));
+  return {length, inverse_of(hn::Max(length, least))};
+}
+
+// Vectors in the field; zero if masked (a masked sample is masked in every component).
+KERNEL_INLINE Three<Kernel> fetch_vectors(const Pass& pass, const Rows& rows, int i) {
+  const LineStyle& line = pass.line;
+  const Kernel zero = hn::Zero(KernelTag());
+  const Kernel x = fetch(line.velocity[0], rows, i);
+  const Kernel y = fetch(line.velocity[1], rows, i);
+  const Kernel z = line.velocity[2] != nullptr ? fetch(line.velocity[2], rows, i) : zero;
+  const auto masked = is_masked(x);
+  return {hn::IfThenElse(masked, zero, x), hn::IfThenElse(masked, zero, y),
+          hn::IfThenElse(masked, zero, z)};
+}
+
+// Scale factors from vectors of the field to those drawn.
+KERNEL_INLINE Kernel rate_of(const float* rates, const Rows& rows, int a, int i) {
+  if (rates == nullptr) return all<Kernel>(1.0F);
+  alignas(64) float lanes[pair_kernels];
+  for (int k = 0; k < pair_kernels; ++k) lanes[k] = rates[rows.sample[a][k]];
+  return load<Kernel>(lanes + i);
+}
+
+// Unit directions as drawn, and magnitudes; a masked sample or one without a direction gets a
+// negative magnitude.
+KERNEL_INLINE Vectors read_vectors(const Pass& pass, const Rows& rows, int i) {
+  const LineStyle& line = pass.line;
+  const Three<Kernel> v = fetch_vectors(pass, rows, i);
+  const Norm raw = norm_of(v);
+  // Scaled by 1/m first: the products stay finite for any data.
+  const Three<Kernel> drawn = {
+      v.x * raw.inverse * all<Kernel>(line.scale[0]) * rate_of(line.rate_x, rows, 1, i),
+      v.y * raw.inverse * all<Kernel>(line.scale[1]) * all<Kernel>(line.rate_y),
+      v.z * raw.inverse * all<Kernel>(line.scale[2]) * rate_of(line.rate_z, rows, 2, i)};
+  const Norm shown = norm_of(drawn);
+  const auto known = hn::Ge(shown.length, all<Kernel>(magnitude_least));
+  return {hn::IfThenElse(known, raw.length, all<Kernel>(-1.0F)),
+          {drawn.x * shown.inverse, drawn.y * shown.inverse, drawn.z * shown.inverse}};
+}
+
+inline float least_magnitude(const LineStyle& line) {
+  return larger(line.min_magnitude, magnitude_least);
+}
+
+// Upper bound of the width of the cell over all view directions: its longest edge.
+KERNEL_INLINE Kernel cell_longest(const Rows& rows, int i) {
+  const Kernel x = load<Kernel>(rows.cell[0] + i);
+  const Kernel y = load<Kernel>(rows.cell[1] + i);
+  return hn::Max(hn::Max(x, y), load<Kernel>(rows.cell[2] + i));
+}
+
+struct Extinctions {
+  Kernel rho;           // per world unit, sum of all layers
+  MaskOf<Kernel> kept;  // optical depth reaches the tolerance in at least one view direction
+};
+
+KERNEL_INLINE Extinctions read_extinctions(const Pass& pass, const Rows& rows, int i) {
+  const Medium& medium = pass.medium;
+  const Kernel zero = hn::Zero(KernelTag());
+  Kernel total = zero;
+  for (int k = 0; k < medium.layers; ++k) {
+    const Extinction& extinction = medium.layer[k].extinction;
+    const Kernel raw = fetch(medium.layer[k].values, rows, i);
+    const auto masked = is_masked(raw);
+    // The value of the first point extends below it. A masked sample lies below every point.
+    const Kernel value = hn::IfThenElse(masked, all<Kernel>(-3e38F), raw);
+    Kernel rho = hn::IfThenElse(masked, zero, all<Kernel>(extinction.y[0]));
+    for (int p = 0; p < extinction.points; ++p) {
+      const Kernel x = all<Kernel>(extinction.x[p]);
+      const Kernel here =
+          all<Kernel>(extinction.y[p]) + all<Kernel>(extinction.slope[p]) * (value - x);
+      rho = hn::IfThenElse(hn::Ge(value, x), here, rho);
+    }
+    rho = hn::IfThenElse(masked, zero, rho);
+    total = total + hn::Max(rho, zero);
+  }
+  const Kernel depth = total * cell_longest(rows, i) * all<Kernel>(1.0F / footprint_integral);
+  return {total,
+          hn::And(hn::Ge(depth, all<Kernel>(medium.min_optical_depth)), hn::Gt(total, zero))};
+}
+
+// The colour of all layers together, weighted by their extinctions.
+void color_density(const Pass& pass, std::int64_t offset, float* color) {
+  const Medium& medium = pass.medium;
+  if (medium.layers == 1) {
+    look_up(medium.layer[0].color, medium.layer[0].values[offset], color);
+    return;
+  }
+  color[0] = color[1] = color[2] = 0;
+  float total = 0;
+  for (int k = 0; k < medium.layers; ++k) {
+    const MediumLayer& layer = medium.layer[k];
+    const float value = layer.values[offset];
+    if (is_masked(value)) continue;
+    const float rho = extinction_at(layer.extinction, value);
+    if (rho <= 0) continue;
+    float own[3];
+    look_up(layer.color, value, own);
+    for (int c = 0; c < 3; ++c) color[c] += rho * own[c];
+    total += rho;
+  }
+  const float inverse = 1.0F / total;
+  for (int c = 0; c < 3; ++c) color[c] *= inverse;
+}
+
+// Upper bound of the optical depth summed over pixels of a splat of unit extinction: the volume of
+// the cell if it is no narrower than a pixel. A narrower splat is bounded by one that is a pixel
+// wide with the same peak, hence by a section of the cell or its longest chord. `scale` is pixels
+// per world unit. The extents of a curved cell bound all three.
+inline float splat_cover(const Pass& pass, const Rows& rows, int i, float scale) {
+  const bool curved = pass.places != nullptr;
+  float edge[3];
+  for (int a = 0; a < 3; ++a) edge[a] = curved ? pass.cell_max[a] : rows.cell[a][i];
+  const float volume = edge[0] * edge[1] * edge[2];
+  const float faces[3] = {edge[1] * edge[2], edge[2] * edge[0], edge[0] * edge[1]};
+  const auto length = [](const float v[3]) {
+    return square_root(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  };
+  const auto widest = [](const float v[3]) { return larger(larger(v[0], v[1]), v[2]); };
+  const float section = curved ? length(faces) : widest(faces);
+  const float chord = curved ? length(edge) : widest(edge);
+  return larger(larger(volume * scale * scale, section * scale), chord);
+}
+
+// Adds the lines of a pair of rows to the summary. Returns the positions with a line.
+std::uint32_t summarise_lines(const Pass& pass, const Rows& rows, BrickSummary& summary) {
+  const Kernel least = all<Kernel>(least_magnitude(pass.line));
+  std::uint32_t lines = 0;
+  for (int i = 0; i < pair_kernels; i += kernel_lanes) {
+    const std::uint32_t here = pair_bits(rows) >> static_cast<unsigned>(i);
+    const Vectors vectors = read_vectors(pass, rows, i);
+    const auto drawn = hn::Ge(vectors.magnitude, least);
+    const std::uint32_t bits = bits_of<Kernel>(drawn) & here;
+    lines |= bits << static_cast<unsigned>(i);
+    alignas(64) float magnitude[pair_kernels];
+    store(vectors.magnitude, magnitude);
+    for (int k = 0; k < kernel_lanes; ++k) {
+      if ((bits >> static_cast<unsigned>(k) & 1U) != 0) {
+        summary.magnitude_max = larger(summary.magnitude_max, magnitude[k]);
+      } else if ((here >> static_cast<unsigned>(k) & 1U) != 0 && magnitude[k] > 0) {
+        ++summary.weak_lines;
+        summary.weak_parts += smaller(magnitude[k] * pass.line.inverse_full_magnitude, 1.0F);
+      }
+    }
+  }
+  return lines;
+}
+
+// The same for splats.
+std::uint32_t summarise_splats(const Pass& pass, const Rows& rows, float scale,
+                               BrickSummary& summary) {
+  std::uint32_t splats = 0;
+  for (int i = 0; i < pair_kernels; i += kernel_lanes) {
+    const Extinctions found = read_extinctions(pass, rows, i);
+    const std::uint32_t here = pair_bits(rows) >> static_cast<unsigned>(i);
+    const std::uint32_t kept = bits_of<Kernel>(found.kept) & here;
+    splats |= kept << static_cast<unsigned>(i);
+    const auto there = hn::Gt(found.rho, hn::Zero(KernelTag()));
+    std::uint32_t thin = bits_of<Kernel>(there) & here & ~kept;
+    if (thin == 0) continue;
+    alignas(64) float rho[pair_kernels];
+    store(found.rho, rho);
+    for (; thin != 0; thin &= thin - 1U) {
+      const int k = __builtin_ctz(thin);
+      summary.thin_medium += rho[k] * splat_cover(pass, rows, i + k, scale);
+    }
+  }
+  return splats;
+}
+
+void summarise(const Pass& pass, const Brick& brick, float scale, BrickSummary& summary) {
+  Rows rows;
+  open_rows(pass, brick, rows);
+  summary = {};
+  for (int pair = 0; pair < rows.pairs; ++pair) {
+    set_pair(pass, pair, rows);
+    const std::uint32_t lines = pass.has_lines != 0 ? summarise_lines(pass, rows, summary) : 0;
+    const std::uint32_t splats =
+        pass.has_medium != 0 ? summarise_splats(pass, rows, scale, summary) : 0;
+    summary.lines += __builtin_popcount(lines);
+    summary.splats += __builtin_popcount(splats);
+    summary.without_both += __builtin_popcount(pair_bits(rows) & ~(lines | splats));
+  }
+  const int positions = rows.u_count * rows.v_count;
+  summary.without_line = pass.has_lines != 0 ? positions - summary.lines : 0;
+  summary.without_splat = pass.has_medium != 0 ? positions - summary.splats : 0;
+}
+
+}  // namespace
+}  // namespace windsplat::engine::kernels

@@ -1,0 +1,191 @@
+// Part of the kernel body: what a vector of pixels sees of one line and of one splat.
+#pragma once
+
+#include "server/engine/kernels/body_math.hpp"
+#include "server/engine/kernels/prepared.hpp"
+
+namespace windsplat::engine::kernels {
+namespace {
+
+// Style of a line: uniform colour, with a head, or with a head and a moving texture.
+constexpr int style_plain = 0;
+constexpr int style_head = 1;
+constexpr int style_moving = 2;
+
+// Pixel centres of a block, relative to its corner.
+alignas(64) constexpr float lane_x[block_pixels] = {0.5F, 1.5F, 2.5F, 3.5F, 0.5F, 1.5F, 2.5F, 3.5F,
+                                                    0.5F, 1.5F, 2.5F, 3.5F, 0.5F, 1.5F, 2.5F, 3.5F};
+alignas(64) constexpr float lane_y[block_pixels] = {0.5F, 0.5F, 0.5F, 0.5F, 1.5F, 1.5F, 1.5F, 1.5F,
+                                                    2.5F, 2.5F, 2.5F, 2.5F, 3.5F, 3.5F, 3.5F, 3.5F};
+
+// Constants of a line, broadcast to all lanes.
+struct RibbonLanes {
+  Pixel x, y, ux, uy;
+  Pixel wx, wy, w0;   // w = wx dx + wy dy + w0
+  Pixel ratio, bend;  // depth ratio, and depth ratio - 1
+  Pixel tail[3], rise[3];
+  Pixel phase, phase_rise;
+  Pixel reach, steep, opacity;  // the ramp: clamp(reach - steep distance, 0, opacity)
+};
+
+KERNEL_INLINE RibbonLanes spread(const Ribbon& r) {
+  const auto lanes = [](float v) { return all<Pixel>(v); };
+  return {lanes(r.x),
+          lanes(r.y),
+          lanes(r.ux),
+          lanes(r.uy),
+          lanes(r.wx),
+          lanes(r.wy),
+          lanes(r.w0),
+          lanes(r.depth_ratio),
+          lanes(r.bend),
+          {lanes(r.tail[0]), lanes(r.tail[1]), lanes(r.tail[2])},
+          {lanes(r.rise[0]), lanes(r.rise[1]), lanes(r.rise[2])},
+          lanes(r.phase),
+          lanes(r.phase_rise),
+          lanes(r.reach),
+          lanes(r.steep),
+          lanes(r.opacity)};
+}
+
+// The same from the arrays of a brick.
+KERNEL_INLINE RibbonLanes spread(const LineStyle& line, const Ribbons& r, int l) {
+  const auto lanes = [&](const float* v) { return all<Pixel>(v[l]); };
+  const auto one = [](float v) { return all<Pixel>(v); };
+  const float* tail = r.tail[l];
+  const float* rise = r.rise[l];
+  RibbonLanes out;
+  out.x = lanes(r.x);
+  out.y = lanes(r.y);
+  out.ux = lanes(r.ux);
+  out.uy = lanes(r.uy);
+  out.wx = lanes(r.wx);
+  out.wy = lanes(r.wy);
+  out.w0 = lanes(r.w0);
+  out.ratio = lanes(r.depth_ratio);
+  out.bend = lanes(r.bend);
+  for (int c = 0; c < 3; ++c) {
+    out.tail[c] = one(tail[c]);
+    out.rise[c] = one(rise[c]);
+  }
+  out.phase = out.phase_rise = hn::Zero(PixelTag());
+  if (line.moving != 0) {
+    out.phase = lanes(r.phase);
+    out.phase_rise = lanes(r.phase_rise);
+  }
+  out.reach = one(line.reach);
+  out.steep = one(line.steep);
+  out.opacity = one(line.opacity);
+  return out;
+}
+
+struct RibbonLane {
+  Pixel opacity;
+  Pixel f;
+};
+
+// How f is computed from w, the position along the line on the screen, where 1/z is linear. The
+// error of the series is below bend^2 / 6.
+enum class Depth { flat, series, exact };
+constexpr float series_bend_max = 4e-3F;
+
+template <Depth Along>
+KERNEL_INLINE Pixel along_ribbon(const RibbonLanes& r, Pixel w) {
+  const Pixel one = all<Pixel>(1.0F);
+  if (Along == Depth::exact) return w * r.ratio / hn::MulAdd(w, r.bend, one);
+  if (Along == Depth::series) {
+    return hn::MulAdd(hn::NegMulAdd(w, w, w), r.bend, w);
+  }
+  return w;
+}
+
+// dx, dy: pixels from the point f = 0 of the line.
+template <Depth Along, int Style>
+KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
+  const Pixel zero = hn::Zero(PixelTag());
+  const Pixel w = clamped(hn::MulAdd(dx, r.wx, hn::MulAdd(dy, r.wy, r.w0)), zero, all<Pixel>(1.0F));
+  const Pixel ex = hn::NegMulAdd(w, r.ux, dx);
+  const Pixel ey = hn::NegMulAdd(w, r.uy, dy);
+  const Pixel distance = hn::Sqrt(hn::MulAdd(ex, ex, ey * ey));
+  const Pixel cover = clamped(hn::NegMulAdd(distance, r.steep, r.reach), zero, r.opacity);
+  if (Style == style_plain) return {cover, zero};
+  const Pixel f = along_ribbon<Along>(r, w);
+  if (Style == style_moving) {
+    // W(frac(q + 1/2 - phase)), W(p) = 1 - |2 p - 1|.
+    const Pixel one = all<Pixel>(1.0F);
+    const Pixel place = hn::MulAdd(f, r.phase_rise, r.phase);
+    const Pixel p = hn::IfThenElse(hn::Ge(place, one), place - one, place);
+    return {cover * (one - hn::Abs(hn::MulSub(all<Pixel>(2.0F), p, one))), f};
+  }
+  return {cover, f};
+}
+
+// Constants of a splat, broadcast to all lanes.
+struct SplatLanes {
+  Pixel x, y, ex, ey, xx, xy, yy;
+  Pixel b0, bx, by, d0, dx, dy, dxx, dxy, dyy, d2_least;
+  Pixel z, near, strength;
+  Pixel color[3];
+};
+
+KERNEL_INLINE SplatLanes spread(const Splat& s) {
+  const auto lanes = [](float v) { return all<Pixel>(v); };
+  return {
+      lanes(s.x),    lanes(s.y),        lanes(s.ex),
+      lanes(s.ey),   lanes(s.xx),       lanes(s.xy),
+      lanes(s.yy),   lanes(s.b0),       lanes(s.bx),
+      lanes(s.by),   lanes(s.d0),       lanes(s.dx),
+      lanes(s.dy),   lanes(s.dxx),      lanes(s.dxy),
+      lanes(s.dyy),  lanes(s.d2_least), lanes(s.z),
+      lanes(s.near), lanes(s.strength), {lanes(s.color[0]), lanes(s.color[1]), lanes(s.color[2])}};
+}
+
+// A splat along the rays of pixels; see Splats.
+struct SplatLane {
+  Pixel r2;      // squared distance from the centre, cells
+  Pixel tau;     // optical depth of the whole splat
+  Pixel cells;   // per unit of view depth along the ray
+  Pixel behind;  // view depth of the point closest to the centre minus that of the centre
+};
+
+// Start of the rays. `eye`: the splat lies beyond the near plane. `eye_inside`: the same, and its
+// centre lies in the picture, so that (ex, ey) is (x, y). `near_plane`: the splat reaches the near
+// plane; the part before it is removed as if the splat were homogeneous over one cell.
+enum class From { eye, eye_inside, near_plane };
+
+template <bool Perspective, From Start>
+KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixel ray) {
+  const Pixel zero = hn::Zero(PixelTag());
+  const Pixel dx = px - s.x;
+  const Pixel dy = py - s.y;
+  // The quadratic form is non-negative, but its rounded sum may be negative.
+  const Pixel slope = hn::MulAdd(s.xx, dx, s.xy * dy);
+  const Pixel top = hn::Max(hn::MulAdd(slope, dx, s.yy * dy * dy), zero);
+  if constexpr (Perspective) {
+    const Pixel ex = Start == From::eye_inside ? dx : px - s.ex;
+    const Pixel ey = Start == From::eye_inside ? dy : py - s.ey;
+    const Pixel across = hn::MulAdd(s.dxx, ex, s.dxy * ey);
+    const Pixel along = s.dyy * ey;
+    const Pixel bent = hn::MulAdd(across, ex, along * ey);
+    const Pixel length2 =
+        hn::Max(hn::MulAdd(s.dx + across, ex, hn::MulAdd(s.dy + along, ey, s.d0)), s.d2_least);
+    const Pixel inverse = inverse_root(length2);
+    const Pixel inverse2 = inverse * inverse;
+    const Pixel r2 = top * inverse2;
+    const Pixel tau = s.strength * footprint(r2) * (inverse * ray);
+    const Pixel cells = length2 * inverse;
+    const Pixel behind =
+        hn::NegMulAdd(s.z, bent, hn::MulAdd(s.bx, ex, hn::MulAdd(s.by, ey, s.b0))) * inverse2;
+    if (Start == From::near_plane) {
+      const Pixel beyond = hn::MulAdd((s.z - s.near) + behind, cells, all<Pixel>(0.5F));
+      return {r2, tau * clamped(beyond, 0.0F, 1.0F), cells, behind};
+    }
+    return {r2, tau, cells, behind};
+  } else {
+    const Pixel behind = hn::MulAdd(s.bx, dx, s.by * dy);
+    return {top, s.strength * footprint(top), hn::Sqrt(s.d0), behind};
+  }
+}
+
+}  // namespace
+}  // namespace windsplat::engine::kernels

@@ -1,0 +1,240 @@
+// A stop's vector -> its line as it is seen.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "server/engine/reference/kernels.hpp"
+
+namespace windsplat::engine::reference {
+
+namespace {
+
+using scene::LineColor;
+using scene::Scene;
+using scene::VectorLayer;
+
+// ---- jitter: pcg3d (Jarzynski & Olano 2020) ----
+
+using Hash = std::array<std::uint32_t, 3>;
+
+Hash pcg3d(Hash v) {
+  for (auto& c : v) c = c * 1664525U + 1013904223U;
+  for (int round = 0; round < 2; ++round) {
+    v[0] += v[1] * v[2];
+    v[1] += v[2] * v[0];
+    v[2] += v[0] * v[1];
+    if (round == 0) {
+      for (auto& c : v) c ^= c >> 16U;
+    }
+  }
+  return v;
+}
+
+double unit_interval(std::uint32_t bits) { return static_cast<double>(bits >> 8U) / 16777216.0; }
+
+struct Jitter {
+  Vec stride{};      // each in [-1/2, 1/2)
+  Vec centre{};      // each in [-1/2, 1/2)
+  double phase = 0;  // in [0, 1)
+};
+
+Jitter jitter_of(const VectorLayer& layer, const std::array<int, 3>& sample) {
+  const Hash key = pcg3d({layer.seed, layer.epoch, 0x9e3779b9U});
+  const Hash first = pcg3d({static_cast<std::uint32_t>(sample[0]) + key[0],
+                            static_cast<std::uint32_t>(sample[1]) + key[1],
+                            static_cast<std::uint32_t>(sample[2]) + key[2]});
+  const Hash second = pcg3d(first);
+  Jitter jitter;
+  for (int a = 0; a < 3; ++a) {
+    jitter.stride[a] = unit_interval(first[a]) - 0.5;
+    jitter.centre[a] = unit_interval(second[a]) - 0.5;
+  }
+  jitter.phase = unit_interval(pcg3d(second)[0]);
+  return jitter;
+}
+
+// ---- lines ----
+
+// The vector at a kernel position as drawn: `unit` along the axes of the cell (shorter than 1 if a
+// slice removed a component), `extent` from tail to head in world units.
+struct DrawnVector {
+  double magnitude = 0;  // of the data
+  Vec unit{};
+  Vec extent{};
+};
+
+std::optional<DrawnVector> read_vector(const Scene& scene, const VectorLayer& layer,
+                                       const Stop& stop) {
+  Vec data{};
+  for (int c = 0; c < layer.field->components; ++c) {
+    data[c] = static_cast<double>(layer.field->component(c)[stop.index]);
+  }
+  if (std::isnan(data[0])) return {};
+  DrawnVector drawn;
+  drawn.magnitude = length(data);
+  if (drawn.magnitude < layer.min_magnitude || drawn.magnitude == 0) return {};
+  Vec d{};
+  for (int c = 0; c < 3; ++c) d[c] = data[c] / drawn.magnitude * layer.scale[c];
+  if (!layer.rate_x.empty()) {
+    d[0] *= layer.rate_x[stop.sample[1]];
+    d[1] *= layer.rate_y;
+    d[2] *= layer.rate_z[stop.sample[2]];
+  }
+  const double norm = length(d);
+  if (norm == 0) return {};
+  for (int c = 0; c < 3; ++c) drawn.unit[c] = d[c] / norm;
+  if (scene.slice) drawn.unit[scene.slice->axis] = 0;
+  const double full = layer.magnitude_range[1];
+  const double part = full > 0 ? std::clamp(drawn.magnitude / full, 0.0, 1.0) : 1.0;
+  if (!scene.lattice.places) {
+    drawn.extent = scaled(drawn.unit, part * layer.length);
+    return drawn;
+  }
+  Vec along{};
+  for (int a = 0; a < 3; ++a) {
+    along = plus(along, drawn.unit[a] / length(stop.edge[a]), stop.edge[a]);
+  }
+  // The edges of a curved cell need not be perpendicular; keep the length of `unit`.
+  const double bent = length(along);
+  if (bent > 0) along = scaled(along, length(drawn.unit) / bent);
+  drawn.extent = scaled(along, part * layer.length);
+  return drawn;
+}
+
+// The part of a line within its kernel box, as q; empty if low > high. Liang-Barsky in cells.
+struct Part {
+  double low = -0.5;
+  double high = 0.5;
+};
+
+Part clip_to_box(const VectorLayer& layer, const Stop& stop, const Vec& in_box, const Vec& extent) {
+  Part part;
+  const double half = (layer.overlap ? layer.span : 1.0) / 2;
+  const Vec slope = stop.to_cells(extent);
+  for (int a = 0; a < 3; ++a) {
+    if (std::abs(slope[a]) > 1e-30) {
+      const double p = (-half - in_box[a]) / slope[a];
+      const double q = (half - in_box[a]) / slope[a];
+      part.low = std::max(part.low, std::min(p, q));
+      part.high = std::min(part.high, std::max(p, q));
+    } else if (std::abs(in_box[a]) > half) {
+      return {1, 0};
+    }
+  }
+  return part;
+}
+
+// In [0, 360): 0 along +y, 90 along +x.
+double bearing(const Vec& v) {
+  const double degrees = std::atan2(v[0] + 0.0, v[1] + 0.0) * 180 / std::numbers::pi;
+  const double turned = degrees < 0 ? degrees + 360 : degrees;
+  return turned < 360 ? turned : 0;
+}
+
+struct Seen {
+  double z = 0;         // height on the uncurved lattice
+  double distance = 0;  // view depth of the middle of the line
+};
+
+Vec undimmed_color(const Scene& scene, const VectorLayer& layer, const Stop& stop,
+                   const DrawnVector& drawn, const Seen& seen) {
+  const auto [low, high] = scene::height_range(scene.lattice);
+  switch (layer.color_by) {
+    case LineColor::world_z:
+      return table_color(layer.color, seen.z);
+    case LineColor::screen_z:
+      return table_color(layer.color, seen.distance);
+    case LineColor::rise: {
+      const double height = (seen.z - low) / (high - low);
+      const double rise = 0.5 + 0.5 * drawn.unit[2];
+      return table_color(layer.color, (1 - layer.rise_weight) * height + layer.rise_weight * rise);
+    }
+    case LineColor::magnitude:
+      return table_color(layer.color, drawn.magnitude);
+    case LineColor::direction:
+      return table_color(layer.color, bearing(drawn.unit));
+    case LineColor::scalar: {
+      const auto value = static_cast<double>(layer.color_field->values[stop.index]);
+      return std::isnan(value) ? Vec{0.5, 0.5, 0.5} : table_color(layer.color, value);
+    }
+    case LineColor::constant:
+      break;
+  }
+  return table_color(layer.color, 0);
+}
+
+double ramp(double v, double low, double high) {
+  if (high > low) return std::clamp((v - low) / (high - low), 0.0, 1.0);
+  return v > low ? 1 : 0;
+}
+
+void project(const View& view, const Vec& p, double& x, double& y) {
+  const double z = view.perspective ? p[2] : 1;
+  x = view.half_width + p[0] / (z * view.pixel);
+  y = view.half_height + p[1] / (z * view.pixel);
+}
+
+// Clips to the near plane. Returns false if nothing remains.
+bool clip_to_near(const View& view, const Vec& p, const Vec& v, Part& part) {
+  if (!view.perspective) return part.low <= part.high;
+  if (v[2] > 0) part.low = std::max(part.low, (view.near - p[2]) / v[2]);
+  if (v[2] < 0) part.high = std::min(part.high, (view.near - p[2]) / v[2]);
+  return part.low <= part.high && (v[2] != 0 || p[2] >= view.near);
+}
+
+}  // namespace
+
+std::optional<Ribbon> make_ribbon(const Scene& scene, const View& view, const VectorLayer& layer,
+                                  const Stop& stop) {
+  const auto drawn = read_vector(scene, layer, stop);
+  if (!drawn) return {};
+  const Jitter jitter = jitter_of(layer, stop.sample);
+  Vec in_box{};  // centre of the line in its kernel box, cells
+  Vec offset{};  // centre of the line from the kernel position, world units
+  for (int a = 0; a < 3; ++a) {
+    in_box[a] = layer.jitter_center * jitter.centre[a];
+    offset = plus(offset, in_box[a] + layer.jitter_stride * jitter.stride[a], stop.edge[a]);
+  }
+  Part part = clip_to_box(layer, stop, in_box, drawn->extent);
+  const Vec p = to_camera(view, plus(stop.from_eye, 1, offset));
+  const Vec v = to_camera(view, drawn->extent);
+  if (!clip_to_near(view, p, v, part)) return {};
+  Ribbon line;
+  line.q0 = part.low;
+  line.q1 = part.high;
+  line.a = plus(p, part.low, v);
+  line.b = plus(p, part.high, v);
+  if (view.perspective) {
+    line.a[2] = std::max(line.a[2], view.near);
+    line.b[2] = std::max(line.b[2], view.near);
+  }
+  project(view, line.a, line.x0, line.y0);
+  project(view, line.b, line.x1, line.y1);
+  line.r1 = layer.r1;
+  line.r2 = layer.r2;
+  line.opacity = layer.opacity;
+  line.desaturation = layer.head_desaturation;
+  line.perspective = view.perspective;
+  line.moving = layer.moving;
+  const double lift = in_box[2] + layer.jitter_stride * jitter.stride[2];
+  const Seen seen{scene.lattice.positions[2][stop.sample[2]] + lift * stop.cell[2], p[2]};
+  const double strong = ramp(drawn->magnitude, layer.magnitude_range[0], layer.magnitude_range[1]);
+  const double far = ramp(p[2], scene.depth_cue.near, scene.depth_cue.far);
+  const double dim =
+      (1 - layer.magnitude_intensity * (1 - strong)) * (1 - scene.depth_cue.strength * far);
+  line.color = scaled(undimmed_color(scene, layer, stop, *drawn, seen), dim);
+  if (layer.moving) {
+    const double full = layer.magnitude_range[1];
+    const double speed = full > 0 ? std::min(drawn->magnitude / full, 1.0) : 1.0;
+    line.phase = jitter.phase + layer.motion_cycles * speed;
+  }
+  return line;
+}
+
+ScreenBox ribbon_box(const Ribbon& line) {
+  return {std::min(line.x0, line.x1) - line.r2, std::max(line.x0, line.x1) + line.r2,
+          std::min(line.y0, line.y1) - line.r2, std::max(line.y0, line.y1) + line.r2};
+}
+
+}  // namespace windsplat::engine::reference

@@ -1,0 +1,52 @@
+"""What the small files of all formats hold: a seed, its grid and its numbers."""
+
+import math
+import struct
+
+DIMS = (8, 6, 4)  # x, y, z
+COUNT = math.prod(DIMS)
+
+
+class Seed:
+    """Files by name, the first of them the one that is asked for; links by name. `sure`: as it is
+    it must load. `escapes`: it asks for what lies outside."""
+
+    def __init__(self, kind, name, files, links=None, path=None, escapes=False, sure=True):
+        self.kind = kind
+        self.name = name
+        self.files = files
+        self.links = links or {}
+        self.path = path or next(iter(files))
+        self.escapes = escapes
+        self.sure = sure and not escapes
+
+
+def numbers(component, step=0):
+    nx, ny, nz = DIMS
+    return [math.sin(0.7 * x + component) + 0.5 * math.cos(0.9 * y - step) + 0.25 * z
+            for z in range(nz) for y in range(ny) for x in range(nx)]
+
+
+def floats(values, big=False):
+    return struct.pack(f"{'>' if big else '<'}{len(values)}f", *values)
+
+
+def as_text(values):
+    return " ".join(f"{v:.4f}" for v in values) + "\n"
+
+
+def winds(big=False, step=0):
+    """All u, all v, all w."""
+    return b"".join(floats(numbers(c, step), big) for c in range(3))
+
+
+def interleaved(step=0):
+    return [v for triple in zip(*(numbers(c, step) for c in range(3))) for v in triple]
+
+
+def lz4_block(data):
+    """Literals alone."""
+    if len(data) < 15:
+        return bytes([len(data) << 4]) + data
+    rest = len(data) - 15
+    return b"\xf0" + b"\xff" * (rest // 255) + bytes([rest % 255]) + data

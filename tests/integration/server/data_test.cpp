@@ -1,0 +1,366 @@
+// Opening, sharing and slow reading of datasets: one client must not affect another.
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <future>
+#include <thread>
+
+#include "server/api/router.hpp"
+#include "server/data/open/open.hpp"
+#include "server/work/drawing.hpp"
+#include "server/work/viewer.hpp"
+#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/slow_source.hpp"
+
+namespace net_test {
+namespace {
+
+using namespace windsplat;  // NOLINT(google-build-using-namespace)
+namespace fs = std::filesystem;
+
+net::ServerOptions with_root(const fs::path& root) {
+  net::ServerOptions options;
+  options.data_root = root.native();
+  return options;
+}
+
+fs::path folder_of_small() { return fs::path(small_file()).parent_path(); }
+
+// The id of the job.
+std::string post_file(std::uint16_t port, const std::string& path) {
+  const Answer answer =
+      request(port, "POST", "/v1/datasets", {{"Content-Type", "application/json"}},
+              Json{{"path", path}}.dump());
+  EXPECT_EQ(answer.status, 202) << answer.body;
+  return answer.status == 202 ? json_of(answer)["id"].get<std::string>() : "";
+}
+
+Json finished_job(std::uint16_t port, const std::string& id) {
+  for (int i = 0; i < 6000; ++i) {
+    Json job = json_of(get(port, "/v1/jobs/" + id));
+    const auto state = job.value("state", "");
+    if (state != "queued" && state != "running") return job;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  ADD_FAILURE() << "job " << id << " does not end";
+  return {};
+}
+
+bool is_running(std::uint16_t port, const std::string& id) {
+  for (int i = 0; i < 6000; ++i) {
+    if (json_of(get(port, "/v1/jobs/" + id)).value("state", "") == "running") return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
+
+TEST(OpenedDatasets, WhatTheServerBeganWithIsNotForgottenBecauseSomebodyPostedItToo) {
+  TestServer server(with_root(folder_of_small()));
+  const Json job = finished_job(server.port(), post_file(server.port(), "small.nc"));
+  EXPECT_EQ(job["state"], "done");
+  EXPECT_EQ(job["result"], "small");
+  const Answer forgotten = request(server.port(), "DELETE", "/v1/datasets/small?forget=true");
+  EXPECT_EQ(forgotten.status, 403);
+  EXPECT_EQ(get(server.port(), "/v1/datasets/small").status, 200);
+}
+
+// Files are opened once the gate is.
+class SharedDataset : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "windsplat-shared-XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    root_ = name;
+    fs::copy_file(small_file(), root_ / "posted.nc");
+    server_ = std::make_unique<TestServer>(
+        with_root(root_),
+        [gate = gate_, server_has_begun = begun_](
+            const data::Location& location) -> Result<std::unique_ptr<data::Source>> {
+          if (*server_has_begun) gate->pass();
+          auto source = data::open_dataset(data::direct_files(location));
+          if (!source) return source.error();
+          return std::unique_ptr<data::Source>(std::move(*source));
+        });
+    *begun_ = true;
+    first_ = post_file(port(), "posted.nc");
+    ASSERT_TRUE(gate_->wait_for(1)) << "the first one opens it";
+    second_ = post_file(port(), "posted.nc");
+    ASSERT_TRUE(is_running(port(), second_)) << "the second one waits for the first";
+  }
+  void TearDown() override {
+    gate_->open();
+    server_.reset();
+    fs::remove_all(root_);
+  }
+  [[nodiscard]] std::uint16_t port() const { return server_->port(); }
+  void cancel(const std::string& job) const {
+    EXPECT_EQ(request(port(), "DELETE", "/v1/jobs/" + job).status, 204);
+  }
+
+  fs::path root_;
+  std::shared_ptr<Gate> gate_ = std::make_shared<Gate>();
+  std::shared_ptr<std::atomic<bool>> begun_ = std::make_shared<std::atomic<bool>>(false);
+  std::unique_ptr<TestServer> server_;
+  std::string first_;
+  std::string second_;
+};
+
+TEST_F(SharedDataset, IsThereForTheFirstWhenTheSecondCancels) {
+  cancel(second_);
+  gate_->open();
+  EXPECT_EQ(finished_job(port(), second_)["state"], "cancelled");
+  EXPECT_EQ(finished_job(port(), first_)["state"], "done");
+  EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 200);
+}
+
+TEST_F(SharedDataset, IsThereForTheSecondWhenTheFirstCancels) {
+  cancel(first_);
+  gate_->open();
+  EXPECT_EQ(finished_job(port(), first_)["state"], "cancelled");
+  EXPECT_EQ(finished_job(port(), second_)["state"], "done");
+  EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 200);
+  EXPECT_EQ(request(port(), "DELETE", "/v1/datasets/posted?forget=true").status, 204)
+      << "it was opened by POST all the same";
+  EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 404);
+}
+
+TEST_F(SharedDataset, GoesWithTheLastThatCancels) {
+  cancel(first_);
+  cancel(second_);
+  gate_->open();
+  EXPECT_EQ(finished_job(port(), first_)["state"], "cancelled");
+  EXPECT_EQ(finished_job(port(), second_)["state"], "cancelled");
+  EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 404);
+}
+
+// A disk that does not answer until the read is cancelled.
+class StuckSource : public data::Source {
+ public:
+  StuckSource(std::unique_ptr<data::Source> source, std::shared_ptr<Gate> gate)
+      : source_(std::move(source)), gate_(std::move(gate)) {}
+  [[nodiscard]] const data::DatasetInfo& info() const override { return source_->info(); }
+  Result<data::Volume> read(std::size_t /*field*/, std::size_t /*step*/) override {
+    gate_->pass();
+    gate_->close();
+    return make_error(ErrorKind::cancelled, "reading was cancelled");
+  }
+  void cancel() override { gate_->open(); }
+
+ private:
+  std::unique_ptr<data::Source> source_;
+  std::shared_ptr<Gate> gate_;
+};
+
+// Its client is there and waits, so 499 would not be true.
+TEST(ForgottenDatasets, APictureThatWaitsForOneIsToldWhatBecameOfIt) {
+  std::string name = (fs::temp_directory_path() / "windsplat-forgot-XXXXXX").string();
+  ASSERT_NE(mkdtemp(name.data()), nullptr);
+  fs::copy_file(small_file(), name + "/posted.nc");
+  const auto gate = std::make_shared<Gate>();
+  {
+    TestServer server(
+        with_root(name),
+        [gate](const data::Location& location) -> Result<std::unique_ptr<data::Source>> {
+          auto source = data::open_dataset(data::direct_files(location));
+          if (!source) return source.error();
+          return std::unique_ptr<data::Source>(
+              std::make_unique<StuckSource>(std::move(*source), gate));
+        });
+    const std::uint16_t port = server.port();
+    ASSERT_EQ(finished_job(port, post_file(port, "posted.nc"))["state"], "done");
+    int reads = 0;
+    for (const auto& [words, status] : {std::pair("", 409), std::pair("?forget=true", 404)}) {
+      auto picture = std::async(std::launch::async, [port] {
+        return get(port, "/v1/datasets/posted/frame.jpg?width=32&height=24");
+      });
+      ASSERT_TRUE(gate->wait_for(++reads));
+      EXPECT_EQ(request(port, "DELETE", std::string("/v1/datasets/posted") + words).status, 204);
+      const Answer answer = picture.get();
+      EXPECT_EQ(answer.status, status) << answer.body;
+    }
+  }
+  fs::remove_all(name);
+}
+
+// Files that differ only in their folder: name, size and time are equal.
+TEST(KnownRanges, AreNotThoseOfAnotherFileThatLooksTheSameFromOutside) {
+  std::string name = (fs::temp_directory_path() / "windsplat-twins-XXXXXX").string();
+  ASSERT_NE(mkdtemp(name.data()), nullptr);
+  const fs::path root = name;
+  fs::create_directory(root / "a");
+  fs::create_directory(root / "b");
+  // NRRD of four numbers each.
+  const auto write = [&](const char* path, const std::string& numbers) {
+    std::ofstream(root / path) << "NRRD0004\ntype: float\ndimension: 3\nsizes: 2 2 2\n"
+                               << "encoding: ascii\n\n"
+                               << numbers << '\n';
+  };
+  write("a/twin.nrrd", "1 2 3 4 5 6 7 8");
+  write("b/twin.nrrd", "2 3 4 5 6 7 8 9");
+  fs::last_write_time(root / "b/twin.nrrd", fs::last_write_time(root / "a/twin.nrrd"));
+  {
+    TestServer server(with_root(root));
+    std::vector<Json> ranges;
+    for (const char* path : {"a/twin.nrrd", "b/twin.nrrd"}) {
+      const Json job = finished_job(server.port(), post_file(server.port(), path));
+      ASSERT_EQ(job["state"], "done") << job;
+      const std::string dataset = "/v1/datasets/" + job["result"].get<std::string>();
+      const Json about = json_of(get(server.port(), dataset));
+      const std::string field = about["fields"][0]["name"];
+      ranges.push_back(
+          json_of(get(server.port(), dataset + "/fields/" + field + "/range?of=all"))["range"]);
+    }
+    EXPECT_EQ(ranges[0], Json({1, 8}));
+    EXPECT_EQ(ranges[1], Json({2, 9}));
+  }
+  fs::remove_all(root);
+}
+
+TEST(Loads, ADatasetThatHangsLeavesTheOthersATurn) {
+  const auto gate = std::make_shared<Gate>();
+  std::string name = (fs::temp_directory_path() / "windsplat-hangs-XXXXXX").string();
+  ASSERT_NE(mkdtemp(name.data()), nullptr);
+  const fs::path root = name;
+  fs::copy_file(small_file(), root / "hangs.nc");
+  TestServer server(
+      with_root(root),
+      [gate](const data::Location& location) -> Result<std::unique_ptr<data::Source>> {
+        auto source = data::open_dataset(data::direct_files(location));
+        if (!source) return source.error();
+        if (location.stem != "hangs") return std::unique_ptr<data::Source>(std::move(*source));
+        return std::unique_ptr<data::Source>(
+            std::make_unique<SlowSource>(std::move(*source), gate));
+      });
+  ASSERT_EQ(finished_job(server.port(), post_file(server.port(), "hangs.nc"))["state"], "done");
+  const std::string probe = "/v1/datasets/hangs/probe?x=0&y=0&z=500&step=";
+  std::vector<std::unique_ptr<Socket>> waiting;
+  for (int i = 0; i < 8; ++i) {  // as many as one address may have
+    waiting.push_back(std::make_unique<Socket>(server.port()));
+    waiting.back()->send("GET " + probe + std::to_string(i % small_steps) +
+                         " HTTP/1.1\r\nHost: x\r\n\r\n");
+  }
+  ASSERT_TRUE(gate->wait_for(1));
+  // More of them than there are threads stand in line before any of these.
+  EXPECT_EQ(get(server.port(), "/v1/datasets/small/probe?x=0&y=0&z=500&step=0").status, 200);
+  EXPECT_EQ(get(server.port(), "/v1/datasets/small/frame.png?width=32&height=32").status, 200);
+  EXPECT_EQ(get(server.port(), "/v1/datasets/small").status, 200);
+  EXPECT_EQ(gate->arrived(), 1);
+  gate->open();
+  for (const auto& socket : waiting) EXPECT_EQ(read_answer(*socket).status, 200);
+  fs::remove_all(root);
+}
+
+TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesWaitForNobody) {
+  Gate gate;
+  const auto one = std::make_shared<int>(1);
+  std::mutex mutex;
+  std::vector<int> order;
+  const auto note = [&](int number) {
+    const std::lock_guard lock(mutex);
+    order.push_back(number);
+  };
+  std::promise<void> cancelled_ran;
+  std::promise<void> other_ran;
+  std::promise<void> last_ran;
+  net::LoadService loads(2, 16, "loads");  // last: its threads use all of these until they end
+  ASSERT_TRUE(loads.submit({{}, [&] { gate.pass(); }, false, one}));
+  ASSERT_TRUE(gate.wait_for(1));
+  const CancelToken unwanted;
+  for (const int i : {1, 2, 3}) ASSERT_TRUE(loads.submit({{}, [&, i] { note(i); }, false, one}));
+  ASSERT_TRUE(loads.submit({unwanted, [&] { cancelled_ran.set_value(); }, false, one}));
+  ASSERT_TRUE(loads.submit({{}, [&] { last_ran.set_value(); }, false, one}));
+  unwanted.cancel();
+  ASSERT_TRUE(loads.submit({{}, [&] { other_ran.set_value(); }}));
+  cancelled_ran.get_future().wait();
+  other_ran.get_future().wait();
+  note(0);
+  gate.open();
+  last_ran.get_future().wait();  // end() cancels what waits, and cancelled ones keep no order
+  loads.end();
+  EXPECT_THAT(order, testing::ElementsAre(0, 1, 2, 3));
+}
+
+// The line of one dataset is full: others still get in.
+TEST(Loads, EveryDatasetHasALineOfItsOwn) {
+  Gate gate;
+  net::LoadService loads(2, 2, "loads");
+  const auto one = std::make_shared<int>(1);
+  const auto two = std::make_shared<int>(2);
+  ASSERT_TRUE(loads.submit({{}, [&] { gate.pass(); }, false, one}));
+  ASSERT_TRUE(gate.wait_for(1));
+  EXPECT_TRUE(loads.submit({{}, [] {}, false, one}));
+  EXPECT_TRUE(loads.submit({{}, [] {}, false, one}));
+  const auto refused = loads.submit({{}, [] {}, false, one});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::busy);
+  EXPECT_TRUE(loads.submit({{}, [] {}, false, two}));
+  gate.open();
+}
+
+// Views that say nothing of their fields' ranges, so that working out what they will need reads
+// the field they show; all but one in vain.
+TEST(Viewer, OfManyWishesThatWaitOnlyTheNewestIsWorkedOut) {
+  const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
+  const auto dataset = store->add("climate:32x16x6").value();
+  const std::string scalar = dataset->info().first(data::FieldKind::scalar)->name;
+  const std::string vector = dataset->info().first(data::FieldKind::vector)->name;
+  Gate gate;
+  std::promise<void> done;
+  net::Services services({}, store, std::make_shared<ThreadPool>(2));
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(services.backend.loads.submit({{}, [&] { gate.pass(); }}));
+  }
+  ASSERT_TRUE(gate.wait_for(2)) << "both threads are taken";
+  protocol::View of_scalar;
+  of_scalar.dataset = dataset->info().id;
+  protocol::View of_vector = of_scalar;
+  of_scalar.vector.field = {protocol::FieldChoice::Kind::none, ""};
+  of_scalar.scalars.emplace(1);
+  of_scalar.scalars->front().field = scalar;
+  of_vector.scalars.emplace();
+  net::Viewer viewer(services.backend, 1, "192.0.2.1");
+  for (int i = 0; i < 1000; ++i) {
+    viewer.start(session::Prefetch{i < 999 ? of_scalar : of_vector, {1}, {}});
+  }
+  ASSERT_TRUE(
+      services.backend.loads.submit({{}, [&] { done.set_value(); }, true, dataset->shared_info()}));
+  gate.open();
+  done.get_future().wait();
+  EXPECT_FALSE(dataset->seen(scalar, 0)) << "the prefetch request was withdrawn";
+  EXPECT_TRUE(dataset->seen(vector, 0));
+}
+
+TEST(Drawings, ARequestThatWasLetInIsNotRefusedOnceItsDataIsThere) {
+  Gate gate;  // before the services, whose threads use it until they end
+  std::promise<std::string> told;
+  const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
+  net::Services services({}, store, std::make_shared<ThreadPool>(1));
+  net::Drawing drawing;
+  drawing.dataset = store->add("climate:8x8x4").value();
+  drawing.draw = [&](const net::PreparedPicture& /*picture*/, data::Dataset& /*dataset*/,
+                     std::int64_t /*queue_us*/, net::Loading loading) {
+    told.set_value(loading == net::Loading::allowed ? "drawn" : "drawn without loading");
+  };
+  // While it loads, as many others come as may wait.
+  drawing.prepare = [&](data::Dataset& dataset, net::Loading loading) -> Result<net::PreparedPtr> {
+    if (loading == net::Loading::none) return make_error(ErrorKind::not_resident, "not loaded");
+    const auto hold = [&](std::int64_t /*queue_us*/) { gate.pass(); };
+    const net::RenderService::Job job{net::RenderService::Kind::request, 1, {}, hold, false, 0};
+    EXPECT_TRUE(services.backend.renderer.submit(job));
+    EXPECT_TRUE(gate.wait_for(1));
+    while (services.backend.renderer.submit(job)) {
+    }
+    return net::prepare_picture(frame::complete({}, dataset).value(), {}, {}, dataset, loading);
+  };
+  drawing.fail = [&](const Error& error) { told.set_value(error.message); };
+  ASSERT_TRUE(net::submit(services.backend, std::move(drawing)));
+  ASSERT_TRUE(gate.wait_for(1));
+  gate.open();
+  EXPECT_EQ(told.get_future().get(), "drawn");
+}
+
+}  // namespace
+}  // namespace net_test

@@ -1,0 +1,211 @@
+// Jobs: states, limits, cancellation, and that an error of the work fails only its job.
+#include "server/work/jobs.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+
+namespace windsplat::net {
+namespace {
+
+using testing::ElementsAre;
+
+// Holds jobs until it is opened.
+class Gate {
+ public:
+  void open() {
+    const std::lock_guard lock(mutex_);
+    open_ = true;
+    changed_.notify_all();
+  }
+  void pass() {
+    std::unique_lock lock(mutex_);
+    ++inside_;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return open_; });
+    --inside_;
+  }
+  void wait_for_inside(int count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return inside_ >= count; });
+  }
+  int inside() {
+    const std::lock_guard lock(mutex_);
+    return inside_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool open_ = false;
+  int inside_ = 0;
+};
+
+std::string submitted(Jobs& jobs, Jobs::Work work) {
+  const auto job = jobs.submit("dataset", std::move(work));
+  EXPECT_TRUE(job);
+  return job ? job->id : "";
+}
+
+protocol::JobDescription finished(const Jobs& jobs, const std::string& id) {
+  while (true) {
+    const auto job = jobs.find(id);
+    if (!job || (job->state != "queued" && job->state != "running")) {
+      EXPECT_TRUE(job) << id;
+      return job ? *job : protocol::JobDescription{};
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+TEST(Jobs, AResultAnErrorAndAFaultEachEndTheirJobAlone) {
+  Jobs jobs(8, 2);
+  const auto good = submitted(jobs, [](const Jobs::Handle&) { return Result<std::string>("gcm"); });
+  const auto bad = submitted(jobs, [](const Jobs::Handle&) -> Result<std::string> {
+    return make_error(ErrorKind::bad_data, "not a file of ours");
+  });
+  const auto thrown = submitted(jobs, [](const Jobs::Handle&) -> Result<std::string> {
+    throw std::runtime_error("at somebody/source.cpp:7");
+  });
+  const auto hungry =
+      submitted(jobs, [](const Jobs::Handle&) -> Result<std::string> { throw std::bad_alloc(); });
+  const auto done = finished(jobs, good);
+  EXPECT_EQ(done.state, "done");
+  EXPECT_EQ(done.progress, 1);
+  EXPECT_EQ(done.result, protocol::JobResult("gcm"));
+  EXPECT_FALSE(done.problem);
+  const auto failed = finished(jobs, bad);
+  EXPECT_EQ(failed.state, "failed");
+  ASSERT_TRUE(failed.problem);
+  EXPECT_EQ(failed.problem->status, 422);
+  EXPECT_EQ(failed.problem->detail, "not a file of ours");
+  EXPECT_FALSE(failed.result);
+  EXPECT_EQ(finished(jobs, thrown).problem->status, 500);
+  EXPECT_THAT(finished(jobs, thrown).problem->detail,
+              testing::Not(testing::HasSubstr("source.cpp")));
+  EXPECT_EQ(finished(jobs, hungry).problem->status, 507);
+  EXPECT_FALSE(jobs.find("99"));
+  EXPECT_FALSE(jobs.cancel("99"));
+}
+
+TEST(Jobs, NoMoreRunThanMayAndTheOthersWait) {
+  Gate gate;
+  Jobs jobs(8, 2);
+  std::vector<std::string> ids;
+  for (int i = 0; i < 5; ++i) {
+    ids.push_back(submitted(jobs, [&](const Jobs::Handle& handle) {
+      handle.report_progress(0.5);
+      gate.pass();
+      return Result<std::string>("x");
+    }));
+  }
+  gate.wait_for_inside(2);
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_EQ(gate.inside(), 2);
+  std::vector<std::string> states;
+  for (const auto& job : jobs.list()) states.push_back(job.state);
+  EXPECT_THAT(states, ElementsAre("running", "running", "queued", "queued", "queued"));
+  EXPECT_EQ(jobs.find(ids[0])->progress, 0.5);
+  EXPECT_GE(jobs.find(ids[0])->eta_ms.value_or(-1), 0);
+  EXPECT_FALSE(jobs.find(ids[4])->eta_ms);
+  gate.open();
+  for (const auto& id : ids) EXPECT_EQ(finished(jobs, id).state, "done");
+}
+
+TEST(Jobs, SlowOnesLeaveAThreadToTheOthers) {
+  Gate gate;
+  Jobs jobs(8, 2);
+  const auto pass = [&](const Jobs::Handle&) {
+    gate.pass();
+    return Result<protocol::JobResult>("x");
+  };
+  Jobs::Terms slow;
+  slow.slow = true;
+  std::vector<std::string> ids;
+  for (int i = 0; i < 3; ++i) ids.push_back(jobs.submit("reference", pass, slow)->id);
+  gate.wait_for_inside(1);
+  ids.push_back(submitted(jobs, pass));
+  gate.wait_for_inside(2);
+  std::vector<std::string> states;
+  for (const auto& job : jobs.list()) states.push_back(job.state);
+  EXPECT_THAT(states, ElementsAre("running", "queued", "queued", "running"));
+  gate.open();
+  for (const auto& id : ids) EXPECT_EQ(finished(jobs, id).state, "done");
+}
+
+TEST(Jobs, CancellingOneThatWaitsOrRuns) {
+  Gate gate;
+  Jobs jobs(8, 1);
+  std::atomic<bool> second_ran{false};
+  const auto running = submitted(jobs, [&](const Jobs::Handle& handle) -> Result<std::string> {
+    gate.pass();
+    if (handle.cancel.cancelled()) return make_error(ErrorKind::cancelled, "unwanted");
+    return std::string("x");
+  });
+  gate.wait_for_inside(1);
+  const auto waiting = submitted(jobs, [&](const Jobs::Handle&) {
+    second_ran = true;
+    return Result<std::string>("x");
+  });
+  EXPECT_TRUE(jobs.cancel(waiting));
+  EXPECT_EQ(jobs.find(waiting)->state, "cancelled");
+  EXPECT_TRUE(jobs.cancel(running));
+  EXPECT_EQ(jobs.find(running)->state, "running") << "until it notices";
+  gate.open();
+  EXPECT_EQ(finished(jobs, running).state, "cancelled");
+  EXPECT_FALSE(finished(jobs, running).problem);
+  const auto last = submitted(jobs, [](const Jobs::Handle&) { return Result<std::string>("x"); });
+  EXPECT_EQ(finished(jobs, last).state, "done");
+  EXPECT_TRUE(jobs.cancel(last));
+  EXPECT_EQ(jobs.find(last)->state, "done") << "what is finished stays so";
+  EXPECT_FALSE(second_ran);
+}
+
+TEST(Jobs, TheOldestFinishedIsForgottenAndUnfinishedOnesNever) {
+  Gate gate;
+  Jobs jobs(3, 1);
+  const auto pass = [&](const Jobs::Handle&) {
+    gate.pass();
+    return Result<std::string>("x");
+  };
+  const auto first = submitted(jobs, pass);
+  submitted(jobs, pass);
+  submitted(jobs, pass);
+  const auto refused = jobs.submit("dataset", pass);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::busy);
+  gate.open();
+  finished(jobs, first);
+  const auto fourth = submitted(jobs, pass);
+  EXPECT_FALSE(jobs.find(first));
+  EXPECT_EQ(jobs.list().size(), 3U);
+  EXPECT_EQ(finished(jobs, fourth).state, "done");
+}
+
+TEST(Jobs, EndingCancelsWhatRunsAndWaits) {
+  std::atomic<int> ran{0};
+  {
+    Jobs jobs(8, 1);
+    Gate started;
+    started.open();
+    for (int i = 0; i < 3; ++i) {
+      submitted(jobs, [&](const Jobs::Handle& handle) -> Result<std::string> {
+        ++ran;
+        while (!handle.cancel.cancelled()) std::this_thread::yield();
+        return make_error(ErrorKind::cancelled, "");
+      });
+    }
+    while (ran == 0) std::this_thread::yield();
+  }
+  EXPECT_EQ(ran, 1);
+}
+
+}  // namespace
+}  // namespace windsplat::net

@@ -1,0 +1,355 @@
+// Queries of values over REST against the numbers in the file; datasets opened by POST.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <numeric>
+#include <thread>
+
+#include "tests/integration/server/net_server.hpp"
+
+namespace net_test {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+
+void expect_problem_saying(const Answer& answer, int status, const std::string& words = "") {
+  EXPECT_EQ(answer.status, status) << answer.body;
+  EXPECT_EQ(answer.header("content-type"), "application/problem+json");
+  EXPECT_THAT(json_of(answer).value("detail", ""), HasSubstr(words));
+}
+
+// The same file, opened without a server.
+class Measures : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto added = store_.add(small_file());
+    ASSERT_TRUE(added);
+    dataset_ = *added;
+  }
+  [[nodiscard]] std::uint16_t port() const { return server_.port(); }
+  Json ask(const std::string& what) {
+    const Answer answer = get(port(), "/v1/datasets/small/" + what);
+    EXPECT_EQ(answer.status, 200) << what << ' ' << answer.body;
+    return json_of(answer);
+  }
+  Answer refused(const std::string& what) { return get(port(), "/v1/datasets/small/" + what); }
+  const windsplat::data::FieldInfo& field(windsplat::data::FieldKind kind) {
+    return *dataset_->info().first(kind);
+  }
+  std::shared_ptr<const windsplat::data::Volume> volume(const std::string& name, int step) {
+    return dataset_->volume(name, static_cast<std::size_t>(step)).value();
+  }
+  // A place a little off the sample's own, as a query.
+  std::string near(int i, int j, int k) {
+    std::string query = "?";
+    const std::array<int, 3> index{i, j, k};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto& c = dataset_->info().grid.axes[a].coordinates;
+      const auto at = static_cast<std::size_t>(index[a]);
+      const double step = at + 1 < c.size() ? c[at + 1] - c[at] : c[at] - c[at - 1];
+      query += std::string(a > 0 ? "&" : "") + "xyz"[a] + '=' + std::to_string(c[at] + 0.2 * step);
+    }
+    return query;
+  }
+  static std::size_t flat(int i, int j, int k) {
+    return static_cast<std::size_t>((k * 16 + j) * 32 + i);
+  }
+
+  windsplat::data::Store store_{std::uint64_t{1} << 30};
+  std::shared_ptr<windsplat::data::Dataset> dataset_;
+  TestServer server_;
+};
+
+TEST_F(Measures, ProbeTellsEveryFieldAtTheNearestSample) {
+  const Json probe = ask("probe" + near(5, 3, 2) + "&step=1");
+  EXPECT_EQ(probe["step"], 1);
+  EXPECT_EQ(probe["position"]["index"], Json({{"x", 5}, {"y", 3}, {"z", 2}}));
+  EXPECT_EQ(probe["values"].size(), dataset_->info().fields.size());
+  for (const auto& info : dataset_->info().fields) {
+    const Json& told = probe["values"][info.name];
+    const auto there = volume(info.name, 1);
+    EXPECT_EQ(told["units"], info.units);
+    for (std::size_t c = 0; c < info.components.size(); ++c) {
+      const Json& value = info.components.size() == 1 ? told["value"] : told["value"][c];
+      EXPECT_EQ(value.get<float>(), there->component(static_cast<int>(c))[flat(5, 3, 2)])
+          << info.name;
+    }
+  }
+}
+
+TEST_F(Measures, ProbesOutsideOrUnclearAreRefused) {
+  expect_problem_saying(refused("probe?x=0&y=95&z=500"), 422, "box");
+  expect_problem_saying(refused("probe?x=0&y=0"), 422, "z is required");
+  expect_problem_saying(refused("probe?x=here&y=0&z=500"), 400);
+  expect_problem_saying(refused("probe?x=1e999&y=0&z=500"), 400);
+  expect_problem_saying(refused("probe?x=0&y=0&z=500&step=3"), 422);
+  expect_problem_saying(refused("probe?lon=0&y=0&z=500"), 400, "x, y, z, step");
+  expect_problem_saying(get(port(), "/v1/datasets/none/probe?x=0&y=0&z=0"), 404);
+}
+
+TEST_F(Measures, AHistogramCountsEverySampleOnce) {
+  for (const auto kind : {windsplat::data::FieldKind::scalar, windsplat::data::FieldKind::vector}) {
+    const std::string name = field(kind).name;
+    const auto there = volume(name, 2);
+    for (const char* query : {"?step=2", "?step=2&bins=7", "?step=2&clip=0.1", "?step=2&log=true",
+                              "?step=2&range=0.1,0.2"}) {
+      const Json h = ask("fields/" + name + "/histogram" + query);
+      std::int64_t sum = h["below"].get<std::int64_t>() + h["above"].get<std::int64_t>() +
+                         h["masked"].get<std::int64_t>();
+      for (const Json& count : h["counts"]) sum += count.get<std::int64_t>();
+      EXPECT_EQ(sum, 32 * 16 * 6) << name << query;
+    }
+    const Json h = ask("fields/" + name + "/histogram?step=2");
+    EXPECT_EQ(h["counts"].size(), 64U);
+    EXPECT_FLOAT_EQ(h["range"][0].get<float>(), there->range[0]);
+    EXPECT_FLOAT_EQ(h["range"][1].get<float>(), there->range[1]);
+    EXPECT_EQ(h["log"], false);
+    EXPECT_EQ(ask("fields/" + name + "/histogram?log=1&bins=5")["edges"].size(), 6U);
+  }
+}
+
+// A share of 0.1 leaves out as many whole values at either end as there are in a tenth of all.
+TEST_F(Measures, AHistogramsClipLeavesOutTheEnds) {
+  const std::string name = field(windsplat::data::FieldKind::scalar).name;
+  const auto there = volume(name, 2);
+  std::vector<float> values(there->values.data(), there->values.data() + there->values.size());
+  std::erase_if(values, [](float value) { return std::isnan(value); });
+  std::sort(values.begin(), values.end());
+  const std::size_t dropped = values.size() / 10;
+  const Json h = ask("fields/" + name + "/histogram?step=2&clip=0.1");
+  EXPECT_EQ(h["range"][0].get<float>(), values[dropped]);
+  EXPECT_EQ(h["range"][1].get<float>(), values[values.size() - 1 - dropped]);
+  EXPECT_LT(values.front(), values[dropped]) << "or this test shows nothing";
+}
+
+TEST_F(Measures, HistogramsThatCannotBeAreRefused) {
+  const std::string base =
+      "fields/" + field(windsplat::data::FieldKind::scalar).name + "/histogram";
+  expect_problem_saying(refused(base + "?bins=0"), 422);
+  expect_problem_saying(refused(base + "?bins=4097"), 422);
+  EXPECT_EQ(ask(base + "?bins=4096")["counts"].size(), 4096U);
+  expect_problem_saying(refused(base + "?range=1"), 400);
+  expect_problem_saying(refused(base + "?range=1,2,3"), 400);
+  expect_problem_saying(refused(base + "?range=2,1"), 422);
+  expect_problem_saying(refused(base + "?range=0,1&log=true"), 422);
+  expect_problem_saying(refused(base + "?range=0,1e39"), 422);
+  expect_problem_saying(refused(base + "?range=0,1&clip=0.1"), 422);
+  expect_problem_saying(refused(base + "?clip=0.5"), 422);
+  expect_problem_saying(refused(base + "?log=maybe"), 400);
+  expect_problem_saying(refused(base + "?colour=1"), 400, "bins");
+  expect_problem_saying(refused("fields/nope/histogram"), 404, "nope");
+  expect_problem_saying(refused("fields/nope/mean"), 404);
+}
+
+TEST_F(Measures, ASeriesIsThePointAtEveryStep) {
+  for (const auto kind : {windsplat::data::FieldKind::scalar, windsplat::data::FieldKind::vector}) {
+    const auto& info = field(kind);
+    const Json series = ask("fields/" + info.name + "/series" + near(9, 8, 1));
+    ASSERT_EQ(series["values"].size(), static_cast<std::size_t>(small_steps));
+    ASSERT_EQ(series["times"].size(), static_cast<std::size_t>(small_steps));
+    EXPECT_EQ(series["units"], info.units);
+    EXPECT_EQ(series["position"]["index"], Json({{"x", 9}, {"y", 8}, {"z", 1}}));
+    for (int step = 0; step < small_steps; ++step) {
+      const auto at = static_cast<std::size_t>(step);
+      const auto there = volume(info.name, step);
+      const Json& value =
+          info.components.size() == 1 ? series["values"][at] : series["values"][at][1];
+      const int component = info.components.size() == 1 ? 0 : 1;
+      EXPECT_EQ(value.get<float>(), there->component(component)[flat(9, 8, 1)]);
+      EXPECT_EQ(series["times"][at]["text"], dataset_->info().steps[at].text);
+    }
+  }
+  expect_problem_saying(refused("fields/wind/series?x=0&y=95&z=500"), 422, "box");
+  expect_problem_saying(refused("fields/nope/series?x=0&y=0&z=500"), 404);
+}
+
+TEST_F(Measures, ARangeOfAllStepsIsReadOnce) {
+  const std::string name = field(windsplat::data::FieldKind::scalar).name;
+  float low = std::numeric_limits<float>::infinity();
+  float high = -low;
+  for (int step = 0; step < small_steps; ++step) {
+    low = std::min(low, volume(name, step)->range[0]);
+    high = std::max(high, volume(name, step)->range[1]);
+  }
+  const Json one = ask("fields/" + name + "/range?step=1");
+  EXPECT_EQ(one["rangeOf"], "step");
+  EXPECT_EQ(one["range"][1].get<float>(), volume(name, 1)->range[1]);
+  EXPECT_EQ(server_.loads(), 1U);
+  const Json all = ask("fields/" + name + "/range?of=all");
+  EXPECT_EQ(all["rangeOf"], "all");
+  EXPECT_EQ(all["range"][0].get<float>(), low);
+  EXPECT_EQ(all["range"][1].get<float>(), high);
+  EXPECT_EQ(server_.loads(), 3U);
+  EXPECT_EQ(request(port(), "DELETE", "/v1/datasets/small").status, 204);
+  EXPECT_EQ(ask("fields/" + name + "/range?of=all"), all);
+  EXPECT_EQ(server_.loads(), 3U) << "remembered though evicted";
+  expect_problem_saying(refused("fields/" + name + "/range?of=most"), 422);
+  expect_problem_saying(refused("fields/" + name + "/range?of=all&step=1"), 422);
+}
+
+TEST_F(Measures, ARangeOfAllStepsIsThatOfEveryOneOfThem) {
+  int wider_than_the_first = 0;
+  for (const auto& info : dataset_->info().fields) {
+    std::array<float, 2> range = volume(info.name, 0)->range;
+    const std::array<float, 2> first = range;
+    for (int step = 1; step < small_steps; ++step) {
+      range[0] = std::min(range[0], volume(info.name, step)->range[0]);
+      range[1] = std::max(range[1], volume(info.name, step)->range[1]);
+    }
+    const Json all = ask("fields/" + info.name + "/range?of=all");
+    EXPECT_EQ(all["range"][0].get<float>(), range[0]) << info.name;
+    EXPECT_EQ(all["range"][1].get<float>(), range[1]) << info.name;
+    wider_than_the_first += range != first ? 1 : 0;
+  }
+  EXPECT_GT(wider_than_the_first, 0) << "or this test shows nothing";
+}
+
+TEST_F(Measures, EvictingKeepsTheDatasetAndForgettingIsForWhatWasPosted) {
+  ask("probe" + near(1, 1, 1));
+  const auto resident = [&] {
+    return json_of(get(port(), "/v1/datasets"))["datasets"][0]["residentBytes"].get<int>();
+  };
+  EXPECT_GT(resident(), 0);
+  EXPECT_EQ(request(port(), "DELETE", "/v1/datasets/small").status, 204);
+  EXPECT_EQ(resident(), 0);
+  expect_problem_saying(request(port(), "DELETE", "/v1/datasets/small?forget=true"), 403);
+  expect_problem_saying(request(port(), "DELETE", "/v1/datasets/small?now=1"), 400, "forget");
+  expect_problem_saying(request(port(), "DELETE", "/v1/datasets/none"), 404);
+  ask("probe" + near(1, 1, 1));
+}
+
+// --- POST ---------------------------------------------------------------------------------------
+
+Answer post_path(std::uint16_t port, const std::string& path) {
+  return request(port, "POST", "/v1/datasets", {{"Content-Type", "application/json"}},
+                 Json{{"path", path}}.dump());
+}
+
+class DataRoot : public testing::Test {
+ protected:
+  DataRoot() {
+    std::string name = (fs::temp_directory_path() / "windsplat-root-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) return;
+    root_ = fs::canonical(name) / "root";
+    fs::create_directories(root_ / "runs");
+    fs::copy_file(small_file(), root_ / "runs/gcm.nc");
+    fs::copy_file(small_file(), root_.parent_path() / "secret.nc");
+    std::ofstream(root_ / "broken.nc") << "this is no data";
+    fs::create_symlink("../secret.nc", root_ / "out.nc");
+    EXPECT_EQ(mkfifo((root_ / "pipe.nc").c_str(), 0600), 0);
+    windsplat::net::ServerOptions options;
+    options.data_root = root_.native();
+    server_ = std::make_unique<TestServer>(options);
+  }
+  ~DataRoot() override {
+    std::error_code ignored;
+    fs::remove_all(root_.parent_path(), ignored);
+  }
+  [[nodiscard]] std::uint16_t port() const { return server_->port(); }
+  // The job once it is finished.
+  Json finished(const std::string& location) {
+    for (int turn = 0; turn < 6000; ++turn) {
+      Json job = json_of(get(port(), location));
+      if (job.value("state", "queued") != "queued" && job["state"] != "running") return job;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return {};
+  }
+
+  fs::path root_;
+  std::unique_ptr<TestServer> server_;
+};
+
+TEST_F(DataRoot, APostedPathBecomesADatasetByWayOfAJob) {
+  const Answer accepted = post_path(port(), "runs/gcm.nc");
+  ASSERT_EQ(accepted.status, 202) << accepted.body;
+  const std::string location = accepted.header("location");
+  EXPECT_EQ(location, "/v1/jobs/" + json_of(accepted)["id"].get<std::string>());
+  const Json job = finished(location);
+  EXPECT_EQ(job["state"], "done") << job;
+  EXPECT_EQ(job["kind"], "dataset");
+  EXPECT_EQ(job["progress"], 1);
+  EXPECT_EQ(job["result"], "gcm");
+  EXPECT_EQ(get(port(), "/v1/datasets/gcm/frame.jpg?width=32&height=32").status, 200);
+  EXPECT_EQ(json_of(get(port(), "/v1/jobs"))["jobs"].size(), 1U);
+  const Json list = json_of(get(port(), "/v1/datasets"))["datasets"];
+  ASSERT_EQ(list.size(), 2U);
+  EXPECT_EQ(list[1]["state"], "ready");
+  EXPECT_TRUE(list[1]["notes"].is_array());
+
+  EXPECT_EQ(request(port(), "DELETE", location).status, 204);
+  EXPECT_EQ(request(port(), "DELETE", "/v1/datasets/gcm?forget=true").status, 204);
+  expect_problem_saying(get(port(), "/v1/datasets/gcm"), 404);
+  EXPECT_EQ(json_of(get(port(), "/v1/datasets"))["datasets"].size(), 1U);
+}
+
+TEST_F(DataRoot, LinksThatAPatternLeavesOutAreToldByTheDataset) {
+  fs::create_symlink("../../secret.nc", root_ / "runs/gcm2.nc");
+  const Json job = finished(post_path(port(), "runs/gcm*.nc").header("location"));
+  ASSERT_EQ(job["state"], "done") << job;
+  const Json told = json_of(get(port(), "/v1/datasets/" + job["result"].get<std::string>()));
+  EXPECT_EQ(told["state"], "ready");
+  EXPECT_THAT(told["notes"].dump(), HasSubstr("1 of 2 names that the pattern matches is a link"));
+}
+
+TEST_F(DataRoot, WhatCannotBeReadIsAFailedJobAndNothingElse) {
+  for (const char* path : {"broken.nc", "runs"}) {
+    const Answer accepted = post_path(port(), path);
+    ASSERT_EQ(accepted.status, 202) << accepted.body;
+    const Json job = finished(accepted.header("location"));
+    EXPECT_EQ(job["state"], "failed") << job;
+    EXPECT_TRUE(job["result"].is_null());
+    EXPECT_EQ(job["problem"]["status"], 422);
+    EXPECT_THAT(job["problem"]["detail"].get<std::string>(), Not(HasSubstr(root_.native())));
+  }
+  EXPECT_EQ(json_of(get(port(), "/v1/datasets"))["datasets"].size(), 1U);
+  EXPECT_EQ(get(port(), "/v1/datasets/small/frame.jpg?width=32&height=32").status, 200);
+}
+
+TEST_F(DataRoot, PathsThatLeadOutAreRefusedAtOnce) {
+  for (const std::string path :
+       {"../secret.nc", "runs/../../secret.nc", "/etc/passwd", "out.nc", "http://127.0.0.1/a.nc",
+        "file:///etc/passwd", "pipe.nc", ".", "..", "../*.nc", "o*.nc"}) {
+    SCOPED_TRACE(path);
+    const Answer answer = post_path(port(), path);
+    expect_problem_saying(answer, 422);
+    EXPECT_EQ(json_of(answer)["errors"][0]["pointer"], "/path");
+    EXPECT_THAT(answer.body, Not(HasSubstr(root_.native())));
+  }
+  expect_problem_saying(post_path(port(), "%2e%2e/secret.nc"), 404);
+  expect_problem_saying(post_path(port(), "nothing.nc"), 404);
+  expect_problem_saying(post_path(port(), "runs/gcm.nc#mode=zarr"), 404);
+  expect_problem_saying(post_path(port(), std::string("runs/gcm.nc\0.png", 16)), 422);
+  EXPECT_TRUE(json_of(get(port(), "/v1/jobs"))["jobs"].empty());
+}
+
+TEST_F(DataRoot, BodiesThatAreNoRequestAreRefused) {
+  const auto post = [&](const std::string& type, const std::string& body) {
+    return request(port(), "POST", "/v1/datasets", {{"Content-Type", type}}, body);
+  };
+  expect_problem_saying(post("text/plain", R"({"path":"runs/gcm.nc"})"), 415);
+  expect_problem_saying(post("application/json", "{"), 400);
+  expect_problem_saying(post("application/json", "{}"), 422);
+  expect_problem_saying(post("application/json", R"({"path":"runs/gcm.nc","id":"x"})"), 422,
+                        "path");
+  expect_problem_saying(
+      request(port(), "POST", "/v1/datasets?path=x", {{"Content-Type", "application/json"}}, "{}"),
+      400);
+  expect_problem_saying(get(port(), "/v1/jobs/77"), 404);
+  expect_problem_saying(request(port(), "DELETE", "/v1/jobs/77"), 404);
+  expect_problem_saying(request(port(), "DELETE", "/v1/jobs"), 405);
+}
+
+TEST(NoDataRoot, FilesAreNotOpenedAndThatIsSaid) {
+  TestServer server;
+  expect_problem_saying(post_path(server.port(), "a.nc"), 403, "--data-root");
+}
+
+}  // namespace
+}  // namespace net_test

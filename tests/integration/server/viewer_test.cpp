@@ -1,0 +1,191 @@
+// Times reported by a session's render jobs, and sharing of scarce memory.
+#include "server/work/viewer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <future>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/api/services.hpp"
+#include "server/frame/frame.hpp"
+#include "server/scene/completed_view.hpp"
+#include "tests/integration/server/net_server.hpp"
+
+namespace net_test {
+namespace {
+
+using namespace windsplat;  // NOLINT(google-build-using-namespace)
+
+// Whether data was prepared for the frame, which the next of its kind need not do again.
+bool prepared(net::Viewer& viewer, std::uint64_t ticket, const protocol::View& view,
+              const quality::Setting& setting = {}) {
+  std::promise<bool> told;
+  viewer.start(session::StartRender{ticket, view, setting, {}},
+               [&](std::uint64_t /*ticket*/, Result<session::Drawn> drawn) {
+                 EXPECT_TRUE(drawn) << (drawn ? "" : drawn.error().message);
+                 told.set_value(drawn && drawn->loaded);
+               });
+  const bool loaded = told.get_future().get();
+  viewer.done(ticket);
+  return loaded;
+}
+
+TEST(Viewer, AFrameThatWaitedForAveragesSaysSoAsOneThatWaitedForFields) {
+  const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
+  const auto dataset = store->add(small_file()).value();
+  net::Services services({}, store, std::make_shared<ThreadPool>(2));
+  net::Viewer viewer(services.backend, 1, "192.0.2.1");
+  protocol::View view;
+  view.dataset = "small";
+  view.image.width = 16;
+  view.image.height = 12;
+  view.method.detail = protocol::Detail::full;
+  EXPECT_TRUE(prepared(viewer, 1, view));
+  EXPECT_FALSE(prepared(viewer, 2, view));
+  ASSERT_EQ(dataset->averages(), 0U);
+  const std::uint64_t loads = dataset->loads();
+  view.method.detail = protocol::Detail::automatic;
+  EXPECT_TRUE(prepared(viewer, 3, view));
+  ASSERT_GT(dataset->averages(), 0U) << "the picture is too large for a coarser level";
+  EXPECT_EQ(dataset->loads(), loads);
+  EXPECT_FALSE(prepared(viewer, 4, view));
+}
+
+// The first frame has to wait for its fields, the second is drawn at another setting, and the view
+// is calibrated besides.
+TEST(Viewer, CompletesAViewOnceForAllThatIsDrawnOfIt) {
+  const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
+  const auto dataset = store->add(small_file()).value();
+  net::Services services({}, store, std::make_shared<ThreadPool>(2));
+  net::Viewer viewer(services.backend, 1, "192.0.2.1");
+  protocol::View view;
+  view.dataset = "small";
+  view.image.width = 96;
+  view.image.height = 72;
+  const std::uint64_t before = scene::completions();
+  EXPECT_TRUE(prepared(viewer, 1, view));
+  EXPECT_FALSE(prepared(viewer, 2, view, {protocol::MethodName::kernel, 2}));
+  viewer.start(session::Calibrate{view});
+  std::promise<void> calibrated;
+  ASSERT_TRUE(services.backend.loads.submit(
+      {{}, [&] { calibrated.set_value(); }, true, dataset->shared_info()}));
+  calibrated.get_future().wait();
+  EXPECT_EQ(scene::completions() - before, 1U);
+  view.camera.eye = protocol::Vec3{3, -3, 2};
+  EXPECT_FALSE(prepared(viewer, 3, view));
+  EXPECT_EQ(scene::completions() - before, 2U) << "another view";
+}
+
+// Data of one step and a half fit: every frame has to wait until those before it are drawn.
+TEST(Viewer, ViewersOfDifferentStepsAllGetTheirFramesWhereOneStepFits) {
+  constexpr std::uint64_t sample_bytes = 4 * sizeof(float);  // a wind and a cloud
+  constexpr std::uint64_t step_bytes = std::uint64_t{32} * 16 * 6 * sample_bytes;
+  const auto store = std::make_shared<data::Store>(step_bytes * 3 / 2);
+  ASSERT_TRUE(store->add(small_file()));
+  net::Services services({}, store, std::make_shared<ThreadPool>(2));
+  constexpr int viewers_count = 8;
+  constexpr int rounds = 5;
+  std::vector<std::unique_ptr<net::Viewer>> viewers;
+  for (int v = 0; v < viewers_count; ++v) {
+    viewers.push_back(std::make_unique<net::Viewer>(
+        services.backend, static_cast<std::uint64_t>(v + 1), "192.0.2.1"));
+  }
+  for (int round = 0; round < rounds; ++round) {
+    std::vector<std::promise<std::string>> faults(viewers_count);
+    for (int v = 0; v < viewers_count; ++v) {
+      protocol::View view;
+      view.dataset = "small";
+      view.step = (v + round) % small_steps;
+      view.image.width = 64;
+      view.image.height = 48;
+      view.method.detail = protocol::Detail::full;
+      std::promise<std::string>& fault = faults[static_cast<std::size_t>(v)];
+      viewers[static_cast<std::size_t>(v)]->start(
+          session::StartRender{static_cast<std::uint64_t>(round + 1), view, {}, {}},
+          [&fault](std::uint64_t /*ticket*/, const Result<session::Drawn>& drawn) {
+            fault.set_value(drawn ? "" : drawn.error().message);
+          });
+    }
+    for (int v = 0; v < viewers_count; ++v) {
+      EXPECT_EQ(faults[static_cast<std::size_t>(v)].get_future().get(), "")
+          << "viewer " << v << ", round " << round;
+      viewers[static_cast<std::size_t>(v)]->done(static_cast<std::uint64_t>(round + 1));
+    }
+    EXPECT_LE(store->counts().bytes, store->counts().bytes_max);
+  }
+}
+
+// One picture of more pixels than are always kept room for, and the data of one step and a half.
+class LargePictures : public testing::Test {
+ protected:
+  static constexpr std::uint64_t step_bytes = std::uint64_t{32} * 16 * 6 * 4 * sizeof(float);
+  LargePictures() {
+    view_.dataset = "small";
+    view_.image.width = 2048;
+    view_.image.height = 1104;
+    view_.method.detail = protocol::Detail::full;
+    store_ = std::make_shared<data::Store>(
+        frame::bytes_beyond_kept(2048, 1104, frame::Format::jpeg) + step_bytes * 3 / 2);
+    EXPECT_TRUE(store_->add(small_file()));
+    services_ = std::make_unique<net::Services>(net::ServerOptions{}, store_,
+                                                std::make_shared<ThreadPool>(2));
+  }
+  // Why there is no frame; empty: there is one.
+  std::future<std::string> fault_of(net::Viewer& viewer, const protocol::View& view) {
+    const auto told = std::make_shared<std::promise<std::string>>();
+    viewer.start(session::StartRender{++tickets_, view, {}, {}},
+                 [told](std::uint64_t /*ticket*/, const Result<session::Drawn>& drawn) {
+                   told->set_value(drawn ? "" : drawn.error().message);
+                 });
+    return told->get_future();
+  }
+
+  protocol::View view_;
+  std::shared_ptr<data::Store> store_;
+  std::unique_ptr<net::Services> services_;
+  std::uint64_t tickets_ = 0;
+};
+
+TEST_F(LargePictures, WaitForTheRoomThatOthersHold) {
+  net::Viewer viewer(services_->backend, 1, "192.0.2.1");
+  ASSERT_EQ(fault_of(viewer, view_).get(), "") << "its data are resident from now on";
+  auto others = store_->reserve(step_bytes);
+  while (!others) {  // memory is released shortly after the reply
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    others = store_->reserve(step_bytes);
+  }
+  auto fault = fault_of(viewer, view_);
+  EXPECT_EQ(fault.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
+  others = make_error(ErrorKind::internal, "let go of");
+  EXPECT_EQ(fault.get(), "");
+}
+
+TEST_F(LargePictures, OfTwoViewersAreDrawnOneAfterTheOtherWhereOneFits) {
+  net::Viewer one(services_->backend, 1, "192.0.2.1");
+  net::Viewer other(services_->backend, 2, "192.0.2.2");
+  for (int round = 0; round < 4; ++round) {
+    view_.step = round % small_steps;
+    auto first = fault_of(one, view_);
+    view_.step = (round + 1) % small_steps;
+    auto second = fault_of(other, view_);
+    EXPECT_EQ(first.get(), "") << round;
+    EXPECT_EQ(second.get(), "") << round;
+    EXPECT_LE(store_->counts().bytes, store_->counts().bytes_max);
+  }
+}
+
+TEST_F(LargePictures, ThatFitNotEvenAloneAreRefusedAtOnce) {
+  net::Viewer viewer(services_->backend, 1, "192.0.2.1");
+  view_.image.height = 2048;
+  const std::string fault = fault_of(viewer, view_).get();
+  EXPECT_EQ(fault.find("a picture of 2048 x 2048 pixels is too large: what is beside the fields"),
+            0U)
+      << fault;
+}
+
+}  // namespace
+}  // namespace net_test

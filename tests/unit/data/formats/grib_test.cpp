@@ -1,0 +1,418 @@
+// GRIB files made of ecCodes' own samples, their values a function of place, level and time that is
+// written here in the order WMO's flag table 3.4 prescribes; and broken ones.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "server/data/model/dataset_info.hpp"
+#include "server/data/model/source.hpp"
+#include "server/data/open/open.hpp"
+#include "tests/unit/data/netcdf_maker.hpp"
+
+#ifdef WINDSPLAT_GRIB
+#include <eccodes.h>
+#endif
+
+namespace windsplat::data::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+#ifndef WINDSPLAT_GRIB
+
+TEST(Grib, IsRefusedByNameWithoutItsLibrary) {
+  const Folder folder;
+  write_bytes(folder / "a.grib", std::string("GRIB\0\0\x30\x01", 8) + std::string(40, '\0'));
+  auto source = open_file(folder / "a.grib");
+  ASSERT_FALSE(source);
+  EXPECT_THAT(source.error().message, HasSubstr("built without GRIB"));
+}
+
+#else
+
+struct Scan {
+  bool west = false;        // iScansNegatively
+  bool north = false;       // jScansPositively
+  bool by_columns = false;  // jPointsAreConsecutive
+  bool alternating = false;
+};
+
+// 4 columns from 10 to 40 E, 3 rows from 60 to 20 N.
+constexpr long columns = 4;
+constexpr long rows = 3;
+
+double value_at(double lon, double lat, double level, double hour) {
+  return lon + 100 * lat + level + 10000 * hour;
+}
+
+class Maker {
+ public:
+  explicit Maker(const std::string& sample)
+      : handle_(codes_grib_handle_new_from_samples(nullptr, sample.c_str())) {
+    EXPECT_NE(handle_, nullptr) << sample;
+  }
+  Maker(const Maker&) = delete;
+  Maker& operator=(const Maker&) = delete;
+  ~Maker() { codes_handle_delete(handle_); }
+
+  void set(const char* key, long value) {
+    EXPECT_EQ(codes_set_long(handle_, key, value), CODES_SUCCESS) << key;
+  }
+  void set(const char* key, double value) {
+    EXPECT_EQ(codes_set_double(handle_, key, value), CODES_SUCCESS) << key;
+  }
+  void set(const char* key, const std::string& value) {
+    std::size_t length = value.size();
+    EXPECT_EQ(codes_set_string(handle_, key, value.c_str(), &length), CODES_SUCCESS) << key;
+  }
+  void values(const std::vector<double>& list) {
+    EXPECT_EQ(codes_set_double_array(handle_, "values", list.data(), list.size()), CODES_SUCCESS);
+  }
+  [[nodiscard]] std::string bytes() const {
+    const void* data = nullptr;
+    std::size_t size = 0;
+    EXPECT_EQ(codes_get_message(handle_, &data, &size), CODES_SUCCESS);
+    return {static_cast<const char*>(data), size};
+  }
+  [[nodiscard]] codes_handle* handle() { return handle_; }
+
+ private:
+  codes_handle* handle_;
+};
+
+void fill_grid(Maker& maker, const Scan& scan, long level, long hour, double missing_lon = -1) {
+  maker.set("Ni", columns);
+  maker.set("Nj", rows);
+  maker.set("iScansNegatively", long{scan.west});
+  maker.set("jScansPositively", long{scan.north});
+  maker.set("jPointsAreConsecutive", long{scan.by_columns});
+  if (scan.alternating) maker.set("alternativeRowScanning", 1L);
+  maker.set("longitudeOfFirstGridPointInDegrees", scan.west ? 40.0 : 10.0);
+  maker.set("longitudeOfLastGridPointInDegrees", scan.west ? 10.0 : 40.0);
+  maker.set("latitudeOfFirstGridPointInDegrees", scan.north ? 20.0 : 60.0);
+  maker.set("latitudeOfLastGridPointInDegrees", scan.north ? 60.0 : 20.0);
+  maker.set("iDirectionIncrementInDegrees", 10.0);
+  maker.set("jDirectionIncrementInDegrees", 20.0);
+  maker.set("bitsPerValue", 24L);
+  maker.set("missingValue", 9999999.0);
+  maker.set("bitmapPresent", long{missing_lon > 0});
+  std::vector<double> list;
+  const long outer = scan.by_columns ? columns : rows;
+  const long inner = scan.by_columns ? rows : columns;
+  for (long a = 0; a < outer; ++a) {
+    for (long b = 0; b < inner; ++b) {
+      const long turned = scan.alternating && a % 2 == 1 ? inner - 1 - b : b;
+      const auto i = static_cast<double>(scan.by_columns ? a : turned);
+      const auto j = static_cast<double>(scan.by_columns ? turned : a);
+      const double lon = scan.west ? 40 - 10 * i : 10 + 10 * i;
+      const double lat = scan.north ? 20 + 20 * j : 60 - 20 * j;
+      list.push_back(lon == missing_lon ? 9999999.0
+                                        : value_at(lon, lat, static_cast<double>(level),
+                                                   static_cast<double>(hour)));
+    }
+  }
+  maker.values(list);
+}
+
+std::string message(int edition, const std::string& quantity, long level, long hour,
+                    const Scan& scan = {}, double missing_lon = -1) {
+  Maker maker(edition == 1 ? "regular_ll_pl_grib1" : "regular_ll_pl_grib2");
+  maker.set("dataDate", 20200229L);
+  maker.set("dataTime", 1200L);
+  maker.set("stepRange", std::to_string(hour));
+  maker.set("typeOfLevel", std::string("isobaricInhPa"));
+  maker.set("level", level);
+  maker.set("shortName", quantity);
+  fill_grid(maker, scan, level, hour, missing_lon);
+  return maker.bytes();
+}
+
+class Grib : public testing::Test {
+ protected:
+  std::unique_ptr<Source> open(const std::string& bytes) {
+    write_bytes(folder_ / "a.grib", bytes);
+    auto source = open_file(folder_ / "a.grib");
+    EXPECT_TRUE(source) << source.error().message;
+    return source ? std::move(*source) : nullptr;
+  }
+  std::string fault(const std::string& bytes) {
+    write_bytes(folder_ / "a.grib", bytes);
+    auto source = open_file(folder_ / "a.grib");
+    if (!source) return source.error().message;
+    auto volume = (*source)->read(0, 0);
+    return volume ? "" : volume.error().message;
+  }
+
+  Folder folder_;
+};
+
+// Every sample of a field where the closed form says, to a few steps of the packing.
+void expect_form(Source& source, const std::string& field, std::size_t step, double hour) {
+  const DatasetInfo& info = source.info();
+  const FieldInfo* found = info.find(field);
+  ASSERT_NE(found, nullptr) << field;
+  auto volume = source.read(static_cast<std::size_t>(found - info.fields.data()), step);
+  ASSERT_TRUE(volume) << volume.error().message;
+  const auto& axes = info.grid.axes;
+  std::size_t n = 0;
+  for (const double level : axes[2].coordinates) {
+    for (const double lat : axes[1].coordinates) {
+      for (const double lon : axes[0].coordinates) {
+        EXPECT_NEAR(volume->values[n], value_at(lon, lat, level, hour), 0.02)
+            << lon << ' ' << lat << ' ' << level;
+        ++n;
+      }
+    }
+  }
+  EXPECT_EQ(n, volume->values.size());
+}
+
+TEST_F(Grib, MessagesOfBothEditionsBecomeAVolumeOverTimeAndLevel) {
+  std::string bytes;
+  for (const long hour : {6, 0}) {
+    for (const long level : {500, 1000, 850}) {
+      for (const char* quantity : {"t", "u", "v"}) {
+        bytes += message(level == 850 ? 1 : 2, quantity, level, hour);
+      }
+    }
+  }
+  const auto source = open(bytes);
+  ASSERT_NE(source, nullptr);
+  const DatasetInfo& info = source->info();
+  EXPECT_EQ(info.format, "GRIB 1 and 2");
+  EXPECT_EQ(info.grid.axes[2].kind, AxisKind::pressure);
+  EXPECT_EQ(info.grid.axes[2].units, "hPa");
+  ASSERT_EQ(info.steps.size(), 2U);
+  EXPECT_EQ(info.steps[0].text, "2020-02-29T12:00:00Z");
+  EXPECT_EQ(info.steps[1].text, "2020-02-29T18:00:00Z");
+  EXPECT_EQ(info.fields.at(0).kind, FieldKind::vector);
+  EXPECT_THAT(info.fields.at(0).components, ElementsAre("u", "v"));
+  EXPECT_THAT(info.grid.axes[2].coordinates, ElementsAre(1000, 850, 500));
+  expect_form(*source, "t", 0, 0);
+  expect_form(*source, "t", 1, 6);
+}
+
+TEST_F(Grib, ValuesStandAtTheirPlacesHoweverTheyAreScanned) {
+  for (const int edition : {1, 2}) {
+    for (int flags = 0; flags < (edition == 1 ? 8 : 16); ++flags) {
+      SCOPED_TRACE(std::to_string(edition) + " " + std::to_string(flags));
+      const Scan scan{(flags & 1) != 0, (flags & 2) != 0, (flags & 4) != 0, (flags & 8) != 0};
+      const auto source =
+          open(message(edition, "t", 1000, 0, scan) + message(edition, "t", 500, 0, scan) +
+               message(edition, "t", 1000, 6, scan) + message(edition, "t", 500, 6, scan));
+      ASSERT_NE(source, nullptr);
+      EXPECT_THAT(source->info().grid.axes[0].coordinates, ElementsAre(10, 20, 30, 40));
+      EXPECT_THAT(source->info().grid.axes[1].coordinates, ElementsAre(20, 40, 60));
+      EXPECT_THAT(source->info().grid.axes[2].coordinates, ElementsAre(1000, 500));
+      expect_form(*source, "t", 0, 0);
+      expect_form(*source, "t", 1, 6);
+    }
+  }
+}
+
+// P_64 (x) by Bonnet's recursion.
+double legendre_64(double x) {
+  double before = 1;
+  double now = x;
+  for (int n = 1; n < 64; ++n) {
+    const double next = ((2 * n + 1) * x * now - n * before) / (n + 1);
+    before = now;
+    now = next;
+  }
+  return now;
+}
+
+// N 32: the sines of its 64 latitudes are the roots of P_64. The value of a row is its latitude,
+// whichever comes first in the message.
+TEST_F(Grib, GaussianLatitudesFromEitherPole) {
+  for (const bool north : {false, true}) {
+    SCOPED_TRACE(north);
+    Maker maker("regular_gg_pl_grib2");
+    maker.set("jScansPositively", long{north});
+    maker.set("latitudeOfFirstGridPointInDegrees", north ? -87.8638 : 87.8638);
+    maker.set("latitudeOfLastGridPointInDegrees", north ? 87.8638 : -87.8638);
+    maker.set("bitsPerValue", 24L);
+    std::vector<double> list;
+    for (int row = 0; row < 64; ++row) {
+      // Latitudes lie nearly even, 180 / 64.5 degrees apart.
+      const double about = (north ? 1 : -1) * (row - 31.5) * 180 / 64.5;
+      list.insert(list.end(), 128, about);
+    }
+    maker.values(list);
+    const auto source = open(maker.bytes());
+    ASSERT_NE(source, nullptr);
+    ASSERT_EQ(source->info().grid.dims(), (std::array<int, 3>{128, 64, 1}));
+    const auto& latitude = source->info().grid.axes[1].coordinates;
+    const auto volume = source->read(0, 0);
+    ASSERT_TRUE(volume);
+    for (std::size_t row = 0; row < 64; ++row) {
+      EXPECT_NEAR(legendre_64(std::sin(latitude[row] * M_PI / 180)), 0, 1e-9) << latitude[row];
+      EXPECT_NEAR(volume->values[row * 128], latitude[row], 0.1);
+    }
+    EXPECT_LT(latitude.front(), -87);
+  }
+}
+
+TEST_F(Grib, BitmapsAndAbsentMessagesAreMasked) {
+  const auto source =
+      open(message(2, "t", 1000, 0, {}, 20) + message(1, "t", 500, 0) + message(2, "t", 1000, 6));
+  ASSERT_NE(source, nullptr);
+  auto first = source->read(0, 0);
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->masked, rows);
+  EXPECT_TRUE(std::isnan(first->values[1]));
+  auto second = source->read(0, 1);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->masked, rows * columns);
+}
+
+TEST_F(Grib, SeveralFieldsInOneMessageAreAllRead) {
+  codes_multi_handle* all = codes_grib_multi_handle_new(nullptr);
+  for (const char* quantity : {"u", "v"}) {
+    Maker maker("regular_ll_pl_grib2");
+    maker.set("shortName", std::string(quantity));
+    fill_grid(maker, {}, quantity[0], 0);
+    ASSERT_EQ(codes_grib_multi_handle_append(maker.handle(), 4, all), CODES_SUCCESS);
+  }
+  FILE* out = std::fopen((folder_ / "m").c_str(), "wb");
+  ASSERT_EQ(codes_grib_multi_handle_write(all, out), CODES_SUCCESS);
+  std::fclose(out);
+  codes_grib_multi_handle_delete(all);
+  const std::string bytes = bytes_of(folder_ / "m");
+  ASSERT_EQ(bytes.find("GRIB", 4), std::string::npos);
+  const auto source = open(bytes);
+  ASSERT_NE(source, nullptr);
+  auto wind = source->read(0, 0);
+  ASSERT_TRUE(wind);
+  EXPECT_EQ(wind->values.size(), 2U * rows * columns);
+  EXPECT_NEAR(wind->values[0], value_at(10, 20, 'u', 0), 0.02);
+  EXPECT_NEAR(wind->values[rows * columns], value_at(10, 20, 'v', 0), 0.02);
+}
+
+// A wind of (10, 0) on a Lambert grid whose first point lies 35 degrees west of the meridian that
+// is upright on it: there east is turned by 35 sin(25) degrees against the rows.
+std::string lambert_wind(const std::string& component, bool along_rows) {
+  Maker maker("GRIB2");
+  maker.set("gridType", std::string("lambert"));
+  maker.set("Nx", 4L);
+  maker.set("Ny", 3L);
+  maker.set("latitudeOfFirstGridPointInDegrees", 30.0);
+  maker.set("longitudeOfFirstGridPointInDegrees", 230.0);
+  maker.set("LaDInDegrees", 25.0);
+  maker.set("LoVInDegrees", 265.0);
+  maker.set("Latin1InDegrees", 25.0);
+  maker.set("Latin2InDegrees", 25.0);
+  maker.set("DxInMetres", 20000.0);
+  maker.set("DyInMetres", 20000.0);
+  maker.set("jScansPositively", 1L);
+  maker.set("uvRelativeToGrid", long{along_rows});
+  maker.set("typeOfLevel", std::string("isobaricInhPa"));
+  maker.set("level", 500L);
+  maker.set("shortName", component);
+  maker.set("bitsPerValue", 16L);
+  maker.values(std::vector<double>(12, component == "u" ? 10 : 0));
+  return maker.bytes();
+}
+
+TEST_F(Grib, WindsAlongTheRowsStayAndOthersAreTurnedToThem) {
+  const double angle = 35 * std::sin(25 * M_PI / 180) * M_PI / 180;
+  for (const bool along_rows : {true, false}) {
+    const auto source = open(lambert_wind("u", along_rows) + lambert_wind("v", along_rows));
+    ASSERT_NE(source, nullptr);
+    ASSERT_EQ(source->info().fields.front().kind, FieldKind::vector);
+    const auto wind = source->read(0, 0);
+    ASSERT_TRUE(wind);
+    const double turned = along_rows ? 0 : angle;
+    EXPECT_NEAR(wind->component(0)[0], 10 * std::cos(turned), 0.02);
+    EXPECT_NEAR(wind->component(1)[0], -10 * std::sin(turned), 0.02);
+  }
+}
+
+// A wind of (10, 0) on a polar stereographic grid whose first point lies 40 degrees west of the
+// meridian that is upright on it: there north is turned by 40 degrees clockwise from the columns.
+std::string polar_wind(int edition, const std::string& component, bool along_rows) {
+  Maker maker(edition == 1 ? "polar_stereographic_pl_grib1" : "polar_stereographic_pl_grib2");
+  maker.set("Nx", 4L);
+  maker.set("Ny", 3L);
+  if (edition == 2) maker.set("numberOfDataPoints", 12L);
+  maker.set("latitudeOfFirstGridPointInDegrees", 60.0);
+  maker.set("longitudeOfFirstGridPointInDegrees", 225.0);
+  maker.set("orientationOfTheGridInDegrees", 265.0);
+  maker.set("DxInMetres", 20000.0);
+  maker.set("DyInMetres", 20000.0);
+  maker.set("iScansNegatively", 0L);
+  maker.set("jScansPositively", 1L);
+  // Flag table 3.3, bit 5; in edition 1 table 7 has it at the same place.
+  maker.set("resolutionAndComponentFlags", along_rows ? 8L : 0L);
+  maker.set("level", 500L);
+  maker.set("shortName", component);
+  maker.set("bitsPerValue", 16L);
+  maker.values(std::vector<double>(12, component == "u" ? 10 : 0));
+  return maker.bytes();
+}
+
+TEST_F(Grib, WindsOnPolarStereographicGridsFollowTheFlagOfTheirEdition) {
+  const double angle = 40 * M_PI / 180;
+  for (const int edition : {1, 2}) {
+    for (const bool along_rows : {true, false}) {
+      SCOPED_TRACE(std::to_string(edition) + (along_rows ? " along rows" : " by east and north"));
+      const auto source =
+          open(polar_wind(edition, "u", along_rows) + polar_wind(edition, "v", along_rows));
+      ASSERT_NE(source, nullptr);
+      ASSERT_EQ(source->info().fields.front().kind, FieldKind::vector);
+      const auto wind = source->read(0, 0);
+      ASSERT_TRUE(wind);
+      const double turned = along_rows ? 0 : angle;
+      EXPECT_NEAR(wind->component(0)[0], 10 * std::cos(turned), 0.02);
+      EXPECT_NEAR(wind->component(1)[0], -10 * std::sin(turned), 0.02);
+    }
+  }
+}
+
+TEST_F(Grib, FurtherMembersAreToldAndLeftOut) {
+  const auto source = open(message(1, "t", 500, 0) + message(1, "t", 500, 0, {}, 20));
+  ASSERT_NE(source, nullptr);
+  EXPECT_THAT(source->info().notes, ElementsAre(HasSubstr("1 more messages")));
+  EXPECT_EQ(source->read(0, 0)->masked, 0);
+}
+
+TEST_F(Grib, AHeadingBeforeTheMessageIsPassedOver) {
+  EXPECT_EQ(fault("\x01\r\r\n001\r\r\nHTXX50 EGRR 291200\r\r\n" + message(1, "t", 500, 0)), "");
+}
+
+TEST_F(Grib, ReducedGridsAreRefusedWithTheirName) {
+  const Maker maker("reduced_gg_pl_32_grib2");
+  EXPECT_THAT(fault(maker.bytes()), HasSubstr("'reduced_gg'"));
+}
+
+TEST_F(Grib, BrokenMessagesAreFaults) {
+  const std::string good = message(2, "t", 500, 0);
+  EXPECT_EQ(fault(good), "");
+  EXPECT_THAT(fault(good.substr(0, good.size() - 1)), HasSubstr("cut short"));
+  EXPECT_THAT(fault(good.substr(0, 12)), HasSubstr("cut short"));
+  std::string without_end = good;
+  without_end.back() = '8';
+  EXPECT_THAT(fault(without_end), HasSubstr("end marker"));
+  std::string huge = good;
+  huge[8] = '\x7f';
+  EXPECT_THAT(fault(huge), HasSubstr("1073741824"));
+  std::string section = good;
+  section[16] = '\x7f';
+  EXPECT_THAT(fault(section), HasSubstr("broken section"));
+  std::string edition = good;
+  edition += good;
+  edition[good.size() + 7] = 9;
+  EXPECT_THAT(fault(edition), HasSubstr("edition 9"));
+  std::string unit = message(1, "t", 500, 6);  // octet 18 of section 1, which follows 8 bytes
+  unit[8 + 17] = 68;
+  EXPECT_THAT(fault(unit), HasSubstr("no date of validity"));
+}
+
+#endif
+
+}  // namespace
+}  // namespace windsplat::data::test

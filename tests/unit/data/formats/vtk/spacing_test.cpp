@@ -1,0 +1,121 @@
+// The spacing of samples follows the layers and the cells of a mesh.
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "tests/unit/data/formats/vtk/test_mesh.hpp"
+
+namespace windsplat::data::vtk_test {
+namespace {
+
+using testing::HasSubstr;
+
+// A model's grid: `n` levels that follow a hill from the ground to a lid, over 24 x 20 columns.
+struct Terrain {
+  static constexpr int columns = 24;
+  static constexpr int rows = 20;
+  static constexpr double step = 20e3;
+  static constexpr double lid = 15e3;
+  int levels;
+  [[nodiscard]] Place at(int i, int j, int k) const {
+    const double ground = 1000 * std::exp(-(std::pow(i - 12, 2) + std::pow(j - 10, 2)) / 20.0);
+    return {i * step, j * step, ground + (lid - ground) * k / (levels - 1)};
+  }
+};
+
+std::string terrain_vts(const Terrain& terrain, VtkXml& xml) {
+  std::vector<double> points;
+  std::vector<double> height;
+  for (int k = 0; k < terrain.levels; ++k) {
+    for (int j = 0; j < Terrain::rows; ++j) {
+      for (int i = 0; i < Terrain::columns; ++i) {
+        const Place p = terrain.at(i, j, k);
+        points.insert(points.end(), p.begin(), p.end());
+        height.push_back(p[2]);
+      }
+    }
+  }
+  const std::string extent = "0 23 0 19 0 " + std::to_string(terrain.levels - 1);
+  std::string inner = "<Piece Extent=\"" + extent + "\"><PointData>";
+  inner += xml.array("Float64", "a", 1, height) + "</PointData><Points>";
+  inner += xml.array("Float64", "p", 3, points) + "</Points></Piece>";
+  return xml.file("StructuredGrid", "WholeExtent=\"" + extent + "\"", inner);
+}
+
+// 460 km long and 15 km high: a spacing of the same length along all axes has three samples above
+// each other. Half the points and cells are about as many samples as cells, so as many layers.
+TEST_F(VtkResampling, LayersOfAShallowGridStayResolved) {
+  const Terrain terrain{30};
+  VtkXml xml({"appended-raw", "", false, 8});
+  const auto source = opened(folder_.write("a.vts", terrain_vts(terrain, xml)));
+  ASSERT_TRUE(source);
+  const auto dims = source->info().grid.dims();
+  EXPECT_NEAR(dims[0], 24, 2);
+  EXPECT_NEAR(dims[1], 20, 2);
+  EXPECT_NEAR(dims[2], 30, 2);
+  EXPECT_NEAR(source->info().grid.axes[2].coordinates.back(), Terrain::lid, 1);
+  EXPECT_LT(source->info().grid.axes[2].coordinates.front(), Terrain::lid / 29);
+  const Outcome out = compare(*source, [](const Place& p) { return p[2]; });
+  EXPECT_LT(out.worst, 1e-2);  // of 15,000 m in single precision
+  EXPECT_THAT(out.notes, testing::Not(HasSubstr("fewer samples")));
+}
+
+TEST_F(VtkResampling, MoreLayersThanSamplesAreNoted) {
+  const Terrain terrain{400};
+  VtkXml xml({"appended-raw", "", false, 8});
+  const auto source = opened(folder_.write("a.vts", terrain_vts(terrain, xml)));
+  ASSERT_TRUE(source);
+  EXPECT_EQ(source->info().grid.dims()[2], 256);
+  EXPECT_GE(source->info().grid.dims()[0], 24);
+  EXPECT_THAT(all_notes(source->info()),
+              HasSubstr("along z fewer samples than cells: 256 for about 399"));
+}
+
+// Layers 0.1 thick that rise by 0.5 from column to column: boxes around the cells are 0.6 high.
+TEST_F(VtkResampling, SlopesDoNotThickenLayers) {
+  constexpr int n = 16;
+  std::vector<double> points;
+  std::vector<double> values;
+  for (int k = 0; k < n; ++k) {
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < n; ++i) {
+        const Place p{i * 1.0, j * 1.0, 0.1 * k + 0.5 * i};
+        points.insert(points.end(), p.begin(), p.end());
+        values.push_back(linear(p));
+      }
+    }
+  }
+  VtkXml xml;
+  std::string inner = "<Piece><PointData>" + xml.array("Float64", "a", 1, values);
+  inner += "</PointData><Points>" + xml.array("Float64", "p", 3, points) + "</Points></Piece>";
+  const auto source = opened(
+      folder_.write("a.vts", xml.file("StructuredGrid", "WholeExtent=\"0 15 0 15 0 15\"", inner)));
+  ASSERT_TRUE(source);
+  const auto& axes = source->info().grid.axes;
+  const auto spacing = [&](std::size_t a) {
+    return axes[a].coordinates[1] - axes[a].coordinates[0];
+  };
+  EXPECT_NEAR(spacing(2) / spacing(0), 0.1, 0.005);
+  EXPECT_LE(spacing(2), 0.1);
+  EXPECT_LT(compare(*source, linear).worst, 1e-5);
+}
+
+// The same of wedges without indices: what is known is their boxes.
+TEST_F(VtkResampling, SpacingFollowsTheCellsOfAMeshToo) {
+  const Map flat = [](const Place& p) { return Place{1000 * p[0], 400 * p[1], 10 * p[2]}; };
+  const TestMesh mesh = boxes(16, flat, as_wedges);
+  VtkXml xml({"appended-raw", "", false, 8});
+  const auto data = xml.array("Float64", "a", 1, at_points(mesh, linear));
+  const auto source = opened(folder_.write("a.vtu", vtu(mesh, data, "", xml)));
+  ASSERT_TRUE(source);
+  const auto dims = source->info().grid.dims();
+  EXPECT_EQ(dims[1], dims[0]);
+  EXPECT_EQ(dims[2], dims[0]);
+  EXPECT_GT(dims[0], 16);
+  const Outcome out = compare(*source, linear);
+  EXPECT_LT(out.worst, 1e-3);
+  EXPECT_EQ(out.inside, 1);
+}
+
+}  // namespace
+}  // namespace windsplat::data::vtk_test

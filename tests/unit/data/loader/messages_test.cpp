@@ -1,0 +1,302 @@
+// What a loader says of a dataset is believed only where it could be true: good messages come out
+// as they went in, and no change to one breaks what the rest of the program relies on.
+#include "server/data/loader/messages.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+
+namespace windsplat::data::loader {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+Axis axis(const char* name, AxisKind kind, std::vector<double> coordinates) {
+  Axis out;
+  out.name = name;
+  out.standard_name = std::string("standard ") + name;
+  out.units = "m";
+  out.kind = kind;
+  out.coordinates = std::move(coordinates);
+  return out;
+}
+
+DatasetInfo good() {
+  DatasetInfo info;
+  info.id = "id";
+  info.title = "A title";
+  info.source = "file.nc";
+  info.format = "netCDF-4";
+  info.digest = "0123";
+  info.time_units = "days since 2000-01-01";
+  info.time_calendar = "noleap";
+  info.grid.axes = {axis("lon", AxisKind::longitude, {-10, 0, 20}),
+                    axis("lat", AxisKind::latitude, {40, 41}),
+                    axis("lev", AxisKind::pressure, {1000, 500, 200, 50})};
+  auto columns = std::make_shared<Columns>();
+  columns->longitude = {1, 2, 3, 4, 5, 6};
+  columns->latitude = {7, 8, 9, 10, 11, 12};
+  info.grid.columns = columns;
+  FieldInfo wind;
+  wind.name = "wind";
+  wind.kind = FieldKind::vector;
+  wind.components = {"u", "v", "w"};
+  wind.component_units = {"m s-1", "m s-1", "Pa s-1"};
+  wind.units = "m s-1";
+  wind.dtype = "float32";
+  FieldInfo heat;
+  heat.name = "T";
+  heat.components = {"T"};
+  heat.component_units = {"K"};
+  heat.units = "K";
+  heat.standard_name = "air_temperature";
+  heat.long_name = "Temperature";
+  heat.dtype = "int16 packed";
+  heat.decoded_bytes = 96;
+  heat.chunk_bytes = 48;
+  info.fields = {wind, heat};
+  info.left_out = {{"x", "not a number"}, {"y", "on another grid"}};
+  info.notes = {"resampled"};
+  info.steps = {{0.5, "2000-01-01T12:00:00Z"}, {1.5, "2000-01-02T12:00:00Z"}};
+  return info;
+}
+
+// What the rest of the program relies on, said anew.
+void expect_sound(const DatasetInfo& info) {
+  double samples = 1;
+  for (const Axis& a : info.grid.axes) {
+    ASSERT_FALSE(a.coordinates.empty());
+    ASSERT_LE(static_cast<int>(a.kind), static_cast<int>(AxisKind::cartesian));
+    samples *= static_cast<double>(a.coordinates.size());
+    for (std::size_t i = 0; i < a.coordinates.size(); ++i) {
+      ASSERT_TRUE(std::isfinite(a.coordinates[i]));
+      if (i < 2) continue;
+      ASSERT_EQ(a.coordinates[i] > a.coordinates[i - 1], a.coordinates[1] > a.coordinates[0]);
+      ASSERT_NE(a.coordinates[i], a.coordinates[i - 1]);
+    }
+  }
+  ASSERT_LE(samples, 2147483648.0);
+  if (info.grid.columns) {
+    const std::size_t layer =
+        info.grid.axes[0].coordinates.size() * info.grid.axes[1].coordinates.size();
+    ASSERT_EQ(info.grid.columns->longitude.size(), layer);
+    ASSERT_EQ(info.grid.columns->latitude.size(), layer);
+    for (std::size_t i = 0; i < layer; ++i) {
+      ASSERT_TRUE(std::isfinite(info.grid.columns->longitude[i]));
+      ASSERT_TRUE(std::isfinite(info.grid.columns->latitude[i]));
+    }
+  }
+  ASSERT_FALSE(info.steps.empty());
+  for (const TimeStep& step : info.steps) ASSERT_TRUE(std::isfinite(step.value));
+  ASSERT_FALSE(info.fields.empty());
+  for (const FieldInfo& field : info.fields) {
+    ASSERT_FALSE(field.name.empty());
+    ASSERT_EQ(printable(field.name, 1000000), field.name);
+    ASSERT_EQ(field.component_units.size(), field.components.size());
+    ASSERT_GE(field.components.size(), field.kind == FieldKind::scalar ? 1U : 2U);
+    ASSERT_LE(field.components.size(), field.kind == FieldKind::scalar ? 1U : 3U);
+  }
+}
+
+TEST(LoaderMessages, an_info_comes_out_as_it_went_in) {
+  const DatasetInfo info = good();
+  auto out = decode_info(encode_info(info));
+  ASSERT_TRUE(out) << out.error().message;
+  EXPECT_EQ(out->id, info.id);
+  EXPECT_EQ(out->title, info.title);
+  EXPECT_EQ(out->source, info.source);
+  EXPECT_EQ(out->format, info.format);
+  EXPECT_EQ(out->digest, info.digest);
+  EXPECT_EQ(out->time_units, info.time_units);
+  EXPECT_EQ(out->time_calendar, info.time_calendar);
+  for (std::size_t a = 0; a < 3; ++a) {
+    EXPECT_EQ(out->grid.axes[a].name, info.grid.axes[a].name);
+    EXPECT_EQ(out->grid.axes[a].standard_name, info.grid.axes[a].standard_name);
+    EXPECT_EQ(out->grid.axes[a].units, info.grid.axes[a].units);
+    EXPECT_EQ(out->grid.axes[a].kind, info.grid.axes[a].kind);
+    EXPECT_EQ(out->grid.axes[a].coordinates, info.grid.axes[a].coordinates);
+  }
+  ASSERT_TRUE(out->grid.columns);
+  EXPECT_EQ(out->grid.columns->longitude, info.grid.columns->longitude);
+  EXPECT_EQ(out->grid.columns->latitude, info.grid.columns->latitude);
+  ASSERT_EQ(out->fields.size(), 2U);
+  for (std::size_t f = 0; f < 2; ++f) {
+    EXPECT_EQ(out->fields[f].name, info.fields[f].name);
+    EXPECT_EQ(out->fields[f].kind, info.fields[f].kind);
+    EXPECT_EQ(out->fields[f].components, info.fields[f].components);
+    EXPECT_EQ(out->fields[f].component_units, info.fields[f].component_units);
+    EXPECT_EQ(out->fields[f].units, info.fields[f].units);
+    EXPECT_EQ(out->fields[f].standard_name, info.fields[f].standard_name);
+    EXPECT_EQ(out->fields[f].long_name, info.fields[f].long_name);
+    EXPECT_EQ(out->fields[f].dtype, info.fields[f].dtype);
+    EXPECT_EQ(out->fields[f].decoded_bytes, info.fields[f].decoded_bytes);
+    EXPECT_EQ(out->fields[f].chunk_bytes, info.fields[f].chunk_bytes);
+  }
+  ASSERT_EQ(out->left_out.size(), 2U);
+  EXPECT_EQ(out->left_out[1].name, "y");
+  EXPECT_EQ(out->left_out[1].reason, "on another grid");
+  EXPECT_EQ(out->notes, info.notes);
+  ASSERT_EQ(out->steps.size(), 2U);
+  EXPECT_EQ(out->steps[1].value, 1.5);
+  EXPECT_EQ(out->steps[1].text, "2000-01-02T12:00:00Z");
+}
+
+TEST(LoaderMessages, what_no_reader_would_say_is_refused) {
+  const std::vector<std::pair<const char*, void (*)(DatasetInfo&)>> lies{
+      {"no steps", [](DatasetInfo& i) { i.steps.clear(); }},
+      {"no fields", [](DatasetInfo& i) { i.fields.clear(); }},
+      {"a step at no time", [](DatasetInfo& i) { i.steps[1].value = std::nan(""); }},
+      {"an axis without coordinates", [](DatasetInfo& i) { i.grid.axes[2].coordinates.clear(); }},
+      {"the same place twice", [](DatasetInfo& i) { i.grid.axes[2].coordinates[1] = 1000; }},
+      {"a turn back", [](DatasetInfo& i) { i.grid.axes[2].coordinates[3] = 2000; }},
+      {"a place at infinity", [](DatasetInfo& i) { i.grid.axes[0].coordinates[2] = infinity; }},
+      {"steps too small to see",
+       [](DatasetInfo& i) {
+         i.grid.axes[0].coordinates = {0, 5e-324, 1e-323};
+       }},
+      {"from east to west",
+       [](DatasetInfo& i) {
+         i.grid.axes[0].coordinates = {20, 0, -10};
+       }},
+      {"an axis of no kind", [](DatasetInfo& i) { i.grid.axes[0].kind = AxisKind(7); }},
+      {"a scalar of two", [](DatasetInfo& i) { i.fields[0].kind = FieldKind::scalar; }},
+      {"a vector of one", [](DatasetInfo& i) { i.fields[1].kind = FieldKind::vector; }},
+      {"a vector of four",
+       [](DatasetInfo& i) {
+         i.fields[0].components.emplace_back("t");
+         i.fields[0].component_units.emplace_back("s");
+       }},
+      {"a unit too few", [](DatasetInfo& i) { i.fields[0].component_units.pop_back(); }},
+      {"a field without a name", [](DatasetInfo& i) { i.fields[0].name.clear(); }},
+      {"a column nowhere",
+       [](DatasetInfo& i) {
+         auto columns = std::make_shared<Columns>(*i.grid.columns);
+         columns->latitude[3] = std::nan("");
+         i.grid.columns = columns;
+       }},
+      {"a column too few",
+       [](DatasetInfo& i) {
+         auto columns = std::make_shared<Columns>(*i.grid.columns);
+         columns->longitude.pop_back();
+         i.grid.columns = columns;
+       }},
+      {"more samples than there may be",
+       [](DatasetInfo& i) {
+         for (Axis& a : i.grid.axes) {
+           a.coordinates.resize(1300);
+           for (std::size_t k = 0; k < 1300; ++k) a.coordinates[k] = static_cast<double>(k);
+         }
+         i.grid.columns = nullptr;
+       }},
+  };
+  for (const auto& [what, lie] : lies) {
+    DatasetInfo info = good();
+    lie(info);
+    EXPECT_FALSE(decode_info(encode_info(info))) << what;
+  }
+}
+
+TEST(LoaderMessages, every_part_missing_or_too_much_is_refused) {
+  const std::string message = encode_info(good());
+  for (std::size_t size = 0; size < message.size(); ++size) {
+    EXPECT_FALSE(decode_info(std::string_view(message).substr(0, size))) << size;
+  }
+  EXPECT_FALSE(decode_info(message + '\0'));
+}
+
+TEST(LoaderMessages, control_characters_are_spelt_out) {
+  DatasetInfo info = good();
+  info.title = "a\nb\x1b[2J";
+  info.fields[1].name = std::string("T\0", 2);
+  auto out = decode_info(encode_info(info));
+  ASSERT_TRUE(out);
+  EXPECT_EQ(out->title, "a\\x0ab\\x1b[2J");
+  EXPECT_EQ(out->fields[1].name, "T\\x00");
+}
+
+TEST(LoaderMessages, no_mutation_of_an_info_breaks_what_others_rely_on) {
+  const std::string message = encode_info(good());
+  std::mt19937 random(20240607);
+  const auto pick = [&](std::size_t n) { return static_cast<std::size_t>(random()) % n; };
+  const std::vector<std::uint64_t> extremes{0,
+                                            1,
+                                            2,
+                                            0x7fffffff,
+                                            0xffffffff,
+                                            std::uint64_t{1} << 32,
+                                            std::uint64_t{1} << 61,
+                                            ~std::uint64_t{0},
+                                            0x7ff0000000000000,
+                                            0x7ff8000000000000};
+  int accepted = 0;
+  for (int round = 0; round < 50'000; ++round) {
+    std::string changed = message;
+    for (std::size_t n = 1 + pick(3); n > 0; --n) {
+      const std::size_t at = pick(changed.size());
+      switch (pick(4)) {
+        case 0:
+          changed[at] = static_cast<char>(random());
+          break;
+        case 1: {
+          const std::uint64_t value = extremes[pick(extremes.size())];
+          if (at + 8 <= changed.size()) std::memcpy(&changed[at], &value, 8);
+          break;
+        }
+        case 2:
+          changed.erase(at, 1 + pick(9));
+          break;
+        default:
+          changed.insert(at, changed.substr(pick(changed.size()), 1 + pick(9)));
+      }
+      if (changed.empty()) changed = message;
+    }
+    auto out = decode_info(changed);
+    if (!out) continue;
+    ++accepted;
+    expect_sound(*out);
+    if (HasFatalFailure()) FAIL() << "round " << round;
+  }
+  EXPECT_GT(accepted, 1000);  // changed letters and numbers are none of its business
+}
+
+TEST(LoaderMessages, errors_keep_kind_and_message_and_nothing_else_passes) {
+  const Error wrong = make_error(ErrorKind::out_of_memory, "no memory");
+  EXPECT_EQ(decode_error(encode_error(wrong)).kind, ErrorKind::out_of_memory);
+  EXPECT_EQ(decode_error(encode_error(wrong)).message, "no memory");
+  // A loader cannot make a client believe that it is the server that drains, or the like.
+  EXPECT_EQ(decode_error(encode_error(make_error(ErrorKind::draining, "x"))).kind,
+            ErrorKind::bad_data);
+  EXPECT_EQ(decode_error(encode_error(make_error(ErrorKind::bad_data, "a\nb"))).message, "a\\x0ab");
+  EXPECT_EQ(decode_error("").kind, ErrorKind::bad_data);
+}
+
+TEST(LoaderMessages, a_task_says_names_but_no_paths) {
+  Task task;
+  task.memory_bytes = 77;
+  task.library_folders = {"/usr/share/tables"};
+  task.location.kind = Location::Kind::series;
+  task.location.companions = true;
+  task.location.stem = "stem";
+  task.location.inside = "a/b";
+  task.location.pattern = "*.nc";
+  task.location.members = {{"a.nc", "/secret/a.nc"}, {"b.nc", "/secret/b.nc"}};
+  const std::string bytes = encode_task(task);
+  EXPECT_EQ(bytes.find("secret"), std::string::npos);
+  auto out = decode_task(bytes);
+  ASSERT_TRUE(out);
+  EXPECT_EQ(out->memory_bytes, 77U);
+  EXPECT_EQ(out->library_folders, task.library_folders);
+  EXPECT_EQ(out->location.kind, Location::Kind::series);
+  EXPECT_TRUE(out->location.companions);
+  EXPECT_EQ(out->location.stem, "stem");
+  EXPECT_EQ(out->location.inside, "a/b");
+  EXPECT_EQ(out->location.pattern, "*.nc");
+  ASSERT_EQ(out->location.members.size(), 2U);
+  EXPECT_EQ(out->location.members[1].name, "b.nc");
+}
+
+}  // namespace
+}  // namespace windsplat::data::loader

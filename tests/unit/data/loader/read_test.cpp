@@ -1,0 +1,251 @@
+// Reading in a process apart: the same numbers and the same errors as in this one.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/types.h>
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+
+#include "server/data/loader/loader.hpp"
+#include "server/data/loader/messages.hpp"
+#include "server/data/open/open.hpp"
+#include "server/data/resident/store.hpp"
+#include "tests/unit/data/loader/loader_fixture.hpp"
+#include "tests/unit/data/loader_files.hpp"
+#include "tests/unit/data/netcdf_maker.hpp"
+
+namespace windsplat::data::loader {
+namespace {
+
+using test::NetcdfMaker;
+using testing::HasSubstr;
+
+// Every field and every step, bit for bit.
+void expect_same_as_here(const std::string& path) {
+  auto here = open_file(path);
+  ASSERT_TRUE(here) << here.error().message;
+  auto location = locate(path);
+  ASSERT_TRUE(location);
+  auto there = open(*location);
+  ASSERT_TRUE(there) << there.error().message;
+  EXPECT_EQ(encode_info((*there)->info()), encode_info((*here)->info())) << path;
+  for (std::size_t f = 0; f < (*here)->info().fields.size(); ++f) {
+    for (std::size_t s = 0; s < (*here)->info().steps.size(); ++s) {
+      auto a = (*here)->read(f, s);
+      auto b = (*there)->read(f, s);
+      ASSERT_TRUE(a) << a.error().message;
+      ASSERT_TRUE(b) << b.error().message;
+      expect_same(*a, *b);
+    }
+  }
+}
+
+TEST_F(Loader, classic_files_read_as_in_this_process) {
+  for (const int mode : {0, NC_64BIT_OFFSET, NC_64BIT_DATA}) {
+    const std::string path = folder_ / "classic.nc";
+    test::write_wind(path, mode);
+    expect_same_as_here(path);
+  }
+}
+
+TEST_F(Loader, netcdf4_files_read_as_in_this_process) {
+  const std::string path = folder_ / "four.nc";
+  test::write_wind(path, NC_NETCDF4);
+  expect_same_as_here(path);
+}
+
+// Chunks that were never written, in a file that says not to fill them in: HDF5 leaves alone what
+// it should read into, and the memory between the two had another field's numbers. They are masked.
+TEST_F(Loader, what_a_library_leaves_alone_is_nothing_of_the_volume_before) {
+  const std::string path = folder_ / "unfilled.nc";
+  {
+    NetcdfMaker file(path);
+    const int y = file.axis("lat", {0, 10}, "degrees_north");
+    const int x = file.axis("lon", {0, 10, 20}, "degrees_east");
+    file.variable("a", NC_FLOAT, {y, x}, test::counting(6, 1));
+    const int b = file.variable("b", NC_FLOAT, {y, x});
+    file.chunk(b, {2, 3});
+    ASSERT_EQ(nc_def_var_fill(file.id(), b, NC_NOFILL, nullptr), NC_NOERR);
+  }
+  const auto source = opened(path);
+  ASSERT_TRUE(source);
+  const auto a = source->read(0, 0);
+  const auto b = source->read(1, 0);
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->range, (std::array<float, 2>{1, 6}));
+  EXPECT_EQ(b->masked, 6);
+}
+
+// How many descriptors this process has to the memory of volumes.
+std::size_t transfers_kept() {
+  std::size_t count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code closed;
+    const auto target = std::filesystem::read_symlink(entry.path(), closed).native();
+    count += target.find("windsplat-volume") != std::string::npos ? 1 : 0;
+  }
+  return count;
+}
+
+// MiB of shared memory that another process has mapped and that takes room, where the system tells.
+double shared_by(pid_t id) {
+  std::ifstream file("/proc/" + std::to_string(id) + "/status");
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with("RssShmem:")) return std::stod(line.substr(9)) / 1024;
+  }
+  return 0;
+}
+
+// The memory between the two is used again for the scalar, and made anew for the vector, which is
+// too large for it to be kept.
+TEST_F(Loader, volumes_small_and_large_read_as_in_this_process) {
+  std::ofstream(folder_ / "large.json")
+      << R"({"windsplat": "raw", "file": "large.raw", "type": "float32", "endian": "little",
+             "dims": {"x": 160, "y": 150, "z": 128}, "steps": {"count": 2},
+             "fields": [{"name": "cloud"}, {"name": "wind", "components": ["u", "v", "w"]}]})";
+  constexpr std::size_t samples = std::size_t{160} * 150 * 128;
+  std::vector<float> values(8 * samples);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i % 1000003);
+  std::ofstream(folder_ / "large.raw", std::ios::binary)
+      .write(reinterpret_cast<const char*>(values.data()),
+             static_cast<std::streamsize>(values.size() * sizeof(float)));
+  expect_same_as_here(folder_ / "large.json");
+  auto source = opened(folder_ / "large.json");
+  ASSERT_TRUE(source);
+  for (const std::size_t field : {1U, 0U, 1U}) {
+    const auto volume = source->read(field, 1);
+    ASSERT_TRUE(volume) << volume.error().message;
+    const bool is_cloud = source->info().fields[field].name == "cloud";
+    EXPECT_EQ(volume->values[0], static_cast<float>(((is_cloud ? 4 : 5) * samples) % 1000003));
+    EXPECT_EQ(transfers_kept(), is_cloud ? 1U : 0U);
+    // No room remains of 35 MiB beside the copy.
+    EXPECT_LT(shared_by(source->process()), is_cloud ? 13 : 1);
+  }
+}
+
+// What a header refers to is part of the dataset.
+TEST_F(Loader, a_companion_that_changes_is_noticed) {
+  std::ofstream(folder_ / "c.json")
+      << R"({"windsplat": "raw", "file": "c.raw", "type": "float32", "endian": "little",
+             "dims": {"x": 4, "y": 4, "z": 4}, "fields": [{"name": "cloud"}]})";
+  test::write_floats(folder_ / "c.raw", 64, 1);
+  Store store(
+      {1 << 20, Storage::float32, [](const Location& location) -> Result<std::unique_ptr<Source>> {
+         auto source = open(location);
+         if (!source) return source.error();
+         return std::unique_ptr<Source>(std::move(*source));
+       }});
+  ASSERT_EQ(store.add(folder_ / "c.json").value()->volume("cloud", 0).value()->values[0], 1.0F);
+  EXPECT_TRUE(store.look_for_changes(0).empty());
+  test::write_floats(folder_ / "c.raw", 64, 2);
+  EXPECT_EQ(store.look_for_changes(0), std::vector<std::string>{"c"});
+  EXPECT_EQ(store.find("c").value()->volume("cloud", 0).value()->values[0], 2.0F);
+}
+
+TEST_F(Loader, files_of_others_read_as_in_this_process) {
+  const char* given = std::getenv("WINDSPLAT_TEST_DATA");
+  const std::string data = given != nullptr ? given : WINDSPLAT_SOURCE_DIR "/build/test-data";
+  int files = 0;
+  for (const char* name : {"ced1.lf00.t00z.eta.nc", "contour.cdf", "nc4uvt.nc",
+                           "rectilinear_grid_3D.nc", "vinth2p.nc"}) {
+    ASSERT_TRUE(std::filesystem::exists(data + '/' + name)) << "run scripts/fetch-test-data";
+    expect_same_as_here(data + '/' + name);
+    ++files;
+  }
+  EXPECT_EQ(files, 5);
+}
+
+TEST_F(Loader, a_file_may_be_called_like_an_address) {
+  for (const char* name : {"file.nc#mode=zarr,s3", "http:x.nc", "[dap4]x.nc", "dods:.nc"}) {
+    const std::string path = folder_ / name;
+    test::write_wind(folder_ / "plain.nc", NC_NETCDF4);
+    std::filesystem::rename(folder_ / "plain.nc", path);
+    expect_same_as_here(path);
+  }
+}
+
+// Two groups of one variable each, of the same name.
+void write_two_groups(const std::string& path) {
+  NetcdfMaker file(path);
+  const int y = file.dimension("y", 2);
+  const int x = file.dimension("x", 3);
+  const std::array<int, 2> dims{y, x};
+  for (const auto& [name, first] : {std::pair("a", 1.0F), std::pair("b", 100.0F)}) {
+    int group = -1;
+    int variable = -1;
+    ASSERT_EQ(nc_def_grp(file.id(), name, &group), NC_NOERR);
+    ASSERT_EQ(nc_def_var(group, "q", NC_FLOAT, 2, dims.data(), &variable), NC_NOERR);
+    const std::vector<double> values = test::counting(6, first);
+    ASSERT_EQ(nc_put_var_double(group, variable, values.data()), NC_NOERR);
+  }
+}
+
+TEST_F(Loader, a_series_is_told_by_its_pattern) {
+  test::write_wind(folder_ / "part_1.nc", 0);
+  test::write_wind(folder_ / "part_2.nc", 0);
+  const auto source = opened(folder_ / "part_*.nc");
+  ASSERT_TRUE(source);
+  EXPECT_EQ(source->info().source, "part_*.nc");
+  EXPECT_EQ(source->info().title, open_file(folder_ / "part_*.nc").value()->info().title);
+  expect_same_as_here(folder_ / "part_*.nc");
+}
+
+TEST_F(Loader, a_group_that_is_named_is_the_one_that_is_read) {
+  const std::string path = folder_ / "two.nc";
+  write_two_groups(path);
+  for (const auto& [group, first] : {std::pair("#/a", 1.0F), std::pair("#/b", 100.0F)}) {
+    const auto source = opened(path + group);
+    ASSERT_TRUE(source);
+    const auto volume = source->read(0, 0);
+    ASSERT_TRUE(volume) << volume.error().message;
+    EXPECT_EQ(volume->range, (std::array<float, 2>{first, first + 5}));
+    EXPECT_TRUE(source->info().notes.empty()) << source->info().notes.front();
+    expect_same_as_here(path + group);
+    source->release();  // and so by the loader that comes next
+    const auto again = source->read(0, 0);
+    ASSERT_TRUE(again) << again.error().message;
+    expect_same(*volume, *again);
+  }
+  const auto absent = open_path(path + "#/nope");
+  ASSERT_FALSE(absent);
+  EXPECT_EQ(absent.error().kind, ErrorKind::not_found);
+  EXPECT_EQ(absent.error().message, "'two.nc' has no group '/nope', but '/a', '/b'");
+}
+
+TEST_F(Loader, what_is_no_dataset_is_the_same_error_as_in_this_process) {
+  const std::string path = folder_ / "text.nc";
+  std::ofstream(path) << "no dataset, whatever its name says";
+  const auto here = open_file(path);
+  const auto there = open_path(path);
+  ASSERT_FALSE(here);
+  ASSERT_FALSE(there);
+  EXPECT_EQ(there.error().kind, here.error().kind);
+  EXPECT_EQ(there.error().message, here.error().message);
+}
+
+// HDF5 reads external files that a dataset names.
+TEST_F(Loader, external_storage_is_refused_by_name) {
+  const std::string other = folder_ / "other";
+  test::write_floats(other, 64, 42.0F);
+  const std::string path = folder_ / "crafted.nc";
+  test::write_external_storage(path, other);
+  for (const auto& source : {open_file(path).error(), open_path(path).error()}) {
+    EXPECT_EQ(source.kind, ErrorKind::bad_data);
+    EXPECT_THAT(source.message, HasSubstr("'secret' is in another file ('" + other + "')"));
+  }
+}
+
+TEST_F(Loader, an_external_link_is_refused_by_name) {
+  const std::string other = folder_ / "other.nc";
+  test::write_wind(other, NC_NETCDF4);
+  const std::string path = folder_ / "crafted.nc";
+  test::write_external_link(path, other, "T");
+  const auto there = open_path(path);
+  ASSERT_FALSE(there);
+  EXPECT_EQ(there.error().kind, ErrorKind::bad_data);
+  EXPECT_THAT(there.error().message, HasSubstr("external link, which is not followed: '/linked'"));
+}
+
+}  // namespace
+}  // namespace windsplat::data::loader
