@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "server/engine/reference/kernels.hpp"
+#include "server/engine/reference/reference.hpp"
 
 namespace windsplat::test {
 

@@ -12,6 +12,7 @@
 #include "server/engine/reference/kernels.hpp"
 #include "server/engine/reference/profile.hpp"
 #include "server/engine/reference/ray.hpp"
+#include "server/engine/reference/reference.hpp"
 #include "tests/numerics/naive_renderer.hpp"
 #include "tests/numerics/partial_footprint.hpp"
 #include "tests/numerics/scenes.hpp"

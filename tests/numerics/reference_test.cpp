@@ -9,6 +9,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "server/engine/reference/kernels.hpp"
 #include "tests/numerics/naive_renderer.hpp"
 #include "tests/numerics/partial_footprint.hpp"
 #include "tests/numerics/scenes.hpp"
