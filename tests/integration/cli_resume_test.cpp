@@ -60,7 +60,7 @@ const std::vector<Json>& deeds() {
   return all;
 }
 
-TEST(Resume, a_whole_view_sent_to_a_restarted_daemon_brings_the_same_picture) {
+TEST(Resume, AWholeViewSentToARestartedDaemonBringsTheSamePicture) {
   const Folder folder;
   const std::string dataset = synth(folder, "climate", "24x16x6");
   Json whole = Json::object();

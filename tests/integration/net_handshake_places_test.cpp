@@ -132,7 +132,7 @@ class HandshakePlaces : public testing::Test {
   std::promise<void> gate_;
 };
 
-TEST_F(HandshakePlaces, that_were_given_back_hold_no_descriptor) {
+TEST_F(HandshakePlaces, ThatWereGivenBackHoldNoDescriptor) {
   const std::string address = "192.0.2.1";
   const std::size_t before = open_descriptors();
   for (int n = 0; n < 32; ++n) come(address);
@@ -145,7 +145,7 @@ TEST_F(HandshakePlaces, that_were_given_back_hold_no_descriptor) {
   })) << open_descriptors() - before - clients.size();
 }
 
-TEST_F(HandshakePlaces, of_an_address_go_to_its_newer_ones) {
+TEST_F(HandshakePlaces, OfAnAddressGoToItsNewerOnes) {
   Tcp::socket& other = come("192.0.2.2");
   for (int n = 0; n < 64; ++n) come("192.0.2.1");
   EXPECT_TRUE(is_open(clients[1]));
@@ -155,7 +155,7 @@ TEST_F(HandshakePlaces, of_an_address_go_to_its_newer_ones) {
   EXPECT_TRUE(is_open(other));
 }
 
-TEST_F(HandshakePlaces, of_many_addresses_are_taken_from_who_has_most) {
+TEST_F(HandshakePlaces, OfManyAddressesAreTakenFromWhoHasMost) {
   Tcp::socket& lonely = come("198.51.100.1");
   Tcp::socket& known = come("198.51.100.2", true);
   Tcp::socket& crowd = come("192.0.2.0");
@@ -165,7 +165,7 @@ TEST_F(HandshakePlaces, of_many_addresses_are_taken_from_who_has_most) {
   EXPECT_TRUE(is_open(known));
 }
 
-TEST_F(HandshakePlaces, of_those_that_showed_the_token_are_not_taken_by_strangers) {
+TEST_F(HandshakePlaces, OfThoseThatShowedTheTokenAreNotTakenByStrangers) {
   for (int n = 0; n < 256; ++n) come("192.0.2." + std::to_string(n % 4), true);
   EXPECT_TRUE(is_closed(come("198.51.100.1")));
   for (std::size_t n = 0; n < 256; ++n) EXPECT_TRUE(is_open(clients[n])) << n;
@@ -173,7 +173,7 @@ TEST_F(HandshakePlaces, of_those_that_showed_the_token_are_not_taken_by_stranger
   EXPECT_TRUE(is_closed(clients[0]));
 }
 
-TEST_F(HandshakePlaces, are_charged_for_what_was_computed_before_they_ended) {
+TEST_F(HandshakePlaces, AreChargedForWhatWasComputedBeforeTheyEnded) {
   const std::string hello = client_hello();
   ASSERT_FALSE(hello.empty());
   const auto took = [&] { return services.metrics.text({}); };

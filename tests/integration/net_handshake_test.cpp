@@ -99,7 +99,7 @@ Client::Setup offering(const char* groups, int version = TLS1_3_VERSION) {
   };
 }
 
-TEST(TlsGroups, that_are_expensive_are_refused) {
+TEST(TlsGroups, ThatAreExpensiveAreRefused) {
   TestServer server(over_tls());
   for (const char* groups : {"X25519", "P-256", "ffdhe2048:P-256", "P-384:X25519"}) {
     EXPECT_TRUE(Client(server.port(), offering(groups)).shaken()) << groups;
@@ -116,7 +116,7 @@ TEST(TlsGroups, that_are_expensive_are_refused) {
   }
 }
 
-TEST(TlsSessions, are_resumed_without_early_data) {
+TEST(TlsSessions, AreResumedWithoutEarlyData) {
   TestServer server(over_tls());
   static SSL_SESSION* ticket = nullptr;
   const auto keep = [](SSL_CTX* context) {
@@ -138,7 +138,7 @@ TEST(TlsSessions, are_resumed_without_early_data) {
   SSL_SESSION_free(std::exchange(ticket, nullptr));
 }
 
-TEST(TlsSessions, ask_for_no_certificate_of_the_client) {
+TEST(TlsSessions, AskForNoCertificateOfTheClient) {
   TestServer server(over_tls());
   static int asked = 0;
   Client client(server.port(), [](SSL_CTX* context) {
@@ -151,7 +151,7 @@ TEST(TlsSessions, ask_for_no_certificate_of_the_client) {
   EXPECT_EQ(asked, 0);
 }
 
-TEST(TlsHandshakes, beyond_an_addresses_time_are_not_begun) {
+TEST(TlsHandshakes, BeyondAnAddressesTimeAreNotBegun) {
   Limits limits;
   limits.handshake_ms_per_address = 2;
   TestServer server(over_tls(limits));
@@ -168,7 +168,7 @@ TEST(TlsHandshakes, beyond_an_addresses_time_are_not_begun) {
   EXPECT_TRUE(Client(server.port(), nullptr, nullptr, "127.0.0.2").shaken());
 }
 
-TEST(TlsHandshakes, of_strangers_leave_time_for_health_asked_by_the_machine_itself) {
+TEST(TlsHandshakes, OfStrangersLeaveTimeForHealthAskedByTheMachineItself) {
   Limits limits;
   limits.handshake_ms = 0.01;  // a further handshake is paid within a minute
   limits.handshake_ms_per_address = 1000;
@@ -192,7 +192,7 @@ TEST(TlsHandshakes, of_strangers_leave_time_for_health_asked_by_the_machine_itse
 }
 
 // HTTP reports to the quota which address has shown the token: it has separate handshakes.
-TEST(TlsHandshakes, of_an_address_that_showed_the_token_do_not_compete_with_strangers) {
+TEST(TlsHandshakes, OfAnAddressThatShowedTheTokenDoNotCompeteWithStrangers) {
   Limits limits;
   limits.handshake_ms = 0.001;  // a further handshake is paid within ten minutes
   limits.handshake_ms_per_address = 1000;
@@ -213,7 +213,7 @@ TEST(TlsHandshakes, of_an_address_that_showed_the_token_do_not_compete_with_stra
   EXPECT_LT(others, 5) << "they wait for what the first stranger owes";
 }
 
-TEST(PlainHttp, at_the_port_of_tls_is_charged_to_its_address) {
+TEST(PlainHttp, AtThePortOfTlsIsChargedToItsAddress) {
   Limits limits;
   limits.bytes_per_address = 1;  // ten at once
   TestServer server(over_tls(limits));
@@ -225,7 +225,7 @@ TEST(PlainHttp, at_the_port_of_tls_is_charged_to_its_address) {
 }
 
 // OpenSSL accepts a ClientHello of 131 kB and waits for all of it.
-TEST(TlsHandshakes, that_send_much_are_ended_before_those_that_send_nothing) {
+TEST(TlsHandshakes, ThatSendMuchAreEndedBeforeThoseThatSendNothing) {
   TestServer server(over_tls());
   Socket silent(server.port());
   Socket large(server.port());
@@ -242,7 +242,7 @@ TEST(TlsHandshakes, that_send_much_are_ended_before_those_that_send_nothing) {
 }
 
 // What ends one: its client, its deadline, the server itself.
-TEST(TlsHandshakes, may_end_at_any_time) {
+TEST(TlsHandshakes, MayEndAtAnyTime) {
   for (int n = 0; n < 24; ++n) {
     TestServer server(over_tls());
     std::deque<Socket> half;

@@ -58,7 +58,7 @@ std::vector<std::unique_ptr<Socket>> hold(std::uint16_t port, int count, bool bu
   return held;
 }
 
-TEST(Limits, beyond_all_connections_health_alone_is_answered) {
+TEST(Limits, BeyondAllConnectionsHealthAloneIsAnswered) {
   ServerOptions options;
   options.limits.connections = 3;
   TestServer server(options);
@@ -76,7 +76,7 @@ TEST(Limits, beyond_all_connections_health_alone_is_answered) {
   EXPECT_TRUE(comes_true([&] { return get(server.port(), "/v1").status == 200; }));
 }
 
-TEST(Limits, whoever_is_idle_for_longest_makes_room) {
+TEST(Limits, WhoeverIsIdleForLongestMakesRoom) {
   ServerOptions options;
   options.limits.connections = 2;
   TestServer server(options);
@@ -87,7 +87,7 @@ TEST(Limits, whoever_is_idle_for_longest_makes_room) {
   EXPECT_EQ(read_answer(*held[1]).status, 200);
 }
 
-TEST(Limits, a_connection_that_says_nothing_is_soon_closed) {
+TEST(Limits, AConnectionThatSaysNothingIsSoonClosed) {
   TestServer server;
   Socket silent(server.port());
   const auto kept = hold(server.port(), 1, false);
@@ -97,7 +97,7 @@ TEST(Limits, a_connection_that_says_nothing_is_soon_closed) {
   EXPECT_EQ(read_answer(*kept[0]).status, 200) << "between requests there is more time";
 }
 
-TEST(Limits, connections_beyond_their_rate_are_closed) {
+TEST(Limits, ConnectionsBeyondTheirRateAreClosed) {
   ServerOptions options;
   options.limits.arrivals_per_address = 0.5;  // 5 at once
   TestServer server(options);
@@ -110,7 +110,7 @@ TEST(Limits, connections_beyond_their_rate_are_closed) {
 }
 
 // Nothing of it is understood, and yet it counts.
-TEST(Limits, nonsense_is_charged_as_requests_are) {
+TEST(Limits, NonsenseIsChargedAsRequestsAre) {
   ServerOptions options;
   options.limits.requests_per_address = 1;  // 10 at once
   TestServer server(options);
@@ -118,7 +118,7 @@ TEST(Limits, nonsense_is_charged_as_requests_are) {
   expect_limit(get(server.port(), "/v1"), 429, "1 requests a second");
 }
 
-TEST(Limits, a_stream_that_says_too_much_is_read_more_slowly) {
+TEST(Limits, AStreamThatSaysTooMuchIsReadMoreSlowly) {
   ServerOptions options;
   options.limits.messages_per_address = 20;  // 40 at once
   TestServer server(options);
@@ -129,7 +129,7 @@ TEST(Limits, a_stream_that_says_too_much_is_read_more_slowly) {
   EXPECT_GT(std::chrono::steady_clock::now() - since, std::chrono::milliseconds(1500));
 }
 
-TEST(Limits, one_address_has_no_more_connections_than_it_may) {
+TEST(Limits, OneAddressHasNoMoreConnectionsThanItMay) {
   ServerOptions options;
   options.limits.connections_per_address = 2;
   TestServer server(options);
@@ -139,7 +139,7 @@ TEST(Limits, one_address_has_no_more_connections_than_it_may) {
 }
 
 // Silent connections hold their places for two seconds; others are closed meanwhile.
-TEST(Limits, the_reserve_is_bounded_and_clears_itself) {
+TEST(Limits, TheReserveIsBoundedAndClearsItself) {
   ServerOptions options;
   options.limits.connections = 1;
   TestServer server(options);
@@ -155,7 +155,7 @@ TEST(Limits, the_reserve_is_bounded_and_clears_itself) {
   EXPECT_GE(read.value("windsplat_connections_refused_total"), 84);
 }
 
-TEST(Limits, one_address_has_no_more_sessions_than_it_may) {
+TEST(Limits, OneAddressHasNoMoreSessionsThanItMay) {
   ServerOptions options;
   options.limits.sessions_per_address = 2;
   TestServer server(options);
@@ -170,7 +170,7 @@ TEST(Limits, one_address_has_no_more_sessions_than_it_may) {
   EXPECT_TRUE(comes_true([&] { return StreamClient(server.port()).handshake().status == 101; }));
 }
 
-TEST(Limits, requests_beyond_their_rate_are_refused_and_health_is_not) {
+TEST(Limits, RequestsBeyondTheirRateAreRefusedAndHealthIsNot) {
   ServerOptions options;
   options.limits.requests_per_address = 2;  // 20 at once
   TestServer server(options);
@@ -186,7 +186,7 @@ TEST(Limits, requests_beyond_their_rate_are_refused_and_health_is_not) {
   EXPECT_EQ(get(server.port(), "/v1").status, 200);
 }
 
-TEST(Limits, drawing_is_charged_and_its_debt_is_waited_for) {
+TEST(Limits, DrawingIsChargedAndItsDebtIsWaitedFor) {
   ServerOptions options;
   options.limits.render_s_per_address = 0.0001;
   TestServer server(options);
@@ -205,7 +205,7 @@ TEST(Limits, drawing_is_charged_and_its_debt_is_waited_for) {
   EXPECT_EQ(refused(server.port(), "render"), 4);
 }
 
-TEST(Limits, a_stream_that_owes_too_much_is_closed) {
+TEST(Limits, AStreamThatOwesTooMuchIsClosed) {
   ServerOptions options;
   options.limits.render_s_per_address = 0.0001;
   TestServer server(options);
@@ -218,7 +218,7 @@ TEST(Limits, a_stream_that_owes_too_much_is_closed) {
   EXPECT_EQ(viewer.close_code(), 1013);
 }
 
-TEST(Limits, bytes_sent_are_charged) {
+TEST(Limits, BytesSentAreCharged) {
   ServerOptions options;
   options.limits.bytes_per_address = 1;  // 10 at once
   TestServer server(options);
@@ -229,7 +229,7 @@ TEST(Limits, bytes_sent_are_charged) {
   }));
 }
 
-TEST(Limits, clients_behind_a_trusted_proxy_are_told_apart) {
+TEST(Limits, ClientsBehindATrustedProxyAreToldApart) {
   ServerOptions options;
   options.limits.requests_per_address = 0.1;  // one, and no more for ten seconds
   options.limits.trusted_proxies = {"127.0.0.1"};
@@ -246,7 +246,7 @@ TEST(Limits, clients_behind_a_trusted_proxy_are_told_apart) {
   EXPECT_EQ(get(wary.port(), "/v1", {{"X-Forwarded-For", "198.51.100.2"}}).status, 429);
 }
 
-TEST(Limits, pictures_too_large_or_too_dear_are_refused_before_anything_is_read) {
+TEST(Limits, PicturesTooLargeOrTooDearAreRefusedBeforeAnythingIsRead) {
   ServerOptions options;
   options.limits.pixels = 100 * 100;
   options.limits.kernels = 1e6;
@@ -299,7 +299,7 @@ TEST(Limits, pictures_too_large_or_too_dear_are_refused_before_anything_is_read)
   EXPECT_GE(refused(server.port(), "kernels"), 4);
 }
 
-TEST(Limits, every_answer_is_safe_by_its_headers) {
+TEST(Limits, EveryAnswerIsSafeByItsHeaders) {
   TestServer server;
   const auto answers = {get(server.port(), "/v1"),
                         get(server.port(), "/nothing"),
@@ -320,7 +320,7 @@ TEST(Limits, every_answer_is_safe_by_its_headers) {
 }
 
 // Whatever is sent, there are as many series as ever.
-TEST(Limits, no_path_method_or_refusal_makes_a_series) {
+TEST(Limits, NoPathMethodOrRefusalMakesASeries) {
   ServerOptions options;
   options.limits.sessions_per_address = 1;
   options.limits.pixels = 10'000;
@@ -343,7 +343,7 @@ TEST(Limits, no_path_method_or_refusal_makes_a_series) {
 }
 
 // Pictures whose data is not there leave the renderer's queue for the loads': that has an end, too.
-TEST(Limits, pictures_that_wait_for_a_slow_disk_are_bounded) {
+TEST(Limits, PicturesThatWaitForASlowDiskAreBounded) {
   namespace data = windsplat::data;
   const auto gate = std::make_shared<Gate>();
   TestServer server(
@@ -377,7 +377,7 @@ TEST(Limits, pictures_that_wait_for_a_slow_disk_are_bounded) {
 // The renderer is free again soon after whoever wanted a picture of seconds has gone: with a byte
 // of a next request before the end, too, and from a stream. The requirement is 100 ms; machines
 // that run many tests at once get thirty times that.
-TEST(Cancel, whoever_leaves_frees_the_renderer) {
+TEST(Cancel, WhoeverLeavesFreesTheRenderer) {
   TestServer server;
   const std::string view = R"({"dataset":"small","image":{"width":4096,"height":4096},)"
                            R"("vector":{"r1":60,"r2":64,"length":3,"span":64},)"

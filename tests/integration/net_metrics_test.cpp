@@ -50,7 +50,7 @@ class MetricsTest : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(MetricsTest, a_picture_moves_what_it_has_to_do_with_by_one) {
+TEST_F(MetricsTest, APictureMovesWhatItHasToDoWithByOne) {
   const Exposition before = scrape(port());
   const Answer picture = get(port(), "/v1/datasets/small/frame.jpg?width=64&height=48");
   ASSERT_EQ(picture.status, 200);
@@ -75,7 +75,7 @@ TEST_F(MetricsTest, a_picture_moves_what_it_has_to_do_with_by_one) {
   EXPECT_EQ(moved(frames("final")), 0) << "that is for viewers' frames";
 }
 
-TEST_F(MetricsTest, data_is_counted_where_it_is_read_and_found) {
+TEST_F(MetricsTest, DataIsCountedWhereItIsReadAndFound) {
   const Exposition before = scrape(port());
   EXPECT_EQ(before.value("windsplat_resident_bytes"), 0);
   EXPECT_EQ(before.value("windsplat_memory_limit_bytes"), 1U << 30);
@@ -92,7 +92,7 @@ TEST_F(MetricsTest, data_is_counted_where_it_is_read_and_found) {
             once.value(R"(windsplat_data_lookups_total{result="hit"})"));
 }
 
-TEST_F(MetricsTest, a_viewers_frames_are_counted_by_what_they_are_for) {
+TEST_F(MetricsTest, AViewersFramesAreCountedByWhatTheyAreFor) {
   {
     StreamClient viewer(port());
     EXPECT_EQ(scrape_until([](const Exposition& now) {
@@ -132,7 +132,7 @@ TEST_F(MetricsTest, a_viewers_frames_are_counted_by_what_they_are_for) {
 
 // Whatever they ask for, one frame waits for them, and a second one when they have taken it; the
 // kernel's buffers of a few hundred kilobytes are the rest.
-TEST_F(MetricsTest, peers_that_never_read_hold_a_frame_each_at_most) {
+TEST_F(MetricsTest, PeersThatNeverReadHoldAFrameEachAtMost) {
   constexpr int peers = 5;  // a frame each before the first is given up as too slow
   const std::string image = R"("image":{"width":2000,"height":1500})";
   const Answer picture = request(port(), "POST", "/v1/frames",
@@ -160,7 +160,7 @@ TEST_F(MetricsTest, peers_that_never_read_hold_a_frame_each_at_most) {
   scrape_until([](const Exposition& now) { return now.value("windsplat_unsent_bytes") == 0; });
 }
 
-TEST_F(MetricsTest, no_client_can_make_series) {
+TEST_F(MetricsTest, NoClientCanMakeSeries) {
   const Exposition before = scrape(port());
   for (int i = 0; i < 50; ++i) {
     const std::string name = "nothing-" + std::to_string(i);
@@ -186,7 +186,7 @@ TEST_F(MetricsTest, no_client_can_make_series) {
   EXPECT_EQ(after.value(requests("/v1", "4xx")), 1);
 }
 
-TEST_F(MetricsTest, are_told_while_the_renderer_is_busy) {
+TEST_F(MetricsTest, AreToldWhileTheRendererIsBusy) {
   Socket waiting(port());
   waiting.send(
       "GET /v1/datasets/small/frame.png?width=4096&height=4096 HTTP/1.1\r\nHost: x\r\n\r\n");
@@ -196,7 +196,7 @@ TEST_F(MetricsTest, are_told_while_the_renderer_is_busy) {
   EXPECT_EQ(waiting.receive(1), "") << "the picture is not there yet";
 }
 
-TEST_F(MetricsTest, of_the_process_are_the_systems) {
+TEST_F(MetricsTest, OfTheProcessAreTheSystems) {
   const Exposition now = scrape(port());
   EXPECT_GT(now.value("process_resident_memory_bytes"), 1 << 20);
   EXPECT_GT(now.value("process_cpu_seconds_total"), 0);
@@ -211,7 +211,7 @@ TEST_F(MetricsTest, of_the_process_are_the_systems) {
             1);
 }
 
-TEST(MetricsAt, the_root_and_below_the_base_path) {
+TEST(MetricsAt, TheRootAndBelowTheBasePath) {
   windsplat::net::ServerOptions options;
   options.base_path = "/winds";
   TestServer server(options);
@@ -221,7 +221,7 @@ TEST(MetricsAt, the_root_and_below_the_base_path) {
   EXPECT_EQ(request(server.port(), "POST", "/metrics", {}, "{}").status, 405);
 }
 
-TEST_F(MetricsTest, are_all_in_the_manual_and_the_manual_has_no_others) {
+TEST_F(MetricsTest, AreAllInTheManualAndTheManualHasNoOthers) {
   std::ifstream manual(WINDSPLAT_SOURCE_DIR "/docs/user/metrics.md");
   std::map<std::string, std::string> types;
   const std::regex row(R"(^\| `([a-z_]+)` \| (counter|gauge|histogram) \|.*)");

@@ -46,7 +46,7 @@ void expect_problem(const Answer& answer, int status, const std::string& pointer
 
 // --- documents ----------------------------------------------------------------------------------
 
-TEST_F(Rest, service_tells_version_links_and_limits_and_every_link_leads_somewhere) {
+TEST_F(Rest, ServiceTellsVersionLinksAndLimitsAndEveryLinkLeadsSomewhere) {
   const Answer answer = get(port(), "/v1");
   ASSERT_EQ(answer.status, 200);
   const Json service = json_of(answer);
@@ -62,7 +62,7 @@ TEST_F(Rest, service_tells_version_links_and_limits_and_every_link_leads_somewhe
   }
 }
 
-TEST_F(Rest, datasets_are_listed_without_being_read_and_described_after_reading) {
+TEST_F(Rest, DatasetsAreListedWithoutBeingReadAndDescribedAfterReading) {
   const Json list = json_of(get(port(), "/v1/datasets"));
   ASSERT_EQ(list["datasets"].size(), 1U);
   EXPECT_EQ(list["datasets"][0]["id"], "small");
@@ -88,14 +88,14 @@ TEST_F(Rest, datasets_are_listed_without_being_read_and_described_after_reading)
   expect_problem(get(port(), "/v1/datasets/nowhere"), 404);
 }
 
-TEST_F(Rest, the_default_view_is_a_view_that_can_be_posted) {
+TEST_F(Rest, TheDefaultViewIsAViewThatCanBePosted) {
   const Json dataset = json_of(get(port(), "/v1/datasets/small"));
   Json view = dataset["defaultView"];
   view["image"] = {{"width", 64}, {"height", 48}};
   EXPECT_EQ(post_view(port(), view.dump()).status, 200);
 }
 
-TEST_F(Rest, color_maps_and_presets_and_schema) {
+TEST_F(Rest, ColorMapsAndPresetsAndSchema) {
   const Json maps = json_of(get(port(), "/v1/colormaps"));
   ASSERT_FALSE(maps["colormaps"].empty());
   EXPECT_GE(maps["colormaps"][0]["colors"].size(), 16U);
@@ -110,7 +110,7 @@ TEST_F(Rest, color_maps_and_presets_and_schema) {
   EXPECT_TRUE(again.body.empty());
 }
 
-TEST_F(Rest, health_answers) {
+TEST_F(Rest, HealthAnswers) {
   EXPECT_EQ(get(port(), "/livez").status, 200);
   EXPECT_EQ(get(port(), "/readyz").status, 200);
   const std::string base = "http://127.0.0.1:" + std::to_string(port());
@@ -122,7 +122,7 @@ TEST_F(Rest, health_answers) {
 
 // --- pictures -----------------------------------------------------------------------------------
 
-TEST_F(Rest, a_picture_has_the_size_asked_for_and_shows_something) {
+TEST_F(Rest, APictureHasTheSizeAskedForAndShowsSomething) {
   const Answer answer = get(port(), "/v1/datasets/small/frame.jpg?width=200&height=120&step=1");
   ASSERT_EQ(answer.status, 200) << answer.body;
   EXPECT_EQ(answer.header("content-type"), "image/jpeg");
@@ -138,7 +138,7 @@ TEST_F(Rest, a_picture_has_the_size_asked_for_and_shows_something) {
   EXPECT_GT(info["work"]["samples"], 0);
 }
 
-TEST_F(Rest, formats_by_suffix_and_by_accept) {
+TEST_F(Rest, FormatsBySuffixAndByAccept) {
   const std::string size = "?width=40&height=30";
   const Answer png = get(port(), "/v1/datasets/small/frame.png" + size);
   EXPECT_EQ(png.header("content-type"), "image/png");
@@ -163,7 +163,7 @@ TEST_F(Rest, formats_by_suffix_and_by_accept) {
                  415);
 }
 
-TEST_F(Rest, orbit_and_preset_change_the_picture) {
+TEST_F(Rest, OrbitAndPresetChangeThePicture) {
   const std::string base = "/v1/datasets/small/frame.npy?width=60&height=40";
   const std::string plain = get(port(), base).body;
   for (const char* change : {"&azimuth=90", "&elevation=80", "&zoom=3", "&preset=top",
@@ -178,7 +178,7 @@ TEST_F(Rest, orbit_and_preset_change_the_picture) {
   }
 }
 
-TEST_F(Rest, quality_of_a_jpeg) {
+TEST_F(Rest, QualityOfAJpeg) {
   const std::string base = "/v1/datasets/small/frame.jpg?width=200&height=120&quality=";
   EXPECT_LT(get(port(), base + "20").body.size(), get(port(), base + "95").body.size());
   expect_problem(get(port(), base + "0"), 422);
@@ -186,7 +186,7 @@ TEST_F(Rest, quality_of_a_jpeg) {
   expect_problem(get(port(), "/v1/datasets/small/frame.png?quality=50"), 400);
 }
 
-TEST_F(Rest, the_same_view_has_the_same_tag_and_bytes_and_is_not_sent_twice) {
+TEST_F(Rest, TheSameViewHasTheSameTagAndBytesAndIsNotSentTwice) {
   const std::string view = R"({"dataset":"small","image":{"width":40,"height":30}})";
   const Answer first = post_view(port(), view);
   ASSERT_EQ(first.status, 200);
@@ -207,7 +207,7 @@ TEST_F(Rest, the_same_view_has_the_same_tag_and_bytes_and_is_not_sent_twice) {
             etag);
 }
 
-TEST_F(Rest, a_budgeted_picture_is_not_to_be_kept) {
+TEST_F(Rest, ABudgetedPictureIsNotToBeKept) {
   const Answer answer = post_view(
       port(), R"({"dataset":"small","image":{"width":40,"height":30},"quality":{"budgetMs":20}})");
   EXPECT_EQ(answer.status, 200);
@@ -217,7 +217,7 @@ TEST_F(Rest, a_budgeted_picture_is_not_to_be_kept) {
 
 // Every picture says what it is thought to err, and one that is asked for by its error or its time
 // is drawn by what does.
-TEST_F(Rest, a_picture_says_its_error_and_keeps_what_is_asked_of_it) {
+TEST_F(Rest, APictureSaysItsErrorAndKeepsWhatIsAskedOfIt) {
   const auto frame_of = [&](const std::string& quality) {
     const Answer answer =
         post_view(port(), R"({"dataset":"small","image":{"width":320,"height":240},"quality":)" +
@@ -240,7 +240,7 @@ TEST_F(Rest, a_picture_says_its_error_and_keeps_what_is_asked_of_it) {
 
 // --- bad input ----------------------------------------------------------------------------------
 
-TEST_F(Rest, bad_views_are_refused_with_the_pointer) {
+TEST_F(Rest, BadViewsAreRefusedWithThePointer) {
   struct Case {
     const char* view;
     int status;
@@ -280,13 +280,13 @@ TEST_F(Rest, bad_views_are_refused_with_the_pointer) {
   expect_problem(post_view(port(), deep), 400);
 }
 
-TEST_F(Rest, a_picture_with_more_pixels_than_allowed_is_413_or_422) {
+TEST_F(Rest, APictureWithMorePixelsThanAllowedIs413Or422) {
   const Answer answer =
       post_view(port(), R"({"dataset":"small","image":{"width":8192,"height":8192}})");
   EXPECT_THAT(answer.status, testing::AnyOf(413, 422));
 }
 
-TEST_F(Rest, bad_queries_are_refused) {
+TEST_F(Rest, BadQueriesAreRefused) {
   const std::string base = "/v1/datasets/small/frame.jpg?";
   for (const char* query :
        {"colour=1", "width=ten", "width=1&width=2", "azimuth=NaN", "azimuth=inf", "azimuth=1e999",
@@ -304,7 +304,7 @@ TEST_F(Rest, bad_queries_are_refused) {
   expect_problem(get(port(), "/v1/datasets/..%2f..%2fetc%2fpasswd"), 404);
 }
 
-TEST_F(Rest, methods_that_do_nothing_are_told_which_do) {
+TEST_F(Rest, MethodsThatDoNothingAreToldWhichDo) {
   const Answer deleted = request(port(), "DELETE", "/v1/datasets");
   expect_problem(deleted, 405);
   EXPECT_EQ(deleted.header("allow"), "GET, HEAD, POST, OPTIONS");
@@ -319,7 +319,7 @@ TEST_F(Rest, methods_that_do_nothing_are_told_which_do) {
   expect_problem(request(port(), "BREW", "/v1"), 501);
 }
 
-TEST_F(Rest, head_is_get_without_the_body) {
+TEST_F(Rest, HeadIsGetWithoutTheBody) {
   for (const char* target :
        {"/v1", "/v1/datasets/small/frame.png?width=40&height=30", "/view.schema.json", "/"}) {
     const Answer whole = get(port(), target);
@@ -331,7 +331,7 @@ TEST_F(Rest, head_is_get_without_the_body) {
   }
 }
 
-TEST_F(Rest, beyond_what_can_wait_comes_429_at_once) {
+TEST_F(Rest, BeyondWhatCanWaitComes429AtOnce) {
   // Resident, so that nothing is let in only to find that it has to be loaded first.
   ASSERT_EQ(get(port(), "/v1/datasets/small/frame.jpg?width=16&height=16").status, 200);
   // More pictures than may wait, requested before the first is done.
@@ -361,7 +361,7 @@ TEST_F(Rest, beyond_what_can_wait_comes_429_at_once) {
 
 // --- the page -----------------------------------------------------------------------------------
 
-TEST_F(Rest, the_page_is_served_safely_and_cached) {
+TEST_F(Rest, ThePageIsServedSafelyAndCached) {
   const Answer page = get(port(), "/");
   ASSERT_EQ(page.status, 200);
   EXPECT_THAT(page.header("content-type"), StartsWith("text/html"));
@@ -394,7 +394,7 @@ TEST_F(Rest, the_page_is_served_safely_and_cached) {
   EXPECT_THAT(code.header("cache-control"), HasSubstr("immutable"));
 }
 
-TEST(RestBase, everything_lies_below_the_base_path_and_health_at_the_root_too) {
+TEST(RestBase, EverythingLiesBelowTheBasePathAndHealthAtTheRootToo) {
   windsplat::net::ServerOptions options;
   options.base_path = "/a/b";
   TestServer server(options);
@@ -412,7 +412,7 @@ TEST(RestBase, everything_lies_below_the_base_path_and_health_at_the_root_too) {
   EXPECT_EQ(Json::parse(get(port, "/a/b/v1").body)["links"]["datasets"], "/a/b/v1/datasets");
 }
 
-TEST(RestListen, an_address_that_cannot_be_had_is_named) {
+TEST(RestListen, AnAddressThatCannotBeHadIsNamed) {
   const auto store = std::make_shared<windsplat::data::Store>(1 << 20);
   const auto pool = std::make_shared<windsplat::ThreadPool>(1);
   windsplat::net::ServerOptions options;

@@ -37,7 +37,7 @@ class Tls : public testing::Test {
   TestServer server_{in_tls()};
 };
 
-TEST_F(Tls, requests_are_answered_and_told_to_stay_in_it) {
+TEST_F(Tls, RequestsAreAnsweredAndToldToStayInIt) {
   EXPECT_THAT(server_.server().url(), testing::StartsWith("https://127.0.0.1:"));
   const Answer live = get(place(), "/livez");
   EXPECT_EQ(live.status, 200);
@@ -56,7 +56,7 @@ TEST_F(Tls, requests_are_answered_and_told_to_stay_in_it) {
   EXPECT_EQ(read_answer(plain_by_name).header("strict-transport-security"), "");
 }
 
-TEST_F(Tls, speaks_1_3_and_http_1_1) {
+TEST_F(Tls, Speaks13AndHttp11) {
   Socket socket(place());
   ASSERT_TRUE(socket.shaken());
   EXPECT_EQ(socket.version(), "TLSv1.3");
@@ -64,7 +64,7 @@ TEST_F(Tls, speaks_1_3_and_http_1_1) {
   EXPECT_EQ(socket.peer_name(), "first");
 }
 
-TEST_F(Tls, one_connection_carries_many_requests_even_sent_at_once) {
+TEST_F(Tls, OneConnectionCarriesManyRequestsEvenSentAtOnce) {
   Socket socket(place());
   const std::string ask =
       "GET /v1/datasets/small/frame.png?width=20&height=20 HTTP/1.1\r\nHost: x\r\n\r\n";
@@ -88,7 +88,7 @@ TEST_F(Tls, one_connection_carries_many_requests_even_sent_at_once) {
 }
 
 // Frames of every size come whole: small ones share a record, large ones take many.
-TEST_F(Tls, a_stream_brings_frames) {
+TEST_F(Tls, AStreamBringsFrames) {
   StreamClient viewer(place(), {{"Sec-WebSocket-Protocol", "windsplat.v1"}});
   ASSERT_EQ(viewer.handshake().status, 101);
   ASSERT_TRUE(viewer.next_text("hello"));
@@ -118,14 +118,14 @@ TEST_F(Tls, a_stream_brings_frames) {
   EXPECT_TRUE(viewer.socket.closed_by_peer());
 }
 
-TEST_F(Tls, a_peer_that_speaks_plain_http_is_told) {
+TEST_F(Tls, APeerThatSpeaksPlainHttpIsTold) {
   const Answer answer = raw(plain(), "GET /livez HTTP/1.1\r\nHost: x\r\n\r\n");
   EXPECT_EQ(answer.status, 400);
   EXPECT_THAT(answer.body, HasSubstr("https://"));
   EXPECT_EQ(answer.header("connection"), "close");
 }
 
-TEST_F(Tls, noise_is_cut_off) {
+TEST_F(Tls, NoiseIsCutOff) {
   for (const std::string& noise : {std::string(100, '\0'), std::string(70000, '\xff'),
                                    std::string("\x16\x03\x01\x40\x00", 5)}) {
     Socket socket(plain());
@@ -134,7 +134,7 @@ TEST_F(Tls, noise_is_cut_off) {
   }
 }
 
-TEST_F(Tls, a_handshake_has_a_deadline_while_others_are_served) {
+TEST_F(Tls, AHandshakeHasADeadlineWhileOthersAreServed) {
   Socket silent(plain());
   Socket slow(plain());
   slow.send(std::string("\x16\x03\x01\x02", 4));
@@ -145,14 +145,14 @@ TEST_F(Tls, a_handshake_has_a_deadline_while_others_are_served) {
   EXPECT_GT(Clock::now() - begin, std::chrono::seconds(3)) << "it is no refusal at once";
 }
 
-TEST_F(Tls, a_slow_header_is_cut_off) {
+TEST_F(Tls, ASlowHeaderIsCutOff) {
   Socket slow(place());
   slow.send("GET /livez HT");
   EXPECT_TRUE(slow.closed_by_peer(20'000));
 }
 
 // With a close_notify and without; were they all drawn, the last would come after a minute of work.
-TEST_F(Tls, a_client_that_leaves_frees_the_renderer) {
+TEST_F(Tls, AClientThatLeavesFreesTheRenderer) {
   for (int n = 0; n < 12; ++n) {
     Socket socket(place());
     socket.send(
@@ -169,7 +169,7 @@ TEST_F(Tls, a_client_that_leaves_frees_the_renderer) {
 }
 
 // What comes in TLS is not always a request, or a client that goes.
-TEST_F(Tls, a_change_of_keys_while_a_picture_is_drawn_is_no_leaving) {
+TEST_F(Tls, AChangeOfKeysWhileAPictureIsDrawnIsNoLeaving) {
   Socket socket(place());
   socket.send(
       "GET /v1/datasets/small/frame.png?width=1500&height=1500 HTTP/1.1\r\nHost: x\r\n\r\n");
@@ -179,7 +179,7 @@ TEST_F(Tls, a_change_of_keys_while_a_picture_is_drawn_is_no_leaving) {
   EXPECT_EQ(read_answer(socket).status, 200);
 }
 
-TEST_F(Tls, a_viewer_that_changes_its_keys_stays) {
+TEST_F(Tls, AViewerThatChangesItsKeysStays) {
   StreamClient viewer(place());
   ASSERT_TRUE(viewer.next_text("hello"));
   EXPECT_TRUE(viewer.socket.change_key());
@@ -190,7 +190,7 @@ TEST_F(Tls, a_viewer_that_changes_its_keys_stays) {
 }
 
 // A body that is not wanted, and sent all the same, does not cost the client its answer.
-TEST_F(Tls, a_body_too_large_gets_413) {
+TEST_F(Tls, ABodyTooLargeGets413) {
   Socket socket(place());
   socket.send("POST /v1/frames HTTP/1.1\r\nHost: x\r\nContent-Length: 104857600\r\n\r\n");
   const std::string megabyte(1 << 20, 'x');
@@ -201,7 +201,7 @@ TEST_F(Tls, a_body_too_large_gets_413) {
 }
 
 // The write deadline is 15 s and some more for the size.
-TEST_F(Tls, a_viewer_that_never_reads_is_sent_away) {
+TEST_F(Tls, AViewerThatNeverReadsIsSentAway) {
   StreamClient viewer(place(), {}, "/v1/stream", 4096);
   ASSERT_TRUE(viewer.next_text("hello"));
   viewer.say(R"({"type":"open","id":1,"dataset":"small"})");
@@ -219,7 +219,7 @@ TEST_F(Tls, a_viewer_that_never_reads_is_sent_away) {
   FAIL() << "it still holds its session";
 }
 
-TEST_F(Tls, another_certificate_is_for_connections_that_come) {
+TEST_F(Tls, AnotherCertificateIsForConnectionsThatCome) {
   Socket old(place());
   StreamClient viewer(place());
   ASSERT_TRUE(viewer.next_text("hello"));
@@ -235,7 +235,7 @@ TEST_F(Tls, another_certificate_is_for_connections_that_come) {
   EXPECT_TRUE(viewer.next_text("opened"));
 }
 
-TEST(TlsDrain, says_goodbye) {
+TEST(TlsDrain, SaysGoodbye) {
   TestServer server(in_tls());
   StreamClient viewer(Place(server.port(), true));
   ASSERT_TRUE(viewer.next_text("hello"));
@@ -244,7 +244,7 @@ TEST(TlsDrain, says_goodbye) {
   EXPECT_TRUE(viewer.socket.closed_by_peer());
 }
 
-TEST(TlsFiles, are_refused_with_a_reason) {
+TEST(TlsFiles, AreRefusedWithAReason) {
   const Certificate mine = make_certificate("mine");
   const Certificate other = make_certificate("other");
   const auto refused = [](const std::string& chain, const std::string& key) {

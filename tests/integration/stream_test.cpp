@@ -66,7 +66,7 @@ class Stream : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(Stream, says_hello_first_and_agrees_on_the_protocol) {
+TEST_F(Stream, SaysHelloFirstAndAgreesOnTheProtocol) {
   StreamClient offers(port(), {{"Sec-WebSocket-Protocol", "chat, windsplat.v1"}});
   EXPECT_EQ(offers.handshake().status, 101);
   EXPECT_EQ(offers.handshake().header("sec-websocket-protocol"), "windsplat.v1");
@@ -82,7 +82,7 @@ TEST_F(Stream, says_hello_first_and_agrees_on_the_protocol) {
   EXPECT_TRUE(plain.next_text("hello"));
 }
 
-TEST_F(Stream, open_then_patch_then_a_moving_and_a_final_frame) {
+TEST_F(Stream, OpenThenPatchThenAMovingAndAFinalFrame) {
   Viewer viewer(port());
   viewer.say(R"({"type":"open","id":3,"dataset":"small"})");
   const auto opened = viewer.next_text("opened");
@@ -102,7 +102,7 @@ TEST_F(Stream, open_then_patch_then_a_moving_and_a_final_frame) {
   EXPECT_GT(picture.distinct(), 160U * 120U / 50);
 }
 
-TEST_F(Stream, a_patch_and_acks_are_enough) {
+TEST_F(Stream, APatchAndAcksAreEnough) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   const auto moving = viewer.frame();
@@ -126,7 +126,7 @@ TEST_F(Stream, a_patch_and_acks_are_enough) {
   EXPECT_THAT(announced, testing::ElementsAre(1, 2));
 }
 
-TEST_F(Stream, chosen_tells_a_view_that_draws_the_same_picture) {
+TEST_F(Stream, ChosenTellsAViewThatDrawsTheSamePicture) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -141,7 +141,7 @@ TEST_F(Stream, chosen_tells_a_view_that_draws_the_same_picture) {
             post_view(port(), small_view, {{"Accept", "image/png"}}).body);
 }
 
-TEST_F(Stream, no_third_frame_before_an_ack) {
+TEST_F(Stream, NoThirdFrameBeforeAnAck) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.next_frame());
@@ -161,7 +161,7 @@ TEST_F(Stream, no_third_frame_before_an_ack) {
   EXPECT_EQ(third->header.rev, 29U) << "the newest view";
 }
 
-TEST_F(Stream, a_drag_shows_motion_and_ends_sharp) {
+TEST_F(Stream, ADragShowsMotionAndEndsSharp) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -181,7 +181,7 @@ TEST_F(Stream, a_drag_shows_motion_and_ends_sharp) {
   EXPECT_TRUE(viewer.final_frame(rev));
 }
 
-TEST_F(Stream, a_still_comes_at_its_size_after_its_announcement) {
+TEST_F(Stream, AStillComesAtItsSizeAfterItsAnnouncement) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -201,7 +201,7 @@ TEST_F(Stream, a_still_comes_at_its_size_after_its_announcement) {
   EXPECT_EQ(progress["done"], 1);
 }
 
-TEST_F(Stream, a_lossless_view_ends_as_the_png_that_a_request_gets) {
+TEST_F(Stream, ALosslessViewEndsAsThePngThatARequestGets) {
   Viewer viewer(port());
   const char* const view =
       R"({"dataset":"small","image":{"width":160,"height":120},"quality":{"lossless":true}})";
@@ -216,7 +216,7 @@ TEST_F(Stream, a_lossless_view_ends_as_the_png_that_a_request_gets) {
   EXPECT_EQ(final->payload, post_view(port(), view, {{"Accept", "image/png"}}).body);
 }
 
-TEST_F(Stream, play_runs_through_the_steps) {
+TEST_F(Stream, PlayRunsThroughTheSteps) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -234,7 +234,7 @@ TEST_F(Stream, play_runs_through_the_steps) {
   }
 }
 
-TEST_F(Stream, two_viewers_share_what_was_read_and_see_their_own_view) {
+TEST_F(Stream, TwoViewersShareWhatWasReadAndSeeTheirOwnView) {
   Viewer one(port());
   Viewer two(port());
   one.patch(1, R"({"dataset":"small","image":{"width":64,"height":48}})");
@@ -260,7 +260,7 @@ TEST_F(Stream, two_viewers_share_what_was_read_and_see_their_own_view) {
 
 // --- bad input ----------------------------------------------------------------------------------
 
-TEST_F(Stream, messages_that_cannot_be_followed_are_answered_and_the_connection_lives) {
+TEST_F(Stream, MessagesThatCannotBeFollowedAreAnsweredAndTheConnectionLives) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -295,7 +295,7 @@ TEST_F(Stream, messages_that_cannot_be_followed_are_answered_and_the_connection_
   EXPECT_EQ(frame->header.step, 1U);
 }
 
-TEST_F(Stream, what_breaks_the_protocol_closes_with_its_code) {
+TEST_F(Stream, WhatBreaksTheProtocolClosesWithItsCode) {
   {
     StreamClient client(port());
     client.send_frame(Opcode::binary, "frames come from the server");
@@ -328,7 +328,7 @@ TEST_F(Stream, what_breaks_the_protocol_closes_with_its_code) {
 }
 
 // A ping between fragments is no sign of a message's end.
-TEST_F(Stream, a_message_that_never_ends_is_cut_off_though_pings_come_between) {
+TEST_F(Stream, AMessageThatNeverEndsIsCutOffThoughPingsComeBetween) {
   StreamClient client(port());
   ASSERT_TRUE(client.next_text("hello"));
   client.send_frame(Opcode::text, "", false);
@@ -342,7 +342,7 @@ TEST_F(Stream, a_message_that_never_ends_is_cut_off_though_pings_come_between) {
   EXPECT_TRUE(cut);
 }
 
-TEST_F(Stream, pings_alone_are_no_message) {
+TEST_F(Stream, PingsAloneAreNoMessage) {
   StreamClient client(port());
   for (int n = 0; n < 24; ++n) {
     client.send_frame(Opcode::ping, "x");
@@ -350,7 +350,7 @@ TEST_F(Stream, pings_alone_are_no_message) {
   }
 }
 
-TEST_F(Stream, a_peer_that_has_said_goodbye_is_not_waited_for) {
+TEST_F(Stream, APeerThatHasSaidGoodbyeIsNotWaitedFor) {
   StreamClient client(port());
   ASSERT_TRUE(client.next_text("hello"));
   const auto begin = std::chrono::steady_clock::now();
@@ -363,14 +363,14 @@ TEST_F(Stream, a_peer_that_has_said_goodbye_is_not_waited_for) {
       << "one that says nothing is waited for 2 s";
 }
 
-TEST_F(Stream, a_message_at_the_limit_is_read) {
+TEST_F(Stream, AMessageAtTheLimitIsRead) {
   Viewer viewer(port());
   const std::string patch = R"({"type":"patch","rev":1,"patch":)" + std::string(small_view) + "}";
   viewer.say(patch + std::string(65536 - patch.size(), ' '));
   EXPECT_TRUE(viewer.final_frame(1));
 }
 
-TEST_F(Stream, pages_of_other_origins_may_not_connect) {
+TEST_F(Stream, PagesOfOtherOriginsMayNotConnect) {
   const std::string own = "http://127.0.0.1:" + std::to_string(port());
   const auto status = [&](const std::string& origin) {
     return StreamClient(port(), {{"Origin", origin}}).handshake().status;
@@ -388,7 +388,7 @@ TEST_F(Stream, pages_of_other_origins_may_not_connect) {
   EXPECT_EQ(StreamClient(other.port(), {{"Origin", "http://lab.example"}}).handshake().status, 403);
 }
 
-TEST_F(Stream, viewers_beyond_the_limit_are_told_so) {
+TEST_F(Stream, ViewersBeyondTheLimitAreToldSo) {
   windsplat::net::ServerOptions options;
   options.sessions_max = 2;
   TestServer server(options);
@@ -408,7 +408,7 @@ TEST_F(Stream, viewers_beyond_the_limit_are_told_so) {
   FAIL() << "no place came free";
 }
 
-TEST_F(Stream, silence_ends_the_session) {
+TEST_F(Stream, SilenceEndsTheSession) {
   windsplat::net::ServerOptions options;
   options.idle_timeout_s = 1;
   const TestServer server(options);
@@ -416,7 +416,7 @@ TEST_F(Stream, silence_ends_the_session) {
   EXPECT_EQ(client.close_code(), 4410);
 }
 
-TEST_F(Stream, a_peer_that_never_reads_is_sent_two_frames_at_most) {
+TEST_F(Stream, APeerThatNeverReadsIsSentTwoFramesAtMost) {
   StreamClient deaf(port(), {}, "/v1/stream", 4096);
   deaf.say(R"({"type":"patch","rev":1,"patch":{"dataset":"small",
               "image":{"width":1600,"height":1200}}})");

@@ -21,6 +21,8 @@ GENERATED = re.compile(r"(.*/)?(package-lock\.json|.*\.generated\.\w+|generated/
 PUT_OFF = re.compile(r"\b(" + "|".join(["TO" + "DO", "FIX" + "ME", "X" * 3]) + r")\b")
 MACHINE = re.compile(r"(?<![\w./:$}*-])/(home|root|Users|work|workspace)/")
 
+TEST_NAME = re.compile(r"^(?:TYPED_)?TEST(?:_[FP])?\(\s*(\w+)\s*,\s*(\w+)\s*\)", re.M)
+
 OPENS_SCOPE = re.compile(r"(inline )?(namespace|class|struct|union|enum|extern)\b")
 
 
@@ -56,6 +58,14 @@ def long_functions(path, lines):
             statement = []
 
 
+def test_names(path, content):
+    for match in TEST_NAME.finditer(content):
+        suite, name = match.groups()
+        if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", suite + name) or not name[0].isupper():
+            number = content.count("\n", 0, match.start()) + 1
+            yield f"{path}:{number}: test name {suite}.{name} is not CamelCase"
+
+
 def complaints_about(path, content):
     lines = content.splitlines()
     for number, line in enumerate(lines, 1):
@@ -72,6 +82,7 @@ def complaints_about(path, content):
         yield f"{path}: {len(lines)} lines"
     if path.endswith((".cpp", ".hpp")):
         yield from long_functions(path, lines)
+        yield from test_names(path, content)
 
 
 def empty_test_folders(root, files):

@@ -22,7 +22,7 @@ CLEAN = {
     "server/transport/listener.cpp": "#include <boost/asio.hpp>\n",
     "protocol/codec_view.cpp": "#include <nlohmann/json.hpp>\n",
     "tests/CMakeLists.txt": "windsplat_test(unit_base unit/base unit windsplat_base)\n",
-    "tests/unit/base/error_test.cpp": "TEST(Error, says_why) {\n}\n",
+    "tests/unit/base/error_test.cpp": "TEST(Error, NamesTheCause) {\n}\n",
     "web/src/base/text.ts": "export const text = 1;\n",
     "web/src/wire/api.ts": 'import type { View } from "../../generated/view";\n',
     "web/src/app/app.ts": 'import {\n  api,\n} from "../wire/api";\nimport "../base/text";\n',
@@ -173,6 +173,12 @@ class Planted(unittest.TestCase):
         self.plant("server/base/a.cpp", "// see docs/d.md\n// ARCHITECTURE.md\n")
         self.expect(check_links, "docs/c.md:1: gone.md", "docs/c.md:3: b.md#z", "#no-heading",
                     "a.cpp:1: docs/d.md", "a.cpp:2: ARCHITECTURE.md")
+
+    def test_name_of_a_test_in_snake_case(self):
+        self.plant("tests/unit/base/a_test.cpp",
+                   "TEST_F(Pool, runs_once) {\n}\nTEST(Pool,\n     endsLate) {\n}\n")
+        self.expect(check_style, "a_test.cpp:1: test name Pool.runs_once",
+                    "a_test.cpp:3: test name Pool.endsLate")
 
     def test_folder_of_tests_without_a_test(self):
         self.plant("tests/unit/base/error_test.cpp", "// nothing yet\n")

@@ -232,7 +232,7 @@ std::vector<int> outcomes(const std::string& path) {
   return out;
 }
 
-TEST(LoaderConfinement, nothing_but_reading_and_computing_is_left) {
+TEST(LoaderConfinement, NothingButReadingAndComputingIsLeft) {
   const test::Folder folder;
   const std::string path = folder / "given";
   std::ofstream(path) << "first";
@@ -245,7 +245,7 @@ TEST(LoaderConfinement, nothing_but_reading_and_computing_is_left) {
 
 #ifdef __x86_64__
 // No rule covers the call numbers of x32.
-TEST(LoaderConfinement, a_call_of_another_abi_ends_the_process) {
+TEST(LoaderConfinement, ACallOfAnotherAbiEndsTheProcess) {
   constexpr long x32 = 0x40000000;
   std::fflush(nullptr);
   const pid_t child = ::fork();

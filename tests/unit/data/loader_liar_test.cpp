@@ -137,7 +137,7 @@ class Liar : public testing::Test {
   Limits limits_;
 };
 
-TEST_F(Liar, a_valid_answer_is_accepted) {
+TEST_F(Liar, AValidAnswerIsAccepted) {
   speak("fd = told()\nos.pwrite(fd, floats(*range(16)), 0)\nos.close(fd)\nsay('filled')\nhear()\n");
   const auto volume = read();
   ASSERT_TRUE(volume) << volume.error().message;
@@ -150,24 +150,24 @@ TEST_F(Liar, a_valid_answer_is_accepted) {
   EXPECT_FLOAT_EQ(volume->range[1], std::hypot(7.0F, 15.0F));
 }
 
-TEST_F(Liar, one_that_ends) {
+TEST_F(Liar, OneThatEnds) {
   be("#!/bin/sh\nexit 7\n");
   expect_not_opened("the loader of 'some.nc' ended with code 7 while opening it");
 }
 
-TEST_F(Liar, one_that_spins) {
+TEST_F(Liar, OneThatSpins) {
   limits_.open_time = milliseconds(300);
   be("#!/bin/sh\nwhile :; do :; done\n");
   expect_not_opened("the loader of 'some.nc' was ended after 0.3 s while opening it");
 }
 
-TEST_F(Liar, one_that_sends_single_bytes) {
+TEST_F(Liar, OneThatSendsSingleBytes) {
   limits_.open_time = milliseconds(700);
   speak("while True: s.send(b'\\x01\\0\\0\\0'[:1]); time.sleep(0.06)\n");
   expect_not_opened("the loader of 'some.nc' was ended after 0.7 s while opening it");
 }
 
-TEST_F(Liar, one_that_sends_malformed_messages) {
+TEST_F(Liar, OneThatSendsMalformedMessages) {
   const std::string message =
       "the loader of 'some.nc' violated the protocol and was ended while opening it";
   speak("s.sendall(b'x' * 1000)\nhear()\n");
@@ -183,14 +183,14 @@ TEST_F(Liar, one_that_sends_malformed_messages) {
 }
 
 // Where little is due, little is taken.
-TEST_F(Liar, one_that_sends_too_many_messages) {
+TEST_F(Liar, OneThatSendsTooManyMessages) {
   speak("told()\nsay('progress', b'x' * 100000)\nhear()\n");
   expect_not_read(
       "the loader of 'some.nc' violated the protocol and was ended while reading 'wind'");
 }
 
 // Memory written by a loader and not reused is released with it.
-TEST_F(Liar, one_that_fails_to_fill_much_is_ended) {
+TEST_F(Liar, OneThatFailsToFillMuchIsEnded) {
   describe_much();
   speak("fd = told()\nos.pwrite(fd, b'x' * 1000, 0)\nfail('no')\nhear()\n");
   auto source = opened();
@@ -201,7 +201,7 @@ TEST_F(Liar, one_that_fails_to_fill_much_is_ended) {
   EXPECT_EQ((*source)->process(), -1);
 }
 
-TEST_F(Liar, one_that_keeps_much_mapped_is_ended) {
+TEST_F(Liar, OneThatKeepsMuchMappedIsEnded) {
   describe_much();
   speak("fd = told()\nm = mmap.mmap(fd, 4096)\nsay('filled')\nhear()\n");
   auto source = opened();
@@ -215,13 +215,13 @@ TEST_F(Liar, one_that_keeps_much_mapped_is_ended) {
   EXPECT_GT((*source)->process(), 0);
 }
 
-TEST_F(Liar, one_that_sends_endless_requests) {
+TEST_F(Liar, OneThatSendsEndlessRequests) {
   limits_.opens_max = 100;
   speak("while True: ask('ask_exists', b'some.nc')\n");
   expect_not_opened("the loader of 'some.nc' violated the protocol and was ended while opening it");
 }
 
-TEST_F(Liar, one_that_requests_other_files) {
+TEST_F(Liar, OneThatRequestsOtherFiles) {
   std::ofstream(folder_ / "beside") << "private";
   limits_.library_folders = {folder_ / "tables"};
   std::filesystem::create_directories(folder_ / "tables");
@@ -249,12 +249,12 @@ TEST_F(Liar, one_that_requests_other_files) {
             "descriptor no no no no no no no no");
 }
 
-TEST_F(Liar, one_that_describes_no_dataset) {
+TEST_F(Liar, OneThatDescribesNoDataset) {
   speak("say('opened', info[:-1])\nhear()\n");
   expect_not_opened("the loader sent a description that cannot be read");
 }
 
-TEST_F(Liar, one_that_keeps_the_memory_cannot_change_what_was_read) {
+TEST_F(Liar, OneThatKeepsTheMemoryCannotChangeWhatWasRead) {
   speak(
       "fd = told()\nm = mmap.mmap(fd, 64)\nm[:] = floats(*[1] * 16)\nsay('filled')\n"
       "time.sleep(0.2)\nm[:] = floats(*[2] * 16)\nhear()\n");
@@ -267,7 +267,7 @@ TEST_F(Liar, one_that_keeps_the_memory_cannot_change_what_was_read) {
   EXPECT_GT((*source)->process(), 0);
 }
 
-TEST_F(Liar, one_that_fills_nothing_or_less_hands_over_what_was_there) {
+TEST_F(Liar, OneThatFillsNothingOrLessHandsOverWhatWasThere) {
   speak(
       "told()\nsay('filled')\n"
       "kind, _, fd = hear()\n"
@@ -282,7 +282,7 @@ TEST_F(Liar, one_that_fills_nothing_or_less_hands_over_what_was_there) {
   }
 }
 
-TEST_F(Liar, one_that_fails_at_first_is_sent_the_memory_again) {
+TEST_F(Liar, OneThatFailsAtFirstIsSentTheMemoryAgain) {
   speak(
       "told()\nfail('not yet')\n"
       "kind, _, fd = hear()\n"
@@ -297,7 +297,7 @@ TEST_F(Liar, one_that_fails_at_first_is_sent_the_memory_again) {
 }
 
 // 64 bytes at 16 a second.
-TEST_F(Liar, one_that_is_slow_has_time_by_the_bytes_that_are_read) {
+TEST_F(Liar, OneThatIsSlowHasTimeByTheBytesThatAreRead) {
   limits_.read_time = milliseconds(100);
   limits_.read_bytes_per_second = 16;
   speak("told()\ntime.sleep(0.5)\nsay('filled')\nhear()\n");
@@ -305,7 +305,7 @@ TEST_F(Liar, one_that_is_slow_has_time_by_the_bytes_that_are_read) {
   EXPECT_TRUE(volume) << volume.error().message;
 }
 
-TEST_F(Liar, progress_is_reported) {
+TEST_F(Liar, ProgressIsReported) {
   speak(
       "told()\nfor done in (0, 0.5, 1): say('progress', struct.pack('<d', done))\n"
       "say('filled')\nhear()\n");
@@ -317,7 +317,7 @@ TEST_F(Liar, progress_is_reported) {
   EXPECT_EQ(heard, (std::vector<double>{0, 0.5, 1}));
 }
 
-TEST_F(Liar, one_that_resizes_the_memory) {
+TEST_F(Liar, OneThatResizesTheMemory) {
   speak(
       "fd = told()\n"
       "for size in (0, 32, 128):\n"
@@ -328,7 +328,7 @@ TEST_F(Liar, one_that_resizes_the_memory) {
   EXPECT_TRUE(volume) << volume.error().message;
 }
 
-TEST_F(Liar, one_that_leaves_infinities_or_half_a_vector) {
+TEST_F(Liar, OneThatLeavesInfinitiesOrHalfAVector) {
   const std::string message = "the loader of 'told.nc' left numbers unmasked while reading 'wind'";
   for (const char* values : {"[inf] + [0] * 15", "[0] * 15 + [-inf]", "[nan] + [0] * 15",
                              "[0] * 12 + [nan] + [0] * 3"}) {

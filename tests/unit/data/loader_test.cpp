@@ -85,7 +85,7 @@ void expect_same_as_here(const std::string& path) {
   }
 }
 
-TEST_F(Loader, classic_files_read_as_in_this_process) {
+TEST_F(Loader, ClassicFilesReadAsInThisProcess) {
   for (const int mode : {0, NC_64BIT_OFFSET, NC_64BIT_DATA}) {
     const std::string path = folder_ / "classic.nc";
     test::write_wind(path, mode);
@@ -93,7 +93,7 @@ TEST_F(Loader, classic_files_read_as_in_this_process) {
   }
 }
 
-TEST_F(Loader, netcdf4_files_read_as_in_this_process) {
+TEST_F(Loader, Netcdf4FilesReadAsInThisProcess) {
   const std::string path = folder_ / "four.nc";
   test::write_wind(path, NC_NETCDF4);
   expect_same_as_here(path);
@@ -101,7 +101,7 @@ TEST_F(Loader, netcdf4_files_read_as_in_this_process) {
 
 // Chunks that were never written, in a file that says not to fill them in: HDF5 leaves alone what
 // it should read into, and the memory between the two had another field's numbers. They are masked.
-TEST_F(Loader, what_a_library_leaves_alone_is_nothing_of_the_volume_before) {
+TEST_F(Loader, WhatALibraryLeavesAloneIsNothingOfTheVolumeBefore) {
   const std::string path = folder_ / "unfilled.nc";
   {
     NetcdfMaker file(path);
@@ -143,7 +143,7 @@ double shared_by(pid_t id) {
 
 // The memory between the two is used again for the scalar, and made anew for the vector, which is
 // too large for it to be kept.
-TEST_F(Loader, volumes_small_and_large_read_as_in_this_process) {
+TEST_F(Loader, VolumesSmallAndLargeReadAsInThisProcess) {
   std::ofstream(folder_ / "large.json")
       << R"({"windsplat": "raw", "file": "large.raw", "type": "float32", "endian": "little",
              "dims": {"x": 160, "y": 150, "z": 128}, "steps": {"count": 2},
@@ -169,7 +169,7 @@ TEST_F(Loader, volumes_small_and_large_read_as_in_this_process) {
 }
 
 // What a header refers to is part of the dataset.
-TEST_F(Loader, a_companion_that_changes_is_noticed) {
+TEST_F(Loader, ACompanionThatChangesIsNoticed) {
   std::ofstream(folder_ / "c.json")
       << R"({"windsplat": "raw", "file": "c.raw", "type": "float32", "endian": "little",
              "dims": {"x": 4, "y": 4, "z": 4}, "fields": [{"name": "cloud"}]})";
@@ -187,7 +187,7 @@ TEST_F(Loader, a_companion_that_changes_is_noticed) {
   EXPECT_EQ(store.find("c").value()->volume("cloud", 0).value()->values[0], 2.0F);
 }
 
-TEST_F(Loader, files_of_others_read_as_in_this_process) {
+TEST_F(Loader, FilesOfOthersReadAsInThisProcess) {
   const char* given = std::getenv("WINDSPLAT_TEST_DATA");
   const std::string data = given != nullptr ? given : WINDSPLAT_SOURCE_DIR "/build/test-data";
   int files = 0;
@@ -200,7 +200,7 @@ TEST_F(Loader, files_of_others_read_as_in_this_process) {
   EXPECT_EQ(files, 5);
 }
 
-TEST_F(Loader, a_file_may_be_called_like_an_address) {
+TEST_F(Loader, AFileMayBeCalledLikeAnAddress) {
   for (const char* name : {"file.nc#mode=zarr,s3", "http:x.nc", "[dap4]x.nc", "dods:.nc"}) {
     const std::string path = folder_ / name;
     test::write_wind(folder_ / "plain.nc", NC_NETCDF4);
@@ -225,7 +225,7 @@ void write_two_groups(const std::string& path) {
   }
 }
 
-TEST_F(Loader, a_series_is_told_by_its_pattern) {
+TEST_F(Loader, ASeriesIsToldByItsPattern) {
   test::write_wind(folder_ / "part_1.nc", 0);
   test::write_wind(folder_ / "part_2.nc", 0);
   const auto source = opened(folder_ / "part_*.nc");
@@ -235,7 +235,7 @@ TEST_F(Loader, a_series_is_told_by_its_pattern) {
   expect_same_as_here(folder_ / "part_*.nc");
 }
 
-TEST_F(Loader, a_group_that_is_named_is_the_one_that_is_read) {
+TEST_F(Loader, AGroupThatIsNamedIsTheOneThatIsRead) {
   const std::string path = folder_ / "two.nc";
   write_two_groups(path);
   for (const auto& [group, first] : {std::pair("#/a", 1.0F), std::pair("#/b", 100.0F)}) {
@@ -257,7 +257,7 @@ TEST_F(Loader, a_group_that_is_named_is_the_one_that_is_read) {
   EXPECT_EQ(absent.error().message, "'two.nc' has no group '/nope', but '/a', '/b'");
 }
 
-TEST_F(Loader, what_is_no_dataset_is_the_same_error_as_in_this_process) {
+TEST_F(Loader, WhatIsNoDatasetIsTheSameErrorAsInThisProcess) {
   const std::string path = folder_ / "text.nc";
   std::ofstream(path) << "no dataset, whatever its name says";
   const auto here = open_file(path);
@@ -269,7 +269,7 @@ TEST_F(Loader, what_is_no_dataset_is_the_same_error_as_in_this_process) {
 }
 
 // HDF5 reads external files that a dataset names.
-TEST_F(Loader, external_storage_is_refused_by_name) {
+TEST_F(Loader, ExternalStorageIsRefusedByName) {
   const std::string other = folder_ / "other";
   test::write_floats(other, 64, 42.0F);
   const std::string path = folder_ / "crafted.nc";
@@ -280,7 +280,7 @@ TEST_F(Loader, external_storage_is_refused_by_name) {
   }
 }
 
-TEST_F(Loader, an_external_link_is_refused_by_name) {
+TEST_F(Loader, AnExternalLinkIsRefusedByName) {
   const std::string other = folder_ / "other.nc";
   test::write_wind(other, NC_NETCDF4);
   const std::string path = folder_ / "crafted.nc";
@@ -291,7 +291,7 @@ TEST_F(Loader, an_external_link_is_refused_by_name) {
   EXPECT_THAT(there.error().message, HasSubstr("external link, which is not followed: '/linked'"));
 }
 
-TEST_F(Loader, one_that_dies_is_an_error_and_the_next_read_starts_another) {
+TEST_F(Loader, OneThatDiesIsAnErrorAndTheNextReadStartsAnother) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   const auto source = opened(path);
@@ -318,7 +318,7 @@ TEST_F(Loader, one_that_dies_is_an_error_and_the_next_read_starts_another) {
   expect_same(*first, *again);
 }
 
-TEST_F(Loader, one_that_died_while_nothing_was_asked_is_replaced_unseen) {
+TEST_F(Loader, OneThatDiedWhileNothingWasAskedIsReplacedUnseen) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, 0);
   const auto source = opened(path);
@@ -331,7 +331,7 @@ TEST_F(Loader, one_that_died_while_nothing_was_asked_is_replaced_unseen) {
   EXPECT_TRUE(read) << read.error().message;
 }
 
-TEST_F(Loader, one_that_takes_too_long_is_ended) {
+TEST_F(Loader, OneThatTakesTooLongIsEnded) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   Limits limits;
@@ -350,7 +350,7 @@ TEST_F(Loader, one_that_takes_too_long_is_ended) {
   EXPECT_TRUE(again) << again.error().message;
 }
 
-TEST_F(Loader, one_that_is_stopped_is_ended_and_others_are_read_meanwhile) {
+TEST_F(Loader, OneThatIsStoppedIsEndedAndOthersAreReadMeanwhile) {
   const std::string path = folder_ / "a.nc";
   const std::string other_path = folder_ / "b.nc";
   test::write_wind(path, NC_NETCDF4);
@@ -380,7 +380,7 @@ TEST_F(Loader, one_that_is_stopped_is_ended_and_others_are_read_meanwhile) {
   EXPECT_NE(source->process(), id);
 }
 
-TEST_F(Loader, its_memory_and_that_of_the_transfer_count_while_it_is_there) {
+TEST_F(Loader, ItsMemoryAndThatOfTheTransferCountWhileItIsThere) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   Limits limits;
@@ -400,7 +400,7 @@ TEST_F(Loader, its_memory_and_that_of_the_transfer_count_while_it_is_there) {
   EXPECT_THAT(refused.error().message, testing::HasSubstr("needs 8.0 MiB"));
 }
 
-TEST_F(Loader, one_that_outgrows_the_budget_while_it_opens_is_an_error) {
+TEST_F(Loader, OneThatOutgrowsTheBudgetWhileItOpensIsAnError) {
   const std::string path = folder_ / "a.nc";
   test::write_positions(path, 1500);  // 36 MB of coordinates
   Limits limits;
@@ -420,7 +420,7 @@ TEST_F(Loader, one_that_outgrows_the_budget_while_it_opens_is_an_error) {
 }
 
 #ifndef WINDSPLAT_SANITIZED  // whose shadow counts as memory
-TEST_F(Loader, a_volume_is_the_same_where_the_memory_of_its_transfer_is_not_kept) {
+TEST_F(Loader, AVolumeIsTheSameWhereTheMemoryOfItsTransferIsNotKept) {
   const std::string path = folder_ / "a.nc";
   test::write_large(path);
   Limits limits;
@@ -440,7 +440,7 @@ TEST_F(Loader, a_volume_is_the_same_where_the_memory_of_its_transfer_is_not_kept
 }
 #endif
 
-TEST_F(Loader, a_read_can_be_cancelled_from_another_thread) {
+TEST_F(Loader, AReadCanBeCancelledFromAnotherThread) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   const auto source = opened(path);
@@ -460,7 +460,7 @@ TEST_F(Loader, a_read_can_be_cancelled_from_another_thread) {
   EXPECT_TRUE(source->read(0, 0));
 }
 
-TEST_F(Loader, released_it_holds_nothing_and_comes_back_for_the_same_file_only) {
+TEST_F(Loader, ReleasedItHoldsNothingAndComesBackForTheSameFileOnly) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   const auto source = opened(path);
@@ -484,7 +484,7 @@ TEST_F(Loader, released_it_holds_nothing_and_comes_back_for_the_same_file_only) 
 
 #ifndef WINDSPLAT_SANITIZED
 // A chunk of 48 MiB, compressed to a few kilobytes.
-TEST_F(Loader, a_file_that_unfolds_beyond_the_memory_is_an_error) {
+TEST_F(Loader, AFileThatUnfoldsBeyondTheMemoryIsAnError) {
   const std::string path = folder_ / "bomb.nc";
   {
     NetcdfMaker file(path);
@@ -516,7 +516,7 @@ std::size_t open_descriptors() {
   return count;
 }
 
-TEST_F(Loader, nothing_is_left_behind_by_200_of_them) {
+TEST_F(Loader, NothingIsLeftBehindBy200OfThem) {
   const std::string path = folder_ / "a.nc";
   const std::string text = folder_ / "text.nc";
   test::write_wind(path, 0);
@@ -537,7 +537,7 @@ TEST_F(Loader, nothing_is_left_behind_by_200_of_them) {
   EXPECT_EQ(errno, ECHILD);
 }
 
-TEST_F(Loader, none_outlives_the_daemon_not_even_at_work) {
+TEST_F(Loader, NoneOutlivesTheDaemonNotEvenAtWork) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, 0);
   ASSERT_EQ(::prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0), 0);  // orphans come to us
@@ -566,7 +566,7 @@ TEST_F(Loader, none_outlives_the_daemon_not_even_at_work) {
   ::prctl(PR_SET_CHILD_SUBREAPER, 0, 0, 0, 0);
 }
 
-TEST_F(Loader, no_program_is_started_that_was_not_named) {
+TEST_F(Loader, NoProgramIsStartedThatWasNotNamed) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, 0);
   set_program("");

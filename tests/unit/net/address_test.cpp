@@ -6,7 +6,7 @@
 namespace windsplat::net {
 namespace {
 
-TEST(Address, counts_ipv4_as_it_is_and_of_ipv6_the_first_64_bits) {
+TEST(Address, CountsIpv4AsItIsAndOfIpv6TheFirst64Bits) {
   EXPECT_EQ(counted_address("192.0.2.1"), "192.0.2.1");
   EXPECT_EQ(counted_address("::ffff:192.0.2.1"), "192.0.2.1");
   EXPECT_EQ(counted_address("2001:db8:1:2:3:4:5:6"), "2001:db8:1:2::/64");
@@ -18,7 +18,7 @@ TEST(Address, counts_ipv4_as_it_is_and_of_ipv6_the_first_64_bits) {
   EXPECT_LE(counted_address(std::string(100'000, 'x')).size(), 64U);
 }
 
-TEST(Network, holds_what_begins_like_it) {
+TEST(Network, HoldsWhatBeginsLikeIt) {
   const auto holds = [](const char* network, const char* address) {
     const auto parsed = Network::parse(network);
     EXPECT_TRUE(parsed) << network;
@@ -41,7 +41,7 @@ TEST(Network, holds_what_begins_like_it) {
   }
 }
 
-TEST(ClientAddress, is_the_last_hop_that_is_no_trusted_proxy) {
+TEST(ClientAddress, IsTheLastHopThatIsNoTrustedProxy) {
   const std::vector<Network> trusted{*Network::parse("10.0.0.0/8"), *Network::parse("192.0.2.7")};
   const auto client = [&](const char* peer, const char* hops) {
     return client_address(peer, hops, trusted);

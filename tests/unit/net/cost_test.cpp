@@ -49,7 +49,7 @@ class CostTest : public testing::Test {
 
 constexpr double samples = 100 * 80 * 60;
 
-TEST_F(CostTest, counts_every_stop_and_every_sample) {
+TEST_F(CostTest, CountsEveryStopAndEverySample) {
   EXPECT_GE(cost(view_).kernels, samples);
   EXPECT_LT(cost(view_).kernels, 20 * samples);
   EXPECT_EQ(cost(view_).pixels, 1280 * 720);
@@ -67,7 +67,7 @@ TEST_F(CostTest, counts_every_stop_and_every_sample) {
   EXPECT_LT(cost(unseen).kernels, samples);
 }
 
-TEST_F(CostTest, a_stride_leaves_samples_out_and_a_slice_all_but_a_layer) {
+TEST_F(CostTest, AStrideLeavesSamplesOutAndASliceAllButALayer) {
   protocol::View strided = view_;
   strided.vector.stride = 4;
   strided.vector.length = 0.001;
@@ -81,7 +81,7 @@ TEST_F(CostTest, a_stride_leaves_samples_out_and_a_slice_all_but_a_layer) {
   EXPECT_NEAR((cost(plain).kernels - picture) / (cost(sliced).kernels - picture), 60, 1);
 }
 
-TEST_F(CostTest, giant_kernels_cost_what_they_cover) {
+TEST_F(CostTest, GiantKernelsCostWhatTheyCover) {
   protocol::View wide = view_;
   wide.vector.r2 = 64;
   EXPECT_GT(cost(wide).kernels, 100 * cost(view_).kernels);
@@ -100,7 +100,7 @@ TEST_F(CostTest, giant_kernels_cost_what_they_cover) {
   EXPECT_EQ(cost(thin).dominant, "/method/slabThickness");
 }
 
-TEST_F(CostTest, what_is_averaged_or_out_of_sight_costs_less) {
+TEST_F(CostTest, WhatIsAveragedOrOutOfSightCostsLess) {
   protocol::View far = view_;
   far.camera.eye = protocol::Vec3{0, -1000, 0};
   far.camera.target = protocol::Vec3{0, 0, 0};
@@ -117,7 +117,7 @@ TEST_F(CostTest, what_is_averaged_or_out_of_sight_costs_less) {
   EXPECT_LT(cost(within).kernels, 0.5 * from_outside);
 }
 
-TEST_F(CostTest, is_finite_and_refused_at_every_extreme_of_a_view) {
+TEST_F(CostTest, IsFiniteAndRefusedAtEveryExtremeOfAView) {
   for (const double r2 : {0.0, 64.0}) {
     for (const double length : {0.0, 10.0}) {
       for (const double eye : {1e-6, 1.0, 1e6}) {
@@ -141,7 +141,7 @@ TEST_F(CostTest, is_finite_and_refused_at_every_extreme_of_a_view) {
   }
 }
 
-TEST(CheckCost, names_what_would_make_it_less_and_the_limit) {
+TEST(CheckCost, NamesWhatWouldMakeItLessAndTheLimit) {
   Limits limits;
   limits.pixels = 1000;
   limits.kernels = 5000;

@@ -11,7 +11,7 @@
 namespace windsplat::net {
 namespace {
 
-TEST(LoadService, bounds_what_waits_for_a_dataset_and_in_all) {
+TEST(LoadService, BoundsWhatWaitsForADatasetAndInAll) {
   constexpr std::size_t most = 3;
   std::promise<void> let_go;
   const std::shared_future<void> gone = let_go.get_future().share();
@@ -47,7 +47,7 @@ TEST(LoadService, bounds_what_waits_for_a_dataset_and_in_all) {
   EXPECT_EQ(ran, taken + 1);
 }
 
-TEST(LoadService, one_payer_has_half_of_the_places) {
+TEST(LoadService, OnePayerHasHalfOfThePlaces) {
   std::promise<void> let_go;
   std::promise<void> begun;
   LoadService loads(1, 4, "loads");
@@ -72,7 +72,7 @@ TEST(LoadService, one_payer_has_half_of_the_places) {
 }
 
 // Loads that wait for memory or whose files hang.
-TEST(LoadService, jobs_that_run_for_long_leave_their_places_as_far_as_there_are_spare_threads) {
+TEST(LoadService, JobsThatRunForLongLeaveTheirPlacesAsFarAsThereAreSpareThreads) {
   constexpr std::size_t places = 2;
   constexpr std::size_t spare = 2;
   std::promise<void> let_go;

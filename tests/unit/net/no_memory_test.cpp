@@ -68,7 +68,7 @@ RenderJob job_of(RenderKind kind, std::uint64_t owner) {
   return job;
 }
 
-TEST(NoMemory, a_job_that_cannot_be_queued_changes_nothing) {
+TEST(NoMemory, AJobThatCannotBeQueuedChangesNothing) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     int failed = 0;
     for (int count = 0;; ++count) {
@@ -93,7 +93,7 @@ TEST(NoMemory, a_job_that_cannot_be_queued_changes_nothing) {
   }
 }
 
-TEST(NoMemory, an_address_is_known_whole_or_not_at_all) {
+TEST(NoMemory, AnAddressIsKnownWholeOrNotAtAll) {
   const std::string here = "2001:db8:1:2:3:4:5:6";
   int failed = 0;
   for (int count = 0;; ++count) {
@@ -106,7 +106,7 @@ TEST(NoMemory, an_address_is_known_whole_or_not_at_all) {
   EXPECT_GE(failed, 2);
 }
 
-TEST(NoMemory, no_place_is_lost_among_connections_and_sessions) {
+TEST(NoMemory, NoPlaceIsLostAmongConnectionsAndSessions) {
   Limits limits;
   limits.connections = 1;
   limits.sessions_per_address = 1;
@@ -132,7 +132,7 @@ TEST(NoMemory, no_place_is_lost_among_connections_and_sessions) {
   EXPECT_GE(failed, 4);
 }
 
-TEST(NoMemory, an_attempt_that_fails_is_told_without_any) {
+TEST(NoMemory, AnAttemptThatFailsIsToldWithoutAny) {
   const CancelToken cancel;
   const CancelToken raised;
   raised.cancel();
@@ -154,7 +154,7 @@ TEST(NoMemory, an_attempt_that_fails_is_told_without_any) {
 }
 
 // The thread has no memory from the first job on.
-TEST(NoMemory, threads_of_services_go_on) {
+TEST(NoMemory, ThreadsOfServicesGoOn) {
   LoadService loads(1, 4, "loads");
   std::promise<void> loaded;
   EXPECT_TRUE(loads.submit({{}, [] {
@@ -180,7 +180,7 @@ TEST(NoMemory, threads_of_services_go_on) {
   drawn.get_future().wait();
 }
 
-TEST(NoMemory, a_client_s_job_without_any_is_a_failed_job) {
+TEST(NoMemory, AClientSJobWithoutAnyIsAFailedJob) {
   Jobs jobs(4, 1);
   const auto ask = [&] {
     return jobs
@@ -202,7 +202,7 @@ TEST(NoMemory, a_client_s_job_without_any_is_a_failed_job) {
   }
 }
 
-TEST(NoMemory, what_cannot_be_posted_is_called_at_home_and_given_up_elsewhere) {
+TEST(NoMemory, WhatCannotBePostedIsCalledAtHomeAndGivenUpElsewhere) {
   boost::asio::io_context io;
   int called = 0;
   const auto call = [&] { ++called; };
@@ -223,7 +223,7 @@ TEST(NoMemory, what_cannot_be_posted_is_called_at_home_and_given_up_elsewhere) {
   EXPECT_EQ(called, 2);
 }
 
-TEST(NoMemory, a_loader_is_ended_by_its_object_s_end) {
+TEST(NoMemory, ALoaderIsEndedByItsObjectSEnd) {
   auto process = std::make_unique<data::loader::Process>();
   ASSERT_TRUE(process->start(WINDSPLAT_PROGRAM));
   const pid_t id = process->id();
@@ -233,7 +233,7 @@ TEST(NoMemory, a_loader_is_ended_by_its_object_s_end) {
 
 // What has come is lost with the memory that it needed, between the system and the handler; what
 // comes next is not.
-TEST(NoMemory, a_connection_that_is_lost_is_not_the_last) {
+TEST(NoMemory, AConnectionThatIsLostIsNotTheLast) {
   namespace asio = boost::asio;
   asio::io_context io;
   const auto more = asio::make_work_guard(io);  // a server has its timers

@@ -54,7 +54,7 @@ bool comes_true(const std::function<bool()>& holds) {
   return false;
 }
 
-TEST(Peer, has_left_when_it_closed_its_side_also_behind_unread_bytes) {
+TEST(Peer, HasLeftWhenItClosedItsSideAlsoBehindUnreadBytes) {
   Listening listening;
   for (const bool byte_first : {false, true}) {
     for (const bool half : {false, true}) {
@@ -75,7 +75,7 @@ TEST(Peer, has_left_when_it_closed_its_side_also_behind_unread_bytes) {
   EXPECT_TRUE(peer_has_left(-1));
 }
 
-TEST(SpareDescriptor, turns_a_client_away_when_there_is_no_other) {
+TEST(SpareDescriptor, TurnsAClientAwayWhenThereIsNoOther) {
   Listening listening;
   SpareDescriptor spare;
   EXPECT_FALSE(spare.turn_away(listening.socket())) << "no pending connection";

@@ -25,7 +25,7 @@ Limits none() {
   return limits;
 }
 
-TEST(Quota, an_address_may_not_have_the_connections_of_all) {
+TEST(Quota, AnAddressMayNotHaveTheConnectionsOfAll) {
   Limits limits = none();
   limits.connections = 3;
   limits.connections_per_address = 2;
@@ -45,7 +45,7 @@ TEST(Quota, an_address_may_not_have_the_connections_of_all) {
   EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
 }
 
-TEST(Quota, the_reserve_has_an_end_and_no_address_has_all_of_it) {
+TEST(Quota, TheReserveHasAnEndAndNoAddressHasAllOfIt) {
   Limits limits = none();
   limits.connections = 1;
   Quota quota(limits);
@@ -64,7 +64,7 @@ TEST(Quota, the_reserve_has_an_end_and_no_address_has_all_of_it) {
   EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Slot::reserve);
 }
 
-TEST(Quota, a_proxy_counts_in_total_alone) {
+TEST(Quota, AProxyCountsInTotalAlone) {
   Limits limits = none();
   limits.connections = 8;
   limits.connections_per_address = 1;
@@ -75,7 +75,7 @@ TEST(Quota, a_proxy_counts_in_total_alone) {
   EXPECT_EQ(quota.connect(here, true, 0).place, Quota::Slot::reserve);
 }
 
-TEST(Quota, sessions_are_counted_by_address) {
+TEST(Quota, SessionsAreCountedByAddress) {
   Limits limits = none();
   limits.sessions_per_address = 2;
   Quota quota(limits);
@@ -89,7 +89,7 @@ TEST(Quota, sessions_are_counted_by_address) {
   EXPECT_FALSE(quota.open_session(here, 0));
 }
 
-TEST(Quota, requests_come_back_at_their_rate_and_health_has_its_own) {
+TEST(Quota, RequestsComeBackAtTheirRateAndHealthHasItsOwn) {
   Limits limits = none();
   limits.requests_per_address = 2;
   Quota quota(limits);
@@ -108,7 +108,7 @@ TEST(Quota, requests_come_back_at_their_rate_and_health_has_its_own) {
   EXPECT_TRUE(quota.request(here, false, second / 2));
 }
 
-TEST(Quota, one_picture_may_go_into_debt_and_the_next_waits_until_it_is_paid) {
+TEST(Quota, OnePictureMayGoIntoDebtAndTheNextWaitsUntilItIsPaid) {
   Limits limits = none();
   limits.render_s_per_address = 6;
   Quota quota(limits);
@@ -126,7 +126,7 @@ TEST(Quota, one_picture_may_go_into_debt_and_the_next_waits_until_it_is_paid) {
   EXPECT_FALSE(quota.picture(here, 30 * second));
 }
 
-TEST(Quota, bytes_are_charged_as_they_leave) {
+TEST(Quota, BytesAreChargedAsTheyLeave) {
   Limits limits = none();
   limits.bytes_per_address = 1000;
   Quota quota(limits);
@@ -140,7 +140,7 @@ TEST(Quota, bytes_are_charged_as_they_leave) {
   EXPECT_FALSE(quota.picture(here, 5 * second));
 }
 
-TEST(Quota, wrong_tokens_are_let_off_so_often_a_minute) {
+TEST(Quota, WrongTokensAreLetOffSoOftenAMinute) {
   Limits limits = none();
   limits.failed_logins_per_address = 3;
   Quota quota(limits);
@@ -153,7 +153,7 @@ TEST(Quota, wrong_tokens_are_let_off_so_often_a_minute) {
   EXPECT_FALSE(quota.failed_login(here, 20 * second));
 }
 
-TEST(Quota, a_token_is_looked_at_while_there_were_not_too_many_wrong_ones) {
+TEST(Quota, ATokenIsLookedAtWhileThereWereNotTooManyWrongOnes) {
   Limits limits = none();
   limits.failed_logins_per_address = 2;
   Quota quota(limits);
@@ -170,7 +170,7 @@ TEST(Quota, a_token_is_looked_at_while_there_were_not_too_many_wrong_ones) {
   EXPECT_FALSE(quota.may_try_login(here, 30 * second));
 }
 
-TEST(Quota, new_connections_come_back_at_their_rate_and_tls_takes_more) {
+TEST(Quota, NewConnectionsComeBackAtTheirRateAndTlsTakesMore) {
   Limits limits = none();
   limits.arrivals_per_address = 2;
   Quota quota(limits);
@@ -185,7 +185,7 @@ TEST(Quota, new_connections_come_back_at_their_rate_and_tls_takes_more) {
   EXPECT_FALSE(quota.arrive(here, false, true, 3 * second));
 }
 
-TEST(Quota, too_many_new_connections_in_all_are_refused_to_those_that_brought_them) {
+TEST(Quota, TooManyNewConnectionsInAllAreRefusedToThoseThatBroughtThem) {
   Limits limits = none();
   limits.arrivals = 5;
   limits.arrivals_per_address = 3;
@@ -198,7 +198,7 @@ TEST(Quota, too_many_new_connections_in_all_are_refused_to_those_that_brought_th
   EXPECT_FALSE(quota.arrive(here, false, false, second));
 }
 
-TEST(Quota, an_address_that_used_up_its_handshake_time_waits_for_it) {
+TEST(Quota, AnAddressThatUsedUpItsHandshakeTimeWaitsForIt) {
   Limits limits = none();
   limits.handshake_ms_per_address = 100;
   Quota quota(limits);
@@ -219,7 +219,7 @@ TEST(Quota, an_address_that_used_up_its_handshake_time_waits_for_it) {
   EXPECT_FALSE(quota.arrive(there, true, true, second)) << "a proxy brings many";
 }
 
-TEST(Quota, strangers_together_use_up_handshake_time_of_strangers_alone) {
+TEST(Quota, StrangersTogetherUseUpHandshakeTimeOfStrangersAlone) {
   Limits limits = none();
   limits.handshake_ms = 100;
   Quota quota(limits);
@@ -239,7 +239,7 @@ TEST(Quota, strangers_together_use_up_handshake_time_of_strangers_alone) {
   EXPECT_FALSE(quota.arrive(there, false, true, second));
 }
 
-TEST(Quota, strangers_use_up_no_handshake_time_of_the_machine_itself) {
+TEST(Quota, StrangersUseUpNoHandshakeTimeOfTheMachineItself) {
   Limits limits = none();
   limits.handshake_ms = 100;
   limits.handshake_ms_per_address = 50;
@@ -268,7 +268,7 @@ TEST(Quota, strangers_use_up_no_handshake_time_of_the_machine_itself) {
   EXPECT_TRUE(without.arrive("127.0.0.1", false, true, 0)) << "it is bounded all the same";
 }
 
-TEST(Quota, messages_are_paid_before_more_is_read) {
+TEST(Quota, MessagesArePaidBeforeMoreIsRead) {
   Limits limits = none();
   limits.messages_per_address = 10;
   limits.received_per_address = 1000;
@@ -280,7 +280,7 @@ TEST(Quota, messages_are_paid_before_more_is_read) {
   EXPECT_EQ(quota.message_received(there, 0, 2 * second), 0);
 }
 
-TEST(Quota, nought_is_no_limit) {
+TEST(Quota, NoughtIsNoLimit) {
   Quota quota(none());
   for (int n = 0; n < 10'000; ++n) {
     ASSERT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
@@ -297,7 +297,7 @@ TEST(Quota, nought_is_no_limit) {
   EXPECT_FALSE(quota.picture(here, 0));
 }
 
-TEST(Quota, idle_addresses_are_forgotten_and_those_in_debt_are_not) {
+TEST(Quota, IdleAddressesAreForgottenAndThoseInDebtAreNot) {
   Limits limits = none();
   limits.render_s_per_address = 1;
   Quota quota(limits);
@@ -311,7 +311,7 @@ TEST(Quota, idle_addresses_are_forgotten_and_those_in_debt_are_not) {
   EXPECT_TRUE(quota.picture(here, later));
 }
 
-TEST(Quota, no_number_of_addresses_makes_it_larger_than_it_may_be) {
+TEST(Quota, NoNumberOfAddressesMakesItLargerThanItMayBe) {
   Limits limits = none();
   limits.connections_per_address = 1;
   Quota quota(limits);
@@ -323,7 +323,7 @@ TEST(Quota, no_number_of_addresses_makes_it_larger_than_it_may_be) {
   EXPECT_EQ(quota.connect(here, false, 2).place, Quota::Slot::reserve) << "its one is known";
 }
 
-TEST(Quota, strangers_make_no_room_of_those_that_showed_the_token) {
+TEST(Quota, StrangersMakeNoRoomOfThoseThatShowedTheToken) {
   Quota quota(none());
   quota.authenticated(here, 0);
   for (std::size_t n = 0; n < 3 * Quota::addresses_max; ++n) {
@@ -339,7 +339,7 @@ TEST(Quota, strangers_make_no_room_of_those_that_showed_the_token) {
   EXPECT_EQ(quota.known(), Quota::addresses_max) << "of those too there is an end";
 }
 
-TEST(Admission, logs_within_a_minute_how_many_handshakes_it_refused) {
+TEST(Admission, LogsWithinAMinuteHowManyHandshakesItRefused) {
   Limits limits = none();
   limits.handshake_ms_per_address = 0.1;  // one at once
   Metrics metrics;
@@ -362,7 +362,7 @@ TEST(Admission, logs_within_a_minute_how_many_handshakes_it_refused) {
   EXPECT_EQ(rest.find("connections="), rest.rfind("connections=")) << "once: " << rest;
 }
 
-TEST(Admission, gives_places_back_when_their_tickets_go) {
+TEST(Admission, GivesPlacesBackWhenTheirTicketsGo) {
   Limits limits = none();
   limits.connections = 1;
   Metrics metrics;
@@ -377,7 +377,7 @@ TEST(Admission, gives_places_back_when_their_tickets_go) {
   EXPECT_FALSE(admission.connect(here)->reserve);
 }
 
-TEST(Admission, answers_with_the_limit_and_when_to_try_again) {
+TEST(Admission, AnswersWithTheLimitAndWhenToTryAgain) {
   Limits limits = none();
   limits.requests_per_address = 0.1;
   limits.connections = 1;
@@ -403,7 +403,7 @@ TEST(Admission, answers_with_the_limit_and_when_to_try_again) {
   EXPECT_FALSE(admission.request(*late, request, true));
 }
 
-TEST(Admission, charges_what_was_refused_unread) {
+TEST(Admission, ChargesWhatWasRefusedUnread) {
   Limits limits = none();
   limits.requests_per_address = 0.1;
   Metrics metrics;
@@ -415,7 +415,7 @@ TEST(Admission, charges_what_was_refused_unread) {
   EXPECT_TRUE(admission.request(*visitor, request, false)) << "the same allowance";
 }
 
-TEST(Admission, refuses_what_takes_too_long) {
+TEST(Admission, RefusesWhatTakesTooLong) {
   Limits limits = none();
   limits.render_s = 2;
   Metrics metrics;
@@ -431,7 +431,7 @@ TEST(Admission, refuses_what_takes_too_long) {
   EXPECT_TRUE(Admission(limits, metrics).check_estimate(cost, 1e12));
 }
 
-TEST(Admission, charges_the_client_behind_a_trusted_proxy) {
+TEST(Admission, ChargesTheClientBehindATrustedProxy) {
   Limits limits = none();
   limits.requests_per_address = 0.1;
   limits.trusted_proxies = {"10.0.0.0/8"};
@@ -452,7 +452,7 @@ TEST(Admission, charges_the_client_behind_a_trusted_proxy) {
   EXPECT_TRUE(ask(*liar, "198.51.100.2"));
 }
 
-TEST(Metrics, names_every_limit_once) {
+TEST(Metrics, NamesEveryLimitOnce) {
   EXPECT_EQ(std::set(limit_names.begin(), limit_names.end()).size(), limit_names.size());
   EXPECT_EQ(static_cast<std::size_t>(LimitKind::handshakes) + 1, limit_names.size());
 }

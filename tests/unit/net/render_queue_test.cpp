@@ -46,7 +46,7 @@ class Renderer {
   std::int64_t now_us_ = 0;
 };
 
-TEST(RenderQueue, gives_owners_equal_times_and_not_equal_numbers_of_jobs) {
+TEST(RenderQueue, GivesOwnersEqualTimesAndNotEqualNumbersOfJobs) {
   Renderer renderer;
   renderer.ask(RenderKind::stream, 1);
   renderer.ask(RenderKind::stream, 2);
@@ -56,7 +56,7 @@ TEST(RenderQueue, gives_owners_equal_times_and_not_equal_numbers_of_jobs) {
   EXPECT_NEAR(renderer.jobs[2], 3 * renderer.jobs[1], 3);
 }
 
-TEST(RenderQueue, gives_streams_and_requests_equal_times_however_many_owners_each_has) {
+TEST(RenderQueue, GivesStreamsAndRequestsEqualTimesHoweverManyOwnersEachHas) {
   Renderer renderer;
   for (std::uint64_t owner = 1; owner <= 5; ++owner) renderer.ask(RenderKind::stream, owner);
   renderer.ask(RenderKind::request, 9);
@@ -68,7 +68,7 @@ TEST(RenderQueue, gives_streams_and_requests_equal_times_however_many_owners_eac
   EXPECT_NEAR(static_cast<double>(streams), static_cast<double>(renderer.used_us[9]), 100);
 }
 
-TEST(RenderQueue, an_owner_that_was_idle_does_not_take_all_that_it_left) {
+TEST(RenderQueue, AnOwnerThatWasIdleDoesNotTakeAllThatItLeft) {
   Renderer renderer;
   const std::map<std::uint64_t, std::int64_t> costs{{1, 10}, {2, 10}};
   renderer.ask(RenderKind::stream, 1);
@@ -83,7 +83,7 @@ TEST(RenderQueue, an_owner_that_was_idle_does_not_take_all_that_it_left) {
   EXPECT_NEAR(renderer.jobs[2], 10, 1);
 }
 
-TEST(RenderQueue, an_owner_that_used_much_is_not_forgiven_because_it_paused_for_a_moment) {
+TEST(RenderQueue, AnOwnerThatUsedMuchIsNotForgivenBecauseItPausedForAMoment) {
   Renderer renderer;
   for (std::uint64_t owner = 1; owner <= 3; ++owner) renderer.ask(RenderKind::stream, owner);
   const std::map<std::uint64_t, std::int64_t> costs{{1, 1000}, {2, 10}, {3, 10}};
@@ -92,7 +92,7 @@ TEST(RenderQueue, an_owner_that_used_much_is_not_forgiven_because_it_paused_for_
   for (int i = 0; i < 198; ++i) EXPECT_NE(renderer.run(costs), 1U);
 }
 
-TEST(Shares, remember_nobody_who_is_idle_and_not_ahead) {
+TEST(Shares, RememberNobodyWhoIsIdleAndNotAhead) {
   Shares shares;
   shares.come(1);
   for (std::uint64_t party = 2; party < 1000; ++party) {
@@ -108,7 +108,7 @@ TEST(Shares, remember_nobody_who_is_idle_and_not_ahead) {
   EXPECT_EQ(shares.known(), 0U);
 }
 
-TEST(RenderQueue, background_waits_for_all_others) {
+TEST(RenderQueue, BackgroundWaitsForAllOthers) {
   Renderer renderer;
   const std::map<std::uint64_t, std::int64_t> costs{{1, 10}, {2, 10}, {3, 10}};
   renderer.ask(RenderKind::background, 1);
@@ -119,7 +119,7 @@ TEST(RenderQueue, background_waits_for_all_others) {
   EXPECT_EQ(renderer.run(costs, false), 1U);
 }
 
-TEST(RenderQueue, a_background_job_that_runs_is_cancelled_by_a_job_of_another_kind_alone) {
+TEST(RenderQueue, ABackgroundJobThatRunsIsCancelledByAJobOfAnotherKindAlone) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     RenderQueue queue;
     RenderJob job;
@@ -143,7 +143,7 @@ TEST(RenderQueue, a_background_job_that_runs_is_cancelled_by_a_job_of_another_ki
   }
 }
 
-TEST(RenderQueue, a_newer_background_job_takes_the_place_of_the_older_which_is_told) {
+TEST(RenderQueue, ANewerBackgroundJobTakesThePlaceOfTheOlderWhichIsTold) {
   RenderQueue queue;
   const auto push = [&](RenderKind kind, std::uint64_t owner) {
     RenderJob job;
@@ -170,7 +170,7 @@ TEST(RenderQueue, a_newer_background_job_takes_the_place_of_the_older_which_is_t
 }
 
 // Cancelled jobs of a closed session: new owners without usage run before them.
-TEST(RenderQueue, a_cancelled_job_does_not_wait_for_its_turn) {
+TEST(RenderQueue, ACancelledJobDoesNotWaitForItsTurn) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     SCOPED_TRACE(static_cast<int>(kind));
     Renderer make;
@@ -197,7 +197,7 @@ TEST(RenderQueue, a_cancelled_job_does_not_wait_for_its_turn) {
   }
 }
 
-TEST(RenderQueue, counts_what_somebody_still_waits_for) {
+TEST(RenderQueue, CountsWhatSomebodyStillWaitsFor) {
   RenderQueue queue;
   RenderJob job;
   job.cost_ms = 100;
@@ -249,7 +249,7 @@ class HeldService {
   RenderService service_;  // last: its thread uses the above
 };
 
-TEST(RenderService, refuses_requests_beyond_its_estimate_of_the_work_that_waits) {
+TEST(RenderService, RefusesRequestsBeyondItsEstimateOfTheWorkThatWaits) {
   HeldService held({16, 10'000, {}});
   EXPECT_TRUE(held.request(60'000)) << "one alone is let in, whatever it costs";
   const auto refused = held.request(1);
@@ -258,7 +258,7 @@ TEST(RenderService, refuses_requests_beyond_its_estimate_of_the_work_that_waits)
   EXPECT_EQ(refused.error().retry_after_s, 60);
 }
 
-TEST(RenderService, tells_when_what_waits_will_be_done) {
+TEST(RenderService, TellsWhenWhatWaitsWillBeDone) {
   HeldService held({16, 10'000, {}});
   EXPECT_TRUE(held.request(4'200));
   EXPECT_TRUE(held.request(3'000));
@@ -269,7 +269,7 @@ TEST(RenderService, tells_when_what_waits_will_be_done) {
   EXPECT_TRUE(held.request(2'000)) << "a smaller one has room";
 }
 
-TEST(Problems, say_in_their_header_when_to_try_again) {
+TEST(Problems, SayInTheirHeaderWhenToTryAgain) {
   const auto retry_after = [](int seconds) {
     Error error = make_error(ErrorKind::busy, "later");
     error.retry_after_s = seconds;
@@ -283,7 +283,7 @@ TEST(Problems, say_in_their_header_when_to_try_again) {
   EXPECT_EQ(retry_after(0), "1") << "unknown: soon";
 }
 
-TEST(RenderService, refuses_by_number_where_no_cost_is_known) {
+TEST(RenderService, RefusesByNumberWhereNoCostIsKnown) {
   HeldService held({3, 10'000, {}});
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(held.request(0));
   const auto refused = held.request(0);
@@ -291,7 +291,7 @@ TEST(RenderService, refuses_by_number_where_no_cost_is_known) {
   EXPECT_EQ(refused.error().retry_after_s, 1);
 }
 
-TEST(RenderService, what_was_let_in_before_is_not_refused) {
+TEST(RenderService, WhatWasLetInBeforeIsNotRefused) {
   HeldService held({1, 10, {}});
   EXPECT_TRUE(held.request(100));
   RenderJob rest;
@@ -301,7 +301,7 @@ TEST(RenderService, what_was_let_in_before_is_not_refused) {
   EXPECT_TRUE(held.service().submit(std::move(rest)));
 }
 
-TEST(RenderService, charges_what_its_clock_says_and_tells_how_long_a_job_waited) {
+TEST(RenderService, ChargesWhatItsClockSaysAndTellsHowLongAJobWaited) {
   std::atomic<std::int64_t> now_us{0};
   std::vector<std::uint64_t> order;
   std::map<std::uint64_t, std::int64_t> queued_us;
@@ -330,7 +330,7 @@ TEST(RenderService, charges_what_its_clock_says_and_tells_how_long_a_job_waited)
   EXPECT_EQ(std::count(order.begin(), order.end(), 8U), 12);
 }
 
-TEST(RenderService, ends_a_background_job_for_a_frame) {
+TEST(RenderService, EndsABackgroundJobForAFrame) {
   std::promise<void> begun;
   std::promise<bool> ended;
   std::promise<void> drawn;
@@ -354,7 +354,7 @@ TEST(RenderService, ends_a_background_job_for_a_frame) {
 
 // A request is refused while another address's picture is drawn and one waits, unless its own cost
 // exceeds what is before it; waiting for one's own pictures is no reason for a refusal.
-TEST(RenderService, keeps_nobody_waiting_long_for_others) {
+TEST(RenderService, KeepsNobodyWaitingLongForOthers) {
   std::atomic<std::int64_t> now_us{0};
   RenderService::Options options;
   options.others_ms_max = 100;
@@ -399,7 +399,7 @@ TEST(RenderService, keeps_nobody_waiting_long_for_others) {
 
 // Where many are refused the next one comes soon: a request is let in when what runs is nearly
 // done.
-TEST(RenderService, under_overload_nobody_waits_for_a_whole_picture) {
+TEST(RenderService, UnderOverloadNobodyWaitsForAWholePicture) {
   std::atomic<std::int64_t> now_us{0};
   RenderService::Options options;
   options.others_ms_max = 20;
@@ -436,7 +436,7 @@ TEST(RenderService, under_overload_nobody_waits_for_a_whole_picture) {
   let_go.set_value();
 }
 
-TEST(RenderQueue, takes_jobs_of_unknown_cost_for_what_it_is_told) {
+TEST(RenderQueue, TakesJobsOfUnknownCostForWhatItIsTold) {
   RenderQueue queue;
   RenderJob job;
   job.payer = "a";
@@ -457,7 +457,7 @@ TEST(RenderQueue, takes_jobs_of_unknown_cost_for_what_it_is_told) {
   EXPECT_EQ(queue.rest_ms(99'000), 0);
 }
 
-TEST(RenderService, one_payer_has_half_of_the_places) {
+TEST(RenderService, OnePayerHasHalfOfThePlaces) {
   RenderService::Options options;
   options.requests_max = 6;
   std::promise<void> begun;
@@ -486,13 +486,13 @@ TEST(RenderService, one_payer_has_half_of_the_places) {
 constexpr auto slab = protocol::MethodName::slab;
 constexpr auto kernel = protocol::MethodName::kernel;
 
-TEST(RenderCosts, take_what_is_unknown_for_what_is_usual) {
+TEST(RenderCosts, TakeWhatIsUnknownForWhatIsUsual) {
   const RenderCosts costs(2);
   EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 1e6), 3) << "6 ns of a thread's time";
   EXPECT_DOUBLE_EQ(RenderCosts(6).estimate_ms("a", slab, 1e6), 1);
 }
 
-TEST(RenderCosts, follow_the_work_and_the_times_by_dataset_and_method) {
+TEST(RenderCosts, FollowTheWorkAndTheTimesByDatasetAndMethod) {
   RenderCosts costs(2);
   costs.learn("a", slab, 1e6, 2000);
   EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 5e5), 1);
@@ -504,7 +504,7 @@ TEST(RenderCosts, follow_the_work_and_the_times_by_dataset_and_method) {
   EXPECT_NEAR(costs.estimate_ms("a", slab, 1e6), 2, 0.01);
 }
 
-TEST(RenderCosts, lie_above_most_of_what_was_seen) {
+TEST(RenderCosts, LieAboveMostOfWhatWasSeen) {
   RenderCosts costs(2);
   int above = 0;
   for (int i = 0; i < 1000; ++i) {
@@ -517,13 +517,13 @@ TEST(RenderCosts, lie_above_most_of_what_was_seen) {
 }
 
 // A machine that slept in the middle of a picture has none refused for good.
-TEST(RenderCosts, believe_no_picture_that_took_an_age) {
+TEST(RenderCosts, BelieveNoPictureThatTookAnAge) {
   RenderCosts costs(2);
   costs.learn("a", slab, 1e6, 3'600'000'000);
   EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 1e6), 50);
 }
 
-TEST(RenderCosts, forget_the_dataset_that_was_not_drawn_for_longest) {
+TEST(RenderCosts, ForgetTheDatasetThatWasNotDrawnForLongest) {
   RenderCosts costs(2);
   costs.learn("first", slab, 1e6, 1000);
   costs.learn("second", slab, 1e6, 1000);

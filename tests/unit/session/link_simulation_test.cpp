@@ -90,7 +90,7 @@ std::string name(const Case& c) {
          std::to_string(c.full / milli) + " ms";
 }
 
-TEST(Simulated, frames_are_young_and_as_many_as_the_link_allows) {
+TEST(Simulated, FramesAreYoungAndAsManyAsTheLinkAllows) {
   for (const Case& c : cases()) {
     SCOPED_TRACE(name(c));
     Clock clock;
@@ -123,7 +123,7 @@ TEST(Simulated, frames_are_young_and_as_many_as_the_link_allows) {
   }
 }
 
-TEST(Simulated, a_moving_frame_is_on_the_link_for_a_moment_and_good_where_the_link_is_fast) {
+TEST(Simulated, AMovingFrameIsOnTheLinkForAMomentAndGoodWhereTheLinkIsFast) {
   for (const Case& c : cases()) {
     SCOPED_TRACE(name(c));
     Clock clock;
@@ -158,7 +158,7 @@ TEST(Simulated, a_moving_frame_is_on_the_link_for_a_moment_and_good_where_the_li
   }
 }
 
-TEST(Simulated, a_link_that_slows_down_and_recovers_is_followed) {
+TEST(Simulated, ALinkThatSlowsDownAndRecoversIsFollowed) {
   Clock clock;
   Renderer renderer(clock, 10 * milli);
   LinkOptions fast{50 * mbit, 10 * milli, 3 * milli};
@@ -183,7 +183,7 @@ TEST(Simulated, a_link_that_slows_down_and_recovers_is_followed) {
   EXPECT_LE(recovered, begin + 43 * second);
 }
 
-TEST(Simulated, a_short_rest_does_not_fill_a_slow_link_with_a_final_frame) {
+TEST(Simulated, AShortRestDoesNotFillASlowLinkWithAFinalFrame) {
   for (const double rate : {0.5, 100.0}) {
     SCOPED_TRACE(rate);
     Clock clock;
@@ -209,7 +209,7 @@ TEST(Simulated, a_short_rest_does_not_fill_a_slow_link_with_a_final_frame) {
   }
 }
 
-TEST(Simulated, a_hidden_viewer_has_nothing_drawn) {
+TEST(Simulated, AHiddenViewerHasNothingDrawn) {
   Clock clock;
   Renderer renderer(clock, 10 * milli);
   Viewer viewer(clock, renderer, {10 * mbit, 20 * milli, 3 * milli});
@@ -227,7 +227,7 @@ TEST(Simulated, a_hidden_viewer_has_nothing_drawn) {
   EXPECT_EQ(viewer.frames.back().rev, viewer.rev());
 }
 
-TEST(Simulated, a_slow_viewer_does_not_slow_another) {
+TEST(Simulated, ASlowViewerDoesNotSlowAnother) {
   const LinkOptions fast{1000 * mbit, 1 * milli, 2 * milli};
   const LinkOptions slow{0.5 * mbit, 200 * milli, 300 * milli};
   std::vector<double> count;
@@ -250,7 +250,7 @@ TEST(Simulated, a_slow_viewer_does_not_slow_another) {
   EXPECT_LE(quantile(told[1].beyond, 0.99), 2 * told[1].interval + 20 * milli);
 }
 
-TEST(Simulated, what_is_said_waits_for_one_frame_at_most) {
+TEST(Simulated, WhatIsSaidWaitsForOneFrameAtMost) {
   for (const double rate : {0.5, 2.0, 10.0}) {
     SCOPED_TRACE(rate);
     Clock clock;

@@ -29,7 +29,7 @@ struct Known {
   }
 };
 
-TEST(Link, knows_nothing_before_a_frame_was_acknowledged) {
+TEST(Link, KnowsNothingBeforeAFrameWasAcknowledged) {
   Link link;
   EXPECT_FALSE(link.known());
   EXPECT_EQ(link.may_start_at(), 0);
@@ -39,7 +39,7 @@ TEST(Link, knows_nothing_before_a_frame_was_acknowledged) {
   EXPECT_EQ(link.bytes_in_flight(), 1000U);
 }
 
-TEST(Link, finds_rate_and_round_trip_however_far_the_viewer_is) {
+TEST(Link, FindsRateAndRoundTripHoweverFarTheViewerIs) {
   for (const double rate : {6e4, 2.5e5, 1.25e6, 1.25e7}) {
     for (const Micros trip : {2 * milli, 40 * milli, 400 * milli}) {
       for (const Micros decode : {0 * milli, 15 * milli}) {
@@ -56,7 +56,7 @@ TEST(Link, finds_rate_and_round_trip_however_far_the_viewer_is) {
   }
 }
 
-TEST(Link, a_frame_that_was_held_up_lowers_nothing) {
+TEST(Link, AFrameThatWasHeldUpLowersNothing) {
   Known known;
   Link link;
   for (int n = 0; n < 5; ++n) known.send(link, 50'000);
@@ -64,7 +64,7 @@ TEST(Link, a_frame_that_was_held_up_lowers_nothing) {
   EXPECT_NEAR(link.bytes_per_s(), known.rate, 0.001 * known.rate);
 }
 
-TEST(Link, two_frames_that_took_long_tell_that_it_has_become_slow) {
+TEST(Link, TwoFramesThatTookLongTellThatItHasBecomeSlow) {
   Known known;
   Link link;
   for (int n = 0; n < 20; ++n) known.send(link, 50'000);
@@ -75,7 +75,7 @@ TEST(Link, two_frames_that_took_long_tell_that_it_has_become_slow) {
   EXPECT_NEAR(link.bytes_per_s(), 1e5, 1e2);
 }
 
-TEST(Link, frames_too_small_to_fill_it_lower_nothing_and_larger_ones_do) {
+TEST(Link, FramesTooSmallToFillItLowerNothingAndLargerOnesDo) {
   Known known;
   known.rate = 2e6;
   Link link;
@@ -87,7 +87,7 @@ TEST(Link, frames_too_small_to_fill_it_lower_nothing_and_larger_ones_do) {
   EXPECT_NEAR(link.bytes_per_s(), 1e5, 1e2) << "it has become slow";
 }
 
-TEST(Link, without_pongs_the_smallest_frame_tells_the_round_trip) {
+TEST(Link, WithoutPongsTheSmallestFrameTellsTheRoundTrip) {
   Known known;
   Link link;
   known.send(link, 1'000, false);
@@ -97,7 +97,7 @@ TEST(Link, without_pongs_the_smallest_frame_tells_the_round_trip) {
   EXPECT_NEAR(link.bytes_per_s(), known.rate, 0.02 * known.rate);
 }
 
-TEST(Link, a_longer_way_is_believed_after_a_while) {
+TEST(Link, ALongerWayIsBelievedAfterAWhile) {
   Known known;
   Link link;
   known.send(link, 50'000);
@@ -107,7 +107,7 @@ TEST(Link, a_longer_way_is_believed_after_a_while) {
   EXPECT_NEAR(link.bytes_per_s(), known.rate, 0.001 * known.rate);
 }
 
-TEST(Link, two_frames_in_a_row_tell_the_rate_that_the_second_alone_hides) {
+TEST(Link, TwoFramesInARowTellTheRateThatTheSecondAloneHides) {
   const Micros trip = 20 * milli;
   const double rate = 1e6;
   Link link;
@@ -119,7 +119,7 @@ TEST(Link, two_frames_in_a_row_tell_the_rate_that_the_second_alone_hides) {
   EXPECT_NEAR(link.bytes_per_s(), rate, 0.001 * rate);
 }
 
-TEST(Link, the_next_frame_is_begun_so_that_it_finds_the_link_free) {
+TEST(Link, TheNextFrameIsBegunSoThatItFindsTheLinkFree) {
   Known known;  // 1 MB/s; frames are drawn in 10 ms
   known.trip = 4 * milli;
   Link link;
@@ -133,7 +133,7 @@ TEST(Link, the_next_frame_is_begun_so_that_it_finds_the_link_free) {
   EXPECT_EQ(link.may_start_at(), 0) << "nothing is in flight";
 }
 
-TEST(Link, the_next_frame_is_begun_so_that_it_finds_the_viewer_free) {
+TEST(Link, TheNextFrameIsBegunSoThatItFindsTheViewerFree) {
   Known known;
   known.trip = 4 * milli;
   known.decode = 200 * milli;
@@ -146,7 +146,7 @@ TEST(Link, the_next_frame_is_begun_so_that_it_finds_the_viewer_free) {
               static_cast<double>(sent + (20 + 200 - 20 - 10) * milli), 1.0 * milli);
 }
 
-TEST(Link, far_viewers_get_their_two_frames_evenly) {
+TEST(Link, FarViewersGetTheirTwoFramesEvenly) {
   Known known;
   known.rate = 1e8;
   known.trip = 400 * milli;
@@ -185,7 +185,7 @@ int settled(JpegRate& jpeg, const Link& link, double pixels) {
   return quality;
 }
 
-TEST(JpegRate, quality_falls_with_the_link_and_rises_where_there_is_plenty) {
+TEST(JpegRate, QualityFallsWithTheLinkAndRisesWhereThereIsPlenty) {
   int before = 0;
   for (const double rate : {1e5, 1.6e6, 2.2e6, 4e6, 1.2e7, 1e8}) {
     JpegRate jpeg;
@@ -209,14 +209,14 @@ TEST(JpegRate, quality_falls_with_the_link_and_rises_where_there_is_plenty) {
   }
 }
 
-TEST(JpegRate, is_usual_while_nothing_is_known_of_the_link) {
+TEST(JpegRate, IsUsualWhileNothingIsKnownOfTheLink) {
   JpegRate jpeg;
   const Link link;
   EXPECT_EQ(jpeg.choose(full, link, budget), 75);
   EXPECT_EQ(jpeg.least_level(1280, 720, link, budget), 0);
 }
 
-TEST(JpegRate, level_gives_way_where_the_lowest_quality_is_too_much) {
+TEST(JpegRate, LevelGivesWayWhereTheLowestQualityIsTooMuch) {
   int before = 4;
   for (const double rate : {1e4, 6.25e4, 2.5e5, 4e5, 1e6}) {
     JpegRate jpeg;
@@ -243,7 +243,7 @@ TEST(JpegRate, level_gives_way_where_the_lowest_quality_is_too_much) {
   EXPECT_EQ(before, 0);
 }
 
-TEST(JpegRate, pictures_that_vary_a_little_do_not_change_the_level) {
+TEST(JpegRate, PicturesThatVaryALittleDoNotChangeTheLevel) {
   // However near to a change of level the link happens to be.
   for (double rate = 1e5; rate < 3e5; rate *= 1.03) {
     JpegRate jpeg;
@@ -259,7 +259,7 @@ TEST(JpegRate, pictures_that_vary_a_little_do_not_change_the_level) {
   }
 }
 
-TEST(JpegRate, a_link_that_recovers_is_used_after_a_few_frames) {
+TEST(JpegRate, ALinkThatRecoversIsUsedAfterAFewFrames) {
   JpegRate jpeg;
   const Link slow = link_of(1e5);
   settled(jpeg, slow, 57'600);

@@ -8,7 +8,7 @@ namespace {
 
 using testing::ElementsAre;
 
-TEST(Pacing, a_patch_alone_brings_a_moving_frame_and_then_the_final_one) {
+TEST(Pacing, APatchAloneBringsAMovingFrameAndThenTheFinalOne) {
   Driver driver;
   driver.patch(7, R"({"dataset":"wind"})", 123.5);
   driver.finish_render();
@@ -38,7 +38,7 @@ TEST(Pacing, a_patch_alone_brings_a_moving_frame_and_then_the_final_one) {
   EXPECT_FALSE(driver.render) << "nothing is left to draw";
 }
 
-TEST(Pacing, moving_frames_are_drawn_by_kernel_and_final_ones_as_asked) {
+TEST(Pacing, MovingFramesAreDrawnByKernelAndFinalOnesAsAsked) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   ASSERT_TRUE(driver.render);
@@ -50,7 +50,7 @@ TEST(Pacing, moving_frames_are_drawn_by_kernel_and_final_ones_as_asked) {
   EXPECT_EQ(driver.render->setting.method, protocol::MethodName::slab);
 }
 
-TEST(Pacing, slow_final_frames_by_slab_do_not_coarsen_moving_ones) {
+TEST(Pacing, SlowFinalFramesBySlabDoNotCoarsenMovingOnes) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   ASSERT_TRUE(driver.render);
@@ -67,7 +67,7 @@ TEST(Pacing, slow_final_frames_by_slab_do_not_coarsen_moving_ones) {
   EXPECT_LE(driver.render->setting.coarser, before.coarser);
 }
 
-TEST(Pacing, every_frame_is_announced_by_what_was_chosen_for_it) {
+TEST(Pacing, EveryFrameIsAnnouncedByWhatWasChosenForIt) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -79,7 +79,7 @@ TEST(Pacing, every_frame_is_announced_by_what_was_chosen_for_it) {
   }
 }
 
-TEST(Pacing, a_lossless_view_rests_as_png_and_moves_as_jpeg) {
+TEST(Pacing, ALosslessViewRestsAsPngAndMovesAsJpeg) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","quality":{"lossless":true}})");
   driver.settle();
@@ -90,7 +90,7 @@ TEST(Pacing, a_lossless_view_rests_as_png_and_moves_as_jpeg) {
   EXPECT_TRUE(Driver::is_final(driver.frames[1]));
 }
 
-TEST(Pacing, a_final_frame_is_of_high_quality_however_slow_the_link) {
+TEST(Pacing, AFinalFrameIsOfHighQualityHoweverSlowTheLink) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -109,7 +109,7 @@ TEST(Pacing, a_final_frame_is_of_high_quality_however_slow_the_link) {
   EXPECT_EQ(driver.frames.back().header.level, 0);
 }
 
-TEST(Pacing, no_third_frame_before_an_acknowledgement) {
+TEST(Pacing, NoThirdFrameBeforeAnAcknowledgement) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -128,7 +128,7 @@ TEST(Pacing, no_third_frame_before_an_acknowledgement) {
   EXPECT_EQ(driver.frames[2].header.rev, 19U) << "the newest view, not the next one";
 }
 
-TEST(Pacing, nothing_is_drawn_while_a_frame_is_being_written) {
+TEST(Pacing, NothingIsDrawnWhileAFrameIsBeingWritten) {
   Driver driver;
   driver.write_at_once = false;
   driver.patch(1, R"({"dataset":"wind"})");
@@ -143,7 +143,7 @@ TEST(Pacing, nothing_is_drawn_while_a_frame_is_being_written) {
   EXPECT_EQ(driver.frames.back().header.rev, 3U);
 }
 
-TEST(Pacing, a_steady_flow_of_patches_starves_nobody) {
+TEST(Pacing, ASteadyFlowOfPatchesStarvesNobody) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -174,7 +174,7 @@ TEST(Pacing, a_steady_flow_of_patches_starves_nobody) {
   EXPECT_GE(driver.frames.back().header.rev + 10, rev) << "and never far behind";
 }
 
-TEST(Pacing, after_stopping_only_the_newest_view_is_shown) {
+TEST(Pacing, AfterStoppingOnlyTheNewestViewIsShown) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -191,7 +191,7 @@ TEST(Pacing, after_stopping_only_the_newest_view_is_shown) {
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(Pacing, a_change_gives_up_the_final_frame_and_a_moving_one_comes_instead) {
+TEST(Pacing, AChangeGivesUpTheFinalFrameAndAMovingOneComesInstead) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -208,7 +208,7 @@ TEST(Pacing, a_change_gives_up_the_final_frame_and_a_moving_one_comes_instead) {
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
 }
 
-TEST(Pacing, a_final_frame_that_was_done_just_before_the_change_is_dropped) {
+TEST(Pacing, AFinalFrameThatWasDoneJustBeforeTheChangeIsDropped) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -223,7 +223,7 @@ TEST(Pacing, a_final_frame_that_was_done_just_before_the_change_is_dropped) {
   EXPECT_EQ(driver.texts_of<protocol::StatsMessage>().back().dropped, 1U);
 }
 
-TEST(Pacing, a_hidden_client_is_sent_nothing_until_it_is_seen_again) {
+TEST(Pacing, AHiddenClientIsSentNothingUntilItIsSeenAgain) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.say(protocol::VisibilityMessage{true});
@@ -251,7 +251,7 @@ Revs unchanged_revs(const Driver& driver) {
   return revs;
 }
 
-TEST(Unchanged, a_patch_that_says_the_same_is_answered_without_a_frame) {
+TEST(Unchanged, APatchThatSaysTheSameIsAnsweredWithoutAFrame) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[1,2,3]}})");
   driver.settle();
@@ -273,7 +273,7 @@ TEST(Unchanged, a_patch_that_says_the_same_is_answered_without_a_frame) {
   EXPECT_EQ(unchanged_revs(driver), (Revs{2, 3, 4}));
 }
 
-TEST(Unchanged, a_view_that_differs_in_anything_is_drawn) {
+TEST(Unchanged, AViewThatDiffersInAnythingIsDrawn) {
   for (const char* other :
        {R"({"step":1})", R"({"camera":{"eye":[1,2,4]}})", R"({"image":{"background":"#010101"}})",
         R"({"image":{"width":99}})", R"({"vector":{"field":null}})", R"({"dataset":"sea"})"}) {
@@ -286,7 +286,7 @@ TEST(Unchanged, a_view_that_differs_in_anything_is_drawn) {
   }
 }
 
-TEST(Unchanged, a_moving_frame_does_not_stand_for_its_view) {
+TEST(Unchanged, AMovingFrameDoesNotStandForItsView) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -298,7 +298,7 @@ TEST(Unchanged, a_moving_frame_does_not_stand_for_its_view) {
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
 }
 
-TEST(Unchanged, back_to_what_was_shown_while_another_view_is_drawn_is_drawn_again) {
+TEST(Unchanged, BackToWhatWasShownWhileAnotherViewIsDrawnIsDrawnAgain) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -311,7 +311,7 @@ TEST(Unchanged, back_to_what_was_shown_while_another_view_is_drawn_is_drawn_agai
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(Unchanged, there_and_back_while_the_credit_is_out_needs_no_frame) {
+TEST(Unchanged, ThereAndBackWhileTheCreditIsOutNeedsNoFrame) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -328,7 +328,7 @@ TEST(Unchanged, there_and_back_while_the_credit_is_out_needs_no_frame) {
   EXPECT_EQ(driver.frames.size(), 2U);
 }
 
-TEST(Unchanged, a_camera_that_moves_where_nothing_shows_sends_nothing) {
+TEST(Unchanged, ACameraThatMovesWhereNothingShowsSendsNothing) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
   driver.settle();
@@ -345,7 +345,7 @@ TEST(Unchanged, a_camera_that_moves_where_nothing_shows_sends_nothing) {
   EXPECT_GT(driver.frames.size(), frames);
 }
 
-TEST(Unchanged, a_moving_frame_with_nothing_in_it_does_not_stand_for_the_final_one) {
+TEST(Unchanged, AMovingFrameWithNothingInItDoesNotStandForTheFinalOne) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
   driver.settle(200 * ms);
@@ -363,7 +363,7 @@ TEST(Unchanged, a_moving_frame_with_nothing_in_it_does_not_stand_for_the_final_o
   EXPECT_TRUE(unchanged_revs(driver).empty());
 }
 
-TEST(Unchanged, a_rev_that_is_said_again_is_answered_again) {
+TEST(Unchanged, ARevThatIsSaidAgainIsAnsweredAgain) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -379,7 +379,7 @@ TEST(Unchanged, a_rev_that_is_said_again_is_answered_again) {
   EXPECT_EQ(unchanged_revs(driver), (Revs{1, 1})) << "no patch, no answer";
 }
 
-TEST(Unchanged, going_back_after_a_refusal_answers_what_was_not_answered_and_no_more) {
+TEST(Unchanged, GoingBackAfterARefusalAnswersWhatWasNotAnsweredAndNoMore) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -391,7 +391,7 @@ TEST(Unchanged, going_back_after_a_refusal_answers_what_was_not_answered_and_no_
   EXPECT_TRUE(unchanged_revs(driver).empty()) << "rev 1 was answered long ago";
 }
 
-TEST(Unchanged, what_shows_nothing_but_differs_by_more_than_the_camera_is_sent) {
+TEST(Unchanged, WhatShowsNothingButDiffersByMoreThanTheCameraIsSent) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
   driver.settle();
@@ -402,7 +402,7 @@ TEST(Unchanged, what_shows_nothing_but_differs_by_more_than_the_camera_is_sent) 
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
 }
 
-TEST(Unchanged, from_something_to_nothing_is_sent) {
+TEST(Unchanged, FromSomethingToNothingIsSent) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();

@@ -47,7 +47,7 @@ std::function<Micros(const quality::Setting&)> costs(const quality::Forecasts& k
   };
 }
 
-TEST(Setting, says_so_in_the_header_and_the_final_frame_is_full) {
+TEST(Setting, SaysSoInTheHeaderAndTheFinalFrameIsFull) {
   Driver driver;
   driver.surveyed = surveyed(400);
   driver.patch(1, R"({"dataset":"wind","image":{"width":800,"height":600}})");
@@ -71,7 +71,7 @@ TEST(Setting, says_so_in_the_header_and_the_final_frame_is_full) {
   EXPECT_FLOAT_EQ(final.error, 3e-4F);
 }
 
-TEST(Setting, keeps_the_budget_on_a_machine_that_is_slower_than_it_was) {
+TEST(Setting, KeepsTheBudgetOnAMachineThatIsSlowerThanItWas) {
   for (const double budget : {16.0, 33.0, 66.0, 100.0}) {
     Driver driver;
     driver.surveyed = surveyed(120);
@@ -97,7 +97,7 @@ TEST(Setting, keeps_the_budget_on_a_machine_that_is_slower_than_it_was) {
   }
 }
 
-TEST(Setting, one_slow_load_does_not_coarsen_what_follows) {
+TEST(Setting, OneSlowLoadDoesNotCoarsenWhatFollows) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   std::uint32_t rev = 1;
@@ -111,7 +111,7 @@ TEST(Setting, one_slow_load_does_not_coarsen_what_follows) {
   EXPECT_LE(driver.render->setting.coarser, before.coarser);
 }
 
-TEST(Setting, never_makes_a_picture_too_small_to_tell_anything) {
+TEST(Setting, NeverMakesAPictureTooSmallToTellAnything) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","image":{"width":300,"height":200}})");
   std::uint32_t rev = 1;
@@ -121,7 +121,7 @@ TEST(Setting, never_makes_a_picture_too_small_to_tell_anything) {
   }
 }
 
-TEST(Setting, comes_back_when_the_scene_has_become_cheap) {
+TEST(Setting, ComesBackWhenTheSceneHasBecomeCheap) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   std::uint32_t rev = 1;
@@ -135,7 +135,7 @@ TEST(Setting, comes_back_when_the_scene_has_become_cheap) {
   EXPECT_EQ(fine.back().coarser, 0);
 }
 
-TEST(Setting, an_error_that_is_asked_for_decides_instead_of_a_budget) {
+TEST(Setting, AnErrorThatIsAskedForDecidesInsteadOfABudget) {
   Driver driver;
   driver.surveyed = surveyed(120);
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.005}})");
@@ -150,7 +150,7 @@ TEST(Setting, an_error_that_is_asked_for_decides_instead_of_a_budget) {
 }
 
 // Sixteen viewers of one kind: each waits for fifteen frames of the others, and all of them shrink.
-TEST(Setting, frames_become_shorter_where_many_wait_for_the_renderer) {
+TEST(Setting, FramesBecomeShorterWhereManyWaitForTheRenderer) {
   Driver driver;
   driver.surveyed = surveyed(33);
   driver.patch(1, R"({"dataset":"wind"})");
@@ -170,7 +170,7 @@ TEST(Setting, frames_become_shorter_where_many_wait_for_the_renderer) {
 
 // --- the way to the final frame -----------------------------------------------------------------
 
-TEST(Refining, a_final_frame_that_is_long_in_coming_has_a_better_one_before_it) {
+TEST(Refining, AFinalFrameThatIsLongInComingHasABetterOneBeforeIt) {
   Driver driver;
   driver.surveyed = surveyed(200);
   driver.measured_error = 5e-4;
@@ -199,7 +199,7 @@ TEST(Refining, a_final_frame_that_is_long_in_coming_has_a_better_one_before_it) 
   EXPECT_EQ(drawn.back(), quality::settings[quality::own_setting(View{})]);
 }
 
-TEST(Refining, is_given_up_by_the_next_change) {
+TEST(Refining, IsGivenUpByTheNextChange) {
   Driver driver;
   driver.surveyed = surveyed(200);
   driver.patch(1, R"({"dataset":"wind"})");
@@ -215,7 +215,7 @@ TEST(Refining, is_given_up_by_the_next_change) {
   EXPECT_TRUE(driver.cancelled);
 }
 
-TEST(Refining, slabs_become_thinner_until_the_measured_error_is_what_was_asked_for) {
+TEST(Refining, SlabsBecomeThinnerUntilTheMeasuredErrorIsWhatWasAskedFor) {
   Driver driver;
   driver.measured_error = 1e-3;  // a quarter of it with every halving
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.0001}})");
@@ -228,7 +228,7 @@ TEST(Refining, slabs_become_thinner_until_the_measured_error_is_what_was_asked_f
   }
 }
 
-TEST(Refining, ends_where_thinner_slabs_do_not_mend_it) {
+TEST(Refining, EndsWhereThinnerSlabsDoNotMendIt) {
   Driver driver;
   driver.averaged = true;
   driver.measured_error = 1e-2;
@@ -239,7 +239,7 @@ TEST(Refining, ends_where_thinner_slabs_do_not_mend_it) {
   EXPECT_LE(driver.frames.size(), 3U) << "one moving, one halving tried";
 }
 
-TEST(Setting, a_late_frame_of_another_dataset_teaches_nothing) {
+TEST(Setting, ALateFrameOfAnotherDatasetTeachesNothing) {
   const auto first_of_sea = [](Micros late) {
     Driver driver;
     driver.surveyed = surveyed(10);
@@ -254,7 +254,7 @@ TEST(Setting, a_late_frame_of_another_dataset_teaches_nothing) {
   EXPECT_EQ(first_of_sea(2000 * ms), first_of_sea(10 * ms));
 }
 
-TEST(Refining, ends_where_no_slab_is_thin_enough) {
+TEST(Refining, EndsWhereNoSlabIsThinEnough) {
   Driver driver;
   driver.measured_error = 1;
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.000001}})");
@@ -263,7 +263,7 @@ TEST(Refining, ends_where_no_slab_is_thin_enough) {
   EXPECT_GT(driver.frames.back().header.error, 1e-6F) << "and says that it is not";
 }
 
-TEST(Refining, a_lossless_final_frame_is_a_png) {
+TEST(Refining, ALosslessFinalFrameIsAPng) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","quality":{"lossless":true}})");
   driver.settle();
@@ -272,7 +272,7 @@ TEST(Refining, a_lossless_final_frame_is_a_png) {
   EXPECT_EQ(driver.frames.back().header.codec, protocol::Codec::png);
 }
 
-TEST(Refining, a_view_that_rests_is_surveyed_once) {
+TEST(Refining, AViewThatRestsIsSurveyedOnce) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   EXPECT_TRUE(driver.calibrations.empty());

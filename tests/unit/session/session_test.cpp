@@ -17,7 +17,7 @@ protocol::DatasetDescription description(const std::string& id) {
 
 // --- opening ------------------------------------------------------------------------------------
 
-TEST(Open, describes_the_dataset_and_then_draws_it) {
+TEST(Open, DescribesTheDatasetAndThenDrawsIt) {
   Driver driver;
   driver.say(protocol::OpenMessage{5, "wind"});
   ASSERT_EQ(driver.describes.size(), 1U);
@@ -35,7 +35,7 @@ TEST(Open, describes_the_dataset_and_then_draws_it) {
 }
 
 // Of several refusals a viewer may see the last alone.
-TEST(Open, that_failed_is_why_there_is_nothing_to_play) {
+TEST(Open, ThatFailedIsWhyThereIsNothingToPlay) {
   const auto why = make_error(ErrorKind::out_of_memory, "the field needs 9 MiB");
   const auto play = [](Driver& driver) {
     driver.texts.clear();
@@ -65,7 +65,7 @@ TEST(Open, that_failed_is_why_there_is_nothing_to_play) {
 }
 
 // Progress is not reported for fast loads, nor for reads of other sessions while this one renders.
-TEST(Open, how_far_reading_has_come_is_told_while_a_frame_waits_for_it) {
+TEST(Open, HowFarReadingHasComeIsToldWhileAFrameWaitsForIt) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.reading = Reading{"u", 0.25};
@@ -96,7 +96,7 @@ TEST(Open, how_far_reading_has_come_is_told_while_a_frame_waits_for_it) {
 
 // --- files that change --------------------------------------------------------------------------
 
-TEST(Changed, the_dataset_is_described_and_drawn_anew) {
+TEST(Changed, TheDatasetIsDescribedAndDrawnAnew) {
   Driver driver;
   driver.say(protocol::OpenMessage{5, "wind"});
   driver.described(5, description("wind"));
@@ -117,7 +117,7 @@ TEST(Changed, the_dataset_is_described_and_drawn_anew) {
   EXPECT_GT(driver.renders, before);
 }
 
-TEST(Changed, a_step_that_is_gone_becomes_the_last_and_neighbours_are_wished_for_anew) {
+TEST(Changed, AStepThatIsGoneBecomesTheLastAndNeighboursAreWishedForAnew) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":8})");
   driver.settle();
@@ -134,7 +134,7 @@ TEST(Changed, a_step_that_is_gone_becomes_the_last_and_neighbours_are_wished_for
   EXPECT_THAT(driver.requests.back().steps, ElementsAre(2));
 }
 
-TEST(Open, an_unknown_dataset_is_an_error_and_the_view_stays) {
+TEST(Open, AnUnknownDatasetIsAnErrorAndTheViewStays) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -149,7 +149,7 @@ TEST(Open, an_unknown_dataset_is_an_error_and_the_view_stays) {
   EXPECT_EQ(driver.render->view.dataset, "wind");
 }
 
-TEST(Open, another_dataset_starts_afresh_but_keeps_the_pictures_size) {
+TEST(Open, AnotherDatasetStartsAfreshButKeepsThePicturesSize) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":4,"image":{"width":640,"height":480},
                       "vector":{"field":"u"}})");
@@ -164,7 +164,7 @@ TEST(Open, another_dataset_starts_afresh_but_keeps_the_pictures_size) {
   EXPECT_EQ(view.vector.field.kind, protocol::FieldChoice::Kind::dataset_default);
 }
 
-TEST(Open, data_that_cannot_be_read_leaves_the_old_view) {
+TEST(Open, DataThatCannotBeReadLeavesTheOldView) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":2})");
   driver.settle();
@@ -178,7 +178,7 @@ TEST(Open, data_that_cannot_be_read_leaves_the_old_view) {
 
 // --- patches ------------------------------------------------------------------------------------
 
-TEST(Patch, that_is_invalid_names_its_rev_and_pointer_and_the_old_view_stays) {
+TEST(Patch, ThatIsInvalidNamesItsRevAndPointerAndTheOldViewStays) {
   for (const char* bad :
        {R"({"image":{"width":0}})", R"({"unknown":1})", R"({"step":-1})", R"({"step":99})",
         R"({"camera":{"fovY":1e999}})", R"({"dataset":"nowhere"})", R"([1])"}) {
@@ -201,7 +201,7 @@ TEST(Patch, that_is_invalid_names_its_rev_and_pointer_and_the_old_view_stays) {
   }
 }
 
-TEST(Patch, before_a_dataset_is_named_is_remembered) {
+TEST(Patch, BeforeADatasetIsNamedIsRemembered) {
   Driver driver;
   driver.patch(1, R"({"image":{"width":320,"height":200}})");
   EXPECT_FALSE(driver.render);
@@ -211,7 +211,7 @@ TEST(Patch, before_a_dataset_is_named_is_remembered) {
   EXPECT_EQ(driver.render->view.image.width, 320);
 }
 
-TEST(Patch, whose_data_cannot_be_read_leaves_no_trace_and_the_others_stand) {
+TEST(Patch, WhoseDataCannotBeReadLeavesNoTraceAndTheOthersStand) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":2})");
   driver.settle();
@@ -227,7 +227,7 @@ TEST(Patch, whose_data_cannot_be_read_leaves_no_trace_and_the_others_stand) {
 }
 
 // The step that cannot be read is hidden under a later patch before any frame is drawn of it.
-TEST(Patch, a_fault_beneath_later_patches_is_found_and_the_stream_goes_on) {
+TEST(Patch, AFaultBeneathLaterPatchesIsFoundAndTheStreamGoesOn) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":2})");
   driver.settle();
@@ -256,7 +256,7 @@ TEST(Patch, a_fault_beneath_later_patches_is_found_and_the_stream_goes_on) {
   EXPECT_TRUE(named) << "the rejected patch is named";
 }
 
-TEST(Patch, that_fails_for_good_is_not_tried_again_and_again) {
+TEST(Patch, ThatFailsForGoodIsNotTriedAgainAndAgain) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -271,7 +271,7 @@ TEST(Patch, that_fails_for_good_is_not_tried_again_and_again) {
   EXPECT_EQ(driver.errors().size(), 2U);
 }
 
-TEST(Patch, that_fails_leaves_the_final_frame_that_stands) {
+TEST(Patch, ThatFailsLeavesTheFinalFrameThatStands) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -287,7 +287,7 @@ TEST(Patch, that_fails_leaves_the_final_frame_that_stands) {
 
 // --- acknowledgements ---------------------------------------------------------------------------
 
-TEST(Ack, of_a_frame_never_sent_is_an_error_and_counts_for_nothing) {
+TEST(Ack, OfAFrameNeverSentIsAnErrorAndCountsForNothing) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.ack(1);
@@ -305,7 +305,7 @@ TEST(Ack, of_a_frame_never_sent_is_an_error_and_counts_for_nothing) {
   EXPECT_TRUE(driver.render);
 }
 
-TEST(Ack, may_be_repeated_or_come_late) {
+TEST(Ack, MayBeRepeatedOrComeLate) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -325,7 +325,7 @@ TEST(Ack, may_be_repeated_or_come_late) {
 
 // --- stills -------------------------------------------------------------------------------------
 
-TEST(Still, is_drawn_at_its_size_and_announced_by_its_id) {
+TEST(Still, IsDrawnAtItsSizeAndAnnouncedByItsId) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":3})");
   driver.settle();
@@ -352,7 +352,7 @@ TEST(Still, is_drawn_at_its_size_and_announced_by_its_id) {
   EXPECT_EQ(driver.texts_of<protocol::ChosenMessage>().back().seq, header.seq);
 }
 
-TEST(Still, waits_for_credit_and_gets_its_turn_while_the_view_moves) {
+TEST(Still, WaitsForCreditAndGetsItsTurnWhileTheViewMoves) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -372,7 +372,7 @@ TEST(Still, waits_for_credit_and_gets_its_turn_while_the_view_moves) {
   EXPECT_EQ(stills, 1);
 }
 
-TEST(Still, whose_data_are_released_while_they_are_read_is_answered) {
+TEST(Still, WhoseDataAreReleasedWhileTheyAreReadIsAnswered) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -385,7 +385,7 @@ TEST(Still, whose_data_are_released_while_they_are_read_is_answered) {
   EXPECT_FALSE(driver.render) << "whoever still wants it asks again";
 }
 
-TEST(Still, too_large_too_many_or_of_nothing_is_an_error) {
+TEST(Still, TooLargeTooManyOrOfNothingIsAnError) {
   Driver driver;
   protocol::StillMessage still;
   still.id = 1;
@@ -422,7 +422,7 @@ void run_for(Driver& driver, Micros duration, Micros cost) {
   }
 }
 
-TEST(Play, shows_every_step_in_time_when_there_is_time) {
+TEST(Play, ShowsEveryStepInTimeWhenThereIsTime) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -432,7 +432,7 @@ TEST(Play, shows_every_step_in_time_when_there_is_time) {
   EXPECT_THAT(driver.steps_shown(), ElementsAre(1U, 2U, 3U, 0U, 1U, 2U, 3U, 0U));
 }
 
-TEST(Play, with_drop_skips_what_is_late) {
+TEST(Play, WithDropSkipsWhatIsLate) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -449,7 +449,7 @@ TEST(Play, with_drop_skips_what_is_late) {
   EXPECT_EQ(shown.back(), 9U) << "the last is where it ends, and on time";
 }
 
-TEST(Play, without_drop_leaves_none_out_however_long_it_takes) {
+TEST(Play, WithoutDropLeavesNoneOutHoweverLongItTakes) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -465,7 +465,7 @@ TEST(Play, without_drop_leaves_none_out_however_long_it_takes) {
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(Play, pause_stops_at_the_step_reached_and_makes_it_final) {
+TEST(Play, PauseStopsAtTheStepReachedAndMakesItFinal) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -481,7 +481,7 @@ TEST(Play, pause_stops_at_the_step_reached_and_makes_it_final) {
   EXPECT_EQ(driver.render->view.step, 3) << "the view keeps the step that time has reached";
 }
 
-TEST(Play, goes_on_from_the_step_that_the_user_picks) {
+TEST(Play, GoesOnFromTheStepThatTheUserPicks) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -492,7 +492,7 @@ TEST(Play, goes_on_from_the_step_that_the_user_picks) {
   EXPECT_THAT(driver.steps_shown(), ElementsAre(7U, 8U, 9U));
 }
 
-TEST(Play, beyond_the_last_step_or_of_nothing_is_an_error) {
+TEST(Play, BeyondTheLastStepOrOfNothingIsAnError) {
   Driver driver;
   driver.say(play(0, 3, 10, true, true));
   driver.patch(1, R"({"dataset":"wind"})");
@@ -501,7 +501,7 @@ TEST(Play, beyond_the_last_step_or_of_nothing_is_an_error) {
   EXPECT_EQ(driver.errors()[1].problem.errors.at(0).pointer, "/to");
 }
 
-TEST(Play, a_step_that_cannot_be_read_stops_it) {
+TEST(Play, AStepThatCannotBeReadStopsIt) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -516,14 +516,14 @@ TEST(Play, a_step_that_cannot_be_read_stops_it) {
 
 // --- ends ---------------------------------------------------------------------------------------
 
-TEST(End, a_binary_message_closes_with_4400) {
+TEST(End, ABinaryMessageClosesWith4400) {
   Driver driver;
   driver.binary();
   ASSERT_TRUE(driver.closed);
   EXPECT_EQ(driver.closed->code, 4400);
 }
 
-TEST(End, a_drain_closes_with_1001_and_gives_up_the_render) {
+TEST(End, ADrainClosesWith1001AndGivesUpTheRender) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.drain();
@@ -535,7 +535,7 @@ TEST(End, a_drain_closes_with_1001_and_gives_up_the_render) {
   EXPECT_TRUE(driver.frames.empty());
 }
 
-TEST(End, silence_closes_with_4410_and_any_message_keeps_it_open) {
+TEST(End, SilenceClosesWith4410AndAnyMessageKeepsItOpen) {
   Options options;
   options.idle_timeout_us = 60'000 * ms;
   Driver driver(options);
@@ -552,7 +552,7 @@ TEST(End, silence_closes_with_4410_and_any_message_keeps_it_open) {
   EXPECT_EQ(driver.closed->code, 4410);
 }
 
-TEST(End, text_that_is_no_message_is_answered_and_nothing_else_happens) {
+TEST(End, TextThatIsNoMessageIsAnsweredAndNothingElseHappens) {
   Driver driver;
   driver.refused(make_error(ErrorKind::malformed, "no JSON"));
   ASSERT_EQ(driver.errors().size(), 1U);
