@@ -29,7 +29,7 @@ std::size_t files_like(const Folder& folder, const std::string& ending) {
   return count;
 }
 
-TEST(CliAnimate, EveryFrameIsWhatRenderDrawsOfItsStep) {
+TEST(CliAnimate, EveryFrameEqualsRenderOfItsStep) {
   const Folder folder;
   const std::string path = folder.file("four.nc");
   ASSERT_EQ(run({"synth", "climate", "--dims", "24x12x6", "--steps", "4", "-o", path}).code, 0);
@@ -48,7 +48,7 @@ TEST(CliAnimate, EveryFrameIsWhatRenderDrawsOfItsStep) {
   EXPECT_EQ(pictures.size(), 4U) << "the steps differ";
 }
 
-TEST(CliAnimate, StepsMayBeginLaterAndLeaveSomeOut) {
+TEST(CliAnimate, StepsMayStartLaterAndSkip) {
   const Folder folder;
   const std::string path = folder.file("four.nc");
   ASSERT_EQ(run({"synth", "climate", "--dims", "24x12x6", "--steps", "4", "-o", path}).code, 0);
@@ -79,7 +79,7 @@ TEST(CliAnimate, FramesBetweenStepsHaveTheirTimes) {
 }
 
 // From one drawn step to the next the time grows evenly, by the stride, from the view's own time.
-TEST(CliAnimate, TimesRunOnOverAStrideFromTheViewsOwn) {
+TEST(CliAnimate, TimesContinueFromTheViewsTimeAcrossAStride) {
   const Folder folder;
   const std::string path = folder.file("four.nc");
   ASSERT_EQ(run({"synth", "tornado", "--dims", "12x12x12", "--steps", "4", "-o", path}).code, 0);
@@ -107,7 +107,7 @@ TEST(CliAnimate, TimesRunOnOverAStrideFromTheViewsOwn) {
 }
 
 // The signal may arrive during any frame: every existing file must be complete.
-TEST(CliAnimate, ASignalStopsItBetweenWholeFiles) {
+TEST(CliAnimate, SignalStopsBetweenWholeFiles) {
   for (const int signal : {SIGINT, SIGTERM}) {
     const Folder folder;
     const std::string path = synth(folder, "tornado", "12x12x12");
@@ -144,7 +144,7 @@ TEST(CliAnimate, StopsAtTheFirstErrorAndNamesIt) {
   EXPECT_THAT(nowhere.err, HasSubstr("f_0.png"));
 }
 
-TEST(CliAnimate, NothingIsDrawnTwiceForNothing) {
+TEST(CliAnimate, SkipsUnnecessaryRendering) {
   const Folder folder;
   const std::string path = synth(folder, "tornado", "8x8x8");
   const Outcome refused =

@@ -60,7 +60,7 @@ const std::vector<Json>& deeds() {
   return all;
 }
 
-TEST(Resume, AWholeViewSentToARestartedDaemonBringsTheSamePicture) {
+TEST(Resume, ViewSentToARestartedDaemonGivesTheSamePicture) {
   const Folder folder;
   const std::string dataset = synth(folder, "climate", "24x16x6");
   Json whole = Json::object();

@@ -67,7 +67,7 @@ double covered(const std::string& npy, int width, int height) {
 }
 
 // A gallery's picture fills its frame: at least a quarter of it is not background.
-TEST(Gallery, EveryViewIsAcceptedAndFillsItsPicture) {
+TEST(Gallery, EveryViewIsValidAndFillsItsPicture) {
   const Folder folder;
   for (const std::string& name : names(".json")) {
     SCOPED_TRACE(name);
@@ -86,7 +86,7 @@ TEST(Gallery, EveryViewIsAcceptedAndFillsItsPicture) {
   }
 }
 
-TEST(Gallery, TheScriptDrawsEveryViewAndNoOther) {
+TEST(Gallery, ScriptRendersEveryViewAndNoOther) {
   std::set<std::string> drawn;
   for (const Entry& entry : script_entries()) {
     SCOPED_TRACE(entry.name);
@@ -99,7 +99,7 @@ TEST(Gallery, TheScriptDrawsEveryViewAndNoOther) {
   EXPECT_EQ(drawn, names(".jpg"));
 }
 
-TEST(Gallery, PicturesAreSmallAndTheTextNamesFilesThatAreThere) {
+TEST(Gallery, PicturesAreSmallAndReferencedFilesExist) {
   const std::string text = read_file((gallery() / "README.md").string());
   for (const std::string& name : names(".jpg")) {
     EXPECT_LE(fs::file_size(gallery() / (name + ".jpg")), picture_bytes_max) << name;
@@ -113,7 +113,7 @@ TEST(Gallery, PicturesAreSmallAndTheTextNamesFilesThatAreThere) {
 }
 
 // The commands of the text are those of the script.
-TEST(Gallery, TheTextTellsTheScriptsCommands) {
+TEST(Gallery, TextQuotesTheCommandsOfTheScript) {
   const std::string text = read_file((gallery() / "README.md").string());
   for (const Entry& entry : script_entries()) {
     std::ostringstream command;
@@ -123,7 +123,7 @@ TEST(Gallery, TheTextTellsTheScriptsCommands) {
   }
 }
 
-TEST(Gallery, QualityChoosesTheBytesOfAJpeg) {
+TEST(Gallery, QualitySetsTheBytesOfAJpeg) {
   const Folder folder;
   const std::string path = synth(folder, "tornado", "16x16x16");
   const auto bytes = [&](const Words& more) {

@@ -57,7 +57,7 @@ bool is_running(std::uint16_t port, const std::string& id) {
   return false;
 }
 
-TEST(OpenedDatasets, WhatTheServerBeganWithIsNotForgottenBecauseSomebodyPostedItToo) {
+TEST(OpenedDatasets, DatasetsOfTheCommandLineAreKeptWhenPostedAgain) {
   TestServer server(with_root(folder_of_small()));
   const Json job = finished_job(server.port(), post_file(server.port(), "small.nc"));
   EXPECT_EQ(job["state"], "done");
@@ -108,7 +108,7 @@ class SharedDataset : public testing::Test {
   std::string second_;
 };
 
-TEST_F(SharedDataset, IsThereForTheFirstWhenTheSecondCancels) {
+TEST_F(SharedDataset, RemainsForTheFirstClientWhenTheSecondCancels) {
   cancel(second_);
   gate_->open();
   EXPECT_EQ(finished_job(port(), second_)["state"], "cancelled");
@@ -116,7 +116,7 @@ TEST_F(SharedDataset, IsThereForTheFirstWhenTheSecondCancels) {
   EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 200);
 }
 
-TEST_F(SharedDataset, IsThereForTheSecondWhenTheFirstCancels) {
+TEST_F(SharedDataset, RemainsForTheSecondClientWhenTheFirstCancels) {
   cancel(first_);
   gate_->open();
   EXPECT_EQ(finished_job(port(), first_)["state"], "cancelled");
@@ -127,7 +127,7 @@ TEST_F(SharedDataset, IsThereForTheSecondWhenTheFirstCancels) {
   EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 404);
 }
 
-TEST_F(SharedDataset, GoesWithTheLastThatCancels) {
+TEST_F(SharedDataset, IsReleasedWhenTheLastClientCancels) {
   cancel(first_);
   cancel(second_);
   gate_->open();
@@ -155,7 +155,7 @@ class StuckSource : public data::Source {
 };
 
 // Its client is there and waits, so 499 would not be true.
-TEST(ForgottenDatasets, APictureThatWaitsForOneIsToldWhatBecameOfIt) {
+TEST(ForgottenDatasets, WaitingPictureReportsTheRemoval) {
   std::string name = (fs::temp_directory_path() / "windsplat-forgot-XXXXXX").string();
   ASSERT_NE(mkdtemp(name.data()), nullptr);
   fs::copy_file(small_file(), name + "/posted.nc");
@@ -186,7 +186,7 @@ TEST(ForgottenDatasets, APictureThatWaitsForOneIsToldWhatBecameOfIt) {
 }
 
 // Files that differ only in their folder: name, size and time are equal.
-TEST(KnownRanges, AreNotThoseOfAnotherFileThatLooksTheSameFromOutside) {
+TEST(KnownRanges, AreNotReusedForAnotherFileOfEqualSizeAndTime) {
   std::string name = (fs::temp_directory_path() / "windsplat-twins-XXXXXX").string();
   ASSERT_NE(mkdtemp(name.data()), nullptr);
   const fs::path root = name;
@@ -219,7 +219,7 @@ TEST(KnownRanges, AreNotThoseOfAnotherFileThatLooksTheSameFromOutside) {
   fs::remove_all(root);
 }
 
-TEST(Loads, ADatasetThatHangsLeavesTheOthersATurn) {
+TEST(Loads, HangingDatasetDoesNotBlockOthers) {
   const auto gate = std::make_shared<Gate>();
   std::string name = (fs::temp_directory_path() / "windsplat-hangs-XXXXXX").string();
   ASSERT_NE(mkdtemp(name.data()), nullptr);
@@ -253,7 +253,7 @@ TEST(Loads, ADatasetThatHangsLeavesTheOthersATurn) {
   fs::remove_all(root);
 }
 
-TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesWaitForNobody) {
+TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesDoNotWait) {
   Gate gate;
   const auto one = std::make_shared<int>(1);
   std::mutex mutex;
@@ -284,7 +284,7 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesWaitForNobody) {
 }
 
 // The line of one dataset is full: others still get in.
-TEST(Loads, EveryDatasetHasALineOfItsOwn) {
+TEST(Loads, EveryDatasetHasItsOwnQueue) {
   Gate gate;
   net::LoadService loads(2, 2, "loads");
   const auto one = std::make_shared<int>(1);
@@ -302,7 +302,7 @@ TEST(Loads, EveryDatasetHasALineOfItsOwn) {
 
 // Views that say nothing of their fields' ranges, so that working out what they will need reads
 // the field they show; all but one in vain.
-TEST(Viewer, OfManyWishesThatWaitOnlyTheNewestIsWorkedOut) {
+TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add("climate:32x16x6").value();
   const std::string scalar = dataset->info().first(data::FieldKind::scalar)->name;
@@ -333,7 +333,7 @@ TEST(Viewer, OfManyWishesThatWaitOnlyTheNewestIsWorkedOut) {
   EXPECT_TRUE(dataset->seen(vector, 0));
 }
 
-TEST(Drawings, ARequestThatWasLetInIsNotRefusedOnceItsDataIsThere) {
+TEST(Drawings, AdmittedRequestIsNotRefusedAfterLoading) {
   Gate gate;  // before the services, whose threads use it until they end
   std::promise<std::string> told;
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);

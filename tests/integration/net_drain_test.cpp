@@ -24,14 +24,14 @@ bool until_final(StreamClient& client) {
   return false;
 }
 
-TEST(Drain, AnIdleServerEnds) {
+TEST(Drain, IdleServerStops) {
   TestServer server;
   EXPECT_EQ(get(server.port(), "/livez").status, 200);
   server.stop();
   EXPECT_EQ(get(server.port(), "/livez").status, 0) << "the listening socket is closed";
 }
 
-TEST(Drain, TwiceOrBeforeItRunsIsNoHarm) {
+TEST(Drain, RepeatedOrEarlyDrainIsHarmless) {
   TestServer server;
   server.server().drain();
   server.server().drain();
@@ -52,7 +52,7 @@ TEST(Drain, StreamsAreClosedWith1001) {
   server.stop();
 }
 
-TEST(Drain, IsNotPutOffByClientsThatAskAgainAndAgain) {
+TEST(Drain, IsNotDelayedByRepeatedRequests) {
   TestServer server;
   std::vector<std::thread> clients;
   clients.reserve(6);
@@ -71,7 +71,7 @@ TEST(Drain, IsNotPutOffByClientsThatAskAgainAndAgain) {
 }
 
 // Operations still in progress at the deadline must not access destroyed objects.
-TEST(Drain, ConnectionsThatOutlastItAreEnded) {
+TEST(Drain, RemainingConnectionsAreClosedAtTheDeadline) {
   windsplat::net::ServerOptions options;
   options.drain_cancel_after = std::chrono::milliseconds(0);
   options.drain_abort_after = std::chrono::milliseconds(0);
@@ -94,7 +94,7 @@ TEST(Drain, ConnectionsThatOutlastItAreEnded) {
   EXPECT_TRUE(drawing.closed_by_peer());
 }
 
-TEST(Drain, APictureThatIsBeingDrawnIsAnsweredAndReadinessIsGoneMeanwhile) {
+TEST(Drain, RunningPictureIsAnsweredWhileReadinessFails) {
   TestServer server;
   Socket drawing(server.port());
   drawing.send(
@@ -117,7 +117,7 @@ TEST(Drain, APictureThatIsBeingDrawnIsAnsweredAndReadinessIsGoneMeanwhile) {
   server.stop();
 }
 
-TEST(Drain, APeerThatNeverReadsDoesNotHoldItUp) {
+TEST(Drain, PeerThatNeverReadsDoesNotDelayIt) {
   TestServer server;
   // A picture of noise that no kernel buffer takes: its write is stuck when the drain begins.
   StreamClient deaf(server.port(), {}, "/v1/stream", 4096);
@@ -134,7 +134,7 @@ TEST(Drain, APeerThatNeverReadsDoesNotHoldItUp) {
   EXPECT_TRUE(deaf.socket.closed_by_peer());
 }
 
-TEST(Drain, IdleConnectionsDoNotHoldItUp) {
+TEST(Drain, IdleConnectionsDoNotDelayIt) {
   TestServer server;
   Socket silent(server.port());
   Socket between(server.port());

@@ -27,7 +27,7 @@ class Edge : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(Edge, RequestsThatCanBeReadInTwoWaysAreRefused) {
+TEST_F(Edge, AmbiguousRequestsAreRefused) {
   const std::string get = "GET /livez HTTP/1.1\r\n";
   const std::string post = "POST /v1/frames HTTP/1.1\r\nHost: x\r\n";
   struct Case {
@@ -62,7 +62,7 @@ TEST_F(Edge, RequestsThatCanBeReadInTwoWaysAreRefused) {
 }
 
 // DNS rebinding: the page of a foreign name that resolves to this machine.
-TEST(LocalHosts, AloneAreAnsweredWhereOnlyTheyAreExpected) {
+TEST(LocalHosts, AreTheOnlyHostNamesAnsweredOnLoopback) {
   windsplat::net::ServerOptions options;
   options.local_hosts_only = true;
   options.allow_origins = {"https://winds.example"};
@@ -82,7 +82,7 @@ TEST(LocalHosts, AloneAreAnsweredWhereOnlyTheyAreExpected) {
   }
 }
 
-TEST_F(Edge, ABodyTooLargeIsRefusedBeforeItIsRead) {
+TEST_F(Edge, OversizeBodyIsRefusedBeforeItIsRead) {
   const std::string post = "POST /v1/frames HTTP/1.1\r\nHost: x\r\n";
   // No body was sent: the response depends on the header only.
   for (const char* length : {"65537", "104857600", "9223372036854775808", "18446744073709551615"}) {
@@ -92,7 +92,7 @@ TEST_F(Edge, ABodyTooLargeIsRefusedBeforeItIsRead) {
   }
 }
 
-TEST_F(Edge, ABodyOf100MbThatIsSentAllTheSameGets413) {
+TEST_F(Edge, BodyOf100MbSentWithoutWaitingGets413) {
   Socket socket(port());
   socket.send("POST /v1/frames HTTP/1.1\r\nHost: x\r\nContent-Length: 104857600\r\n\r\n");
   const std::string megabyte(1 << 20, 'x');
@@ -102,7 +102,7 @@ TEST_F(Edge, ABodyOf100MbThatIsSentAllTheSameGets413) {
   EXPECT_EQ(read_answer(socket).status, 413);
 }
 
-TEST_F(Edge, HeadersOfEverySizeAboutTheLimit) {
+TEST_F(Edge, HeadersOfEverySizeAroundTheLimit) {
   const std::string start = "GET /livez HTTP/1.1\r\nHost: x\r\nX: ";
   const std::string end = "\r\n\r\n";
   for (const std::size_t size : {8191U, 8192U, 8193U, 9000U, 16383U, 16384U, 16385U, 70000U}) {
@@ -131,7 +131,7 @@ TEST_F(Edge, BodiesAtTheLimitAreRead) {
   }
 }
 
-TEST_F(Edge, AConnectionCarriesManyRequestsEvenSentAtOnce) {
+TEST_F(Edge, ConnectionCarriesManyRequestsEvenPipelined) {
   Socket socket(port());
   const std::string one = "GET /livez HTTP/1.1\r\nHost: x\r\n\r\n";
   const std::string picture =
@@ -155,7 +155,7 @@ TEST_F(Edge, AConnectionCarriesManyRequestsEvenSentAtOnce) {
   EXPECT_EQ(read_answer(socket).status, 200);
 }
 
-TEST_F(Edge, ARefusalAfterAHeadHasItsBody) {
+TEST_F(Edge, RefusalAfterAHeadRequestHasItsBody) {
   Socket socket(port());
   socket.send("HEAD /livez HTTP/1.1\r\nHost: x\r\n\r\n");
   EXPECT_EQ(read_answer(socket, true).status, 200);
@@ -177,7 +177,7 @@ TEST_F(Edge, AbsoluteFormIsTheSamePath) {
   EXPECT_EQ(raw(port(), "GET http://x/livez HTTP/1.1\r\nHost: x\r\n\r\n").status, 200);
 }
 
-TEST_F(Edge, AnExpected100IsSaidBeforeTheBodyComes) {
+TEST_F(Edge, ExpectedContinueIsSentBeforeTheBody) {
   const std::string body = R"({"dataset":"small","image":{"width":16,"height":16}})";
   Socket socket(port());
   socket.send(
@@ -189,7 +189,7 @@ TEST_F(Edge, AnExpected100IsSaidBeforeTheBodyComes) {
   EXPECT_EQ(read_answer(socket).status, 200);
 }
 
-TEST_F(Edge, ASlowHeaderIsCutOffWhileOthersAreServed) {
+TEST_F(Edge, SlowHeaderTimesOutWhileOthersAreServed) {
   Socket slow(port());
   slow.send("GET /livez HT");
   Socket silent_body(port());
@@ -199,7 +199,7 @@ TEST_F(Edge, ASlowHeaderIsCutOffWhileOthersAreServed) {
   EXPECT_TRUE(silent_body.closed_by_peer());
 }
 
-TEST_F(Edge, AClientThatLeavesFreesTheRenderer) {
+TEST_F(Edge, DisconnectCancelsTheRendering) {
   for (int n = 0; n < 12; ++n) {
     Socket socket(port());
     socket.send(

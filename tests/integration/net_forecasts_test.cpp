@@ -66,7 +66,7 @@ TEST_F(Forecasts, AreACurveOfErrorAgainstTime) {
 }
 
 // The forecast setting is the one with which POST /v1/frames draws the view.
-TEST_F(Forecasts, TheChosenPointIsHowThePictureIsDrawn) {
+TEST_F(Forecasts, ChosenPointIsTheRenderedSetting) {
   Json view = view_of(320, 240);
   draw(view);
   EXPECT_TRUE(json_of(post(view))["chosen"].is_null());
@@ -83,7 +83,7 @@ TEST_F(Forecasts, TheChosenPointIsHowThePictureIsDrawn) {
   }
 }
 
-TEST_F(Forecasts, ALargerBudgetNeverChoosesWhatErrsMore) {
+TEST_F(Forecasts, LargerBudgetNeverChoosesALargerError) {
   Json view = view_of(640, 480);
   draw(view);
   double last = 2;
@@ -99,7 +99,7 @@ TEST_F(Forecasts, ALargerBudgetNeverChoosesWhatErrsMore) {
   EXPECT_GT(different, 1U) << "or this test shows nothing";
 }
 
-TEST_F(Forecasts, BeforeTheDataIsThereTheyAreNotMadeAndNothingIsLoaded) {
+TEST_F(Forecasts, AreEmptyBeforeLoadingAndLoadNothing) {
   const Json view = view_of(320, 240);
   const Answer early = post(view);
   expect_refused(early, 409, "POST /v1/frames");
@@ -114,7 +114,7 @@ TEST_F(Forecasts, BeforeTheDataIsThereTheyAreNotMadeAndNothingIsLoaded) {
 
 // A viewer that rests has its view surveyed: from then on the same view's errors are measured ones,
 // and times are told in milliseconds of this machine.
-TEST_F(Forecasts, AreMeasuredOnceAViewerHasLooked) {
+TEST_F(Forecasts, AreMeasuredAfterASession) {
   const Json view = view_of(320, 240);
   draw(view);
   const auto share_measured = [&](const char* key, const Json& yes) {
@@ -150,7 +150,7 @@ TEST_F(Forecasts, AreMeasuredOnceAViewerHasLooked) {
   }
 }
 
-TEST_F(Forecasts, WhatHasNoneIsRefused) {
+TEST_F(Forecasts, ViewWithoutForecastIsRefused) {
   Json reference = view_of(320, 240);
   reference["method"]["name"] = "reference";
   const Answer refused = post(reference);

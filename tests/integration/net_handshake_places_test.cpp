@@ -132,7 +132,7 @@ class HandshakePlaces : public testing::Test {
   std::promise<void> gate_;
 };
 
-TEST_F(HandshakePlaces, ThatWereGivenBackHoldNoDescriptor) {
+TEST_F(HandshakePlaces, ReleasedSlotsHoldNoDescriptor) {
   const std::string address = "192.0.2.1";
   const std::size_t before = open_descriptors();
   for (int n = 0; n < 32; ++n) come(address);
@@ -145,7 +145,7 @@ TEST_F(HandshakePlaces, ThatWereGivenBackHoldNoDescriptor) {
   })) << open_descriptors() - before - clients.size();
 }
 
-TEST_F(HandshakePlaces, OfAnAddressGoToItsNewerOnes) {
+TEST_F(HandshakePlaces, OfAnAddressGoToItsNewestConnections) {
   Tcp::socket& other = come("192.0.2.2");
   for (int n = 0; n < 64; ++n) come("192.0.2.1");
   EXPECT_TRUE(is_open(clients[1]));
@@ -155,7 +155,7 @@ TEST_F(HandshakePlaces, OfAnAddressGoToItsNewerOnes) {
   EXPECT_TRUE(is_open(other));
 }
 
-TEST_F(HandshakePlaces, OfManyAddressesAreTakenFromWhoHasMost) {
+TEST_F(HandshakePlaces, OfManyAddressesAreTakenFromTheLargestHolder) {
   Tcp::socket& lonely = come("198.51.100.1");
   Tcp::socket& known = come("198.51.100.2", true);
   Tcp::socket& crowd = come("192.0.2.0");
@@ -165,7 +165,7 @@ TEST_F(HandshakePlaces, OfManyAddressesAreTakenFromWhoHasMost) {
   EXPECT_TRUE(is_open(known));
 }
 
-TEST_F(HandshakePlaces, OfThoseThatShowedTheTokenAreNotTakenByStrangers) {
+TEST_F(HandshakePlaces, OfAuthenticatedAddressesAreNotTakenByOthers) {
   for (int n = 0; n < 256; ++n) come("192.0.2." + std::to_string(n % 4), true);
   EXPECT_TRUE(is_closed(come("198.51.100.1")));
   for (std::size_t n = 0; n < 256; ++n) EXPECT_TRUE(is_open(clients[n])) << n;
@@ -173,7 +173,7 @@ TEST_F(HandshakePlaces, OfThoseThatShowedTheTokenAreNotTakenByStrangers) {
   EXPECT_TRUE(is_closed(clients[0]));
 }
 
-TEST_F(HandshakePlaces, AreChargedForWhatWasComputedBeforeTheyEnded) {
+TEST_F(HandshakePlaces, AreChargedForComputationBeforeTheClose) {
   const std::string hello = client_hello();
   ASSERT_FALSE(hello.empty());
   const auto took = [&] { return services.metrics.text({}); };

@@ -151,7 +151,7 @@ TEST(TlsSessions, AskForNoCertificateOfTheClient) {
   EXPECT_EQ(asked, 0);
 }
 
-TEST(TlsHandshakes, BeyondAnAddressesTimeAreNotBegun) {
+TEST(TlsHandshakes, BeyondTheTimeOfAnAddressAreNotStarted) {
   Limits limits;
   limits.handshake_ms_per_address = 2;
   TestServer server(over_tls(limits));
@@ -168,7 +168,7 @@ TEST(TlsHandshakes, BeyondAnAddressesTimeAreNotBegun) {
   EXPECT_TRUE(Client(server.port(), nullptr, nullptr, "127.0.0.2").shaken());
 }
 
-TEST(TlsHandshakes, OfStrangersLeaveTimeForHealthAskedByTheMachineItself) {
+TEST(TlsHandshakes, OfOtherAddressesLeaveTimeForLocalHealthChecks) {
   Limits limits;
   limits.handshake_ms = 0.01;  // a further handshake is paid within a minute
   limits.handshake_ms_per_address = 1000;
@@ -192,7 +192,7 @@ TEST(TlsHandshakes, OfStrangersLeaveTimeForHealthAskedByTheMachineItself) {
 }
 
 // HTTP reports to the quota which address has shown the token: it has separate handshakes.
-TEST(TlsHandshakes, OfAnAddressThatShowedTheTokenDoNotCompeteWithStrangers) {
+TEST(TlsHandshakes, OfAuthenticatedAddressesDoNotCompeteWithOthers) {
   Limits limits;
   limits.handshake_ms = 0.001;  // a further handshake is paid within ten minutes
   limits.handshake_ms_per_address = 1000;
@@ -213,7 +213,7 @@ TEST(TlsHandshakes, OfAnAddressThatShowedTheTokenDoNotCompeteWithStrangers) {
   EXPECT_LT(others, 5) << "they wait for what the first stranger owes";
 }
 
-TEST(PlainHttp, AtThePortOfTlsIsChargedToItsAddress) {
+TEST(PlainHttp, AtTheTlsPortIsChargedToItsAddress) {
   Limits limits;
   limits.bytes_per_address = 1;  // ten at once
   TestServer server(over_tls(limits));
@@ -225,7 +225,7 @@ TEST(PlainHttp, AtThePortOfTlsIsChargedToItsAddress) {
 }
 
 // OpenSSL accepts a ClientHello of 131 kB and waits for all of it.
-TEST(TlsHandshakes, ThatSendMuchAreEndedBeforeThoseThatSendNothing) {
+TEST(TlsHandshakes, WithMuchInputAreClosedBeforeIdleOnes) {
   TestServer server(over_tls());
   Socket silent(server.port());
   Socket large(server.port());
@@ -242,7 +242,7 @@ TEST(TlsHandshakes, ThatSendMuchAreEndedBeforeThoseThatSendNothing) {
 }
 
 // What ends one: its client, its deadline, the server itself.
-TEST(TlsHandshakes, MayEndAtAnyTime) {
+TEST(TlsHandshakes, MayBeAbortedAtAnyTime) {
   for (int n = 0; n < 24; ++n) {
     TestServer server(over_tls());
     std::deque<Socket> half;

@@ -58,7 +58,7 @@ std::vector<std::unique_ptr<Socket>> hold(std::uint16_t port, int count, bool bu
   return held;
 }
 
-TEST(Limits, BeyondAllConnectionsHealthAloneIsAnswered) {
+TEST(Limits, AtTheConnectionLimitOnlyHealthIsAnswered) {
   ServerOptions options;
   options.limits.connections = 3;
   TestServer server(options);
@@ -76,7 +76,7 @@ TEST(Limits, BeyondAllConnectionsHealthAloneIsAnswered) {
   EXPECT_TRUE(comes_true([&] { return get(server.port(), "/v1").status == 200; }));
 }
 
-TEST(Limits, WhoeverIsIdleForLongestMakesRoom) {
+TEST(Limits, LongestIdleConnectionIsClosedForANewOne) {
   ServerOptions options;
   options.limits.connections = 2;
   TestServer server(options);
@@ -87,7 +87,7 @@ TEST(Limits, WhoeverIsIdleForLongestMakesRoom) {
   EXPECT_EQ(read_answer(*held[1]).status, 200);
 }
 
-TEST(Limits, AConnectionThatSaysNothingIsSoonClosed) {
+TEST(Limits, SilentConnectionIsClosedSoon) {
   TestServer server;
   Socket silent(server.port());
   const auto kept = hold(server.port(), 1, false);
@@ -97,7 +97,7 @@ TEST(Limits, AConnectionThatSaysNothingIsSoonClosed) {
   EXPECT_EQ(read_answer(*kept[0]).status, 200) << "between requests there is more time";
 }
 
-TEST(Limits, ConnectionsBeyondTheirRateAreClosed) {
+TEST(Limits, ConnectionsAboveTheirRateAreClosed) {
   ServerOptions options;
   options.limits.arrivals_per_address = 0.5;  // 5 at once
   TestServer server(options);
@@ -110,7 +110,7 @@ TEST(Limits, ConnectionsBeyondTheirRateAreClosed) {
 }
 
 // Nothing of it is understood, and yet it counts.
-TEST(Limits, NonsenseIsChargedAsRequestsAre) {
+TEST(Limits, MalformedInputIsChargedLikeRequests) {
   ServerOptions options;
   options.limits.requests_per_address = 1;  // 10 at once
   TestServer server(options);
@@ -118,7 +118,7 @@ TEST(Limits, NonsenseIsChargedAsRequestsAre) {
   expect_limit(get(server.port(), "/v1"), 429, "1 requests a second");
 }
 
-TEST(Limits, AStreamThatSaysTooMuchIsReadMoreSlowly) {
+TEST(Limits, StreamWithTooManyMessagesIsThrottled) {
   ServerOptions options;
   options.limits.messages_per_address = 20;  // 40 at once
   TestServer server(options);
@@ -129,7 +129,7 @@ TEST(Limits, AStreamThatSaysTooMuchIsReadMoreSlowly) {
   EXPECT_GT(std::chrono::steady_clock::now() - since, std::chrono::milliseconds(1500));
 }
 
-TEST(Limits, OneAddressHasNoMoreConnectionsThanItMay) {
+TEST(Limits, ConnectionsOfOneAddressAreLimited) {
   ServerOptions options;
   options.limits.connections_per_address = 2;
   TestServer server(options);
@@ -139,7 +139,7 @@ TEST(Limits, OneAddressHasNoMoreConnectionsThanItMay) {
 }
 
 // Silent connections hold their places for two seconds; others are closed meanwhile.
-TEST(Limits, TheReserveIsBoundedAndClearsItself) {
+TEST(Limits, ReservedConnectionsAreBoundedAndReleased) {
   ServerOptions options;
   options.limits.connections = 1;
   TestServer server(options);
@@ -155,7 +155,7 @@ TEST(Limits, TheReserveIsBoundedAndClearsItself) {
   EXPECT_GE(read.value("windsplat_connections_refused_total"), 84);
 }
 
-TEST(Limits, OneAddressHasNoMoreSessionsThanItMay) {
+TEST(Limits, SessionsOfOneAddressAreLimited) {
   ServerOptions options;
   options.limits.sessions_per_address = 2;
   TestServer server(options);
@@ -170,7 +170,7 @@ TEST(Limits, OneAddressHasNoMoreSessionsThanItMay) {
   EXPECT_TRUE(comes_true([&] { return StreamClient(server.port()).handshake().status == 101; }));
 }
 
-TEST(Limits, RequestsBeyondTheirRateAreRefusedAndHealthIsNot) {
+TEST(Limits, RequestsAboveTheirRateAreRefusedExceptHealth) {
   ServerOptions options;
   options.limits.requests_per_address = 2;  // 20 at once
   TestServer server(options);
@@ -186,7 +186,7 @@ TEST(Limits, RequestsBeyondTheirRateAreRefusedAndHealthIsNot) {
   EXPECT_EQ(get(server.port(), "/v1").status, 200);
 }
 
-TEST(Limits, DrawingIsChargedAndItsDebtIsWaitedFor) {
+TEST(Limits, RenderingIsChargedAndItsDebtDelaysRequests) {
   ServerOptions options;
   options.limits.render_s_per_address = 0.0001;
   TestServer server(options);
@@ -205,7 +205,7 @@ TEST(Limits, DrawingIsChargedAndItsDebtIsWaitedFor) {
   EXPECT_EQ(refused(server.port(), "render"), 4);
 }
 
-TEST(Limits, AStreamThatOwesTooMuchIsClosed) {
+TEST(Limits, StreamAboveItsQuotaIsClosed) {
   ServerOptions options;
   options.limits.render_s_per_address = 0.0001;
   TestServer server(options);
@@ -229,7 +229,7 @@ TEST(Limits, BytesSentAreCharged) {
   }));
 }
 
-TEST(Limits, ClientsBehindATrustedProxyAreToldApart) {
+TEST(Limits, ClientsBehindATrustedProxyAreDistinguished) {
   ServerOptions options;
   options.limits.requests_per_address = 0.1;  // one, and no more for ten seconds
   options.limits.trusted_proxies = {"127.0.0.1"};
@@ -246,7 +246,7 @@ TEST(Limits, ClientsBehindATrustedProxyAreToldApart) {
   EXPECT_EQ(get(wary.port(), "/v1", {{"X-Forwarded-For", "198.51.100.2"}}).status, 429);
 }
 
-TEST(Limits, PicturesTooLargeOrTooDearAreRefusedBeforeAnythingIsRead) {
+TEST(Limits, OversizeOrExpensivePicturesAreRefusedBeforeLoading) {
   ServerOptions options;
   options.limits.pixels = 100 * 100;
   options.limits.kernels = 1e6;
@@ -299,7 +299,7 @@ TEST(Limits, PicturesTooLargeOrTooDearAreRefusedBeforeAnythingIsRead) {
   EXPECT_GE(refused(server.port(), "kernels"), 4);
 }
 
-TEST(Limits, EveryAnswerIsSafeByItsHeaders) {
+TEST(Limits, EveryResponseHasSecurityHeaders) {
   TestServer server;
   const auto answers = {get(server.port(), "/v1"),
                         get(server.port(), "/nothing"),
@@ -320,7 +320,7 @@ TEST(Limits, EveryAnswerIsSafeByItsHeaders) {
 }
 
 // Whatever is sent, there are as many series as ever.
-TEST(Limits, NoPathMethodOrRefusalMakesASeries) {
+TEST(Limits, PathsMethodsAndRefusalsCreateNoMetricSeries) {
   ServerOptions options;
   options.limits.sessions_per_address = 1;
   options.limits.pixels = 10'000;
@@ -343,7 +343,7 @@ TEST(Limits, NoPathMethodOrRefusalMakesASeries) {
 }
 
 // Pictures whose data is not there leave the renderer's queue for the loads': that has an end, too.
-TEST(Limits, PicturesThatWaitForASlowDiskAreBounded) {
+TEST(Limits, PicturesWaitingForASlowDiskAreBounded) {
   namespace data = windsplat::data;
   const auto gate = std::make_shared<Gate>();
   TestServer server(
@@ -377,7 +377,7 @@ TEST(Limits, PicturesThatWaitForASlowDiskAreBounded) {
 // The renderer is free again soon after whoever wanted a picture of seconds has gone: with a byte
 // of a next request before the end, too, and from a stream. The requirement is 100 ms; machines
 // that run many tests at once get thirty times that.
-TEST(Cancel, WhoeverLeavesFreesTheRenderer) {
+TEST(Cancel, DisconnectCancelsTheRendering) {
   TestServer server;
   const std::string view = R"({"dataset":"small","image":{"width":4096,"height":4096},)"
                            R"("vector":{"r1":60,"r2":64,"length":3,"span":64},)"

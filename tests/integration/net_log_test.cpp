@@ -54,7 +54,7 @@ class Logged : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(Logged, ARequestsOwnIdComesBackAndIsLogged) {
+TEST_F(Logged, RequestIdIsReturnedAndLogged) {
   const std::string id = "Az09._-" + std::string(57, 'x');
   const Answer answer = get(port(), "/v1/datasets/small/frame.jpg?width=40&height=30&preset=wind",
                             {{"X-Request-Id", id}});
@@ -70,7 +70,7 @@ TEST_F(Logged, ARequestsOwnIdComesBackAndIsLogged) {
   EXPECT_GE(told[0]["ms"].get<double>(), 0);
 }
 
-TEST_F(Logged, AnIdThatIsNotFitIsReplaced) {
+TEST_F(Logged, InvalidRequestIdIsReplaced) {
   std::set<std::string> ids;
   const std::string too_long(65, 'x');
   for (const char* given : {"two words", "a,b", "", "\"quoted\"", "\xc3\xa4", too_long.c_str()}) {
@@ -84,7 +84,7 @@ TEST_F(Logged, AnIdThatIsNotFitIsReplaced) {
   EXPECT_EQ(ids.size(), 7U) << "each has its own";
 }
 
-TEST_F(Logged, ProblemsNameTheirRequest) {
+TEST_F(Logged, ProblemsContainTheirRequestId) {
   const Answer own = get(port(), "/v1/datasets/none", {{"X-Request-Id", "mine-1"}});
   EXPECT_EQ(own.status, 404);
   EXPECT_EQ(json_of(own)["requestId"], "mine-1");
@@ -101,7 +101,7 @@ TEST_F(Logged, ProblemsNameTheirRequest) {
   EXPECT_EQ(told[0]["status"], 400);
 }
 
-TEST_F(Logged, RequestsOfOneConnectionHaveIdsOfTheirOwn) {
+TEST_F(Logged, RequestsOfOneConnectionHaveDistinctIds) {
   Socket socket(port());
   const std::string request = "GET /v1 HTTP/1.1\r\nHost: x\r\n";
   socket.send(request + "X-Request-Id: first\r\n\r\n");
@@ -110,7 +110,7 @@ TEST_F(Logged, RequestsOfOneConnectionHaveIdsOfTheirOwn) {
   EXPECT_THAT(read_answer(socket).header("x-request-id"), MatchesRegex("[0-9a-f]{16}"));
 }
 
-TEST_F(Logged, AViewerIsKnownByItsUpgrade) {
+TEST_F(Logged, SessionHasTheRequestIdOfItsUpgrade) {
   {
     StreamClient viewer(port(), {{"X-Request-Id", "viewer-7"}});
     EXPECT_EQ(viewer.handshake().status, 101);
@@ -126,7 +126,7 @@ TEST_F(Logged, AViewerIsKnownByItsUpgrade) {
   EXPECT_THAT(messages, testing::ElementsAre("session opened", "session disconnected"));
 }
 
-TEST_F(Logged, SaysNeitherPathsNorQueriesNorHeaders) {
+TEST_F(Logged, ContainsNoPathsQueriesOrHeaders) {
   get(port(), "/v1/datasets/small/frame.jpg?width=40&height=30&token=hunter2",
       {{"Authorization", "Bearer hunter2"}, {"Cookie", "session=hunter2"}});
   get(port(), "/hunter2?hunter2", {{"Referer", "https://hunter2.example/"}});

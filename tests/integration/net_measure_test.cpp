@@ -66,7 +66,7 @@ class Measures : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(Measures, ProbeTellsEveryFieldAtTheNearestSample) {
+TEST_F(Measures, ProbeReturnsEveryFieldAtTheNearestSample) {
   const Json probe = ask("probe" + near(5, 3, 2) + "&step=1");
   EXPECT_EQ(probe["step"], 1);
   EXPECT_EQ(probe["position"]["index"], Json({{"x", 5}, {"y", 3}, {"z", 2}}));
@@ -83,7 +83,7 @@ TEST_F(Measures, ProbeTellsEveryFieldAtTheNearestSample) {
   }
 }
 
-TEST_F(Measures, ProbesOutsideOrUnclearAreRefused) {
+TEST_F(Measures, InvalidOrOutsideProbesAreRefused) {
   expect_problem_saying(refused("probe?x=0&y=95&z=500"), 422, "box");
   expect_problem_saying(refused("probe?x=0&y=0"), 422, "z is required");
   expect_problem_saying(refused("probe?x=here&y=0&z=500"), 400);
@@ -93,7 +93,7 @@ TEST_F(Measures, ProbesOutsideOrUnclearAreRefused) {
   expect_problem_saying(get(port(), "/v1/datasets/none/probe?x=0&y=0&z=0"), 404);
 }
 
-TEST_F(Measures, AHistogramCountsEverySampleOnce) {
+TEST_F(Measures, HistogramCountsEverySampleOnce) {
   for (const auto kind : {windsplat::data::FieldKind::scalar, windsplat::data::FieldKind::vector}) {
     const std::string name = field(kind).name;
     const auto there = volume(name, 2);
@@ -115,7 +115,7 @@ TEST_F(Measures, AHistogramCountsEverySampleOnce) {
 }
 
 // A share of 0.1 leaves out as many whole values at either end as there are in a tenth of all.
-TEST_F(Measures, AHistogramsClipLeavesOutTheEnds) {
+TEST_F(Measures, HistogramClipOmitsBothEnds) {
   const std::string name = field(windsplat::data::FieldKind::scalar).name;
   const auto there = volume(name, 2);
   std::vector<float> values(there->values.data(), there->values.data() + there->values.size());
@@ -128,7 +128,7 @@ TEST_F(Measures, AHistogramsClipLeavesOutTheEnds) {
   EXPECT_LT(values.front(), values[dropped]) << "or this test shows nothing";
 }
 
-TEST_F(Measures, HistogramsThatCannotBeAreRefused) {
+TEST_F(Measures, InvalidHistogramsAreRefused) {
   const std::string base =
       "fields/" + field(windsplat::data::FieldKind::scalar).name + "/histogram";
   expect_problem_saying(refused(base + "?bins=0"), 422);
@@ -147,7 +147,7 @@ TEST_F(Measures, HistogramsThatCannotBeAreRefused) {
   expect_problem_saying(refused("fields/nope/mean"), 404);
 }
 
-TEST_F(Measures, ASeriesIsThePointAtEveryStep) {
+TEST_F(Measures, SeriesIsTheProbeAtEveryStep) {
   for (const auto kind : {windsplat::data::FieldKind::scalar, windsplat::data::FieldKind::vector}) {
     const auto& info = field(kind);
     const Json series = ask("fields/" + info.name + "/series" + near(9, 8, 1));
@@ -169,7 +169,7 @@ TEST_F(Measures, ASeriesIsThePointAtEveryStep) {
   expect_problem_saying(refused("fields/nope/series?x=0&y=0&z=500"), 404);
 }
 
-TEST_F(Measures, ARangeOfAllStepsIsReadOnce) {
+TEST_F(Measures, RangeOfAllStepsIsReadOnce) {
   const std::string name = field(windsplat::data::FieldKind::scalar).name;
   float low = std::numeric_limits<float>::infinity();
   float high = -low;
@@ -193,7 +193,7 @@ TEST_F(Measures, ARangeOfAllStepsIsReadOnce) {
   expect_problem_saying(refused("fields/" + name + "/range?of=all&step=1"), 422);
 }
 
-TEST_F(Measures, ARangeOfAllStepsIsThatOfEveryOneOfThem) {
+TEST_F(Measures, RangeOfAllStepsIsTheUnionOfTheSteps) {
   int wider_than_the_first = 0;
   for (const auto& info : dataset_->info().fields) {
     std::array<float, 2> range = volume(info.name, 0)->range;
@@ -210,7 +210,7 @@ TEST_F(Measures, ARangeOfAllStepsIsThatOfEveryOneOfThem) {
   EXPECT_GT(wider_than_the_first, 0) << "or this test shows nothing";
 }
 
-TEST_F(Measures, EvictingKeepsTheDatasetAndForgettingIsForWhatWasPosted) {
+TEST_F(Measures, EvictionKeepsDatasetsAndOnlyPostedOnesCanBeRemoved) {
   ask("probe" + near(1, 1, 1));
   const auto resident = [&] {
     return json_of(get(port(), "/v1/datasets"))["datasets"][0]["residentBytes"].get<int>();
@@ -266,7 +266,7 @@ class DataRoot : public testing::Test {
   std::unique_ptr<TestServer> server_;
 };
 
-TEST_F(DataRoot, APostedPathBecomesADatasetByWayOfAJob) {
+TEST_F(DataRoot, PostedPathBecomesADatasetThroughAJob) {
   const Answer accepted = post_path(port(), "runs/gcm.nc");
   ASSERT_EQ(accepted.status, 202) << accepted.body;
   const std::string location = accepted.header("location");
@@ -289,7 +289,7 @@ TEST_F(DataRoot, APostedPathBecomesADatasetByWayOfAJob) {
   EXPECT_EQ(json_of(get(port(), "/v1/datasets"))["datasets"].size(), 1U);
 }
 
-TEST_F(DataRoot, LinksThatAPatternLeavesOutAreToldByTheDataset) {
+TEST_F(DataRoot, LinksOmittedFromAPatternAreListed) {
   fs::create_symlink("../../secret.nc", root_ / "runs/gcm2.nc");
   const Json job = finished(post_path(port(), "runs/gcm*.nc").header("location"));
   ASSERT_EQ(job["state"], "done") << job;
@@ -298,7 +298,7 @@ TEST_F(DataRoot, LinksThatAPatternLeavesOutAreToldByTheDataset) {
   EXPECT_THAT(told["notes"].dump(), HasSubstr("1 of 2 names that the pattern matches is a link"));
 }
 
-TEST_F(DataRoot, WhatCannotBeReadIsAFailedJobAndNothingElse) {
+TEST_F(DataRoot, UnreadableFileIsAFailedJob) {
   for (const char* path : {"broken.nc", "runs"}) {
     const Answer accepted = post_path(port(), path);
     ASSERT_EQ(accepted.status, 202) << accepted.body;
@@ -312,7 +312,7 @@ TEST_F(DataRoot, WhatCannotBeReadIsAFailedJobAndNothingElse) {
   EXPECT_EQ(get(port(), "/v1/datasets/small/frame.jpg?width=32&height=32").status, 200);
 }
 
-TEST_F(DataRoot, PathsThatLeadOutAreRefusedAtOnce) {
+TEST_F(DataRoot, PathsOutsideTheRootAreRefused) {
   for (const std::string path :
        {"../secret.nc", "runs/../../secret.nc", "/etc/passwd", "out.nc", "http://127.0.0.1/a.nc",
         "file:///etc/passwd", "pipe.nc", ".", "..", "../*.nc", "o*.nc"}) {
@@ -329,7 +329,7 @@ TEST_F(DataRoot, PathsThatLeadOutAreRefusedAtOnce) {
   EXPECT_TRUE(json_of(get(port(), "/v1/jobs"))["jobs"].empty());
 }
 
-TEST_F(DataRoot, BodiesThatAreNoRequestAreRefused) {
+TEST_F(DataRoot, InvalidBodiesAreRefused) {
   const auto post = [&](const std::string& type, const std::string& body) {
     return request(port(), "POST", "/v1/datasets", {{"Content-Type", type}}, body);
   };
@@ -346,7 +346,7 @@ TEST_F(DataRoot, BodiesThatAreNoRequestAreRefused) {
   expect_problem_saying(request(port(), "DELETE", "/v1/jobs"), 405);
 }
 
-TEST(NoDataRoot, FilesAreNotOpenedAndThatIsSaid) {
+TEST(NoDataRoot, PostedFilesAreRefusedWithTheReason) {
   TestServer server;
   expect_problem_saying(post_path(server.port(), "a.nc"), 403, "--data-root");
 }

@@ -50,7 +50,7 @@ class MetricsTest : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(MetricsTest, APictureMovesWhatItHasToDoWithByOne) {
+TEST_F(MetricsTest, PictureIncrementsItsCountersByOne) {
   const Exposition before = scrape(port());
   const Answer picture = get(port(), "/v1/datasets/small/frame.jpg?width=64&height=48");
   ASSERT_EQ(picture.status, 200);
@@ -75,7 +75,7 @@ TEST_F(MetricsTest, APictureMovesWhatItHasToDoWithByOne) {
   EXPECT_EQ(moved(frames("final")), 0) << "that is for viewers' frames";
 }
 
-TEST_F(MetricsTest, DataIsCountedWhereItIsReadAndFound) {
+TEST_F(MetricsTest, LoadsAndHitsAreCountedSeparately) {
   const Exposition before = scrape(port());
   EXPECT_EQ(before.value("windsplat_resident_bytes"), 0);
   EXPECT_EQ(before.value("windsplat_memory_limit_bytes"), 1U << 30);
@@ -92,7 +92,7 @@ TEST_F(MetricsTest, DataIsCountedWhereItIsReadAndFound) {
             once.value(R"(windsplat_data_lookups_total{result="hit"})"));
 }
 
-TEST_F(MetricsTest, AViewersFramesAreCountedByWhatTheyAreFor) {
+TEST_F(MetricsTest, FramesOfASessionAreCountedByPurpose) {
   {
     StreamClient viewer(port());
     EXPECT_EQ(scrape_until([](const Exposition& now) {
@@ -132,7 +132,7 @@ TEST_F(MetricsTest, AViewersFramesAreCountedByWhatTheyAreFor) {
 
 // Whatever they ask for, one frame waits for them, and a second one when they have taken it; the
 // kernel's buffers of a few hundred kilobytes are the rest.
-TEST_F(MetricsTest, PeersThatNeverReadHoldAFrameEachAtMost) {
+TEST_F(MetricsTest, PeersThatNeverReadHoldOneFrameEach) {
   constexpr int peers = 5;  // a frame each before the first is given up as too slow
   const std::string image = R"("image":{"width":2000,"height":1500})";
   const Answer picture = request(port(), "POST", "/v1/frames",
@@ -160,7 +160,7 @@ TEST_F(MetricsTest, PeersThatNeverReadHoldAFrameEachAtMost) {
   scrape_until([](const Exposition& now) { return now.value("windsplat_unsent_bytes") == 0; });
 }
 
-TEST_F(MetricsTest, NoClientCanMakeSeries) {
+TEST_F(MetricsTest, ClientsCannotCreateSeries) {
   const Exposition before = scrape(port());
   for (int i = 0; i < 50; ++i) {
     const std::string name = "nothing-" + std::to_string(i);
@@ -186,7 +186,7 @@ TEST_F(MetricsTest, NoClientCanMakeSeries) {
   EXPECT_EQ(after.value(requests("/v1", "4xx")), 1);
 }
 
-TEST_F(MetricsTest, AreToldWhileTheRendererIsBusy) {
+TEST_F(MetricsTest, AreServedWhileTheRendererIsBusy) {
   Socket waiting(port());
   waiting.send(
       "GET /v1/datasets/small/frame.png?width=4096&height=4096 HTTP/1.1\r\nHost: x\r\n\r\n");
@@ -196,7 +196,7 @@ TEST_F(MetricsTest, AreToldWhileTheRendererIsBusy) {
   EXPECT_EQ(waiting.receive(1), "") << "the picture is not there yet";
 }
 
-TEST_F(MetricsTest, OfTheProcessAreTheSystems) {
+TEST_F(MetricsTest, OfTheProcessMatchTheSystem) {
   const Exposition now = scrape(port());
   EXPECT_GT(now.value("process_resident_memory_bytes"), 1 << 20);
   EXPECT_GT(now.value("process_cpu_seconds_total"), 0);
@@ -211,7 +211,7 @@ TEST_F(MetricsTest, OfTheProcessAreTheSystems) {
             1);
 }
 
-TEST(MetricsAt, TheRootAndBelowTheBasePath) {
+TEST(MetricsAt, RootAndBasePath) {
   windsplat::net::ServerOptions options;
   options.base_path = "/winds";
   TestServer server(options);
@@ -221,7 +221,7 @@ TEST(MetricsAt, TheRootAndBelowTheBasePath) {
   EXPECT_EQ(request(server.port(), "POST", "/metrics", {}, "{}").status, 405);
 }
 
-TEST_F(MetricsTest, AreAllInTheManualAndTheManualHasNoOthers) {
+TEST_F(MetricsTest, AreExactlyThoseOfTheManual) {
   std::ifstream manual(WINDSPLAT_SOURCE_DIR "/docs/user/metrics.md");
   std::map<std::string, std::string> types;
   const std::regex row(R"(^\| `([a-z_]+)` \| (counter|gauge|histogram) \|.*)");

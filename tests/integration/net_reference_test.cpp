@@ -70,7 +70,7 @@ std::string rendered(const std::string& format) {
   return cli_test::read_file(file);
 }
 
-TEST(References, APostedViewBecomesThePictureThatRenderDraws) {
+TEST(References, PostedViewBecomesThePictureOfRender) {
   TestServer server;
   const std::string job_path = begun(server.port(), reference_view);
   double progress = 0;
@@ -121,7 +121,7 @@ TEST(References, APostedViewBecomesThePictureThatRenderDraws) {
   EXPECT_NE(finished(server.port(), begun(server.port(), other))["result"]["id"], result["id"]);
 }
 
-TEST(References, OthersAreAnsweredMeanwhileAndNothingDrawnIsLost) {
+TEST(References, OtherRequestsAreServedMeanwhileAndNoWorkIsLost) {
   TestServer server;
   const std::string job_path = begun(server.port(), large_view);
   double progress = 0;
@@ -140,7 +140,7 @@ TEST(References, OthersAreAnsweredMeanwhileAndNothingDrawnIsLost) {
   EXPECT_GT(json_of(get(server.port(), job_path))["etaMs"].get<double>(), 0);
 }  // and the server ends, whatever is still drawn
 
-TEST(References, ADeletedJobEndsAndMakesRoomAtOnce) {
+TEST(References, DeletedJobStopsAndFreesItsSlot) {
   TestServer server;
   const std::string first = begun(server.port(), large_view);
   job_when(server.port(), first, [](const Json& now) { return now["state"] == "running"; });
@@ -156,7 +156,7 @@ TEST(References, ADeletedJobEndsAndMakesRoomAtOnce) {
 }
 
 // Of 1920 x 1080 the values alone are 32 MiB.
-TEST(References, WhatNeedsMoreMemoryThanThereIsSaysSo) {
+TEST(References, InsufficientMemoryIsReported) {
   TestServer server({}, {}, std::uint64_t{24} << 20);
   const std::string view = R"({"dataset":"small","image":{"width":1920,"height":1080}})";
   const Json job = finished(server.port(), begun(server.port(), view));
@@ -169,7 +169,7 @@ TEST(References, WhatNeedsMoreMemoryThanThereIsSaysSo) {
   EXPECT_EQ(finished(server.port(), begun(server.port(), reference_view))["state"], "done");
 }
 
-TEST(References, WhatCannotBeDrawnIsRefusedByItsPlace) {
+TEST(References, InvalidViewIsRefusedWithItsPointer) {
   TestServer server;
   const auto refused = [&](const std::string& view) {
     const Answer answer = post_reference(server.port(), view);
@@ -194,7 +194,7 @@ TEST(References, WhatCannotBeDrawnIsRefusedByItsPlace) {
   EXPECT_EQ(json_of(get(server.port(), "/v1"))["links"]["references"], "/v1/references");
 }
 
-TEST(ReferenceTickets, OneAnAddressAndFourInAll) {
+TEST(ReferenceTickets, OnePerAddressAndFourInTotal) {
   References references;
   const CancelToken unwanted;
   const auto first = references.admit("a", unwanted);
@@ -213,7 +213,7 @@ TEST(ReferenceTickets, OneAnAddressAndFourInAll) {
   EXPECT_TRUE(references.admit("a", {})) << "the first is not wanted any more";
 }
 
-TEST(ReferencePictures, TheLeastRecentlyAskedForAreForgotten) {
+TEST(ReferencePictures, LeastRecentlyRequestedAreEvicted) {
   References references;
   const auto keep = [&](const std::string& id, std::size_t bytes) {
     windsplat::protocol::ReferenceDescription description;

@@ -46,7 +46,7 @@ void expect_problem(const Answer& answer, int status, const std::string& pointer
 
 // --- documents ----------------------------------------------------------------------------------
 
-TEST_F(Rest, ServiceTellsVersionLinksAndLimitsAndEveryLinkLeadsSomewhere) {
+TEST_F(Rest, ServiceReportsVersionLimitsAndValidLinks) {
   const Answer answer = get(port(), "/v1");
   ASSERT_EQ(answer.status, 200);
   const Json service = json_of(answer);
@@ -62,7 +62,7 @@ TEST_F(Rest, ServiceTellsVersionLinksAndLimitsAndEveryLinkLeadsSomewhere) {
   }
 }
 
-TEST_F(Rest, DatasetsAreListedWithoutBeingReadAndDescribedAfterReading) {
+TEST_F(Rest, DatasetsAreListedBeforeAndDescribedAfterReading) {
   const Json list = json_of(get(port(), "/v1/datasets"));
   ASSERT_EQ(list["datasets"].size(), 1U);
   EXPECT_EQ(list["datasets"][0]["id"], "small");
@@ -88,7 +88,7 @@ TEST_F(Rest, DatasetsAreListedWithoutBeingReadAndDescribedAfterReading) {
   expect_problem(get(port(), "/v1/datasets/nowhere"), 404);
 }
 
-TEST_F(Rest, TheDefaultViewIsAViewThatCanBePosted) {
+TEST_F(Rest, DefaultViewCanBePosted) {
   const Json dataset = json_of(get(port(), "/v1/datasets/small"));
   Json view = dataset["defaultView"];
   view["image"] = {{"width", 64}, {"height", 48}};
@@ -122,7 +122,7 @@ TEST_F(Rest, HealthAnswers) {
 
 // --- pictures -----------------------------------------------------------------------------------
 
-TEST_F(Rest, APictureHasTheSizeAskedForAndShowsSomething) {
+TEST_F(Rest, PictureHasTheRequestedSizeAndContent) {
   const Answer answer = get(port(), "/v1/datasets/small/frame.jpg?width=200&height=120&step=1");
   ASSERT_EQ(answer.status, 200) << answer.body;
   EXPECT_EQ(answer.header("content-type"), "image/jpeg");
@@ -186,7 +186,7 @@ TEST_F(Rest, QualityOfAJpeg) {
   expect_problem(get(port(), "/v1/datasets/small/frame.png?quality=50"), 400);
 }
 
-TEST_F(Rest, TheSameViewHasTheSameTagAndBytesAndIsNotSentTwice) {
+TEST_F(Rest, SameViewHasTheSameTagAndBytesAndGets304) {
   const std::string view = R"({"dataset":"small","image":{"width":40,"height":30}})";
   const Answer first = post_view(port(), view);
   ASSERT_EQ(first.status, 200);
@@ -207,7 +207,7 @@ TEST_F(Rest, TheSameViewHasTheSameTagAndBytesAndIsNotSentTwice) {
             etag);
 }
 
-TEST_F(Rest, ABudgetedPictureIsNotToBeKept) {
+TEST_F(Rest, BudgetedPictureIsNotCacheable) {
   const Answer answer = post_view(
       port(), R"({"dataset":"small","image":{"width":40,"height":30},"quality":{"budgetMs":20}})");
   EXPECT_EQ(answer.status, 200);
@@ -217,7 +217,7 @@ TEST_F(Rest, ABudgetedPictureIsNotToBeKept) {
 
 // Every picture says what it is thought to err, and one that is asked for by its error or its time
 // is drawn by what does.
-TEST_F(Rest, APictureSaysItsErrorAndKeepsWhatIsAskedOfIt) {
+TEST_F(Rest, PictureReportsItsErrorAndMeetsErrorAndBudget) {
   const auto frame_of = [&](const std::string& quality) {
     const Answer answer =
         post_view(port(), R"({"dataset":"small","image":{"width":320,"height":240},"quality":)" +
@@ -240,7 +240,7 @@ TEST_F(Rest, APictureSaysItsErrorAndKeepsWhatIsAskedOfIt) {
 
 // --- bad input ----------------------------------------------------------------------------------
 
-TEST_F(Rest, BadViewsAreRefusedWithThePointer) {
+TEST_F(Rest, InvalidViewsAreRefusedWithThePointer) {
   struct Case {
     const char* view;
     int status;
@@ -280,13 +280,13 @@ TEST_F(Rest, BadViewsAreRefusedWithThePointer) {
   expect_problem(post_view(port(), deep), 400);
 }
 
-TEST_F(Rest, APictureWithMorePixelsThanAllowedIs413Or422) {
+TEST_F(Rest, PictureAboveThePixelLimitGets413Or422) {
   const Answer answer =
       post_view(port(), R"({"dataset":"small","image":{"width":8192,"height":8192}})");
   EXPECT_THAT(answer.status, testing::AnyOf(413, 422));
 }
 
-TEST_F(Rest, BadQueriesAreRefused) {
+TEST_F(Rest, InvalidQueriesAreRefused) {
   const std::string base = "/v1/datasets/small/frame.jpg?";
   for (const char* query :
        {"colour=1", "width=ten", "width=1&width=2", "azimuth=NaN", "azimuth=inf", "azimuth=1e999",
@@ -304,7 +304,7 @@ TEST_F(Rest, BadQueriesAreRefused) {
   expect_problem(get(port(), "/v1/datasets/..%2f..%2fetc%2fpasswd"), 404);
 }
 
-TEST_F(Rest, MethodsThatDoNothingAreToldWhichDo) {
+TEST_F(Rest, UnsupportedMethodsGetTheAllowedOnes) {
   const Answer deleted = request(port(), "DELETE", "/v1/datasets");
   expect_problem(deleted, 405);
   EXPECT_EQ(deleted.header("allow"), "GET, HEAD, POST, OPTIONS");
@@ -331,7 +331,7 @@ TEST_F(Rest, HeadIsGetWithoutTheBody) {
   }
 }
 
-TEST_F(Rest, BeyondWhatCanWaitComes429AtOnce) {
+TEST_F(Rest, FullQueueGets429AtOnce) {
   // Resident, so that nothing is let in only to find that it has to be loaded first.
   ASSERT_EQ(get(port(), "/v1/datasets/small/frame.jpg?width=16&height=16").status, 200);
   // More pictures than may wait, requested before the first is done.
@@ -361,7 +361,7 @@ TEST_F(Rest, BeyondWhatCanWaitComes429AtOnce) {
 
 // --- the page -----------------------------------------------------------------------------------
 
-TEST_F(Rest, ThePageIsServedSafelyAndCached) {
+TEST_F(Rest, PageIsServedWithSecurityAndCacheHeaders) {
   const Answer page = get(port(), "/");
   ASSERT_EQ(page.status, 200);
   EXPECT_THAT(page.header("content-type"), StartsWith("text/html"));
@@ -394,7 +394,7 @@ TEST_F(Rest, ThePageIsServedSafelyAndCached) {
   EXPECT_THAT(code.header("cache-control"), HasSubstr("immutable"));
 }
 
-TEST(RestBase, EverythingLiesBelowTheBasePathAndHealthAtTheRootToo) {
+TEST(RestBase, BasePathPrefixesEverythingAndHealthIsAlsoAtTheRoot) {
   windsplat::net::ServerOptions options;
   options.base_path = "/a/b";
   TestServer server(options);
@@ -412,7 +412,7 @@ TEST(RestBase, EverythingLiesBelowTheBasePathAndHealthAtTheRootToo) {
   EXPECT_EQ(Json::parse(get(port, "/a/b/v1").body)["links"]["datasets"], "/a/b/v1/datasets");
 }
 
-TEST(RestListen, AnAddressThatCannotBeHadIsNamed) {
+TEST(RestListen, UnavailableAddressIsReported) {
   const auto store = std::make_shared<windsplat::data::Store>(1 << 20);
   const auto pool = std::make_shared<windsplat::ThreadPool>(1);
   windsplat::net::ServerOptions options;

@@ -37,7 +37,7 @@ class Tls : public testing::Test {
   TestServer server_{in_tls()};
 };
 
-TEST_F(Tls, RequestsAreAnsweredAndToldToStayInIt) {
+TEST_F(Tls, RequestsAreAnsweredWithStrictTransportSecurity) {
   EXPECT_THAT(server_.server().url(), testing::StartsWith("https://127.0.0.1:"));
   const Answer live = get(place(), "/livez");
   EXPECT_EQ(live.status, 200);
@@ -56,7 +56,7 @@ TEST_F(Tls, RequestsAreAnsweredAndToldToStayInIt) {
   EXPECT_EQ(read_answer(plain_by_name).header("strict-transport-security"), "");
 }
 
-TEST_F(Tls, Speaks13AndHttp11) {
+TEST_F(Tls, SupportsTls13AndHttp11) {
   Socket socket(place());
   ASSERT_TRUE(socket.shaken());
   EXPECT_EQ(socket.version(), "TLSv1.3");
@@ -64,7 +64,7 @@ TEST_F(Tls, Speaks13AndHttp11) {
   EXPECT_EQ(socket.peer_name(), "first");
 }
 
-TEST_F(Tls, OneConnectionCarriesManyRequestsEvenSentAtOnce) {
+TEST_F(Tls, ConnectionCarriesManyRequestsEvenPipelined) {
   Socket socket(place());
   const std::string ask =
       "GET /v1/datasets/small/frame.png?width=20&height=20 HTTP/1.1\r\nHost: x\r\n\r\n";
@@ -88,7 +88,7 @@ TEST_F(Tls, OneConnectionCarriesManyRequestsEvenSentAtOnce) {
 }
 
 // Frames of every size come whole: small ones share a record, large ones take many.
-TEST_F(Tls, AStreamBringsFrames) {
+TEST_F(Tls, StreamSendsFrames) {
   StreamClient viewer(place(), {{"Sec-WebSocket-Protocol", "windsplat.v1"}});
   ASSERT_EQ(viewer.handshake().status, 101);
   ASSERT_TRUE(viewer.next_text("hello"));
@@ -118,14 +118,14 @@ TEST_F(Tls, AStreamBringsFrames) {
   EXPECT_TRUE(viewer.socket.closed_by_peer());
 }
 
-TEST_F(Tls, APeerThatSpeaksPlainHttpIsTold) {
+TEST_F(Tls, PlainHttpClientGetsAnExplanation) {
   const Answer answer = raw(plain(), "GET /livez HTTP/1.1\r\nHost: x\r\n\r\n");
   EXPECT_EQ(answer.status, 400);
   EXPECT_THAT(answer.body, HasSubstr("https://"));
   EXPECT_EQ(answer.header("connection"), "close");
 }
 
-TEST_F(Tls, NoiseIsCutOff) {
+TEST_F(Tls, NoiseIsDisconnected) {
   for (const std::string& noise : {std::string(100, '\0'), std::string(70000, '\xff'),
                                    std::string("\x16\x03\x01\x40\x00", 5)}) {
     Socket socket(plain());
@@ -134,7 +134,7 @@ TEST_F(Tls, NoiseIsCutOff) {
   }
 }
 
-TEST_F(Tls, AHandshakeHasADeadlineWhileOthersAreServed) {
+TEST_F(Tls, HandshakeHasADeadlineWhileOthersAreServed) {
   Socket silent(plain());
   Socket slow(plain());
   slow.send(std::string("\x16\x03\x01\x02", 4));
@@ -145,14 +145,14 @@ TEST_F(Tls, AHandshakeHasADeadlineWhileOthersAreServed) {
   EXPECT_GT(Clock::now() - begin, std::chrono::seconds(3)) << "it is no refusal at once";
 }
 
-TEST_F(Tls, ASlowHeaderIsCutOff) {
+TEST_F(Tls, SlowHeaderTimesOut) {
   Socket slow(place());
   slow.send("GET /livez HT");
   EXPECT_TRUE(slow.closed_by_peer(20'000));
 }
 
 // With a close_notify and without; were they all drawn, the last would come after a minute of work.
-TEST_F(Tls, AClientThatLeavesFreesTheRenderer) {
+TEST_F(Tls, DisconnectCancelsTheRendering) {
   for (int n = 0; n < 12; ++n) {
     Socket socket(place());
     socket.send(
@@ -169,7 +169,7 @@ TEST_F(Tls, AClientThatLeavesFreesTheRenderer) {
 }
 
 // What comes in TLS is not always a request, or a client that goes.
-TEST_F(Tls, AChangeOfKeysWhileAPictureIsDrawnIsNoLeaving) {
+TEST_F(Tls, KeyUpdateDuringAPictureIsNoDisconnect) {
   Socket socket(place());
   socket.send(
       "GET /v1/datasets/small/frame.png?width=1500&height=1500 HTTP/1.1\r\nHost: x\r\n\r\n");
@@ -179,7 +179,7 @@ TEST_F(Tls, AChangeOfKeysWhileAPictureIsDrawnIsNoLeaving) {
   EXPECT_EQ(read_answer(socket).status, 200);
 }
 
-TEST_F(Tls, AViewerThatChangesItsKeysStays) {
+TEST_F(Tls, KeyUpdateDuringAStreamIsNoDisconnect) {
   StreamClient viewer(place());
   ASSERT_TRUE(viewer.next_text("hello"));
   EXPECT_TRUE(viewer.socket.change_key());
@@ -190,7 +190,7 @@ TEST_F(Tls, AViewerThatChangesItsKeysStays) {
 }
 
 // A body that is not wanted, and sent all the same, does not cost the client its answer.
-TEST_F(Tls, ABodyTooLargeGets413) {
+TEST_F(Tls, OversizeBodyGets413) {
   Socket socket(place());
   socket.send("POST /v1/frames HTTP/1.1\r\nHost: x\r\nContent-Length: 104857600\r\n\r\n");
   const std::string megabyte(1 << 20, 'x');
@@ -201,7 +201,7 @@ TEST_F(Tls, ABodyTooLargeGets413) {
 }
 
 // The write deadline is 15 s and some more for the size.
-TEST_F(Tls, AViewerThatNeverReadsIsSentAway) {
+TEST_F(Tls, SessionThatNeverReadsIsClosed) {
   StreamClient viewer(place(), {}, "/v1/stream", 4096);
   ASSERT_TRUE(viewer.next_text("hello"));
   viewer.say(R"({"type":"open","id":1,"dataset":"small"})");
@@ -219,7 +219,7 @@ TEST_F(Tls, AViewerThatNeverReadsIsSentAway) {
   FAIL() << "it still holds its session";
 }
 
-TEST_F(Tls, AnotherCertificateIsForConnectionsThatCome) {
+TEST_F(Tls, NewCertificateIsUsedForNewConnections) {
   Socket old(place());
   StreamClient viewer(place());
   ASSERT_TRUE(viewer.next_text("hello"));
@@ -235,7 +235,7 @@ TEST_F(Tls, AnotherCertificateIsForConnectionsThatCome) {
   EXPECT_TRUE(viewer.next_text("opened"));
 }
 
-TEST(TlsDrain, SaysGoodbye) {
+TEST(TlsDrain, SendsCloseNotify) {
   TestServer server(in_tls());
   StreamClient viewer(Place(server.port(), true));
   ASSERT_TRUE(viewer.next_text("hello"));
@@ -244,7 +244,7 @@ TEST(TlsDrain, SaysGoodbye) {
   EXPECT_TRUE(viewer.socket.closed_by_peer());
 }
 
-TEST(TlsFiles, AreRefusedWithAReason) {
+TEST(TlsFiles, InvalidFilesAreRefusedWithAReason) {
   const Certificate mine = make_certificate("mine");
   const Certificate other = make_certificate("other");
   const auto refused = [](const std::string& chain, const std::string& key) {

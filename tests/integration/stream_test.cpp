@@ -66,7 +66,7 @@ class Stream : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(Stream, SaysHelloFirstAndAgreesOnTheProtocol) {
+TEST_F(Stream, SendsHelloFirstAndNegotiatesTheProtocol) {
   StreamClient offers(port(), {{"Sec-WebSocket-Protocol", "chat, windsplat.v1"}});
   EXPECT_EQ(offers.handshake().status, 101);
   EXPECT_EQ(offers.handshake().header("sec-websocket-protocol"), "windsplat.v1");
@@ -82,7 +82,7 @@ TEST_F(Stream, SaysHelloFirstAndAgreesOnTheProtocol) {
   EXPECT_TRUE(plain.next_text("hello"));
 }
 
-TEST_F(Stream, OpenThenPatchThenAMovingAndAFinalFrame) {
+TEST_F(Stream, OpenAndPatchGiveAMovingAndAFinalFrame) {
   Viewer viewer(port());
   viewer.say(R"({"type":"open","id":3,"dataset":"small"})");
   const auto opened = viewer.next_text("opened");
@@ -102,7 +102,7 @@ TEST_F(Stream, OpenThenPatchThenAMovingAndAFinalFrame) {
   EXPECT_GT(picture.distinct(), 160U * 120U / 50);
 }
 
-TEST_F(Stream, APatchAndAcksAreEnough) {
+TEST_F(Stream, PatchAndAcksSuffice) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   const auto moving = viewer.frame();
@@ -126,7 +126,7 @@ TEST_F(Stream, APatchAndAcksAreEnough) {
   EXPECT_THAT(announced, testing::ElementsAre(1, 2));
 }
 
-TEST_F(Stream, ChosenTellsAViewThatDrawsTheSamePicture) {
+TEST_F(Stream, ChosenReportsAViewThatRendersTheSamePicture) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -161,7 +161,7 @@ TEST_F(Stream, NoThirdFrameBeforeAnAck) {
   EXPECT_EQ(third->header.rev, 29U) << "the newest view";
 }
 
-TEST_F(Stream, ADragShowsMotionAndEndsSharp) {
+TEST_F(Stream, DragShowsMovingFramesAndEndsWithTheFinalFrame) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -181,7 +181,7 @@ TEST_F(Stream, ADragShowsMotionAndEndsSharp) {
   EXPECT_TRUE(viewer.final_frame(rev));
 }
 
-TEST_F(Stream, AStillComesAtItsSizeAfterItsAnnouncement) {
+TEST_F(Stream, StillFollowsItsAnnouncementAtItsSize) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -201,7 +201,7 @@ TEST_F(Stream, AStillComesAtItsSizeAfterItsAnnouncement) {
   EXPECT_EQ(progress["done"], 1);
 }
 
-TEST_F(Stream, ALosslessViewEndsAsThePngThatARequestGets) {
+TEST_F(Stream, LosslessViewEndsWithThePngOfARequest) {
   Viewer viewer(port());
   const char* const view =
       R"({"dataset":"small","image":{"width":160,"height":120},"quality":{"lossless":true}})";
@@ -216,7 +216,7 @@ TEST_F(Stream, ALosslessViewEndsAsThePngThatARequestGets) {
   EXPECT_EQ(final->payload, post_view(port(), view, {{"Accept", "image/png"}}).body);
 }
 
-TEST_F(Stream, PlayRunsThroughTheSteps) {
+TEST_F(Stream, PlayShowsTheSteps) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -234,7 +234,7 @@ TEST_F(Stream, PlayRunsThroughTheSteps) {
   }
 }
 
-TEST_F(Stream, TwoViewersShareWhatWasReadAndSeeTheirOwnView) {
+TEST_F(Stream, TwoSessionsShareLoadedDataAndKeepTheirViews) {
   Viewer one(port());
   Viewer two(port());
   one.patch(1, R"({"dataset":"small","image":{"width":64,"height":48}})");
@@ -260,7 +260,7 @@ TEST_F(Stream, TwoViewersShareWhatWasReadAndSeeTheirOwnView) {
 
 // --- bad input ----------------------------------------------------------------------------------
 
-TEST_F(Stream, MessagesThatCannotBeFollowedAreAnsweredAndTheConnectionLives) {
+TEST_F(Stream, InvalidMessagesAreAnsweredAndTheConnectionStays) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -295,7 +295,7 @@ TEST_F(Stream, MessagesThatCannotBeFollowedAreAnsweredAndTheConnectionLives) {
   EXPECT_EQ(frame->header.step, 1U);
 }
 
-TEST_F(Stream, WhatBreaksTheProtocolClosesWithItsCode) {
+TEST_F(Stream, ProtocolViolationsCloseWithTheirCode) {
   {
     StreamClient client(port());
     client.send_frame(Opcode::binary, "frames come from the server");
@@ -328,7 +328,7 @@ TEST_F(Stream, WhatBreaksTheProtocolClosesWithItsCode) {
 }
 
 // A ping between fragments is no sign of a message's end.
-TEST_F(Stream, AMessageThatNeverEndsIsCutOffThoughPingsComeBetween) {
+TEST_F(Stream, EndlessMessageTimesOutDespitePings) {
   StreamClient client(port());
   ASSERT_TRUE(client.next_text("hello"));
   client.send_frame(Opcode::text, "", false);
@@ -342,7 +342,7 @@ TEST_F(Stream, AMessageThatNeverEndsIsCutOffThoughPingsComeBetween) {
   EXPECT_TRUE(cut);
 }
 
-TEST_F(Stream, PingsAloneAreNoMessage) {
+TEST_F(Stream, PingsDoNotCountAsMessages) {
   StreamClient client(port());
   for (int n = 0; n < 24; ++n) {
     client.send_frame(Opcode::ping, "x");
@@ -350,7 +350,7 @@ TEST_F(Stream, PingsAloneAreNoMessage) {
   }
 }
 
-TEST_F(Stream, APeerThatHasSaidGoodbyeIsNotWaitedFor) {
+TEST_F(Stream, PeerThatClosedIsNotWaitedFor) {
   StreamClient client(port());
   ASSERT_TRUE(client.next_text("hello"));
   const auto begin = std::chrono::steady_clock::now();
@@ -363,14 +363,14 @@ TEST_F(Stream, APeerThatHasSaidGoodbyeIsNotWaitedFor) {
       << "one that says nothing is waited for 2 s";
 }
 
-TEST_F(Stream, AMessageAtTheLimitIsRead) {
+TEST_F(Stream, MessageAtTheLimitIsRead) {
   Viewer viewer(port());
   const std::string patch = R"({"type":"patch","rev":1,"patch":)" + std::string(small_view) + "}";
   viewer.say(patch + std::string(65536 - patch.size(), ' '));
   EXPECT_TRUE(viewer.final_frame(1));
 }
 
-TEST_F(Stream, PagesOfOtherOriginsMayNotConnect) {
+TEST_F(Stream, PagesOfOtherOriginsCannotConnect) {
   const std::string own = "http://127.0.0.1:" + std::to_string(port());
   const auto status = [&](const std::string& origin) {
     return StreamClient(port(), {{"Origin", origin}}).handshake().status;
@@ -388,7 +388,7 @@ TEST_F(Stream, PagesOfOtherOriginsMayNotConnect) {
   EXPECT_EQ(StreamClient(other.port(), {{"Origin", "http://lab.example"}}).handshake().status, 403);
 }
 
-TEST_F(Stream, ViewersBeyondTheLimitAreToldSo) {
+TEST_F(Stream, SessionsAboveTheLimitAreRefusedWithTheReason) {
   windsplat::net::ServerOptions options;
   options.sessions_max = 2;
   TestServer server(options);
@@ -408,7 +408,7 @@ TEST_F(Stream, ViewersBeyondTheLimitAreToldSo) {
   FAIL() << "no place came free";
 }
 
-TEST_F(Stream, SilenceEndsTheSession) {
+TEST_F(Stream, SilenceClosesTheSession) {
   windsplat::net::ServerOptions options;
   options.idle_timeout_s = 1;
   const TestServer server(options);
@@ -416,7 +416,7 @@ TEST_F(Stream, SilenceEndsTheSession) {
   EXPECT_EQ(client.close_code(), 4410);
 }
 
-TEST_F(Stream, APeerThatNeverReadsIsSentTwoFramesAtMost) {
+TEST_F(Stream, PeerThatNeverReadsIsSentAtMostTwoFrames) {
   StreamClient deaf(port(), {}, "/v1/stream", 4096);
   deaf.say(R"({"type":"patch","rev":1,"patch":{"dataset":"small",
               "image":{"width":1600,"height":1200}}})");

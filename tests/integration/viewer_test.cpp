@@ -32,7 +32,7 @@ bool prepared(net::Viewer& viewer, std::uint64_t ticket, const protocol::View& v
   return loaded;
 }
 
-TEST(Viewer, AFrameThatWaitedForAveragesSaysSoAsOneThatWaitedForFields) {
+TEST(Viewer, WaitForAveragesIsReportedLikeAWaitForFields) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add(small_file()).value();
   net::Services services({}, store, std::make_shared<ThreadPool>(2));
@@ -54,7 +54,7 @@ TEST(Viewer, AFrameThatWaitedForAveragesSaysSoAsOneThatWaitedForFields) {
 }
 
 // Data of one step and a half fit: every frame has to wait until those before it are drawn.
-TEST(Viewer, ViewersOfDifferentStepsAllGetTheirFramesWhereOneStepFits) {
+TEST(Viewer, SessionsAtDifferentStepsGetFramesWhenOneStepFits) {
   constexpr std::uint64_t sample_bytes = 4 * sizeof(float);  // a wind and a cloud
   constexpr std::uint64_t step_bytes = std::uint64_t{32} * 16 * 6 * sample_bytes;
   const auto store = std::make_shared<data::Store>(step_bytes * 3 / 2);
@@ -123,7 +123,7 @@ class LargePictures : public testing::Test {
   std::uint64_t tickets_ = 0;
 };
 
-TEST_F(LargePictures, WaitForTheRoomThatOthersHold) {
+TEST_F(LargePictures, WaitForMemoryHeldByOthers) {
   net::Viewer viewer(services_->backend, 1, "192.0.2.1");
   ASSERT_EQ(fault_of(viewer, view_).get(), "") << "its data are resident from now on";
   auto others = store_->reserve(step_bytes);
@@ -137,7 +137,7 @@ TEST_F(LargePictures, WaitForTheRoomThatOthersHold) {
   EXPECT_EQ(fault.get(), "");
 }
 
-TEST_F(LargePictures, OfTwoViewersAreDrawnOneAfterTheOtherWhereOneFits) {
+TEST_F(LargePictures, OfTwoSessionsAreRenderedInTurnWhenOneFits) {
   net::Viewer one(services_->backend, 1, "192.0.2.1");
   net::Viewer other(services_->backend, 2, "192.0.2.2");
   for (int round = 0; round < 4; ++round) {
@@ -151,7 +151,7 @@ TEST_F(LargePictures, OfTwoViewersAreDrawnOneAfterTheOtherWhereOneFits) {
   }
 }
 
-TEST_F(LargePictures, ThatFitNotEvenAloneAreRefusedAtOnce) {
+TEST_F(LargePictures, ThatNeverFitAreRefusedAtOnce) {
   net::Viewer viewer(services_->backend, 1, "192.0.2.1");
   view_.image.height = 2048;
   const std::string fault = fault_of(viewer, view_).get();

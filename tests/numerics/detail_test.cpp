@@ -59,7 +59,7 @@ double mean_alpha(const engine::Image& image) {
   return 4 * sum / static_cast<double>(image.rgba.size());
 }
 
-TEST(Detail, ASmoothBlobLooksTheSameAtAnEighthOfItsSamples) {
+TEST(Detail, SmoothBlobLooksTheSameAtAnEighthOfItsSamples) {
   scene::Scene full = small_picture();
   const auto blob = [](int, double x, double y, double z) {
     return static_cast<float>(4 * std::exp(-6 * (x * x + y * y + z * z)));

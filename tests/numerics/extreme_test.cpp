@@ -51,7 +51,7 @@ double worst_error(const scene::Scene& scene) {
   return worst;
 }
 
-TEST(Stiff, AnOpaqueCellHidesTheLineBehindItAndNoLineBefore) {
+TEST(Stiff, OpaqueCellHidesLinesBehindItOnly) {
   for (const float rho : {1e4F, 1e10F, 1e30F, 3e38F, infinity}) {
     scene::Scene scene = line_in_cell(1, 0.8, 2.0F);
     scene.scalars[0].extinction = {{0, static_cast<double>(rho)}, {2, static_cast<double>(rho)}};
@@ -69,7 +69,7 @@ TEST(Stiff, AnOpaqueCellHidesTheLineBehindItAndNoLineBefore) {
   }
 }
 
-TEST(Stiff, AnOpaqueLineEndsTheRay) {
+TEST(Stiff, OpaqueLineEndsTheRay) {
   for (const float rho : {0.0F, 1e-30F, 1.0F, 50.0F, 1e30F}) {
     const engine::Image image = render(line_in_cell(rho, 1, 0.0F)).image;
     const float* middle = pixel(image, 20, 20);
@@ -81,7 +81,7 @@ TEST(Stiff, AnOpaqueLineEndsTheRay) {
 }
 
 // Where one kernel alone is seen and its line lies in the middle, the method is exact.
-TEST(Stiff, OneKernelWithALineInItsMiddleIsTheTruth) {
+TEST(Stiff, OneKernelWithACentralLineEqualsTheReference) {
   for (const float rho : {0.0F, 1e-30F, 1e-3F, 1.0F, 50.0F, 1e4F, 1e30F}) {
     EXPECT_LT(worst_error(line_in_cell(rho, 0.8, 0.0F)), 1e-5) << rho;
   }
@@ -102,7 +102,7 @@ scene::Scene small_scene(const scene::Lattice& lattice, float wind, float rho) {
 }
 
 #if defined(__SSE__)
-TEST(Extremes, DenormalsDrawTheSameWhetherTheyAreFlushedOrNot) {
+TEST(Extremes, DenormalsRenderTheSameFlushedOrNot) {
   for (const float tiny : {1e-45F, 1e-41F, 1e-38F}) {
     const scene::Scene scene =
         small_scene(even_lattice({5, 5, 5}, {0.3, 0.3, 0.3}), tiny, 1e3F * tiny);
@@ -117,7 +117,7 @@ TEST(Extremes, DenormalsDrawTheSameWhetherTheyAreFlushedOrNot) {
 }
 #endif
 
-TEST(Extremes, AKernelThatCoversTheScreenIsItsFootprint) {
+TEST(Extremes, KernelThatCoversTheScreenEqualsItsFootprint) {
   scene::Scene scene;
   scene.lattice = even_lattice({1, 1, 1}, {2, 2, 2});
   scene.scalars.push_back(medium(uniform(scene.lattice, 0.8F), {1.0F, 0.5F, 0.25F}));
@@ -141,7 +141,7 @@ TEST(Extremes, AKernelThatCoversTheScreenIsItsFootprint) {
   }
 }
 
-TEST(Extremes, AVeryFarEyeSeesWhatANearOneDoes) {
+TEST(Extremes, VeryFarEyeRendersLikeANearOne) {
   scene::Scene scene = small_scene(even_lattice({6, 5, 4}, {0.3, 0.3, 0.3}), 1.0F, 2.0F);
   scene.camera = look({0, 0, 0}, {0.3, 1, -0.4}, 4, 64, 48, false, 1);
   const engine::Image near = render(scene).image;
@@ -161,7 +161,7 @@ TEST(Extremes, AVeryFarEyeSeesWhatANearOneDoes) {
 }
 
 // Optical depths of a column add to tau = 2; accumulated in float, the sum errs by 8e-3 at most.
-TEST(Extremes, AMillionLayersAddUp) {
+TEST(Extremes, MillionLayersAddUp) {
   for (const int layers : {1000, 100000, 1000000}) {
     scene::Scene scene;
     scene.lattice = even_lattice({1, 1, layers}, {1, 1, 2.0 / layers});
@@ -175,7 +175,7 @@ TEST(Extremes, AMillionLayersAddUp) {
   }
 }
 
-TEST(Extremes, AnAllEqualFieldHasTheTablesFirstColour) {
+TEST(Extremes, ConstantFieldHasTheFirstColorOfTheTable) {
   scene::Scene scene = small_scene(even_lattice({1, 1, 1}, {2, 2, 2}), 1.0F, 1.0F);
   scene.scalars[0] = medium(uniform(scene.lattice, 3.0F), {0, 0, 0});
   scene.scalars[0].color = ramp_color(3, 3, {0.5F, 0.25F, 1.0F}, {1.0F, 0.0F, 0.0F});
@@ -194,7 +194,7 @@ TEST(Extremes, AnAllEqualFieldHasTheTablesFirstColour) {
   EXPECT_NEAR(middle[2], middle[3], 1e-6);
 }
 
-TEST(Extremes, ACellAMillionTimesFlatterIsDrawnRight) {
+TEST(Extremes, CellFlattenedAMillionTimesIsCorrect) {
   for (const auto& cell :
        {glm::dvec3(2e-6, 2, 2), glm::dvec3(2, 2e-6, 2), glm::dvec3(2, 2, 2e-6)}) {
     scene::Scene scene;
@@ -207,7 +207,7 @@ TEST(Extremes, ACellAMillionTimesFlatterIsDrawnRight) {
   }
 }
 
-TEST(Extremes, AnEyeInsideTheVolumeSeesAFinitePictureNearTheTruth) {
+TEST(Extremes, EyeInsideTheVolumeGivesAFinitePictureNearTheReference) {
   scene::Scene scene = small_scene(even_lattice({12, 12, 12}, {0.15, 0.15, 0.15}), 1.0F, 2.0F);
   scene.vector->length = 0.1;
   scene.camera = look({0.013, 0.004, 0.009}, {0.3, 1, -0.4}, 0, 40, 30, true, 1);
@@ -216,7 +216,7 @@ TEST(Extremes, AnEyeInsideTheVolumeSeesAFinitePictureNearTheTruth) {
   EXPECT_LT(worst_error(scene), 0.35);
 }
 
-TEST(Extremes, APictureAsLargeAsTheWireAllows) {
+TEST(Extremes, PictureOfTheMaximumSize) {
   scene::Scene scene = small_scene(even_lattice({3, 3, 3}, {0.3, 0.3, 0.3}), 1.0F, 2.0F);
   for (const auto& size : {std::array<int, 2>{4096, 4096}, {8192, 1}, {1, 8192}}) {
     scene.camera.width = size[0];

@@ -30,7 +30,7 @@ Pair attenuate(const Table& table, float tau) {
   return pair;
 }
 
-TEST(Attenuation, HoldsFromNothingToInfinity) {
+TEST(Attenuation, HoldsFromZeroToInfinity) {
   for (const Table* table : usable_tables()) {
     SCOPED_TRACE(table->name);
     EXPECT_EQ(attenuate(*table, 0.0F).absorbed, 0.0F);
@@ -105,7 +105,7 @@ TEST(Jitter, IsWhiteOverTheLattice) {
   }
 }
 
-TEST(Jitter, NumbersOfOneStopAreIndependent) {
+TEST(Jitter, NumbersOfOneKernelPositionAreIndependent) {
   const Table& table = engine::kernels::portable_table();
   for (int a = 0; a < 6; ++a) {
     for (int b = 0; b < a; ++b) {
@@ -188,7 +188,7 @@ TEST(Targets, AgreeAtAwkwardSizes) {
 }
 
 // Whole numbers, so that lengths are whole and as long as the tolerance says.
-TEST(Targets, DrawLinesThatAreJustAsStrongAsTheTolerance) {
+TEST(Targets, RenderLinesExactlyAtTheTolerance) {
   for (const Table* table : usable_tables()) {
     int drawn = 0;
     for (int part = 1; part <= 100; ++part) {
@@ -223,7 +223,7 @@ TEST(Targets, MeasureVectorsOfAnySize) {
   }
 }
 
-TEST(Targets, VariantNamesTheOneInUse) {
+TEST(Targets, VariantNamesTheActiveTarget) {
   const auto table = engine::kernels::chosen_table();
   ASSERT_TRUE(table);
   const engine::Rendered rendered = render(busy_scene(8, 8, true));

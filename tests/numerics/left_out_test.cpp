@@ -40,7 +40,7 @@ bool names(const engine::Variant& variant, const std::string& word) {
 
 class EitherMethod : public testing::TestWithParam<Method> {};
 
-TEST_P(EitherMethod, WithoutAScalarNothingOfAMediumIsPlannedOrComputed) {
+TEST_P(EitherMethod, WithoutAScalarNoMediumIsPreparedOrComputed) {
   Scene scene = wind_and_cloud(GetParam());
   const engine::WorkReport both = render(scene).work;
   EXPECT_GT(both.exponentials, 0);
@@ -67,7 +67,7 @@ TEST_P(EitherMethod, WithoutAScalarNothingOfAMediumIsPlannedOrComputed) {
   }
 }
 
-TEST_P(EitherMethod, WithoutAVectorNothingOfALineIsPlannedOrComputed) {
+TEST_P(EitherMethod, WithoutAVectorNoLineIsPreparedOrComputed) {
   Scene scene = wind_and_cloud(GetParam());
   const engine::WorkReport both = render(scene).work;
   scene.vector.reset();
@@ -103,7 +103,7 @@ TEST_P(EitherMethod, OnlyTheAnalyticRuleEvaluatesASecondExponential) {
   EXPECT_GT(exponentials(Compositing::analytic), one);
 }
 
-TEST_P(EitherMethod, ASliceVisitsItsLayerAlone) {
+TEST_P(EitherMethod, SliceVisitsItsLayerOnly) {
   Scene scene = wind_and_cloud(GetParam());
   const int dims[3] = {12, 10, 6};
   for (int axis = 0; axis < 3; ++axis) {
@@ -214,7 +214,7 @@ Change between(const engine::Image& a, const engine::Image& b) {
 // Sums of a few hundred floats in [0, 1].
 constexpr double float_noise = 2e-6;
 
-TEST(LeftOut, WeakLinesAndThinMediaChangeThePictureByNoMoreThanTheirBound) {
+TEST(LeftOut, WeakLinesAndThinMediaStayWithinTheirBound) {
   int tight = 0;
   int changed = 0;
   for (std::uint32_t seed = 0; seed < 240; ++seed) {
@@ -236,7 +236,7 @@ TEST(LeftOut, WeakLinesAndThinMediaChangeThePictureByNoMoreThanTheirBound) {
 }
 
 // A pixel whose centre meets a splat narrower than itself shows its peak, far more than its share.
-TEST(LeftOut, ASplatNarrowerThanAPixelIsBoundByItsPeak) {
+TEST(LeftOut, SplatNarrowerThanAPixelIsBoundedByItsPeak) {
   for (const bool perspective : {false, true}) {
     for (const double cell : {0.1, 0.01, 0.001}) {
       Scene scene;
@@ -258,7 +258,7 @@ TEST(LeftOut, ASplatNarrowerThanAPixelIsBoundByItsPeak) {
   }
 }
 
-TEST(LeftOut, StoppingEarlyChangesNoPixelByMoreThanItsBound) {
+TEST(LeftOut, EarlyTerminationStaysWithinItsBound) {
   int stopped = 0;
   for (std::uint32_t seed = 200; seed < 260; ++seed) {
     Scene scene = Weak(seed).make(seed % 3 != 1, true, seed % 2 == 0);

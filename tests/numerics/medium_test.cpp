@@ -59,7 +59,7 @@ TEST(Splat, AbsorbsByItsFootprintInAnisotropicCells) {
   }
 }
 
-TEST(Splat, OpticalDepthFromAlmostNothingToInfinity) {
+TEST(Splat, OpticalDepthFromNearZeroToInfinity) {
   const auto centre = [](double rho) {
     const engine::Image image = render(one_splat(rho, {1, 1, 1}, {0, 1, 0}, false)).image;
     return std::array<float, 2>{pixel(image, 31, 31)[0], pixel(image, 31, 31)[3]};
@@ -76,7 +76,7 @@ TEST(Splat, OpticalDepthFromAlmostNothingToInfinity) {
   }
 }
 
-TEST(Splat, NoOpticalDepthLeavesThePixelAlone) {
+TEST(Splat, ZeroOpticalDepthLeavesThePixelUnchanged) {
   scene::Scene scene = one_splat(2, {1, 1, 1}, {0, 1, 0}, true);
   const engine::Image before = render(scene).image;
   scene.scalars.push_back(medium(uniform(scene.lattice, 0.0F), {0.3F, 1.0F, 1.0F}));
@@ -133,7 +133,7 @@ TEST(UniformMedium, AbsorbsOneMinusExpWithinTheFootprintsRipple) {
   EXPECT_NEAR(generic.mean, 0, 0.002);
 }
 
-TEST(UniformMedium, AStrideOfTwoAbsorbsTheSame) {
+TEST(UniformMedium, StrideOfTwoAbsorbsTheSame) {
   scene::Scene scene;
   scene.lattice = even_lattice({40, 40, 16}, {1, 1, 1});
   scene.camera = look({0, 0, 0}, {0.31, 0.17, -1}, 100, 32, 32, false, 3);
@@ -150,7 +150,7 @@ TEST(UniformMedium, AStrideOfTwoAbsorbsTheSame) {
 
 // Seen along z a splat's optical depth is that of its whole cell, so whatever number of layers a
 // stop stands for, the mean over a cell is extinction times thickness.
-TEST(UniformMedium, AnyStrideAbsorbsWhatTheBoxHolds) {
+TEST(UniformMedium, AnyStrideAbsorbsLikeTheBox) {
   for (const int layers : {1, 3, 19}) {
     for (const int stride : {1, 2, 4, 8}) {
       scene::Scene scene;
@@ -168,7 +168,7 @@ TEST(UniformMedium, AnyStrideAbsorbsWhatTheBoxHolds) {
   }
 }
 
-TEST(Media, ExtinctionsAddAndColoursMixByThem) {
+TEST(Media, ExtinctionsAddAndWeightTheirColors) {
   scene::Scene scene = one_splat(0.6, {1, 1, 1}, {0, 1, 0}, false);
   scene.scalars.push_back(medium(uniform(scene.lattice, 1.8F), {0.0F, 0.1F, 1.0F}));
   const engine::Image image = render(scene).image;
@@ -179,7 +179,7 @@ TEST(Media, ExtinctionsAddAndColoursMixByThem) {
   EXPECT_NEAR(pixel(image, 31, 31)[2], alpha * (0.25 * 0.25 + 0.75), 1e-6);
 }
 
-TEST(Media, ExtinctionStepsWhereItsPointsCoincide) {
+TEST(Media, ExtinctionIsDiscontinuousWhereItsPointsCoincide) {
   scene::Scene scene = one_splat(1, {1, 1, 1}, {0, 1, 0}, false);
   const auto alpha_at = [&](float value) {
     scene.scalars[0].field = uniform(scene.lattice, value);

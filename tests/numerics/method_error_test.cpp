@@ -42,7 +42,7 @@ frame::Difference error_of(Scene scene, Method method, double thickness,
   return frame::difference_of(render(scene, 2).image.rgba, truth);
 }
 
-TEST(MethodError, SlabsOfOneCellErrAFifthOfKernelsAtMostAtEqualStride) {
+TEST(MethodError, OneCellSlabsHaveAtMostAFifthOfTheKernelErrorAtEqualStride) {
   for (const auto& [name, strides] :
        {std::pair{"soft", std::vector{1, 2}}, std::pair{"dense", std::vector{1}}}) {
     for (const int stride : strides) {
@@ -56,7 +56,7 @@ TEST(MethodError, SlabsOfOneCellErrAFifthOfKernelsAtMostAtEqualStride) {
 }
 
 // A slab of thickness 1 is twice as deep at stride 2, which a dense medium shows.
-TEST(MethodError, SlabsAsThickAsAtStrideOneErrAFifthAtMostInADenseMediumToo) {
+TEST(MethodError, StrideOneSlabsHaveAtMostAFifthOfTheErrorInADenseMedium) {
   const Scene scene = standard_scene("dense", 2);
   const std::vector<double> truth = integral(scene);
   EXPECT_GE(error_of(scene, Method::kernel, 1, truth).rmse,
@@ -64,7 +64,7 @@ TEST(MethodError, SlabsAsThickAsAtStrideOneErrAFifthAtMostInADenseMediumToo) {
 }
 
 // Every line at its own depth in every pixel, whatever the slabs are.
-TEST(MethodError, SlabsOfLinesAloneAreTheIntegralItself) {
+TEST(MethodError, SlabsOfLinesOnlyEqualTheIntegral) {
   const Scene scene = standard_scene("vectors", 1);
   const std::vector<double> truth = integral(scene);
   for (const double thickness : {2.0, 1.0, 0.37}) {
@@ -73,7 +73,7 @@ TEST(MethodError, SlabsOfLinesAloneAreTheIntegralItself) {
   EXPECT_GT(error_of(scene, Method::kernel, 1, truth).max, 1e-2);
 }
 
-TEST(MethodError, SlabsAreOfSecondOrderInTheirThickness) {
+TEST(MethodError, SlabsAreSecondOrderInTheirThickness) {
   const Scene scene = standard_scene("soft", 1);
   const std::vector<double> truth = integral(scene);
   const std::vector<double> thickness{2, 1, 0.5};
@@ -125,7 +125,7 @@ std::array<double, 2> seam(double tau, Compositing compositing, Method method) {
 }
 
 // Attenuated twice, by x a_s and by (1 - x) a_s: the product of both, x (1 - x) a_s^2, is lost.
-TEST(Seam, NaiveLosesUpToAQuarterOfTheMediumRoundALineThatHardlyIs) {
+TEST(Seam, NaiveLosesUpToAQuarterOfTheMediumAroundAFaintLine) {
   for (const double tau : {0.2, 1.0, 3.0, 100.0}) {
     const double absorbed = -std::expm1(-tau);
     const auto lost = seam(tau, Compositing::cd_naive, Method::kernel);
@@ -146,7 +146,7 @@ TEST(Seam, CorrectedAndAnalyticHaveNone) {
   }
 }
 
-TEST(Seam, NaiveSlabsShowOneToo) {
+TEST(Seam, NaiveSlabsShowASeam) {
   EXPECT_GT(seam(3, Compositing::cd_naive, Method::slab)[0], 0.02);
 }
 

@@ -196,7 +196,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 // From inside a medium, through a narrow picture: most of the cells that fill it have their middles
 // elsewhere, and some the eye is in.
-TEST(Inside, CellsWhoseMiddlesAreElsewhereFillThePicture) {
+TEST(Inside, CellsWithOffsetCentersFillThePicture) {
   for (std::uint32_t seed = 1; seed <= 24; ++seed) {
     Scene scene = SceneMaker(seed).make(What::scalars, true, true);
     scene.slice.reset();
@@ -212,7 +212,7 @@ TEST(Inside, CellsWhoseMiddlesAreElsewhereFillThePicture) {
 
 // Lines that point almost at the eye: hundredths of a pixel long, grey at the one end. Which end a
 // pixel is nearer to must not hang on the last digits of its place in the picture.
-TEST(EndOn, LinesKeepTheirColours) {
+TEST(EndOn, LinesKeepTheirColors) {
   Scene scene;
   scene.lattice = even_lattice({24, 18, 6}, {0.1, 0.1, 0.1});
   const glm::dvec3 eye{0.3, -3, 0.4};
@@ -235,7 +235,7 @@ TEST(EndOn, LinesKeepTheirColours) {
 }
 
 // Forward Euler doubles what differs wherever tau passes 1: compared below that.
-TEST(Euler, EqualsTheNaiveRendererWhereItIsStable) {
+TEST(Euler, EqualsTheNaiveRendererWhereStable) {
   for (const std::uint32_t seed : {2U, 3U, 8U, 15U}) {
     Scene scene = SceneMaker(seed).make(What::both, seed != 3, false);
     scene.compositing = scene::Compositing::cd_euler;
@@ -248,7 +248,7 @@ TEST(Euler, EqualsTheNaiveRendererWhereItIsStable) {
 
 // Lines that cross come in another order in some pixel than in the middle of their block: a slab
 // may end early only where all that is left lies behind.
-TEST(Slabs, EndEarlyWithinTheBoundTheyReport) {
+TEST(Slabs, TerminateWithinTheirReportedBound) {
   int ended = 0;
   for (std::uint32_t seed = 1; seed <= 120; ++seed) {
     Scene scene = SceneMaker(seed).make(What::both, seed % 2 == 0, false);
@@ -277,7 +277,7 @@ TEST(Slabs, EndEarlyWithinTheBoundTheyReport) {
   EXPECT_GT(ended, 20);
 }
 
-TEST(Threads, AnyNumberGivesTheSameBits) {
+TEST(Threads, AnyCountGivesTheSameBits) {
   for (const std::uint32_t seed : {2U, 5U, 16U, 23U}) {
     Scene scene = SceneMaker(seed).make(What::both, seed != 5, false);
     if (seed > 10) scene.method = scene::Method::slab;

@@ -18,7 +18,7 @@ namespace {
 namespace reference = engine::reference;
 
 // From the last piece to the first, by workers in turn, one piece cut short and drawn again.
-TEST(ReferencePainting, APaintingInPiecesIsTheWholePicture) {
+TEST(ReferencePainting, RenderingInPiecesEqualsTheWholePicture) {
   const scene::Scene scene = cloudy_scene(8, 33);
   ThreadPool pool(1);
   const auto at_once = reference::render(scene, pool, {});
@@ -47,7 +47,7 @@ TEST(ReferencePainting, APaintingInPiecesIsTheWholePicture) {
   EXPECT_EQ(painting.evaluations(), whole.evaluations);
 }
 
-TEST(ReferencePainting, AsksForMemoryBeforeItTakesAnyAndStopsWhereItIsUnwanted) {
+TEST(ReferencePainting, RequestsMemoryBeforeUseAndStopsWhenCancelled) {
   const scene::Scene scene = cloudy_scene(8, 33);
   std::vector<std::uint64_t> asked;
   // The error, if any, where the n-th question is refused, or cancels.
@@ -80,7 +80,7 @@ TEST(ReferencePainting, AsksForMemoryBeforeItTakesAnyAndStopsWhereItIsUnwanted) 
   EXPECT_TRUE(asked.empty()) << "cancelled before";
 }
 
-TEST(ReferenceGrid, ListsByTileWhatWasCountedAndNoticesAtEachBoxThatItIsUnwanted) {
+TEST(ReferenceGrid, ListsCountedKernelsByTileAndStopsWhenCancelled) {
   // 20 by 12 pixels: 3 by 2 tiles of 8. All, one tile, none, the middle column.
   const std::vector<reference::ScreenBox> boxes{
       {0, 20, 0, 12}, {2, 5, 9, 11}, {30, 40, 0, 12}, {9, 15, 2, 11}};

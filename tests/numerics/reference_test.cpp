@@ -84,7 +84,7 @@ TEST(Kernel3d, ItsLineIntegralIsTheFootprint) {
   }
 }
 
-TEST(Kernel3d, HoldsItsMassAndIsNowhereNegative) {
+TEST(Kernel3d, ConservesMassAndIsNonnegative) {
   const auto shell = [](double r) { return 4 * pi * r * r * reference::kernel_3d(r); };
   EXPECT_NEAR(simpson(shell, 0, s) + simpson(shell, s, t), footprint_integral, 1e-9);
   for (int i = 0; i <= 20000; ++i) EXPECT_GE(reference::kernel_3d(1e-4 * i), 0);
@@ -94,7 +94,7 @@ TEST(Kernel3d, HoldsItsMassAndIsNowhereNegative) {
   EXPECT_NEAR(reference::kernel_3d(s - 1e-9), reference::kernel_3d(s + 1e-9), 1e-8);
 }
 
-TEST(Kernel3d, ItsTableErrsLessThanOnePartInATrillion) {
+TEST(Kernel3d, TableErrorIsBelowOneInATrillion) {
   const reference::Profile profile;
   double worst = 0;
   for (int i = 0; i <= 300000; ++i) {
@@ -164,7 +164,7 @@ TEST(Ray, SlabRampAndBlobHaveTheirClosedForms) {
   }
 }
 
-TEST(Ray, AColourThatChangesEvenlyHasTheFormOfPhi) {
+TEST(Ray, LinearColorHasTheClosedFormOfPhi) {
   const Rgb to{0.2, 1.0, 0.0};
   for (const double tau : {1e-6, 0.01, 0.5, 4.0, 30.0, 1e3, 1e6}) {
     const Formula medium{[=](double) { return tau / 2; },
@@ -216,7 +216,7 @@ TEST(Ray, SheetsInASlabHaveTheirClosedForm) {
   }
 }
 
-TEST(Ray, ACheckeredRayIsCompositedPieceByPiece) {
+TEST(Ray, CheckeredRayIsCompositedPieceByPiece) {
   const auto odd = [](double z) { return static_cast<int>(std::floor(z)) % 2 == 1; };
   const Rgb other{0.1, 0.2, 1.0};
   const Formula medium{[&](double z) { return odd(z) ? 2.0 : 0.5; },
@@ -306,7 +306,7 @@ TEST(Reference, SplatsApartAreCompositedByOver) {
 
 // A line through a splat: I = c_s A + a exp(-tf) (c_v - c_s), tf the part of tau before it, by the
 // kernel's partial integral.
-TEST(Reference, ALineInASplatSeesTheSplatsPartBeforeIt) {
+TEST(Reference, LineInASplatSeesThePartOfTheSplatInFront) {
   for (const double rho : {0.01, 0.7, 3.0, 60.0}) {
     for (const float slope : {0.0F, 4.0F, -9.0F, 30.0F}) {
       scene::Scene scene;
@@ -347,7 +347,7 @@ TEST(Reference, ALineInASplatSeesTheSplatsPartBeforeIt) {
   }
 }
 
-TEST(Reference, RaysBeginAtTheNearPlane) {
+TEST(Reference, RaysStartAtTheNearPlane) {
   scene::Scene scene;
   scene.lattice = even_lattice({1, 1, 1}, {1, 1, 1});
   scene.scalars = {medium(constant_scalar(scene.lattice, 2), {1.0F, 1.0F, 1.0F})};
@@ -361,7 +361,7 @@ TEST(Reference, RaysBeginAtTheNearPlane) {
   EXPECT_EQ(truth(scene).rgba[3], 0);
 }
 
-TEST(Reference, AUniformLatticeAbsorbsWithinTheFootprintsRipple) {
+TEST(Reference, UniformLatticeAbsorbsWithinTheFootprintsRipple) {
   scene::Scene scene;
   scene.lattice = even_lattice({24, 24, 9}, {1, 1, 1});
   scene.scalars = {medium(constant_scalar(scene.lattice, 0.1), {1.0F, 1.0F, 1.0F})};
@@ -425,7 +425,7 @@ TEST(Reference, EqualsTheNaiveRendererWhereThatIsExact) {
 }
 
 // A lattice that is bent by nothing but a turn, seen by an eye that turns with it.
-TEST(Reference, TurnedPlacesSeenFromATurnedEyeLookTheSame) {
+TEST(Reference, RotatedPositionsAndEyeGiveTheSamePicture) {
   scene::Scene scene = cloudy_scene(4, 24);
   scene.lattice = even_lattice({4, 3, 1}, {0.3, 0.4, 0.5});
   const auto wave = [](int c, double x, double y, double) {
@@ -464,7 +464,7 @@ TEST(Reference, TurnedPlacesSeenFromATurnedEyeLookTheSame) {
   }
 }
 
-TEST(Reference, ASliceDrawsTheMediumOfItsLayerAlone) {
+TEST(Reference, SliceRendersTheMediumOfItsLayerOnly) {
   scene::Scene scene = cloudy_scene(5, 24);
   scene.vector.reset();
   scene.slice = scene::Slice{2, 3};
@@ -484,7 +484,7 @@ TEST(Reference, ASliceDrawsTheMediumOfItsLayerAlone) {
   EXPECT_GT(brightest, 0.1);
 }
 
-TEST(Reference, ASliceDropsAVectorsPartAcrossItAndKeepsTheRestAsLong) {
+TEST(Reference, SliceDropsTheNormalComponentAndKeepsTheRest) {
   scene::Scene scene;
   scene.lattice = even_lattice({2, 2, 3}, {1, 1, 1});
   scene.camera = look({0, 0, 0}, {0, 1, 0}, 5, 10, 10, false, 2);
@@ -504,7 +504,7 @@ TEST(Reference, ASliceDropsAVectorsPartAcrossItAndKeepsTheRestAsLong) {
   }
 }
 
-TEST(Reference, AnyNumberOfThreadsGivesTheSameBits) {
+TEST(Reference, AnyThreadCountGivesTheSameBits) {
   const scene::Scene scene = cloudy_scene(8, 33);
   const reference::Picture one = truth(scene, 1e-10, 1);
   const reference::Picture three = truth(scene, 1e-10, 3);
@@ -514,7 +514,7 @@ TEST(Reference, AnyNumberOfThreadsGivesTheSameBits) {
   EXPECT_GT(one.evaluations, one.pieces);
 }
 
-TEST(Reference, TellsProgressAndStopsWhenCancelled) {
+TEST(Reference, ReportsProgressAndStopsWhenCancelled) {
   const scene::Scene scene = cloudy_scene(6, 20);
   ThreadPool pool(2);
   const CancelToken cancel;

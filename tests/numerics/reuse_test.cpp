@@ -89,7 +89,7 @@ class Reuse : public testing::Test {
   engine::RenderSpace space_;
 };
 
-TEST_F(Reuse, EveryChangeOfASceneShowsAtOnce) {
+TEST_F(Reuse, EverySceneChangeTakesEffectAtOnce) {
   expect_to_show({
       {"the same", [](Scene&) {}},
       {"camera",
@@ -153,7 +153,7 @@ TEST_F(Reuse, EveryChangeOfASceneShowsAtOnce) {
 }
 
 // What a plan of another kind says must not stay.
-TEST_F(Reuse, EveryOtherKindOfSceneShowsAtOnce) {
+TEST_F(Reuse, EverySceneKindTakesEffectAtOnce) {
   expect_to_show({
       {"nothing",
        [](Scene& s) {
@@ -197,7 +197,7 @@ TEST_F(Reuse, EveryOtherKindOfSceneShowsAtOnce) {
 }
 
 // A step that replaces another often takes its very place in memory.
-TEST_F(Reuse, AnotherFieldAtTheSameAddressIsAnotherField) {
+TEST_F(Reuse, NewFieldAtTheSameAddressIsDetected) {
   Scene scene = plain_scene();
   scene.vector.reset();
   for (int step = 0; step < 20; ++step) {
@@ -210,7 +210,7 @@ TEST_F(Reuse, AnotherFieldAtTheSameAddressIsAnotherField) {
 }
 
 // Fields whose memory is reused for certain, by an owner of their own.
-TEST_F(Reuse, AFieldWithoutAnOwnerIsReadAnew) {
+TEST_F(Reuse, FieldWithoutAnOwnerIsReadAgain) {
   data::Volume place = *make_volume(plain_scene().lattice, 1, wave);
   Scene scene = plain_scene();
   scene.vector.reset();
@@ -220,7 +220,7 @@ TEST_F(Reuse, AFieldWithoutAnOwnerIsReadAnew) {
   expect_same(scene, "after");
 }
 
-TEST_F(Reuse, MoreScenesThanAreRemembered) {
+TEST_F(Reuse, MoreScenesThanTheCacheHolds) {
   std::vector<Scene> scenes;
   for (int n = 0; n < 20; ++n) {
     scenes.push_back(plain_scene());
@@ -232,7 +232,7 @@ TEST_F(Reuse, MoreScenesThanAreRemembered) {
 }
 
 // Mostly nothing: whole cubes of 8 x 8 x 8 samples are passed over, and counted as what they are.
-TEST_F(Reuse, BlankRegionsAreCountedSampleBySample) {
+TEST_F(Reuse, BlankRegionsAreCountedPerSample) {
   Scene scene;
   scene.lattice = even_lattice({40, 40, 40}, {0.05, 0.05, 0.05});
   std::int64_t dense = 0;
@@ -259,7 +259,7 @@ TEST_F(Reuse, BlankRegionsAreCountedSampleBySample) {
   }
 }
 
-TEST_F(Reuse, ACancelledFrameLeavesNothingBehind) {
+TEST_F(Reuse, CancelledFrameLeavesNoState) {
   const Scene scene = plain_scene();
   expect_same(scene, "before");
   const CancelToken cancelled;
@@ -271,7 +271,7 @@ TEST_F(Reuse, ACancelledFrameLeavesNothingBehind) {
   expect_same(scene, "the first again");
 }
 
-TEST(StableSort, SortsAndKeepsTheOrderOfEquals) {
+TEST(StableSort, KeepsTheOrderOfEqualElements) {
   for (const std::size_t count : {0U, 1U, 7U, 8U, 9U, 16U, 17U, 100U, 1000U}) {
     std::vector<std::pair<int, std::size_t>> items;
     for (std::size_t i = 0; i < count; ++i) items.emplace_back(i * 7919 % 13, i);

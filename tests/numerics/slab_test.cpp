@@ -49,7 +49,7 @@ Scene blobs(double density, int size, double azimuth, bool perspective) {
   return scene;
 }
 
-TEST(PartialFootprint, EndsAtNothingAndAllAndGrows) {
+TEST(PartialFootprint, RisesMonotonicallyFromZeroToAll) {
   const auto& table = engine::partial_footprints();
   constexpr int columns = engine::kernels::partial_columns - 1;
   constexpr auto one = static_cast<std::int32_t>(engine::kernels::partial_one);
@@ -67,7 +67,7 @@ TEST(PartialFootprint, EndsAtNothingAndAllAndGrows) {
   }
 }
 
-TEST(Slab, OneSplatAbsorbsWhatItsKernelDoes) {
+TEST(Slab, OneSplatAbsorbsLikeItsKernel) {
   for (const bool perspective : {false, true}) {
     Scene scene = blobs(3, 48, 0.4, perspective);
     scene.lattice = even_lattice({1, 1, 1}, {0.5, 0.3, 0.7});
@@ -127,7 +127,7 @@ TEST(Slab, LinesDoNotDependOnTheThickness) {
   }
 }
 
-TEST(Slab, TurningByAMicroradianHardlyChangesAMedium) {
+TEST(Slab, RotationByAMicroradianBarelyChangesAMedium) {
   for (const bool perspective : {false, true}) {
     for (int step = 0; step < 4; ++step) {
       const double azimuth = (2 * step + (perspective ? 1 : 0)) * 3.14159265358979 / 8;

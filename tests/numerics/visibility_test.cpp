@@ -35,7 +35,7 @@ glm::dvec3 place(const scene::Lattice& lattice, std::array<int, 3> at) {
   return {lattice.positions[0][at[0]], lattice.positions[1][at[1]], lattice.positions[2][at[2]]};
 }
 
-TEST(Visibility, NearerHidesFartherFromTwentySixSides) {
+TEST(Visibility, NearerHidesFartherFromTwentySixDirections) {
   const scene::Lattice lattice = even_lattice({21, 21, 21}, {0.1, 0.07, 0.15});
   for (int dx = -1; dx <= 1; ++dx) {
     for (int dy = -1; dy <= 1; ++dy) {
@@ -62,7 +62,7 @@ TEST(Visibility, NearerHidesFartherFromTwentySixSides) {
   }
 }
 
-TEST(Visibility, HoldsForEveryPairSeenFromAnEyeInTheMiddle) {
+TEST(Visibility, HoldsForEveryPairSeenFromTheCenter) {
   const scene::Lattice lattice = even_lattice({17, 17, 17}, {0.1, 0.1, 0.1});
   const glm::dvec3 eye{0.01, -0.02, 0.03};
   std::mt19937 random(5);
@@ -90,7 +90,7 @@ TEST(Visibility, HoldsForEveryPairSeenFromAnEyeInTheMiddle) {
   }
 }
 
-TEST(Visibility, AnOpaqueMediumHidesLinesBehindIt) {
+TEST(Visibility, OpaqueMediumHidesLinesBehindIt) {
   scene::Scene scene;
   scene.lattice = even_lattice({9, 9, 9}, {0.2, 0.2, 0.2});
   const auto wind = make_volume(scene.lattice, 3, [](int c, double, double y, double) {

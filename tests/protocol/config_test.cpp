@@ -75,7 +75,7 @@ TEST(Config, HasTheLimitsOfEveryDocument) {
   EXPECT_THAT(deep.error().message, HasSubstr("32 levels"));
 }
 
-TEST(Config, NamesEveryValueAtFault) {
+TEST(Config, ReportsEveryInvalidValue) {
   const auto config = parse_config(R"({"a": null, "b": 1, "c": {}})");
   ASSERT_FALSE(config);
   ASSERT_EQ(config.error().at.size(), 2U);

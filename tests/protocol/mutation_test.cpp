@@ -103,7 +103,7 @@ void expect_words(const Error& error, const std::string& input) {
   ASSERT_TRUE(Json::accept(encode_problem(problem_from(error)))) << input;
 }
 
-TEST(Mutation, AViewIsTakenForGoodOrRefusedWithWords) {
+TEST(Mutation, ViewIsAcceptedOrRefusedWithAMessage) {
   const auto good = corpus("valid", "view");
   const auto bad = corpus("invalid", "view");
   Mutator mutator(20240611);
@@ -131,7 +131,7 @@ TEST(Mutation, AViewIsTakenForGoodOrRefusedWithWords) {
   EXPECT_GT(refused, 5000);
 }
 
-TEST(Mutation, APatchGivesAGoodViewOrNone) {
+TEST(Mutation, PatchGivesAValidViewOrNone) {
   const auto good = corpus("valid", "view");
   const auto bad = corpus("invalid", "view");
   Mutator mutator(7);
@@ -159,7 +159,7 @@ TEST(Mutation, APatchGivesAGoodViewOrNone) {
   EXPECT_GT(applied, 1000);
 }
 
-TEST(Mutation, AClientMessageIsTakenAsTheSchemaSaysOrRefusedWithWords) {
+TEST(Mutation, ClientMessageFollowsTheSchemaOrIsRefusedWithAMessage) {
   const auto good = corpus("valid", "clientMessage");
   const auto bad = corpus("invalid", "clientMessage");
   Mutator mutator(99);
@@ -181,7 +181,7 @@ TEST(Mutation, AClientMessageIsTakenAsTheSchemaSaysOrRefusedWithWords) {
   EXPECT_GT(taken, 1000);
 }
 
-TEST(Mutation, AHeaderThatParsesEncodesToItself) {
+TEST(Mutation, ParsedHeaderEncodesToItself) {
   Mutator mutator(5);
   FrameHeader header;
   header.seq = 3;

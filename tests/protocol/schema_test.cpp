@@ -83,7 +83,7 @@ TEST(Schema, StaticDefaultsAreThoseOfTheStructs) {
   EXPECT_GE(compared, 35);
 }
 
-TEST(Schema, TheDefaultViewIsValidAndSaysWhatNothingSays) {
+TEST(Schema, DefaultViewIsValidAndEqualsTheEmptyOne) {
   const auto said = ViewDocument::parse(encode_view(View{}));
   ASSERT_TRUE(said.has_value()) << said.error().message;
   EXPECT_EQ(encode_view(said->view()), encode_view(ViewDocument{}.view()));
@@ -104,7 +104,7 @@ TEST(Schema, EncodedViewsHoldExactlyTheSchemasKeys) {
 
 // The bound itself passes and the next number beyond it does not: the codec's range is the
 // schema's.
-TEST(Schema, RangesOfNumbersAreTheCodecs) {
+TEST(Schema, RangesOfNumbersMatchTheCodec) {
   int bounds = 0;
   walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
     const bool integer = schema.value("type", Json()) == "integer";
@@ -124,7 +124,7 @@ TEST(Schema, RangesOfNumbersAreTheCodecs) {
   EXPECT_GE(bounds, 50);
 }
 
-TEST(Schema, RangesInsideArraysAreTheCodecs) {
+TEST(Schema, RangesInsideArraysMatchTheCodec) {
   int bounds = 0;
   walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
     if (!schema.contains("items") || !schema["items"].contains("minimum")) return;
@@ -152,7 +152,7 @@ TEST(Schema, RangesInsideArraysAreTheCodecs) {
   EXPECT_GE(bounds, 30);
 }
 
-TEST(Schema, LimitsOfTheViewAreThoseOfTheLimitsFile) {
+TEST(Schema, LimitsOfTheViewMatchTheLimitsFile) {
   const Json schema = read_protocol_json("view.schema.json");
   const auto at = [&](const char* pointer) {
     return schema.at(Json::json_pointer(pointer)).get<double>();
@@ -192,7 +192,7 @@ TEST(Schema, LimitsOfTheViewAreThoseOfTheLimitsFile) {
               HasSubstr(std::to_string(limits::image_pixels_max)));
 }
 
-TEST(Schema, ListsAreAsLongAsTheLimitsAllow) {
+TEST(Schema, ListLengthsMatchTheLimits) {
   const auto media = [](int count) {
     Json view{{"scalars", Json::array()}};
     for (int i = 0; i < count; ++i)
@@ -210,7 +210,7 @@ TEST(Schema, ListsAreAsLongAsTheLimitsAllow) {
   EXPECT_EQ(first_pointer(points(limits::extinction_points_max + 1)), "/scalars/0/extinction");
 }
 
-TEST(Schema, NamesAreMeasuredInCharactersNotBytes) {
+TEST(Schema, NamesAreMeasuredInCharacters) {
   std::string longest;
   for (std::size_t i = 0; i < limits::name_chars_max; ++i) longest += "\xc3\xbc";
   for (const char* at : {"/dataset", "/vector/field", "/vector/color/map", "/vector/color/field",
@@ -223,7 +223,7 @@ TEST(Schema, NamesAreMeasuredInCharactersNotBytes) {
 }
 
 // The codec and the schema agree about every key and every kind of value that could stand there.
-TEST(Schema, EveryKeyTakesTheKindsOfValueThatTheSchemaSays) {
+TEST(Schema, EveryKeyAcceptsTheTypesOfTheSchema) {
   const std::vector<Json> samples{
       nullptr,       true,       3,         2.5,    "#123456", "auto",       "q\n",
       Json::array(), {{"x", 1}}, {0, 0, 1}, {0, 1}, {{0, 1}},  "perspective"};

@@ -63,7 +63,7 @@ TEST(Inspect, CountsWhatIsDecodedOnce) {
   }
 }
 
-TEST(Inspect, SaysWhyRangesAreOverTheFirstStep) {
+TEST(Inspect, ExplainsWhyRangesCoverTheFirstStepOnly) {
   const Folder folder;
   const std::string path = folder.file("a.nc");
   write_steps(path, 1024);  // chunks of 16 MiB
@@ -79,7 +79,7 @@ TEST(Inspect, SaysWhyRangesAreOverTheFirstStep) {
   EXPECT_FALSE(has_note(all, "ranges are"));
 }
 
-TEST(Inspect, ReadsRangesBeyondTheLimitWhereItIsAsked) {
+TEST(Inspect, ReadsRangesAboveTheLimitOnRequest) {
   const Folder folder;
   const std::string path = folder.file("a.nc");
   write_steps(path, 8192);  // chunks of 128 MiB

@@ -33,7 +33,7 @@ class SettingsFile : public testing::Test {
   std::filesystem::path folder_;
 };
 
-TEST_F(SettingsFile, IsReadWholeAndNoFurtherThanItMayBe) {
+TEST_F(SettingsFile, IsReadWholeUpToItsLimit) {
   std::ofstream(file("text")) << "0123456789";
   EXPECT_EQ(read_settings_file(file("text"), 10).value(), "0123456789");
   const auto large = read_settings_file(file("text"), 9);
@@ -45,7 +45,7 @@ TEST_F(SettingsFile, IsReadWholeAndNoFurtherThanItMayBe) {
 }
 
 // Opening a pipe without a writer would block.
-TEST_F(SettingsFile, ThatIsNoneIsNotWaitedFor) {
+TEST_F(SettingsFile, NonRegularFileDoesNotBlock) {
   ASSERT_EQ(mkfifo(file("pipe").c_str(), 0600), 0);
   for (const std::string& path : {file("pipe"), folder_.string(), std::string("/dev/zero")}) {
     const auto text = read_settings_file(path, 10);
@@ -81,7 +81,7 @@ class Gate {
   bool open_ = false;
 };
 
-TEST(Errand, IsNotWaitedForByWhoeverWantsItOrEndsIt) {
+TEST(Errand, DoesNotBlockRequestersOrShutdown) {
   Gate gate;
   std::atomic<int> calls = 0;
   Errand errand([&] {
@@ -97,7 +97,7 @@ TEST(Errand, IsNotWaitedForByWhoeverWantsItOrEndsIt) {
   EXPECT_EQ(calls, 1) << "none is begun after the end";
 }
 
-TEST(Errand, IsDoneOnceMoreForWhatCameMeanwhileAndLivesThroughFaults) {
+TEST(Errand, RunsOnceMoreForMissedRequestsAndSurvivesExceptions) {
   Gate gate;
   std::atomic<int> calls = 0;
   Gate second;

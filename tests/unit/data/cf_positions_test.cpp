@@ -117,7 +117,7 @@ void PrintTo(const Turned& turned, std::ostream* out) {
 // The wind's east and north are 10 steps.i + 1 steps.j, in steps of unit length.
 class TurnedAxes : public testing::TestWithParam<Turned> {};
 
-TEST_P(TurnedAxes, VectorsAlongRowsAndColumnsTurnWithThem) {
+TEST_P(TurnedAxes, VectorsAlongRowsAndColumnsAreRotatedWithThem) {
   const auto& [steps, drawn, note] = GetParam();
   const Folder folder;
   write_turned(folder / "t.nc", steps, "x_wind", "y_wind");
@@ -137,7 +137,7 @@ TEST_P(TurnedAxes, VectorsAlongRowsAndColumnsTurnWithThem) {
 }
 
 // Files from north to south whose v is northward are many; those whose v is along the index few.
-TEST_P(TurnedAxes, VectorsThatSayNothingStayAsTheyAreAndANoteSaysSo) {
+TEST_P(TurnedAxes, VectorsWithoutADirectionStayAndAreNoted) {
   const Folder folder;
   write_turned(folder / "t.nc", GetParam().steps, "", "");
   auto source = open_file(folder / "t.nc");
@@ -148,7 +148,7 @@ TEST_P(TurnedAxes, VectorsThatSayNothingStayAsTheyAreAndANoteSaysSo) {
   EXPECT_TRUE(has_note((*source)->info(), "does not say which way its components point"));
 }
 
-TEST_P(TurnedAxes, TheDerivedVerticalMotionsHorizontalPartToo) {
+TEST_P(TurnedAxes, HorizontalPartOfDerivedMotionIsRotated) {
   const auto& [steps, drawn, note] = GetParam();
   const Folder folder;
   write_turned(folder / "t.nc", steps, "x_wind", "y_wind", true);
@@ -216,7 +216,7 @@ void write_pole(const std::string& path, const char* mapping, double north_longi
 
 // The rotated grid's own frame: its pole, the direction of its longitude of the true pole, and what
 // is at right angles to both.
-TEST(Positions, ARotatedPolesColumnsAndWindsAreThoseOfItsFrame) {
+TEST(Positions, RotatedPoleColumnsAndWindsFollowTheirFrame) {
   for (const double north : {0.0, 25.0}) {
     const Folder folder;
     write_pole(folder / "p.nc", "rotated_latitude_longitude", north);
@@ -258,7 +258,7 @@ TEST(Positions, ARotatedPolesColumnsAndWindsAreThoseOfItsFrame) {
   }
 }
 
-TEST(Positions, WindsByEastAndNorthOnAMapWithoutPositionsAreNoted) {
+TEST(Positions, EastNorthWindsOnAMapWithoutPositionsAreNoted) {
   struct Case {
     const char* mapping;
     const char* name;

@@ -48,7 +48,7 @@ TEST(DatasetInfo, FindsFieldsByNameAndKind) {
   EXPECT_EQ(info.first(FieldKind::vector), nullptr);
 }
 
-TEST(FinishVolume, MasksInfinityAndNanAndRangesTheRest) {
+TEST(FinishVolume, MasksInfinityAndNanAndComputesTheRange) {
   const Volume volume = make_volume({3, 2, 1}, 1, {4, kNan, -2, kInfinity, 7, -kInfinity});
   EXPECT_EQ(volume.masked, 3);
   EXPECT_EQ(volume.range, (std::array<float, 2>{-2, 7}));
@@ -57,7 +57,7 @@ TEST(FinishVolume, MasksInfinityAndNanAndRangesTheRest) {
   }
 }
 
-TEST(FinishVolume, MakesAVectorsMaskCommonAndRangesItsMagnitude) {
+TEST(FinishVolume, UnitesTheMasksOfAVectorAndRangesItsMagnitude) {
   // Sample 0 is (3, 4, 12): length 13. Samples 1 and 2 lack one component each. Sample 3 is zero.
   const Volume volume = make_volume({4, 1, 1}, 3, {3, kNan, 5, 0, 4, 1, 5, 0, 12, 1, kInfinity, 0});
   EXPECT_EQ(volume.masked, 2);
@@ -77,7 +77,7 @@ TEST(FinishVolume, HugeComponentsDoNotOverflowTheMagnitude) {
   EXPECT_FLOAT_EQ(make_volume({1, 1, 1}, 2, {3e-30F, 4e-30F}).range[1], 5e-30F);
 }
 
-TEST(FinishVolume, AllMaskedHasRangeZero) {
+TEST(FinishVolume, FullyMaskedVolumeHasRangeZero) {
   const Volume volume = make_volume({2, 1, 1}, 2, {kNan, kNan, 1, 2});
   EXPECT_EQ(volume.masked, 2);
   EXPECT_EQ(volume.range, (std::array<float, 2>{0, 0}));

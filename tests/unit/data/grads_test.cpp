@@ -43,7 +43,7 @@ std::string descriptor(const std::string& more, const std::string& variables,
 const std::string two_days = "tdef 2 linear 06Z28FEB2000 1dy";
 const std::string one_u = "1\nu 2 99 wind [m/s]";
 
-TEST(Grads, RecordsAreLevelsOfVariablesOfTimes) {
+TEST(Grads, RecordsAreOrderedByTimeVariableAndLevel) {
   const Folder folder;
   write_file(folder / "d.ctl", descriptor(two_days,
                                           "3\nps 0 99 pressure\nu 2 99 wind [m/s]\n"
@@ -88,7 +88,7 @@ TEST(Grads, UndefIsMasked) {
 }
 
 // GrADS masks a hundred thousandth of the value to both sides.
-TEST(Grads, UndefIsMaskedWithWhatRoundingMadeOfIt) {
+TEST(Grads, RoundedUndefIsMasked) {
   const Folder folder;
   Doubles values = counted(24);
   values[4] = -999.00995;
@@ -164,7 +164,7 @@ TEST(Grads, ByteOrdersAndHeaders) {
   }
 }
 
-TEST(Grads, BytesThatNothingDescribesAreWholeStepsOrRefused) {
+TEST(Grads, ExtraBytesAreWholeStepsOrRefused) {
   const Folder folder;
   write_file(folder / "d.ctl", descriptor(two_days, one_u));
   write_file(folder / "d.dat", packed<float>(counted(24)));
@@ -186,7 +186,7 @@ TEST(Grads, BytesThatNothingDescribesAreWholeStepsOrRefused) {
   EXPECT_THAT(source->info().notes, Contains(HasSubstr("4 bytes after the last steps")));
 }
 
-TEST(Grads, AMissingFileIsReportedWithItsReference) {
+TEST(Grads, MissingFileIsReportedWithItsReference) {
   const Folder folder;
   write_file(folder / "d.ctl", descriptor(two_days, one_u));
   write_file(folder / "t.ctl", descriptor(two_days + "\noptions template", one_u, "^t%d2.dat"));
@@ -200,7 +200,7 @@ TEST(Grads, AMissingFileIsReportedWithItsReference) {
               HasSubstr("'t28.dat', which 't.ctl' names, is not there"));
 }
 
-TEST(Grads, OtherOrdersAndWholeNumbers) {
+TEST(Grads, OtherByteOrdersAndIntegers) {
   const Folder folder;
   // All times of u, then of v.
   write_file(folder / "d.ctl", descriptor(two_days, "2\nu 2 -1,20 u\nv 2 -1,20 v"));
@@ -251,7 +251,7 @@ TEST(Grads, TemplatesJoinFilesOfUnequalLength) {
   EXPECT_EQ(source->info().steps[1].text, "1999-02-01T00:00:00Z");
 }
 
-TEST(Grads, AFileThatATemplateNamesMayBeAbsent) {
+TEST(Grads, FileOfATemplateMayBeMissing) {
   const Folder folder;
   write_file(folder / "d.ctl", descriptor("tdef 3 linear 21Z31dec1999 90mn\noptions template",
                                           one_u, "^%y4%m2%d2%h2%n2_%t2_%f3.dat"));
@@ -399,7 +399,7 @@ TEST_F(GradsModel, RangesAndMaskedCountsOfTheFirstAndLastTime) {
 }
 
 // The fastest wind blows at 200 hPa, 38 N, 135 E, east over Japan; mountains are masked below.
-TEST_F(GradsModel, SamplesLieWhereTheyBelong) {
+TEST_F(GradsModel, SamplesHaveTheirExpectedPositions) {
   const auto u = values_of(*source_, "U", 0);
   const auto index = [](std::size_t x, std::size_t y, std::size_t z) {
     return x + 72 * (y + 46 * z);

@@ -24,7 +24,7 @@ using testing::HasSubstr;
 
 #ifndef WINDSPLAT_GRIB
 
-TEST(Grib, IsRefusedByNameWithoutItsLibrary) {
+TEST(Grib, IsRefusedByNameWithoutTheLibrary) {
   const Folder folder;
   write_bytes(folder / "a.grib", std::string("GRIB\0\0\x30\x01", 8) + std::string(40, '\0'));
   auto source = open_file(folder / "a.grib");
@@ -196,7 +196,7 @@ TEST_F(Grib, MessagesOfBothEditionsBecomeAVolumeOverTimeAndLevel) {
   expect_form(*source, "t", 1, 6);
 }
 
-TEST_F(Grib, ValuesStandAtTheirPlacesHoweverTheyAreScanned) {
+TEST_F(Grib, ValuesKeepTheirPositionsInEveryScanningMode) {
   for (const int edition : {1, 2}) {
     for (int flags = 0; flags < (edition == 1 ? 8 : 16); ++flags) {
       SCOPED_TRACE(std::to_string(edition) + " " + std::to_string(flags));
@@ -318,7 +318,7 @@ std::string lambert_wind(const std::string& component, bool along_rows) {
   return maker.bytes();
 }
 
-TEST_F(Grib, WindsAlongTheRowsStayAndOthersAreTurnedToThem) {
+TEST_F(Grib, WindsAlongRowsStayAndOthersAreRotated) {
   const double angle = 35 * std::sin(25 * M_PI / 180) * M_PI / 180;
   for (const bool along_rows : {true, false}) {
     const auto source = open(lambert_wind("u", along_rows) + lambert_wind("v", along_rows));
@@ -373,23 +373,23 @@ TEST_F(Grib, WindsOnPolarStereographicGridsFollowTheFlagOfTheirEdition) {
   }
 }
 
-TEST_F(Grib, FurtherMembersAreToldAndLeftOut) {
+TEST_F(Grib, FurtherMembersAreReportedAndOmitted) {
   const auto source = open(message(1, "t", 500, 0) + message(1, "t", 500, 0, {}, 20));
   ASSERT_NE(source, nullptr);
   EXPECT_THAT(source->info().notes, ElementsAre(HasSubstr("1 more messages")));
   EXPECT_EQ(source->read(0, 0)->masked, 0);
 }
 
-TEST_F(Grib, AHeadingBeforeTheMessageIsPassedOver) {
+TEST_F(Grib, HeadingBeforeTheMessageIsSkipped) {
   EXPECT_EQ(fault("\x01\r\r\n001\r\r\nHTXX50 EGRR 291200\r\r\n" + message(1, "t", 500, 0)), "");
 }
 
-TEST_F(Grib, ReducedGridsAreRefusedWithTheirName) {
+TEST_F(Grib, ReducedGridsAreRefusedByName) {
   const Maker maker("reduced_gg_pl_32_grib2");
   EXPECT_THAT(fault(maker.bytes()), HasSubstr("'reduced_gg'"));
 }
 
-TEST_F(Grib, BrokenMessagesAreFaults) {
+TEST_F(Grib, BrokenMessagesAreErrors) {
   const std::string good = message(2, "t", 500, 0);
   EXPECT_EQ(fault(good), "");
   EXPECT_THAT(fault(good.substr(0, good.size() - 1)), HasSubstr("cut short"));

@@ -232,7 +232,7 @@ std::vector<int> outcomes(const std::string& path) {
   return out;
 }
 
-TEST(LoaderConfinement, NothingButReadingAndComputingIsLeft) {
+TEST(LoaderConfinement, AllowsOnlyReadingAndComputing) {
   const test::Folder folder;
   const std::string path = folder / "given";
   std::ofstream(path) << "first";
@@ -245,7 +245,7 @@ TEST(LoaderConfinement, NothingButReadingAndComputingIsLeft) {
 
 #ifdef __x86_64__
 // No rule covers the call numbers of x32.
-TEST(LoaderConfinement, ACallOfAnotherAbiEndsTheProcess) {
+TEST(LoaderConfinement, SystemCallOfAnotherAbiTerminatesTheProcess) {
   constexpr long x32 = 0x40000000;
   std::fflush(nullptr);
   const pid_t child = ::fork();

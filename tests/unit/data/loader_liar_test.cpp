@@ -42,7 +42,7 @@ DatasetInfo told() {
   return info;
 }
 
-class Liar : public testing::Test {
+class FaultyLoader : public testing::Test {
  protected:
   void SetUp() override {
     file_ = folder_ / "some.nc";
@@ -137,7 +137,7 @@ class Liar : public testing::Test {
   Limits limits_;
 };
 
-TEST_F(Liar, AValidAnswerIsAccepted) {
+TEST_F(FaultyLoader, ValidAnswerIsAccepted) {
   speak("fd = told()\nos.pwrite(fd, floats(*range(16)), 0)\nos.close(fd)\nsay('filled')\nhear()\n");
   const auto volume = read();
   ASSERT_TRUE(volume) << volume.error().message;
@@ -150,24 +150,24 @@ TEST_F(Liar, AValidAnswerIsAccepted) {
   EXPECT_FLOAT_EQ(volume->range[1], std::hypot(7.0F, 15.0F));
 }
 
-TEST_F(Liar, OneThatEnds) {
+TEST_F(FaultyLoader, ExitIsAnError) {
   be("#!/bin/sh\nexit 7\n");
   expect_not_opened("the loader of 'some.nc' ended with code 7 while opening it");
 }
 
-TEST_F(Liar, OneThatSpins) {
+TEST_F(FaultyLoader, EndlessLoopIsTerminated) {
   limits_.open_time = milliseconds(300);
   be("#!/bin/sh\nwhile :; do :; done\n");
   expect_not_opened("the loader of 'some.nc' was ended after 0.3 s while opening it");
 }
 
-TEST_F(Liar, OneThatSendsSingleBytes) {
+TEST_F(FaultyLoader, SingleByteMessagesAreRead) {
   limits_.open_time = milliseconds(700);
   speak("while True: s.send(b'\\x01\\0\\0\\0'[:1]); time.sleep(0.06)\n");
   expect_not_opened("the loader of 'some.nc' was ended after 0.7 s while opening it");
 }
 
-TEST_F(Liar, OneThatSendsMalformedMessages) {
+TEST_F(FaultyLoader, MalformedMessagesAreRefused) {
   const std::string message =
       "the loader of 'some.nc' violated the protocol and was ended while opening it";
   speak("s.sendall(b'x' * 1000)\nhear()\n");
@@ -183,14 +183,14 @@ TEST_F(Liar, OneThatSendsMalformedMessages) {
 }
 
 // Where little is due, little is taken.
-TEST_F(Liar, OneThatSendsTooManyMessages) {
+TEST_F(FaultyLoader, TooManyMessagesAreRefused) {
   speak("told()\nsay('progress', b'x' * 100000)\nhear()\n");
   expect_not_read(
       "the loader of 'some.nc' violated the protocol and was ended while reading 'wind'");
 }
 
 // Memory written by a loader and not reused is released with it.
-TEST_F(Liar, OneThatFailsToFillMuchIsEnded) {
+TEST_F(FaultyLoader, FailingToFillMuchMemoryIsTerminated) {
   describe_much();
   speak("fd = told()\nos.pwrite(fd, b'x' * 1000, 0)\nfail('no')\nhear()\n");
   auto source = opened();
@@ -201,7 +201,7 @@ TEST_F(Liar, OneThatFailsToFillMuchIsEnded) {
   EXPECT_EQ((*source)->process(), -1);
 }
 
-TEST_F(Liar, OneThatKeepsMuchMappedIsEnded) {
+TEST_F(FaultyLoader, KeepingMuchMemoryMappedIsTerminated) {
   describe_much();
   speak("fd = told()\nm = mmap.mmap(fd, 4096)\nsay('filled')\nhear()\n");
   auto source = opened();
@@ -215,13 +215,13 @@ TEST_F(Liar, OneThatKeepsMuchMappedIsEnded) {
   EXPECT_GT((*source)->process(), 0);
 }
 
-TEST_F(Liar, OneThatSendsEndlessRequests) {
+TEST_F(FaultyLoader, EndlessRequestsAreRefused) {
   limits_.opens_max = 100;
   speak("while True: ask('ask_exists', b'some.nc')\n");
   expect_not_opened("the loader of 'some.nc' violated the protocol and was ended while opening it");
 }
 
-TEST_F(Liar, OneThatRequestsOtherFiles) {
+TEST_F(FaultyLoader, RequestsForOtherFilesAreRefused) {
   std::ofstream(folder_ / "beside") << "private";
   limits_.library_folders = {folder_ / "tables"};
   std::filesystem::create_directories(folder_ / "tables");
@@ -249,12 +249,12 @@ TEST_F(Liar, OneThatRequestsOtherFiles) {
             "descriptor no no no no no no no no");
 }
 
-TEST_F(Liar, OneThatDescribesNoDataset) {
+TEST_F(FaultyLoader, InvalidDatasetsAreRefused) {
   speak("say('opened', info[:-1])\nhear()\n");
   expect_not_opened("the loader sent a description that cannot be read");
 }
 
-TEST_F(Liar, OneThatKeepsTheMemoryCannotChangeWhatWasRead) {
+TEST_F(FaultyLoader, KeptMemoryCannotChangeTheVolume) {
   speak(
       "fd = told()\nm = mmap.mmap(fd, 64)\nm[:] = floats(*[1] * 16)\nsay('filled')\n"
       "time.sleep(0.2)\nm[:] = floats(*[2] * 16)\nhear()\n");
@@ -267,7 +267,7 @@ TEST_F(Liar, OneThatKeepsTheMemoryCannotChangeWhatWasRead) {
   EXPECT_GT((*source)->process(), 0);
 }
 
-TEST_F(Liar, OneThatFillsNothingOrLessHandsOverWhatWasThere) {
+TEST_F(FaultyLoader, UnfilledMemoryReadsAsZero) {
   speak(
       "told()\nsay('filled')\n"
       "kind, _, fd = hear()\n"
@@ -282,7 +282,7 @@ TEST_F(Liar, OneThatFillsNothingOrLessHandsOverWhatWasThere) {
   }
 }
 
-TEST_F(Liar, OneThatFailsAtFirstIsSentTheMemoryAgain) {
+TEST_F(FaultyLoader, FailureAtFirstSendsTheMemoryAgain) {
   speak(
       "told()\nfail('not yet')\n"
       "kind, _, fd = hear()\n"
@@ -297,7 +297,7 @@ TEST_F(Liar, OneThatFailsAtFirstIsSentTheMemoryAgain) {
 }
 
 // 64 bytes at 16 a second.
-TEST_F(Liar, OneThatIsSlowHasTimeByTheBytesThatAreRead) {
+TEST_F(FaultyLoader, TimeLimitGrowsWithTheBytesRead) {
   limits_.read_time = milliseconds(100);
   limits_.read_bytes_per_second = 16;
   speak("told()\ntime.sleep(0.5)\nsay('filled')\nhear()\n");
@@ -305,7 +305,7 @@ TEST_F(Liar, OneThatIsSlowHasTimeByTheBytesThatAreRead) {
   EXPECT_TRUE(volume) << volume.error().message;
 }
 
-TEST_F(Liar, ProgressIsReported) {
+TEST_F(FaultyLoader, ProgressIsReported) {
   speak(
       "told()\nfor done in (0, 0.5, 1): say('progress', struct.pack('<d', done))\n"
       "say('filled')\nhear()\n");
@@ -317,7 +317,7 @@ TEST_F(Liar, ProgressIsReported) {
   EXPECT_EQ(heard, (std::vector<double>{0, 0.5, 1}));
 }
 
-TEST_F(Liar, OneThatResizesTheMemory) {
+TEST_F(FaultyLoader, ResizedMemoryIsRefused) {
   speak(
       "fd = told()\n"
       "for size in (0, 32, 128):\n"
@@ -328,7 +328,7 @@ TEST_F(Liar, OneThatResizesTheMemory) {
   EXPECT_TRUE(volume) << volume.error().message;
 }
 
-TEST_F(Liar, OneThatLeavesInfinitiesOrHalfAVector) {
+TEST_F(FaultyLoader, InfinitiesAndIncompleteVectorsAreRefused) {
   const std::string message = "the loader of 'told.nc' left numbers unmasked while reading 'wind'";
   for (const char* values : {"[inf] + [0] * 15", "[0] * 15 + [-inf]", "[nan] + [0] * 15",
                              "[0] * 12 + [nan] + [0] * 3"}) {

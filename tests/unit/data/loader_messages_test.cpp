@@ -101,7 +101,7 @@ void expect_sound(const DatasetInfo& info) {
   }
 }
 
-TEST(LoaderMessages, AnInfoComesOutAsItWentIn) {
+TEST(LoaderMessages, InfoSurvivesARoundTrip) {
   const DatasetInfo info = good();
   auto out = decode_info(encode_info(info));
   ASSERT_TRUE(out) << out.error().message;
@@ -144,7 +144,7 @@ TEST(LoaderMessages, AnInfoComesOutAsItWentIn) {
   EXPECT_EQ(out->steps[1].text, "2000-01-02T12:00:00Z");
 }
 
-TEST(LoaderMessages, WhatNoReaderWouldSayIsRefused) {
+TEST(LoaderMessages, ValuesNoReaderReportsAreRefused) {
   const std::vector<std::pair<const char*, void (*)(DatasetInfo&)>> lies{
       {"no steps", [](DatasetInfo& i) { i.steps.clear(); }},
       {"no fields", [](DatasetInfo& i) { i.fields.clear(); }},
@@ -199,7 +199,7 @@ TEST(LoaderMessages, WhatNoReaderWouldSayIsRefused) {
   }
 }
 
-TEST(LoaderMessages, EveryPartMissingOrTooMuchIsRefused) {
+TEST(LoaderMessages, MissingOrExtraPartsAreRefused) {
   const std::string message = encode_info(good());
   for (std::size_t size = 0; size < message.size(); ++size) {
     EXPECT_FALSE(decode_info(std::string_view(message).substr(0, size))) << size;
@@ -207,7 +207,7 @@ TEST(LoaderMessages, EveryPartMissingOrTooMuchIsRefused) {
   EXPECT_FALSE(decode_info(message + '\0'));
 }
 
-TEST(LoaderMessages, ControlCharactersAreSpeltOut) {
+TEST(LoaderMessages, ControlCharactersAreEscaped) {
   DatasetInfo info = good();
   info.title = "a\nb\x1b[2J";
   info.fields[1].name = std::string("T\0", 2);
@@ -217,7 +217,7 @@ TEST(LoaderMessages, ControlCharactersAreSpeltOut) {
   EXPECT_EQ(out->fields[1].name, "T\\x00");
 }
 
-TEST(LoaderMessages, NoMutationOfAnInfoBreaksWhatOthersRelyOn) {
+TEST(LoaderMessages, NoMutationOfAnInfoViolatesItsInvariants) {
   const std::string message = encode_info(good());
   std::mt19937 random(20240607);
   const auto pick = [&](std::size_t n) { return static_cast<std::size_t>(random()) % n; };
@@ -262,7 +262,7 @@ TEST(LoaderMessages, NoMutationOfAnInfoBreaksWhatOthersRelyOn) {
   EXPECT_GT(accepted, 1000);  // changed letters and numbers are none of its business
 }
 
-TEST(LoaderMessages, ErrorsKeepKindAndMessageAndNothingElsePasses) {
+TEST(LoaderMessages, OnlyKindAndMessageOfErrorsPass) {
   const Error wrong = make_error(ErrorKind::out_of_memory, "no memory");
   EXPECT_EQ(decode_error(encode_error(wrong)).kind, ErrorKind::out_of_memory);
   EXPECT_EQ(decode_error(encode_error(wrong)).message, "no memory");
@@ -273,7 +273,7 @@ TEST(LoaderMessages, ErrorsKeepKindAndMessageAndNothingElsePasses) {
   EXPECT_EQ(decode_error("").kind, ErrorKind::bad_data);
 }
 
-TEST(LoaderMessages, ATaskSaysNamesButNoPaths) {
+TEST(LoaderMessages, TaskContainsNamesButNoPaths) {
   Task task;
   task.memory_bytes = 77;
   task.library_folders = {"/usr/share/tables"};

@@ -31,7 +31,7 @@ std::vector<std::string> of_children(const std::string& begin) {
   return out;
 }
 
-TEST(LoaderPrivileges, ALoaderHasNoCapabilities) {
+TEST(LoaderPrivileges, LoaderHasNoCapabilities) {
   const test::Folder folder;
   const std::string path = folder / "a.nc";
   test::write_wind(path, NC_NETCDF4);
@@ -63,7 +63,7 @@ int read_without_devices(const std::string& path) {
   return 0;
 }
 
-TEST(LoaderPrivileges, ALoaderStartsWhereTheNullDeviceIsGoneMeanwhile) {
+TEST(LoaderPrivileges, LoaderStartsWithoutTheNullDevice) {
   const test::Folder folder;
   const std::string path = folder / "a.nc";
   test::write_wind(path, NC_NETCDF4);

@@ -101,7 +101,7 @@ TEST_F(Loader, Netcdf4FilesReadAsInThisProcess) {
 
 // Chunks that were never written, in a file that says not to fill them in: HDF5 leaves alone what
 // it should read into, and the memory between the two had another field's numbers. They are masked.
-TEST_F(Loader, WhatALibraryLeavesAloneIsNothingOfTheVolumeBefore) {
+TEST_F(Loader, UnwrittenSamplesHoldNothingOfAnEarlierVolume) {
   const std::string path = folder_ / "unfilled.nc";
   {
     NetcdfMaker file(path);
@@ -143,7 +143,7 @@ double shared_by(pid_t id) {
 
 // The memory between the two is used again for the scalar, and made anew for the vector, which is
 // too large for it to be kept.
-TEST_F(Loader, VolumesSmallAndLargeReadAsInThisProcess) {
+TEST_F(Loader, SmallAndLargeVolumesReadAsInThisProcess) {
   std::ofstream(folder_ / "large.json")
       << R"({"windsplat": "raw", "file": "large.raw", "type": "float32", "endian": "little",
              "dims": {"x": 160, "y": 150, "z": 128}, "steps": {"count": 2},
@@ -169,7 +169,7 @@ TEST_F(Loader, VolumesSmallAndLargeReadAsInThisProcess) {
 }
 
 // What a header refers to is part of the dataset.
-TEST_F(Loader, ACompanionThatChangesIsNoticed) {
+TEST_F(Loader, ChangedCompanionFileIsDetected) {
   std::ofstream(folder_ / "c.json")
       << R"({"windsplat": "raw", "file": "c.raw", "type": "float32", "endian": "little",
              "dims": {"x": 4, "y": 4, "z": 4}, "fields": [{"name": "cloud"}]})";
@@ -187,7 +187,7 @@ TEST_F(Loader, ACompanionThatChangesIsNoticed) {
   EXPECT_EQ(store.find("c").value()->volume("cloud", 0).value()->values[0], 2.0F);
 }
 
-TEST_F(Loader, FilesOfOthersReadAsInThisProcess) {
+TEST_F(Loader, ForeignFilesReadAsInThisProcess) {
   const char* given = std::getenv("WINDSPLAT_TEST_DATA");
   const std::string data = given != nullptr ? given : WINDSPLAT_SOURCE_DIR "/build/test-data";
   int files = 0;
@@ -200,7 +200,7 @@ TEST_F(Loader, FilesOfOthersReadAsInThisProcess) {
   EXPECT_EQ(files, 5);
 }
 
-TEST_F(Loader, AFileMayBeCalledLikeAnAddress) {
+TEST_F(Loader, FileNameMayLookLikeAUrl) {
   for (const char* name : {"file.nc#mode=zarr,s3", "http:x.nc", "[dap4]x.nc", "dods:.nc"}) {
     const std::string path = folder_ / name;
     test::write_wind(folder_ / "plain.nc", NC_NETCDF4);
@@ -225,7 +225,7 @@ void write_two_groups(const std::string& path) {
   }
 }
 
-TEST_F(Loader, ASeriesIsToldByItsPattern) {
+TEST_F(Loader, SeriesKeepsItsPatternAsName) {
   test::write_wind(folder_ / "part_1.nc", 0);
   test::write_wind(folder_ / "part_2.nc", 0);
   const auto source = opened(folder_ / "part_*.nc");
@@ -235,7 +235,7 @@ TEST_F(Loader, ASeriesIsToldByItsPattern) {
   expect_same_as_here(folder_ / "part_*.nc");
 }
 
-TEST_F(Loader, AGroupThatIsNamedIsTheOneThatIsRead) {
+TEST_F(Loader, NamedGroupIsRead) {
   const std::string path = folder_ / "two.nc";
   write_two_groups(path);
   for (const auto& [group, first] : {std::pair("#/a", 1.0F), std::pair("#/b", 100.0F)}) {
@@ -257,7 +257,7 @@ TEST_F(Loader, AGroupThatIsNamedIsTheOneThatIsRead) {
   EXPECT_EQ(absent.error().message, "'two.nc' has no group '/nope', but '/a', '/b'");
 }
 
-TEST_F(Loader, WhatIsNoDatasetIsTheSameErrorAsInThisProcess) {
+TEST_F(Loader, InvalidFileGivesTheSameErrorAsInThisProcess) {
   const std::string path = folder_ / "text.nc";
   std::ofstream(path) << "no dataset, whatever its name says";
   const auto here = open_file(path);
@@ -280,7 +280,7 @@ TEST_F(Loader, ExternalStorageIsRefusedByName) {
   }
 }
 
-TEST_F(Loader, AnExternalLinkIsRefusedByName) {
+TEST_F(Loader, ExternalLinkIsRefusedByName) {
   const std::string other = folder_ / "other.nc";
   test::write_wind(other, NC_NETCDF4);
   const std::string path = folder_ / "crafted.nc";
@@ -291,7 +291,7 @@ TEST_F(Loader, AnExternalLinkIsRefusedByName) {
   EXPECT_THAT(there.error().message, HasSubstr("external link, which is not followed: '/linked'"));
 }
 
-TEST_F(Loader, OneThatDiesIsAnErrorAndTheNextReadStartsAnother) {
+TEST_F(Loader, CrashIsAnErrorAndTheNextReadStartsAnother) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   const auto source = opened(path);
@@ -318,7 +318,7 @@ TEST_F(Loader, OneThatDiesIsAnErrorAndTheNextReadStartsAnother) {
   expect_same(*first, *again);
 }
 
-TEST_F(Loader, OneThatDiedWhileNothingWasAskedIsReplacedUnseen) {
+TEST_F(Loader, CrashWhileIdleIsReplacedSilently) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, 0);
   const auto source = opened(path);
@@ -331,7 +331,7 @@ TEST_F(Loader, OneThatDiedWhileNothingWasAskedIsReplacedUnseen) {
   EXPECT_TRUE(read) << read.error().message;
 }
 
-TEST_F(Loader, OneThatTakesTooLongIsEnded) {
+TEST_F(Loader, TimeoutEndsIt) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   Limits limits;
@@ -350,7 +350,7 @@ TEST_F(Loader, OneThatTakesTooLongIsEnded) {
   EXPECT_TRUE(again) << again.error().message;
 }
 
-TEST_F(Loader, OneThatIsStoppedIsEndedAndOthersAreReadMeanwhile) {
+TEST_F(Loader, StoppedLoaderIsEndedWhileOthersAreRead) {
   const std::string path = folder_ / "a.nc";
   const std::string other_path = folder_ / "b.nc";
   test::write_wind(path, NC_NETCDF4);
@@ -380,7 +380,7 @@ TEST_F(Loader, OneThatIsStoppedIsEndedAndOthersAreReadMeanwhile) {
   EXPECT_NE(source->process(), id);
 }
 
-TEST_F(Loader, ItsMemoryAndThatOfTheTransferCountWhileItIsThere) {
+TEST_F(Loader, ItsMemoryAndTransfersAreCountedWhileItRuns) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   Limits limits;
@@ -400,7 +400,7 @@ TEST_F(Loader, ItsMemoryAndThatOfTheTransferCountWhileItIsThere) {
   EXPECT_THAT(refused.error().message, testing::HasSubstr("needs 8.0 MiB"));
 }
 
-TEST_F(Loader, OneThatOutgrowsTheBudgetWhileItOpensIsAnError) {
+TEST_F(Loader, ExceedingTheBudgetWhileOpeningIsAnError) {
   const std::string path = folder_ / "a.nc";
   test::write_positions(path, 1500);  // 36 MB of coordinates
   Limits limits;
@@ -420,7 +420,7 @@ TEST_F(Loader, OneThatOutgrowsTheBudgetWhileItOpensIsAnError) {
 }
 
 #ifndef WINDSPLAT_SANITIZED  // whose shadow counts as memory
-TEST_F(Loader, AVolumeIsTheSameWhereTheMemoryOfItsTransferIsNotKept) {
+TEST_F(Loader, VolumeIsTheSameWhenTransferMemoryIsNotKept) {
   const std::string path = folder_ / "a.nc";
   test::write_large(path);
   Limits limits;
@@ -440,7 +440,7 @@ TEST_F(Loader, AVolumeIsTheSameWhereTheMemoryOfItsTransferIsNotKept) {
 }
 #endif
 
-TEST_F(Loader, AReadCanBeCancelledFromAnotherThread) {
+TEST_F(Loader, ReadCanBeCancelledFromAnotherThread) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   const auto source = opened(path);
@@ -460,7 +460,7 @@ TEST_F(Loader, AReadCanBeCancelledFromAnotherThread) {
   EXPECT_TRUE(source->read(0, 0));
 }
 
-TEST_F(Loader, ReleasedItHoldsNothingAndComesBackForTheSameFileOnly) {
+TEST_F(Loader, ReleasedLoaderHoldsNothingAndReopensTheSameFileOnly) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   const auto source = opened(path);
@@ -484,7 +484,7 @@ TEST_F(Loader, ReleasedItHoldsNothingAndComesBackForTheSameFileOnly) {
 
 #ifndef WINDSPLAT_SANITIZED
 // A chunk of 48 MiB, compressed to a few kilobytes.
-TEST_F(Loader, AFileThatUnfoldsBeyondTheMemoryIsAnError) {
+TEST_F(Loader, FileThatDecompressesBeyondTheMemoryIsAnError) {
   const std::string path = folder_ / "bomb.nc";
   {
     NetcdfMaker file(path);
@@ -516,7 +516,7 @@ std::size_t open_descriptors() {
   return count;
 }
 
-TEST_F(Loader, NothingIsLeftBehindBy200OfThem) {
+TEST_F(Loader, TwoHundredLoadersLeaveNothingBehind) {
   const std::string path = folder_ / "a.nc";
   const std::string text = folder_ / "text.nc";
   test::write_wind(path, 0);
@@ -537,7 +537,7 @@ TEST_F(Loader, NothingIsLeftBehindBy200OfThem) {
   EXPECT_EQ(errno, ECHILD);
 }
 
-TEST_F(Loader, NoneOutlivesTheDaemonNotEvenAtWork) {
+TEST_F(Loader, NoneOutlivesTheDaemonEvenWhileBusy) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, 0);
   ASSERT_EQ(::prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0), 0);  // orphans come to us
@@ -566,7 +566,7 @@ TEST_F(Loader, NoneOutlivesTheDaemonNotEvenAtWork) {
   ::prctl(PR_SET_CHILD_SUBREAPER, 0, 0, 0, 0);
 }
 
-TEST_F(Loader, NoProgramIsStartedThatWasNotNamed) {
+TEST_F(Loader, StartsOnlyTheNamedProgram) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, 0);
   set_program("");

@@ -195,7 +195,7 @@ INSTANTIATE_TEST_SUITE_P(
                     VerticalCase{"sigma", "sigma_level", "", "up", AxisKind::level, false},
                     VerticalCase{"lev", "sigma_level", "", "", AxisKind::level, false}));
 
-TEST(NetcdfAxes, ValuesTellTheWayWherePositiveIsSilent) {
+TEST(NetcdfAxes, ValuesDecideTheDirectionWithoutPositive) {
   struct Case {
     const char* name;
     const char* units;
@@ -238,7 +238,7 @@ TEST(NetcdfAxes, ValuesTellTheWayWherePositiveIsSilent) {
   }
 }
 
-TEST(NetcdfAxes, OceanPressureIsNoAir) {
+TEST(NetcdfAxes, OceanPressureIsNotAirPressure) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "o.nc");
@@ -254,7 +254,7 @@ TEST(NetcdfAxes, OceanPressureIsNoAir) {
 }
 
 // A second dimension of length 1 along one axis is ignored, at any position.
-TEST(NetcdfAxes, ASecondTimeOrLevelOfLengthOneIsPassedOver) {
+TEST(NetcdfAxes, SecondTimeOrLevelOfLengthOneIsSkipped) {
   for (const int second : {0, 1, 2, 3}) {
     const Folder folder;
     {
@@ -335,7 +335,7 @@ TEST(NetcdfAxes, RecognisesAxesByTheAxisAttributeAgainstTheNames) {
   EXPECT_EQ(volume->values, (std::vector<float>{0, 2, 4, 1, 3, 5}));
 }
 
-TEST(NetcdfAxes, UnknownNamesTakePlacesFromTheRight) {
+TEST(NetcdfAxes, UnknownDimensionsAreAssignedFromTheRight) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "plain.nc");
@@ -357,7 +357,7 @@ TEST(NetcdfAxes, UnknownNamesTakePlacesFromTheRight) {
   EXPECT_EQ(volume->values[4], 4.0F);
 }
 
-TEST(NetcdfAxes, AnUnlimitedUnknownFirstDimensionIsTime) {
+TEST(NetcdfAxes, UnknownUnlimitedFirstDimensionIsTime) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "u.nc", 0);
@@ -375,7 +375,7 @@ TEST(NetcdfAxes, AnUnlimitedUnknownFirstDimensionIsTime) {
   EXPECT_EQ(volume->values[0], 12.0F);
 }
 
-TEST(NetcdfAxes, UnevenAxesAndWrappedLongitudesStayAsTheyAre) {
+TEST(NetcdfAxes, UnevenAxesAndWrappedLongitudesAreKept) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "w.nc");
@@ -411,7 +411,7 @@ TEST(NetcdfAxes, DimensionsOfOne) {
   EXPECT_EQ(volume->values, (std::vector<float>{3, 4}));
 }
 
-TEST(NetcdfAxes, AFileWithoutTimeHasOneStepAndAScalarTimeNamesIt) {
+TEST(NetcdfAxes, FileWithoutTimeHasOneStepNamedByAScalarTime) {
   const Folder folder;
   for (const bool timed : {false, true}) {
     {
@@ -466,7 +466,7 @@ TEST(NetcdfAxes, CoordinatesThatAreNotMonotonicAreRefused) {
   }
 }
 
-TEST(NetcdfAxes, CurvilinearCoordinatesTellWhichDimensionRunsWhere) {
+TEST(NetcdfAxes, CurvilinearCoordinatesDecideDimensionDirections) {
   // Rows run east and columns south, as no name betrays; longitude crosses the date line.
   const Folder folder;
   {
@@ -510,7 +510,7 @@ TEST(NetcdfAxes, CurvilinearCoordinatesTellWhichDimensionRunsWhere) {
   }
 }
 
-TEST(NetcdfAxes, CurvilinearCoordinatesWithGapsTellDirectionsAlone) {
+TEST(NetcdfAxes, CurvilinearCoordinatesWithGapsGiveDirectionsOnly) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "g.nc");

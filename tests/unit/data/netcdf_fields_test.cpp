@@ -123,7 +123,7 @@ TEST(NetcdfFields, OtherVectorsByTheirStem) {
             (Expected{{"uvstress", {"ustress", "vstress"}}}));
 }
 
-TEST(NetcdfFields, WhatIsNoVector) {
+TEST(NetcdfFields, OtherVariablesFormNoVector) {
   EXPECT_EQ(vectors({variable("u"), variable("w")}), Expected{});
   EXPECT_EQ(vectors({variable("u", "m/s"), variable("v", "V")}), Expected{});  // v: a voltage
   EXPECT_EQ(vectors({variable("max", "K"), variable("min", "K")}), Expected{});
@@ -132,13 +132,13 @@ TEST(NetcdfFields, WhatIsNoVector) {
   EXPECT_EQ(vectors(elsewhere), Expected{});
 }
 
-TEST(NetcdfFields, VectorsNeverShareANameWithAVariable) {
+TEST(NetcdfFields, VectorNamesDifferFromVariableNames) {
   EXPECT_EQ(
       vectors({variable("wind"), variable("u"), variable("v"), variable("ua"), variable("va")}),
       (Expected{{"wind_vector", {"u", "v"}}, {"wind_vector_2", {"ua", "va"}}}));
 }
 
-TEST(NetcdfFields, AVectorsInfoSpeaksForItsComponents) {
+TEST(NetcdfFields, VectorInfoReplacesThatOfItsComponents) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "w.nc");
@@ -184,7 +184,7 @@ TEST(NetcdfFields, AVectorsInfoSpeaksForItsComponents) {
   EXPECT_EQ(alone->masked, 0);
 }
 
-TEST(NetcdfFields, TheLargestGridWinsAndEverythingElseIsExplained) {
+TEST(NetcdfFields, LargestGridIsUsedAndTheRestIsExplained) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "many.nc");

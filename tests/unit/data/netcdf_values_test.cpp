@@ -205,7 +205,7 @@ TEST(NetcdfValues, SignedShortsMarkedUnsigned) {
   expect_values(described(-32768, -2), {kNan, kNan, kNan, 32768, 65533, 65534, kNan});
 }
 
-TEST(NetcdfValues, EveryFormatHoldsTheSame) {
+TEST(NetcdfValues, EveryFormatHoldsTheSameValues) {
   struct Case {
     int mode;
     const char* format;
@@ -274,7 +274,7 @@ TEST(NetcdfValues, BlocksAndStepsReadAgainAreTheSame) {
   }
 }
 
-TEST(NetcdfValues, AVolumeReadInManyBlocksIsWhole) {
+TEST(NetcdfValues, VolumeReadInManyBlocksIsComplete) {
   // 40 x 300 x 500 doubles are more than one read's worth; chunks do not divide the levels.
   const Folder folder;
   const std::array<std::size_t, 3> lengths{40, 300, 500};

@@ -256,7 +256,7 @@ TEST(NetcdfWriter, FollowsCfConventions) {
   nc_close(ncid);
 }
 
-TEST(NetcdfWriter, WhatALinkLeadsToIsWrittenAlsoWhereItIsNotThereYet) {
+TEST(NetcdfWriter, LinkTargetIsWrittenEvenIfMissing) {
   FakeSource source(
       make_info({axis("x", AxisKind::cartesian, {0, 1}), axis("y", AxisKind::cartesian, {0, 1}),
                  axis("z", AxisKind::cartesian, {0, 1})}));
@@ -272,7 +272,7 @@ TEST(NetcdfWriter, WhatALinkLeadsToIsWrittenAlsoWhereItIsNotThereYet) {
   EXPECT_TRUE(std::filesystem::is_symlink(folder / "loop.nc"));
 }
 
-TEST(NetcdfWriter, AFailureLeavesTheOldFileAndNoRemains) {
+TEST(NetcdfWriter, FailureKeepsTheOldFileAndLeavesNoPart) {
   FakeSource source(
       make_info({axis("x", AxisKind::cartesian, {0, 1}), axis("y", AxisKind::cartesian, {0, 1}),
                  axis("z", AxisKind::cartesian, {0, 1})}));

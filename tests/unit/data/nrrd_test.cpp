@@ -31,7 +31,7 @@ std::string header(const std::string& fields) {
 
 const std::string plain_2x3x2 = "dimension: 3\nsizes: 2 3 2\ntype: float\nendian: little\n";
 
-TEST(Nrrd, RawSamplesLieFastestFirst) {
+TEST(Nrrd, RawSamplesAreFastestFirst) {
   const Folder folder;
   write_file(folder / "a.nrrd", header(plain_2x3x2 + "encoding: raw\ncontent: a title\n\n") +
                                     packed<float>(counted(12)));
@@ -115,7 +115,7 @@ TEST(Nrrd, EncodingsHoldTheSameSamples) {
 }
 
 // Bytes of the file, whatever they mean; lines first.
-TEST(Nrrd, LinesAndBytesInFrontOfEncodedDataAreSkipped) {
+TEST(Nrrd, LinesAndBytesBeforeEncodedDataAreSkipped) {
   const Folder folder;
   for (const auto& [encoding, data] :
        std::vector<std::pair<std::string, std::string>>{{"hex", "00010203"}, {"text", "0 1 2 3"}}) {
@@ -130,7 +130,7 @@ TEST(Nrrd, LinesAndBytesInFrontOfEncodedDataAreSkipped) {
   }
 }
 
-TEST(Nrrd, NotANumberIsMasked) {
+TEST(Nrrd, NanIsMasked) {
   const Folder folder;
   write_file(folder / "m.nrrd",
              header("dimension: 2\nsizes: 2 2\ntype: float\nencoding: ascii\n\n1 nan -inf 4\n"));
@@ -140,7 +140,7 @@ TEST(Nrrd, NotANumberIsMasked) {
 }
 
 // A long series in one gzip stream: steps in any order, each what it should be.
-TEST(Nrrd, StepsOfAGzipStreamAreReachedInAnyOrder) {
+TEST(Nrrd, StepsOfAGzipStreamAreReadInAnyOrder) {
   const Folder folder;
   constexpr std::size_t steps = 20;
   constexpr std::size_t cube = 64 * 64 * 64;  // 1 MiB of float a step
@@ -163,7 +163,7 @@ TEST(Nrrd, StepsOfAGzipStreamAreReachedInAnyOrder) {
   }
 }
 
-TEST(Nrrd, SpacingsAndEndsPlaceSamples) {
+TEST(Nrrd, SpacingsAndBoundsPlaceSamples) {
   const Folder folder;
   write_file(
       folder / "p.nrrd",
@@ -183,7 +183,7 @@ TEST(Nrrd, SpacingsAndEndsPlaceSamples) {
 }
 
 // Left-posterior-superior: x and y are turned, and so are a vector's first two components.
-TEST(Nrrd, AnatomicalSpaceIsTurned) {
+TEST(Nrrd, AnatomicalSpaceIsReoriented) {
   const Folder folder;
   write_file(folder / "v.nrrd",
              header("dimension: 4\nsizes: 3 2 2 2\ntype: double\nendian: big\nencoding: raw\n"
@@ -210,7 +210,7 @@ TEST(Nrrd, AnatomicalSpaceIsTurned) {
   EXPECT_THAT(source->info().notes, testing::Contains(HasSubstr("left-posterior-superior")));
 }
 
-TEST(Nrrd, DirectionsTellWhichAxisIsWhich) {
+TEST(Nrrd, DirectionsIdentifyAxes) {
   const Folder folder;
   write_file(folder / "d.nrrd",
              header("dimension: 3\nsizes: 2 3 4\ntype: uint8\nencoding: raw\n"
@@ -227,7 +227,7 @@ TEST(Nrrd, DirectionsTellWhichAxisIsWhich) {
   EXPECT_EQ(values[3 * 4], 19);  // z 2
 }
 
-TEST(Nrrd, ObliqueAxesKeepTheirSpacingAndSaySo) {
+TEST(Nrrd, ObliqueAxesKeepTheirSpacingWithANote) {
   const Folder folder;
   write_file(folder / "o.nrrd",
              header("dimension: 3\nsizes: 2 2 2\ntype: uint8\nencoding: raw\nspace dimension: 3\n"
@@ -254,7 +254,7 @@ TEST(Nrrd, ComponentsMayComeLast) {
   EXPECT_EQ(values_of(*source, "c"), floats(counted(16)));
 }
 
-TEST(Nrrd, WithoutKindsTheOuterAxesAreGuessed) {
+TEST(Nrrd, WithoutKindsTheOuterAxesAreInferred) {
   const Folder folder;
   write_file(folder / "g.nrrd", header("dimension: 5\nsizes: 3 2 2 2 4\ntype: uint8\n"
                                        "encoding: raw\n\n") +
@@ -327,7 +327,7 @@ TEST(Nrrd, BytesAfterTheSamplesAreReported) {
   EXPECT_THAT(absent.error().message, HasSubstr("'c', which 'c.nhdr' names, is not there"));
 }
 
-TEST(Nrrd, ChangedDataFilesAreNoticed) {
+TEST(Nrrd, ChangedDataFilesAreDetected) {
   const Folder folder;
   write_file(folder / "c.nhdr", header("dimension: 2\nsizes: 2 6\ntype: uint8\nencoding: raw\n"
                                        "data file: c%d.raw 0 5 1\n"));
@@ -410,7 +410,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return std::string(test.param.name); });
 
 // Truncated or overwritten data yield an error, without an invalid read.
-TEST(NrrdRefusal, BrokenDataAreFoundWhenTheyAreRead) {
+TEST(NrrdRefusal, BrokenDataAreDetectedWhenRead) {
   const Folder folder;
   const std::string good = gzipped(packed<float>(counted(12)));
   std::string damaged = good;

@@ -93,7 +93,7 @@ TEST_F(RealFile, NamesAndUnits) {
   EXPECT_EQ(info().time_units, "Month");
 }
 
-TEST_F(RealFile, ValuesAtPlaces) {
+TEST_F(RealFile, ValuesAtPositions) {
   const Volume wind = volume("wind");
   const Volume temperature = volume("T");
   ASSERT_EQ(wind.components, 2);
@@ -124,7 +124,7 @@ TEST_F(RealFile, RangesAndMask) {
   EXPECT_EQ(wind.masked, 0);
 }
 
-TEST_F(RealFile, TheJetBlowsEastAndItsFastestSampleIsWhereItIs) {
+TEST_F(RealFile, JetBlowsEastWithItsMaximumAtTheKnownSample) {
   // d["U"][0].argmax() is (7, 44, 119): 200 hPa, 34.9 N, 154.7 E.
   const Volume u = volume("U");
   EXPECT_EQ(at(info(), u, 0, 154.6875, 34.882523, 200), 81.63902F);

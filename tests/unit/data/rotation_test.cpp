@@ -85,7 +85,7 @@ void write_lambert(const std::string& path, const Lambert& grid, const std::stri
   }
 }
 
-TEST(Rotation, EastNorthWindsAreRotatedToTheGridsAxes) {
+TEST(Rotation, EastNorthWindsAreRotatedToTheGridAxes) {
   for (const double turn : {0.0, 25 * degree, -30 * degree}) {
     for (const bool south : {false, true}) {
       for (const bool with_metres : {false, true}) {
@@ -124,7 +124,7 @@ TEST(Rotation, EastNorthWindsAreRotatedToTheGridsAxes) {
 // and columns. A map of degrees is not conformal: rows at an angle a from east have the direction
 // (cos a / cos phi, sin a) on it, columns (-sin a / cos phi, cos a), and scaling both to 1 leaves
 // an eastward wind some 4 degrees off at 45 N.
-TEST(Rotation, OnTheMapOfDegreesAWindDueEastPointsEast) {
+TEST(Rotation, EastWindPointsEastOnALatitudeLongitudeMap) {
   const Lambert lambert = make_lambert(25 * degree, false);
   const Columns columns{lambert.longitude, lambert.latitude};
   const cf::GridBearing bearing = cf::bearing_of(columns, width);
@@ -157,7 +157,7 @@ TEST(Rotation, OnTheMapOfDegreesAWindDueEastPointsEast) {
   }
 }
 
-TEST(Rotation, WindsAlongTheGridStayAndUnnamedOnesAreNoted) {
+TEST(Rotation, GridWindsStayAndUnspecifiedOnesAreNoted) {
   const Lambert grid = make_lambert(25 * degree, false);
   for (const bool named : {true, false}) {
     const Folder folder;
@@ -171,7 +171,7 @@ TEST(Rotation, WindsAlongTheGridStayAndUnnamedOnesAreNoted) {
   }
 }
 
-TEST(Rotation, AGridSeenFromBelowKeepsEastEast) {
+TEST(Rotation, MirroredGridKeepsEastwardWinds) {
   // x runs north and y runs east: an eastward wind is along y.
   Columns columns;
   for (std::size_t j = 0; j < 3; ++j) {

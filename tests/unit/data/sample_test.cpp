@@ -70,7 +70,7 @@ TEST(Samples, RefuseUnknownNamesAndSizes) {
   EXPECT_EQ(open_sample("tornado", {8, 8, 8}, -2).error().kind, ErrorKind::invalid);
 }
 
-TEST(Samples, TakeAnyDimensionsAndSteps) {
+TEST(Samples, AcceptAnyDimensionsAndSteps) {
   const std::array<int, 3> dims = {7, 5, 3};
   const std::array<int, 3> single = {1, 1, 1};
   for (const std::string& name : sample_names()) {
@@ -89,7 +89,7 @@ TEST(Samples, TakeAnyDimensionsAndSteps) {
   EXPECT_EQ(sample("climate")->info().grid.dims(), (std::array<int, 3>{320, 160, 19}));
 }
 
-TEST(Samples, AreTheSameEveryTimeAndChangeWithTheStep) {
+TEST(Samples, AreReproducibleAndChangeWithTheStep) {
   for (const std::string& name : sample_names()) {
     auto first = sample(name, {24, 20, 16});
     auto second = sample(name, {24, 20, 16});
@@ -186,7 +186,7 @@ TEST(Tornado, FunnelIsCloudMovesAndClearsOutwards) {
   EXPECT_LT(edge, 0.05);
 }
 
-TEST(Climate, SaysWhatItIsInCfTerms) {
+TEST(Climate, FollowsCfConventions) {
   auto source = sample("climate");
   const DatasetInfo& info = source->info();
   EXPECT_EQ(info.grid.axes[0].kind, AxisKind::longitude);
@@ -343,7 +343,7 @@ TEST(Climate, CloudIsAFractionAndFollowsTheWeather) {
   EXPECT_EQ(cover(-89, 89, 70, 10), 0.0);
 }
 
-TEST(Climate, AirRisesWhereItsFrontsAreCloudy) {
+TEST(Climate, AirRisesInCloudyFronts) {
   auto source = sample("climate");
   const Volume cloud = read(*source, "cloud");
   const Volume wind = read(*source, "wind");
@@ -413,7 +413,7 @@ TEST(ElectricField, EnergyIsHalfEpsilonTimesSquare) {
   }
 }
 
-TEST(ElectricField, CabinShadesAndItsWallsKeepTheFieldOut) {
+TEST(ElectricField, CabinShadesAndItsWallsExcludeTheField) {
   auto source = sample("efield");
   const auto& axes = source->info().grid.axes;
   const auto peak = [&](double x, double y, double z) {
@@ -438,7 +438,7 @@ TEST(ElectricField, CabinShadesAndItsWallsKeepTheFieldOut) {
   EXPECT_EQ(at(walls, 0, nearest(axes[0], 0.2), 13, 16), 0.0);
 }
 
-TEST(ElectricField, HasNoChargeInTheOpenAir) {
+TEST(ElectricField, HasNoChargeInFreeSpace) {
   auto source = sample("efield", {96, 48, 48}, 4);
   const Volume field = read(*source, "E", 1);
   const auto& axes = source->info().grid.axes;

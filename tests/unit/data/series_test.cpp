@@ -65,7 +65,7 @@ std::vector<std::string> texts(const DatasetInfo& info) {
   return out;
 }
 
-TEST(Series, TimesToldAgainWithinAFileAreCounted) {
+TEST(Series, RepeatedTimesWithinAFileAreCounted) {
   const Folder folder;
   write_part(folder / "a.nc", {{0, 6, 6, 6}, "hours since 2001-01-01", "", 1000});
   write_part(folder / "b.nc", {{6, 12}, "hours since 2001-01-01", "", 2000});
@@ -77,7 +77,7 @@ TEST(Series, TimesToldAgainWithinAFileAreCounted) {
   EXPECT_EQ(first_sample(**source, 1), 2000);
 }
 
-TEST(Series, StepsAreInOrderOfTimeWhateverTheFilesEpochsAndNames) {
+TEST(Series, StepsAreOrderedByTimeForAnyFileEpochsAndNames) {
   const Folder folder;
   write_part(folder / "run_a.nc", {{0, 6}, "hours since 2001-01-03", "", 3000});
   write_part(folder / "run_b.nc", {{0, 0.25}, "days since 2001-01-01", "gregorian", 1000});
@@ -97,7 +97,7 @@ TEST(Series, StepsAreInOrderOfTimeWhateverTheFilesEpochsAndNames) {
 }
 
 // Sample (y, x) of time t is 100 t + 10 y + x, wherever the file has the time.
-TEST(Series, TimeNeedNotBeTheFirstDimension) {
+TEST(Series, TimeMayBeAnyDimension) {
   const Folder folder;
   for (const int part : {0, 1}) {
     NetcdfMaker file(folder / (part == 0 ? "t0.nc" : "t1.nc"));
@@ -125,7 +125,7 @@ TEST(Series, TimeNeedNotBeTheFirstDimension) {
   }
 }
 
-TEST(Series, OfTwoFilesWithOneTimeTheLaterCounts) {
+TEST(Series, LaterOfTwoFilesWithOneTimeIsUsed) {
   const Folder folder;
   write_part(folder / "f1.nc", {{0, 6, 12}, "hours since 2001-01-01", "", 1000});
   write_part(folder / "f2.nc", {{0, 6}, "hours since 2001-01-01 12:00", "", 5000});
@@ -138,7 +138,7 @@ TEST(Series, OfTwoFilesWithOneTimeTheLaterCounts) {
   EXPECT_TRUE(has_note((*source)->info(), "1 time lies in more than one file"));
 }
 
-TEST(Series, MembersThatDoNotFitAreNamedWithWhatDiffers) {
+TEST(Series, IncompatibleMembersAreReportedWithTheDifference) {
   struct Case {
     Part part;
     const char* says;
@@ -167,7 +167,7 @@ TEST(Series, MembersThatDoNotFitAreNamedWithWhatDiffers) {
   EXPECT_NE(source.error().message.find("'s2.nc'"), std::string::npos) << source.error().message;
 }
 
-TEST(Series, CoordinatesMayDifferByTheRoundingOfSinglePrecision) {
+TEST(Series, CoordinatesMayDifferBySinglePrecisionRounding) {
   const Folder folder;
   write_part(folder / "s1.nc", {{0}, "hours since 2001-01-01", "", 1, {-10, 0, 10.1}});
   write_part(folder / "s2.nc",
@@ -177,7 +177,7 @@ TEST(Series, CoordinatesMayDifferByTheRoundingOfSinglePrecision) {
   EXPECT_EQ(first_sample(**source, 1), 2);
 }
 
-TEST(Series, VariablesThatNotAllFilesHaveAreLeftOutWithTheReason) {
+TEST(Series, VariablesMissingInSomeFilesAreOmittedWithTheReason) {
   const Folder folder;
   Part with{{0}, "hours since 2001-01-01"};
   with.extra = true;
@@ -296,7 +296,7 @@ class Counted final : public cf::ArrayFile {
   int& open_;
 };
 
-TEST(Series, FewFilesAreOpenAtATimeAndOneThatChangesIsNoticed) {
+TEST(Series, FewFilesAreOpenAtATimeAndAChangedOneIsDetected) {
   const Folder folder;
   constexpr std::size_t members = 80;
   for (std::size_t m = 0; m < members; ++m) {

@@ -26,7 +26,7 @@ std::string real_file(const std::string& name) {
          "/" + name;
 }
 
-TEST(StandardAtmosphere, TableOfTheStandard) {
+TEST(StandardAtmosphere, MatchesTheTableOfTheStandard) {
   // ISO 2533: geopotential height, temperature, pressure.
   struct Row {
     double height, kelvin, pascals;
@@ -141,7 +141,7 @@ TEST(HybridLevels, FormsOfTheFormulaGiveTheSamePressures) {
   }
 }
 
-TEST(HybridLevels, SigmaHasThePressureOfItsTop) {
+TEST(HybridLevels, SigmaUsesThePressureAtItsTop) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "s.nc");
@@ -162,7 +162,7 @@ TEST(HybridLevels, SigmaHasThePressureOfItsTop) {
 }
 
 // What p = ptop + sigma (ps - ptop) is at sigma 0.5 and 100000 Pa, where ptop is told badly.
-TEST(HybridLevels, ATopThatIsNotToldIsNotedAndOneWithoutAUnitHasTheSurfaces) {
+TEST(HybridLevels, MissingTopIsNotedAndATopWithoutUnitUsesThatOfTheSurface) {
   struct Case {
     const char* formula;
     const char* ptop_units;
@@ -201,7 +201,7 @@ TEST(HybridLevels, ATopThatIsNotToldIsNotedAndOneWithoutAUnitHasTheSurfaces) {
   }
 }
 
-TEST(HybridLevels, WithoutASurfacePressureLevelsStayLevels) {
+TEST(HybridLevels, WithoutSurfacePressureLevelsStayLevels) {
   const Folder folder;
   write_hybrid(folder / "h.nc", {"a: A b: B p0: P0 ps: absent", {0.1, 0}, "", true, true});
   auto source = open_file(folder / "h.nc");
@@ -217,7 +217,7 @@ std::vector<std::size_t> chunk_beyond_the_limit(std::size_t values_a_step, std::
   return chunk;
 }
 
-TEST(HybridLevels, WithASurfacePressureBeyondTheLimitLevelsStayLevels) {
+TEST(HybridLevels, WithOversizeSurfacePressureLevelsStayLevels) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "h.nc");
@@ -264,7 +264,7 @@ void write_omega(const std::string& path, const std::string& temperature_units,
   file.text(file.variable("ps", NC_FLOAT, {y, x}, counting(4, 99000)), "units", "Pa");
 }
 
-TEST(Omega, BecomesMetresASecondByTheFilesTemperature) {
+TEST(Omega, BecomesMetersPerSecondByTheTemperatureOfTheFile) {
   struct Case {
     std::string units;
     double value;
@@ -297,7 +297,7 @@ TEST(Omega, BecomesMetresASecondByTheFilesTemperature) {
 }
 
 // What the standard name says is Pa s-1 where the file is silent. A picture turns it by its unit.
-TEST(Omega, StaysWhereLookingAtTheTemperatureIsBeyondTheLimit) {
+TEST(Omega, StaysWhenReadingTheTemperatureExceedsTheLimit) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "o.nc");
@@ -324,7 +324,7 @@ TEST(Omega, StaysWhereLookingAtTheTemperatureIsBeyondTheLimit) {
   EXPECT_TRUE(has_note(info, "'T' is too large"));
 }
 
-TEST(Omega, IsKnownByItsUnitOrItsStandardName) {
+TEST(Omega, IsRecognizedByUnitOrStandardName) {
   for (const auto& [written, told] : {std::pair("", "Pa s-1"), {"Pa/sec", "Pa/sec"}}) {
     const Folder folder;
     write_omega(folder / "o.nc", "", {}, written);
@@ -337,7 +337,7 @@ TEST(Omega, IsKnownByItsUnitOrItsStandardName) {
   }
 }
 
-TEST(Omega, WithoutATemperatureTheStandardAtmosphereIsTaken) {
+TEST(Omega, WithoutATemperatureUsesTheStandardAtmosphere) {
   const Folder folder;
   write_omega(folder / "o.nc", "", {});
   auto source = open_file(folder / "o.nc");
@@ -372,7 +372,7 @@ TEST(Heights, FromGeopotentialAndFromTheStandardAtmosphere) {
   EXPECT_NEAR(standard.values[7], 5574.4, 0.2);  // 500 hPa at 5574 m
 }
 
-TEST(Heights, MissingLevelsOfARealFileAreMaskedWhole) {
+TEST(Heights, MissingLevelsOfARealFileAreMasked) {
   // contour.cdf: valid_range and fill hide 8988 samples of Z at the first step, 224 of the lowest
   // three levels each and all 33 x 36 = 1188 of those above but for none; netCDF4's masks.
   auto source = open_file(real_file("contour.cdf"));
@@ -390,7 +390,7 @@ TEST(Heights, MissingLevelsOfARealFileAreMaskedWhole) {
   EXPECT_FLOAT_EQ(height.range[1], z.range[1]);
 }
 
-TEST(Heights, AnOceansDepthsRunDownAndItsLandIsMissing) {
+TEST(Heights, OceanDepthsRunDownAndLandIsMasked) {
   // levitus_climatology.cdf: netCDF4 counts 577275 masked values of TEMP, 57917 of them at the
   // deepest of 20 levels and 22636 at the surface; TEMP[0, 90, 180] is 26.794998.
   auto source = open_file(real_file("levitus_climatology.cdf"));

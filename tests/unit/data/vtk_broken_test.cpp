@@ -25,7 +25,7 @@ std::string image(const VtkCoding& coding) {
   return xml.image(broken_dims, "", data);
 }
 
-TEST(VtkBroken, EveryCutIsAnError) {
+TEST(VtkBroken, EveryTruncationIsAnError) {
   const VtkFolder folder;
   for (const char* format : {"ascii", "base64", "appended-raw", "appended-base64"}) {
     for (const char* compressor : {"", "ZLib", "LZ4"}) {
@@ -43,7 +43,7 @@ TEST(VtkBroken, EveryCutIsAnError) {
 }
 
 // Any changed byte yields an error or numbers, never a crash.
-TEST(VtkBroken, AnyByteMayBeWrong) {
+TEST(VtkBroken, AnyByteMayBeCorrupt) {
   const VtkFolder folder;
   for (const char* format : {"ascii", "appended-raw"}) {
     const std::string whole = image({format, "ZLib", false, 8});
@@ -74,7 +74,7 @@ long peak_kilobytes() {
   return usage.ru_maxrss;
 }
 
-TEST(VtkBroken, HugeClaimsAreRefusedBeforeMemoryIsTaken) {
+TEST(VtkBroken, HugeSizesAreRefusedBeforeAllocation) {
   const VtkFolder folder;
   const long before = peak_kilobytes();
   const std::string ascii =
@@ -109,7 +109,7 @@ TEST(VtkBroken, HugeClaimsAreRefusedBeforeMemoryIsTaken) {
 }
 
 // Eight points and their values; the whole claims 301^3.
-TEST(VtkBroken, PiecesThatCannotFillTheWholeAreRefusedBeforeMemoryIsTaken) {
+TEST(VtkBroken, PiecesThatCannotFillTheWholeAreRefusedBeforeAllocation) {
   const VtkFolder folder;
   const long before = peak_kilobytes();
   VtkXml xml;
@@ -143,7 +143,7 @@ TEST(VtkBroken, PiecesThatCannotFillTheWholeAreRefusedBeforeMemoryIsTaken) {
   EXPECT_LT(peak_kilobytes() - before, 64 * 1024);
 }
 
-TEST(VtkBroken, PiecesMustNotOverlapWithoutBound) {
+TEST(VtkBroken, OverlapOfPiecesIsBounded) {
   const VtkFolder folder;
   VtkXml xml;
   const std::string data = xml.array("Float32", "a", 1, {1, 2, 3, 4, 5, 6, 7, 8});
@@ -159,7 +159,7 @@ TEST(VtkBroken, PiecesMustNotOverlapWithoutBound) {
   EXPECT_THAT(file(pieces + piece + piece), HasSubstr("overlap"));
 }
 
-TEST(VtkBroken, OffsetsMustLieInTheFile) {
+TEST(VtkBroken, OffsetsMustBeInsideTheFile) {
   const VtkFolder folder;
   for (const char* offset : {"100000", "-5", "18446744073709551615", "x", ""}) {
     VtkXml xml({"appended-raw", "", false, 4});

@@ -72,7 +72,7 @@ class Distorted {
   std::mt19937 random_;
 };
 
-TEST(VtkCells, WhatIsFoundInACellLiesInItsSlantedBox) {
+TEST(VtkCells, PointsFoundInACellAreInItsObliqueBox) {
   Distorted distorted(7);
   constexpr std::size_t row = 16;
   std::size_t found = 0;
@@ -120,7 +120,7 @@ TEST(VtkCells, WhatIsFoundInACellLiesInItsSlantedBox) {
 
 // A plate along the diagonal of x and z, a hundredth thick: of a row along x all but a piece of
 // that thickness times the square root of two is left out.
-TEST(VtkCells, ASlantedPlateLeavesOutAllButItself) {
+TEST(VtkCells, ObliquePlateLeavesTheRestEmpty) {
   const double t = 0.01 / std::numbers::sqrt2;
   Corners corners{};
   for (std::size_t i = 0; i < 8; ++i) {

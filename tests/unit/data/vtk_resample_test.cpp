@@ -160,7 +160,7 @@ Place twist(const Place& p) {
 
 double linear(const Place& p) { return 3 * p[0] - 2 * p[1] + 0.5 * p[2] + 1; }
 
-TEST_F(VtkResampling, LinearFieldsComeBackOnTwistedCellsOfEveryShape) {
+TEST_F(VtkResampling, LinearFieldsAreExactOnTwistedCellsOfEveryShape) {
   // The twist keeps areas at each height, so the volume is 2.
   for (const auto& cut : {as_hexahedron, as_voxel, as_wedges, as_tetrahedra, as_pyramids}) {
     const TestMesh mesh = boxes(12, twist, cut);
@@ -172,7 +172,7 @@ TEST_F(VtkResampling, LinearFieldsComeBackOnTwistedCellsOfEveryShape) {
   }
 }
 
-TEST_F(VtkResampling, SmoothFieldsConvergeWithTheSquareOfTheCellsSize) {
+TEST_F(VtkResampling, SmoothFieldsConvergeWithTheSquareOfTheCellSize) {
   const Function smooth = [](const Place& p) { return std::sin(2 * p[0]) * std::cos(p[1] + p[2]); };
   for (const auto& cut : {as_hexahedron, as_tetrahedra, as_wedges}) {
     const double coarse = outcome(boxes(8, twist, cut), smooth).worst;
@@ -183,7 +183,7 @@ TEST_F(VtkResampling, SmoothFieldsConvergeWithTheSquareOfTheCellsSize) {
 }
 
 // A shell: what lies in its hole and outside of it is in no cell, and is not made up.
-TEST_F(VtkResampling, TheShareInsideIsThatOfTheMesh) {
+TEST_F(VtkResampling, ShareOfInsideSamplesIsThatOfTheMesh) {
   const Map shell = [](const Place& p) {
     const double angle = p[0] * 2 * std::numbers::pi;
     const double radius = 1 + p[1];
@@ -196,7 +196,7 @@ TEST_F(VtkResampling, TheShareInsideIsThatOfTheMesh) {
   EXPECT_LT(out.worst, 1e-5);
 }
 
-TEST_F(VtkResampling, ACurvedStructuredGridIsResampledTooAndItsHiddenCellsAreNot) {
+TEST_F(VtkResampling, CurvedStructuredGridIsResampledWithoutHiddenCells) {
   constexpr int n = 11;
   std::vector<double> points;
   std::vector<double> values;
@@ -231,7 +231,7 @@ TEST_F(VtkResampling, ACurvedStructuredGridIsResampledTooAndItsHiddenCellsAreNot
   EXPECT_LT(inside, 0.7);
 }
 
-TEST_F(VtkResampling, AFlatMeshIsAPlane) {
+TEST_F(VtkResampling, FlatMeshIsAPlane) {
   TestMesh mesh;
   // y = 5; both cells are as high as long.
   mesh.points = {0, 5, 0, 2, 5, 0, 2, 5, 2, 0, 5, 2, 4, 5, 0};
@@ -340,7 +340,7 @@ TEST_F(VtkResampling, SlopesDoNotThickenLayers) {
 }
 
 // The same of wedges without indices: what is known is their boxes.
-TEST_F(VtkResampling, SpacingFollowsTheCellsOfAMeshToo) {
+TEST_F(VtkResampling, SpacingFollowsTheCellsOfAMesh) {
   const Map flat = [](const Place& p) { return Place{1000 * p[0], 400 * p[1], 10 * p[2]}; };
   const TestMesh mesh = boxes(16, flat, as_wedges);
   VtkXml xml({"appended-raw", "", false, 8});
@@ -356,7 +356,7 @@ TEST_F(VtkResampling, SpacingFollowsTheCellsOfAMeshToo) {
   EXPECT_EQ(out.inside, 1);
 }
 
-TEST_F(VtkResampling, CellDataAreThoseOfTheCellThatHoldsTheSample) {
+TEST_F(VtkResampling, CellDataAreThoseOfTheContainingCell) {
   const Map stretch = [](const Place& p) { return Place{p[0] + 0.3 * p[2], p[1], p[2]}; };
   const TestMesh mesh = boxes(2, stretch, as_hexahedron);
   VtkXml xml;
@@ -395,7 +395,7 @@ TestMesh slivers(double width, int count) {
   return mesh;
 }
 
-TEST_F(VtkResampling, SliversHoldWhatTheirBarycentricCoordinatesSay) {
+TEST_F(VtkResampling, SliversUseTheirBarycentricCoordinates) {
   constexpr double width = 0.1;
   const TestMesh mesh = slivers(width, 20);
   VtkXml xml;
@@ -424,7 +424,7 @@ TEST_F(VtkResampling, SliversHoldWhatTheirBarycentricCoordinatesSay) {
 
 // Wedges that lie one upon the other in half of a cube: samples of the other half are sought in
 // every one of them. A few kilobytes must not make a minute of work.
-TEST_F(VtkResampling, CellsThatAskForMoreWorkThanTheirFileIsWorthAreRefused) {
+TEST_F(VtkResampling, CellsWithExcessiveWorkForTheirFileAreRefused) {
   for (const int count : {20, 200}) {
     TestMesh mesh;
     mesh.points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1};
@@ -444,7 +444,7 @@ TEST_F(VtkResampling, CellsThatAskForMoreWorkThanTheirFileIsWorthAreRefused) {
 }
 
 // As much overlap as a file can honestly have: a cell that lies in the cube a thousand times over.
-TEST_F(VtkResampling, CellsThatLieOneUponTheOtherAreReadWithinThatBound) {
+TEST_F(VtkResampling, OverlappingCellsWithinThatBoundAreRead) {
   TestMesh mesh = boxes(
       1, [](const Place& p) { return p; }, as_hexahedron);
   for (int c = 1; c < 1000; ++c) mesh.cell(12, {0, 1, 3, 2, 4, 5, 7, 6});
@@ -496,7 +496,7 @@ TEST_F(VtkResampling, HiddenCellsHoldNothing) {
 }
 
 // At x = 0 the corners at x = 1 have no weight.
-TEST_F(VtkResampling, WhatHasNoWeightMayBeMissing) {
+TEST_F(VtkResampling, PointsOfZeroWeightMayBeMissing) {
   const TestMesh mesh = boxes(
       1, [](const Place& p) { return p; }, as_hexahedron);
   VtkXml xml({"base64", "", false, 4});
@@ -513,7 +513,7 @@ TEST_F(VtkResampling, WhatHasNoWeightMayBeMissing) {
   EXPECT_EQ(volume.range, (std::array<float, 2>{5, 5}));
 }
 
-TEST_F(VtkResampling, DegenerateAndUnreadableCellsAreCountedAndTheOthersShown) {
+TEST_F(VtkResampling, DegenerateCellsAreCountedAndTheOthersShown) {
   TestMesh mesh = boxes(
       3, [](const Place& p) { return p; }, as_hexahedron);
   mesh.cell(12, {0, 0, 0, 0, 1, 1, 1, 1});
@@ -557,7 +557,7 @@ TEST_F(VtkResampling, BrokenCellsAreErrors) {
               HasSubstr("without any volume"));
 }
 
-TEST_F(VtkResampling, ASurfaceInSpaceIsRefused) {
+TEST_F(VtkResampling, SurfaceInSpaceIsRefused) {
   TestMesh mesh;
   mesh.points = {0, 0, 0, 1, 0, 0, 1, 1, 1};
   mesh.cell(5, {0, 1, 2});

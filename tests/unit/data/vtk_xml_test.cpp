@@ -30,7 +30,7 @@ std::vector<VtkCoding> all_codings() {
   return out;
 }
 
-TEST(VtkXmlFile, NumbersAreTheSameHoweverTheyAreWritten) {
+TEST(VtkXmlFile, ValuesAreTheSameInEveryEncoding) {
   const VtkFolder folder;
   const std::vector<std::string> types{"Int8",   "UInt8", "Int16",  "UInt16",  "Int32",
                                        "UInt32", "Int64", "UInt64", "Float32", "Float64"};
@@ -64,7 +64,7 @@ TEST(VtkXmlFile, NumbersAreTheSameHoweverTheyAreWritten) {
 }
 
 // Some writers end the header's base64 with its own padding, without a compressor too.
-TEST(VtkXmlFile, AHeaderInAUnitOfItsOwnIsRead) {
+TEST(VtkXmlFile, SeparatelyEncodedHeaderIsRead) {
   const VtkFolder folder;
   const std::string bytes = packed("Float32", even_ramp(samples), false);
   const std::string data = "<DataArray type=\"Float32\" Name=\"a\" format=\"binary\">" +
@@ -95,7 +95,7 @@ TEST(VtkXmlFile, OriginSpacingAndExtentPlaceTheSamples) {
 }
 
 // i runs along y, j against x, k along z: world = origin + direction * (spacing * index).
-TEST(VtkXmlFile, ADirectionMayPermuteAndTurnAxes) {
+TEST(VtkXmlFile, DirectionMayPermuteAndReverseAxes) {
   const VtkFolder folder;
   VtkXml xml;
   const auto source = opened(folder.write(
@@ -121,7 +121,7 @@ TEST(VtkXmlFile, ADirectionMayPermuteAndTurnAxes) {
       HasSubstr("Direction"));
 }
 
-TEST(VtkXmlFile, ARectilinearGridKeepsItsUnevenCoordinatesAndTurnsThoseThatDescend) {
+TEST(VtkXmlFile, RectilinearGridKeepsUnevenAndReversesDescendingAxes) {
   const VtkFolder folder;
   VtkXml xml({"appended-raw", "ZLib", true, 8});
   std::string inner = "<Piece Extent=\"0 4 0 3 0 2\"><PointData>";
@@ -138,7 +138,7 @@ TEST(VtkXmlFile, ARectilinearGridKeepsItsUnevenCoordinatesAndTurnsThoseThatDesce
   EXPECT_EQ(volume_of(*source, "a").values[40], 0);
 }
 
-TEST(VtkXmlFile, PiecesAreAssembledAndWhatNoneCoversIsMasked) {
+TEST(VtkXmlFile, PiecesAreAssembledAndGapsMasked) {
   const VtkFolder folder;
   VtkXml xml({"appended-base64", "LZ4", false, 4});
   const auto piece = [&](int first, int last, double value) {
@@ -189,7 +189,7 @@ TEST(VtkXmlFile, CellsBetweenPiecesAreMaskedAndNoted) {
 }
 
 // x descends: the first piece lies in the east. Values are 10 times the world's x, plus y.
-TEST(VtkXmlFile, PiecesAlongAnAxisThatDescendsStandWhereTheyBelong) {
+TEST(VtkXmlFile, PiecesAlongADescendingAxisKeepTheirPositions) {
   const VtkFolder folder;
   VtkXml xml;
   const auto piece = [&](int first, const std::vector<double>& x) {
@@ -214,7 +214,7 @@ TEST(VtkXmlFile, PiecesAlongAnAxisThatDescendsStandWhereTheyBelong) {
   EXPECT_THAT(values, ElementsAre(0, 10, 40, 90, 160, 1, 11, 41, 91, 161));
 }
 
-TEST(VtkXmlFile, HiddenPointsAndWhatIsNotANumberAreMasked) {
+TEST(VtkXmlFile, HiddenPointsAndNanAreMasked) {
   const VtkFolder folder;
   VtkXml xml({"base64", "", false, 4});
   std::vector<double> values = even_ramp(samples);
@@ -234,7 +234,7 @@ TEST(VtkXmlFile, HiddenPointsAndWhatIsNotANumberAreMasked) {
   EXPECT_EQ(volume.values[11], 12);
 }
 
-TEST(VtkXmlFile, CellsAreShownAtTheirCentresWhereTheyHaveMoreFields) {
+TEST(VtkXmlFile, CellCentersAreUsedWhereTheyHaveMoreFields) {
   const VtkFolder folder;
   VtkXml xml;
   const auto source =
@@ -253,7 +253,7 @@ TEST(VtkXmlFile, CellsAreShownAtTheirCentresWhereTheyHaveMoreFields) {
   EXPECT_THAT(reason_of(info, "p"), HasSubstr("at points"));
 }
 
-TEST(VtkXmlFile, ArraysOfOtherKindsAreLeftOutWithTheReason) {
+TEST(VtkXmlFile, UnsupportedArraysAreOmittedWithTheReason) {
   const VtkFolder folder;
   VtkXml xml;
   std::string data = xml.array("Float32", "stress", 6, even_ramp(6 * samples));
@@ -270,7 +270,7 @@ TEST(VtkXmlFile, ArraysOfOtherKindsAreLeftOutWithTheReason) {
   EXPECT_THAT(reason_of(info, "words"), HasSubstr("String"));
 }
 
-TEST(VtkXmlFile, LzmaAndOtherDataSetsAreRefusedWithTheReason) {
+TEST(VtkXmlFile, LzmaAndUnsupportedDataSetsAreRefusedWithTheReason) {
   const VtkFolder folder;
   EXPECT_THAT(
       refusal(folder.write("a.vti", VtkXml({"ascii", "LZMA", false, 4}).image(xml_dims, "", ""))),
@@ -280,7 +280,7 @@ TEST(VtkXmlFile, LzmaAndOtherDataSetsAreRefusedWithTheReason) {
 }
 
 // Numbers beyond a double's range are those of data all the same: infinite with their sign, or 0.
-TEST(VtkXmlFile, TextBeyondTheRangeOfNumbersIsMaskedOrZero) {
+TEST(VtkXmlFile, TextBeyondTheNumericRangeIsMaskedOrZero) {
   const VtkFolder folder;
   VtkXml xml;
   std::string data = xml.array("Float64", "a", 1, {11, 22, 33, 44});

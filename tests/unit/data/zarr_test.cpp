@@ -175,7 +175,7 @@ void expect_decoded(const std::string& compressor, const std::string& stored) {
   EXPECT_THAT(store.fault(), HasSubstr("'f/0.0' ")) << compressor;
 }
 
-TEST(Zarr, EveryCompressorGivesTheSameNumbers) {
+TEST(Zarr, EveryCompressorGivesTheSameValues) {
   const std::string plain = bytes_of_items(ramp());
   expect_decoded("zlib", zlib_stream(plain, 15));
   expect_decoded("gzip", zlib_stream(plain, 31));
@@ -188,7 +188,7 @@ TEST(Zarr, EveryCompressorGivesTheSameNumbers) {
   }
 }
 
-TEST(Zarr, ChunksAtTheEdgeAreCutAndBothSeparatorsAndOrdersAreRead) {
+TEST(Zarr, EdgeChunksAreCroppedAndBothSeparatorsAndOrdersRead) {
   // f[2, 3] in chunks of 2 x 2: the second one has a column beyond the edge.
   for (const char* separator : {".", "/"}) {
     for (const bool columns_first : {false, true}) {
@@ -226,7 +226,7 @@ TEST(Zarr, TypesOfEveryWidth) {
               {1.5F, std::ldexp(1.0F, -24)});
 }
 
-TEST(Zarr, AnAbsentChunkIsTheFillValueAndNeverZeroByChance) {
+TEST(Zarr, MissingChunkIsTheFillValueAndNeverZeroByChance) {
   const auto without_second = [](const std::string& dtype, const std::string& fill,
                                  const std::string& attributes) {
     const Store store;
@@ -248,7 +248,7 @@ TEST(Zarr, AnAbsentChunkIsTheFillValueAndNeverZeroByChance) {
   expect_same(store.values(), {-32767, 1});
 }
 
-TEST(Zarr, AChunkThatIsALinkToNowhereIsLostAndNotAbsent) {
+TEST(Zarr, DanglingChunkLinkIsAnErrorNotAMissingChunk) {
   namespace fs = std::filesystem;
   const Store store;
   store.put("f/.zarray", array_json("[1,4]", "[1,2]", "<i2", "-9"));
@@ -308,7 +308,7 @@ TEST(Zarr, AttributesOfXarrayPackMaskAndOrient) {
   }
 }
 
-TEST(Zarr, FiltersAreUndoneLastFirst) {
+TEST(Zarr, FiltersAreReversedLastFirst) {
   const Store store;
   std::string json = array_json("[1,4]", "[1,4]", "<f8");
   json.replace(json.find("\"filters\":null"), 14,

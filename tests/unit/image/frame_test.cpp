@@ -43,7 +43,7 @@ class Produce : public testing::Test {
   CancelToken cancel;
 };
 
-TEST_F(Produce, EachFormatIsWhatItsFirstBytesSay) {
+TEST_F(Produce, EveryFormatHasItsSignature) {
   const auto jpeg = produce_as(Format::jpeg);
   const auto png = produce_as(Format::png);
   const auto npy = produce_as(Format::npy);
@@ -68,7 +68,7 @@ TEST_F(Produce, LevelHalvesBothSidesAndKeepsAtLeastOnePixel) {
 }
 
 // Coverage is a mean over the picture: resolution must not change how much of it is lit.
-TEST_F(Produce, ALowerLevelShowsTheSamePicture) {
+TEST_F(Produce, LowerLevelShowsTheSamePicture) {
   view.image.width = 256;
   view.image.height = 192;
   const auto mean_opacity = [](const Frame& frame) {
@@ -86,7 +86,7 @@ TEST_F(Produce, ALowerLevelShowsTheSamePicture) {
   EXPECT_NEAR(mean_opacity(*half) / mean_opacity(*whole), 1, 0.1);
 }
 
-TEST_F(Produce, ReportNamesTheFieldsShownAndTheirBytes) {
+TEST_F(Produce, ReportListsShownFieldsAndTheirBytes) {
   const auto both = produce_as(Format::jpeg);
   ASSERT_TRUE(both) << both.error().message;
   const auto& info = dataset->info();
@@ -121,7 +121,7 @@ TEST_F(Produce, ReportNamesTheFieldsShownAndTheirBytes) {
   EXPECT_EQ(nothing->work.bytes, 0);
 }
 
-TEST_F(Produce, BackgroundIsOfThePictureButNotOfTheArray) {
+TEST_F(Produce, BackgroundIsPartOfThePictureButNotOfTheArray) {
   view.vector.field.kind = protocol::FieldChoice::Kind::none;
   view.scalars.emplace();
   view.image.background = "#204060";
@@ -139,7 +139,7 @@ TEST_F(Produce, BackgroundIsOfThePictureButNotOfTheArray) {
   for (std::size_t i = values_at; i < npy->bytes.size(); ++i) ASSERT_EQ(npy->bytes[i], 0);
 }
 
-TEST_F(Produce, AnyNumberOfThreadsGivesTheSameBytes) {
+TEST_F(Produce, AnyThreadCountGivesTheSameBytes) {
   ThreadPool one(1);
   const auto alone = produce(view, *dataset, {Format::png}, one, cancel);
   const auto shared = produce_as(Format::png);
@@ -172,7 +172,7 @@ TEST_F(Produce, JpegShowsWhatPngShows) {
 }
 
 // A workspace that other frames were drawn into gives what a new one gives, and a step apart too.
-TEST_F(Produce, AWorkspaceCarriesNothingOver) {
+TEST_F(Produce, WorkspaceKeepsNoStateBetweenPictures) {
   Workspace used;
   ThreadPool one(1);
   const Encoding moving{Format::jpeg, 80, image::Subsampling::s420};
@@ -196,7 +196,7 @@ TEST_F(Produce, AWorkspaceCarriesNothingOver) {
             produce(view, *dataset, moving, pool, cancel)->bytes);
 }
 
-TEST_F(Produce, WrongViewsAndCancelledFramesAreErrors) {
+TEST_F(Produce, InvalidViewsAndCancelledFramesAreErrors) {
   view.step = 2;
   const auto late = produce_as(Format::jpeg);
   ASSERT_FALSE(late);
@@ -212,7 +212,7 @@ TEST_F(Produce, WrongViewsAndCancelledFramesAreErrors) {
 }
 
 // Who waits for the renderer with others is refused what takes minutes.
-TEST_F(Produce, TheReferenceIsDrawnOnlyWhereItIsAllowed) {
+TEST_F(Produce, ReferenceIsRenderedOnlyWhereAllowed) {
   view.method.name = protocol::MethodName::reference;
   const auto refused = produce_as(Format::png);
   ASSERT_FALSE(refused);
@@ -223,7 +223,7 @@ TEST_F(Produce, TheReferenceIsDrawnOnlyWhereItIsAllowed) {
 }
 
 // Fields of colour and of heights are among those touched, each once however often it is used.
-TEST(ProduceFields, OfColourAndHeightAreToldOnce) {
+TEST(ProduceFields, OfColorAndHeightAreListedOnce) {
   auto source = std::make_unique<scene::FakeSource>(
       scene::atmosphere_grid(),
       std::vector<data::FieldInfo>{scene::wind_info(), scene::scalar_info("z", "m"),
@@ -253,7 +253,7 @@ TEST(ProduceFields, OfColourAndHeightAreToldOnce) {
 }
 
 // The source is asked for what is shown and for nothing else, whatever draws it.
-TEST(ProduceFields, WhatIsNotShownIsNeverRead) {
+TEST(ProduceFields, UnusedFieldsAreNeverRead) {
   using Reads = scene::FakeSource::Reads;
   for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
     const auto reads_of = [&](const auto& change) {
@@ -326,7 +326,7 @@ TEST_F(Produce, FrameInfoNamesMethodsAndSlabs) {
   EXPECT_EQ(info.slab_thickness, 0.5);
 }
 
-TEST_F(Produce, ReportTellsTheLevelAndWhatIsReallyDrawn) {
+TEST_F(Produce, ReportContainsTheLevelAndActualSettings) {
   view.image.width = 10;
   view.image.height = 8;
   const auto coarse = produce_as(Format::png);
@@ -348,7 +348,7 @@ TEST_F(Produce, ReportTellsTheLevelAndWhatIsReallyDrawn) {
   EXPECT_EQ(coarse->work.fields, full->work.fields);
 }
 
-TEST_F(Produce, FrameInfoTellsTheReport) {
+TEST_F(Produce, FrameInfoContainsTheReport) {
   const auto frame = produce_as(Format::jpeg, 1);
   ASSERT_TRUE(frame) << frame.error().message;
   view.vector.stride = 3;

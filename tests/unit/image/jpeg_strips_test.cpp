@@ -109,7 +109,7 @@ const std::vector<std::pair<int, int>> many_sizes{
     {1, 1},     {1, 67},     {67, 1},    {17, 9},     {18, 22},     {334, 398}, {640, 480},
     {641, 479}, {1280, 720}, {9, 20000}, {20000, 17}, {1921, 1081}, {47, 3001}};
 
-TEST(JpegStrips, DecodeToWhatOnePieceDecodesTo) {
+TEST(JpegStrips, DecodeLikeOnePiece) {
   ThreadPool pool(2);
   JpegEncoder encoder;
   Bytes bytes;
@@ -129,7 +129,7 @@ TEST(JpegStrips, DecodeToWhatOnePieceDecodesTo) {
 
 // Every interval but the last is whole, markers count modulo 8, and large pictures have enough
 // strips for many threads.
-TEST(JpegStrips, RestartMarkersSayWhereStripsEnd) {
+TEST(JpegStrips, RestartMarkersMarkTheEndsOfStrips) {
   ThreadPool pool(1);
   JpegEncoder encoder;
   Bytes bytes;
@@ -156,7 +156,7 @@ TEST(JpegStrips, RestartMarkersSayWhereStripsEnd) {
   EXPECT_GT(most, 8U) << "no picture here has come round to marker 0 again";
 }
 
-TEST(JpegStrips, AnyNumberOfThreadsGivesTheSameBytes) {
+TEST(JpegStrips, AnyThreadCountGivesTheSameBytes) {
   ThreadPool one(1);
   ThreadPool two(2);
   ThreadPool five(5);
@@ -176,7 +176,7 @@ TEST(JpegStrips, AnyNumberOfThreadsGivesTheSameBytes) {
 }
 
 // The frame loop keeps its memory: neither the bytes' storage nor the planes' moves.
-TEST(JpegStrips, StorageIsKept) {
+TEST(JpegStrips, StorageIsReused) {
   ThreadPool pool(2);
   JpegEncoder encoder;
   YccPicture picture = waves(640, 480, Subsampling::s420);
@@ -192,7 +192,7 @@ TEST(JpegStrips, StorageIsKept) {
   EXPECT_EQ(picture.planes()[0].samples, luma);
 }
 
-TEST(JpegStrips, RefuseWhatTheFormatCannotHold) {
+TEST(JpegStrips, RefuseSizesTheFormatCannotHold) {
   ThreadPool pool(1);
   JpegEncoder encoder;
   Bytes bytes;
@@ -205,7 +205,7 @@ TEST(JpegStrips, RefuseWhatTheFormatCannotHold) {
 }
 
 // Its MCUs reach beyond what the library takes.
-TEST(JpegStrips, HoldTheLongestEdgeOfTheFormat) {
+TEST(JpegStrips, SupportTheLongestEdgeOfTheFormat) {
   ThreadPool pool(1);
   JpegEncoder encoder;
   Bytes bytes;
@@ -224,7 +224,7 @@ TEST(JpegStrips, HoldTheLongestEdgeOfTheFormat) {
 }
 
 // A decoder reads all of them by the first one's tables.
-TEST(JpegStitch, RefusesStripsOfOtherTables) {
+TEST(JpegStitch, RefusesStripsWithOtherTables) {
   ThreadPool pool(1);
   JpegEncoder encoder;
   Bytes first;
@@ -242,7 +242,7 @@ TEST(JpegStitch, RefusesStripsOfOtherTables) {
   EXPECT_TRUE(stitch(std::vector<std::span<const std::uint8_t>>{first, other}, {64, 25, 4}, out));
 }
 
-TEST(JpegStitch, RefusesStripsOfAnotherForm) {
+TEST(JpegStitch, RefusesStripsOfAnotherShape) {
   ThreadPool pool(1);
   JpegEncoder encoder;
   Bytes strip;

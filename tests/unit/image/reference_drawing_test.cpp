@@ -65,7 +65,7 @@ class Drawing : public testing::Test {
   std::uint64_t reserved = 0;
 };
 
-TEST_F(Drawing, InStripsThatAreCutShortIsThePictureDrawnAtOnce) {
+TEST_F(Drawing, InterruptedStripsGiveThePictureRenderedAtOnce) {
   const auto drawing = begin();
   ASSERT_TRUE(drawing) << drawing.error().message;
   int strips = 0;
@@ -92,7 +92,7 @@ TEST_F(Drawing, InStripsThatAreCutShortIsThePictureDrawnAtOnce) {
   EXPECT_GT(reserved, 16U * 75 * 40);
 }
 
-TEST_F(Drawing, ItsErrorIsWhatTheTwoPicturesDifferBy) {
+TEST_F(Drawing, ItsErrorIsTheDifferenceOfTheTwoPictures) {
   view.method.name = protocol::MethodName::kernel;
   const auto drawing = begin();
   ASSERT_TRUE(drawing) << drawing.error().message;
@@ -116,7 +116,7 @@ TEST_F(Drawing, ItsErrorIsWhatTheTwoPicturesDifferBy) {
 }
 
 // Lines 128 pixels wide cover 256 tiles at least, where they are not at the picture's edge.
-TEST_F(Drawing, WhatItsListsNeedIsCountedAndRefusedByTheSizeOfThePicture) {
+TEST_F(Drawing, MemoryOfListsIsCountedAndRefusedByPictureSize) {
   view.image.width = 640;
   view.image.height = 480;
   view.vector.r1 = 0.5;
@@ -143,7 +143,7 @@ TEST_F(Drawing, WhatItsListsNeedIsCountedAndRefusedByTheSizeOfThePicture) {
   EXPECT_FALSE(begin());
 }
 
-TEST_F(Drawing, WhatIsUnwantedIsNotBegun) {
+TEST_F(Drawing, CancelledDrawingIsNotStarted) {
   const CancelToken raised;
   raised.cancel();
   const auto unwanted = begin(raised);

@@ -106,7 +106,7 @@ double worst_sample(const Pixels& pixels, const Colour& background, const YccPic
 // Half a code is the error of perfect rounding; the polynomial adds 1/12 of one to each channel.
 constexpr double tolerance = 0.5 + 0.15;
 
-TEST(Ycc, IsTheFormulaAtEverySizeAndPastTheEdges) {
+TEST(Ycc, MatchesTheFormulaAtEverySizeAndBeyondTheEdges) {
   const Colour background{0.02F, 0.3F, 0.9F};
   YccPicture picture;
   for (const Subsampling subsampling : {Subsampling::s420, Subsampling::s444}) {
@@ -129,7 +129,7 @@ TEST(Ycc, IsTheFormulaAtEverySizeAndPastTheEdges) {
 }
 
 // Wherever a chroma sample ends: the last part may begin within the last MCU, or long before it.
-TEST(Ycc, PartsMayBeCutWithinAnMcu) {
+TEST(Ycc, PartsMayBeSplitWithinAnMcu) {
   const Colour background{0.02F, 0.3F, 0.9F};
   YccPicture picture;
   for (const int width : {66, 67, 81, 130}) {
@@ -146,7 +146,7 @@ TEST(Ycc, PartsMayBeCutWithinAnMcu) {
   }
 }
 
-TEST(Ycc, PlanesReachToWholeMcus) {
+TEST(Ycc, PlanesExtendToWholeMcus) {
   YccPicture picture;
   picture.reset(17, 33, Subsampling::s420, {});
   EXPECT_EQ(picture.planes()[0].width, 32);
@@ -159,7 +159,7 @@ TEST(Ycc, PlanesReachToWholeMcus) {
 }
 
 // No seam where a tile with nothing in it was delivered beside one that was not.
-TEST(Ycc, WhatIsNeverDeliveredIsWhatClearPixelsAre) {
+TEST(Ycc, MissingTilesAreTransparentPixels) {
   for (const Subsampling subsampling : {Subsampling::s420, Subsampling::s444}) {
     for (int shade = 0; shade <= 100; ++shade) {
       const Colour background{0.01F * shade, 1.0F - 0.01F * shade, 1e-4F * shade * shade};
@@ -181,7 +181,7 @@ TEST(Ycc, WhatIsNeverDeliveredIsWhatClearPixelsAre) {
   }
 }
 
-TEST(Ycc, GreysHaveNoChromaAndPrimariesTheExtremes) {
+TEST(Ycc, GraysHaveNoChromaAndPrimariesTheExtremes) {
   YccPicture picture;
   const auto codes = [&](Colour colour) {
     picture.reset(1, 1, Subsampling::s444, colour);
@@ -201,7 +201,7 @@ TEST(Ycc, GreysHaveNoChromaAndPrimariesTheExtremes) {
 }
 
 // A row of vectors that have nothing in all of one channel, or in all but one.
-TEST(Ycc, OnlyPixelsWithNothingAtAllAreSkipped) {
+TEST(Ycc, OnlyFullyTransparentPixelsAreSkipped) {
   const Colour background{0.9F, 0.5F, 0.2F};
   YccPicture picture;
   for (int channel = 0; channel < 4; ++channel) {
@@ -247,7 +247,7 @@ TEST(Ycc, InstructionSetsAgree) {
 }
 
 // A second picture of another size and background finds nothing of the first.
-TEST(Ycc, StorageThatIsUsedAgainStartsAsBackground) {
+TEST(Ycc, ReusedStorageStartsAsBackground) {
   YccPicture picture;
   picture.reset(64, 64, Subsampling::s420, {1, 1, 1});
   put_tiles(busy(64, 64, 3), picture);
@@ -255,7 +255,7 @@ TEST(Ycc, StorageThatIsUsedAgainStartsAsBackground) {
   EXPECT_LE(worst_sample({40, 24, std::vector<float>(std::size_t{4} * 40 * 24)}, {}, picture), 0.5);
 }
 
-TEST(Ycc, PartsThatCutAChromaSampleAreABug) {
+TEST(Ycc, PartsThatSplitAChromaSampleAreABug) {
   YccPicture picture;
   picture.reset(8, 8, Subsampling::s420, {});
   const std::vector<float> rgba(std::size_t{4} * 64);
@@ -267,7 +267,7 @@ TEST(Ycc, PartsThatCutAChromaSampleAreABug) {
 }
 
 // The same picture by way of rounded RGB codes and the library's own colour conversion.
-TEST(Ycc, DecodedPictureIsThatOfTheRgbPath) {
+TEST(Ycc, DecodedPictureEqualsTheRgbPath) {
   ThreadPool pool(1);
   JpegEncoder encoder;
   YccPicture picture;

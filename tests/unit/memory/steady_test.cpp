@@ -155,7 +155,7 @@ TEST_P(SteadyState, FramesAllocateNothing) {
 
 // A camera that goes where it never was finds almost everything there: what still grows is far less
 // than a picture a frame.
-TEST_P(SteadyState, AWayNeverTakenBeforeCostsHardlyMore) {
+TEST_P(SteadyState, NewPathCostsFewAllocations) {
   const std::array<int, 3> dims{64, 40, 12};
   const auto warm = orbit(GetParam(), dims, 240, 180);
   const auto scenes = orbit(GetParam(), dims, 240, 180, 7);
@@ -172,7 +172,7 @@ INSTANTIATE_TEST_SUITE_P(Looks, SteadyState,
                                          Look::clouds));
 
 // From a view to a JPEG: no picture, no planes, no strips, but the bytes that are sent.
-TEST(SteadyStateItself, AJpegCostsItsOwnBytes) {
+TEST(SteadyStateItself, JpegAllocatesItsOwnBytesOnly) {
   data::Dataset dataset(data::open_sample("climate", {64, 40, 12}, 1).value(), "climate",
                         std::uint64_t{1} << 30U);
   protocol::View view = scene::default_view(dataset).value();
@@ -213,7 +213,7 @@ constexpr int huge_width = 2048;
 constexpr int huge_height = 1536;
 constexpr std::int64_t huge_pixels = std::int64_t{huge_width} * huge_height;
 
-TEST(HugePicture, FloatsAreGivenBackByTheNextSmallerOne) {
+TEST(HugePicture, FloatsAreReleasedByTheNextSmallerPicture) {
   const auto huge = orbit(Look::kernel, {8, 8, 4}, huge_width, huge_height);
   const auto small = orbit(Look::kernel, {8, 8, 4}, 160, 120);
   ThreadPool pool(2);
@@ -224,7 +224,7 @@ TEST(HugePicture, FloatsAreGivenBackByTheNextSmallerOne) {
   EXPECT_LT(space.image().rgba.capacity(), std::size_t{4} * 1920 * 1080);
 }
 
-TEST(HugePicture, FloatsOfAPngAreGivenBackWhenItIsEncoded) {
+TEST(HugePicture, FloatsOfAPngAreReleasedAfterEncoding) {
   data::Dataset dataset(data::open_sample("climate", {8, 8, 4}, 1).value(), "climate",
                         std::uint64_t{1} << 30U);
   protocol::View view = scene::default_view(dataset).value();
@@ -241,7 +241,7 @@ TEST(HugePicture, FloatsOfAPngAreGivenBackWhenItIsEncoded) {
 }
 
 // What a workspace of planes and strips holds after one huge picture and a small one.
-TEST(HugePicture, PlanesAndStripsAreGivenBackByTheNextSmallerOne) {
+TEST(HugePicture, PlanesAndStripsAreReleasedByTheNextSmallerPicture) {
   ThreadPool pool(2);
   for (const auto subsampling : {image::Subsampling::s420, image::Subsampling::s444}) {
     image::YccPicture planes;
@@ -272,7 +272,7 @@ TEST(HugePicture, PlanesAndStripsAreGivenBackByTheNextSmallerOne) {
 }
 
 // What a daemon that has no memory left does as it ends, and destructors of its sessions do.
-TEST(WithoutMemory, WishesAreTakenBackAndAStoreEnds) {
+TEST(WithoutMemory, PrefetchRequestsAreWithdrawnAndAStoreIsDestroyed) {
   data::Store store(std::uint64_t{1} << 30U);
   const auto dataset = store.add("climate:16x16x8").value();
   const std::string field = dataset->info().fields.front().name;
@@ -287,7 +287,7 @@ TEST(WithoutMemory, WishesAreTakenBackAndAStoreEnds) {
 }
 
 // Whichever allocation fails, of libpng, of zlib or of the bytes: an error, and nothing is leaked.
-TEST(WithoutMemory, APngIsAnError) {
+TEST(WithoutMemory, PngIsAnError) {
   constexpr int edge = 200;
   std::vector<std::uint8_t> noise(std::size_t{3} * edge * edge);
   std::uint32_t state = 1;
@@ -315,7 +315,7 @@ TEST(WithoutMemory, APngIsAnError) {
 }
 
 // The counter counts: a vector as large as a picture would be seen.
-TEST(SteadyStateItself, SeesAVector) {
+TEST(SteadyStateItself, CountsTheAllocationOfAVector) {
   const Spent spent = spent_by([] {
     std::vector<float> picture(4UL * 320 * 240);
     ASSERT_EQ(picture.back(), 0.0F);

@@ -6,7 +6,7 @@
 namespace windsplat::net {
 namespace {
 
-TEST(Address, CountsIpv4AsItIsAndOfIpv6TheFirst64Bits) {
+TEST(Address, CountsIpv4WholeAndIpv6ByTheFirst64Bits) {
   EXPECT_EQ(counted_address("192.0.2.1"), "192.0.2.1");
   EXPECT_EQ(counted_address("::ffff:192.0.2.1"), "192.0.2.1");
   EXPECT_EQ(counted_address("2001:db8:1:2:3:4:5:6"), "2001:db8:1:2::/64");
@@ -18,7 +18,7 @@ TEST(Address, CountsIpv4AsItIsAndOfIpv6TheFirst64Bits) {
   EXPECT_LE(counted_address(std::string(100'000, 'x')).size(), 64U);
 }
 
-TEST(Network, HoldsWhatBeginsLikeIt) {
+TEST(Network, ContainsAddressesWithItsPrefix) {
   const auto holds = [](const char* network, const char* address) {
     const auto parsed = Network::parse(network);
     EXPECT_TRUE(parsed) << network;

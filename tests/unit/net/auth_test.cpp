@@ -36,7 +36,7 @@ Verdict verdict(const Request& request, bool upgrade = false) {
 
 std::string cookie_header(const std::string& value) { return "a=b; windsplat=" + value + "; c=d"; }
 
-TEST(TokenFile, IsOneLineOfABearerTokensCharacters) {
+TEST(TokenFile, IsOneLineOfBearerTokenCharacters) {
   EXPECT_TRUE(token("0123456789abcdef\n").is("0123456789abcdef"));
   EXPECT_TRUE(token("0123456789abcdef\r\n").is("0123456789abcdef"));
   EXPECT_TRUE(token(std::string(512, 'x')).is(std::string(512, 'x')));
@@ -54,7 +54,7 @@ TEST(TokenFile, IsOneLineOfABearerTokensCharacters) {
   }
 }
 
-TEST(TokenFile, IsThatTokenAndNoOther) {
+TEST(TokenFile, MatchesOnlyItsToken) {
   const Token mine = token();
   EXPECT_TRUE(mine.is(secret));
   for (const char* other : {"", "0", "0123456789abcdef-._~+/=", "0123456789abcdef-._~+/===",
@@ -63,7 +63,7 @@ TEST(TokenFile, IsThatTokenAndNoOther) {
   }
 }
 
-TEST(Cookie, IsAnHmacOfItsEndByTheToken) {
+TEST(Cookie, IsAnHmacOfItsExpiryByTheToken) {
   // By Python's hmac: key = HMAC-SHA256(token, "windsplat cookie, version 1"), HMAC-SHA256(key,
   // end).
   const std::string end = "2000000000";
@@ -71,7 +71,7 @@ TEST(Cookie, IsAnHmacOfItsEndByTheToken) {
   EXPECT_EQ(token().cookie(2'000'000'000), end + "." + mac);
 }
 
-TEST(Cookie, EndsAndIsGoodForItsTokenAlone) {
+TEST(Cookie, ExpiresAndIsValidForItsTokenOnly) {
   const Token mine = token();
   const std::string cookie = mine.cookie(now_s + 1);
   EXPECT_TRUE(mine.admits(cookie, now_s));
@@ -88,7 +88,7 @@ TEST(Cookie, EndsAndIsGoodForItsTokenAlone) {
   }
 }
 
-TEST(Cookie, HasThePortInItsName) {
+TEST(Cookie, ContainsThePortInItsName) {
   const auto name = [](const char* host) {
     Request out;
     out.headers = {{"Host", host}};
@@ -107,7 +107,7 @@ TEST(Cookie, HasThePortInItsName) {
   EXPECT_EQ(judge(asked, false, &mine, {}, now_s), Verdict::allowed);
 }
 
-TEST(TokenFile, AnotherOneHasToBeShownAnew) {
+TEST(TokenFile, NewTokenInvalidatesEarlierProofs) {
   const Token first = token();
   const Token same = token();
   const Token other = token("another-token-of-24-char");
@@ -118,7 +118,7 @@ TEST(TokenFile, AnotherOneHasToBeShownAnew) {
   EXPECT_FALSE(is_other_token(nullptr, nullptr));
 }
 
-TEST(TokenFile, ASecretIsOverwrittenBeforeItGoes) {
+TEST(TokenFile, SecretIsOverwrittenBeforeRelease) {
   std::string text(64, 's');
   const char* const bytes = text.data();
   wipe(text);
@@ -126,7 +126,7 @@ TEST(TokenFile, ASecretIsOverwrittenBeforeItGoes) {
   EXPECT_EQ(std::count(bytes, bytes + 64, 's'), 0);
 }
 
-TEST(Judge, HealthIsOpenAndNothingElse) {
+TEST(Authentication, OnlyHealthIsPublic) {
   EXPECT_EQ(verdict(request("GET", {"livez"})), Verdict::allowed);
   EXPECT_EQ(verdict(request("HEAD", {"readyz"})), Verdict::allowed);
   for (const std::vector<std::string>& path : {std::vector<std::string>{},
@@ -144,7 +144,7 @@ TEST(Judge, HealthIsOpenAndNothingElse) {
   }
 }
 
-TEST(Judge, ABearerTokenLetsIn) {
+TEST(Authentication, BearerTokenGrantsAccess) {
   const std::string right = std::string("Bearer ") + secret;
   const std::vector<std::string> path{"v1"};
   EXPECT_EQ(verdict(request("GET", path, {{"Authorization", right}})), Verdict::allowed);
@@ -166,7 +166,7 @@ TEST(Judge, ABearerTokenLetsIn) {
 }
 
 // A proxy that asks for a password has the browser send it with every request.
-TEST(Judge, AnotherSchemeIsNoProofAndNoWrongOne) {
+TEST(Authentication, AnotherSchemeIsNeitherProofNorAWrongToken) {
   const std::string basic = "Basic dXNlcjpwYXNzd29yZA==";
   for (const std::string& other : {basic, std::string(secret), std::string("Bearers ") + secret}) {
     const Headers alone{{"Authorization", other}};
@@ -186,7 +186,7 @@ TEST(Judge, AnotherSchemeIsNoProofAndNoWrongOne) {
 }
 
 // What may be a guess, right or wrong, and is counted before it is compared.
-TEST(Judge, AGuessIsWhatShowsATokenWhereOneIsAskedFor) {
+TEST(Authentication, WrongTokensCountOnlyWhereOneIsRequired) {
   const Headers bearer{{"Authorization", "Bearer x"}};
   const Headers offer{{"Sec-WebSocket-Protocol", "bearer.eA"}};
   EXPECT_TRUE(shows_token(request("GET", {"v1"}, bearer), false));
@@ -196,7 +196,7 @@ TEST(Judge, AGuessIsWhatShowsATokenWhereOneIsAskedFor) {
   EXPECT_FALSE(shows_token(request("GET", {"v1"}, {{"Cookie", "windsplat=1.2"}}), false));
 }
 
-TEST(Judge, APageInPlainHttpIsNotOneOfAServerInTls) {
+TEST(Authentication, PlainHttpOriginDiffersFromTheTlsServer) {
   const Token mine = token();
   const auto posted = [&](const char* origin, bool tls) {
     return judge(request("POST", {"v1", "views"},
@@ -210,7 +210,7 @@ TEST(Judge, APageInPlainHttpIsNotOneOfAServerInTls) {
   EXPECT_EQ(posted("https://winds.example", false), Verdict::allowed) << "a proxy may speak TLS";
 }
 
-TEST(Judge, ASubprotocolLetsAWebsocketIn) {
+TEST(Authentication, SubprotocolAuthenticatesAWebSocket) {
   const std::string right = std::string("windsplat.v1, bearer.") + secret_in_base64url;
   const auto with = [](const std::string& offers) {
     return request("GET", {"v1", "stream"}, {{"Sec-WebSocket-Protocol", offers}});
@@ -224,7 +224,7 @@ TEST(Judge, ASubprotocolLetsAWebsocketIn) {
   }
 }
 
-TEST(Judge, ACookieLetsInAndChangesSomethingForPagesOfOursAlone) {
+TEST(Authentication, CookieAuthenticatesAndAllowsChangesFromOwnPagesOnly) {
   const std::string cookie = cookie_header(token().cookie(now_s + 100));
   const auto with = [&](const char* method, Headers more) {
     more.emplace_back("Cookie", cookie);
@@ -250,7 +250,7 @@ TEST(Judge, ACookieLetsInAndChangesSomethingForPagesOfOursAlone) {
             Verdict::no_token);
 }
 
-TEST(Judge, AForeignPageIsRefusedEvenWithTheToken) {
+TEST(Authentication, ForeignOriginIsRefusedEvenWithTheToken) {
   const Headers headers{{"Authorization", std::string("Bearer ") + secret},
                         {"Origin", "https://evil.example"}};
   EXPECT_EQ(verdict(request("GET", {"v1", "stream"}, headers), true), Verdict::wrong_origin);
@@ -263,7 +263,7 @@ TEST(Judge, AForeignPageIsRefusedEvenWithTheToken) {
       << "without a token, too";
 }
 
-TEST(Judge, ATokenInAnAddressIsRefusedBeforeAllElse) {
+TEST(Authentication, TokenInAUrlIsRefusedFirst) {
   for (const char* key : {"token", "access_token", "TOKEN"}) {
     Request asked = request("GET", {"livez"}, {{"Authorization", std::string("Bearer ") + secret}});
     asked.query = {{"width", "3"}, {key, secret}};
@@ -287,7 +287,7 @@ std::string text_of(const Response& response) {
   return {response.body.bytes.begin(), response.body.bytes.end()};
 }
 
-TEST(TurnedAway, ProgramsGetAProblemAndPeopleAForm) {
+TEST(AccessRefusal, ProgramsGetAProblemAndBrowsersAForm) {
   const Request program = request("GET", {"v1"}, {{"Accept", "*/*"}});
   const Response problem = turned_away(Verdict::no_token, program, "/");
   EXPECT_EQ(problem.status, 401);
@@ -316,7 +316,7 @@ Request login(const std::string& body, Headers headers = {{"Origin", "http://win
   return out;
 }
 
-TEST(Login, ComesFromAPageOfOurs) {
+TEST(Login, RequiresAnOwnPage) {
   EXPECT_EQ(verdict(login("")), Verdict::allowed);
   EXPECT_EQ(verdict(login("", {{"Sec-Fetch-Site", "same-origin"}})), Verdict::allowed);
   EXPECT_EQ(verdict(login("", {})), Verdict::wrong_origin);
@@ -324,7 +324,7 @@ TEST(Login, ComesFromAPageOfOurs) {
   EXPECT_EQ(verdict(login("", {{"Origin", "null"}})), Verdict::wrong_origin);
 }
 
-TEST(Login, ChangesTheTokenForACookie) {
+TEST(Login, ExchangesTheTokenForACookie) {
   const Token mine = token();
   for (const char* body :
        {"token=0123456789abcdef-._~%2B%2F%3D%3D", "token=+0123456789abcdef-._~%2b/==+",
@@ -342,7 +342,7 @@ TEST(Login, ChangesTheTokenForACookie) {
   }
 }
 
-TEST(Login, ACookieIsForTlsAloneWhereThePageIs) {
+TEST(Login, CookieIsSecureUnderTls) {
   const std::string body = "token=0123456789abcdef-._~%2B/==";
   const auto cookie = [&](bool tls, const char* origin) {
     return header_of(log_in(login(body, {{"Origin", origin}}), token(), "/", tls, now_s),
@@ -353,7 +353,7 @@ TEST(Login, ACookieIsForTlsAloneWhereThePageIs) {
   EXPECT_THAT(cookie(false, "http://winds.example"), Not(HasSubstr("Secure")));
 }
 
-TEST(Login, WithAnotherTokenShowsTheFormAgain) {
+TEST(Login, WrongTokenShowsTheFormAgain) {
   for (const char* body : {"", "token", "token=", "token=wrong", "nekot=0123456789abcdef-._~%2B/==",
                            "token=%", "token=%2", "token=%zz"}) {
     const Response out = log_in(login(body), token(), "/", false, now_s);

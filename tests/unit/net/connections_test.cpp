@@ -29,7 +29,7 @@ class Idle : public Connection {
   Since since_;
 };
 
-TEST(Connections, EndTheOneThatIsIdleForLongest) {
+TEST(Connections, CloseTheLongestIdleConnection) {
   const Clock::time_point now = Clock::now();
   const auto of = [&](int seconds) {
     return std::make_shared<Idle>(now - std::chrono::seconds(seconds));
@@ -70,7 +70,7 @@ class Shaking : public Connection {
   const bool known_;
 };
 
-TEST(Connections, EndAHandshakeOfWhomHasMostAndStrangersFirst) {
+TEST(Connections, CloseAHandshakeOfTheLargestHolderAndUnauthenticatedFirst) {
   std::vector<std::shared_ptr<Shaking>> all;
   Connections connections;
   const auto come = [&](const std::string& address, int seconds, bool known = false) {

@@ -49,7 +49,7 @@ class CostTest : public testing::Test {
 
 constexpr double samples = 100 * 80 * 60;
 
-TEST_F(CostTest, CountsEveryStopAndEverySample) {
+TEST_F(CostTest, CountsEveryKernelPositionAndSample) {
   EXPECT_GE(cost(view_).kernels, samples);
   EXPECT_LT(cost(view_).kernels, 20 * samples);
   EXPECT_EQ(cost(view_).pixels, 1280 * 720);
@@ -67,7 +67,7 @@ TEST_F(CostTest, CountsEveryStopAndEverySample) {
   EXPECT_LT(cost(unseen).kernels, samples);
 }
 
-TEST_F(CostTest, AStrideLeavesSamplesOutAndASliceAllButALayer) {
+TEST_F(CostTest, StrideReducesSamplesAndASliceLeavesOneLayer) {
   protocol::View strided = view_;
   strided.vector.stride = 4;
   strided.vector.length = 0.001;
@@ -100,7 +100,7 @@ TEST_F(CostTest, GiantKernelsCostWhatTheyCover) {
   EXPECT_EQ(cost(thin).dominant, "/method/slabThickness");
 }
 
-TEST_F(CostTest, WhatIsAveragedOrOutOfSightCostsLess) {
+TEST_F(CostTest, AveragedOrCulledSamplesCostLess) {
   protocol::View far = view_;
   far.camera.eye = protocol::Vec3{0, -1000, 0};
   far.camera.target = protocol::Vec3{0, 0, 0};
@@ -141,7 +141,7 @@ TEST_F(CostTest, IsFiniteAndRefusedAtEveryExtremeOfAView) {
   }
 }
 
-TEST(CheckCost, NamesWhatWouldMakeItLessAndTheLimit) {
+TEST(CheckCost, NamesTheLimitAndHowToReduceTheCost) {
   Limits limits;
   limits.pixels = 1000;
   limits.kernels = 5000;

@@ -52,7 +52,7 @@ TEST(HandshakeThread, AddressesTakeTurns) {
   EXPECT_EQ(order, "abcabaa");
 }
 
-TEST(HandshakeThread, GoesOnAfterAStepThatThrows) {
+TEST(HandshakeThread, ContinuesAfterAStepThatThrows) {
   std::promise<void> done;
   Held held;
   held.thread.submit("a", [] { throw std::runtime_error("no memory"); });
@@ -61,7 +61,7 @@ TEST(HandshakeThread, GoesOnAfterAStepThatThrows) {
   EXPECT_EQ(done.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
 }
 
-TEST(HandshakeThread, LeavesTheProcessorToOthers) {
+TEST(HandshakeThread, YieldsTheProcessorToOthers) {
   int nice = 0;
   Held held;
   held.thread.submit(
@@ -70,7 +70,7 @@ TEST(HandshakeThread, LeavesTheProcessorToOthers) {
   EXPECT_GT(nice, ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())));
 }
 
-TEST(HandshakeThread, LetsGoOfAnOwnersStepsAtOnce) {
+TEST(HandshakeThread, ReleasesTheStepsOfAnOwnerAtOnce) {
   const auto kept = std::make_shared<int>(0);
   std::string order;
   const int mine = 0;
@@ -108,7 +108,7 @@ class Task final : public HandshakeTask {
   void pay() override { ++paid; }
 };
 
-TEST(HandshakeTask, ThatHasEndedWaitsForNoTurn) {
+TEST(HandshakeTask, EndedTaskDoesNotWaitForATurn) {
   Held held;
   const auto task = std::make_shared<Task>(held.thread);
   task->submit([] {});
@@ -124,7 +124,7 @@ TEST(HandshakeTask, ThatHasEndedWaitsForNoTurn) {
   EXPECT_EQ(*kept, 0);
 }
 
-TEST(HandshakeTask, IsToldWhatAStepTookThatThrew) {
+TEST(HandshakeTask, ReceivesTheTimeOfAStepThatThrew) {
   Held held;
   const auto task = std::make_shared<Task>(held.thread);
   task->submit([] { throw std::runtime_error("no memory"); });
@@ -132,7 +132,7 @@ TEST(HandshakeTask, IsToldWhatAStepTookThatThrew) {
   EXPECT_EQ(task->steps, 1);
 }
 
-TEST(HandshakeThread, DropsWhatWaitsWhenItEnds) {
+TEST(HandshakeThread, DiscardsWaitingStepsAtShutdown) {
   const auto kept = std::make_shared<int>(0);
   std::promise<void> gate;
   std::promise<void> begun;

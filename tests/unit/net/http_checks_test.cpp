@@ -21,7 +21,7 @@ Request request_with(Headers headers) {
   return request;
 }
 
-TEST(HeaderBytes, ARequestLineIsThreeWordsAndTheLastAVersion) {
+TEST(HeaderBytes, RequestLineHasThreePartsWithAVersionLast) {
   for (const char* line :
        {"GET / HTTP/1.1", "GET / HTTP/9.0", "X * HTTP/1.0", "GET http://a/b?c HTTP/1.1"}) {
     EXPECT_EQ(status_of_line(line), 0) << line;
@@ -35,7 +35,7 @@ TEST(HeaderBytes, ARequestLineIsThreeWordsAndTheLastAVersion) {
   }
 }
 
-TEST(HeaderBytes, LineEndsArePairsAndNothingIsFolded) {
+TEST(HeaderBytes, LineEndsAreCrlfWithoutFolding) {
   const std::string line = "GET / HTTP/1.1\r\n";
   EXPECT_EQ(status_of(check_header_bytes(line + "A: 1\r\nB: 2\r\n\r\n")), 0);
   for (const char* rest : {"A: 1\nB: 2\r\n\r\n", "A: 1\rB: 2\r\n\r\n", "A: 1\r\r\n\r\n",
@@ -44,7 +44,7 @@ TEST(HeaderBytes, LineEndsArePairsAndNothingIsFolded) {
   }
 }
 
-TEST(RequestCheck, AHostIsANameOrAnAddressWithOrWithoutAPort) {
+TEST(RequestCheck, HostIsANameOrAddressWithOptionalPort) {
   for (const char* host : {"a", "a.example", "a-b_c~d.example:80", "127.0.0.1", "127.0.0.1:65535",
                            "[::1]", "[2001:db8::1]:8080", "[::ffff:1.2.3.4]", "a:", "%41"}) {
     EXPECT_EQ(status_of(check_request(request_with({{"Host", host}}), 11)), 0) << host;
@@ -67,7 +67,7 @@ Headers upgrade_headers() {
           {"Sec-WebSocket-Key", "dGhlIHNhbXBsZSBub25jZQ=="}};
 }
 
-TEST(Upgrade, IsAskedForByListsInAnyNumberOfLines) {
+TEST(Upgrade, IsRequestedByListsInAnyNumberOfLines) {
   Request request = request_with(upgrade_headers());
   EXPECT_TRUE(asks_for_websocket(request, 11));
   EXPECT_FALSE(asks_for_websocket(request, 10));
@@ -101,7 +101,7 @@ TEST(Upgrade, NeedsAKeyOf16BytesOnce) {
   EXPECT_EQ(status_of(check_upgrade(request)), 400);
 }
 
-TEST(Upgrade, OfAnotherVersionIsToldWhichOneWouldDo) {
+TEST(Upgrade, OtherVersionGetsTheSupportedOne) {
   for (const char* version : {"", "8", "12", "14", "013", "13, 8", "+13"}) {
     Request request = request_with(upgrade_headers());
     request.headers[3].second = version;
@@ -124,7 +124,7 @@ std::string told(std::string_view target, const char* host) {
   return out;
 }
 
-TEST(Target, InAbsoluteFormNamesTheHostThatWasAskedFor) {
+TEST(Target, AbsoluteFormNamesTheRequestedHost) {
   EXPECT_EQ(told("/a/b?c=/d", "h:1"), "/a/b?c=/d");
   EXPECT_EQ(told("http://h:1/a/b?c=/d", "h:1"), "/a/b?c=/d");
   EXPECT_EQ(told("HTTPS://H/a", "h"), "/a");
@@ -135,7 +135,7 @@ TEST(Target, InAbsoluteFormNamesTheHostThatWasAskedFor) {
   }
 }
 
-TEST(Target, WithoutAWordBehindTheQuestionMarkHasNoQuery) {
+TEST(Target, WithoutQueryTextHasNoQuery) {
   EXPECT_EQ(told("/a?", "h"), "/a");
   EXPECT_EQ(told("/a?&&", "h"), "/a");
   EXPECT_EQ(told("/a?&b=1&", "h"), "/a?b=1");

@@ -11,7 +11,7 @@
 namespace windsplat::net {
 namespace {
 
-TEST(LoadService, BoundsWhatWaitsForADatasetAndInAll) {
+TEST(LoadService, LimitsWaitingJobsPerDatasetAndInTotal) {
   constexpr std::size_t most = 3;
   std::promise<void> let_go;
   const std::shared_future<void> gone = let_go.get_future().share();
@@ -47,7 +47,7 @@ TEST(LoadService, BoundsWhatWaitsForADatasetAndInAll) {
   EXPECT_EQ(ran, taken + 1);
 }
 
-TEST(LoadService, OnePayerHasHalfOfThePlaces) {
+TEST(LoadService, OnePayerMayUseHalfOfTheSlots) {
   std::promise<void> let_go;
   std::promise<void> begun;
   LoadService loads(1, 4, "loads");
@@ -72,7 +72,7 @@ TEST(LoadService, OnePayerHasHalfOfThePlaces) {
 }
 
 // Loads that wait for memory or whose files hang.
-TEST(LoadService, JobsThatRunForLongLeaveTheirPlacesAsFarAsThereAreSpareThreads) {
+TEST(LoadService, LongRunningJobsReleaseTheirSlotsToSpareThreads) {
   constexpr std::size_t places = 2;
   constexpr std::size_t spare = 2;
   std::promise<void> let_go;

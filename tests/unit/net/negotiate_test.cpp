@@ -6,7 +6,7 @@
 namespace windsplat::net {
 namespace {
 
-TEST(HostNames, OfLoopbackAreThree) {
+TEST(HostNames, LoopbackHasThree) {
   for (const char* host : {"localhost", "LOCALHOST:8080", "127.0.0.1", "127.9.9.9:1", "[::1]:80"}) {
     EXPECT_TRUE(names_loopback(host)) << host;
   }
@@ -16,7 +16,7 @@ TEST(HostNames, OfLoopbackAreThree) {
 }
 
 // A page can have its own name resolve to this machine, but no address.
-TEST(HostNames, AreNoAddresses) {
+TEST(HostNames, AddressesAreNotHostNames) {
   for (const char* host : {"10.0.0.1", "10.0.0.1:8080", "[2001:db8::1]", "[::ffff:1.2.3.4]:80"}) {
     EXPECT_TRUE(is_address(host)) << host;
   }
@@ -26,7 +26,7 @@ TEST(HostNames, AreNoAddresses) {
   }
 }
 
-TEST(HostNames, MayBeGiven) {
+TEST(HostNames, CanBeConfigured) {
   const std::vector<std::string> origins{"https://a.example"};
   const std::vector<std::string> names{"winds.example"};
   for (const char* host : {"localhost:1", "a.example", "winds.example", "WINDS.example:8080"}) {

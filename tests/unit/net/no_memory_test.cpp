@@ -68,7 +68,7 @@ RenderJob job_of(RenderKind kind, std::uint64_t owner) {
   return job;
 }
 
-TEST(NoMemory, AJobThatCannotBeQueuedChangesNothing) {
+TEST(NoMemory, JobThatCannotBeQueuedChangesNothing) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     int failed = 0;
     for (int count = 0;; ++count) {
@@ -93,7 +93,7 @@ TEST(NoMemory, AJobThatCannotBeQueuedChangesNothing) {
   }
 }
 
-TEST(NoMemory, AnAddressIsKnownWholeOrNotAtAll) {
+TEST(NoMemory, AddressIsRegisteredWholeOrNotAtAll) {
   const std::string here = "2001:db8:1:2:3:4:5:6";
   int failed = 0;
   for (int count = 0;; ++count) {
@@ -106,7 +106,7 @@ TEST(NoMemory, AnAddressIsKnownWholeOrNotAtAll) {
   EXPECT_GE(failed, 2);
 }
 
-TEST(NoMemory, NoPlaceIsLostAmongConnectionsAndSessions) {
+TEST(NoMemory, NoConnectionOrSessionSlotIsLost) {
   Limits limits;
   limits.connections = 1;
   limits.sessions_per_address = 1;
@@ -132,7 +132,7 @@ TEST(NoMemory, NoPlaceIsLostAmongConnectionsAndSessions) {
   EXPECT_GE(failed, 4);
 }
 
-TEST(NoMemory, AnAttemptThatFailsIsToldWithoutAny) {
+TEST(NoMemory, FailedAttemptIsReportedWithoutAllocating) {
   const CancelToken cancel;
   const CancelToken raised;
   raised.cancel();
@@ -154,7 +154,7 @@ TEST(NoMemory, AnAttemptThatFailsIsToldWithoutAny) {
 }
 
 // The thread has no memory from the first job on.
-TEST(NoMemory, ThreadsOfServicesGoOn) {
+TEST(NoMemory, ThreadsOfServicesContinue) {
   LoadService loads(1, 4, "loads");
   std::promise<void> loaded;
   EXPECT_TRUE(loads.submit({{}, [] {
@@ -180,7 +180,7 @@ TEST(NoMemory, ThreadsOfServicesGoOn) {
   drawn.get_future().wait();
 }
 
-TEST(NoMemory, AClientSJobWithoutAnyIsAFailedJob) {
+TEST(NoMemory, ClientJobThatCannotAllocateIsAFailedJob) {
   Jobs jobs(4, 1);
   const auto ask = [&] {
     return jobs
@@ -202,7 +202,7 @@ TEST(NoMemory, AClientSJobWithoutAnyIsAFailedJob) {
   }
 }
 
-TEST(NoMemory, WhatCannotBePostedIsCalledAtHomeAndGivenUpElsewhere) {
+TEST(NoMemory, CallbackThatCannotBePostedRunsInPlaceOrIsCancelled) {
   boost::asio::io_context io;
   int called = 0;
   const auto call = [&] { ++called; };
@@ -223,7 +223,7 @@ TEST(NoMemory, WhatCannotBePostedIsCalledAtHomeAndGivenUpElsewhere) {
   EXPECT_EQ(called, 2);
 }
 
-TEST(NoMemory, ALoaderIsEndedByItsObjectSEnd) {
+TEST(NoMemory, LoaderEndsWithItsObject) {
   auto process = std::make_unique<data::loader::Process>();
   ASSERT_TRUE(process->start(WINDSPLAT_PROGRAM));
   const pid_t id = process->id();
@@ -233,7 +233,7 @@ TEST(NoMemory, ALoaderIsEndedByItsObjectSEnd) {
 
 // What has come is lost with the memory that it needed, between the system and the handler; what
 // comes next is not.
-TEST(NoMemory, AConnectionThatIsLostIsNotTheLast) {
+TEST(NoMemory, LostConnectionDoesNotStopTheListener) {
   namespace asio = boost::asio;
   asio::io_context io;
   const auto more = asio::make_work_guard(io);  // a server has its timers

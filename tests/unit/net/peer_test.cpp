@@ -54,7 +54,7 @@ bool comes_true(const std::function<bool()>& holds) {
   return false;
 }
 
-TEST(Peer, HasLeftWhenItClosedItsSideAlsoBehindUnreadBytes) {
+TEST(Peer, HasDisconnectedWhenItClosesEvenWithUnreadBytes) {
   Listening listening;
   for (const bool byte_first : {false, true}) {
     for (const bool half : {false, true}) {
@@ -75,7 +75,7 @@ TEST(Peer, HasLeftWhenItClosedItsSideAlsoBehindUnreadBytes) {
   EXPECT_TRUE(peer_has_left(-1));
 }
 
-TEST(SpareDescriptor, TurnsAClientAwayWhenThereIsNoOther) {
+TEST(SpareDescriptor, RefusesAClientWhenDescriptorsRunOut) {
   Listening listening;
   SpareDescriptor spare;
   EXPECT_FALSE(spare.turn_away(listening.socket())) << "no pending connection";

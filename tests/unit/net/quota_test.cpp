@@ -25,7 +25,7 @@ Limits none() {
   return limits;
 }
 
-TEST(Quota, AnAddressMayNotHaveTheConnectionsOfAll) {
+TEST(Quota, OneAddressCannotUseAllConnections) {
   Limits limits = none();
   limits.connections = 3;
   limits.connections_per_address = 2;
@@ -45,7 +45,7 @@ TEST(Quota, AnAddressMayNotHaveTheConnectionsOfAll) {
   EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
 }
 
-TEST(Quota, TheReserveHasAnEndAndNoAddressHasAllOfIt) {
+TEST(Quota, ReserveIsLimitedInTotalAndPerAddress) {
   Limits limits = none();
   limits.connections = 1;
   Quota quota(limits);
@@ -64,7 +64,7 @@ TEST(Quota, TheReserveHasAnEndAndNoAddressHasAllOfIt) {
   EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Slot::reserve);
 }
 
-TEST(Quota, AProxyCountsInTotalAlone) {
+TEST(Quota, ProxyIsLimitedInTotalOnly) {
   Limits limits = none();
   limits.connections = 8;
   limits.connections_per_address = 1;
@@ -89,7 +89,7 @@ TEST(Quota, SessionsAreCountedByAddress) {
   EXPECT_FALSE(quota.open_session(here, 0));
 }
 
-TEST(Quota, RequestsComeBackAtTheirRateAndHealthHasItsOwn) {
+TEST(Quota, RequestsRefillAtTheirRateAndHealthHasItsOwn) {
   Limits limits = none();
   limits.requests_per_address = 2;
   Quota quota(limits);
@@ -108,7 +108,7 @@ TEST(Quota, RequestsComeBackAtTheirRateAndHealthHasItsOwn) {
   EXPECT_TRUE(quota.request(here, false, second / 2));
 }
 
-TEST(Quota, OnePictureMayGoIntoDebtAndTheNextWaitsUntilItIsPaid) {
+TEST(Quota, OnePictureMayOverdrawAndTheNextWaitsUntilRepaid) {
   Limits limits = none();
   limits.render_s_per_address = 6;
   Quota quota(limits);
@@ -126,7 +126,7 @@ TEST(Quota, OnePictureMayGoIntoDebtAndTheNextWaitsUntilItIsPaid) {
   EXPECT_FALSE(quota.picture(here, 30 * second));
 }
 
-TEST(Quota, BytesAreChargedAsTheyLeave) {
+TEST(Quota, BytesAreChargedWhenSent) {
   Limits limits = none();
   limits.bytes_per_address = 1000;
   Quota quota(limits);
@@ -140,7 +140,7 @@ TEST(Quota, BytesAreChargedAsTheyLeave) {
   EXPECT_FALSE(quota.picture(here, 5 * second));
 }
 
-TEST(Quota, WrongTokensAreLetOffSoOftenAMinute) {
+TEST(Quota, WrongTokensAreLimitedPerMinute) {
   Limits limits = none();
   limits.failed_logins_per_address = 3;
   Quota quota(limits);
@@ -153,7 +153,7 @@ TEST(Quota, WrongTokensAreLetOffSoOftenAMinute) {
   EXPECT_FALSE(quota.failed_login(here, 20 * second));
 }
 
-TEST(Quota, ATokenIsLookedAtWhileThereWereNotTooManyWrongOnes) {
+TEST(Quota, TokensAreCheckedUntilTooManyWereWrong) {
   Limits limits = none();
   limits.failed_logins_per_address = 2;
   Quota quota(limits);
@@ -170,7 +170,7 @@ TEST(Quota, ATokenIsLookedAtWhileThereWereNotTooManyWrongOnes) {
   EXPECT_FALSE(quota.may_try_login(here, 30 * second));
 }
 
-TEST(Quota, NewConnectionsComeBackAtTheirRateAndTlsTakesMore) {
+TEST(Quota, NewConnectionsRefillAtTheirRateAndTlsCostsMore) {
   Limits limits = none();
   limits.arrivals_per_address = 2;
   Quota quota(limits);
@@ -185,7 +185,7 @@ TEST(Quota, NewConnectionsComeBackAtTheirRateAndTlsTakesMore) {
   EXPECT_FALSE(quota.arrive(here, false, true, 3 * second));
 }
 
-TEST(Quota, TooManyNewConnectionsInAllAreRefusedToThoseThatBroughtThem) {
+TEST(Quota, TotalConnectionRateIsEnforcedOnItsLargestUsers) {
   Limits limits = none();
   limits.arrivals = 5;
   limits.arrivals_per_address = 3;
@@ -198,7 +198,7 @@ TEST(Quota, TooManyNewConnectionsInAllAreRefusedToThoseThatBroughtThem) {
   EXPECT_FALSE(quota.arrive(here, false, false, second));
 }
 
-TEST(Quota, AnAddressThatUsedUpItsHandshakeTimeWaitsForIt) {
+TEST(Quota, AddressOverItsHandshakeTimeIsThrottled) {
   Limits limits = none();
   limits.handshake_ms_per_address = 100;
   Quota quota(limits);
@@ -219,7 +219,7 @@ TEST(Quota, AnAddressThatUsedUpItsHandshakeTimeWaitsForIt) {
   EXPECT_FALSE(quota.arrive(there, true, true, second)) << "a proxy brings many";
 }
 
-TEST(Quota, StrangersTogetherUseUpHandshakeTimeOfStrangersAlone) {
+TEST(Quota, UnauthenticatedClientsExhaustTheirOwnHandshakeTimeOnly) {
   Limits limits = none();
   limits.handshake_ms = 100;
   Quota quota(limits);
@@ -239,7 +239,7 @@ TEST(Quota, StrangersTogetherUseUpHandshakeTimeOfStrangersAlone) {
   EXPECT_FALSE(quota.arrive(there, false, true, second));
 }
 
-TEST(Quota, StrangersUseUpNoHandshakeTimeOfTheMachineItself) {
+TEST(Quota, RemoteClientsDoNotExhaustLocalHandshakeTime) {
   Limits limits = none();
   limits.handshake_ms = 100;
   limits.handshake_ms_per_address = 50;
@@ -268,7 +268,7 @@ TEST(Quota, StrangersUseUpNoHandshakeTimeOfTheMachineItself) {
   EXPECT_TRUE(without.arrive("127.0.0.1", false, true, 0)) << "it is bounded all the same";
 }
 
-TEST(Quota, MessagesArePaidBeforeMoreIsRead) {
+TEST(Quota, MessagesAreChargedBeforeMoreIsRead) {
   Limits limits = none();
   limits.messages_per_address = 10;
   limits.received_per_address = 1000;
@@ -280,7 +280,7 @@ TEST(Quota, MessagesArePaidBeforeMoreIsRead) {
   EXPECT_EQ(quota.message_received(there, 0, 2 * second), 0);
 }
 
-TEST(Quota, NoughtIsNoLimit) {
+TEST(Quota, ZeroMeansNoLimit) {
   Quota quota(none());
   for (int n = 0; n < 10'000; ++n) {
     ASSERT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
@@ -297,7 +297,7 @@ TEST(Quota, NoughtIsNoLimit) {
   EXPECT_FALSE(quota.picture(here, 0));
 }
 
-TEST(Quota, IdleAddressesAreForgottenAndThoseInDebtAreNot) {
+TEST(Quota, IdleAddressesAreForgottenExceptThoseInDebt) {
   Limits limits = none();
   limits.render_s_per_address = 1;
   Quota quota(limits);
@@ -311,7 +311,7 @@ TEST(Quota, IdleAddressesAreForgottenAndThoseInDebtAreNot) {
   EXPECT_TRUE(quota.picture(here, later));
 }
 
-TEST(Quota, NoNumberOfAddressesMakesItLargerThanItMayBe) {
+TEST(Quota, NumberOfAddressesIsBounded) {
   Limits limits = none();
   limits.connections_per_address = 1;
   Quota quota(limits);
@@ -323,7 +323,7 @@ TEST(Quota, NoNumberOfAddressesMakesItLargerThanItMayBe) {
   EXPECT_EQ(quota.connect(here, false, 2).place, Quota::Slot::reserve) << "its one is known";
 }
 
-TEST(Quota, StrangersMakeNoRoomOfThoseThatShowedTheToken) {
+TEST(Quota, UnauthenticatedClientsDoNotEvictAuthenticatedAddresses) {
   Quota quota(none());
   quota.authenticated(here, 0);
   for (std::size_t n = 0; n < 3 * Quota::addresses_max; ++n) {
@@ -339,7 +339,7 @@ TEST(Quota, StrangersMakeNoRoomOfThoseThatShowedTheToken) {
   EXPECT_EQ(quota.known(), Quota::addresses_max) << "of those too there is an end";
 }
 
-TEST(Admission, LogsWithinAMinuteHowManyHandshakesItRefused) {
+TEST(Admission, LogsRefusedHandshakesOncePerMinute) {
   Limits limits = none();
   limits.handshake_ms_per_address = 0.1;  // one at once
   Metrics metrics;
@@ -362,7 +362,7 @@ TEST(Admission, LogsWithinAMinuteHowManyHandshakesItRefused) {
   EXPECT_EQ(rest.find("connections="), rest.rfind("connections=")) << "once: " << rest;
 }
 
-TEST(Admission, GivesPlacesBackWhenTheirTicketsGo) {
+TEST(Admission, ReleasesSlotsWithTheirTickets) {
   Limits limits = none();
   limits.connections = 1;
   Metrics metrics;
@@ -377,7 +377,7 @@ TEST(Admission, GivesPlacesBackWhenTheirTicketsGo) {
   EXPECT_FALSE(admission.connect(here)->reserve);
 }
 
-TEST(Admission, AnswersWithTheLimitAndWhenToTryAgain) {
+TEST(Admission, RefusesWithTheLimitAndARetryTime) {
   Limits limits = none();
   limits.requests_per_address = 0.1;
   limits.connections = 1;
@@ -403,7 +403,7 @@ TEST(Admission, AnswersWithTheLimitAndWhenToTryAgain) {
   EXPECT_FALSE(admission.request(*late, request, true));
 }
 
-TEST(Admission, ChargesWhatWasRefusedUnread) {
+TEST(Admission, ChargesRefusedUnreadBodies) {
   Limits limits = none();
   limits.requests_per_address = 0.1;
   Metrics metrics;
@@ -415,7 +415,7 @@ TEST(Admission, ChargesWhatWasRefusedUnread) {
   EXPECT_TRUE(admission.request(*visitor, request, false)) << "the same allowance";
 }
 
-TEST(Admission, RefusesWhatTakesTooLong) {
+TEST(Admission, RefusesExpensiveRequests) {
   Limits limits = none();
   limits.render_s = 2;
   Metrics metrics;
@@ -452,7 +452,7 @@ TEST(Admission, ChargesTheClientBehindATrustedProxy) {
   EXPECT_TRUE(ask(*liar, "198.51.100.2"));
 }
 
-TEST(Metrics, NamesEveryLimitOnce) {
+TEST(Metrics, HaveEveryLimitOnce) {
   EXPECT_EQ(std::set(limit_names.begin(), limit_names.end()).size(), limit_names.size());
   EXPECT_EQ(static_cast<std::size_t>(LimitKind::handshakes) + 1, limit_names.size());
 }

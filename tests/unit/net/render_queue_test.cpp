@@ -46,7 +46,7 @@ class Renderer {
   std::int64_t now_us_ = 0;
 };
 
-TEST(RenderQueue, GivesOwnersEqualTimesAndNotEqualNumbersOfJobs) {
+TEST(RenderQueue, GivesOwnersEqualTimesNotEqualJobCounts) {
   Renderer renderer;
   renderer.ask(RenderKind::stream, 1);
   renderer.ask(RenderKind::stream, 2);
@@ -56,7 +56,7 @@ TEST(RenderQueue, GivesOwnersEqualTimesAndNotEqualNumbersOfJobs) {
   EXPECT_NEAR(renderer.jobs[2], 3 * renderer.jobs[1], 3);
 }
 
-TEST(RenderQueue, GivesStreamsAndRequestsEqualTimesHoweverManyOwnersEachHas) {
+TEST(RenderQueue, SharesTimeEquallyBetweenStreamsAndRequests) {
   Renderer renderer;
   for (std::uint64_t owner = 1; owner <= 5; ++owner) renderer.ask(RenderKind::stream, owner);
   renderer.ask(RenderKind::request, 9);
@@ -68,7 +68,7 @@ TEST(RenderQueue, GivesStreamsAndRequestsEqualTimesHoweverManyOwnersEachHas) {
   EXPECT_NEAR(static_cast<double>(streams), static_cast<double>(renderer.used_us[9]), 100);
 }
 
-TEST(RenderQueue, AnOwnerThatWasIdleDoesNotTakeAllThatItLeft) {
+TEST(RenderQueue, IdleOwnerCannotReclaimItsUnusedShare) {
   Renderer renderer;
   const std::map<std::uint64_t, std::int64_t> costs{{1, 10}, {2, 10}};
   renderer.ask(RenderKind::stream, 1);
@@ -83,7 +83,7 @@ TEST(RenderQueue, AnOwnerThatWasIdleDoesNotTakeAllThatItLeft) {
   EXPECT_NEAR(renderer.jobs[2], 10, 1);
 }
 
-TEST(RenderQueue, AnOwnerThatUsedMuchIsNotForgivenBecauseItPausedForAMoment) {
+TEST(RenderQueue, ShortPauseDoesNotResetTheShareOfAnOwner) {
   Renderer renderer;
   for (std::uint64_t owner = 1; owner <= 3; ++owner) renderer.ask(RenderKind::stream, owner);
   const std::map<std::uint64_t, std::int64_t> costs{{1, 1000}, {2, 10}, {3, 10}};
@@ -92,7 +92,7 @@ TEST(RenderQueue, AnOwnerThatUsedMuchIsNotForgivenBecauseItPausedForAMoment) {
   for (int i = 0; i < 198; ++i) EXPECT_NE(renderer.run(costs), 1U);
 }
 
-TEST(Shares, RememberNobodyWhoIsIdleAndNotAhead) {
+TEST(Shares, ForgetIdleOwnersThatAreNotAhead) {
   Shares shares;
   shares.come(1);
   for (std::uint64_t party = 2; party < 1000; ++party) {
@@ -119,7 +119,7 @@ TEST(RenderQueue, BackgroundWaitsForAllOthers) {
   EXPECT_EQ(renderer.run(costs, false), 1U);
 }
 
-TEST(RenderQueue, ABackgroundJobThatRunsIsCancelledByAJobOfAnotherKindAlone) {
+TEST(RenderQueue, RunningBackgroundJobIsCancelledByOtherJobsOnly) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     RenderQueue queue;
     RenderJob job;
@@ -143,7 +143,7 @@ TEST(RenderQueue, ABackgroundJobThatRunsIsCancelledByAJobOfAnotherKindAlone) {
   }
 }
 
-TEST(RenderQueue, ANewerBackgroundJobTakesThePlaceOfTheOlderWhichIsTold) {
+TEST(RenderQueue, NewerBackgroundJobReplacesTheOlderWithNotice) {
   RenderQueue queue;
   const auto push = [&](RenderKind kind, std::uint64_t owner) {
     RenderJob job;
@@ -170,7 +170,7 @@ TEST(RenderQueue, ANewerBackgroundJobTakesThePlaceOfTheOlderWhichIsTold) {
 }
 
 // Cancelled jobs of a closed session: new owners without usage run before them.
-TEST(RenderQueue, ACancelledJobDoesNotWaitForItsTurn) {
+TEST(RenderQueue, CancelledJobDoesNotWaitForItsTurn) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     SCOPED_TRACE(static_cast<int>(kind));
     Renderer make;
@@ -197,7 +197,7 @@ TEST(RenderQueue, ACancelledJobDoesNotWaitForItsTurn) {
   }
 }
 
-TEST(RenderQueue, CountsWhatSomebodyStillWaitsFor) {
+TEST(RenderQueue, CountsJobsThatAreStillAwaited) {
   RenderQueue queue;
   RenderJob job;
   job.cost_ms = 100;
@@ -249,7 +249,7 @@ class HeldService {
   RenderService service_;  // last: its thread uses the above
 };
 
-TEST(RenderService, RefusesRequestsBeyondItsEstimateOfTheWorkThatWaits) {
+TEST(RenderService, RefusesRequestsAboveItsEstimateOfWaitingWork) {
   HeldService held({16, 10'000, {}});
   EXPECT_TRUE(held.request(60'000)) << "one alone is let in, whatever it costs";
   const auto refused = held.request(1);
@@ -258,7 +258,7 @@ TEST(RenderService, RefusesRequestsBeyondItsEstimateOfTheWorkThatWaits) {
   EXPECT_EQ(refused.error().retry_after_s, 60);
 }
 
-TEST(RenderService, TellsWhenWhatWaitsWillBeDone) {
+TEST(RenderService, EstimatesWhenWaitingWorkWillBeDone) {
   HeldService held({16, 10'000, {}});
   EXPECT_TRUE(held.request(4'200));
   EXPECT_TRUE(held.request(3'000));
@@ -269,7 +269,7 @@ TEST(RenderService, TellsWhenWhatWaitsWillBeDone) {
   EXPECT_TRUE(held.request(2'000)) << "a smaller one has room";
 }
 
-TEST(Problems, SayInTheirHeaderWhenToTryAgain) {
+TEST(Problems, ContainARetryTimeInTheirHeader) {
   const auto retry_after = [](int seconds) {
     Error error = make_error(ErrorKind::busy, "later");
     error.retry_after_s = seconds;
@@ -283,7 +283,7 @@ TEST(Problems, SayInTheirHeaderWhenToTryAgain) {
   EXPECT_EQ(retry_after(0), "1") << "unknown: soon";
 }
 
-TEST(RenderService, RefusesByNumberWhereNoCostIsKnown) {
+TEST(RenderService, LimitsTheNumberOfJobsOfUnknownCost) {
   HeldService held({3, 10'000, {}});
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(held.request(0));
   const auto refused = held.request(0);
@@ -291,7 +291,7 @@ TEST(RenderService, RefusesByNumberWhereNoCostIsKnown) {
   EXPECT_EQ(refused.error().retry_after_s, 1);
 }
 
-TEST(RenderService, WhatWasLetInBeforeIsNotRefused) {
+TEST(RenderService, AdmittedJobsAreNotRefusedLater) {
   HeldService held({1, 10, {}});
   EXPECT_TRUE(held.request(100));
   RenderJob rest;
@@ -301,7 +301,7 @@ TEST(RenderService, WhatWasLetInBeforeIsNotRefused) {
   EXPECT_TRUE(held.service().submit(std::move(rest)));
 }
 
-TEST(RenderService, ChargesWhatItsClockSaysAndTellsHowLongAJobWaited) {
+TEST(RenderService, ChargesMeasuredTimeAndReportsTheWait) {
   std::atomic<std::int64_t> now_us{0};
   std::vector<std::uint64_t> order;
   std::map<std::uint64_t, std::int64_t> queued_us;
@@ -330,7 +330,7 @@ TEST(RenderService, ChargesWhatItsClockSaysAndTellsHowLongAJobWaited) {
   EXPECT_EQ(std::count(order.begin(), order.end(), 8U), 12);
 }
 
-TEST(RenderService, EndsABackgroundJobForAFrame) {
+TEST(RenderService, CancelsABackgroundJobForAFrame) {
   std::promise<void> begun;
   std::promise<bool> ended;
   std::promise<void> drawn;
@@ -354,7 +354,7 @@ TEST(RenderService, EndsABackgroundJobForAFrame) {
 
 // A request is refused while another address's picture is drawn and one waits, unless its own cost
 // exceeds what is before it; waiting for one's own pictures is no reason for a refusal.
-TEST(RenderService, KeepsNobodyWaitingLongForOthers) {
+TEST(RenderService, BoundsTheWaitForOthers) {
   std::atomic<std::int64_t> now_us{0};
   RenderService::Options options;
   options.others_ms_max = 100;
@@ -399,7 +399,7 @@ TEST(RenderService, KeepsNobodyWaitingLongForOthers) {
 
 // Where many are refused the next one comes soon: a request is let in when what runs is nearly
 // done.
-TEST(RenderService, UnderOverloadNobodyWaitsForAWholePicture) {
+TEST(RenderService, UnderOverloadNoJobWaitsForAWholePicture) {
   std::atomic<std::int64_t> now_us{0};
   RenderService::Options options;
   options.others_ms_max = 20;
@@ -436,7 +436,7 @@ TEST(RenderService, UnderOverloadNobodyWaitsForAWholePicture) {
   let_go.set_value();
 }
 
-TEST(RenderQueue, TakesJobsOfUnknownCostForWhatItIsTold) {
+TEST(RenderQueue, UsesTheGivenCostForJobsOfUnknownCost) {
   RenderQueue queue;
   RenderJob job;
   job.payer = "a";
@@ -457,7 +457,7 @@ TEST(RenderQueue, TakesJobsOfUnknownCostForWhatItIsTold) {
   EXPECT_EQ(queue.rest_ms(99'000), 0);
 }
 
-TEST(RenderService, OnePayerHasHalfOfThePlaces) {
+TEST(RenderService, OnePayerMayUseHalfOfTheSlots) {
   RenderService::Options options;
   options.requests_max = 6;
   std::promise<void> begun;
@@ -486,13 +486,13 @@ TEST(RenderService, OnePayerHasHalfOfThePlaces) {
 constexpr auto slab = protocol::MethodName::slab;
 constexpr auto kernel = protocol::MethodName::kernel;
 
-TEST(RenderCosts, TakeWhatIsUnknownForWhatIsUsual) {
+TEST(RenderCosts, UseTypicalCostsForUnknownOnes) {
   const RenderCosts costs(2);
   EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 1e6), 3) << "6 ns of a thread's time";
   EXPECT_DOUBLE_EQ(RenderCosts(6).estimate_ms("a", slab, 1e6), 1);
 }
 
-TEST(RenderCosts, FollowTheWorkAndTheTimesByDatasetAndMethod) {
+TEST(RenderCosts, FollowWorkAndTimesByDatasetAndMethod) {
   RenderCosts costs(2);
   costs.learn("a", slab, 1e6, 2000);
   EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 5e5), 1);
@@ -504,7 +504,7 @@ TEST(RenderCosts, FollowTheWorkAndTheTimesByDatasetAndMethod) {
   EXPECT_NEAR(costs.estimate_ms("a", slab, 1e6), 2, 0.01);
 }
 
-TEST(RenderCosts, LieAboveMostOfWhatWasSeen) {
+TEST(RenderCosts, AreAboveMostMeasuredCosts) {
   RenderCosts costs(2);
   int above = 0;
   for (int i = 0; i < 1000; ++i) {
@@ -517,13 +517,13 @@ TEST(RenderCosts, LieAboveMostOfWhatWasSeen) {
 }
 
 // A machine that slept in the middle of a picture has none refused for good.
-TEST(RenderCosts, BelieveNoPictureThatTookAnAge) {
+TEST(RenderCosts, IgnoreOutliers) {
   RenderCosts costs(2);
   costs.learn("a", slab, 1e6, 3'600'000'000);
   EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 1e6), 50);
 }
 
-TEST(RenderCosts, ForgetTheDatasetThatWasNotDrawnForLongest) {
+TEST(RenderCosts, ForgetTheLeastRecentlyRenderedDataset) {
   RenderCosts costs(2);
   costs.learn("first", slab, 1e6, 1000);
   costs.learn("second", slab, 1e6, 1000);

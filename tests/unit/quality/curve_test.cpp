@@ -33,7 +33,7 @@ class Curve : public testing::Test {
   Forecasts forecasts;
 };
 
-TEST_F(Curve, IsSortedByTimeAndHoldsEverySettingThatIsAllowed) {
+TEST_F(Curve, IsSortedByTimeAndContainsEveryAllowedSetting) {
   const ForecastDescription out = curve(view, forecasts);
   EXPECT_EQ(out.width, 1920);
   EXPECT_EQ(out.height, 1080);
@@ -56,7 +56,7 @@ TEST_F(Curve, IsSortedByTimeAndHoldsEverySettingThatIsAllowed) {
 }
 
 // The definition, point by point against every other.
-TEST_F(Curve, TheFrontIsWhatNoOtherPointBeatsInBoth) {
+TEST_F(Curve, FrontContainsTheUndominatedPoints) {
   forecasts[3] = forecasts[7] = {0.05, 0.1, 0.5, true};  // of two alike one is enough
   const ForecastDescription out = curve(view, forecasts);
   int on_front = 0;
@@ -76,7 +76,7 @@ TEST_F(Curve, TheFrontIsWhatNoOtherPointBeatsInBoth) {
   EXPECT_LT(on_front, static_cast<int>(settings_count) - 1);
 }
 
-TEST_F(Curve, APointTellsHowItWouldBeDrawn) {
+TEST_F(Curve, PointContainsItsSetting) {
   view.method.slab_thickness = 3;
   const Setting setting{MethodName::slab, 2, 1};
   const Setting thin{MethodName::slab, 0, 0, 4};
@@ -99,7 +99,7 @@ TEST_F(Curve, APointTellsHowItWouldBeDrawn) {
 }
 
 // ln(error) is normal: 1.645 standard deviations leave 5 of 100 out at either end.
-TEST_F(Curve, BoundsAreThoseOfALogNormalErrorAndStayWithinWhatErrorsCanBe) {
+TEST_F(Curve, BoundsAreThoseOfALogNormalErrorWithinPossibleErrors) {
   for (Forecast& forecast : forecasts) forecast = {0.01, 0.4, 1, true};
   for (const ForecastPoint& point : curve(view, forecasts).points) {
     EXPECT_NEAR(std::log(point.error_high / point.error), 1.645 * 0.4, 0.01);
@@ -113,7 +113,7 @@ TEST_F(Curve, BoundsAreThoseOfALogNormalErrorAndStayWithinWhatErrorsCanBe) {
   }
 }
 
-TEST_F(Curve, TheChosenPointIsThePickedSetting) {
+TEST_F(Curve, ChosenPointIsThePickedSetting) {
   view.quality = {};
   EXPECT_FALSE(curve(view, forecasts).chosen);
   for (const double budget : {3.0, 9.0, 20.0, 60.0}) {
@@ -130,7 +130,7 @@ TEST_F(Curve, TheChosenPointIsThePickedSetting) {
 }
 
 // Of one style: near the sight that was measured, and as far from it as sights get.
-TEST(Measured, IsSaidOfErrorsFromNearByAlone) {
+TEST(Measured, IsReportedForErrorsOfNearbyViewpointsOnly) {
   Table table{Kind{}};
   const Viewpoint viewpoint{1, {0, 1, 0}, 640, 480};
   Viewpoint beside = viewpoint;

@@ -21,7 +21,7 @@ double error_of(const Kind& kind, const Setting& setting,
 }
 
 // Method slab is of order 2 in the thickness of its slabs.
-TEST(Laws, SlabsErrByTheSquareOfTheirThickness) {
+TEST(Laws, SlabErrorGrowsWithTheSquareOfThickness) {
   for (const Kind& kind : {both, media}) {
     Kind dense = kind;
     dense.thickness = 4;  // far above the least error that is told
@@ -34,7 +34,7 @@ TEST(Laws, SlabsErrByTheSquareOfTheirThickness) {
   }
 }
 
-TEST(Laws, FewerPixelsAndCoarserDataErrMoreThanTheViewsOwn) {
+TEST(Laws, FewerPixelsAndCoarserDataIncreaseTheError) {
   for (const Kind& kind : {both, media}) {
     double last = error_of(kind, {MethodName::slab, 0, 0});
     for (const Setting& worse : {Setting{MethodName::kernel, 0, 0},
@@ -52,12 +52,12 @@ TEST(Laws, FewerPixelsAndCoarserDataErrMoreThanTheViewsOwn) {
   }
 }
 
-TEST(Laws, LinesAloneAreExactUnderSlabs) {
+TEST(Laws, LinesAloneAreExactWithSlabs) {
   const Kind lines{true, false, 0.16, 1.4, 1, 1};
   EXPECT_EQ(error_of(lines, {MethodName::slab, 0, 0}), error_least);
 }
 
-TEST(Laws, OfAViewThatIsNotCompletedTooEveryErrorIsPositiveAndFinite) {
+TEST(Laws, IncompleteViewsHavePositiveFiniteErrors) {
   for (const Kind& kind : {Kind{}, both, media, Kind{true, true, 1e-9, 50, 1e35, 32}}) {
     for (const Viewpoint& viewpoint :
          {Viewpoint{}, Viewpoint{1e12, {0, 0, 1}, 8192, 8192}, Viewpoint{1e-12}}) {
@@ -82,7 +82,7 @@ TEST(Laws, FewerPixelsTakeLessTime) {
   EXPECT_GT(ms({MethodName::slab, 0, 0, 2}), ms({MethodName::slab, 0, 0}));
 }
 
-TEST(Prior, IsTheLawsAndAsUncertainAsStylesAndSightsTogether) {
+TEST(Prior, EqualsTheLawsWithTheCombinedUncertainty) {
   const Viewpoint viewpoint{2, {}, 640, 480};
   for (const Setting& setting : settings) {
     const Forecast told = prior(both, setting, viewpoint);

@@ -81,7 +81,7 @@ class Measure : public testing::Test {
   CancelToken cancel;
 };
 
-TEST_F(Measure, AFramesMeasuredErrorIsItsErrorAgainstTheIntegral) {
+TEST_F(Measure, MeasuredFrameErrorIsItsErrorAgainstTheIntegral) {
   for (const auto method : {protocol::MethodName::slab, protocol::MethodName::kernel}) {
     const Frame frame = drawn(method, Format::npy);
     ASSERT_TRUE(frame.error);
@@ -92,7 +92,7 @@ TEST_F(Measure, AFramesMeasuredErrorIsItsErrorAgainstTheIntegral) {
 }
 
 // What thinner slabs mend less, or not at all: the rule of compositing and an early stop.
-TEST_F(Measure, OtherRulesAndEarlyStopsAreMeasuredAgainstTheIntegralToo) {
+TEST_F(Measure, OtherRulesAndEarlyTerminationAreMeasuredAgainstTheIntegral) {
   const protocol::MethodView usual = view.method;
   true_error(drawn(protocol::MethodName::slab, Format::npy));  // keeps the integral
   for (const auto& [compositing, stop] : {std::pair{protocol::Compositing::simple, 1.5e-4},
@@ -121,7 +121,7 @@ TEST_F(Measure, OtherRulesAndEarlyStopsAreMeasuredAgainstTheIntegralToo) {
   }
 }
 
-TEST_F(Measure, WhatIsMeasuredIsThePictureThatIsSent) {
+TEST_F(Measure, MeasuredPictureIsTheSentOne) {
   Encoding encoding;
   for (const Format format : {Format::png, Format::npy, Format::jpeg}) {
     const Frame measured = drawn(protocol::MethodName::slab, format);
@@ -134,14 +134,14 @@ TEST_F(Measure, WhatIsMeasuredIsThePictureThatIsSent) {
   }
 }
 
-TEST_F(Measure, EveryFormatOfAPictureIsToldTheSameError) {
+TEST_F(Measure, EveryFormatOfAPictureReportsTheSameError) {
   const double png = drawn(protocol::MethodName::slab, Format::png).error.value();
   const Frame jpeg = drawn(protocol::MethodName::slab, Format::jpeg);
   EXPECT_NEAR(jpeg.error.value() / png, 1, 1e-4);
   EXPECT_GT(jpeg.jpeg_error.value(), 0);
 }
 
-TEST_F(Measure, OnlyPicturesOfFullSizeAreMeasured) {
+TEST_F(Measure, OnlyFullSizePicturesAreMeasured) {
   Encoding encoding;
   encoding.measure = true;
   encoding.half_level = 1;
@@ -150,7 +150,7 @@ TEST_F(Measure, OnlyPicturesOfFullSizeAreMeasured) {
   EXPECT_FALSE(small->error);
 }
 
-TEST_F(Measure, ASurveyTellsOfEveryAllowedSettingOnce) {
+TEST_F(Measure, CalibrationRunReportsEveryAllowedSettingOnce) {
   const auto found = surveyed();
   for (std::size_t i = 0; i < quality::settings_count; ++i) {
     EXPECT_EQ(found.count(i), quality::is_allowed(quality::settings[i], view) ? 1U : 0U) << i;
@@ -162,7 +162,7 @@ TEST_F(Measure, ASurveyTellsOfEveryAllowedSettingOnce) {
 }
 
 // Two ways to the same number: a survey's truth is another than a frame's finer run.
-TEST_F(Measure, ASurveyAgreesWithWhatFramesMeasure) {
+TEST_F(Measure, CalibrationRunAgreesWithMeasuredFrames) {
   auto found = surveyed();
   const auto error_of = [&](const quality::Setting& setting) {
     return found.at(quality::index_of(setting).value()).error.value();
@@ -177,7 +177,7 @@ TEST_F(Measure, ASurveyAgreesWithWhatFramesMeasure) {
 }
 
 // Seen from far away the view averages its data: slabs of any thickness err alike then.
-TEST_F(Measure, ASurveyOfAveragesDrawsThemAsFramesDo) {
+TEST_F(Measure, CalibrationRunRendersAveragesAsFramesDo) {
   auto placed = scene::complete_and_place(view, *dataset);
   scene::orbit(view, placed.value().placed->lattice, 20, 30, 0.05);
   placed = scene::complete_and_place(view, *dataset);
@@ -191,7 +191,7 @@ TEST_F(Measure, ASurveyOfAveragesDrawsThemAsFramesDo) {
 }
 
 // What is told of the detail is what scenes are built by.
-TEST_F(Measure, AViewAveragesWhereItsDetailIsBelowOne) {
+TEST_F(Measure, ViewUsesAveragesWhereItsDetailIsBelowOne) {
   const auto placed = scene::complete_and_place(view, *dataset).value();
   int averaged = 0;
   for (const bool lines : {true, false}) {
@@ -211,7 +211,7 @@ TEST_F(Measure, AViewAveragesWhereItsDetailIsBelowOne) {
   EXPECT_EQ(scene::detail_shown(scene::complete_and_place(view, *dataset).value()).value(), 0);
 }
 
-TEST_F(Measure, ACancelledSurveyEnds) {
+TEST_F(Measure, CancelledCalibrationRunStops) {
   int told = 0;
   const CancelToken stop;
   const auto done = calibrate(view, *dataset, pool, stop, workspace, [&](const CalibrationSample&) {

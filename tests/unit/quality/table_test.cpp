@@ -27,7 +27,7 @@ double prior_of(std::size_t setting, const Viewpoint& viewpoint) {
   return prior(kind, settings[setting], viewpoint).error;
 }
 
-TEST(Table, NothingMeasuredIsThePrior) {
+TEST(Table, WithoutMeasurementsEqualsThePrior) {
   const Table table(kind);
   const Forecasts told = table.forecasts(sight_at(0));
   for (std::size_t i = 0; i < told.size(); ++i) {
@@ -39,7 +39,7 @@ TEST(Table, NothingMeasuredIsThePrior) {
   }
 }
 
-TEST(Table, AtAMeasuredSightWhatWasMeasured) {
+TEST(Table, AtAMeasuredViewpointEqualsTheMeasurement) {
   Table table(kind);
   const double error = 5 * prior_of(half, sight_at(0));
   const double ms = 7 * prior(kind, settings[half], sight_at(0)).ms;
@@ -53,7 +53,7 @@ TEST(Table, AtAMeasuredSightWhatWasMeasured) {
   EXPECT_EQ(table.forecast(kernel, sight_at(0)).error, prior_of(kernel, sight_at(0)));
 }
 
-TEST(Table, WhatOnlyTellsAnErrorNeverPushesOutATime) {
+TEST(Table, ErrorMeasurementsNeverReplaceTimes) {
   Table table(kind);
   table.add(half, sight_at(0), {0.02, 50.0});
   for (std::size_t n = 0; n < 2 * Table::measurements_max; ++n) {
@@ -63,7 +63,7 @@ TEST(Table, WhatOnlyTellsAnErrorNeverPushesOutATime) {
   EXPECT_TRUE(table.forecast(half, sight_at(0)).timed);
 }
 
-TEST(Table, WhatIsNoNumberIsNotKept) {
+TEST(Table, NonFiniteMeasurementsAreIgnored) {
   Table table(kind);
   for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
     table.add(half, sight_at(0), {bad, {}});
@@ -75,7 +75,7 @@ TEST(Table, WhatIsNoNumberIsNotKept) {
 
 // One measurement: E = c / (c(0) + noise^2) of its logarithm over the prior's, where c is the
 // correlated variance at that distance.
-TEST(Table, OneMeasurementCountsByItsShareOfTheVariance) {
+TEST(Table, MeasurementsAreWeightedByTheirShareOfTheVariance) {
   const Scatter scatter = expected_error(kind, settings[half], sight_at(0)).scatter;
   const double signature = scatter.signature * scatter.signature;
   const double near = scatter.viewpoint * scatter.viewpoint;
@@ -92,7 +92,7 @@ TEST(Table, OneMeasurementCountsByItsShareOfTheVariance) {
   }
 }
 
-TEST(Table, SpreadGrowsWithTheDistanceAndShrinksWithMeasurements) {
+TEST(Table, UncertaintyGrowsWithDistanceAndShrinksWithMeasurements) {
   Table table(kind);
   table.add(kernel, sight_at(0), {0.01, {}});
   double last = 0;
@@ -108,7 +108,7 @@ TEST(Table, SpreadGrowsWithTheDistanceAndShrinksWithMeasurements) {
 }
 
 // Far from what was measured a style is still the same style.
-TEST(Table, FarAwayItStaysOnTheSideOfThePriorWhereTheStyleIs) {
+TEST(Table, FarAwayEstimatesKeepTheBiasOfTheScene) {
   Table table(kind);
   const double factor = 4;
   table.add(half, sight_at(0), {factor * prior_of(half, sight_at(0)), {}});
@@ -117,7 +117,7 @@ TEST(Table, FarAwayItStaysOnTheSideOfThePriorWhereTheStyleIs) {
   EXPECT_LT(far, factor);
 }
 
-TEST(Table, TwoAtOneSightAreTheirGeometricMean) {
+TEST(Table, TwoMeasurementsAtOneViewpointGiveTheirGeometricMean) {
   Table table(kind);
   const double base = prior_of(half, sight_at(0));
   table.add(half, sight_at(0), {base * 2, {}});
@@ -125,7 +125,7 @@ TEST(Table, TwoAtOneSightAreTheirGeometricMean) {
   EXPECT_NEAR(table.forecast(half, sight_at(0)).error / (4 * base), 1, 0.03);
 }
 
-TEST(Table, TheNearerOfTwoCountsMore) {
+TEST(Table, NearerMeasurementHasMoreWeight) {
   Table table(kind);
   const auto ratio = [&](double steps) {
     return table.forecast(half, sight_at(steps)).error / prior_of(half, sight_at(steps));
@@ -146,7 +146,7 @@ TEST(Table, KeepsTheNewestMeasurementsOfASetting) {
   EXPECT_NEAR(table.forecast(half, sight_at(0)).error / (0.1 * base), 1, 0.03);
 }
 
-TEST(Table, ManyMeasurementsOfOnePlaceAreNoTrouble) {
+TEST(Table, ManyMeasurementsAtOneViewpointStayStable) {
   Table table(kind);
   for (int i = 0; i < 100; ++i) table.add(kernel, sight_at(0), {0.01, 5.0});
   const Forecast told = table.forecast(kernel, sight_at(0.7));
@@ -156,7 +156,7 @@ TEST(Table, ManyMeasurementsOfOnePlaceAreNoTrouble) {
 }
 
 // An error of nothing is an error of rounding: logarithms stay finite.
-TEST(Table, AnErrorOfNothingIsTheLeastThereIs) {
+TEST(Table, ZeroErrorIsTheSmallestStoredError) {
   Table table(kind);
   table.add(kernel, sight_at(0), {0.0, 0.0});
   const Forecast told = table.forecast(kernel, sight_at(0));
@@ -166,7 +166,7 @@ TEST(Table, AnErrorOfNothingIsTheLeastThereIs) {
 }
 
 // Times that were not measured follow those that were.
-TEST(Table, AMachineOfAnotherSpeedIsOfThatSpeedInEverySetting) {
+TEST(Table, SpeedOfTheMachineAppliesToEverySetting) {
   Table table(kind);
   for (const std::size_t i : {kernel, half}) {
     table.add(i, sight_at(0), {{}, 10 * prior(kind, settings[i], sight_at(0)).ms});
@@ -179,7 +179,7 @@ TEST(Table, AMachineOfAnotherSpeedIsOfThatSpeedInEverySetting) {
 
 // Where cells are smaller than what the picture resolves it averages: that errs by another law, and
 // what was measured on one side says nothing of the other.
-TEST(Table, AveragesAreKnownApartFromWhatIsDrawnOfEverySample) {
+TEST(Table, AveragesAreLearnedSeparatelyFromFullDetail) {
   Table table(kind);
   Viewpoint near = sight_at(0);
   near.detail = 1.1;
@@ -194,7 +194,7 @@ TEST(Table, AveragesAreKnownApartFromWhatIsDrawnOfEverySample) {
   EXPECT_EQ(prior_of(half, far), prior_of(half, near));
 }
 
-TEST(Study, IsBegunOnceAndWantedWhereNothingIsKnown) {
+TEST(Study, StartsOnceAndIsNeededWhereNothingIsKnown) {
   Table table(kind);
   EXPECT_TRUE(table.wants_study(sight_at(0)));
   table.begin_study(sight_at(0));
@@ -206,14 +206,14 @@ TEST(Study, IsBegunOnceAndWantedWhereNothingIsKnown) {
   EXPECT_TRUE(table.wants_study(sight_at(2)));
 }
 
-TEST(Study, OneThatWasCutOffIsWantedAgain) {
+TEST(Study, InterruptedRunIsNeededAgain) {
   Table table(kind);
   table.begin_study(sight_at(0));
   table.end_study(false);
   EXPECT_TRUE(table.wants_study(sight_at(0)));
 }
 
-TEST(Study, TheOldestAreForgotten) {
+TEST(Study, OldestRunsAreForgotten) {
   Table table(kind);
   for (std::size_t i = 0; i <= Table::studies_max; ++i) {
     table.begin_study(sight_at(2.0 * static_cast<double>(i)));
@@ -223,7 +223,7 @@ TEST(Study, TheOldestAreForgotten) {
   EXPECT_FALSE(table.wants_study(sight_at(2)));
 }
 
-TEST(Encoding, ErrsLessAtAHigherQualityAndMoreWithHalfTheChroma) {
+TEST(Encoding, ErrorFallsWithQualityAndGrowsWithHalfChroma) {
   const Table table(kind);
   for (int quality = 11; quality <= 100; ++quality) {
     EXPECT_LT(table.encoding_error(quality, true, sight_at(0)),
@@ -233,7 +233,7 @@ TEST(Encoding, ErrsLessAtAHigherQualityAndMoreWithHalfTheChroma) {
             table.encoding_error(80, true, sight_at(0)));
 }
 
-TEST(Encoding, FollowsWhatWasMeasured) {
+TEST(Encoding, FollowsMeasurements) {
   Table table(kind);
   const double before = table.encoding_error(60, true, sight_at(0));
   const double measured = 3 * table.encoding_error(90, true, sight_at(0));
@@ -245,7 +245,7 @@ TEST(Encoding, FollowsWhatWasMeasured) {
       << "the newest count most";
 }
 
-TEST(Encoding, NearerThereIsMoreToEncode) {
+TEST(Encoding, CloserViewpointsNeedMoreBytes) {
   Table table(kind);
   table.add_encoding(90, sight_at(0), 0.01);
   EXPECT_GT(table.encoding_error(90, true, sight_at(-1)), 0.01);
@@ -253,7 +253,7 @@ TEST(Encoding, NearerThereIsMoreToEncode) {
 }
 
 // Halving the chroma loses the same whatever the quality: squares add up.
-TEST(Encoding, HalfTheChromaAddsTheSameAtEveryQuality) {
+TEST(Encoding, HalfChromaAddsTheSameAtEveryQuality) {
   Table table(kind);
   table.add_encoding(90, sight_at(0), 0.02);
   const auto added = [&](int quality) {
@@ -264,7 +264,7 @@ TEST(Encoding, HalfTheChromaAddsTheSameAtEveryQuality) {
   for (const int quality : {1, 40, 70, 95}) EXPECT_NEAR(added(quality), added(90), 1e-12);
 }
 
-TEST(Encoding, WhatIsNoErrorTeachesNothing) {
+TEST(Encoding, InvalidErrorsAreIgnored) {
   Table table(kind);
   const double before = table.encoding_error(90, true, sight_at(0));
   for (const double wrong : {0.0, -1.0, std::nan(""), double{INFINITY}}) {

@@ -57,7 +57,7 @@ double radius(int level, double scale = 1) {
   return inner + (level + 0.5) / 3 * (1 - inner);
 }
 
-TEST(Sphere, PolesAndEquatorStandWhereTheyShould) {
+TEST(Sphere, PolesAndEquatorAreInPlace) {
   const auto lattice = place_lattice(globe(), mapped(GeometryMapping::sphere));
   ASSERT_TRUE(lattice) << lattice.error().message;
   ASSERT_TRUE(lattice->places);
@@ -78,7 +78,7 @@ TEST(Sphere, PolesAndEquatorStandWhereTheyShould) {
   }
 }
 
-TEST(Sphere, TheUnbentLatticeHasTheBentOnesMeanCells) {
+TEST(Sphere, RectilinearLatticeHasTheMeanCellsOfTheCurvedOne) {
   const auto lattice = place_lattice(globe(), mapped(GeometryMapping::sphere));
   ASSERT_TRUE(lattice);
   const double inner = 1 / 1.15;
@@ -96,7 +96,7 @@ TEST(Sphere, TheUnbentLatticeHasTheBentOnesMeanCells) {
               0.5 * (lattice->spacing[1][3] + lattice->spacing[1][4]), 1e-12);
 }
 
-TEST(Sphere, HeightScalesTheShellAlone) {
+TEST(Sphere, HeightScalesTheShellOnly) {
   GeometryView geometry = mapped(GeometryMapping::sphere);
   geometry.scale = {5, 7, 2};
   const auto lattice = place_lattice(globe(), geometry);
@@ -107,7 +107,7 @@ TEST(Sphere, HeightScalesTheShellAlone) {
   EXPECT_NEAR(lattice->box_max.z, 1, tolerance);
 }
 
-TEST(Sphere, OneLevelIsAsThickAsItsColumnsAreApart) {
+TEST(Sphere, SingleLevelIsAsThickAsItsColumnSpacing) {
   data::Grid grid = globe();
   grid.axes[0].coordinates = steps(0, 3, 120);
   grid.axes[2] = axis(AxisKind::pressure, "hPa", {500});
@@ -156,7 +156,7 @@ TEST(Sphere, IsFramedFromEveryDirection) {
 }
 
 // A view begins opposite the part of the globe that the data cover.
-TEST(Sphere, APartIsSeenFromAboveItself) {
+TEST(Sphere, PartIsViewedFromAboveItself) {
   data::Grid grid = globe();
   grid.axes[0].coordinates = steps(120, 5, 7);
   grid.axes[1].coordinates = steps(-10, 5, 5);
@@ -206,7 +206,7 @@ TEST(Curvilinear, EveryColumnHasItsLongitudeAndLatitude) {
   EXPECT_NEAR(lattice->spacing[1][1], std::hypot(5, 2) * scale, tolerance);
 }
 
-TEST(Curvilinear, ColumnsStandOnTheGlobeToo) {
+TEST(Curvilinear, ColumnsArePlacedOnTheGlobe) {
   const auto lattice = place_lattice(sheared(), mapped(GeometryMapping::sphere));
   ASSERT_TRUE(lattice);
   const glm::dvec3 p = place(*lattice, 3, 1, 1);  // 382 = 22 E, 5 N
@@ -270,7 +270,7 @@ TEST(HeightField, TerrainKeepsItsSlope) {
   EXPECT_NEAR(lattice.box_min.z, -lattice.box_max.z, tolerance);
 }
 
-TEST(HeightField, AMaskedHeightIsItsLevelsMean) {
+TEST(HeightField, MaskedHeightIsTheMeanOfItsLevel) {
   auto dataset = terrain(metres(), "m", [](std::size_t n) {
     if (n == 9) return std::nan("");
     return 10.0 * static_cast<double>(n / 8) + (n % 8 == 0 ? 7.0 : 0.0);
@@ -284,7 +284,7 @@ TEST(HeightField, AMaskedHeightIsItsLevelsMean) {
   EXPECT_NEAR(place(lattice, 1, 0, 1).z, lattice.positions[2][1], tolerance);
 }
 
-TEST(HeightField, StandsOnTheGlobe) {
+TEST(HeightField, IsPlacedOnTheGlobe) {
   auto dataset = terrain(globe(), "m", [](std::size_t n) {
     return 1000.0 * static_cast<double>(n / 84) + (n % 84 == 40 ? 500.0 : 0.0);
   });
@@ -299,7 +299,7 @@ TEST(HeightField, StandsOnTheGlobe) {
   EXPECT_NEAR(glm::length(place(lattice, 5, 3, 2)), at(2000), tolerance);
 }
 
-TEST(HeightField, OfOneLevelIsASurface) {
+TEST(HeightField, SingleLevelIsASurface) {
   data::Grid grid = metres();
   grid.axes[2].coordinates = {0};
   auto dataset = terrain(grid, "m", [](std::size_t n) { return 5.0 * static_cast<double>(n % 4); });
@@ -309,7 +309,7 @@ TEST(HeightField, OfOneLevelIsASurface) {
   EXPECT_NEAR(east.z, 0.5 * east.x, tolerance);
 }
 
-TEST(HeightField, IsRefusedWhereItIsNoHeight) {
+TEST(HeightField, OtherQuantitiesAreRefused) {
   const auto refusal = [](data::Dataset& dataset, const char* field) {
     View view;
     view.geometry.height_field = field;
@@ -354,7 +354,7 @@ TEST(HeightField, IsLoadedOnceAndOnlyIfNamed) {
 }
 
 // A metre is as long anywhere on a globe: the shell's middle radius over the Earth's.
-TEST(WorldRates, OnTheGlobeAreLengthsPerMetre) {
+TEST(WorldRates, OnTheGlobeAreLengthsPerMeter) {
   auto dataset = dataset_of(
       std::make_unique<FakeSource>(globe(), std::vector<data::FieldInfo>{wind_info()}, 1));
   View view;

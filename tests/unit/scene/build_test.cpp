@@ -71,7 +71,7 @@ TEST(BuildScene, AnEmptyOpacityFunctionIsNoMedium) {
   EXPECT_TRUE(reads->empty());
 }
 
-TEST(BuildScene, ShowsTheStepThatWasAskedFor) {
+TEST(BuildScene, ShowsTheRequestedStep) {
   auto dataset = weather();
   View view;
   view.step = 1;
@@ -80,7 +80,7 @@ TEST(BuildScene, ShowsTheStepThatWasAskedFor) {
   EXPECT_EQ(scene.scalars[0].field->component(0)[5], 1005.0F);
 }
 
-TEST(BuildScene, RadiiFollowThePicturesHeight) {
+TEST(BuildScene, RadiiScaleWithThePictureHeight) {
   auto dataset = weather();
   View view;
   view.image.height = 1440;
@@ -105,7 +105,7 @@ TEST(BuildScene, RadiiFollowThePicturesHeight) {
   EXPECT_NEAR(scene.vector->opacity, 0.8, 1e-12);
 }
 
-TEST(BuildScene, ReversedColourRangesTurnTheMapAbout) {
+TEST(BuildScene, ReversedColorRangesReverseTheMap) {
   auto dataset = weather();
   View view;
   protocol::ScalarView scalar;
@@ -120,7 +120,7 @@ TEST(BuildScene, ReversedColourRangesTurnTheMapAbout) {
   EXPECT_EQ(table.entries.front(), color_map_linear("viridis", 256).back());
 }
 
-TEST(BuildScene, ConstantColourAndBackgroundAreLinear) {
+TEST(BuildScene, ConstantColorAndBackgroundAreLinear) {
   auto dataset = weather();
   View view;
   view.vector.color.by = protocol::ColorBy::constant;
@@ -199,7 +199,7 @@ TEST(BuildScene, OmegaOnNumberedLevelsIsNotTurned) {
   EXPECT_EQ(built(View{}, *dataset).vector->scale, glm::dvec3(1, 1, 1));
 }
 
-TEST(WorldRates, HeightAxesTakeMetresPerSecondAsTheyStand) {
+TEST(WorldRates, HeightAxesUseMetersPerSecondUnchanged) {
   data::Grid grid = atmosphere_grid();
   grid.axes[0] = axis(data::AxisKind::cartesian, "km", {0, 1, 2, 3});
   grid.axes[1] = axis(data::AxisKind::cartesian, "km", {0, 1, 2});
@@ -214,7 +214,7 @@ TEST(WorldRates, HeightAxesTakeMetresPerSecondAsTheyStand) {
   EXPECT_NEAR(scene.vector->rate_z[1], 0.3 / 3000.0, 1e-12);
 }
 
-TEST(WorldRates, AreAbsentForComponentsAndRefusedWhereUnknown) {
+TEST(WorldRates, AreAbsentForComponentsAndRefusedForUnknownUnits) {
   auto dataset = weather();
   EXPECT_TRUE(built(View{}, *dataset).vector->rate_x.empty());
   data::Grid grid = atmosphere_grid();
@@ -229,7 +229,7 @@ TEST(WorldRates, AreAbsentForComponentsAndRefusedWhereUnknown) {
   EXPECT_EQ(refused.error().at.at(0).pointer, "/vector/space");
 }
 
-TEST(Presets, ChangeWhatTheirNamesSay) {
+TEST(Presets, ChangeTheNamedProperties) {
   auto dataset = weather();
   const Lattice lattice = *place_lattice(dataset->info().grid, {});
   const View start = *default_view(*dataset);
@@ -257,7 +257,7 @@ TEST(Presets, ChangeWhatTheirNamesSay) {
   EXPECT_EQ(refused.error().at.at(0).pointer, "/preset");
 }
 
-TEST(Describe, LoadsNothingUnlessRangesAreWanted) {
+TEST(Describe, LoadsNothingUnlessRangesAreRequested) {
   auto dataset = weather();
   const auto brief = *describe(*dataset, RangesOf::none);
   EXPECT_EQ(dataset->loads(), 0U);
@@ -275,7 +275,7 @@ TEST(Describe, LoadsNothingUnlessRangesAreWanted) {
   EXPECT_EQ(brief.bytes_when_resident, 5U * 36U * 4U * 3U);
 }
 
-TEST(Describe, RangesAreOfTheFirstStepOrOfAll) {
+TEST(Describe, RangesCoverTheFirstStepOrAll) {
   auto dataset = weather();
   const auto first = *describe(*dataset, RangesOf::first_step);
   EXPECT_EQ(first.fields[1].range, (protocol::Range{0, 35}));
@@ -288,7 +288,7 @@ TEST(Describe, RangesAreOfTheFirstStepOrOfAll) {
   EXPECT_EQ(all.fields[1].range_of, "all");
 }
 
-TEST(Describe, AWhollyMaskedFieldHasNoRange) {
+TEST(Describe, FullyMaskedFieldHasNoRange) {
   auto source = std::make_unique<FakeSource>(
       atmosphere_grid(), std::vector<data::FieldInfo>{scalar_info("cloud", "1")}, 2);
   source->constant = std::make_unique<double>(std::nan(""));

@@ -95,7 +95,7 @@ TEST(Orbit, AzimuthZeroLooksNorthAndPositiveMovesEast) {
   EXPECT_NEAR(std::atan2(eye[2], -eye[1]), 30 * std::numbers::pi / 180, 1e-12);
 }
 
-TEST(Orbit, StraightDownHasNorthUpAndLeavesAValidCamera) {
+TEST(Orbit, StraightDownHasNorthUpAndAValidCamera) {
   auto dataset = atmosphere();
   const Lattice lattice = *place_lattice(dataset->info().grid, {});
   protocol::View view;
@@ -141,7 +141,7 @@ TEST(Orbit, ZoomOneFramesTheWholeBoxTightlyInEitherProjection) {
   }
 }
 
-TEST(Orbit, ZoomTwoDrawsTheCentreTwiceAsLarge) {
+TEST(Orbit, ZoomTwoRendersTheCenterTwiceAsLarge) {
   auto dataset = atmosphere();
   const Lattice lattice = *place_lattice(dataset->info().grid, {});
   for (const auto projection :
@@ -164,7 +164,7 @@ std::string pointer_of(const Result<protocol::View>& result) {
   return result.error().at[0].pointer;
 }
 
-TEST(Camera, ImpossibleCamerasAreRefusedByName) {
+TEST(Camera, InvalidCamerasAreRefusedByName) {
   auto dataset = atmosphere();
   protocol::View view;
   view.camera.eye = protocol::Vec3{0, 0, 4};
@@ -179,7 +179,7 @@ TEST(Camera, ImpossibleCamerasAreRefusedByName) {
   EXPECT_EQ(pointer_of(complete_view(view, *dataset)), "/camera/eye");
 }
 
-TEST(DepthCue, ItsEndsAreTheBoxsNearestAndFarthestCorners) {
+TEST(DepthCue, EndsAtTheNearestAndFarthestCornersOfTheBox) {
   auto dataset = atmosphere();
   protocol::View view;
   view.camera.eye = protocol::Vec3{0, -5, 0};

@@ -32,7 +32,7 @@ std::string pointer_of_refusal(const View& view, data::Dataset& dataset) {
   return refused.error().at[0].pointer;
 }
 
-TEST(Slice, IsTheLayerThatTheViewNames) {
+TEST(Slice, IsTheLayerNamedByTheView) {
   auto dataset = known_weather();
   EXPECT_FALSE(built(View{}, *dataset).slice);
   View view;
@@ -75,7 +75,7 @@ TEST(Slice, KeepsItsLinesByDefault) {
 }
 
 // Of many lines in one layer only the strongest of that layer are shown, wherever the others are.
-TEST(Slice, CountsItsOwnLinesAlone) {
+TEST(Slice, CountsItsOwnLinesOnly) {
   data::Grid grid;
   std::vector<double> many(900);
   for (std::size_t n = 0; n < many.size(); ++n) many[n] = static_cast<double>(n);
@@ -106,7 +106,7 @@ TEST(Slice, CountsItsOwnLinesAlone) {
   EXPECT_DOUBLE_EQ(*complete_view(view, *dataset)->vector.min_magnitude, 0.9);  // all but the top
 }
 
-TEST(Slice, LinesAndMediumAreMeasuredByTheLayer) {
+TEST(Slice, LinesAndMediumAreScaledToTheLayer) {
   auto dataset = known_weather();
   View view;
   const Scene whole = built(view, *dataset);
@@ -130,7 +130,7 @@ TEST(ColorByDirection, SpansTheCompass) {
   EXPECT_FALSE(scene.vector->color_field);
 }
 
-TEST(ColorByScalar, TakesTheFieldAtTheStepAndItsRangeFromTheFirst) {
+TEST(ColorByScalar, UsesTheFieldAtTheStepAndTheRangeOfTheFirst) {
   auto reads = std::make_shared<FakeSource::Reads>();
   auto dataset = known_weather(reads);
   View view;
@@ -148,7 +148,7 @@ TEST(ColorByScalar, TakesTheFieldAtTheStepAndItsRangeFromTheFirst) {
   EXPECT_EQ((*reads)["temperature@2"], 1);
 }
 
-TEST(ColorByScalar, LoadsNothingThatIsNotDrawn) {
+TEST(ColorByScalar, LoadsNothingThatIsNotRendered) {
   for (const bool lines : {true, false}) {
     auto reads = std::make_shared<FakeSource::Reads>();
     auto dataset = known_weather(reads);
@@ -188,7 +188,7 @@ TEST(Motion, CyclesAreRateTimesStepAndTime) {
   EXPECT_DOUBLE_EQ(scene.vector->motion_cycles, 1.5 * 2.25);
 }
 
-TEST(Methods, AreTheViews) {
+TEST(Methods, MatchThoseOfTheView) {
   auto dataset = known_weather();
   View view;
   EXPECT_EQ(built(view, *dataset).method, Method::slab);

@@ -53,7 +53,7 @@ struct Drag {
 
 double always(int /*frame*/) { return 1; }
 
-TEST(Chooser, CorrectsForecastsByWhatFramesTook) {
+TEST(Chooser, CorrectsForecastsByMeasuredFrames) {
   Drag drag;
   const Forecasts known = surveyed(100);
   const auto drawn = drag.run(known, {50.0, std::nullopt}, 30, [](int) { return 3.0; });
@@ -63,7 +63,7 @@ TEST(Chooser, CorrectsForecastsByWhatFramesTook) {
   EXPECT_NEAR(expected, 3 * known[drawn.back()].ms, 0.05 * expected);
 }
 
-TEST(Chooser, GoesDownAtOnceAndUpWithPatience) {
+TEST(Chooser, CoarsensAtOnceAndRefinesWithHysteresis) {
   Drag drag;
   const Forecasts known = surveyed(100);
   const quality::Aim aim{30.0, std::nullopt};
@@ -76,7 +76,7 @@ TEST(Chooser, GoesDownAtOnceAndUpWithPatience) {
   EXPECT_EQ(after.back(), calm.back());
 }
 
-TEST(Chooser, DoesNotFlickerWhereCostsScatter) {
+TEST(Chooser, DoesNotOscillateWhenCostsVary) {
   Drag drag;
   const Forecasts known = surveyed(100);
   const auto drawn = drag.run(known, {40.0, std::nullopt}, 400, [](int n) {
@@ -87,7 +87,7 @@ TEST(Chooser, DoesNotFlickerWhereCostsScatter) {
   EXPECT_LE(changes, 4);
 }
 
-TEST(Chooser, AnErrorIsKeptByTheFastestSettingThatDoes) {
+TEST(Chooser, FastestSettingWithinTheErrorIsChosen) {
   const Forecasts known = surveyed(100);
   for (const double most : {0.2, 0.08, 0.03, 0.005}) {
     Drag drag;
@@ -102,7 +102,7 @@ TEST(Chooser, AnErrorIsKeptByTheFastestSettingThatDoes) {
 }
 
 // Nothing is surveyed: what finer pictures take is only guessed, and each is tried in its turn.
-TEST(Chooser, WithoutASurveyFinerPicturesAreTriedOneAfterTheOther) {
+TEST(Chooser, WithoutACalibrationRunFinerPicturesAreTriedOneByOne) {
   Drag drag;
   const Forecasts guessed = quality::Table(quality::Kind{}).forecasts(viewpoint);
   const quality::Aim aim{30.0, std::nullopt};
@@ -119,7 +119,7 @@ TEST(Chooser, WithoutASurveyFinerPicturesAreTriedOneAfterTheOther) {
   EXPECT_LE(0.5 * guessed[fast.back()].ms, 30);
 }
 
-TEST(Chooser, LeavesOutPicturesThatTheLinkCannotCarry) {
+TEST(Chooser, ExcludesPicturesTheLinkCannotCarry) {
   Chooser chooser;
   const Forecasts known = surveyed(10);
   const protocol::View view;

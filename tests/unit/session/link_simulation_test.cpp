@@ -90,7 +90,7 @@ std::string name(const Case& c) {
          std::to_string(c.full / milli) + " ms";
 }
 
-TEST(Simulated, FramesAreYoungAndAsManyAsTheLinkAllows) {
+TEST(Simulated, FramesAreRecentAndAsManyAsTheLinkAllows) {
   for (const Case& c : cases()) {
     SCOPED_TRACE(name(c));
     Clock clock;
@@ -123,7 +123,7 @@ TEST(Simulated, FramesAreYoungAndAsManyAsTheLinkAllows) {
   }
 }
 
-TEST(Simulated, AMovingFrameIsOnTheLinkForAMomentAndGoodWhereTheLinkIsFast) {
+TEST(Simulated, MovingFramesLeaveTheLinkSoonAndAreGoodOnAFastLink) {
   for (const Case& c : cases()) {
     SCOPED_TRACE(name(c));
     Clock clock;
@@ -158,7 +158,7 @@ TEST(Simulated, AMovingFrameIsOnTheLinkForAMomentAndGoodWhereTheLinkIsFast) {
   }
 }
 
-TEST(Simulated, ALinkThatSlowsDownAndRecoversIsFollowed) {
+TEST(Simulated, SlowingAndRecoveringLinkIsFollowed) {
   Clock clock;
   Renderer renderer(clock, 10 * milli);
   LinkOptions fast{50 * mbit, 10 * milli, 3 * milli};
@@ -183,7 +183,7 @@ TEST(Simulated, ALinkThatSlowsDownAndRecoversIsFollowed) {
   EXPECT_LE(recovered, begin + 43 * second);
 }
 
-TEST(Simulated, AShortRestDoesNotFillASlowLinkWithAFinalFrame) {
+TEST(Simulated, ShortRestDoesNotFillASlowLinkWithAFinalFrame) {
   for (const double rate : {0.5, 100.0}) {
     SCOPED_TRACE(rate);
     Clock clock;
@@ -209,7 +209,7 @@ TEST(Simulated, AShortRestDoesNotFillASlowLinkWithAFinalFrame) {
   }
 }
 
-TEST(Simulated, AHiddenViewerHasNothingDrawn) {
+TEST(Simulated, HiddenSessionRendersNothing) {
   Clock clock;
   Renderer renderer(clock, 10 * milli);
   Viewer viewer(clock, renderer, {10 * mbit, 20 * milli, 3 * milli});
@@ -227,7 +227,7 @@ TEST(Simulated, AHiddenViewerHasNothingDrawn) {
   EXPECT_EQ(viewer.frames.back().rev, viewer.rev());
 }
 
-TEST(Simulated, ASlowViewerDoesNotSlowAnother) {
+TEST(Simulated, SlowSessionDoesNotSlowAnother) {
   const LinkOptions fast{1000 * mbit, 1 * milli, 2 * milli};
   const LinkOptions slow{0.5 * mbit, 200 * milli, 300 * milli};
   std::vector<double> count;
@@ -250,7 +250,7 @@ TEST(Simulated, ASlowViewerDoesNotSlowAnother) {
   EXPECT_LE(quantile(told[1].beyond, 0.99), 2 * told[1].interval + 20 * milli);
 }
 
-TEST(Simulated, WhatIsSaidWaitsForOneFrameAtMost) {
+TEST(Simulated, MessagesWaitForOneFrameAtMost) {
   for (const double rate : {0.5, 2.0, 10.0}) {
     SCOPED_TRACE(rate);
     Clock clock;

@@ -29,7 +29,7 @@ struct Known {
   }
 };
 
-TEST(Link, KnowsNothingBeforeAFrameWasAcknowledged) {
+TEST(Link, HasNoEstimateBeforeAnAcknowledgement) {
   Link link;
   EXPECT_FALSE(link.known());
   EXPECT_EQ(link.may_start_at(), 0);
@@ -39,7 +39,7 @@ TEST(Link, KnowsNothingBeforeAFrameWasAcknowledged) {
   EXPECT_EQ(link.bytes_in_flight(), 1000U);
 }
 
-TEST(Link, FindsRateAndRoundTripHoweverFarTheViewerIs) {
+TEST(Link, EstimatesRateAndRoundTripAtAnyDistance) {
   for (const double rate : {6e4, 2.5e5, 1.25e6, 1.25e7}) {
     for (const Micros trip : {2 * milli, 40 * milli, 400 * milli}) {
       for (const Micros decode : {0 * milli, 15 * milli}) {
@@ -56,7 +56,7 @@ TEST(Link, FindsRateAndRoundTripHoweverFarTheViewerIs) {
   }
 }
 
-TEST(Link, AFrameThatWasHeldUpLowersNothing) {
+TEST(Link, OneDelayedFrameLowersNothing) {
   Known known;
   Link link;
   for (int n = 0; n < 5; ++n) known.send(link, 50'000);
@@ -64,7 +64,7 @@ TEST(Link, AFrameThatWasHeldUpLowersNothing) {
   EXPECT_NEAR(link.bytes_per_s(), known.rate, 0.001 * known.rate);
 }
 
-TEST(Link, TwoFramesThatTookLongTellThatItHasBecomeSlow) {
+TEST(Link, TwoSlowFramesLowerTheRate) {
   Known known;
   Link link;
   for (int n = 0; n < 20; ++n) known.send(link, 50'000);
@@ -75,7 +75,7 @@ TEST(Link, TwoFramesThatTookLongTellThatItHasBecomeSlow) {
   EXPECT_NEAR(link.bytes_per_s(), 1e5, 1e2);
 }
 
-TEST(Link, FramesTooSmallToFillItLowerNothingAndLargerOnesDo) {
+TEST(Link, SmallFramesLowerNothingAndLargerOnesDo) {
   Known known;
   known.rate = 2e6;
   Link link;
@@ -87,7 +87,7 @@ TEST(Link, FramesTooSmallToFillItLowerNothingAndLargerOnesDo) {
   EXPECT_NEAR(link.bytes_per_s(), 1e5, 1e2) << "it has become slow";
 }
 
-TEST(Link, WithoutPongsTheSmallestFrameTellsTheRoundTrip) {
+TEST(Link, WithoutPongsTheSmallestFrameGivesTheRoundTrip) {
   Known known;
   Link link;
   known.send(link, 1'000, false);
@@ -97,7 +97,7 @@ TEST(Link, WithoutPongsTheSmallestFrameTellsTheRoundTrip) {
   EXPECT_NEAR(link.bytes_per_s(), known.rate, 0.02 * known.rate);
 }
 
-TEST(Link, ALongerWayIsBelievedAfterAWhile) {
+TEST(Link, LongerRoundTripIsAcceptedAfterAWhile) {
   Known known;
   Link link;
   known.send(link, 50'000);
@@ -107,7 +107,7 @@ TEST(Link, ALongerWayIsBelievedAfterAWhile) {
   EXPECT_NEAR(link.bytes_per_s(), known.rate, 0.001 * known.rate);
 }
 
-TEST(Link, TwoFramesInARowTellTheRateThatTheSecondAloneHides) {
+TEST(Link, ConsecutiveFramesRevealTheRateHiddenByTheSecond) {
   const Micros trip = 20 * milli;
   const double rate = 1e6;
   Link link;
@@ -119,7 +119,7 @@ TEST(Link, TwoFramesInARowTellTheRateThatTheSecondAloneHides) {
   EXPECT_NEAR(link.bytes_per_s(), rate, 0.001 * rate);
 }
 
-TEST(Link, TheNextFrameIsBegunSoThatItFindsTheLinkFree) {
+TEST(Link, NextFrameStartsSoThatTheLinkIsFree) {
   Known known;  // 1 MB/s; frames are drawn in 10 ms
   known.trip = 4 * milli;
   Link link;
@@ -133,7 +133,7 @@ TEST(Link, TheNextFrameIsBegunSoThatItFindsTheLinkFree) {
   EXPECT_EQ(link.may_start_at(), 0) << "nothing is in flight";
 }
 
-TEST(Link, TheNextFrameIsBegunSoThatItFindsTheViewerFree) {
+TEST(Link, NextFrameStartsSoThatTheClientIsFree) {
   Known known;
   known.trip = 4 * milli;
   known.decode = 200 * milli;
@@ -146,7 +146,7 @@ TEST(Link, TheNextFrameIsBegunSoThatItFindsTheViewerFree) {
               static_cast<double>(sent + (20 + 200 - 20 - 10) * milli), 1.0 * milli);
 }
 
-TEST(Link, FarViewersGetTheirTwoFramesEvenly) {
+TEST(Link, DistantClientsGetTheirTwoFramesEvenlySpaced) {
   Known known;
   known.rate = 1e8;
   known.trip = 400 * milli;
@@ -185,7 +185,7 @@ int settled(JpegRate& jpeg, const Link& link, double pixels) {
   return quality;
 }
 
-TEST(JpegRate, QualityFallsWithTheLinkAndRisesWhereThereIsPlenty) {
+TEST(JpegRate, QualityFollowsTheLinkRate) {
   int before = 0;
   for (const double rate : {1e5, 1.6e6, 2.2e6, 4e6, 1.2e7, 1e8}) {
     JpegRate jpeg;
@@ -209,14 +209,14 @@ TEST(JpegRate, QualityFallsWithTheLinkAndRisesWhereThereIsPlenty) {
   }
 }
 
-TEST(JpegRate, IsUsualWhileNothingIsKnownOfTheLink) {
+TEST(JpegRate, IsDefaultWhileTheLinkIsUnknown) {
   JpegRate jpeg;
   const Link link;
   EXPECT_EQ(jpeg.choose(full, link, budget), 75);
   EXPECT_EQ(jpeg.least_level(1280, 720, link, budget), 0);
 }
 
-TEST(JpegRate, LevelGivesWayWhereTheLowestQualityIsTooMuch) {
+TEST(JpegRate, LevelChangesWhenTheLowestQualityIsTooLarge) {
   int before = 4;
   for (const double rate : {1e4, 6.25e4, 2.5e5, 4e5, 1e6}) {
     JpegRate jpeg;
@@ -243,7 +243,7 @@ TEST(JpegRate, LevelGivesWayWhereTheLowestQualityIsTooMuch) {
   EXPECT_EQ(before, 0);
 }
 
-TEST(JpegRate, PicturesThatVaryALittleDoNotChangeTheLevel) {
+TEST(JpegRate, SmallVariationsOfPicturesKeepTheLevel) {
   // However near to a change of level the link happens to be.
   for (double rate = 1e5; rate < 3e5; rate *= 1.03) {
     JpegRate jpeg;
@@ -259,7 +259,7 @@ TEST(JpegRate, PicturesThatVaryALittleDoNotChangeTheLevel) {
   }
 }
 
-TEST(JpegRate, ALinkThatRecoversIsUsedAfterAFewFrames) {
+TEST(JpegRate, RecoveredLinkIsUsedAfterAFewFrames) {
   JpegRate jpeg;
   const Link slow = link_of(1e5);
   settled(jpeg, slow, 57'600);

@@ -8,7 +8,7 @@ namespace {
 
 using testing::ElementsAre;
 
-TEST(Pacing, APatchAloneBringsAMovingFrameAndThenTheFinalOne) {
+TEST(Pacing, SinglePatchGivesAMovingAndThenTheFinalFrame) {
   Driver driver;
   driver.patch(7, R"({"dataset":"wind"})", 123.5);
   driver.finish_render();
@@ -38,7 +38,7 @@ TEST(Pacing, APatchAloneBringsAMovingFrameAndThenTheFinalOne) {
   EXPECT_FALSE(driver.render) << "nothing is left to draw";
 }
 
-TEST(Pacing, MovingFramesAreDrawnByKernelAndFinalOnesAsAsked) {
+TEST(Pacing, MovingFramesUseKernelsAndFinalOnesTheRequestedMethod) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   ASSERT_TRUE(driver.render);
@@ -50,7 +50,7 @@ TEST(Pacing, MovingFramesAreDrawnByKernelAndFinalOnesAsAsked) {
   EXPECT_EQ(driver.render->setting.method, protocol::MethodName::slab);
 }
 
-TEST(Pacing, SlowFinalFramesBySlabDoNotCoarsenMovingOnes) {
+TEST(Pacing, SlowFinalSlabFramesDoNotCoarsenMovingOnes) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   ASSERT_TRUE(driver.render);
@@ -67,7 +67,7 @@ TEST(Pacing, SlowFinalFramesBySlabDoNotCoarsenMovingOnes) {
   EXPECT_LE(driver.render->setting.coarser, before.coarser);
 }
 
-TEST(Pacing, EveryFrameIsAnnouncedByWhatWasChosenForIt) {
+TEST(Pacing, EveryFrameIsAnnouncedWithItsSetting) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -79,7 +79,7 @@ TEST(Pacing, EveryFrameIsAnnouncedByWhatWasChosenForIt) {
   }
 }
 
-TEST(Pacing, ALosslessViewRestsAsPngAndMovesAsJpeg) {
+TEST(Pacing, LosslessViewRestsAsPngAndMovesAsJpeg) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","quality":{"lossless":true}})");
   driver.settle();
@@ -90,7 +90,7 @@ TEST(Pacing, ALosslessViewRestsAsPngAndMovesAsJpeg) {
   EXPECT_TRUE(Driver::is_final(driver.frames[1]));
 }
 
-TEST(Pacing, AFinalFrameIsOfHighQualityHoweverSlowTheLink) {
+TEST(Pacing, FinalFrameHasHighQualityOnAnyLink) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -128,7 +128,7 @@ TEST(Pacing, NoThirdFrameBeforeAnAcknowledgement) {
   EXPECT_EQ(driver.frames[2].header.rev, 19U) << "the newest view, not the next one";
 }
 
-TEST(Pacing, NothingIsDrawnWhileAFrameIsBeingWritten) {
+TEST(Pacing, NothingIsRenderedWhileAFrameIsWritten) {
   Driver driver;
   driver.write_at_once = false;
   driver.patch(1, R"({"dataset":"wind"})");
@@ -143,7 +143,7 @@ TEST(Pacing, NothingIsDrawnWhileAFrameIsBeingWritten) {
   EXPECT_EQ(driver.frames.back().header.rev, 3U);
 }
 
-TEST(Pacing, ASteadyFlowOfPatchesStarvesNobody) {
+TEST(Pacing, SteadyPatchesStarveNoSession) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -191,7 +191,7 @@ TEST(Pacing, AfterStoppingOnlyTheNewestViewIsShown) {
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(Pacing, AChangeGivesUpTheFinalFrameAndAMovingOneComesInstead) {
+TEST(Pacing, ChangeCancelsTheFinalFrameForAMovingOne) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -208,7 +208,7 @@ TEST(Pacing, AChangeGivesUpTheFinalFrameAndAMovingOneComesInstead) {
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
 }
 
-TEST(Pacing, AFinalFrameThatWasDoneJustBeforeTheChangeIsDropped) {
+TEST(Pacing, FinalFrameFinishedJustBeforeAChangeIsDropped) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -223,7 +223,7 @@ TEST(Pacing, AFinalFrameThatWasDoneJustBeforeTheChangeIsDropped) {
   EXPECT_EQ(driver.texts_of<protocol::StatsMessage>().back().dropped, 1U);
 }
 
-TEST(Pacing, AHiddenClientIsSentNothingUntilItIsSeenAgain) {
+TEST(Pacing, HiddenClientGetsNothingUntilVisible) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.say(protocol::VisibilityMessage{true});
@@ -251,7 +251,7 @@ Revs unchanged_revs(const Driver& driver) {
   return revs;
 }
 
-TEST(Unchanged, APatchThatSaysTheSameIsAnsweredWithoutAFrame) {
+TEST(Unchanged, EquivalentPatchIsAnsweredWithoutAFrame) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[1,2,3]}})");
   driver.settle();
@@ -273,7 +273,7 @@ TEST(Unchanged, APatchThatSaysTheSameIsAnsweredWithoutAFrame) {
   EXPECT_EQ(unchanged_revs(driver), (Revs{2, 3, 4}));
 }
 
-TEST(Unchanged, AViewThatDiffersInAnythingIsDrawn) {
+TEST(Unchanged, AnyDifferenceIsRendered) {
   for (const char* other :
        {R"({"step":1})", R"({"camera":{"eye":[1,2,4]}})", R"({"image":{"background":"#010101"}})",
         R"({"image":{"width":99}})", R"({"vector":{"field":null}})", R"({"dataset":"sea"})"}) {
@@ -286,7 +286,7 @@ TEST(Unchanged, AViewThatDiffersInAnythingIsDrawn) {
   }
 }
 
-TEST(Unchanged, AMovingFrameDoesNotStandForItsView) {
+TEST(Unchanged, MovingFrameDoesNotStandForItsView) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -298,7 +298,7 @@ TEST(Unchanged, AMovingFrameDoesNotStandForItsView) {
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
 }
 
-TEST(Unchanged, BackToWhatWasShownWhileAnotherViewIsDrawnIsDrawnAgain) {
+TEST(Unchanged, ReturnToTheShownViewDuringARenderIsRenderedAgain) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -311,7 +311,7 @@ TEST(Unchanged, BackToWhatWasShownWhileAnotherViewIsDrawnIsDrawnAgain) {
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(Unchanged, ThereAndBackWhileTheCreditIsOutNeedsNoFrame) {
+TEST(Unchanged, ThereAndBackWithoutCreditNeedsNoFrame) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -328,7 +328,7 @@ TEST(Unchanged, ThereAndBackWhileTheCreditIsOutNeedsNoFrame) {
   EXPECT_EQ(driver.frames.size(), 2U);
 }
 
-TEST(Unchanged, ACameraThatMovesWhereNothingShowsSendsNothing) {
+TEST(Unchanged, CameraMotionWithoutVisibleContentSendsNothing) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
   driver.settle();
@@ -345,7 +345,7 @@ TEST(Unchanged, ACameraThatMovesWhereNothingShowsSendsNothing) {
   EXPECT_GT(driver.frames.size(), frames);
 }
 
-TEST(Unchanged, AMovingFrameWithNothingInItDoesNotStandForTheFinalOne) {
+TEST(Unchanged, EmptyMovingFrameDoesNotStandForTheFinalOne) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
   driver.settle(200 * ms);
@@ -363,7 +363,7 @@ TEST(Unchanged, AMovingFrameWithNothingInItDoesNotStandForTheFinalOne) {
   EXPECT_TRUE(unchanged_revs(driver).empty());
 }
 
-TEST(Unchanged, ARevThatIsSaidAgainIsAnsweredAgain) {
+TEST(Unchanged, RepeatedRevIsAnsweredAgain) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -379,7 +379,7 @@ TEST(Unchanged, ARevThatIsSaidAgainIsAnsweredAgain) {
   EXPECT_EQ(unchanged_revs(driver), (Revs{1, 1})) << "no patch, no answer";
 }
 
-TEST(Unchanged, GoingBackAfterARefusalAnswersWhatWasNotAnsweredAndNoMore) {
+TEST(Unchanged, ReturnAfterARefusalAnswersOpenPatchesOnly) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -391,7 +391,7 @@ TEST(Unchanged, GoingBackAfterARefusalAnswersWhatWasNotAnsweredAndNoMore) {
   EXPECT_TRUE(unchanged_revs(driver).empty()) << "rev 1 was answered long ago";
 }
 
-TEST(Unchanged, WhatShowsNothingButDiffersByMoreThanTheCameraIsSent) {
+TEST(Unchanged, EmptyViewDifferingInMoreThanTheCameraIsSent) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
   driver.settle();
@@ -402,7 +402,7 @@ TEST(Unchanged, WhatShowsNothingButDiffersByMoreThanTheCameraIsSent) {
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
 }
 
-TEST(Unchanged, FromSomethingToNothingIsSent) {
+TEST(Unchanged, ChangeToAnEmptyPictureIsSent) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();

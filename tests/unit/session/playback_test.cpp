@@ -43,7 +43,7 @@ std::vector<std::uint32_t> moving_steps(const Driver& driver) {
 
 // --- order --------------------------------------------------------------------------------------
 
-TEST(Reverse, RunsDownAndBeginsAgainAtTheTop) {
+TEST(Reverse, RunsDownAndRestartsAtTheTop) {
   Driver driver;
   rest_at(driver, 2);
   driver.say(play(4, 0, 10, true, true));
@@ -51,7 +51,7 @@ TEST(Reverse, RunsDownAndBeginsAgainAtTheTop) {
   EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 0U, 4U, 3U, 2U, 1U));
 }
 
-TEST(Reverse, WithoutLoopEndsAtTheBottomAndMakesItFinal) {
+TEST(Reverse, WithoutLoopEndsAtTheFirstStepAndMakesItFinal) {
   Driver driver;
   rest_at(driver, 2);
   driver.say(play(9, 0, 10, false, true));
@@ -64,7 +64,7 @@ TEST(Reverse, WithoutLoopEndsAtTheBottomAndMakesItFinal) {
   EXPECT_THAT(driver.steps_shown(), ElementsAre(9U, 8U));
 }
 
-TEST(Reverse, WithDropSkipsDownwardAndOverTheEnd) {
+TEST(Reverse, WithDropSkipsDownwardAndAcrossTheEnd) {
   Driver driver;
   rest_at(driver, 3);
   driver.say(play(9, 0, 10, true, true));
@@ -84,7 +84,7 @@ TEST(Reverse, FromBeyondTheLastStepIsAnError) {
 
 // --- changes on the way -------------------------------------------------------------------------
 
-TEST(Seamless, AFasterPaceGoesOnFromThePresentStep) {
+TEST(Seamless, FasterPaceContinuesFromThePresentStep) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 1, true, true));
@@ -95,7 +95,7 @@ TEST(Seamless, AFasterPaceGoesOnFromThePresentStep) {
   EXPECT_THAT(moving_steps(driver), ElementsAre(2U, 3U, 4U));
 }
 
-TEST(Seamless, SayingTheSameAgainAndAgainHoldsNothingUp) {
+TEST(Seamless, RepeatedEqualMessagesDelayNothing) {
   Driver driver;
   rest_at(driver, 0);
   for (int n = 0; n < 20; ++n) {
@@ -105,7 +105,7 @@ TEST(Seamless, SayingTheSameAgainAndAgainHoldsNothingUp) {
   EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 2U, 3U, 4U));
 }
 
-TEST(Seamless, TurningRoundGoesBackOverTheStepsJustSeen) {
+TEST(Seamless, ReversalReturnsOverTheStepsJustShown) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 10, true, true));
@@ -115,7 +115,7 @@ TEST(Seamless, TurningRoundGoesBackOverTheStepsJustSeen) {
   EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 2U, 3U, 2U, 1U, 0U));
 }
 
-TEST(Seamless, DroppingFromNowOnDoesNotLeapOverWhatWasLate) {
+TEST(Seamless, DroppingFromNowOnDoesNotSkipLateSteps) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 10, true, false));
@@ -127,7 +127,7 @@ TEST(Seamless, DroppingFromNowOnDoesNotLeapOverWhatWasLate) {
   EXPECT_EQ(driver.render->view.step, 2);
 }
 
-TEST(Seamless, NoLoopFromNowOnEndsAtTheLastStep) {
+TEST(Seamless, LoopTurnedOffEndsAtTheLastStep) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 3, 10, true, true));
@@ -138,7 +138,7 @@ TEST(Seamless, NoLoopFromNowOnEndsAtTheLastStep) {
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(Seamless, OneStepAloneIsShownAndNothingRuns) {
+TEST(Seamless, SingleStepIsShownWithoutPlayback) {
   Driver driver;
   rest_at(driver, 5);
   driver.say(play(7, 7, 60, true, true));
@@ -147,7 +147,7 @@ TEST(Seamless, OneStepAloneIsShownAndNothingRuns) {
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(EveryStep, IsShownWhileTheViewIsTurnedAllTheTime) {
+TEST(EveryStep, IsShownDuringContinuousRotation) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 20, false, false));
@@ -177,7 +177,7 @@ TEST(Scrub, AtRestShowsTheNewestOfManySteps) {
   EXPECT_THAT(driver.steps_shown(), ElementsAre(1U, 8U, 8U));
 }
 
-TEST(Hidden, StepsWaitUntilSomeoneLooksAgain) {
+TEST(Hidden, StepsWaitUntilVisible) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 10, true, true));
@@ -192,7 +192,7 @@ TEST(Hidden, StepsWaitUntilSomeoneLooksAgain) {
 
 // --- counts -------------------------------------------------------------------------------------
 
-TEST(PlayStats, TellThePaceAndThatNothingWasLeftOut) {
+TEST(PlayStats, ReportThePaceAndThatNothingWasDropped) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 25, true, true));
@@ -204,7 +204,7 @@ TEST(PlayStats, TellThePaceAndThatNothingWasLeftOut) {
   EXPECT_EQ(stats.back().steps_not_ready, 0U);
 }
 
-TEST(PlayStats, WithoutDropTellThePaceThatDrawingAllows) {
+TEST(PlayStats, WithoutDropReportTheRenderingPace) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 60, true, false));
@@ -215,7 +215,7 @@ TEST(PlayStats, WithoutDropTellThePaceThatDrawingAllows) {
   EXPECT_EQ(stats.back().steps_dropped, 0U);
 }
 
-TEST(PlayStats, StepsShownAndDroppedAreAllThatWentBy) {
+TEST(PlayStats, ShownAndDroppedStepsAddUp) {
   for (const Micros cost : {30 * ms, 70 * ms, 130 * ms, 310 * ms}) {
     Driver driver;
     rest_at(driver, 0);
@@ -240,7 +240,7 @@ TEST(PlayStats, StepsShownAndDroppedAreAllThatWentBy) {
   }
 }
 
-TEST(PlayStats, CountTheStepsThatHadToBeReadFirst) {
+TEST(PlayStats, CountStepsThatWaitedForLoading) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 10, true, true));
@@ -261,7 +261,7 @@ std::vector<int> iota(int first, int count) {
   return out;
 }
 
-TEST(PrefetchRequest, AtRestIsForTheNeighbours) {
+TEST(PrefetchRequest, AtRestCoversTheNeighbors) {
   for (const auto& [step, wanted] : std::vector<std::pair<int, std::vector<int>>>{
            {0, {1}}, {4, {5, 3}}, {steps - 1, {steps - 2}}}) {
     Driver driver;
@@ -276,7 +276,7 @@ TEST(PrefetchRequest, AtRestIsForTheNeighbours) {
   }
 }
 
-TEST(PrefetchRequest, OutlivesATurnOfTheCameraButNotAnotherStep) {
+TEST(PrefetchRequest, SurvivesCameraMotionButNotAnotherStep) {
   Driver driver;
   rest_at(driver, 4);
   driver.patch(2, R"({"camera":{"fovY":20}})");
@@ -290,7 +290,7 @@ TEST(PrefetchRequest, OutlivesATurnOfTheCameraButNotAnotherStep) {
   EXPECT_THAT(driver.requests[1].steps, ElementsAre(8, 6));
 }
 
-TEST(PrefetchRequest, IsSaidAnewForOtherFields) {
+TEST(PrefetchRequest, IsRenewedForOtherFields) {
   Driver driver;
   rest_at(driver, 4);
   driver.patch(2, R"({"scalars":[{"field":"salt"}]})");
@@ -302,7 +302,7 @@ TEST(PrefetchRequest, IsSaidAnewForOtherFields) {
   EXPECT_EQ(driver.requests[1].view.scalars->at(0).field, "salt");
 }
 
-TEST(PrefetchRequest, WhileStepsRunIsForThoseAheadInTheirOrder) {
+TEST(PrefetchRequest, DuringPlaybackCoversFollowingStepsInOrder) {
   Driver driver;
   rest_at(driver, 6);
   driver.say(play(0, 9, 10, true, true));
@@ -317,7 +317,7 @@ TEST(PrefetchRequest, WhileStepsRunIsForThoseAheadInTheirOrder) {
   EXPECT_THAT(driver.requests[2].steps, ElementsAre(6, 5, 4, 3, 2, 1, 0)) << "no loop: no further";
 }
 
-TEST(PrefetchRequest, EndsWithTheRunAndComesBackAtRest) {
+TEST(PrefetchRequest, EndsWithPlaybackAndReturnsAtRest) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 10, true, true));
@@ -328,7 +328,7 @@ TEST(PrefetchRequest, EndsWithTheRunAndComesBackAtRest) {
   EXPECT_THAT(driver.requests.back().steps, ElementsAre(4, 2));
 }
 
-TEST(PrefetchRequest, IsForNothingWhileNobodyLooksAndAfterTheEnd) {
+TEST(PrefetchRequest, IsEmptyWhileHiddenAndAfterTheEnd) {
   Driver driver;
   rest_at(driver, 4);
   driver.say(protocol::VisibilityMessage{true});
@@ -343,7 +343,7 @@ TEST(PrefetchRequest, IsForNothingWhileNobodyLooksAndAfterTheEnd) {
   EXPECT_TRUE(driver.closed);
 }
 
-TEST(PrefetchRequest, GoesWithTheDataset) {
+TEST(PrefetchRequest, IsWithdrawnWithTheDataset) {
   Driver driver;
   rest_at(driver, 4);
   driver.say(protocol::OpenMessage{3, "sea"});
@@ -356,7 +356,7 @@ TEST(PrefetchRequest, GoesWithTheDataset) {
 }
 
 // Sixteen at most: asked of the player itself, with more steps than the driver's datasets have.
-TEST(PrefetchRequest, ReachesSixteenStepsAhead) {
+TEST(PrefetchRequest, CoversSixteenStepsAhead) {
   Player player;
   player.start(play(0, 239, 24, true, true), 230, 0);
   auto wanted = iota(231, 9);

@@ -15,7 +15,7 @@ Player playing(bool drop) {
   return player;
 }
 
-TEST(Player, WhatIsLateIsDroppedInOneGo) {
+TEST(Player, LateStepsAreDroppedTogether) {
   Player player = playing(true);
   EXPECT_EQ(player.advance(99 * ms, true).passed, 0);
   const auto late = player.advance(450 * ms, false);  // steps 1 to 4 are due
@@ -24,7 +24,7 @@ TEST(Player, WhatIsLateIsDroppedInOneGo) {
   EXPECT_EQ(player.next_at(false), 500 * ms);
 }
 
-TEST(Player, WithoutDropAStallIsNotCaughtUpWith) {
+TEST(Player, WithoutDropAStallIsNotCompensated) {
   Player player = playing(false);
   int step = player.advance(1000 * ms, true).step;
   EXPECT_EQ(step, 1);

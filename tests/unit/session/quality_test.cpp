@@ -47,7 +47,7 @@ std::function<Micros(const quality::Setting&)> costs(const quality::Forecasts& k
   };
 }
 
-TEST(Setting, SaysSoInTheHeaderAndTheFinalFrameIsFull) {
+TEST(Setting, IsReportedInTheHeaderAndTheFinalFrameIsFull) {
   Driver driver;
   driver.surveyed = surveyed(400);
   driver.patch(1, R"({"dataset":"wind","image":{"width":800,"height":600}})");
@@ -71,7 +71,7 @@ TEST(Setting, SaysSoInTheHeaderAndTheFinalFrameIsFull) {
   EXPECT_FLOAT_EQ(final.error, 3e-4F);
 }
 
-TEST(Setting, KeepsTheBudgetOnAMachineThatIsSlowerThanItWas) {
+TEST(Setting, KeepsTheBudgetOnASlowedMachine) {
   for (const double budget : {16.0, 33.0, 66.0, 100.0}) {
     Driver driver;
     driver.surveyed = surveyed(120);
@@ -97,7 +97,7 @@ TEST(Setting, KeepsTheBudgetOnAMachineThatIsSlowerThanItWas) {
   }
 }
 
-TEST(Setting, OneSlowLoadDoesNotCoarsenWhatFollows) {
+TEST(Setting, OneSlowLoadDoesNotCoarsenLaterFrames) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   std::uint32_t rev = 1;
@@ -111,7 +111,7 @@ TEST(Setting, OneSlowLoadDoesNotCoarsenWhatFollows) {
   EXPECT_LE(driver.render->setting.coarser, before.coarser);
 }
 
-TEST(Setting, NeverMakesAPictureTooSmallToTellAnything) {
+TEST(Setting, KeepsAMinimumPictureSize) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","image":{"width":300,"height":200}})");
   std::uint32_t rev = 1;
@@ -121,7 +121,7 @@ TEST(Setting, NeverMakesAPictureTooSmallToTellAnything) {
   }
 }
 
-TEST(Setting, ComesBackWhenTheSceneHasBecomeCheap) {
+TEST(Setting, RecoversWhenTheSceneBecomesCheap) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   std::uint32_t rev = 1;
@@ -135,7 +135,7 @@ TEST(Setting, ComesBackWhenTheSceneHasBecomeCheap) {
   EXPECT_EQ(fine.back().coarser, 0);
 }
 
-TEST(Setting, AnErrorThatIsAskedForDecidesInsteadOfABudget) {
+TEST(Setting, RequestedErrorReplacesTheBudget) {
   Driver driver;
   driver.surveyed = surveyed(120);
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.005}})");
@@ -150,7 +150,7 @@ TEST(Setting, AnErrorThatIsAskedForDecidesInsteadOfABudget) {
 }
 
 // Sixteen viewers of one kind: each waits for fifteen frames of the others, and all of them shrink.
-TEST(Setting, FramesBecomeShorterWhereManyWaitForTheRenderer) {
+TEST(Setting, FramesBecomeCheaperWhenManyWaitForTheRenderer) {
   Driver driver;
   driver.surveyed = surveyed(33);
   driver.patch(1, R"({"dataset":"wind"})");
@@ -170,7 +170,7 @@ TEST(Setting, FramesBecomeShorterWhereManyWaitForTheRenderer) {
 
 // --- the way to the final frame -----------------------------------------------------------------
 
-TEST(Refining, AFinalFrameThatIsLongInComingHasABetterOneBeforeIt) {
+TEST(Refining, LongFinalFrameIsPrecededByABetterOne) {
   Driver driver;
   driver.surveyed = surveyed(200);
   driver.measured_error = 5e-4;
@@ -199,7 +199,7 @@ TEST(Refining, AFinalFrameThatIsLongInComingHasABetterOneBeforeIt) {
   EXPECT_EQ(drawn.back(), quality::settings[quality::own_setting(View{})]);
 }
 
-TEST(Refining, IsGivenUpByTheNextChange) {
+TEST(Refining, IsCancelledByTheNextChange) {
   Driver driver;
   driver.surveyed = surveyed(200);
   driver.patch(1, R"({"dataset":"wind"})");
@@ -215,7 +215,7 @@ TEST(Refining, IsGivenUpByTheNextChange) {
   EXPECT_TRUE(driver.cancelled);
 }
 
-TEST(Refining, SlabsBecomeThinnerUntilTheMeasuredErrorIsWhatWasAskedFor) {
+TEST(Refining, SlabsBecomeThinnerUntilTheRequestedErrorIsMet) {
   Driver driver;
   driver.measured_error = 1e-3;  // a quarter of it with every halving
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.0001}})");
@@ -228,7 +228,7 @@ TEST(Refining, SlabsBecomeThinnerUntilTheMeasuredErrorIsWhatWasAskedFor) {
   }
 }
 
-TEST(Refining, EndsWhereThinnerSlabsDoNotMendIt) {
+TEST(Refining, EndsWhereThinnerSlabsDoNotHelp) {
   Driver driver;
   driver.averaged = true;
   driver.measured_error = 1e-2;
@@ -239,7 +239,7 @@ TEST(Refining, EndsWhereThinnerSlabsDoNotMendIt) {
   EXPECT_LE(driver.frames.size(), 3U) << "one moving, one halving tried";
 }
 
-TEST(Setting, ALateFrameOfAnotherDatasetTeachesNothing) {
+TEST(Setting, LateFrameOfAnotherDatasetIsIgnored) {
   const auto first_of_sea = [](Micros late) {
     Driver driver;
     driver.surveyed = surveyed(10);
@@ -263,7 +263,7 @@ TEST(Refining, EndsWhereNoSlabIsThinEnough) {
   EXPECT_GT(driver.frames.back().header.error, 1e-6F) << "and says that it is not";
 }
 
-TEST(Refining, ALosslessFinalFrameIsAPng) {
+TEST(Refining, LosslessFinalFrameIsAPng) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","quality":{"lossless":true}})");
   driver.settle();
@@ -272,7 +272,7 @@ TEST(Refining, ALosslessFinalFrameIsAPng) {
   EXPECT_EQ(driver.frames.back().header.codec, protocol::Codec::png);
 }
 
-TEST(Refining, AViewThatRestsIsSurveyedOnce) {
+TEST(Refining, ViewAtRestIsCalibratedOnce) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   EXPECT_TRUE(driver.calibrations.empty());

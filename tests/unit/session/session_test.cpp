@@ -17,7 +17,7 @@ protocol::DatasetDescription description(const std::string& id) {
 
 // --- opening ------------------------------------------------------------------------------------
 
-TEST(Open, DescribesTheDatasetAndThenDrawsIt) {
+TEST(Open, DescribesTheDatasetAndRendersIt) {
   Driver driver;
   driver.say(protocol::OpenMessage{5, "wind"});
   ASSERT_EQ(driver.describes.size(), 1U);
@@ -35,7 +35,7 @@ TEST(Open, DescribesTheDatasetAndThenDrawsIt) {
 }
 
 // Of several refusals a viewer may see the last alone.
-TEST(Open, ThatFailedIsWhyThereIsNothingToPlay) {
+TEST(Open, FailureExplainsWhyThereIsNothingToPlay) {
   const auto why = make_error(ErrorKind::out_of_memory, "the field needs 9 MiB");
   const auto play = [](Driver& driver) {
     driver.texts.clear();
@@ -65,7 +65,7 @@ TEST(Open, ThatFailedIsWhyThereIsNothingToPlay) {
 }
 
 // Progress is not reported for fast loads, nor for reads of other sessions while this one renders.
-TEST(Open, HowFarReadingHasComeIsToldWhileAFrameWaitsForIt) {
+TEST(Open, LoadingProgressIsReportedWhileAFrameWaits) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.reading = Reading{"u", 0.25};
@@ -96,7 +96,7 @@ TEST(Open, HowFarReadingHasComeIsToldWhileAFrameWaitsForIt) {
 
 // --- files that change --------------------------------------------------------------------------
 
-TEST(Changed, TheDatasetIsDescribedAndDrawnAnew) {
+TEST(Changed, DatasetIsDescribedAndRenderedAgain) {
   Driver driver;
   driver.say(protocol::OpenMessage{5, "wind"});
   driver.described(5, description("wind"));
@@ -117,7 +117,7 @@ TEST(Changed, TheDatasetIsDescribedAndDrawnAnew) {
   EXPECT_GT(driver.renders, before);
 }
 
-TEST(Changed, AStepThatIsGoneBecomesTheLastAndNeighboursAreWishedForAnew) {
+TEST(Changed, MissingStepBecomesTheLastAndNeighborsArePrefetched) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":8})");
   driver.settle();
@@ -134,7 +134,7 @@ TEST(Changed, AStepThatIsGoneBecomesTheLastAndNeighboursAreWishedForAnew) {
   EXPECT_THAT(driver.requests.back().steps, ElementsAre(2));
 }
 
-TEST(Open, AnUnknownDatasetIsAnErrorAndTheViewStays) {
+TEST(Open, UnknownDatasetIsAnErrorAndTheViewStays) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -149,7 +149,7 @@ TEST(Open, AnUnknownDatasetIsAnErrorAndTheViewStays) {
   EXPECT_EQ(driver.render->view.dataset, "wind");
 }
 
-TEST(Open, AnotherDatasetStartsAfreshButKeepsThePicturesSize) {
+TEST(Open, AnotherDatasetResetsTheViewExceptThePictureSize) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":4,"image":{"width":640,"height":480},
                       "vector":{"field":"u"}})");
@@ -164,7 +164,7 @@ TEST(Open, AnotherDatasetStartsAfreshButKeepsThePicturesSize) {
   EXPECT_EQ(view.vector.field.kind, protocol::FieldChoice::Kind::dataset_default);
 }
 
-TEST(Open, DataThatCannotBeReadLeavesTheOldView) {
+TEST(Open, UnreadableDataKeepTheOldView) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":2})");
   driver.settle();
@@ -178,7 +178,7 @@ TEST(Open, DataThatCannotBeReadLeavesTheOldView) {
 
 // --- patches ------------------------------------------------------------------------------------
 
-TEST(Patch, ThatIsInvalidNamesItsRevAndPointerAndTheOldViewStays) {
+TEST(Patch, InvalidPatchNamesRevAndPointerAndKeepsTheView) {
   for (const char* bad :
        {R"({"image":{"width":0}})", R"({"unknown":1})", R"({"step":-1})", R"({"step":99})",
         R"({"camera":{"fovY":1e999}})", R"({"dataset":"nowhere"})", R"([1])"}) {
@@ -201,7 +201,7 @@ TEST(Patch, ThatIsInvalidNamesItsRevAndPointerAndTheOldViewStays) {
   }
 }
 
-TEST(Patch, BeforeADatasetIsNamedIsRemembered) {
+TEST(Patch, BeforeADatasetIsOpenIsRemembered) {
   Driver driver;
   driver.patch(1, R"({"image":{"width":320,"height":200}})");
   EXPECT_FALSE(driver.render);
@@ -211,7 +211,7 @@ TEST(Patch, BeforeADatasetIsNamedIsRemembered) {
   EXPECT_EQ(driver.render->view.image.width, 320);
 }
 
-TEST(Patch, WhoseDataCannotBeReadLeavesNoTraceAndTheOthersStand) {
+TEST(Patch, UnreadableDataDiscardThatPatchOnly) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":2})");
   driver.settle();
@@ -227,7 +227,7 @@ TEST(Patch, WhoseDataCannotBeReadLeavesNoTraceAndTheOthersStand) {
 }
 
 // The step that cannot be read is hidden under a later patch before any frame is drawn of it.
-TEST(Patch, AFaultBeneathLaterPatchesIsFoundAndTheStreamGoesOn) {
+TEST(Patch, FailedPatchBelowLaterOnesIsFoundAndTheStreamContinues) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":2})");
   driver.settle();
@@ -256,7 +256,7 @@ TEST(Patch, AFaultBeneathLaterPatchesIsFoundAndTheStreamGoesOn) {
   EXPECT_TRUE(named) << "the rejected patch is named";
 }
 
-TEST(Patch, ThatFailsForGoodIsNotTriedAgainAndAgain) {
+TEST(Patch, PermanentFailureIsNotRetried) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -271,7 +271,7 @@ TEST(Patch, ThatFailsForGoodIsNotTriedAgainAndAgain) {
   EXPECT_EQ(driver.errors().size(), 2U);
 }
 
-TEST(Patch, ThatFailsLeavesTheFinalFrameThatStands) {
+TEST(Patch, FailureKeepsTheFinalFrame) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -287,7 +287,7 @@ TEST(Patch, ThatFailsLeavesTheFinalFrameThatStands) {
 
 // --- acknowledgements ---------------------------------------------------------------------------
 
-TEST(Ack, OfAFrameNeverSentIsAnErrorAndCountsForNothing) {
+TEST(Ack, OfAnUnsentFrameIsAnErrorAndGivesNoCredit) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.ack(1);
@@ -305,7 +305,7 @@ TEST(Ack, OfAFrameNeverSentIsAnErrorAndCountsForNothing) {
   EXPECT_TRUE(driver.render);
 }
 
-TEST(Ack, MayBeRepeatedOrComeLate) {
+TEST(Ack, MayBeRepeatedOrLate) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -325,7 +325,7 @@ TEST(Ack, MayBeRepeatedOrComeLate) {
 
 // --- stills -------------------------------------------------------------------------------------
 
-TEST(Still, IsDrawnAtItsSizeAndAnnouncedByItsId) {
+TEST(Still, IsRenderedAtItsSizeAndAnnouncedWithItsId) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":3})");
   driver.settle();
@@ -352,7 +352,7 @@ TEST(Still, IsDrawnAtItsSizeAndAnnouncedByItsId) {
   EXPECT_EQ(driver.texts_of<protocol::ChosenMessage>().back().seq, header.seq);
 }
 
-TEST(Still, WaitsForCreditAndGetsItsTurnWhileTheViewMoves) {
+TEST(Still, WaitsForCreditAndIsServedWhileTheViewMoves) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -372,7 +372,7 @@ TEST(Still, WaitsForCreditAndGetsItsTurnWhileTheViewMoves) {
   EXPECT_EQ(stills, 1);
 }
 
-TEST(Still, WhoseDataAreReleasedWhileTheyAreReadIsAnswered) {
+TEST(Still, ReleasedDataDuringLoadingAreReported) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -385,7 +385,7 @@ TEST(Still, WhoseDataAreReleasedWhileTheyAreReadIsAnswered) {
   EXPECT_FALSE(driver.render) << "whoever still wants it asks again";
 }
 
-TEST(Still, TooLargeTooManyOrOfNothingIsAnError) {
+TEST(Still, OversizeExcessOrEmptyStillIsAnError) {
   Driver driver;
   protocol::StillMessage still;
   still.id = 1;
@@ -422,7 +422,7 @@ void run_for(Driver& driver, Micros duration, Micros cost) {
   }
 }
 
-TEST(Play, ShowsEveryStepInTimeWhenThereIsTime) {
+TEST(Play, ShowsEveryStepInTimeWhenPossible) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -432,7 +432,7 @@ TEST(Play, ShowsEveryStepInTimeWhenThereIsTime) {
   EXPECT_THAT(driver.steps_shown(), ElementsAre(1U, 2U, 3U, 0U, 1U, 2U, 3U, 0U));
 }
 
-TEST(Play, WithDropSkipsWhatIsLate) {
+TEST(Play, WithDropSkipsLateSteps) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -449,7 +449,7 @@ TEST(Play, WithDropSkipsWhatIsLate) {
   EXPECT_EQ(shown.back(), 9U) << "the last is where it ends, and on time";
 }
 
-TEST(Play, WithoutDropLeavesNoneOutHoweverLongItTakes) {
+TEST(Play, WithoutDropShowsEveryStep) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -465,7 +465,7 @@ TEST(Play, WithoutDropLeavesNoneOutHoweverLongItTakes) {
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(Play, PauseStopsAtTheStepReachedAndMakesItFinal) {
+TEST(Play, PauseStopsAtTheShownStepAndMakesItFinal) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -481,7 +481,7 @@ TEST(Play, PauseStopsAtTheStepReachedAndMakesItFinal) {
   EXPECT_EQ(driver.render->view.step, 3) << "the view keeps the step that time has reached";
 }
 
-TEST(Play, GoesOnFromTheStepThatTheUserPicks) {
+TEST(Play, ContinuesFromASelectedStep) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -492,7 +492,7 @@ TEST(Play, GoesOnFromTheStepThatTheUserPicks) {
   EXPECT_THAT(driver.steps_shown(), ElementsAre(7U, 8U, 9U));
 }
 
-TEST(Play, BeyondTheLastStepOrOfNothingIsAnError) {
+TEST(Play, InvalidStepOrMissingDatasetIsAnError) {
   Driver driver;
   driver.say(play(0, 3, 10, true, true));
   driver.patch(1, R"({"dataset":"wind"})");
@@ -501,7 +501,7 @@ TEST(Play, BeyondTheLastStepOrOfNothingIsAnError) {
   EXPECT_EQ(driver.errors()[1].problem.errors.at(0).pointer, "/to");
 }
 
-TEST(Play, AStepThatCannotBeReadStopsIt) {
+TEST(Play, UnreadableStepStopsIt) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -516,14 +516,14 @@ TEST(Play, AStepThatCannotBeReadStopsIt) {
 
 // --- ends ---------------------------------------------------------------------------------------
 
-TEST(End, ABinaryMessageClosesWith4400) {
+TEST(End, BinaryMessageClosesWith4400) {
   Driver driver;
   driver.binary();
   ASSERT_TRUE(driver.closed);
   EXPECT_EQ(driver.closed->code, 4400);
 }
 
-TEST(End, ADrainClosesWith1001AndGivesUpTheRender) {
+TEST(End, DrainClosesWith1001AndCancelsTheRender) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.drain();
@@ -552,7 +552,7 @@ TEST(End, SilenceClosesWith4410AndAnyMessageKeepsItOpen) {
   EXPECT_EQ(driver.closed->code, 4410);
 }
 
-TEST(End, TextThatIsNoMessageIsAnsweredAndNothingElseHappens) {
+TEST(End, InvalidMessageIsAnsweredWithoutOtherEffects) {
   Driver driver;
   driver.refused(make_error(ErrorKind::malformed, "no JSON"));
   ASSERT_EQ(driver.errors().size(), 1U);

@@ -18,7 +18,7 @@ using test::Folder;
 using test::NetcdfMaker;
 using test::write_small;
 
-TEST(Store, AFileThatChangesIsOpenedAnewUnderItsName) {
+TEST(Store, ChangedFileIsReopenedUnderItsName) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   Store store(1 << 20);
@@ -51,7 +51,7 @@ void write_hour(const std::string& path, double hour, double first) {
   file.variable("f", NC_FLOAT, {t, y, x}, test::counting(4, first));
 }
 
-TEST(Store, ASeriesGrowsAndShrinksWithItsFolder) {
+TEST(Store, SeriesGrowsAndShrinksWithItsFolder) {
   const Folder folder;
   write_hour(folder / "f1.nc", 1, 10);
   write_hour(folder / "f2.nc", 2, 20);
@@ -73,7 +73,7 @@ TEST(Store, ASeriesGrowsAndShrinksWithItsFolder) {
   EXPECT_EQ(store.find(id).value()->volume("f", 0).value()->values[3], 23.0F);
 }
 
-TEST(Store, WhatIsLeftOutOfASeriesIsNoted) {
+TEST(Store, OmittedFilesOfASeriesAreNoted) {
   const Folder folder;
   write_hour(folder / "f1.nc", 1, 10);
   std::filesystem::create_symlink("nowhere.nc", folder / "f2.nc");
@@ -90,7 +90,7 @@ TEST(Store, WhatIsLeftOutOfASeriesIsNoted) {
 }
 
 // Like a running model's output: the same file of the same size.
-TEST(Store, AFileThatIsWrittenOverInPlaceIsOpenedAnew) {
+TEST(Store, FileOverwrittenInPlaceIsReopened) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   write_small(folder / "new.nc", 50);
@@ -105,7 +105,7 @@ TEST(Store, AFileThatIsWrittenOverInPlaceIsOpenedAnew) {
   EXPECT_EQ(store.find("rain").value()->volume("f", 0).value()->values[3], 53.0F);
 }
 
-TEST(Store, WhatCannotBeOpenedAnewIsTriedOnceAChange) {
+TEST(Store, FailedReopenIsRetriedAfterAChange) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   std::atomic<int> opened{0};
@@ -129,7 +129,7 @@ TEST(Store, WhatCannotBeOpenedAnewIsTriedOnceAChange) {
 }
 
 // A first view that fits no more would make every frame an error.
-TEST(Store, WhatDoesNotPassTheCheckIsNotPutInPlaceOfWhatDid) {
+TEST(Store, DatasetThatFailsTheCheckDoesNotReplaceAValidOne) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   std::atomic<int> opened{0};
@@ -162,7 +162,7 @@ TEST(Store, WhatDoesNotPassTheCheckIsNotPutInPlaceOfWhatDid) {
   EXPECT_EQ(store.problem("rain"), "");
 }
 
-TEST(Store, WhatIsListedAsFailedIsOpenedOnceItsFileIsReplaced) {
+TEST(Store, FailedDatasetIsOpenedWhenItsFileIsReplaced) {
   const Folder folder;
   const std::string rain = folder / "rain.nc";
   const std::string snow = folder / "snow.nc";
@@ -195,7 +195,7 @@ TEST(Store, WhatIsListedAsFailedIsOpenedOnceItsFileIsReplaced) {
   EXPECT_EQ(store.find("rain").value()->volume("f", 0).value()->values[3], 53.0F);
 }
 
-TEST(Store, WhatIsOpenedByItsNewNameIsNoLongerListedAsFailed) {
+TEST(Store, DatasetOpenedByItsNewNameIsNoLongerFailed) {
   const Folder folder;
   const std::string late = folder / "late.nc";
   Store store(1 << 20);
@@ -208,7 +208,7 @@ TEST(Store, WhatIsOpenedByItsNewNameIsNoLongerListedAsFailed) {
   EXPECT_EQ(store.all().size(), 1U);
 }
 
-TEST(Store, WhatIsTakenOffTheListWhileItIsOpenedStaysAway) {
+TEST(Store, DatasetRemovedWhileOpeningStaysRemoved) {
   const Folder folder;
   const std::string rain = folder / "rain.nc";
   std::ofstream(rain) << "no numbers";

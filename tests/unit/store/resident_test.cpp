@@ -134,7 +134,7 @@ struct Fixture {
   std::shared_ptr<Dataset> dataset;
 };
 
-TEST(Resident, AHandleForWhatIsThereNeverLoads) {
+TEST(Resident, ResidentVolumeIsNeverLoadedAgain) {
   Fixture f(10);
   Dataset resident = f.dataset->resident_only();
   const auto absent = resident.volume("f", 3);
@@ -152,7 +152,7 @@ TEST(Resident, AHandleForWhatIsThereNeverLoads) {
   EXPECT_EQ(resident.level("f", 3, half).value(), level.value());
 }
 
-TEST(Resident, WhatIsWishedForIsLoadedSoonestFirst) {
+TEST(Resident, PrefetchRequestsAreLoadedSoonestFirst) {
   Fixture f(10);
   f.request_prefetch({7, 8, 9, 10});
   f.wait_until_resident(10);
@@ -165,7 +165,7 @@ TEST(Resident, WhatIsWishedForIsLoadedSoonestFirst) {
   EXPECT_EQ(f.log->read().size(), 5U) << "what is there is not read again";
 }
 
-TEST(Resident, ANewWishReplacesWhatWasNotYetLoaded) {
+TEST(Resident, NewPrefetchRequestReplacesPendingOnes) {
   Fixture f(10);
   f.log->hold = true;
   f.request_prefetch({1, 2, 3, 4});
@@ -177,7 +177,7 @@ TEST(Resident, ANewWishReplacesWhatWasNotYetLoaded) {
   EXPECT_EQ(f.log->read(), (std::vector<std::size_t>{1, 50}));
 }
 
-TEST(Resident, LoadingAheadStaysWithinTheLimitAndKeepsWhatIsWishedFor) {
+TEST(Resident, PrefetchStaysWithinTheLimitAndKeepsRequestedVolumes) {
   Fixture f(4);
   const auto held = f.dataset->volume("f", 0);
   f.request_prefetch({1, 2, 3, 4, 5, 6});
@@ -196,7 +196,7 @@ TEST(Resident, LoadingAheadStaysWithinTheLimitAndKeepsWhatIsWishedFor) {
 }
 
 // Least-recently-used alone would take the oldest.
-TEST(Resident, WhatNobodyWishesForGoesBeforeOlderWishes) {
+TEST(Resident, UnrequestedVolumesAreEvictedBeforeOlderRequests) {
   Fixture f(3);
   for (const std::size_t step : {1, 2, 3}) ASSERT_TRUE(f.dataset->volume("f", step));
   f.request_prefetch({1, 2});
@@ -206,7 +206,7 @@ TEST(Resident, WhatNobodyWishesForGoesBeforeOlderWishes) {
   EXPECT_FALSE(f.is_resident(3));
 }
 
-TEST(Resident, AnAverageThatIsWishedForStaysThoughItCouldBeMadeAgain) {
+TEST(Resident, RequestedAverageStaysThoughItCouldBeRecomputed) {
   Fixture f(4);
   Coarsening half;
   half.halvings = {1, 1, 1};
@@ -219,7 +219,7 @@ TEST(Resident, AnAverageThatIsWishedForStaysThoughItCouldBeMadeAgain) {
   EXPECT_FALSE(f.is_resident(0)) << "the oldest that nobody wishes for";
 }
 
-TEST(Resident, OwnersOfWishesTakeTurns) {
+TEST(Resident, OwnersOfPrefetchRequestsTakeTurns) {
   Fixture f(10);
   f.log->hold = true;
   f.request_prefetch({1, 2, 3}, 1);
@@ -230,7 +230,7 @@ TEST(Resident, OwnersOfWishesTakeTurns) {
   EXPECT_EQ(f.log->read(), (std::vector<std::size_t>{1, 11, 2, 12, 3, 13}));
 }
 
-TEST(Resident, WhatWasRemovedIsNotLoadedAnyMore) {
+TEST(Resident, RemovedDatasetIsNoLongerLoaded) {
   Fixture f(10);
   f.log->hold = true;
   f.request_prefetch({1, 2, 3});
@@ -244,7 +244,7 @@ TEST(Resident, WhatWasRemovedIsNotLoadedAnyMore) {
 
 // A series larger than memory, played in a loop with the next steps wished for: every step is there
 // when it is shown, though least-recently-used alone would have evicted each before its return.
-TEST(Resident, ASeriesLargerThanMemoryPlaysWithEveryStepThere) {
+TEST(Resident, SeriesLargerThanMemoryPlaysEveryStep) {
   Fixture f(8);
   constexpr std::size_t steps = 20;
   std::size_t waited_for = 0;
@@ -263,7 +263,7 @@ TEST(Resident, ASeriesLargerThanMemoryPlaysWithEveryStepThere) {
   EXPECT_LE(waited_for, 1U) << "but for the first";
 }
 
-TEST(Resident, WhoWaitsComesBeforeWhatIsAhead) {
+TEST(Resident, DemandedLoadPrecedesPrefetch) {
   Fixture f(50);
   f.log->hold = true;
   f.request_prefetch({1, 2, 3, 4, 5, 6, 7, 8});
@@ -277,7 +277,7 @@ TEST(Resident, WhoWaitsComesBeforeWhatIsAhead) {
   EXPECT_EQ(read[1], 60U) << "right after the one in work";
 }
 
-TEST(Resident, EvictionFreesWhatNobodyHolds) {
+TEST(Resident, EvictionFreesUnreferencedVolumes) {
   Fixture f(10);
   const auto held = f.dataset->volume("f", 0);
   ASSERT_TRUE(f.dataset->volume("f", 1));
@@ -290,7 +290,7 @@ TEST(Resident, EvictionFreesWhatNobodyHolds) {
 }
 
 // The caller still waits, so the error states why the data were removed.
-TEST(Resident, ALoadThatSomebodyElseEndsSaysWhy) {
+TEST(Resident, LoadCancelledByAnotherCallerReportsTheReason) {
   const std::vector<std::pair<std::function<void(Fixture&)>, ErrorKind>> ends{
       {[](Fixture& f) { f.dataset->evict(); }, ErrorKind::not_resident},
       {[](Fixture& f) { EXPECT_TRUE(f.store.remove("series")); }, ErrorKind::not_found},
@@ -309,7 +309,7 @@ TEST(Resident, ALoadThatSomebodyElseEndsSaysWhy) {
   }
 }
 
-TEST(Resident, WhatIsHeldOfADatasetThatIsGoneCountsUntilItIsLetGoOf) {
+TEST(Resident, HeldVolumesOfARemovedDatasetCountUntilReleased) {
   Fixture f(10);
   auto held = f.dataset->volume("f", 3);
   ASSERT_TRUE(f.dataset->volume("f", 4));
@@ -322,7 +322,7 @@ TEST(Resident, WhatIsHeldOfADatasetThatIsGoneCountsUntilItIsLetGoOf) {
   EXPECT_EQ(f.store.counts().bytes, 0U);
 }
 
-TEST(Resident, WhatIsBeingReadIsToldUntilItIsThere) {
+TEST(Resident, LoadingProgressIsReportedUntilDone) {
   Fixture f(10);
   f.log->hold = true;
   std::thread reader([&] { ASSERT_TRUE(f.dataset->volume("f", 7)); });
@@ -340,7 +340,7 @@ TEST(Resident, WhatIsBeingReadIsToldUntilItIsThere) {
   EXPECT_FALSE(f.dataset->loading());
 }
 
-TEST(Resident, ASourceIsReleasedWhenNothingWasReadForAWhile) {
+TEST(Resident, SourceIsReleasedAfterIdleTime) {
   Fixture f(10);
   ASSERT_TRUE(f.dataset->volume("f", 0));
   f.store.release_idle(3600);
@@ -350,7 +350,7 @@ TEST(Resident, ASourceIsReleasedWhenNothingWasReadForAWhile) {
   EXPECT_EQ(f.log->released, 1);
 }
 
-TEST(Resident, NumbersAreRememberedByTheirKeyAndFailuresAreNot) {
+TEST(Resident, ValuesAreCachedByKeyAndFailuresAreNot) {
   Fixture f(1);
   int made = 0;
   const auto ask = [&](const std::string& key, bool fails) {
@@ -368,7 +368,7 @@ TEST(Resident, NumbersAreRememberedByTheirKeyAndFailuresAreNot) {
 }
 
 // A moment of coarser frames must not cost the series what it has read.
-TEST(Resident, AveragesGoBeforeTheVolumesTheyAreMadeOf) {
+TEST(Resident, AveragesAreEvictedBeforeTheirSourceVolumes) {
   Fixture f(6);
   Coarsening half;
   half.halvings = {1, 1, 1};
@@ -407,7 +407,7 @@ TEST(Resident, PackedStorageHoldsMoreStepsWithinItsError) {
   EXPECT_GE(packed.dataset->counts().unpacked, 5U);
 }
 
-TEST(Resident, TheErrorOfPackedStorageIsTheLargestOfAllSteps) {
+TEST(Resident, ErrorOfPackedStorageIsTheMaximumOfAllSteps) {
   Fixture f(10, Storage::packed16);
   ASSERT_TRUE(f.dataset->volume("f", last_step));
   ASSERT_TRUE(f.dataset->volume("f", 1));
@@ -416,7 +416,7 @@ TEST(Resident, TheErrorOfPackedStorageIsTheLargestOfAllSteps) {
 }
 
 // Limit: three volumes. Two that are wished for, with their packed forms, fill it.
-TEST(Resident, APackedFormTakesNoWishsPlace) {
+TEST(Resident, PackedFormDoesNotReplaceAPrefetchRequest) {
   Fixture f(3, Storage::packed16);
   f.request_prefetch({1, 2});
   for (int i = 0; i < 10000 && !f.is_resident(2); ++i) {
@@ -459,7 +459,7 @@ TEST(Packed, MaskedConstantAndExtremeValues) {
   EXPECT_EQ(unpack(*empty).masked, 4);
 }
 
-TEST(Packed, RandomValuesErrByHalfAStepAtMost) {
+TEST(Packed, RandomValuesDeviateByAtMostHalfAStep) {
   std::mt19937 random(5);
   for (const float scale : {1e-30F, 1.0F, 1e30F}) {
     std::normal_distribution<float> normal(0.3F, 1.0F);

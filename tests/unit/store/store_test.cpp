@@ -117,7 +117,7 @@ std::unique_ptr<Dataset> make_dataset(std::uint64_t volumes_max) {
                                    volumes_max * kVolumeBytes);
 }
 
-TEST(Dataset, LoadsOnFirstNeedAndOnlyOnce) {
+TEST(Dataset, LoadsOnFirstUseAndOnlyOnce) {
   const auto dataset = make_dataset(10);
   EXPECT_EQ(dataset->info().id, "fake");
   EXPECT_EQ(dataset->loads(), 0U);
@@ -134,7 +134,7 @@ TEST(Dataset, LoadsOnFirstNeedAndOnlyOnce) {
   EXPECT_EQ(dataset->resident_bytes(), 4 * kVolumeBytes);
 }
 
-TEST(Dataset, SaysWhatItDoesNotHave) {
+TEST(Dataset, ReportsUnknownFieldsAndSteps) {
   const auto dataset = make_dataset(10);
   const auto field = dataset->volume("nothing", 0);
   ASSERT_FALSE(field);
@@ -147,7 +147,7 @@ TEST(Dataset, SaysWhatItDoesNotHave) {
   EXPECT_EQ(dataset->loads(), 0U);
 }
 
-TEST(Dataset, ThreadsThatAskTogetherShareOneLoad) {
+TEST(Dataset, ConcurrentThreadsShareOneLoad) {
   auto source = std::make_unique<FakeSource>();
   auto gate = std::make_shared<FakeSource::Gate>();
   source->gate = gate;
@@ -175,7 +175,7 @@ TEST(Dataset, ThreadsThatAskTogetherShareOneLoad) {
   }
 }
 
-TEST(Dataset, TheLeastRecentlyUsedGoesFirst) {
+TEST(Dataset, LeastRecentlyUsedIsEvictedFirst) {
   const auto dataset = make_dataset(3);
   for (const std::size_t step : {0, 1, 2}) {
     ASSERT_TRUE(dataset->volume("a", step));
@@ -191,7 +191,7 @@ TEST(Dataset, TheLeastRecentlyUsedGoesFirst) {
   EXPECT_EQ(dataset->loads(), 5U);
 }
 
-TEST(Dataset, WhatSomebodyHoldsIsNotEvictedAndStaysValid) {
+TEST(Dataset, HeldVolumeIsNotEvictedAndStaysValid) {
   const auto dataset = make_dataset(3);
   auto held = dataset->volume("a", 0);
   ASSERT_TRUE(held);
@@ -204,7 +204,7 @@ TEST(Dataset, WhatSomebodyHoldsIsNotEvictedAndStaysValid) {
   EXPECT_EQ(dataset->loads(), 20U);
 }
 
-TEST(Dataset, BeyondTheLimitIsRefusedWithFiguresAndNothingIsLost) {
+TEST(Dataset, LoadAboveTheLimitIsRefusedWithFigures) {
   const auto dataset = make_dataset(3);
   auto a = dataset->volume("a", 0);
   auto b = dataset->volume("b", 0);
@@ -222,13 +222,13 @@ TEST(Dataset, BeyondTheLimitIsRefusedWithFiguresAndNothingIsLost) {
   EXPECT_EQ(dataset->resident_bytes(), 3 * kVolumeBytes);
 }
 
-TEST(Dataset, AVolumeLargerThanTheLimitIsRefused) {
+TEST(Dataset, VolumeLargerThanTheLimitIsRefused) {
   const auto dataset = make_dataset(2);
   EXPECT_EQ(dataset->volume("v", 0).error().kind, ErrorKind::out_of_memory);
   EXPECT_TRUE(dataset->volume("a", 0));
 }
 
-TEST(Dataset, AFailureIsToldToAllWhoWaitAndTriedAgainLater) {
+TEST(Dataset, FailureReachesAllWaitersAndIsRetriedLater) {
   auto source = std::make_unique<FakeSource>();
   source->failures = 1;
   Dataset dataset(std::move(source), "fake", kVolumeBytes);
@@ -251,7 +251,7 @@ TEST(Dataset, ExceptionsOfASourceBecomeErrors) {
             ErrorKind::out_of_memory);
 }
 
-TEST(Dataset, ManyThreadsUnderASmallBudget) {
+TEST(Dataset, ManyThreadsWithASmallBudget) {
   const auto dataset = make_dataset(6);
   std::atomic<int> wrong{0};
   std::atomic<int> refused{0};
@@ -286,7 +286,7 @@ std::string numbered(int i) {
   return name;
 }
 
-TEST(Store, IdsAreFileNamesMadeUnique) {
+TEST(Store, IdsAreUniqueFileNames) {
   const Folder folder;
   std::filesystem::create_directory(folder / "sub");
   write_small(folder / "rain.nc", 0);
@@ -308,7 +308,7 @@ TEST(Store, IdsAreFileNamesMadeUnique) {
   EXPECT_EQ((*store.find("tornado-2"))->info().format, "sample");
 }
 
-TEST(Store, WhatIsNotThereIsNamed) {
+TEST(Store, MissingDatasetIsNamed) {
   Store store(1 << 20);
   const auto found = store.find("nothing");
   ASSERT_FALSE(found);
@@ -338,7 +338,7 @@ TEST(Store, DatasetsShareOneBudget) {
   EXPECT_EQ((*b)->resident_bytes(), 16U);
 }
 
-TEST(Store, AFileReadByManyThreadsGivesEachItsNumbers) {
+TEST(Store, FileReadByManyThreadsGivesCorrectValues) {
   const Folder folder;
   Store store(1 << 24);
   for (int i = 0; i < 4; ++i) {
@@ -365,7 +365,7 @@ TEST(Store, AFileReadByManyThreadsGivesEachItsNumbers) {
   EXPECT_EQ(wrong, 0);
 }
 
-TEST(Store, TheSameFilesAreOneDatasetHoweverOftenTheyAreAdded) {
+TEST(Store, SameFilesAreOneDatasetWhenAddedAgain) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   std::filesystem::create_symlink(folder / "rain.nc", folder / "link.nc");
@@ -396,7 +396,7 @@ TEST(Store, TheSameFilesAreOneDatasetHoweverOftenTheyAreAdded) {
   EXPECT_EQ(opened, 2) << "what was removed is opened anew";
 }
 
-TEST(Store, WhatIsRefusedStaysListedAsFailedUntilItPasses) {
+TEST(Store, RefusedDatasetStaysFailedUntilItPasses) {
   const Folder folder;
   const std::string file = folder / "rain.nc";
   write_small(file, 0);
@@ -422,7 +422,7 @@ TEST(Store, WhatIsRefusedStaysListedAsFailedUntilItPasses) {
 }
 
 // Other waiters for the same volume must not wait forever.
-TEST(Budget, WhatThrowsIsAnErrorAndCanBeAskedForAgain) {
+TEST(Budget, ExceptionIsAnErrorAndTheLoadCanBeRetried) {
   Budget budget(1000);
   const ResidentKey key{budget.next_owner(), 0, 0, ""};
   const auto fails =
@@ -435,7 +435,7 @@ TEST(Budget, WhatThrowsIsAnErrorAndCanBeAskedForAgain) {
   EXPECT_TRUE(works);
 }
 
-TEST(Store, WhatThrowsWhileItIsOpenedIsAnErrorAndCanBeAddedAgain) {
+TEST(Store, ExceptionWhileOpeningIsAnErrorAndCanBeRetried) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   int asked = 0;
@@ -450,7 +450,7 @@ TEST(Store, WhatThrowsWhileItIsOpenedIsAnErrorAndCanBeAddedAgain) {
 }
 
 // Steps and places can be more than what is shown of them.
-TEST(Store, WhatIsKnownOfADatasetCountsInTheLimit) {
+TEST(Store, MetadataOfADatasetCountsInTheLimit) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   Store store({4 << 20, Storage::float32, [](const Location&) -> Result<std::unique_ptr<Source>> {
@@ -466,7 +466,7 @@ TEST(Store, WhatIsKnownOfADatasetCountsInTheLimit) {
 }
 
 // A model writes its newest file.
-TEST(Store, OfALongSeriesAChangeOfTheLastFileIsSeen) {
+TEST(Store, ChangeOfTheLastFileOfALongSeriesIsDetected) {
   const Folder folder;
   for (int i = 100; i < 200; ++i) std::ofstream(folder / numbered(i)) << "a step";
   StoreOptions options;
@@ -481,7 +481,7 @@ TEST(Store, OfALongSeriesAChangeOfTheLastFileIsSeen) {
   EXPECT_EQ(store.look_for_changes(0).size(), 1U);
 }
 
-TEST(Store, WhatIsRemovedWhileItIsOpenedAnewStaysAway) {
+TEST(Store, DatasetRemovedWhileReopeningStaysRemoved) {
   const Folder folder;
   std::ofstream(folder / "rain") << "a";
   Store* whole = nullptr;

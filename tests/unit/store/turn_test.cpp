@@ -56,7 +56,7 @@ class Turn : public testing::Test {
   std::shared_ptr<Dataset> dataset_ = series(budget_);
 };
 
-TEST_F(Turn, AStepThatIsHeldGivesWayToTheNextOnceItIsLetGoOf) {
+TEST_F(Turn, HeldStepIsEvictedForTheNextOnceReleased) {
   auto shown = dataset_->volume("a", 0);
   ASSERT_TRUE(shown);
   EXPECT_FALSE(dataset_->volume("a", 1)) << "without in_turn the error is immediate";
@@ -74,7 +74,7 @@ TEST_F(Turn, AStepThatIsHeldGivesWayToTheNextOnceItIsLetGoOf) {
   EXPECT_LE(budget_->counts().bytes, budget_->bytes_max());
 }
 
-TEST_F(Turn, NobodyHoldsAnewWhatIsWaitedFor) {
+TEST_F(Turn, VolumeAwaitedByATurnIsFoundByHoldersOnly) {
   auto shown = dataset_->volume("a", 0);
   ASSERT_TRUE(shown);
   auto next = std::async(std::launch::async, [&] {
@@ -95,7 +95,7 @@ TEST_F(Turn, NobodyHoldsAnewWhatIsWaitedFor) {
   EXPECT_TRUE(next.get());
 }
 
-TEST_F(Turn, WhatTheCallerHoldsItselfIsNotWaitedFor) {
+TEST_F(Turn, VolumesHeldByTheCallerAreNotWaitedFor) {
   const auto begin = TurnClock::now();
   Dataset patient = dataset_->in_turn();
   const auto first = patient.volume("a", 0);
@@ -106,7 +106,7 @@ TEST_F(Turn, WhatTheCallerHoldsItselfIsNotWaitedFor) {
   EXPECT_LT(TurnClock::now() - begin, Budget::patience / 2);
 }
 
-TEST_F(Turn, WhatIsLargerThanTheLimitIsRefusedAtOnce) {
+TEST_F(Turn, VolumeLargerThanTheLimitIsRefusedAtOnce) {
   const auto small = std::make_shared<Budget>(plain_bytes - 1);
   const auto dataset = series(small);
   const auto begin = TurnClock::now();
@@ -120,7 +120,7 @@ TEST_F(Turn, WhatIsLargerThanTheLimitIsRefusedAtOnce) {
   EXPECT_LT(TurnClock::now() - begin, Budget::patience / 2);
 }
 
-TEST_F(Turn, ACancelledWaitEndsAndWhatWasInItsWayStaysResident) {
+TEST_F(Turn, CancelledWaitEndsAndKeepsBlockingVolumesResident) {
   const auto shown = dataset_->volume("a", 0);
   ASSERT_TRUE(shown);
   const CancelToken cancel;
@@ -143,7 +143,7 @@ TEST_F(Turn, ACancelledWaitEndsAndWhatWasInItsWayStaysResident) {
   EXPECT_EQ(budget_->counts().evictions, 0U);
 }
 
-TEST_F(Turn, ATurnThatIsTakenIsNotWaitedForByWhoIsCancelled) {
+TEST_F(Turn, CancelledCallerDoesNotWaitForAnOccupiedTurn) {
   Store store(plain_bytes);
   const auto taken = store.take_turn(*dataset_);
   ASSERT_TRUE(taken);
@@ -155,7 +155,7 @@ TEST_F(Turn, ATurnThatIsTakenIsNotWaitedForByWhoIsCancelled) {
   EXPECT_FALSE(next.get());
 }
 
-TEST_F(Turn, ATurnThatEndsIsTheNextOnes) {
+TEST_F(Turn, EndedTurnPassesToTheNext) {
   Store store(plain_bytes);
   auto taken = store.take_turn(*dataset_);
   auto next = std::async(std::launch::async, [&] { return store.take_turn(*dataset_) != nullptr; });
@@ -164,7 +164,7 @@ TEST_F(Turn, ATurnThatEndsIsTheNextOnes) {
   EXPECT_TRUE(next.get());
 }
 
-TEST_F(Turn, WorkOfOthersIsWaitedForButNotWhatLasts) {
+TEST_F(Turn, TemporaryWorkIsWaitedForButNotPermanentData) {
   const auto load = [&] {
     Dataset patient = dataset_->in_turn();
     return patient.volume("a", 0);
@@ -185,7 +185,7 @@ TEST_F(Turn, WorkOfOthersIsWaitedForButNotWhatLasts) {
   EXPECT_LT(TurnClock::now() - begin, Budget::reservation_patience / 2);
 }
 
-TEST(Budget, WhatFitsBesideALoadInTurnDoesNotWaitForIt) {
+TEST(Budget, LoadThatFitsBesideALoadInTurnDoesNotWait) {
   Budget budget(10);
   const std::uint64_t owner = budget.next_owner();
   const auto get = [&](std::size_t step, std::uint64_t bytes, Urgency urgency) {
@@ -203,7 +203,7 @@ TEST(Budget, WhatFitsBesideALoadInTurnDoesNotWaitForIt) {
   EXPECT_TRUE(next.get());
 }
 
-TEST_F(Turn, NobodyWaitsAtTheEnd) {
+TEST_F(Turn, ShutdownEndsAllWaits) {
   const auto shown = dataset_->volume("a", 0);
   ASSERT_TRUE(shown);
   const auto begin = TurnClock::now();
@@ -232,7 +232,7 @@ class HungrySource : public PlainSource {
   Reservation work_;
 };
 
-TEST(Reservation, WaitsWhereItIsPartOfALoadInTurn) {
+TEST(Reservation, WaitsAsPartOfALoadInTurn) {
   const auto budget = std::make_shared<Budget>(plain_bytes * 2);
   Dataset dataset(std::make_unique<HungrySource>(budget), "hungry", budget);
   auto shown = dataset.volume("a", 0);
@@ -248,7 +248,7 @@ TEST(Reservation, WaitsWhereItIsPartOfALoadInTurn) {
   EXPECT_TRUE(loaded) << loaded.error().message;
 }
 
-TEST(Reservation, CountsMakesRoomAndIsGivenBack) {
+TEST(Reservation, IsCountedEvictsAndIsReleased) {
   const auto budget = std::make_shared<Budget>(2 * plain_bytes);
   Dataset dataset(std::make_unique<PlainSource>(), "series", budget);
   ASSERT_TRUE(dataset.volume("a", 0));

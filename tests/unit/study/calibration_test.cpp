@@ -38,7 +38,7 @@ Calibration made_up() {
   return calibration;
 }
 
-TEST(Looks, AreThoseThatASubjectHas) {
+TEST(Looks, MatchTheContentOfTheSubject) {
   const auto names_of = [](const char* scene) {
     std::set<std::string> names;
     for (const Look& look : looks_of(standard_subject(scene, true).value())) {
@@ -51,7 +51,7 @@ TEST(Looks, AreThoseThatASubjectHas) {
   EXPECT_EQ(names_of("scalar"), (std::set<std::string>{"as it is", "ten times as dense"}));
 }
 
-TEST(Looks, DifferAsTheirNamesSay) {
+TEST(Looks, DifferInTheNamedProperties) {
   const Subject subject = standard_subject("soft", true).value();
   for (const Look& look : looks_of(subject)) {
     const bool lines = look.view.vector.field.kind == protocol::FieldChoice::Kind::named;
@@ -64,7 +64,7 @@ TEST(Looks, DifferAsTheirNamesSay) {
   }
 }
 
-TEST(Seen, IsTheSameEachTimeAndAnotherFromEveryPlace) {
+TEST(Seen, IsReproducibleAndDiffersByViewpoint) {
   const Subject subject = standard_subject("soft", true).value();
   std::set<double> heights;
   for (std::uint64_t n = 0; n < 20; ++n) {
@@ -92,7 +92,7 @@ TEST(Agreement, CountsSharesAndTheMedianRatio) {
   EXPECT_EQ(agreement(Calibration()).count, 0U);
 }
 
-TEST(Agreement, ErrorsOfRoundingAreAllAlike) {
+TEST(Agreement, RoundingErrorsAreEquivalent) {
   Calibration calibration;
   calibration.compared = {compared(1e-5, 1e-9)};
   EXPECT_DOUBLE_EQ(agreement(calibration).within_two, 1);
@@ -135,7 +135,7 @@ TEST(Calibrate, ComparesEverySettingOfEveryHeldOutView) {
   EXPECT_GT(made.checks[0].apart, 0.1);
 }
 
-TEST(Calibrate, EndsWhenItIsCancelled) {
+TEST(Calibrate, StopsWhenCancelled) {
   ThreadPool pool(1);
   const CancelToken cancel;
   const auto made = calibrate(standard_subject("vectors", true).value(), {100, 80, 1, 2}, {}, pool,
@@ -144,7 +144,7 @@ TEST(Calibrate, EndsWhenItIsCancelled) {
   EXPECT_EQ(made.error().kind, ErrorKind::cancelled);
 }
 
-TEST(CalibrationReport, IsInTheJsonThePageAndThePlot) {
+TEST(CalibrationReport, IsPartOfTheJsonThePageAndThePlot) {
   Report report;
   report.scenes.emplace_back();
   SceneReport& scene = report.scenes[0];

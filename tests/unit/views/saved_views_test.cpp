@@ -41,7 +41,7 @@ Result<std::optional<SavedView>> set_step(SavedViews& views, const std::string& 
 
 std::size_t bytes_of(const SavedView& saved) { return protocol::encode_view_file(saved).size(); }
 
-TEST(SavedViewsFolder, ThatAnybodyMayChangeIsNamed) {
+TEST(SavedViewsFolder, WorldWritableFolderIsReported) {
   const test::Folder folder;
   const auto warnings = [&](fs::perms state, fs::perms views) {
     fs::create_directories(folder / "state/views");
@@ -66,7 +66,7 @@ TEST(SavedViewsFolder, ThatAnybodyMayChangeIsNamed) {
   EXPECT_THAT(warnings(group, all), HasSubstr("/state/views mode=0777"));
 }
 
-TEST(SavedViewsInMemory, AreFoundUnderIdsOfTheirOwn) {
+TEST(SavedViewsInMemory, AreFoundByTheirIds) {
   const auto views = SavedViews::open({}).value();
   EXPECT_FALSE(views->on_disk());
   std::set<std::string> ids;
@@ -85,7 +85,7 @@ TEST(SavedViewsInMemory, AreFoundUnderIdsOfTheirOwn) {
   EXPECT_EQ(letters.size(), 32U);
 }
 
-TEST(SavedViewsInMemory, WhatIsNotThereIsNotFound) {
+TEST(SavedViewsInMemory, MissingViewIsNotFound) {
   const auto views = SavedViews::open({}).value();
   for (const std::string id : {"0123456789", "", "..", "../views", "/etc/passwd"}) {
     EXPECT_EQ(views->find(id).error().kind, ErrorKind::not_found) << id;
@@ -94,7 +94,7 @@ TEST(SavedViewsInMemory, WhatIsNotThereIsNotFound) {
   }
 }
 
-TEST(SavedViewsInMemory, AFullStoreRefusesAndKeepsWhatItHas) {
+TEST(SavedViewsInMemory, FullStoreRefusesAndKeepsItsViews) {
   const auto views = SavedViews::open({{}, 3}).value();
   std::vector<std::string> ids;
   for (int step = 0; step < 3; ++step) {
@@ -113,7 +113,7 @@ TEST(SavedViewsInMemory, AFullStoreRefusesAndKeepsWhatItHas) {
   EXPECT_FALSE(views->add(view_of_step(4), time_of_all));
 }
 
-TEST(SavedViewsInMemory, BytesAreCountedAsViewsComeChangeAndGo) {
+TEST(SavedViewsInMemory, BytesFollowAdditionsChangesAndRemovals) {
   const std::size_t one = bytes_of({"0123456789", time_of_all, view_of_step(1)});
   const auto views = SavedViews::open({{}, 100, 2 * one + 1}).value();
   const std::string first = views->add(view_of_step(1), time_of_all)->id;
@@ -131,7 +131,7 @@ TEST(SavedViewsInMemory, BytesAreCountedAsViewsComeChangeAndGo) {
   EXPECT_TRUE(views->add(view_of_step(3), time_of_all));
 }
 
-TEST(SavedViewsInMemory, AChangeIsMadeOnlyWhereItMayBe) {
+TEST(SavedViewsInMemory, ConditionalChangeIsMadeOnlyWhenItsConditionHolds) {
   const auto views = SavedViews::open({}).value();
   const std::string id = views->add(view_of_step(1), time_of_all)->id;
   const auto never = [](const SavedView&) { return false; };
@@ -148,7 +148,7 @@ TEST(SavedViewsInMemory, AChangeIsMadeOnlyWhereItMayBe) {
   EXPECT_EQ(views->find(id)->view.view().step, 1);
 }
 
-TEST(SavedViewsInMemory, ManyThreadsAddChangeAndReadAtOnce) {
+TEST(SavedViewsInMemory, ManyThreadsAddChangeAndReadConcurrently) {
   const auto views = SavedViews::open({}).value();
   const std::string shared = views->add(view_of_step(0), time_of_all)->id;
   std::atomic<int> bad{0};
@@ -196,7 +196,7 @@ class SavedViewsOnDisk : public testing::Test {
   test::Folder root_;
 };
 
-TEST_F(SavedViewsOnDisk, OutlastARestart) {
+TEST_F(SavedViewsOnDisk, SurviveARestart) {
   std::map<std::string, std::string> told;
   std::string gone;
   {
@@ -223,7 +223,7 @@ TEST_F(SavedViewsOnDisk, OutlastARestart) {
   EXPECT_EQ(set_step(*views, told.begin()->first, 5).value()->created, time_of_all);
 }
 
-TEST_F(SavedViewsOnDisk, CountAgainstTheBoundsAfterARestart) {
+TEST_F(SavedViewsOnDisk, CountAgainstTheLimitsAfterARestart) {
   std::string id;
   {
     const auto views = open().value();
@@ -241,7 +241,7 @@ TEST_F(SavedViewsOnDisk, CountAgainstTheBoundsAfterARestart) {
 }
 
 // A lower bound than before: what there is no room for stays on the disk.
-TEST_F(SavedViewsOnDisk, NoneIsRemovedToKeepABound) {
+TEST_F(SavedViewsOnDisk, NoneIsRemovedToMeetALimit) {
   {
     const auto views = open().value();
     for (int step = 0; step < 5; ++step) EXPECT_TRUE(views->add(view_of_step(step), time_of_all));
@@ -251,7 +251,7 @@ TEST_F(SavedViewsOnDisk, NoneIsRemovedToKeepABound) {
   EXPECT_EQ(files(), before);
 }
 
-TEST_F(SavedViewsOnDisk, TornAndForeignFilesAreIgnoredAndLeftAlone) {
+TEST_F(SavedViewsOnDisk, TruncatedAndForeignFilesAreIgnoredAndKept) {
   std::string good;
   {
     const auto views = open().value();
@@ -293,7 +293,7 @@ TEST_F(SavedViewsOnDisk, TornAndForeignFilesAreIgnoredAndLeftAlone) {
   EXPECT_EQ(files(), before);
 }
 
-TEST_F(SavedViewsOnDisk, AWriteThatNeverEndedIsClearedAway) {
+TEST_F(SavedViewsOnDisk, UnfinishedWriteIsRemoved) {
   std::string good;
   {
     const auto views = open().value();
@@ -307,7 +307,7 @@ TEST_F(SavedViewsOnDisk, AWriteThatNeverEndedIsClearedAway) {
   EXPECT_EQ(files(), before);
 }
 
-TEST_F(SavedViewsOnDisk, AWriteThatFailsChangesNothing) {
+TEST_F(SavedViewsOnDisk, FailedWriteChangesNothing) {
   const auto views = SavedViews::open({state(), 2}).value();
   const std::string id = views->add(view_of_step(1), time_of_all)->id;
   const auto before = files();
@@ -357,7 +357,7 @@ class ReadOnly {
   uid_t user_;
 };
 
-TEST_F(SavedViewsOnDisk, AFolderThatBecomesReadOnlyServesItsViewsAndRefusesChangesWithTheReason) {
+TEST_F(SavedViewsOnDisk, ReadOnlyFolderServesItsViewsAndRefusesChangesWithTheReason) {
   const auto views = open().value();
   const std::string id = views->add(view_of_step(1), time_of_all)->id;
   {
@@ -375,7 +375,7 @@ TEST_F(SavedViewsOnDisk, AFolderThatBecomesReadOnlyServesItsViewsAndRefusesChang
   EXPECT_TRUE(set_step(*views, id, 3)) << "it can be written to again";
 }
 
-TEST_F(SavedViewsOnDisk, AFolderThatIsMissingIsMadeByTheFirstChange) {
+TEST_F(SavedViewsOnDisk, MissingFolderIsCreatedByTheFirstChange) {
   const auto views = open().value();
   fs::remove_all(state() / "views");
   const auto saved = views->add(view_of_step(4), time_of_all);
@@ -383,7 +383,7 @@ TEST_F(SavedViewsOnDisk, AFolderThatIsMissingIsMadeByTheFirstChange) {
   EXPECT_EQ(files().count(saved->id + ".json"), 1U);
 }
 
-TEST_F(SavedViewsOnDisk, AReadOnlyFolderIsOpenedAndRead) {
+TEST_F(SavedViewsOnDisk, ReadOnlyFolderIsOpenedAndRead) {
   const std::string id = open().value()->add(view_of_step(1), time_of_all)->id;
   fs::create_directory(root_ / "empty");
   const ReadOnly disk(root_.path());
@@ -395,7 +395,7 @@ TEST_F(SavedViewsOnDisk, AReadOnlyFolderIsOpenedAndRead) {
   EXPECT_EQ((*without)->add(view_of_step(1), time_of_all).error().kind, ErrorKind::out_of_memory);
 }
 
-TEST_F(SavedViewsOnDisk, AnIdWhoseFileIsThereIsNotGivenAgain) {
+TEST_F(SavedViewsOnDisk, IdOfAnExistingFileIsNotReused) {
   const auto views = open().value();
   const std::string id = views->add(view_of_step(1), time_of_all)->id;
   fs::remove(file_of(id));
@@ -403,7 +403,7 @@ TEST_F(SavedViewsOnDisk, AnIdWhoseFileIsThereIsNotGivenAgain) {
   EXPECT_FALSE(views->find(id));
 }
 
-TEST_F(SavedViewsOnDisk, OneProcessAtATimeHasTheFolder) {
+TEST_F(SavedViewsOnDisk, OneProcessAtATimeLocksTheFolder) {
   auto views = open().value();
   const auto second = open();
   ASSERT_FALSE(second);
@@ -413,7 +413,7 @@ TEST_F(SavedViewsOnDisk, OneProcessAtATimeHasTheFolder) {
   EXPECT_TRUE(open());
 }
 
-TEST_F(SavedViewsOnDisk, AFolderThatIsNoneIsRefused) {
+TEST_F(SavedViewsOnDisk, PathThatIsNoFolderIsRefused) {
   std::ofstream(root_ / "deep") << "a file";
   const auto refused = open();
   ASSERT_FALSE(refused);
@@ -425,7 +425,7 @@ TEST_F(SavedViewsOnDisk, AFolderThatIsNoneIsRefused) {
   EXPECT_FALSE(open());
 }
 
-TEST_F(SavedViewsOnDisk, AreForTheOwnerAlone) {
+TEST_F(SavedViewsOnDisk, AreAccessibleToTheOwnerOnly) {
   const auto views = open().value();
   EXPECT_EQ(fs::status(state() / "views").permissions(), fs::perms::owner_all);
 }
