@@ -54,7 +54,7 @@ async function seen(page) {
   return (await page.screenshot({ clip })).toString("base64");
 }
 
-test("r asks for the reference, shows it while it is held and no longer", () =>
+test("r requests the reference and shows it while held", () =>
   withPage(async (page) => {
     const before = await pixels(page);
     const seenBefore = await seen(page);
@@ -90,7 +90,7 @@ test("r asks for the reference, shows it while it is held and no longer", () =>
     assert.equal((await pixels(page)).hash, before.hash);
   }));
 
-test("the error shown is the true one of the picture", () =>
+test("the shown error is the true error of the picture", () =>
   withPage(async (page) => {
     await page.keyboard.press("r");
     await ready(page);
@@ -108,7 +108,7 @@ test("the error shown is the true one of the picture", () =>
     assert.ok(mean / 255 < 13 * truth.value + 0.01, `${mean} for ${truth.value}`);
   }));
 
-test("another view drops it: what is there, and what is being drawn", () =>
+test("a view change discards the reference and its job", () =>
   withPage(async (page) => {
     await page.keyboard.press("r");
     await ready(page);
@@ -140,7 +140,7 @@ test("another view drops it: what is there, and what is being drawn", () =>
     await ready(page);
   }));
 
-test("the button is held by mouse, finger or space", () =>
+test("the button can be held by mouse, finger or space", () =>
   withPage(
     async (page) => {
       const button = page.getByRole("button", { name: "Reference: hold to show it" });

@@ -42,7 +42,7 @@ async function byteProxy(port) {
   };
 }
 
-test("page and frames that come a byte at a time are the same page and frames", (t) =>
+test("page and frames received one byte at a time are unchanged", (t) =>
   withPage(async (whole) => {
     const proxy = await byteProxy(shared.daemon.port);
     t.after(proxy.close);

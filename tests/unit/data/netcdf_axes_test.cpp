@@ -316,7 +316,7 @@ TEST(NetcdfAxes, TimesOutOfOrderAreNoted) {
   }
 }
 
-TEST(NetcdfAxes, RecognisesAxesByTheAxisAttributeAgainstTheNames) {
+TEST(NetcdfAxes, RecognizesAxesByTheAxisAttributeAgainstTheNames) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "a.nc");

@@ -71,7 +71,7 @@ double root_mean_square(const Picture& a, const Picture& b) {
 
 const std::vector<std::pair<int, int>> few_sizes{{1, 1}, {1, 67}, {67, 1}, {17, 9}, {256, 64}};
 
-TEST(Jpeg, KeepsSizeSubsamplingAndColours) {
+TEST(Jpeg, KeepsSizeSubsamplingAndColors) {
   for (const auto& [width, height] : few_sizes) {
     for (const Subsampling subsampling : {Subsampling::s444, Subsampling::s420}) {
       const Picture picture = smooth_picture(width, height);
