@@ -1,4 +1,4 @@
-// The errors that frames are told against true ones, at views that nothing was measured of.
+// Forecast errors of frames against their true errors, at viewpoints without measurements.
 #include "server/study/calibration.hpp"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ Subject small_tornado() {
   return make_subject("tornado", dataset, view, {48, 36}).value();
 }
 
-// Two surveyed views of each of five looks, three held out.
+// Two calibrated and three held-out viewpoints of each of five scenes.
 const Calibration& calibrated() {
   static const Calibration made = [] {
     ThreadPool pool(2);
@@ -66,7 +66,7 @@ TEST(Calibration, JpegErrorsAreWithinAFactorOfTwoAfterOneMeasurement) {
   EXPECT_GE(agreement_of_encodings(calibrated()).within_two, 0.85);
 }
 
-// Two ways to the truth, one of them the integral.
+// Two independent computations of the reference; one is the integral.
 TEST(Calibration, ReferenceEqualsTheIntegral) {
   ASSERT_EQ(calibrated().checks.size(), 5U);
   for (const TruthCheck& check : calibrated().checks) {

@@ -1,4 +1,4 @@
-// Orders of convergence: of the reference's rule, and of what each compositing makes of a cell.
+// Orders of convergence of the reference's quadrature and of every compositing rule for a cell.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@ using scene::Compositing;
 
 // ---- a medium on [0, 1] with lines in it ----
 
-constexpr double edge = 0.4371;  // where the stepped medium jumps
+constexpr double edge = 0.4371;  // discontinuity of the medium
 
 struct Haze {
   bool stepped = false;
@@ -171,8 +171,8 @@ void add_cell(const Haze& haze, Rule rule, double from, double to, const Sheet* 
   }
 }
 
-// Cells of width 1 / n whose borders lie at (i + phase) / n, cut off at the medium's ends (and at
-// its edge, if told).
+// Cells of width 1 / n with boundaries at (i + phase) / n, clipped to the medium and, on request,
+// at its discontinuity.
 Light by_cells(const Haze& haze, const std::vector<Sheet>& lines, Rule rule, int n, double phase,
                bool split_at_edge) {
   std::vector<double> borders{0};
@@ -237,7 +237,7 @@ TEST(CellOrder, DiscontinuityCostsAnOrderUnlessCellsAreSplitThere) {
   }
 }
 
-// ---- bounds that the formulas promise ----
+// ---- bounds implied by the formulas ----
 
 TEST(CellRules, CorrectedDeviatesByAtMostAnEighthOfTauSquared) {
   for (const double tau : {1e-4, 0.01, 0.3, 1.0, 3.0}) {

@@ -1,4 +1,4 @@
-// Curved lattices: each sample has its own place and cell.
+// Curved lattices: each sample has its own position and cell.
 #include <gtest/gtest.h>
 
 #include <cmath>

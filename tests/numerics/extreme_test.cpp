@@ -1,4 +1,4 @@
-// Stiff and extreme scenes, each with the picture that it must give.
+// Stiff and extreme scenes with known pictures.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,8 +17,8 @@ namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-// A line across the middle of a splat, tilted so that at the right it leaves its cell's back; red
-// medium, blue line.
+// A line across the middle of a splat, tilted so that its right end leaves the back of the cell;
+// red medium, blue line.
 scene::Scene line_in_cell(float rho, double opacity, float away) {
   scene::Scene scene;
   scene.lattice = even_lattice({1, 1, 1}, {2, 2, 2});
@@ -62,7 +62,7 @@ TEST(Stiff, OpaqueCellHidesLinesBehindItOnly) {
     EXPECT_EQ(behind[1], 0.5F) << rho;
     EXPECT_EQ(behind[2], 0.0F) << rho;
     EXPECT_EQ(behind[3], 1.0F) << rho;
-    const float* before = pixel(image, 9, 20);  // at its cell's very front: nothing attenuates it
+    const float* before = pixel(image, 9, 20);  // at the front of its cell
     EXPECT_NEAR(before[2], 0.8, 1e-6) << rho;
     EXPECT_NEAR(before[0], 0.2, 1e-6) << rho;
     EXPECT_EQ(before[3], 1.0F) << rho;
@@ -75,12 +75,12 @@ TEST(Stiff, OpaqueLineEndsTheRay) {
     const float* middle = pixel(image, 20, 20);
     EXPECT_EQ(middle[3], 1.0F) << rho;
     const double passed = std::exp(-static_cast<double>(rho) / footprint_integral);
-    EXPECT_NEAR(middle[0], 1 - passed, 1e-6) << rho;  // half its cell is before it
+    EXPECT_NEAR(middle[0], 1 - passed, 1e-6) << rho;  // half of its cell is in front of it
     EXPECT_NEAR(middle[2], passed, 1e-6) << rho;
   }
 }
 
-// Where one kernel alone is seen and its line lies in the middle, the method is exact.
+// For a single kernel with a line in its middle the method is exact.
 TEST(Stiff, OneKernelWithACentralLineEqualsTheReference) {
   for (const float rho : {0.0F, 1e-30F, 1e-3F, 1.0F, 50.0F, 1e4F, 1e30F}) {
     EXPECT_LT(worst_error(line_in_cell(rho, 0.8, 0.0F)), 1e-5) << rho;
@@ -131,7 +131,7 @@ TEST(Extremes, KernelThatCoversTheScreenEqualsItsFootprint) {
         const double r = distance * off / std::hypot(1.0, off) / 2;
         ASSERT_LT(r, 0.48);
         const double whole = 0.8 * (1 - r * r / (0.48 * 1.37)) * 2 / footprint_integral;
-        // Of a kernel that the eye stands in, what lies behind the near plane does not count.
+        // For a kernel that contains the eye, only the part beyond the near plane counts.
         const double ray = std::hypot(1.0, off);
         const double beyond = 0.5 + (distance / (ray * ray) - scene.camera.near) * ray / 2;
         const double tau = whole * std::min(beyond, 1.0);
@@ -147,20 +147,20 @@ TEST(Extremes, VeryFarEyeRendersLikeANearOne) {
   const engine::Image near = render(scene).image;
   scene.camera = look({0, 0, 0}, {0.3, 1, -0.4}, 1e5, 64, 48, false, 1);
   const engine::Image far = render(scene).image;
-  // Through a lens that narrows as the eye draws back, perspective becomes orthographic.
+  // With a field of view that narrows as the eye recedes, perspective converges to orthographic.
   scene.camera = look({0, 0, 0}, {0.3, 1, -0.4}, 1e5, 64, 48, true, 1e-5);
   const engine::Image narrow = render(scene).image;
   float brightest = 0;
   for (std::size_t i = 0; i < near.rgba.size(); ++i) {
     ASSERT_NEAR(near.rgba[i], far.rgba[i], 1e-5);
-    // A hundred-thousandth of a line's place, at its edge's slope.
+    // A position error of 1e-5 of the line, times the slope of its edge.
     ASSERT_NEAR(near.rgba[i], narrow.rgba[i], 5e-3);
     brightest = std::max(brightest, near.rgba[i]);
   }
   EXPECT_GT(brightest, 0.3F);
 }
 
-// Optical depths of a column add to tau = 2; accumulated in float, the sum errs by 8e-3 at most.
+// Optical depths of a column add up to tau = 2; accumulation in float deviates by at most 8e-3.
 TEST(Extremes, MillionLayersAddUp) {
   for (const int layers : {1000, 100000, 1000000}) {
     scene::Scene scene;
@@ -212,7 +212,7 @@ TEST(Extremes, EyeInsideTheVolumeGivesAFinitePictureNearTheReference) {
   scene.vector->length = 0.1;
   scene.camera = look({0.013, 0.004, 0.009}, {0.3, 1, -0.4}, 0, 40, 30, true, 1);
   scene.camera.near = 0.05;
-  // The engine takes or leaves a whole splat at the eye: the error of a few cells of rho h = 0.4.
+  // The engine keeps or drops whole splats at the eye: an error of a few cells of rho h = 0.4.
   EXPECT_LT(worst_error(scene), 0.35);
 }
 

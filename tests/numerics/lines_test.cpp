@@ -63,7 +63,7 @@ TEST(Line, AlongTheViewIsADiscOfTheOuterRadius) {
         const double distance = std::hypot(x - 40, y - 40);
         const double part = std::clamp((3.5 - distance) / 2, 0.0, 1.0);
         ASSERT_NEAR(pixel(image, x, y)[3], 0.75 * part, 1e-5) << x << " " << y;
-        // Neither head nor tail: its middle is what is seen.
+        // Neither head nor tail: the middle is visible.
         const double grey = 0.5 * 0.5;
         ASSERT_NEAR(pixel(image, x, y)[0], 0.75 * part * (0.2 + grey * 0.6), 0.01) << x << " " << y;
       }

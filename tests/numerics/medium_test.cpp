@@ -1,4 +1,4 @@
-// Physics of the medium: what a splat and a lattice of splats absorb.
+// Physics of the medium: absorption of a splat and of a lattice of splats.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -64,7 +64,7 @@ TEST(Splat, OpticalDepthFromNearZeroToInfinity) {
     const engine::Image image = render(one_splat(rho, {1, 1, 1}, {0, 1, 0}, false)).image;
     return std::array<float, 2>{pixel(image, 31, 31)[0], pixel(image, 31, 31)[3]};
   };
-  // Colour adds up from nothing; alpha is what is missing from 1 of the light let through.
+  // Colour accumulates from zero; alpha is one minus the transmittance.
   const double faint = 1e-30;
   EXPECT_NEAR(centre(faint)[0] / (faint / footprint_integral), 1, 1e-6);
   EXPECT_NEAR(centre(faint)[1], 0, 6e-8);
@@ -83,8 +83,7 @@ TEST(Splat, ZeroOpticalDepthLeavesThePixelUnchanged) {
   EXPECT_EQ(before.rgba, render(scene).image.rgba);
 }
 
-// Relative deviation of the optical depth from rho L over pixels whose rays cross the slab from
-// face to face.
+// Relative deviation of the optical depth from rho L, over pixels whose rays cross the whole slab.
 struct Ripple {
   double peak_to_peak = 0, rms = 0, mean = 0;
 };
@@ -148,8 +147,8 @@ TEST(UniformMedium, StrideOfTwoAbsorbsTheSame) {
   }
 }
 
-// Seen along z a splat's optical depth is that of its whole cell, so whatever number of layers a
-// stop stands for, the mean over a cell is extinction times thickness.
+// Along z the optical depth of a splat is that of its whole cell; for any number of layers per
+// kernel position the mean over a cell is extinction times thickness.
 TEST(UniformMedium, AnyStrideAbsorbsLikeTheBox) {
   for (const int layers : {1, 3, 19}) {
     for (const int stride : {1, 2, 4, 8}) {

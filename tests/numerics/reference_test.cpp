@@ -1,4 +1,4 @@
-// The reference against closed forms: its kernel, its rule along one ray, and whole pictures.
+// The reference against closed forms: its kernel, its quadrature along one ray, and whole pictures.
 #include "server/engine/reference/reference.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ using Rgb = std::array<double, 3>;
 constexpr double s = 0.48;
 constexpr double t = 1.37;
 
-// Simpson's rule on nodes that crowd towards both ends: independent of what it tests.
+// Simpson's rule with nodes graded towards both ends: independent of the tested rule.
 double simpson(const std::function<double(double)>& f, double from, double to) {
   constexpr int steps = 4000;
   double sum = 0;
@@ -40,7 +40,7 @@ double simpson(const std::function<double(double)>& f, double from, double to) {
   return sum * (to - from) / (3 * steps);
 }
 
-// The integral of K from far before to z (in cells from the middle) along a line at distance b.
+// The integral of K from infinity to z (in cells from the centre) along a line at distance b.
 double partial_footprint(double b, double z) {
   if (b >= t) return 0;
   const double end = std::sqrt(t * t - b * b);
@@ -90,7 +90,7 @@ TEST(Kernel3d, ConservesMassAndIsNonnegative) {
   for (int i = 0; i <= 20000; ++i) EXPECT_GE(reference::kernel_3d(1e-4 * i), 0);
   EXPECT_EQ(reference::kernel_3d(t), 0);
   EXPECT_EQ(reference::kernel_3d(2), 0);
-  // Continuous where its two formulas meet.
+  // Continuous at the joint of its two formulas.
   EXPECT_NEAR(reference::kernel_3d(s - 1e-9), reference::kernel_3d(s + 1e-9), 1e-8);
 }
 
@@ -196,7 +196,7 @@ TEST(Ray, SheetsInASlabHaveTheirClosedForm) {
         sheets.push_back({unit(random), unit(random), {unit(random), unit(random), unit(random)}});
       }
       if (count == 7) sheets[3].opacity = 1;
-      sheets.push_back({-0.5, 0.3, {1, 1, 0}});  // before the slab
+      sheets.push_back({-0.5, 0.3, {1, 1, 0}});  // in front of and behind the slab
       sheets.push_back({1.5, 0.8, {0, 1, 1}});   // and behind
       std::sort(sheets.begin(), sheets.end(),
                 [](const Sheet& a, const Sheet& b) { return a.depth < b.depth; });
@@ -229,7 +229,7 @@ TEST(Ray, CheckeredRayIsCompositedPieceByPiece) {
     open *= 1 - here;
   }
   expect_light(along(medium, {0, 1, 2, 3, 4, 5, 6, 7, 8}), 1 - open, rgb);
-  // Not told where the steps are, it finds them.
+  // Finds discontinuities that are not given.
   expect_light(along(medium, {0, 8}, {}, 1e-9), 1 - open, rgb, 1e-7);
 }
 
@@ -281,7 +281,7 @@ TEST(Reference, OneSplatIsItsFootprintInAnisotropicCells) {
 
 TEST(Reference, SplatsApartAreCompositedByOver) {
   scene::Scene scene;
-  scene.lattice = even_lattice({1, 2, 1}, {1, 3, 1});  // their middles lie 3 apart, 1.37 * 3 wide
+  scene.lattice = even_lattice({1, 2, 1}, {1, 3, 1});  // their centres are 3 apart, 1.37 * 3 wide
   scene.lattice.positions[1] = {-5, 5};
   const auto red = make_volume(scene.lattice, 1,
                                [](int, double, double y, double) { return y < 0 ? 1.0F : 0.0F; });
@@ -304,8 +304,8 @@ TEST(Reference, SplatsApartAreCompositedByOver) {
   }
 }
 
-// A line through a splat: I = c_s A + a exp(-tf) (c_v - c_s), tf the part of tau before it, by the
-// kernel's partial integral.
+// A line through a splat: I = c_s A + a exp(-tf) (c_v - c_s), tf the part of tau in front of it, by
+// the partial integral of the kernel.
 TEST(Reference, LineInASplatSeesThePartOfTheSplatInFront) {
   for (const double rho : {0.01, 0.7, 3.0, 60.0}) {
     for (const float slope : {0.0F, 4.0F, -9.0F, 30.0F}) {
@@ -353,7 +353,7 @@ TEST(Reference, RaysStartAtTheNearPlane) {
   scene.scalars = {medium(constant_scalar(scene.lattice, 2), {1.0F, 1.0F, 1.0F})};
   scene.camera = look({0, 0, 0}, {0, 1, 0}, 0.5, 1, 1, true, 0.1);
   for (const double near : {1e-3, 0.2, 0.45}) {
-    scene.camera.near = near;  // the splat's middle is 0.5 away
+    scene.camera.near = near;  // the centre of the splat is 0.5 away
     const double tau = 2 * (footprint(0) - partial_footprint(0, near - 0.5)) / footprint_integral;
     EXPECT_NEAR(truth(scene).rgba[3], -std::expm1(-tau), 1e-9) << near;
   }
@@ -380,8 +380,8 @@ TEST(Reference, UniformLatticeAbsorbsWithinTheFootprintsRipple) {
   }
 }
 
-// Lines alone, which no pair of kernels can put in the wrong order, are what the naive renderer
-// draws; and so is a medium of one colour, for optical depths add in any order.
+// Lines alone, whose order is unambiguous, and a medium of one colour, whose optical depths add in
+// any order, equal the naive renderer.
 TEST(Reference, EqualsTheNaiveRendererWhereThatIsExact) {
   scene::Scene scene;
   scene.lattice = make_lattice({{{0.1, 0.12, 0.09, 0.1, 0.3}, {0.1, 0.1, 0.12, 0.1}, {0.2, 0.15}}});
@@ -414,7 +414,7 @@ TEST(Reference, EqualsTheNaiveRendererWhereThatIsExact) {
       double brightest = 0;
       double alpha = 0;
       for (std::size_t i = 0; i < drawn.rgba.size(); ++i) {
-        // Where lines of neighbouring cells cross, only the opacity does not tell their order.
+        // Where lines of neighbouring cells cross, only opacity is independent of their order.
         if (i % 4 == 3) alpha = std::max(alpha, std::abs(lines.rgba[i] - drawn.rgba[i]));
         brightest = std::max(brightest, drawn.rgba[i]);
       }
@@ -424,7 +424,7 @@ TEST(Reference, EqualsTheNaiveRendererWhereThatIsExact) {
   }
 }
 
-// A lattice that is bent by nothing but a turn, seen by an eye that turns with it.
+// A rotated lattice seen by an eye rotated with it.
 TEST(Reference, RotatedPositionsAndEyeGiveTheSamePicture) {
   scene::Scene scene = cloudy_scene(4, 24);
   scene.lattice = even_lattice({4, 3, 1}, {0.3, 0.4, 0.5});
@@ -458,7 +458,7 @@ TEST(Reference, RotatedPositionsAndEyeGiveTheSamePicture) {
     scene.camera.forward = turn(scene.camera.forward);
     const reference::Picture turned = truth(scene);
     for (std::size_t i = 0; i < straight.rgba.size(); ++i) {
-      ASSERT_NEAR(straight.rgba[i], turned.rgba[i], 1e-5);  // places are floats
+      ASSERT_NEAR(straight.rgba[i], turned.rgba[i], 1e-5);  // positions are floats
     }
     EXPECT_GT(straight.rgba[4 * (12 * 24 + 12) + 3], 0.3);
   }

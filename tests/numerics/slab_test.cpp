@@ -1,5 +1,5 @@
-// The slab method: partial footprints, order in the slab's thickness, no popping when the view
-// turns, lines at their depth.
+// The slab method: partial footprints, order in slab thickness, no popping during rotation, lines
+// at their depth.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -102,8 +102,8 @@ TEST(Slab, HalvingTheThicknessQuartersTheError) {
   }
 }
 
-// Lines are in exact order whatever the slabs: also where a brick lies in hundreds of them, and
-// where all lines lie in one.
+// Lines are in exact order for any slabs: when a brick spans hundreds of slabs, and when one slab
+// contains all lines.
 TEST(Slab, LinesDoNotDependOnTheThickness) {
   for (const bool perspective : {false, true}) {
     Scene scene = blobs(6, 64, 0.4, perspective);

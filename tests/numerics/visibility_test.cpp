@@ -1,4 +1,4 @@
-// What is nearer hides what is farther, from every side and from inside.
+// Nearer content hides farther content, from every direction and from inside.
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
@@ -8,8 +8,8 @@
 namespace windsplat::test {
 namespace {
 
-// Two opaque splats, red at sample a and green at b; which one the pixel at the middle shows when
-// the view goes along the line through both.
+// Two opaque splats, red at sample a and green at b; the centre pixel shows one of them when the
+// view direction is the line through both.
 scene::Scene two_splats(const scene::Lattice& lattice, std::array<int, 3> red,
                         std::array<int, 3> green) {
   scene::Scene scene;
@@ -46,7 +46,7 @@ TEST(Visibility, NearerHidesFartherFromTwentySixDirections) {
         scene::Scene scene = two_splats(lattice, red, green);
         const glm::dvec3 forward = place(lattice, green) - place(lattice, red);
         for (const bool perspective : {false, true}) {
-          // From outside, and from inside the box between its middle and the red splat's side.
+          // From outside, and from inside the box between its centre and the face of the red splat.
           for (const double distance : {4.0, 0.9 * glm::length(forward)}) {
             scene.camera = look(place(lattice, green), forward, distance, 15, 15, perspective, 0.1);
             const bool behind_eye = perspective && distance < glm::length(forward);
@@ -72,7 +72,7 @@ TEST(Visibility, HoldsForEveryPairSeenFromTheCenter) {
     const std::array<int, 3> near{at(random), at(random), at(random)};
     const glm::dvec3 to = place(lattice, near) - eye;
     if (glm::length(to) < 0.25 || glm::length(to) > 0.4) continue;
-    // The sample nearest twice as far in the same direction.
+    // The nearest sample at twice the distance in the same direction.
     std::array<int, 3> far{};
     bool inside = true;
     for (int a = 0; a < 3; ++a) {

@@ -1,4 +1,4 @@
-// The work report, cancelling, and scenes with little or nothing in them.
+// The work report, cancellation, and empty or small scenes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
-// Eight by eight by four samples in sight; the wind grows with x, the cloud with y.
+// Eight by eight by four visible samples; the wind grows with x, the cloud with y.
 scene::Scene counted_scene() {
   scene::Scene scene;
   scene.lattice = even_lattice({8, 8, 4}, {0.2, 0.2, 0.2});
@@ -104,7 +104,7 @@ TEST(Work, OpaqueTilesTerminateEarlyAndLookTheSame) {
 }
 
 TEST(Cancel, BeforeAndDuringAFrame) {
-  // So much work that a thread that wakes late still cancels in its midst.
+  // Enough work that a thread that wakes late still cancels before the end.
   scene::Scene scene;
   scene.lattice = even_lattice({80, 80, 80}, {0.024, 0.024, 0.024});
   const auto wind = make_volume(scene.lattice, 3, [](int, double, double, double) { return 1.0F; });
@@ -136,7 +136,7 @@ TEST(Cancel, BeforeAndDuringAFrame) {
   canceller.join();
   ASSERT_FALSE(cut_short);
   EXPECT_EQ(cut_short.error().kind, ErrorKind::cancelled);
-  EXPECT_LT(part / whole, 0.75) << "cancelled at a fifth of its time, yet drawn on";
+  EXPECT_LT(part / whole, 0.75) << "cancelled at a fifth of its time, yet rendering continued";
 }
 
 bool all_finite(const engine::Image& image) {
@@ -159,8 +159,7 @@ scene::Scene both(const scene::Lattice& lattice, float wind, float rho) {
   return scene;
 }
 
-// Tiles: once each, cut at even pixels, clear where none comes, and the very bits of the image;
-// none comes where the camera sees nothing.
+// Tiles are delivered once, at even pixels, with the bits of the image; blank tiles are omitted.
 TEST(Tiles, AreDeliveredOnceAndFormTheImage) {
   for (const auto& [width, height] : {std::pair{1, 1}, {67, 65}, {300, 201}}) {
     for (const auto method : {scene::Method::kernel, scene::Method::slab}) {
@@ -241,7 +240,7 @@ TEST(Extremes, EyeInsideTheVolumeHasBoundedWork) {
   const engine::Rendered rendered = render(scene);
   EXPECT_TRUE(all_finite(rendered.image));
   EXPECT_GT(pixel(rendered.image, 80, 60)[3], 0.8F);
-  // The few kernels about the eye may cover the screen; a kernel beside it must not.
+  // The few kernels around the eye may cover the screen; a kernel beside it must not.
   EXPECT_LT(rendered.work.pixel_updates, 100L * 160 * 120 + 64L * 64 * 64 * 150);
 }
 

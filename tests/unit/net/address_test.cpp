@@ -47,18 +47,18 @@ TEST(ClientAddress, IsTheLastHopThatIsNoTrustedProxy) {
     return client_address(peer, hops, trusted);
   };
   EXPECT_EQ(client("10.0.0.1", "198.51.100.1"), "198.51.100.1");
-  // What the client itself claims stands before what the proxy saw.
+  // Entries claimed by the client precede those added by the proxy.
   EXPECT_EQ(client("10.0.0.1", "1.1.1.1, 198.51.100.1"), "198.51.100.1");
   EXPECT_EQ(client("10.0.0.1", "1.1.1.1,198.51.100.1 ,\t192.0.2.7, 10.9.9.9"), "198.51.100.1");
   EXPECT_EQ(client("10.0.0.1", "198.51.100.1:4711"), "198.51.100.1");
   EXPECT_EQ(client("10.0.0.1", "[2001:db8::1]:443"), "2001:db8::1");
   EXPECT_EQ(client("10.0.0.1", "2001:db8::1"), "2001:db8::1");
-  // Nobody said, or nothing that can be understood: the proxy itself.
+  // Without a valid header the address is that of the proxy.
   for (const char* hops : {"", ",", "unknown", "198.51.100.1, _hidden", "[", "[]", "1.2.3", ":"}) {
     EXPECT_EQ(client("10.0.0.1", hops), "10.0.0.1") << hops;
   }
   EXPECT_EQ(client("10.0.0.1", "10.2.2.2, 10.1.1.1"), "10.2.2.2");
-  // From anybody else it is not believed.
+  // The header is ignored from untrusted peers.
   EXPECT_EQ(client("203.0.113.9", "198.51.100.1"), "203.0.113.9");
   EXPECT_EQ(client("", "198.51.100.1"), "");
 }

@@ -64,8 +64,8 @@ TEST(TokenFile, MatchesOnlyItsToken) {
 }
 
 TEST(Cookie, IsAnHmacOfItsExpiryByTheToken) {
-  // By Python's hmac: key = HMAC-SHA256(token, "windsplat cookie, version 1"), HMAC-SHA256(key,
-  // end).
+  // Computed by Python's hmac: key = HMAC-SHA256(token, "windsplat cookie, version 1"),
+  // HMAC-SHA256(key, end).
   const std::string end = "2000000000";
   const std::string mac = "0ecadcfbdcb915cc2f78f27377d8b4326d90cdb1f9c7c3bf9baf6e16c217df2d";
   EXPECT_EQ(token().cookie(2'000'000'000), end + "." + mac);
@@ -102,7 +102,7 @@ TEST(Cookie, ContainsThePortInItsName) {
   const Token mine = token();
   Request asked = request("GET", {"v1"}, {{"Cookie", cookie_header(mine.cookie(now_s + 9))}});
   asked.headers.back().second = "winds.example:8080";  // the Host
-  EXPECT_EQ(judge(asked, false, &mine, {}, now_s), Verdict::no_token) << "another daemon's";
+  EXPECT_EQ(judge(asked, false, &mine, {}, now_s), Verdict::no_token) << "cookie of another daemon";
   asked.headers.front().second = "windsplat-8080=" + mine.cookie(now_s + 9);
   EXPECT_EQ(judge(asked, false, &mine, {}, now_s), Verdict::allowed);
 }
@@ -114,7 +114,7 @@ TEST(TokenFile, NewTokenInvalidatesEarlierProofs) {
   EXPECT_FALSE(is_other_token(&first, &same));
   EXPECT_TRUE(is_other_token(&first, &other));
   EXPECT_TRUE(is_other_token(nullptr, &first));
-  EXPECT_FALSE(is_other_token(&first, nullptr)) << "no token is required any more";
+  EXPECT_FALSE(is_other_token(&first, nullptr)) << "the token is no longer required";
   EXPECT_FALSE(is_other_token(nullptr, nullptr));
 }
 
@@ -158,14 +158,14 @@ TEST(Authentication, BearerTokenGrantsAccess) {
   }
   EXPECT_EQ(verdict(request("GET", path, {{"Authorization", right}, {"Authorization", right}})),
             Verdict::wrong_token)
-      << "which of two counts is not guessed";
+      << "two cookies are ambiguous";
   EXPECT_EQ(verdict(request("GET", path,
                             {{"Authorization", "Bearer wrong"},
                              {"Cookie", cookie_header(token().cookie(now_s + 9))}})),
             Verdict::wrong_token);
 }
 
-// A proxy that asks for a password has the browser send it with every request.
+// Browsers repeat the credentials of a proxy with every request.
 TEST(Authentication, AnotherSchemeIsNeitherProofNorAWrongToken) {
   const std::string basic = "Basic dXNlcjpwYXNzd29yZA==";
   for (const std::string& other : {basic, std::string(secret), std::string("Bearers ") + secret}) {
@@ -185,7 +185,7 @@ TEST(Authentication, AnotherSchemeIsNeitherProofNorAWrongToken) {
             Verdict::allowed);
 }
 
-// What may be a guess, right or wrong, and is counted before it is compared.
+// Credentials that could be attempts are counted before they are compared.
 TEST(Authentication, WrongTokensCountOnlyWhereOneIsRequired) {
   const Headers bearer{{"Authorization", "Bearer x"}};
   const Headers offer{{"Sec-WebSocket-Protocol", "bearer.eA"}};
@@ -205,9 +205,10 @@ TEST(Authentication, PlainHttpOriginDiffersFromTheTlsServer) {
   };
   EXPECT_EQ(posted("http://winds.example", true), Verdict::wrong_origin);
   EXPECT_EQ(posted("https://winds.example", true), Verdict::allowed);
-  EXPECT_EQ(posted("http://friend.example", true), Verdict::allowed) << "it was named";
+  EXPECT_EQ(posted("http://friend.example", true), Verdict::allowed) << "the host was named";
   EXPECT_EQ(posted("http://winds.example", false), Verdict::allowed);
-  EXPECT_EQ(posted("https://winds.example", false), Verdict::allowed) << "a proxy may speak TLS";
+  EXPECT_EQ(posted("https://winds.example", false), Verdict::allowed)
+      << "a proxy may terminate TLS";
 }
 
 TEST(Authentication, SubprotocolAuthenticatesAWebSocket) {
@@ -216,7 +217,7 @@ TEST(Authentication, SubprotocolAuthenticatesAWebSocket) {
     return request("GET", {"v1", "stream"}, {{"Sec-WebSocket-Protocol", offers}});
   };
   EXPECT_EQ(verdict(with(right), true), Verdict::allowed);
-  EXPECT_EQ(verdict(with(right), false), Verdict::no_token) << "of an upgrade alone";
+  EXPECT_EQ(verdict(with(right), false), Verdict::no_token) << "upgrades only";
   EXPECT_EQ(verdict(with("windsplat.v1"), true), Verdict::no_token);
   for (const std::string& wrong : {right + "=", right + "A", right.substr(0, right.size() - 1),
                                    std::string("bearer."), std::string("bearer.") + secret}) {
@@ -256,11 +257,11 @@ TEST(Authentication, ForeignOriginIsRefusedEvenWithTheToken) {
   EXPECT_EQ(verdict(request("GET", {"v1", "stream"}, headers), true), Verdict::wrong_origin);
   EXPECT_EQ(verdict(request("POST", {"v1", "views"}, headers)), Verdict::wrong_origin);
   EXPECT_EQ(verdict(request("GET", {"v1"}, headers)), Verdict::allowed)
-      << "what is read the browser itself keeps from the page";
+      << "the browser prevents the page from reading the response";
   EXPECT_EQ(judge(request("PUT", {"v1"}, {{"Origin", "https://evil.example"}}), false, nullptr, {},
                   now_s),
             Verdict::wrong_origin)
-      << "without a token, too";
+      << "also without a token";
 }
 
 TEST(Authentication, TokenInAUrlIsRefusedFirst) {

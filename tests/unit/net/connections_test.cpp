@@ -39,7 +39,7 @@ TEST(Connections, CloseTheLongestIdleConnection) {
   Connections connections;
   connections.add(connections.next_id(), busy, false);
   for (const auto& one : idle) connections.add(connections.next_id(), one, false);
-  EXPECT_FALSE(connections.end_longest(&Connection::idle_since, 3)) << "so many there may be";
+  EXPECT_FALSE(connections.end_longest(&Connection::idle_since, 3)) << "the limit";
   EXPECT_FALSE(connections.end_longest(&Connection::unasked_since));
   EXPECT_TRUE(connections.end_longest(&Connection::idle_since, 2));
   EXPECT_TRUE(idle[1]->ended);
@@ -77,7 +77,7 @@ TEST(Connections, CloseAHandshakeOfTheLargestHolderAndUnauthenticatedFirst) {
     all.push_back(std::make_shared<Shaking>(address, seconds, known));
     connections.add(connections.next_id(), all.back(), false);
   };
-  const auto next = [&](std::size_t most) {  // which one ended; -1: none
+  const auto next = [&](std::size_t most) {  // index of the closed connection; -1: none
     std::vector<bool> before;
     for (const auto& one : all) before.push_back(one->ended());
     if (!connections.end_handshake(most)) return -1;
@@ -95,7 +95,7 @@ TEST(Connections, CloseAHandshakeOfTheLargestHolderAndUnauthenticatedFirst) {
   come("a", 70, true);   // 5
   connections.add(connections.next_id(), std::make_shared<Idle>(std::nullopt), false);
   EXPECT_EQ(next(6), -1);
-  EXPECT_EQ(next(5), 3) << "the oldest of the stranger with two";
+  EXPECT_EQ(next(5), 3) << "the oldest of the unauthenticated address with two";
   EXPECT_EQ(next(4), 1) << "one each";
   EXPECT_EQ(next(3), 2);
   EXPECT_EQ(next(2), 0) << "no other connection is left";

@@ -58,10 +58,10 @@ TEST_F(CostTest, CountsEveryKernelPositionAndSample) {
   EXPECT_GE(cost(with_medium).kernels, cost(view_).kernels + samples);
   protocol::View nothing = view_;
   nothing.vector.field = {protocol::FieldChoice::Kind::none, ""};
-  EXPECT_LT(cost(nothing).kernels, samples) << "the picture alone";
+  EXPECT_LT(cost(nothing).kernels, samples) << "the picture only";
   nothing.scalars = {medium()};
   (*nothing.scalars)[0].extinction = {{0, 0}};
-  EXPECT_LT(cost(nothing).kernels, samples) << "it absorbs nothing";
+  EXPECT_LT(cost(nothing).kernels, samples) << "a transparent medium absorbs nothing";
   protocol::View unseen = view_;
   unseen.vector.opacity = 0;
   EXPECT_LT(cost(unseen).kernels, samples);
@@ -73,7 +73,7 @@ TEST_F(CostTest, StrideReducesSamplesAndASliceLeavesOneLayer) {
   strided.vector.length = 0.001;
   protocol::View plain = view_;
   plain.vector.length = 0.001;
-  // 16 pixels at least count for each: the rest is the picture's.
+  // At least 16 pixels are counted for each kernel; the rest is the cost of the picture.
   const double picture = 1280.0 * 720 / frame::Cost::pixels_a_kernel;
   EXPECT_NEAR((cost(plain).kernels - picture) / (cost(strided).kernels - picture), 64, 1);
   protocol::View sliced = plain;
@@ -107,7 +107,7 @@ TEST_F(CostTest, AveragedOrCulledSamplesCostLess) {
   const double all = cost(far).kernels;
   far.method.detail = protocol::Detail::automatic;
   EXPECT_LT(cost(far).kernels, 0.2 * all);
-  // From within, most of the large kernels lie behind the eye or beside the picture.
+  // From inside, most of the large kernels are behind the eye or outside the picture.
   protocol::View within = view_;
   within.vector.r2 = 20;
   const double from_outside = cost(within).kernels;

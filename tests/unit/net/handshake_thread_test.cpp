@@ -17,7 +17,7 @@
 namespace windsplat::net {
 namespace {
 
-// Steps are queued behind one that waits, so that the order is the thread's own choice.
+// Steps are queued behind a blocked one, so that the thread alone decides the order.
 class Held {
  public:
   Held() {
@@ -112,7 +112,7 @@ TEST(HandshakeTask, EndedTaskDoesNotWaitForATurn) {
   Held held;
   const auto task = std::make_shared<Task>(held.thread);
   task->submit([] {});
-  EXPECT_EQ(task.use_count(), 2) << "the step that waits keeps it";
+  EXPECT_EQ(task.use_count(), 2) << "the waiting step keeps it";
   task->end();
   EXPECT_EQ(task.use_count(), 1);
   const auto kept = std::make_shared<int>(0);
@@ -144,7 +144,7 @@ TEST(HandshakeThread, DiscardsWaitingStepsAtShutdown) {
   begun.get_future().wait();
   thread.submit("a", [kept] { ++*kept; });
   std::thread ending([&thread] { thread.stop(); });
-  while (kept.use_count() > 1) std::this_thread::yield();  // dropped while a step is under way
+  while (kept.use_count() > 1) std::this_thread::yield();  // dropped while a step runs
   gate.set_value();
   ending.join();
   thread.submit("a", [kept] { ++*kept; });

@@ -114,7 +114,7 @@ TEST(Upgrade, OtherVersionGetsTheSupportedOne) {
   }
 }
 
-// What the path and query of a target are, joined; empty where it is refused.
+// Path and query of a target, joined; empty if it is refused.
 std::string told(std::string_view target, const char* host) {
   Request request = request_with({{"Host", host}});
   if (!parse_target(target, "/", request)) return "";

@@ -39,8 +39,8 @@ TEST(LoadService, LimitsWaitingJobsPerDatasetAndInTotal) {
     EXPECT_FALSE(ask(dataset)) << n;
   }
   EXPECT_EQ(taken, static_cast<int>(most * LoadService::datasets_full));
-  EXPECT_FALSE(ask(std::make_shared<const int>(0))) << "another one, but so many in all";
-  EXPECT_TRUE(ask(nullptr, true)) << "let in before";
+  EXPECT_FALSE(ask(std::make_shared<const int>(0))) << "the limit of all datasets";
+  EXPECT_TRUE(ask(nullptr, true)) << "admitted before";
   EXPECT_EQ(refusals, static_cast<int>(LoadService::datasets_full) + 1);
   let_go.set_value();
   loads.end();
@@ -62,7 +62,7 @@ TEST(LoadService, OnePayerMayUseHalfOfTheSlots) {
   };
   EXPECT_TRUE(ask(one, "a"));
   EXPECT_TRUE(ask(one, "a"));
-  EXPECT_FALSE(ask(one, "a")) << "half of a dataset's";
+  EXPECT_FALSE(ask(one, "a")) << "half of the slots of a dataset";
   EXPECT_TRUE(ask(one, "b"));
   EXPECT_TRUE(ask(one, "b"));
   for (int n = 0; n < 6; ++n) EXPECT_TRUE(ask(std::make_shared<const int>(n), "a")) << n;
@@ -71,7 +71,7 @@ TEST(LoadService, OnePayerMayUseHalfOfTheSlots) {
   let_go.set_value();
 }
 
-// Loads that wait for memory or whose files hang.
+// Loads that wait for memory or block on their files.
 TEST(LoadService, LongRunningJobsReleaseTheirSlotsToSpareThreads) {
   constexpr std::size_t places = 2;
   constexpr std::size_t spare = 2;

@@ -15,7 +15,7 @@ TEST(HostNames, LoopbackHasThree) {
   }
 }
 
-// A page can have its own name resolve to this machine, but no address.
+// A page can make its own name resolve to this machine, but not an address.
 TEST(HostNames, AddressesAreNotHostNames) {
   for (const char* host : {"10.0.0.1", "10.0.0.1:8080", "[2001:db8::1]", "[::ffff:1.2.3.4]:80"}) {
     EXPECT_TRUE(is_address(host)) << host;

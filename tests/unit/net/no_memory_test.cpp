@@ -1,5 +1,5 @@
-// Where memory fails in the middle of something: nothing is left half done, and no thread of a
-// service ends. Allocations of a thread fail from the one on that a test names.
+// Allocation failures in services: no partial state remains, and no service thread ends.
+// Allocations of a thread fail from a given one on.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -30,7 +30,7 @@ thread_local int allocations_left = enough;
 
 }  // namespace
 
-// Not inlined: the compiler would take malloc for a mismatch of delete.
+// Not inlined: the compiler would report a mismatch of malloc and delete.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   if (allocations_left == 0) throw std::bad_alloc();
   if (allocations_left > 0) --allocations_left;
@@ -45,7 +45,7 @@ thread_local int allocations_left = enough;
 namespace windsplat::net {
 namespace {
 
-// Whether `body` got through with so many allocations.
+// Whether `body` succeeded with that many allocations.
 template <class Body>
 bool with_allocations(int count, const Body& body) {
   allocations_left = count;
@@ -83,7 +83,7 @@ TEST(NoMemory, JobThatCannotBeQueuedChangesNothing) {
       queue.done(10);
       EXPECT_TRUE(queue.empty());
       EXPECT_FALSE(queue.pop()) << count;
-      // A failed job still counts for its owner's turn.
+      // A failed job still counts as its owner's turn.
       queue.push(job_of(kind, 2), 0);
       ASSERT_TRUE(queue.pop());
       queue.done(10);
@@ -118,7 +118,7 @@ TEST(NoMemory, NoConnectionOrSessionSlotIsLost) {
     const auto both = [&] {
       const auto visitor = admission.connect(here);
       const auto seat = admission.open_session("2001:db8:1:2::/64");
-      // To go takes no memory.
+      // Releasing needs no memory.
       allocations_left = 0;
     };
     const bool through = with_allocations(count, both);
@@ -150,10 +150,10 @@ TEST(NoMemory, FailedAttemptIsReportedWithoutAllocating) {
   }));
   EXPECT_EQ(first, ErrorKind::out_of_memory);
   EXPECT_EQ(second, ErrorKind::internal);
-  EXPECT_EQ(third, ErrorKind::out_of_memory) << "there is none for its words";
+  EXPECT_EQ(third, ErrorKind::out_of_memory) << "no memory for the message";
 }
 
-// The thread has no memory from the first job on.
+// The thread cannot allocate from the first job on.
 TEST(NoMemory, ThreadsOfServicesContinue) {
   LoadService loads(1, 4, "loads");
   std::promise<void> loaded;
@@ -193,7 +193,7 @@ TEST(NoMemory, ClientJobThatCannotAllocateIsAFailedJob) {
         .id;
   };
   const std::string first = ask();
-  const std::string second = ask();  // which finds no memory even to begin
+  const std::string second = ask();  // cannot allocate even at the start
   for (const std::string& id : {first, second}) {
     while (jobs.find(id).value().state == "queued" || jobs.find(id).value().state == "running") {
       std::this_thread::yield();
@@ -231,8 +231,7 @@ TEST(NoMemory, LoaderEndsWithItsObject) {
   EXPECT_EQ(::kill(id, 0), -1) << "it still runs";
 }
 
-// What has come is lost with the memory that it needed, between the system and the handler; what
-// comes next is not.
+// Data that arrived are lost with the memory they needed; later data are not.
 TEST(NoMemory, LostConnectionDoesNotStopTheListener) {
   namespace asio = boost::asio;
   asio::io_context io;

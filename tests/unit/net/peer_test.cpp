@@ -91,7 +91,7 @@ TEST(SpareDescriptor, RefusesAClientWhenDescriptorsRunOut) {
   EXPECT_TRUE(spare.turn_away(listening.socket()));
   char byte = 0;
   EXPECT_LE(::recv(client, &byte, 1, 0), 0) << "closed at once";
-  EXPECT_EQ(::open("/dev/null", O_RDONLY), -1) << "the spare one is taken again";
+  EXPECT_EQ(::open("/dev/null", O_RDONLY), -1) << "the spare descriptor is reopened";
   for (const int one : taken) ::close(one);
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
   ::close(client);

@@ -95,7 +95,7 @@ TEST(Quota, RequestsRefillAtTheirRateAndHealthHasItsOwn) {
   Quota quota(limits);
   int at_once = 0;
   while (!quota.request(here, false, 0)) ++at_once;
-  EXPECT_EQ(at_once, 20) << "ten seconds' worth";
+  EXPECT_EQ(at_once, 20) << "the burst of ten seconds";
   const auto refused = quota.request(here, false, 0);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->kind, LimitKind::requests);
@@ -114,12 +114,12 @@ TEST(Quota, OnePictureMayOverdrawAndTheNextWaitsUntilRepaid) {
   Quota quota(limits);
   EXPECT_FALSE(quota.picture(here, 0));
   quota.rendered(here, 6 * second, 0);
-  EXPECT_FALSE(quota.picture(here, 0)) << "all of a minute's may be had at once";
+  EXPECT_FALSE(quota.picture(here, 0)) << "the burst of a minute";
   quota.rendered(here, 3 * second, 0);
   const auto refused = quota.picture(here, 0);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->kind, LimitKind::render);
-  EXPECT_EQ(refused->retry_after_s, 30) << "3 s at 6 s a minute";
+  EXPECT_EQ(refused->retry_after_s, 30) << "3 s of rendering at 6 s per minute";
   EXPECT_EQ(quota.throttle_delay(here, 0), 30 * second);
   EXPECT_FALSE(quota.picture(there, 0));
   EXPECT_TRUE(quota.picture(here, 30 * second - 1));
@@ -131,7 +131,7 @@ TEST(Quota, BytesAreChargedWhenSent) {
   limits.bytes_per_address = 1000;
   Quota quota(limits);
   quota.sent(here, 10'000, 0);
-  EXPECT_FALSE(quota.picture(here, 0)) << "ten seconds' worth";
+  EXPECT_FALSE(quota.picture(here, 0)) << "the burst of ten seconds";
   quota.sent(here, 5000, 0);
   const auto refused = quota.picture(here, 0);
   ASSERT_TRUE(refused);
@@ -157,8 +157,7 @@ TEST(Quota, TokensAreCheckedUntilTooManyWereWrong) {
   Limits limits = none();
   limits.failed_logins_per_address = 2;
   Quota quota(limits);
-  for (int n = 0; n < 100; ++n)
-    ASSERT_FALSE(quota.may_try_login(here, 0)) << "asking costs nothing";
+  for (int n = 0; n < 100; ++n) ASSERT_FALSE(quota.may_try_login(here, 0)) << "checks are free";
   quota.failed_login(here, 0);
   EXPECT_FALSE(quota.may_try_login(here, 0));
   quota.failed_login(here, 0);
@@ -205,18 +204,18 @@ TEST(Quota, AddressOverItsHandshakeTimeIsThrottled) {
   ASSERT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
   ASSERT_EQ(quota.connect(there, false, 0).place, Quota::Slot::ordinary);
   quota.handshake_took(here, false, second, 0);
-  EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "ten seconds' worth at once";
+  EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "the burst of ten seconds";
   quota.handshake_took(here, false, second / 10, 0);
   const auto refused = quota.arrive(here, false, true, 0);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->kind, LimitKind::handshakes);
   EXPECT_EQ(refused->limit, 100);
   EXPECT_EQ(refused->retry_after_s, 1);
-  EXPECT_FALSE(quota.arrive(here, false, false, 0)) << "plain TCP takes no handshake";
+  EXPECT_FALSE(quota.arrive(here, false, false, 0)) << "plain TCP has no handshake";
   EXPECT_FALSE(quota.arrive(there, false, true, 0));
   EXPECT_FALSE(quota.arrive(here, false, true, second));
   quota.handshake_took(there, true, 60 * second, second);
-  EXPECT_FALSE(quota.arrive(there, true, true, second)) << "a proxy brings many";
+  EXPECT_FALSE(quota.arrive(there, true, true, second)) << "a proxy carries many clients";
 }
 
 TEST(Quota, UnauthenticatedClientsExhaustTheirOwnHandshakeTimeOnly) {
@@ -232,10 +231,10 @@ TEST(Quota, UnauthenticatedClientsExhaustTheirOwnHandshakeTimeOnly) {
   const auto refused = quota.arrive(there, false, true, 0);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->kind, LimitKind::handshakes);
-  EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "it has shown the token";
+  EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "authenticated";
   EXPECT_FALSE(quota.arrive(there, true, true, 0)) << "a proxy's";
   quota.handshake_took(here, false, 2 * second, 0);
-  EXPECT_TRUE(quota.arrive(here, false, true, 0)) << "those have a limit, too";
+  EXPECT_TRUE(quota.arrive(here, false, true, 0)) << "authenticated addresses have a limit, too";
   EXPECT_FALSE(quota.arrive(there, false, true, second));
 }
 
@@ -250,22 +249,24 @@ TEST(Quota, RemoteClientsDoNotExhaustLocalHandshakeTime) {
     quota.handshake_took(address, false, 2 * second, 0);
     ASSERT_TRUE(quota.arrive(address, false, true, 0)) << address;
   }
-  EXPECT_TRUE(quota.arrive("127.0.0.2", false, true, 0)) << "a stranger like others";
+  EXPECT_TRUE(quota.arrive("127.0.0.2", false, true, 0))
+      << "an unauthenticated address like others";
   for (const std::string own : {"127.0.0.1", "::/64"}) {
     ASSERT_EQ(quota.connect(own, false, 0).place, Quota::Slot::ordinary);
     EXPECT_FALSE(quota.arrive(own, false, true, 0)) << own;
     quota.handshake_took(own, false, second, 0);
     const auto refused = quota.arrive(own, false, true, 0);
-    ASSERT_TRUE(refused) << "it has its own allowance alone";
+    ASSERT_TRUE(refused) << "it has its own allowance only";
     EXPECT_EQ(refused->limit, 50);
   }
-  EXPECT_FALSE(quota.arrive("127.0.0.2", false, true, 11 * second)) << "others do not pay for it";
+  EXPECT_FALSE(quota.arrive("127.0.0.2", false, true, 11 * second))
+      << "others are not charged for it";
 
   limits.handshake_ms_per_address = 0;
   Quota without(limits);
   ASSERT_EQ(without.connect("127.0.0.1", false, 0).place, Quota::Slot::ordinary);
   without.handshake_took("127.0.0.1", false, 2 * second, 0);
-  EXPECT_TRUE(without.arrive("127.0.0.1", false, true, 0)) << "it is bounded all the same";
+  EXPECT_TRUE(without.arrive("127.0.0.1", false, true, 0)) << "it is bounded nevertheless";
 }
 
 TEST(Quota, MessagesAreChargedBeforeMoreIsRead) {
@@ -320,7 +321,7 @@ TEST(Quota, NumberOfAddressesIsBounded) {
     quota.request("2001:db8:0:" + std::to_string(n) + "::/64", false, 1);
   }
   EXPECT_EQ(quota.known(), Quota::addresses_max);
-  EXPECT_EQ(quota.connect(here, false, 2).place, Quota::Slot::reserve) << "its one is known";
+  EXPECT_EQ(quota.connect(here, false, 2).place, Quota::Slot::reserve) << "a known address";
 }
 
 TEST(Quota, UnauthenticatedClientsDoNotEvictAuthenticatedAddresses) {
@@ -336,7 +337,7 @@ TEST(Quota, UnauthenticatedClientsDoNotEvictAuthenticatedAddresses) {
   for (std::size_t n = 0; n < 2 * Quota::addresses_max; ++n) {
     quota.authenticated("2001:db8:1:" + std::to_string(n) + "::/64", 3);
   }
-  EXPECT_EQ(quota.known(), Quota::addresses_max) << "of those too there is an end";
+  EXPECT_EQ(quota.known(), Quota::addresses_max) << "authenticated addresses are bounded, too";
 }
 
 TEST(Admission, LogsRefusedHandshakesOncePerMinute) {
@@ -397,7 +398,7 @@ TEST(Admission, RefusesWithTheLimitAndARetryTime) {
   const std::string text(refused->body.bytes.begin(), refused->body.bytes.end());
   EXPECT_NE(text.find("0.1 requests a second (--max-requests-per-address)"), std::string::npos)
       << text;
-  // In the reserve health alone is answered, and as the server's fault.
+  // In the reserve only health is answered, and refusals are server errors.
   const auto late = admission.connect(there);
   EXPECT_EQ(admission.request(*late, request, false)->status, 503);
   EXPECT_FALSE(admission.request(*late, request, true));
@@ -410,7 +411,7 @@ TEST(Admission, ChargesRefusedUnreadBodies) {
   Admission admission(limits, metrics, [] { return 0; });
   const auto visitor = admission.connect(here);
   EXPECT_TRUE(admission.count_malformed(*visitor, {}));
-  EXPECT_FALSE(admission.count_malformed(*visitor, {})) << "not worth a line";
+  EXPECT_FALSE(admission.count_malformed(*visitor, {})) << "not logged yet";
   Request request;
   EXPECT_TRUE(admission.request(*visitor, request, false)) << "the same allowance";
 }
@@ -446,7 +447,7 @@ TEST(Admission, ChargesTheClientBehindATrustedProxy) {
   EXPECT_FALSE(ask(*proxy, here));
   EXPECT_TRUE(ask(*proxy, here));
   EXPECT_FALSE(ask(*proxy, there));
-  // Anybody else may say what they like.
+  // Other addresses may send any header.
   const auto liar = admission.connect("203.0.113.9");
   EXPECT_FALSE(ask(*liar, "198.51.100.1"));
   EXPECT_TRUE(ask(*liar, "198.51.100.2"));

@@ -1,5 +1,5 @@
-// Scheduling of the renderer: shares of time, cancelled background jobs, refusals. Times are
-// simulated.
+// Scheduling of the renderer: shares of time, cancelled background jobs, refusals, in simulated
+// time.
 #include "server/work/render_queue.hpp"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 namespace windsplat::net {
 namespace {
 
-// Owners that always have something to do: each gives its next job as soon as one was begun.
+// Owners with permanent demand: each submits its next job when one starts.
 class Renderer {
  public:
   RenderJob job(RenderKind kind, std::uint64_t owner) {
@@ -87,7 +87,7 @@ TEST(RenderQueue, ShortPauseDoesNotResetTheShareOfAnOwner) {
   Renderer renderer;
   for (std::uint64_t owner = 1; owner <= 3; ++owner) renderer.ask(RenderKind::stream, owner);
   const std::map<std::uint64_t, std::int64_t> costs{{1, 1000}, {2, 10}, {3, 10}};
-  EXPECT_EQ(renderer.run(costs, false), 1U) << "the first of equals is the one that came first";
+  EXPECT_EQ(renderer.run(costs, false), 1U) << "first come, first served among equals";
   renderer.ask(RenderKind::stream, 1);
   for (int i = 0; i < 198; ++i) EXPECT_NE(renderer.run(costs), 1U);
 }
@@ -136,7 +136,7 @@ TEST(RenderQueue, RunningBackgroundJobIsCancelledByOtherJobsOnly) {
     queue.done(1);
     const auto next = queue.pop();
     ASSERT_TRUE(next);
-    EXPECT_EQ(next->job.owner, 2U) << "and it is not run again";
+    EXPECT_EQ(next->job.owner, 2U) << "it is not run again";
     EXPECT_FALSE(next->job.cancel.cancelled());
     queue.done(1);
     EXPECT_TRUE(queue.empty());
@@ -213,7 +213,7 @@ TEST(RenderQueue, CountsJobsThatAreStillAwaited) {
   EXPECT_DOUBLE_EQ(queue.requests_waiting().cost_ms, 100);
 }
 
-// A service whose thread is held in a job of a stream's until release() or the end.
+// A service whose thread is blocked in a job of a stream until release() or the end.
 class HeldService {
  public:
   explicit HeldService(RenderService::Options options = {}) : service_(std::move(options)) {
@@ -251,7 +251,7 @@ class HeldService {
 
 TEST(RenderService, RefusesRequestsAboveItsEstimateOfWaitingWork) {
   HeldService held({16, 10'000, {}});
-  EXPECT_TRUE(held.request(60'000)) << "one alone is let in, whatever it costs";
+  EXPECT_TRUE(held.request(60'000)) << "one request is admitted at any cost";
   const auto refused = held.request(1);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::busy);
@@ -266,7 +266,7 @@ TEST(RenderService, EstimatesWhenWaitingWorkWillBeDone) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().retry_after_s, 8) << "7.2 s, in whole seconds";
   EXPECT_NE(refused.error().message.find("8 s"), std::string::npos) << refused.error().message;
-  EXPECT_TRUE(held.request(2'000)) << "a smaller one has room";
+  EXPECT_TRUE(held.request(2'000)) << "there is room for a smaller one";
 }
 
 TEST(Problems, ContainARetryTimeInTheirHeader) {
@@ -280,7 +280,7 @@ TEST(Problems, ContainARetryTimeInTheirHeader) {
     return found == headers.end() ? "" : found->second;
   };
   EXPECT_EQ(retry_after(8), "8");
-  EXPECT_EQ(retry_after(0), "1") << "unknown: soon";
+  EXPECT_EQ(retry_after(0), "1") << "unknown cost: retry soon";
 }
 
 TEST(RenderService, LimitsTheNumberOfJobsOfUnknownCost) {
@@ -352,8 +352,8 @@ TEST(RenderService, CancelsABackgroundJobForAFrame) {
   drawn.get_future().wait();
 }
 
-// A request is refused while another address's picture is drawn and one waits, unless its own cost
-// exceeds what is before it; waiting for one's own pictures is no reason for a refusal.
+// A request is refused while pictures of other addresses run and wait, unless its own cost exceeds
+// theirs; waiting for pictures of the same address never causes a refusal.
 TEST(RenderService, BoundsTheWaitForOthers) {
   std::atomic<std::int64_t> now_us{0};
   RenderService::Options options;
@@ -385,7 +385,7 @@ TEST(RenderService, BoundsTheWaitForOthers) {
     EXPECT_TRUE(service.submit(std::move(first)));
     begun.get_future().wait();
     EXPECT_TRUE(ask("b", 90)) << "no other request waits";
-    EXPECT_FALSE(ask("c", 90)) << "90 of the one that runs and 90 of b's";
+    EXPECT_FALSE(ask("c", 90)) << "90 of the running job and 90 of b";
     EXPECT_TRUE(ask("b", 90)) << "its own";
     EXPECT_TRUE(ask("c", 300)) << "a long one";
     EXPECT_FALSE(ask("c", 90));
@@ -397,8 +397,7 @@ TEST(RenderService, BoundsTheWaitForOthers) {
   EXPECT_EQ(charged["a"], 40'000 + 90'000);
 }
 
-// Where many are refused the next one comes soon: a request is let in when what runs is nearly
-// done.
+// After refusals the next request is admitted soon: when the running job is nearly done.
 TEST(RenderService, UnderOverloadNoJobWaitsForAWholePicture) {
   std::atomic<std::int64_t> now_us{0};
   RenderService::Options options;
@@ -426,10 +425,10 @@ TEST(RenderService, UnderOverloadNoJobWaitsForAWholePicture) {
   gone.cost_ms = 100;
   gone.payer = "w";
   gone.run = [](std::int64_t /*queue_us*/) {};
-  EXPECT_TRUE(service.submit(gone)) << "one waits for the one that runs";
+  EXPECT_TRUE(service.submit(gone)) << "one waits for the running job";
   for (int n = 0; n < 20; ++n) EXPECT_FALSE(ask("p" + std::to_string(n)));
   gone.cancel.cancel();
-  EXPECT_FALSE(ask("x")) << "100 ms of the one that runs";
+  EXPECT_FALSE(ask("x")) << "100 ms of the running job";
   now_us = 60'000;
   EXPECT_TRUE(ask("x")) << "40 ms";
   now_us = 5'000'000;
@@ -446,7 +445,7 @@ TEST(RenderQueue, UsesTheGivenCostForJobsOfUnknownCost) {
   queue.push(job, 0);
   job.payer = "b";
   queue.push(job, 0);
-  EXPECT_EQ(queue.requests_before("c", 50).cost_ms, 80) << "one of a's, one of b's";
+  EXPECT_EQ(queue.requests_before("c", 50).cost_ms, 80) << "one of a, one of b";
   EXPECT_EQ(queue.requests_before("c", 50).count, 2U);
   EXPECT_EQ(queue.requests_before("b", 50).cost_ms, 50);
   EXPECT_EQ(queue.requests_before("a", 50).cost_ms, 30);
@@ -479,7 +478,7 @@ TEST(RenderService, OnePayerMayUseHalfOfTheSlots) {
   for (int n = 0; n < 3; ++n) EXPECT_TRUE(ask("a")) << n;
   EXPECT_FALSE(ask("a"));
   for (int n = 0; n < 3; ++n) EXPECT_TRUE(ask("b")) << n;
-  EXPECT_FALSE(ask("c")) << "so many in all";
+  EXPECT_FALSE(ask("c")) << "the limit";
   let_go.set_value();
 }
 
@@ -488,7 +487,7 @@ constexpr auto kernel = protocol::MethodName::kernel;
 
 TEST(RenderCosts, UseTypicalCostsForUnknownOnes) {
   const RenderCosts costs(2);
-  EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 1e6), 3) << "6 ns of a thread's time";
+  EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 1e6), 3) << "6 ns of thread time";
   EXPECT_DOUBLE_EQ(RenderCosts(6).estimate_ms("a", slab, 1e6), 1);
 }
 
@@ -516,7 +515,7 @@ TEST(RenderCosts, AreAboveMostMeasuredCosts) {
   EXPECT_LT(above, 950);
 }
 
-// A machine that slept in the middle of a picture has none refused for good.
+// A machine that suspended during a picture must not refuse requests forever.
 TEST(RenderCosts, IgnoreOutliers) {
   RenderCosts costs(2);
   costs.learn("a", slab, 1e6, 3'600'000'000);

@@ -1,4 +1,4 @@
-// What is told of a style before anything was measured of it.
+// Forecasts of a scene before any measurement.
 #include "server/quality/laws.hpp"
 
 #include <gtest/gtest.h>
@@ -20,11 +20,11 @@ double error_of(const Kind& kind, const Setting& setting,
   return expected_error(kind, setting, viewpoint).value;
 }
 
-// Method slab is of order 2 in the thickness of its slabs.
+// The slab method is of order 2 in the slab thickness.
 TEST(Laws, SlabErrorGrowsWithTheSquareOfThickness) {
   for (const Kind& kind : {both, media}) {
     Kind dense = kind;
-    dense.thickness = 4;  // far above the least error that is told
+    dense.thickness = 4;  // far above the smallest reported error
     const double own = error_of(dense, {MethodName::slab, 0, 0});
     EXPECT_NEAR(error_of(dense, {MethodName::slab, 0, 0, 2}) / own, 1.0 / 4, 1e-12);
     EXPECT_NEAR(error_of(dense, {MethodName::slab, 0, 0, 4}) / own, 1.0 / 16, 1e-12);

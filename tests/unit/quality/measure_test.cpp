@@ -1,4 +1,4 @@
-// frame::survey and frame::measured_error on a small sample, against the integral itself.
+// frame::survey and frame::measured_error on a small sample, against the integral.
 #include "server/frame/measure.hpp"
 
 #include <gtest/gtest.h>
@@ -56,7 +56,7 @@ class Measure : public testing::Test {
     return frame ? std::move(*frame) : Frame();
   }
 
-  // Of a frame's pixels, which end its bytes, against the integral.
+  // Error of the decoded pixels of a frame against the integral.
   double true_error(const Frame& npy) {
     if (integral.empty()) {
       const auto scene = scene::build_scene(view, *dataset);
@@ -91,7 +91,7 @@ TEST_F(Measure, MeasuredFrameErrorIsItsErrorAgainstTheIntegral) {
   }
 }
 
-// What thinner slabs mend less, or not at all: the rule of compositing and an early stop.
+// Errors that thinner slabs reduce less or not at all: compositing rule and early termination.
 TEST_F(Measure, OtherRulesAndEarlyTerminationAreMeasuredAgainstTheIntegral) {
   const protocol::MethodView usual = view.method;
   true_error(drawn(protocol::MethodName::slab, Format::npy));  // keeps the integral
@@ -115,7 +115,7 @@ TEST_F(Measure, OtherRulesAndEarlyTerminationAreMeasuredAgainstTheIntegral) {
         quality::prior(quality::signature_of(view).kind,
                        quality::settings[quality::own_setting(view)], quality::viewpoint_of(view))
             .error;
-    EXPECT_GT(promised, 0.2 * truth) << "before anything was measured";
+    EXPECT_GT(promised, 0.2 * truth) << "before any measurement";
     view.method.slab_thickness /= 4;
     EXPECT_NEAR(error_of(4) / drawn(protocol::MethodName::slab, Format::npy).error.value(), 1, 0.3);
   }
@@ -161,7 +161,7 @@ TEST_F(Measure, CalibrationRunReportsEveryAllowedSettingOnce) {
   }
 }
 
-// Two ways to the same number: a survey's truth is another than a frame's finer run.
+// Two estimates of the same error: a calibration run uses another reference than a frame.
 TEST_F(Measure, CalibrationRunAgreesWithMeasuredFrames) {
   auto found = surveyed();
   const auto error_of = [&](const quality::Setting& setting) {
@@ -176,7 +176,7 @@ TEST_F(Measure, CalibrationRunAgreesWithMeasuredFrames) {
               4, 1e-3);
 }
 
-// Seen from far away the view averages its data: slabs of any thickness err alike then.
+// From far away the view uses averaged data: slabs of any thickness have equal errors.
 TEST_F(Measure, CalibrationRunRendersAveragesAsFramesDo) {
   auto placed = scene::complete_and_place(view, *dataset);
   scene::orbit(view, placed.value().placed->lattice, 20, 30, 0.05);
@@ -190,7 +190,7 @@ TEST_F(Measure, CalibrationRunRendersAveragesAsFramesDo) {
   EXPECT_NEAR(error_of(4) / error_of(1), 1, 0.1);
 }
 
-// What is told of the detail is what scenes are built by.
+// Scenes are built with the reported detail.
 TEST_F(Measure, ViewUsesAveragesWhereItsDetailIsBelowOne) {
   const auto placed = scene::complete_and_place(view, *dataset).value();
   int averaged = 0;

@@ -1,4 +1,4 @@
-// Forecasts made up, a budget, an error -> the setting that is picked.
+// Synthetic forecasts, a budget, an error -> the chosen setting.
 #include "server/quality/pick.hpp"
 
 #include <gtest/gtest.h>
@@ -74,7 +74,7 @@ TEST_F(Pick, UncertainErrorsMustMeetTheLimitWithTheirSpread) {
   set(middle, 0.02, 8, 0.5);
   EXPECT_EQ(picked({{}, 0.03}), fine);
   EXPECT_EQ(picked({{}, 0.05}), fast);
-  // One in twenty of a normal distribution lies beyond 1.645 standard deviations.
+  // 5 % of a normal distribution are beyond 1.645 standard deviations.
   EXPECT_NEAR(std::log(error_bound({0.02, 0.5, 8, true}) / 0.02) / 0.5, 1.645, 0.01);
 }
 
@@ -93,7 +93,7 @@ TEST_F(Pick, ReducedPicturesWhereALimitIsSet) {
   EXPECT_EQ(picked_of(1e9), finest);
   EXPECT_EQ(picked_of(1280 * 720 - 1), middle);
   EXPECT_EQ(picked_of(320 * 180), fast);
-  // None is as small: then the limit is none.
+  // No setting meets the limit, so it is ignored.
   EXPECT_EQ(picked_of(100), finest);
 }
 

@@ -1,4 +1,4 @@
-// Settings: how large their pictures are, what they make of a view, and where they are allowed.
+// Settings: picture sizes, their effect on a view, and where they are allowed.
 #include "server/quality/setting.hpp"
 
 #include <gtest/gtest.h>

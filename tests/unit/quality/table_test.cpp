@@ -1,4 +1,4 @@
-// Measurements of one style -> forecasts, against closed forms.
+// Measurements of one scene -> forecasts, against closed forms.
 #include "server/quality/table.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ constexpr std::size_t kernel = 0;
 constexpr std::size_t half = 2;  // half the width
 const Kind kind{true, true, 0.16, 1.4, 1, 1};
 
-// A sight at that distance of every other with another number: heights apart alone.
+// A viewpoint at that distance from all others: only heights differ.
 Viewpoint sight_at(double steps) {
   Viewpoint viewpoint{std::exp(0.5 * steps), {0, 1, 0}, 640, 480};
   return viewpoint;
@@ -49,7 +49,7 @@ TEST(Table, AtAMeasuredViewpointEqualsTheMeasurement) {
   EXPECT_NEAR(told.ms / ms, 1, 0.03);
   EXPECT_TRUE(told.timed);
   EXPECT_LT(told.spread, 0.1);
-  // Of another setting it says nothing.
+  // Other settings are unaffected.
   EXPECT_EQ(table.forecast(kernel, sight_at(0)).error, prior_of(kernel, sight_at(0)));
 }
 
@@ -107,7 +107,7 @@ TEST(Table, UncertaintyGrowsWithDistanceAndShrinksWithMeasurements) {
   EXPECT_LT(table.forecast(kernel, sight_at(4)).spread, last);
 }
 
-// Far from what was measured a style is still the same style.
+// Far from the measurements the scene still has its own bias.
 TEST(Table, FarAwayEstimatesKeepTheBiasOfTheScene) {
   Table table(kind);
   const double factor = 4;
@@ -155,7 +155,7 @@ TEST(Table, ManyMeasurementsAtOneViewpointStayStable) {
   EXPECT_GT(error_bound(told), told.error);
 }
 
-// An error of nothing is an error of rounding: logarithms stay finite.
+// A zero error is a rounding error: logarithms stay finite.
 TEST(Table, ZeroErrorIsTheSmallestStoredError) {
   Table table(kind);
   table.add(kernel, sight_at(0), {0.0, 0.0});
@@ -165,7 +165,7 @@ TEST(Table, ZeroErrorIsTheSmallestStoredError) {
   EXPECT_GT(told.ms, 0);
 }
 
-// Times that were not measured follow those that were.
+// Unmeasured times follow the measured ones.
 TEST(Table, SpeedOfTheMachineAppliesToEverySetting) {
   Table table(kind);
   for (const std::size_t i : {kernel, half}) {
@@ -177,8 +177,8 @@ TEST(Table, SpeedOfTheMachineAppliesToEverySetting) {
   EXPECT_NEAR(told[other].ms / prior(kind, settings[other], sight_at(0)).ms, 10, 0.5);
 }
 
-// Where cells are smaller than what the picture resolves it averages: that errs by another law, and
-// what was measured on one side says nothing of the other.
+// Where cells are smaller than the resolution, data are averaged, with another error law:
+// measurements on one side do not apply to the other.
 TEST(Table, AveragesAreLearnedSeparatelyFromFullDetail) {
   Table table(kind);
   Viewpoint near = sight_at(0);
@@ -190,7 +190,7 @@ TEST(Table, AveragesAreLearnedSeparatelyFromFullDetail) {
   EXPECT_NEAR(table.forecast(slab, near).error / prior_of(slab, near), 3, 0.2);
   EXPECT_EQ(table.forecast(slab, far).error, prior_of(slab, far));
   EXPECT_GT(prior_of(slab, far), 10 * prior_of(slab, near));
-  // Fewer pixels err more than the averages do.
+  // Reducing pixels adds more error than averaging.
   EXPECT_EQ(prior_of(half, far), prior_of(half, near));
 }
 
@@ -242,7 +242,7 @@ TEST(Encoding, FollowsMeasurements) {
   EXPECT_NEAR(table.encoding_error(60, true, sight_at(0)) / before, 3, 1e-9);
   for (int i = 0; i < 20; ++i) table.add_encoding(90, sight_at(0), 2 * measured);
   EXPECT_NEAR(table.encoding_error(90, true, sight_at(0)) / measured, 2, 1e-4)
-      << "the newest count most";
+      << "the newest have the largest weight";
 }
 
 TEST(Encoding, CloserViewpointsNeedMoreBytes) {
@@ -252,7 +252,7 @@ TEST(Encoding, CloserViewpointsNeedMoreBytes) {
   EXPECT_LT(table.encoding_error(90, true, sight_at(1)), 0.01);
 }
 
-// Halving the chroma loses the same whatever the quality: squares add up.
+// Halving chroma adds the same squared error at any quality.
 TEST(Encoding, HalfChromaAddsTheSameAtEveryQuality) {
   Table table(kind);
   table.add_encoding(90, sight_at(0), 0.02);

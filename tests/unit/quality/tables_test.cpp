@@ -1,4 +1,4 @@
-// Tables of styles shared by many: what is kept, for how many, and from several threads at once.
+// Calibration tables shared by sessions: retention, capacity and concurrent access.
 #include "server/quality/tables.hpp"
 
 #include <gtest/gtest.h>
@@ -91,7 +91,7 @@ TEST(Tables, OneOfManyCallersStartsTheCalibrationRun) {
   EXPECT_FALSE(tables.begin_study(signature("a"), viewpoint));
 }
 
-// The sanitizer of threads looks on.
+// Run under ThreadSanitizer.
 TEST(Tables, ManyThreadsConcurrently) {
   Tables tables;
   std::atomic<int> wrong{0};

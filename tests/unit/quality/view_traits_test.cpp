@@ -1,4 +1,4 @@
-// What of a view is its style, and how far two sights are apart.
+// Scene signature of a view, and the distance of two viewpoints.
 #include "server/quality/view_traits.hpp"
 
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ TEST(Viewpoint, WithoutACameraUsesTheOtherExceptForPixels) {
   EXPECT_EQ(viewpoint.pixels_high, 111);
 }
 
-// As large as the volume is in the picture, so large are its cells.
+// Cells scale with the size of the volume in the picture.
 TEST(Viewpoint, DetailIsScaledFromTheOther) {
   protocol::View view = completed();
   view.image.height = 480;
@@ -94,7 +94,7 @@ TEST(SceneSignature, DistinguishesLinesAndMedium) {
   EXPECT_FALSE(signature_of(view).kind.lines);
 }
 
-// A view that nobody completed yet may show anything.
+// An incomplete view may show anything.
 TEST(SceneSignature, IncompleteViewHasLinesInAMedium) {
   const Kind kind = signature_of(protocol::View()).kind;
   EXPECT_TRUE(kind.lines && kind.medium);
