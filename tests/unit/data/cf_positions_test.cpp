@@ -1,5 +1,5 @@
-// Longitudes and latitudes as files tell them, and which way vectors point on the axes that come of
-// them. Expected numbers are plane and spherical geometry.
+// Longitudes and latitudes of files, and the directions of vectors on the resulting axes. Expected
+// values are plane and spherical geometry.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -55,7 +55,7 @@ TEST(Positions, RadiansOfTwoDimensionsBecomeDegrees) {
     NetcdfMaker file(folder / "r.nc");
     const int j = file.dimension("nj", 2);
     const int i = file.dimension("ni", 3);
-    // 190 degrees less 360 is where the next one of 179 goes on.
+    // 190 degrees minus 360 continues 179.
     text_variable(
         file, "clon", {j, i},
         {178 * degree, 179 * degree, -170 * degree, 178 * degree, 179 * degree, -170 * degree},
@@ -74,8 +74,8 @@ TEST(Positions, RadiansOfTwoDimensionsBecomeDegrees) {
   EXPECT_EQ(volume_of(**source, "f").values[2], 2);
 }
 
-// A grid of indices i (fastest) and j whose steps on the map are the given ones, and a wind of 10
-// along i and 1 along j, 4 upward.
+// A grid of indices i (fastest) and j with the given steps on the map, and a wind of 10 along i, 1
+// along j and 4 upward.
 struct Steps {
   std::array<double, 2> i;  // longitude, latitude
   std::array<double, 2> j;
@@ -106,7 +106,7 @@ void write_turned(const std::string& path, const Steps& steps, const std::string
 
 struct Turned {
   Steps steps;
-  std::array<float, 2> drawn;  // the wind along the drawn axes, which run east and north
+  std::array<float, 2> drawn;  // the wind along the rendered axes, which run east and north
   const char* note;
 };
 
@@ -136,7 +136,7 @@ TEST_P(TurnedAxes, VectorsAlongRowsAndColumnsAreRotatedWithThem) {
   EXPECT_GT(columns.latitude.back(), columns.latitude.front());
 }
 
-// Files from north to south whose v is northward are many; those whose v is along the index few.
+// Files stored north to south usually have a northward v, rarely one along the index.
 TEST_P(TurnedAxes, VectorsWithoutADirectionStayAndAreNoted) {
   const Folder folder;
   write_turned(folder / "t.nc", GetParam().steps, "", "");
@@ -214,8 +214,8 @@ void write_pole(const std::string& path, const char* mapping, double north_longi
   file.text(text_variable(file, "va", {y, x}, v, "m s-1", "northward_wind"), "grid_mapping", "rp");
 }
 
-// The rotated grid's own frame: its pole, the direction of its longitude of the true pole, and what
-// is at right angles to both.
+// The frame of the rotated grid: its pole, the direction of its longitude of the true pole, and the
+// direction perpendicular to both.
 TEST(Positions, RotatedPoleColumnsAndWindsFollowTheirFrame) {
   for (const double north : {0.0, 25.0}) {
     const Folder folder;
@@ -245,7 +245,7 @@ TEST(Positions, RotatedPoleColumnsAndWindsFollowTheirFrame) {
         const Vector to_north = cross(at, east);
         const Vector along_x = unit(cross(up, at));
         const Vector along_y = cross(at, along_x);
-        // Differences of places are of first order at the edges.
+        // Finite differences are of first order at the edges.
         EXPECT_NEAR(wind.component(0)[n], 3 * dot(east, along_x) + 4 * dot(to_north, along_x),
                     0.05);
         EXPECT_NEAR(wind.component(1)[n], 3 * dot(east, along_y) + 4 * dot(to_north, along_y),

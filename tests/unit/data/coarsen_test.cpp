@@ -1,4 +1,4 @@
-// Coarser volumes: what averages conserve, how masks combine, and how a dataset shares levels.
+// Averaged volumes: conservation, masks, and sharing of levels by a dataset.
 #include "server/data/model/coarsen.hpp"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ std::vector<double> sums(const std::vector<double>& widths, int halvings) {
   return out;
 }
 
-// The integral of a component over space, its unmasked cells alone.
+// The integral of a component over space, over unmasked cells only.
 double integral(const Volume& volume, int c, const std::array<std::vector<double>, 3>& widths) {
   double sum = 0;
   std::size_t n = 0;
@@ -159,7 +159,7 @@ TEST_F(Levels, LevelZeroIsTheVolumeItself) {
 TEST_F(Levels, StayWithinTheMemoryLimit) {
   EXPECT_EQ(dataset_within(fine_bytes)->level("cloud", 0, halves()).error().kind,
             ErrorKind::out_of_memory);
-  // Room for a volume and its level: the next step's evict both.
+  // Memory for a volume and its level: the next step evicts both.
   const auto dataset = dataset_within(fine_bytes + coarse_bytes);
   ASSERT_TRUE(dataset->level("cloud", 0, halves()));
   ASSERT_TRUE(dataset->level("cloud", 1, halves()));
@@ -174,7 +174,7 @@ TEST_F(Levels, DoNotEvictTheirSourceVolume) {
     EXPECT_EQ(dataset->level("cloud", 0, halves()).error().kind, ErrorKind::out_of_memory);
     EXPECT_EQ(dataset->resident_bytes(), fine_bytes);
   }
-  EXPECT_EQ(dataset->loads(), 1U) << "no room for a level is no reason to read the volume again";
+  EXPECT_EQ(dataset->loads(), 1U) << "lack of memory for a level must not cause another read";
 }
 
 TEST_F(Levels, DoNotDependOnTheUnitOfWidth) {

@@ -86,7 +86,7 @@ TEST(Dx, DataAreReadFromTheSameOrAnotherFile) {
   }
 }
 
-// The second index runs southward from y 20: its first row is the last of the volume.
+// The second index runs south from y 20: its first row is the last of the volume.
 TEST(Dx, NegativeDeltaReversesItsAxis) {
   const Folder folder;
   std::string southward = grid;
@@ -218,7 +218,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadDxCase{"word", grid + "surprise 4\n", "'surprise' is not understood"}),
     [](const auto& test) { return std::string(test.param.name); });
 
-// A product of itself, a series of itself: there is an end.
+// A product or series that contains itself must end.
 TEST(DxRefusal, CyclesAreRefused) {
   const Folder folder;
   write_file(folder / "c.dx",
@@ -242,7 +242,7 @@ std::string dx_sample(const std::string& name) {
   return path;
 }
 
-// y is up: the world's x, y, z are the file's z, x, y, and the wind turns with them.
+// y is up: world x, y, z are z, x, y of the file, and the wind is rotated with them.
 TEST(DxStorm, WindIsRotatedUpright) {
   const auto source = opened(dx_sample("wind.dx"));
   ASSERT_TRUE(source);

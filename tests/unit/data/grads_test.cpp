@@ -106,7 +106,7 @@ TEST(Grads, RoundedUndefIsMasked) {
   EXPECT_EQ(u[7], -998.9899F);
 }
 
-// Rows from the north and levels from above: what comes out lies as without the options.
+// Rows from the north and levels from above: the result is the same as without the options.
 TEST(Grads, ReversedRowsAndLevels) {
   const Folder folder;
   write_file(folder / "d.ctl",
@@ -177,7 +177,7 @@ TEST(Grads, ExtraBytesAreWholeStepsOrRefused) {
   write_file(folder / "d.dat", packed<float>(counted(26)));
   EXPECT_THAT(refusal(folder / "d.ctl"), HasSubstr("has 104 bytes, 'd.ctl' describes 96"));
 
-  // Of a template the files' lengths may differ.
+  // Files of a template may differ in length.
   write_file(folder / "t.ctl", descriptor(two_days + "\noptions template", one_u, "^t%d2.dat"));
   write_file(folder / "t28.dat", packed<float>(counted(12)));
   write_file(folder / "t29.dat", packed<float>(counted(13)));
@@ -236,7 +236,7 @@ TEST(Grads, OtherByteOrdersAndIntegers) {
   EXPECT_EQ(values_of(*source, "d"), floats(values(-100000)));
 }
 
-// One file a month of daily steps, 28 days after the 31st of January: one day, then two.
+// One file of daily steps per month, from 28 days after the 31st of January: one day, then two.
 TEST(Grads, TemplatesJoinFilesOfUnequalLength) {
   const Folder folder;
   write_file(folder / "d.ctl", descriptor("tdef 4 linear 31jan1999 1dy\noptions template", one_u,
@@ -398,7 +398,8 @@ TEST_F(GradsModel, RangesAndMaskedCountsOfTheFirstAndLastTime) {
   }
 }
 
-// The fastest wind blows at 200 hPa, 38 N, 135 E, east over Japan; mountains are masked below.
+// The strongest wind is at 200 hPa, 38 N, 135 E, eastward over Japan; levels below mountains are
+// masked.
 TEST_F(GradsModel, SamplesHaveTheirExpectedPositions) {
   const auto u = values_of(*source_, "U", 0);
   const auto index = [](std::size_t x, std::size_t y, std::size_t z) {

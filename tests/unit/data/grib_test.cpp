@@ -1,5 +1,5 @@
-// GRIB files made of ecCodes' own samples, their values a function of place, level and time that is
-// written here in the order WMO's flag table 3.4 prescribes; and broken ones.
+// GRIB files made from the samples of ecCodes, whose values are a function of position, level and
+// time written in the order of WMO flag table 3.4; and broken files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -150,7 +150,7 @@ class Grib : public testing::Test {
   Folder folder_;
 };
 
-// Every sample of a field where the closed form says, to a few steps of the packing.
+// Every sample of a field equals the closed form, within a few packing steps.
 void expect_form(Source& source, const std::string& field, std::size_t step, double hour) {
   const DatasetInfo& info = source.info();
   const FieldInfo* found = info.find(field);
@@ -226,8 +226,8 @@ double legendre_64(double x) {
   return now;
 }
 
-// N 32: the sines of its 64 latitudes are the roots of P_64. The value of a row is its latitude,
-// whichever comes first in the message.
+// N 32: the sines of its 64 latitudes are the roots of P_64. The value of a row is its latitude, in
+// either order.
 TEST_F(Grib, GaussianLatitudesFromEitherPole) {
   for (const bool north : {false, true}) {
     SCOPED_TRACE(north);
@@ -238,7 +238,7 @@ TEST_F(Grib, GaussianLatitudesFromEitherPole) {
     maker.set("bitsPerValue", 24L);
     std::vector<double> list;
     for (int row = 0; row < 64; ++row) {
-      // Latitudes lie nearly even, 180 / 64.5 degrees apart.
+      // Latitudes are nearly even, 180 / 64.5 degrees apart.
       const double about = (north ? 1 : -1) * (row - 31.5) * 180 / 64.5;
       list.insert(list.end(), 128, about);
     }
@@ -293,8 +293,8 @@ TEST_F(Grib, SeveralFieldsInOneMessageAreAllRead) {
   EXPECT_NEAR(wind->values[rows * columns], value_at(10, 20, 'v', 0), 0.02);
 }
 
-// A wind of (10, 0) on a Lambert grid whose first point lies 35 degrees west of the meridian that
-// is upright on it: there east is turned by 35 sin(25) degrees against the rows.
+// A wind of (10, 0) on a Lambert grid whose first point is 35 degrees west of the central meridian:
+// there east is rotated by 35 sin(25) degrees relative to the rows.
 std::string lambert_wind(const std::string& component, bool along_rows) {
   Maker maker("GRIB2");
   maker.set("gridType", std::string("lambert"));
@@ -332,8 +332,8 @@ TEST_F(Grib, WindsAlongRowsStayAndOthersAreRotated) {
   }
 }
 
-// A wind of (10, 0) on a polar stereographic grid whose first point lies 40 degrees west of the
-// meridian that is upright on it: there north is turned by 40 degrees clockwise from the columns.
+// A wind of (10, 0) on a polar stereographic grid whose first point is 40 degrees west of the
+// central meridian: there north is rotated 40 degrees clockwise from the columns.
 std::string polar_wind(int edition, const std::string& component, bool along_rows) {
   Maker maker(edition == 1 ? "polar_stereographic_pl_grib1" : "polar_stereographic_pl_grib2");
   maker.set("Nx", 4L);
@@ -346,7 +346,7 @@ std::string polar_wind(int edition, const std::string& component, bool along_row
   maker.set("DyInMetres", 20000.0);
   maker.set("iScansNegatively", 0L);
   maker.set("jScansPositively", 1L);
-  // Flag table 3.3, bit 5; in edition 1 table 7 has it at the same place.
+  // Flag table 3.3, bit 5; the same position in table 7 of edition 1.
   maker.set("resolutionAndComponentFlags", along_rows ? 8L : 0L);
   maker.set("level", 500L);
   maker.set("shortName", component);

@@ -93,8 +93,8 @@ TEST(Groups, WithoutARootFieldTheFirstGroupByBreadthIsUsed) {
   EXPECT_TRUE(has_note((*source)->info(), "the group '/b' is shown"));
 }
 
-// Rows that run north-east in the root, which also has a surface pressure and a field of its own;
-// the winds and levels are in a group.
+// Rows run north-east in the root, which also has a surface pressure and a field; winds and levels
+// are in a group.
 TEST(Groups, PositionsAndSurfacePressureOfParentGroupsApply) {
   const Folder folder;
   {
@@ -133,7 +133,8 @@ TEST(Groups, PositionsAndSurfacePressureOfParentGroupsApply) {
   const DatasetInfo& info = (*source)->info();
   ASSERT_NE(info.grid.columns, nullptr);
   EXPECT_TRUE(has_note(info, "'wind' is given by east and north: turned"));
-  // Rows run north-east, so that a wind from due west is half along them, half against columns.
+  // Rows run north-east, so that a wind from due west is half along the rows, half against the
+  // columns.
   const Volume wind = volume_of(**source, "wind");
   EXPECT_NEAR(wind.component(0)[1], 10 * std::sqrt(0.5), 0.05);
   EXPECT_NEAR(wind.component(1)[1], -10 * std::sqrt(0.5), 0.05);
@@ -178,7 +179,7 @@ TEST(Groups, FormatsWithoutGroupsRefuseAGroupName) {
   }
 }
 
-// As h5py or a simulation writes it: no netCDF conventions, no dimension scales.
+// As written by h5py or a simulation: no netCDF conventions, no dimension scales.
 TEST(Groups, PlainHdf5) {
   const Folder folder;
   {
@@ -216,8 +217,8 @@ TEST(Groups, PlainHdf5) {
   }
 }
 
-// Arrays [x][y][z] or [x][y][z][t], with no word about it. The value: component, x, y, z, t as
-// digits.
+// Arrays [x][y][z] or [x][y][z][t] without metadata. The value has the digits component, x, y, z,
+// t.
 void write_like_meep(const std::string& path, const std::vector<const char*>& names,
                      const std::vector<hsize_t>& dims) {
   const netcdf::LibraryLock lock;
@@ -294,7 +295,7 @@ void write_bare(const std::string& path,
 
 TEST(Groups, FirstOfFourUnnamedDimensionsIsTime) {
   const Folder folder;
-  // As many rows as steps: to the library both are one dimension.
+  // As many rows as steps: the library treats both as one dimension.
   write_bare(folder / "b.h5", {{"q", {6, 2, 3, 5}}, {"p", {6, 2, 3, 5}}, {"still", {2, 6, 5}}});
   auto source = open_file(folder / "b.h5");
   ASSERT_TRUE(source) << source.error().message;

@@ -1,5 +1,5 @@
-// What a confined process can still do, tried in one: a fork of the test gives everything up and
-// reports the outcome of each attempt.
+// Capabilities of a confined process: a fork of the test drops its privileges and reports the
+// outcome of each attempt.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/mman.h>
@@ -27,7 +27,7 @@ namespace {
 
 struct Attempt {
   const char* what;
-  int expected;  // errno; 0: it works
+  int expected;  // errno; 0: success
   long (*act)(int file);
 };
 
@@ -105,7 +105,7 @@ const std::vector<Attempt> on_the_given_file{
 };
 
 const std::vector<Attempt> on_the_world{
-    // The world.
+    // Network and processes.
     {"socket", EPERM, [](int) -> long { return ::socket(AF_INET, SOCK_STREAM, 0); }},
     {"local socket", EPERM, [](int) -> long { return ::socket(AF_UNIX, SOCK_STREAM, 0); }},
     {"connect", EPERM, [](int) -> long { return ::connect(0, nullptr, 0); }},

@@ -1,5 +1,5 @@
-// Loaders that do not do what ours does, as if a file had taken one over: scripts that speak the
-// protocol on descriptor 3. Whatever they say, the daemon gets an error or true invariants.
+// Faulty or compromised loaders: scripts that speak the protocol on descriptor 3. For any messages
+// the daemon gets an error or values that satisfy the invariants.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -64,7 +64,7 @@ class FaultyLoader : public testing::Test {
     set_program(path);
   }
 
-  // A script that knows how to speak; K is Kind.
+  // A script that implements the protocol; K is Kind.
   void speak(const std::string& what) {
     std::string script = "#!/usr/bin/env python3\n";
     script += "import array, mmap, os, socket, struct, sys, time\n";
@@ -108,7 +108,7 @@ class FaultyLoader : public testing::Test {
     EXPECT_EQ(source.error().message, message);
   }
 
-  // What is told from now on is larger than the memory that is kept between reads.
+  // Later messages are larger than the memory kept between reads.
   void describe_much() {
     DatasetInfo large = told();
     large.grid.axes[0].coordinates.resize(5'000'000);
@@ -182,7 +182,7 @@ TEST_F(FaultyLoader, MalformedMessagesAreRefused) {
   expect_not_opened(message);
 }
 
-// Where little is due, little is taken.
+// A small expected amount limits the memory taken.
 TEST_F(FaultyLoader, TooManyMessagesAreRefused) {
   speak("told()\nsay('progress', b'x' * 100000)\nhear()\n");
   expect_not_read(

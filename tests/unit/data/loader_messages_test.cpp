@@ -1,5 +1,5 @@
-// What a loader says of a dataset is believed only where it could be true: good messages come out
-// as they went in, and no change to one breaks what the rest of the program relies on.
+// Validation of loader messages: valid ones survive a round trip, and no mutation violates the
+// invariants of the program.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -64,7 +64,7 @@ DatasetInfo good() {
   return info;
 }
 
-// What the rest of the program relies on, said anew.
+// The invariants of the program, stated independently.
 void expect_sound(const DatasetInfo& info) {
   double samples = 1;
   for (const Axis& a : info.grid.axes) {
@@ -259,14 +259,14 @@ TEST(LoaderMessages, NoMutationOfAnInfoViolatesItsInvariants) {
     expect_sound(*out);
     if (HasFatalFailure()) FAIL() << "round " << round;
   }
-  EXPECT_GT(accepted, 1000);  // changed letters and numbers are none of its business
+  EXPECT_GT(accepted, 1000);  // changed letters and digits do not matter
 }
 
 TEST(LoaderMessages, OnlyKindAndMessageOfErrorsPass) {
   const Error wrong = make_error(ErrorKind::out_of_memory, "no memory");
   EXPECT_EQ(decode_error(encode_error(wrong)).kind, ErrorKind::out_of_memory);
   EXPECT_EQ(decode_error(encode_error(wrong)).message, "no memory");
-  // A loader cannot make a client believe that it is the server that drains, or the like.
+  // A loader must not be able to report that the server drains, for instance.
   EXPECT_EQ(decode_error(encode_error(make_error(ErrorKind::draining, "x"))).kind,
             ErrorKind::bad_data);
   EXPECT_EQ(decode_error(encode_error(make_error(ErrorKind::bad_data, "a\nb"))).message, "a\\x0ab");

@@ -1,5 +1,5 @@
-// Reading in a process apart: the same numbers as in this one, and whatever happens to that process
-// is an error of the call. Loaders that lie are little programs of the test's own.
+// Reading in a separate process: values equal those of in-process reading, and any failure of the
+// process is an error of the call. Faulty loaders are scripts of the test.
 #include "server/data/loader/loader.hpp"
 
 #include <fcntl.h>
@@ -99,8 +99,8 @@ TEST_F(Loader, Netcdf4FilesReadAsInThisProcess) {
   expect_same_as_here(path);
 }
 
-// Chunks that were never written, in a file that says not to fill them in: HDF5 leaves alone what
-// it should read into, and the memory between the two had another field's numbers. They are masked.
+// Unwritten chunks in a file without fill values: HDF5 leaves the destination unchanged, and the
+// shared memory contained another field. They must be masked.
 TEST_F(Loader, UnwrittenSamplesHoldNothingOfAnEarlierVolume) {
   const std::string path = folder_ / "unfilled.nc";
   {
@@ -121,7 +121,7 @@ TEST_F(Loader, UnwrittenSamplesHoldNothingOfAnEarlierVolume) {
   EXPECT_EQ(b->masked, 6);
 }
 
-// How many descriptors this process has to the memory of volumes.
+// Number of descriptors of this process for volume memory.
 std::size_t transfers_kept() {
   std::size_t count = 0;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
@@ -132,7 +132,7 @@ std::size_t transfers_kept() {
   return count;
 }
 
-// MiB of shared memory that another process has mapped and that takes room, where the system tells.
+// MiB of resident shared memory mapped by another process, if the system reports it.
 double shared_by(pid_t id) {
   std::ifstream file("/proc/" + std::to_string(id) + "/status");
   for (std::string line; std::getline(file, line);) {
@@ -141,8 +141,8 @@ double shared_by(pid_t id) {
   return 0;
 }
 
-// The memory between the two is used again for the scalar, and made anew for the vector, which is
-// too large for it to be kept.
+// The shared memory is reused for the scalar and reallocated for the vector, which is too large to
+// be kept.
 TEST_F(Loader, SmallAndLargeVolumesReadAsInThisProcess) {
   std::ofstream(folder_ / "large.json")
       << R"({"windsplat": "raw", "file": "large.raw", "type": "float32", "endian": "little",
@@ -163,12 +163,12 @@ TEST_F(Loader, SmallAndLargeVolumesReadAsInThisProcess) {
     const bool is_cloud = source->info().fields[field].name == "cloud";
     EXPECT_EQ(volume->values[0], static_cast<float>(((is_cloud ? 4 : 5) * samples) % 1000003));
     EXPECT_EQ(transfers_kept(), is_cloud ? 1U : 0U);
-    // No room remains of 35 MiB beside the copy.
+    // No memory for 35 MiB in addition to the copy.
     EXPECT_LT(shared_by(source->process()), is_cloud ? 13 : 1);
   }
 }
 
-// What a header refers to is part of the dataset.
+// Files referenced by a header are part of the dataset.
 TEST_F(Loader, ChangedCompanionFileIsDetected) {
   std::ofstream(folder_ / "c.json")
       << R"({"windsplat": "raw", "file": "c.raw", "type": "float32", "endian": "little",
@@ -246,7 +246,7 @@ TEST_F(Loader, NamedGroupIsRead) {
     EXPECT_EQ(volume->range, (std::array<float, 2>{first, first + 5}));
     EXPECT_TRUE(source->info().notes.empty()) << source->info().notes.front();
     expect_same_as_here(path + group);
-    source->release();  // and so by the loader that comes next
+    source->release();  // also by the next loader
     const auto again = source->read(0, 0);
     ASSERT_TRUE(again) << again.error().message;
     expect_same(*volume, *again);
@@ -259,7 +259,7 @@ TEST_F(Loader, NamedGroupIsRead) {
 
 TEST_F(Loader, InvalidFileGivesTheSameErrorAsInThisProcess) {
   const std::string path = folder_ / "text.nc";
-  std::ofstream(path) << "no dataset, whatever its name says";
+  std::ofstream(path) << "no dataset, whatever its name";
   const auto here = open_file(path);
   const auto there = open_path(path);
   ASSERT_FALSE(here);
@@ -300,7 +300,7 @@ TEST_F(Loader, CrashIsAnErrorAndTheNextReadStartsAnother) {
   ASSERT_TRUE(first);
   const pid_t id = source->process();
   ASSERT_GT(id, 0);
-  ASSERT_EQ(::kill(id, SIGSTOP), 0);  // so that it dies while it should read
+  ASSERT_EQ(::kill(id, SIGSTOP), 0);  // so that it ends during a read
   std::thread killer([id] {
     std::this_thread::sleep_for(milliseconds(100));
     ::kill(id, SIGKILL);
@@ -404,11 +404,11 @@ TEST_F(Loader, ExceedingTheBudgetWhileOpeningIsAnError) {
   const std::string path = folder_ / "a.nc";
   test::write_positions(path, 1500);  // 36 MB of coordinates
   Limits limits;
-  // Memory of an idle loader, and little more.
+  // Memory of an idle loader, with some tolerance.
   limits.budget = std::make_shared<Budget>((std::uint64_t{8} << 20) + (std::uint64_t{64} << 10));
   for (int n = 0; n < 3; ++n) {
     const auto source = open_path(path, limits);
-    // Between two looks it may have opened the file: the loader is gone, and what it found is good.
+    // It may have opened the file between two checks: the loader is gone, and its result is valid.
     if (source) {
       EXPECT_EQ((*source)->process(), -1);
       EXPECT_GT((*source)->info().stored_bytes, 0U);
@@ -419,7 +419,7 @@ TEST_F(Loader, ExceedingTheBudgetWhileOpeningIsAnError) {
   }
 }
 
-#ifndef WINDSPLAT_SANITIZED  // whose shadow counts as memory
+#ifndef WINDSPLAT_SANITIZED  // whose shadow memory counts
 TEST_F(Loader, VolumeIsTheSameWhenTransferMemoryIsNotKept) {
   const std::string path = folder_ / "a.nc";
   test::write_large(path);
@@ -540,7 +540,8 @@ TEST_F(Loader, TwoHundredLoadersLeaveNothingBehind) {
 TEST_F(Loader, NoneOutlivesTheDaemonEvenWhileBusy) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, 0);
-  ASSERT_EQ(::prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0), 0);  // orphans come to us
+  ASSERT_EQ(::prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0),
+            0);  // adopts orphans
   int ends[2];
   ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
   const pid_t daemon = ::fork();
@@ -555,7 +556,7 @@ TEST_F(Loader, NoneOutlivesTheDaemonEvenWhileBusy) {
   ::close(ends[0]);
   ::close(ends[1]);
   ASSERT_GT(id, 0);
-  ::kill(id, SIGSTOP);  // it cannot look at its socket
+  ::kill(id, SIGSTOP);  // it cannot check its socket
   ::kill(daemon, SIGKILL);
   ASSERT_EQ(::waitpid(daemon, nullptr, 0), daemon);
   ::kill(id, SIGCONT);

@@ -113,7 +113,7 @@ TEST_F(LocateBeneath, GroupIsNamedAfterTheFile) {
   EXPECT_EQ(found.stem, "a");
   EXPECT_EQ(located("runs/f*.nc#/g").inside, "g");
   EXPECT_EQ(located("runs/f*.nc#/g").members.size(), 2U);
-  // A folder that is called so is a folder.
+  // A folder with that name is a folder.
   fs::create_directory(root_ / "odd#");
   std::ofstream(root_ / "odd#/b.nc") << "data";
   EXPECT_EQ(located("odd#/b.nc").inside, "");
@@ -183,7 +183,7 @@ TEST_F(LocateBeneath, PatternIsMatchedAgainWithinTheSameRoot) {
   fs::create_symlink("nowhere.nc", root_ / "runs/f5.nc");
   fs::create_symlink("f6.nc", root_ / "runs/f6.nc");
   const auto beside_links = locate_again(series);
-  ASSERT_TRUE(beside_links) << "links that lead nowhere or out are no files of the series";
+  ASSERT_TRUE(beside_links) << "links that lead nowhere or out are not part of the series";
   EXPECT_EQ(beside_links->members.size(), 3U);
 }
 

@@ -28,7 +28,7 @@ Volume volume_of(std::vector<float> values, int components = 1) {
   return volume;
 }
 
-// 0, 1, ..., count - 1 in an order that is neither.
+// 0, 1, ..., count - 1, neither ascending nor descending.
 Volume ramp(int count) {
   std::vector<float> values(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
@@ -72,7 +72,7 @@ TEST(Histogram, OutsideAndMaskedSamplesAreCountedSeparately) {
 }
 
 TEST(Histogram, VectorsAreCountedByMagnitude) {
-  // (3,4) and (0,0) and (-6,8) and one that is masked.
+  // (3,4), (0,0), (-6,8) and a masked sample.
   const Volume volume = volume_of({3, 0, -6, 1, 4, 0, 8, nan}, 2);
   const Histogram h = made(volume, {.bins = 2});
   EXPECT_THAT(*h.range, ElementsAre(0, 10));
@@ -80,7 +80,7 @@ TEST(Histogram, VectorsAreCountedByMagnitude) {
   EXPECT_EQ(h.masked, 1);
 }
 
-// Of n values a share c leaves out floor(c n) at either end, and no more.
+// Of n values a share c omits floor(c n) at either end.
 TEST(Histogram, ClippingOmitsTheShareAtEitherEnd) {
   const Volume volume = ramp(10'000);
   for (const auto& [clip, dropped] :
@@ -134,7 +134,7 @@ TEST(Histogram, LogarithmicBinsOfAGeometricSeriesAreEven) {
   EXPECT_THAT(own.counts, ElementsAre(5, 5, 6));
 }
 
-// A bin holds what its edges say, also where arithmetic of bins would round otherwise.
+// A bin contains the values between its edges, also where bin arithmetic would round otherwise.
 TEST(Histogram, CountsMatchTheReturnedEdges) {
   std::vector<float> values;
   for (int i = 0; i <= 3000; ++i) values.push_back(static_cast<float>(i) / 1000.0F + 0.1F);

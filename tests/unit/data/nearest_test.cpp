@@ -1,4 +1,4 @@
-// Which sample a place is nearest to, on axes of every kind.
+// The sample nearest to a position, on axes of every kind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ Axis axis_of(AxisKind kind, std::vector<double> coordinates, std::string units =
   return axis;
 }
 
-// A quarter of the way round, descending latitudes, uneven pressures that descend upwards.
+// A quarter of the globe, descending latitudes, uneven pressures that descend upwards.
 Grid model_grid() {
   Grid grid;
   grid.axes[0] =
@@ -107,8 +107,8 @@ TEST(NearestSample, DimensionOfOneNeedsNoCoordinate) {
   EXPECT_EQ(place->coordinates[2], 1);
 }
 
-// Columns of a grid whose pole is moved: a cap round the real pole, where longitude and latitude
-// say nothing about neighbours.
+// Columns of a rotated-pole grid: a cap around the true pole, where longitude and latitude do not
+// indicate neighbours.
 Grid polar_grid(int n, double spacing) {
   auto columns = std::make_shared<Columns>();
   for (int j = 0; j < n; ++j) {
@@ -140,7 +140,7 @@ TEST(NearestSample, NearestColumnIsMeasuredOnTheSphere) {
     const double latitude = 90 - std::hypot(x, y);
     const double longitude = std::atan2(y, x) * 180 / M_PI + 360 * (trial % 3 - 1);
     const std::array<int, 3> index = found(grid, longitude, latitude, 850);
-    // By unit vectors, another way to the same distance.
+    // By unit vectors, an independent formula for the distance.
     const auto unit = [](double lon, double lat) {
       const double a = lon * M_PI / 180;
       const double b = lat * M_PI / 180;

@@ -1,4 +1,4 @@
-// Axes of files the tests wrote: any order of dimensions, any direction, any way of naming.
+// Axes of generated files: any order of dimensions, any direction, any naming.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -40,7 +40,7 @@ float place_value(double x, double y, double z) {
   return static_cast<float>(x + 1000 * y + z / 16);
 }
 
-// Every sample of the volume is that of its axes' coordinates.
+// Every sample of the volume has the value of its coordinates.
 void expect_placed(const DatasetInfo& info, const Volume& volume) {
   const auto& [x, y, z] = info.grid.axes;
   ASSERT_EQ(volume.dims, info.grid.dims());
@@ -90,7 +90,7 @@ TEST_P(AnyOrder, AndAnyDirectionGiveTheSameVolume) {
             at.at(order[2]) = c;
             for (const double d : coordinates.at(order[3])) {
               at.at(order[3]) = d;
-              // Step 0 holds the places, step 6 h their negatives.
+              // Step 0 contains the encoded positions, step 6 h their negatives.
               values.push_back(static_cast<double>(place_value(at[3], at[2], at[1])) *
                                (at[0] == 0 ? 1 : -1));
             }
@@ -278,7 +278,7 @@ TEST(NetcdfAxes, SecondTimeOrLevelOfLengthOneIsSkipped) {
   }
   const Folder folder;
   {
-    NetcdfMaker file(folder / "u.nc");  // five without a role: the long ones have the places
+    NetcdfMaker file(folder / "u.nc");  // five without a role: the long ones become the axes
     const std::vector<int> dims{file.dimension("a", 1), file.dimension("b", 2),
                                 file.dimension("c", 1), file.dimension("d", 3),
                                 file.dimension("e", 4)};
@@ -467,7 +467,7 @@ TEST(NetcdfAxes, CoordinatesThatAreNotMonotonicAreRefused) {
 }
 
 TEST(NetcdfAxes, CurvilinearCoordinatesDecideDimensionDirections) {
-  // Rows run east and columns south, as no name betrays; longitude crosses the date line.
+  // Rows run east and columns south, which no name indicates; longitude crosses the date line.
   const Folder folder;
   {
     NetcdfMaker file(folder / "c.nc");
@@ -495,7 +495,8 @@ TEST(NetcdfAxes, CurvilinearCoordinatesDecideDimensionDirections) {
   // South-west corner: i = 0, j = 3; then eastwards by i, northwards by falling j.
   EXPECT_EQ(volume->values, (std::vector<float>{3, 7, 11, 2, 6, 10, 1, 5, 9, 0, 4, 8}));
   EXPECT_NE(reason_for(info, "longs").find("more than one dimension"), std::string::npos);
-  // Every column stands where the file says, in the volume's order; the date line is no jump.
+  // Every column is at its position of the file, in the order of the volume; the date line is no
+  // discontinuity.
   ASSERT_NE(info.grid.columns, nullptr);
   const Columns& columns = *info.grid.columns;
   ASSERT_EQ(columns.longitude.size(), 12U);

@@ -1,4 +1,4 @@
-// Which variables become fields, which become a vector together, and why the rest is left out.
+// Which variables become fields, which form vectors, and why others are omitted.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -87,7 +87,7 @@ TEST(NetcdfFields, WindsByStandardNameWhateverTheirNames) {
                      variable("c", "m s-1", "upward_air_velocity"),
                      variable("d", "Pa s-1", "lagrangian_tendency_of_air_pressure")}),
             (Expected{{"wind", {"a", "b", "c"}}}));
-  // Only the horizontal parts carry the attribute.
+  // Only the horizontal components have the attribute.
   EXPECT_EQ(vectors({variable("ua", "m s-1", "eastward_wind"),
                      variable("va", "m s-1", "northward_wind"), variable("wa")}),
             (Expected{{"wind", {"ua", "va", "wa"}}}));
@@ -157,7 +157,7 @@ TEST(NetcdfFields, VectorInfoReplacesThatOfItsComponents) {
   auto source = open_file(folder / "w.nc");
   ASSERT_TRUE(source) << source.error().message;
   const DatasetInfo& info = (*source)->info();
-  ASSERT_EQ(info.fields.size(), 6U);  // wind, its three components, and what they make
+  ASSERT_EQ(info.fields.size(), 6U);  // wind, its three components, and derived fields
   EXPECT_EQ(info.fields[4].name, "standard_height");
   EXPECT_EQ(info.fields[5].name, "wind_m");
   const FieldInfo& wind = info.fields[0];
@@ -224,7 +224,7 @@ TEST(NetcdfFields, LargestGridIsUsedAndTheRestIsExplained) {
   EXPECT_EQ(reasons["ps"], "on another grid (lat 3, lon 4)");
   EXPECT_EQ(reasons["moisture"], "on another grid (depth 2, lat 3, lon 4)");
   EXPECT_EQ(reasons["lat_bnds"], "bounds of a coordinate");
-  EXPECT_EQ(reasons.count("lat"), 0U) << "a coordinate places the fields";
+  EXPECT_EQ(reasons.count("lat"), 0U) << "the fields have coordinates";
   EXPECT_EQ(reasons["label"], "text, not numbers");
   EXPECT_EQ(reasons["hyam"], "fewer than two spatial dimensions");
   EXPECT_EQ(reasons["spread"], "its dimension 'member' is neither space nor time");

@@ -1,4 +1,4 @@
-// Files that are not what they should be: each is refused with a reason, none crashes the reader.
+// Invalid files: each is refused with a reason, none crashes the reader.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -67,7 +67,7 @@ TEST(NetcdfRefusals, UrlsAndLibraryDirectives) {
   expect_refused("[mode=bytes]https://127.0.0.1:9/a.nc", ErrorKind::bad_data, "URL");
   write_good(folder / "a.nc", 0);
   expect_refused((folder / "a.nc") + "#mode=zarr", ErrorKind::not_found, "no such file");
-  // The library never sees a file's name: one that looks like directions to it is a plain file.
+  // The library never sees a file name: one that resembles its directives is a plain file.
   std::filesystem::copy_file(folder / "a.nc", folder / "a.nc#mode=zarr");
   std::filesystem::create_symlink(folder / "a.nc#mode=zarr", folder / "innocent.nc");
   for (const char* name : {"a.nc#mode=zarr", "innocent.nc"}) {
@@ -114,8 +114,8 @@ TEST(NetcdfRefusals, OversizeGridsAreRefusedBeforeAllocation) {
                  "'x' has 1000000000 entries, more than the");
 }
 
-// A file cut at every length that may matter either opens and gives the very numbers of the whole
-// file, or is refused. Nothing in between: no zeros, no crash.
+// A file truncated at any relevant length either opens and gives the values of the whole file, or
+// is refused: no zeros, no crash.
 void cut_everywhere(int mode, const std::vector<std::size_t>& lengths_to_keep_back, bool all) {
   const Folder folder;
   write_good(folder / "whole.nc", mode);
@@ -145,7 +145,7 @@ void cut_everywhere(int mode, const std::vector<std::size_t>& lengths_to_keep_ba
     ASSERT_TRUE(volume) << length << " of " << whole.size();
     ASSERT_EQ(volume->values, expected->values) << length << " of " << whole.size();
   }
-  // Only padding behind the last value can be missing without loss: at most three bytes.
+  // Only padding after the last value can be missing without loss: at most three bytes.
   EXPECT_GE(refused, static_cast<int>(lengths.size()) - 3);
   EXPECT_GT(refused, 0);
 }
@@ -177,8 +177,8 @@ TEST(NetcdfRefusals, TruncatedClassicFileIsReportedWithBothSizes) {
 }
 
 TEST(NetcdfRefusals, HeaderSizeMatchesFilesOfEveryShape) {
-  // Sizes that the format's rules give by hand: records of one variable are not padded, of several
-  // are; the last value's padding is not asked for.
+  // Sizes by the rules of the format: records of a single variable are not padded, those of several
+  // are; padding after the last value is optional.
   struct Case {
     nc_type type;
     std::size_t columns;
@@ -217,7 +217,7 @@ TEST(NetcdfRefusals, HeaderSizeMatchesFilesOfEveryShape) {
 }
 
 TEST(NetcdfRefusals, CorruptClassicHeaderNeverCrashes) {
-  // Every header byte set to each of four values; whatever opens must also be readable or refused.
+  // Every header byte set to each of four values; whatever opens must be readable or refused.
   const Folder folder;
   write_good(folder / "good.nc", 0);
   const std::string good = bytes_of(folder / "good.nc");

@@ -1,5 +1,5 @@
-// NRRD: every encoding and layout from bytes written here; what is expected follows from the
-// format's definition (teem's documentation of nrrd).
+// NRRD: every encoding and layout, from bytes written here; expected values follow from the
+// definition of the format (teem's documentation of nrrd).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -72,7 +72,7 @@ TEST_P(NrrdType, IsReadInBothByteOrders) {
   }
 }
 
-// -32767 and its like are netCDF's fill values; here they are numbers.
+// -32767 and similar are fill values of netCDF; here they are values.
 INSTANTIATE_TEST_SUITE_P(
     All, NrrdType,
     testing::Values(TypeCase{"signed char", packed<std::int8_t>, -128, "int8"},
@@ -114,7 +114,7 @@ TEST(Nrrd, EncodingsHoldTheSameSamples) {
   }
 }
 
-// Bytes of the file, whatever they mean; lines first.
+// Bytes of the file, independent of their meaning; lines first.
 TEST(Nrrd, LinesAndBytesBeforeEncodedDataAreSkipped) {
   const Folder folder;
   for (const auto& [encoding, data] :
@@ -139,7 +139,7 @@ TEST(Nrrd, NanIsMasked) {
   EXPECT_EQ(test::volume_of(*source, "m").masked, 2);
 }
 
-// A long series in one gzip stream: steps in any order, each what it should be.
+// A long series in one gzip stream: steps in any order with the right values.
 TEST(Nrrd, StepsOfAGzipStreamAreReadInAnyOrder) {
   const Folder folder;
   constexpr std::size_t steps = 20;
@@ -182,7 +182,7 @@ TEST(Nrrd, SpacingsAndBoundsPlaceSamples) {
   EXPECT_EQ(values_of(*source, "p")[0], 6);
 }
 
-// Left-posterior-superior: x and y are turned, and so are a vector's first two components.
+// Left-posterior-superior: x and y are reversed, as are the first two components of vectors.
 TEST(Nrrd, AnatomicalSpaceIsReoriented) {
   const Folder folder;
   write_file(folder / "v.nrrd",
@@ -311,7 +311,8 @@ TEST(Nrrd, BytesAfterTheSamplesAreReported) {
   write_file(folder / "a.nrrd", header(fields + "\n") + raw + "12345");
   EXPECT_THAT(opened(folder / "a.nrrd")->info().notes,
               testing::Contains("5 bytes after the last step are not described"));
-  // Two files, one of them too long; and data that are the file's end have nothing behind them.
+  // Two files, one of them too long; data that extend to the end of the file have no trailing
+  // bytes.
   write_file(folder / "b.nhdr", header(fields + "data file: LIST\nb0\nb1\n"));
   write_file(folder / "b0", raw.substr(0, 24));
   write_file(folder / "b1", raw.substr(24) + "123");
@@ -424,7 +425,7 @@ TEST(NrrdRefusal, BrokenDataAreDetectedWhenRead) {
            {"hex", std::string(95, '0') + "g"}}) {
     write_file(folder / "b.nrrd", header(plain_2x3x2 + "encoding: " + encoding + "\n\n") + data);
     auto source = open_file(folder / "b.nrrd");
-    if (!source) continue;  // fewer bytes than are possible
+    if (!source) continue;  // fewer bytes than possible
     const auto volume = (*source)->read(0, 0);
     ASSERT_FALSE(volume) << encoding << ' ' << data;
     EXPECT_EQ(volume.error().kind, ErrorKind::bad_data);

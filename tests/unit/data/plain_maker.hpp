@@ -67,7 +67,7 @@ inline std::unique_ptr<Source> opened(const std::string& path) {
   return source ? std::move(*source) : nullptr;
 }
 
-// Why a file is refused.
+// The reason for which a file is refused.
 inline std::string refusal(const std::string& path) {
   const auto source = open_file(path);
   EXPECT_FALSE(source) << path << " was opened";

@@ -1,5 +1,4 @@
-// Raw files and the JSON that describes them (docs/user/formats.md): what is expected follows from
-// that page.
+// Raw files and the JSON that describes them; expected values follow from docs/user/formats.md.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

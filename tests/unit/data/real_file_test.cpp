@@ -42,7 +42,7 @@ class RealFile : public testing::Test {
   std::unique_ptr<Source> source_;
 };
 
-// The sample nearest to a place, by the axes' own coordinates.
+// The sample nearest to a position, by axis coordinates.
 float at(const DatasetInfo& info, const Volume& volume, int component, double lon, double lat,
          double hpa) {
   const std::array<double, 3> place{lon, lat, hpa};
@@ -128,7 +128,8 @@ TEST_F(RealFile, JetBlowsEastWithItsMaximumAtTheKnownSample) {
   // d["U"][0].argmax() is (7, 44, 119): 200 hPa, 34.9 N, 154.7 E.
   const Volume u = volume("U");
   EXPECT_EQ(at(info(), u, 0, 154.6875, 34.882523, 200), 81.63902F);
-  // The polar night is colder aloft than the tropics on the ground: up is up.
+  // The polar night aloft is colder than the tropics at the ground: the vertical direction is
+  // right.
   const Volume temperature = volume("T");
   EXPECT_GT(at(info(), temperature, 0, 0, 0, 1000), at(info(), temperature, 0, 0, 0, 100) + 80);
 }

@@ -1,4 +1,4 @@
-// The built-in samples: sizes, determinism, and the physics that their formulas promise.
+// The built-in samples: sizes, determinism, and the physics of their formulas.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -111,7 +111,7 @@ TEST(Tornado, AirTurnsCounterClockwiseAndRisesEverywhere) {
   const Volume vorticity = read(*source, "vorticity", 5);
   const double spacing = 1500.0 / 64;
   for (int k = 2; k < 62; k += 12) {
-    // The axis is where the stated vorticity peaks.
+    // The axis is where the documented vorticity peaks.
     int ai = 2;
     int aj = 2;
     for (int j = 2; j < 62; ++j) {
@@ -163,7 +163,8 @@ TEST(Tornado, WindConservesMass) {
       }
     }
   }
-  // What is left is the differences' own truncation, (spacing / core)^2 / 6 of the gradients.
+  // The remainder is the truncation error of the differences, (spacing / core)^2 / 6 of the
+  // gradients.
   EXPECT_LT(std::sqrt(divergence / shear), 0.03);
 }
 
@@ -335,8 +336,7 @@ TEST(Climate, CloudIsAFractionAndFollowsTheWeather) {
     }
     return sum / count;
   };
-  // The tropics' towers and the storm tracks stand over the clear subtropics, and nothing is in
-  // the stratosphere.
+  // Tropical towers and storm tracks are over the clear subtropics, and the stratosphere is empty.
   EXPECT_GT(cover(-8, 6, 700, 250), 2.0 * cover(17, 24, 700, 250));
   EXPECT_GT(cover(42, 58, 700, 300), 2.0 * cover(17, 24, 700, 300));
   EXPECT_GT(cover(-60, -44, 700, 300), 2.0 * cover(-24, -17, 700, 300));
@@ -398,7 +398,7 @@ TEST(ElectricField, OneStepIsOneSixteenthOfAPeriod) {
   for (std::size_t n = 0; n < now.values.size(); ++n) {
     worst = std::max(worst, std::abs(static_cast<double>(now.values[n] + half_later.values[n])));
   }
-  EXPECT_LT(worst, 1e-3);  // half a period turns the field about
+  EXPECT_LT(worst, 1e-3);  // half a period reverses the field
   EXPECT_NEAR(source->info().steps[8].value, 0.5e9 / 600e6, 1e-9);
 }
 

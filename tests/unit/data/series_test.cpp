@@ -1,5 +1,5 @@
-// Several netCDF files as one dataset. Every sample of the test's files tells where it came from,
-// so that a step of a series can be told from all others.
+// Several netCDF files as one dataset. Every sample of the test files encodes its origin, so that a
+// step of a series differs from all others.
 #include "server/data/cf/series.hpp"
 
 #include <gtest/gtest.h>
@@ -96,7 +96,7 @@ TEST(Series, StepsAreOrderedByTimeForAnyFileEpochsAndNames) {
   EXPECT_TRUE(has_note((*source)->info(), "3 files joined along time"));
 }
 
-// Sample (y, x) of time t is 100 t + 10 y + x, wherever the file has the time.
+// Sample (y, x) of time t is 100 t + 10 y + x, for any order of dimensions.
 TEST(Series, TimeMayBeAnyDimension) {
   const Folder folder;
   for (const int part : {0, 1}) {
@@ -187,7 +187,7 @@ TEST(Series, VariablesMissingInSomeFilesAreOmittedWithTheReason) {
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().find("g"), nullptr);
   EXPECT_EQ(reason_of((*source)->info(), "g"), "only some files have it: 's2.nc' does not");
-  // The other way round, and units that differ.
+  // The other way round, with different units.
   with.kelvin = "C";
   with.times = {6};
   write_part(folder / "u1.nc", {{0}, "hours since 2001-01-01"});
@@ -262,7 +262,7 @@ TEST(Series, FilesWithoutATimeDimensionAreOneStepEach) {
   EXPECT_EQ(first_sample(**timed, 0), 200);
 }
 
-// A file that knows how many like it are open.
+// A file that counts the open files of its kind.
 class Counted final : public cf::ArrayFile {
  public:
   Counted(std::unique_ptr<cf::ArrayFile> file, int& open) : file_(std::move(file)), open_(open) {

@@ -1,5 +1,5 @@
-// HDF5 whose data are elsewhere, were never written, or are far larger than the file: each is
-// refused or masked by name, and `inspect` stays small and quick.
+// HDF5 data that are external, unwritten, or far larger than the file: each is refused or masked by
+// name, and `inspect` stays small and fast.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -232,7 +232,7 @@ TEST(Storage, LookupOfManyChunksIsPartial) {
   EXPECT_EQ(volume_of(**source, "v").masked, 0);
 }
 
-// Two chunks with one number would be taken for each other: present or absent.
+// Two chunks with one number would be confused: present or absent.
 TEST(Storage, MoreChunksThanValuesAreRefused) {
   const Folder folder;
   {
@@ -260,7 +260,7 @@ TEST(Storage, OnlyNetcdfIsCalledNetcdf) {
     NetcdfMaker file(folder / "a.nc");
     file.variable("u", NC_FLOAT, {file.dimension("y", 4), file.dimension("x", 4)}, counting(16));
   }
-  // What versions before 4.4 wrote has no properties.
+  // Files of versions before 4.4 have no properties.
   std::filesystem::copy_file(folder / "a.nc", folder / "old.nc");
   {
     const hid_t file = H5Fopen((folder / "old.nc").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
@@ -275,8 +275,8 @@ TEST(Storage, OnlyNetcdfIsCalledNetcdf) {
   }
 }
 
-// The library says of an absent chunk that it is there once it was read: of the second block, too,
-// it is masked.
+// The library reports an absent chunk as present after it was read: it is masked in the second
+// block, too.
 TEST(Storage, MissingChunkIsMaskedInEveryBlock) {
   const Folder folder;
   {
@@ -288,7 +288,7 @@ TEST(Storage, MissingChunkIsMaskedInEveryBlock) {
   EXPECT_EQ(volume_of(**source, "u").masked, 5 * 1024 * 1024);
 }
 
-// Bytes have no default fill value in CF: those beyond what was written read as -127.
+// Bytes have no default fill value in CF: unwritten ones read as -127.
 TEST(Storage, VariableShorterThanTheUnlimitedDimensionIsMasked) {
   const Folder folder;
   {
@@ -315,7 +315,7 @@ TEST(Storage, ChunksAboveTheLimitAreRefused) {
   expect_refused(folder / "a.h5", "'u' is its chunks have more than 1073741824 bytes");
 }
 
-// A chunk that many blocks need is decoded once: what is read is right, too.
+// A chunk needed by many blocks is decoded once, and its values are right.
 TEST(Storage, ChunkLargerThanTheLibraryCacheIsReadWhole) {
   const Folder folder;
   {
@@ -329,7 +329,8 @@ TEST(Storage, ChunkLargerThanTheLibraryCacheIsReadWhole) {
   EXPECT_EQ(volume.range[1], 0);
 }
 
-// Chunks of several steps are kept for the next step, of all variables as far as they fit together.
+// Chunks of several steps are kept for the next step, as far as those of all variables fit
+// together.
 TEST(Storage, MetadataOfAllVariablesShareOneLimit) {
   const Folder folder;
   const Lengths chunk{2, 4, 1024, 1024};  // 32 MiB
@@ -368,7 +369,7 @@ TEST(Storage, MetadataOfAllVariablesShareOneLimit) {
   }
 }
 
-// What a process and its loader took: processor time and the larger one's memory.
+// Cost of a process and its loader: processor time and the larger peak memory.
 struct Cost {
   double cpu_s = 0;
   long resident_kib = 0;
@@ -385,7 +386,7 @@ Cost inspect(const std::string& path) {
   for (const int out : {1, 2}) {
     posix_spawn_file_actions_addopen(&actions, out, "/dev/null", O_WRONLY, 0);
   }
-  // A child counts this process's peak as its own until it runs another program.
+  // A child inherits this process's peak memory until it runs another program.
   ::malloc_trim(0);
   const int peak = ::open("/proc/self/clear_refs", O_WRONLY | O_CLOEXEC);
   EXPECT_EQ(::write(peak, "5", 1), 1);
@@ -404,7 +405,7 @@ Cost inspect(const std::string& path) {
           WIFEXITED(status) && WEXITSTATUS(status) == 0};
 }
 
-// Bytes that allow more to be decoded.
+// Bytes that permit more to be decoded.
 void pad(const Hdf5Maker& file) {
   file.set(
       "padding", {200000}, [](hid_t) {},
@@ -515,12 +516,12 @@ TEST_P(HostileFiles, InspectIsFastAndSmall) {
   hostile_files().at(GetParam())(path);
   ASSERT_LT(bytes_of(path), 1U << 20);
   const Cost cost = inspect(path);
-  // Beyond what opening may take: an axis of 2^24, coordinates of 3000 x 3000, more objects than a
-  // file of that size can hold. The others are described.
+  // Above the limits of opening: an axis of 2^24, coordinates of 3000 x 3000, more objects than a
+  // file of that size can contain. The others are described.
   const std::set<std::string> refused{"groups_of_groups", "links_to_one_variable", "long_axis",
                                       "positions"};
   EXPECT_EQ(cost.is_read, refused.count(GetParam()) == 0);
-#ifndef WINDSPLAT_SANITIZED  // whose shadow counts as memory
+#ifndef WINDSPLAT_SANITIZED  // whose shadow memory counts
   EXPECT_LT(cost.cpu_s, 1);
   EXPECT_LT(cost.resident_kib, 200 * 1000);
 #endif

@@ -1,6 +1,6 @@
-// Levels that follow the ground, and fields made of others. Expected numbers are the formulas of CF
-// (appendix D) and tables of the standard atmosphere, and for vinth2p.nc what numpy makes of it:
-//   a*1e5 + b*PS of hyam, hybm and PS in double; PS[0].mean() is 96608.06500816345 Pa.
+// Terrain-following levels and derived fields. Expected values are the formulas of CF (appendix D),
+// tables of the standard atmosphere, and for vinth2p.nc the result of numpy: a*1e5 + b*PS of hyam,
+// hybm and PS in double; PS[0].mean() is 96608.06500816345 Pa.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -50,7 +50,7 @@ TEST(HybridLevels, Vinth2pHasThePressuresOfItsFormula) {
   EXPECT_EQ(z.kind, AxisKind::pressure);
   EXPECT_EQ(z.units, "Pa");
   ASSERT_EQ(z.coordinates.size(), 18U);
-  // PS is float32, and its mean is over what was read: to 1e-7.
+  // PS is float32, and its mean is over the read values: to 1e-7.
   EXPECT_NEAR(z.coordinates[0], 95886.22888248185, 0.01);
   EXPECT_NEAR(z.coordinates[1], 93757.4667948502, 0.01);
   EXPECT_NEAR(z.coordinates[17], 480.9299949556589, 1e-4);
@@ -161,7 +161,7 @@ TEST(HybridLevels, SigmaUsesThePressureAtItsTop) {
   EXPECT_FLOAT_EQ(p.values[7], 46000);
 }
 
-// What p = ptop + sigma (ps - ptop) is at sigma 0.5 and 100000 Pa, where ptop is told badly.
+// p = ptop + sigma (ps - ptop) at sigma 0.5 and 100000 Pa, with ptop incomplete.
 TEST(HybridLevels, MissingTopIsNotedAndATopWithoutUnitUsesThatOfTheSurface) {
   struct Case {
     const char* formula;
@@ -210,7 +210,7 @@ TEST(HybridLevels, WithoutSurfacePressureLevelsStayLevels) {
   EXPECT_EQ((*source)->info().find("pressure"), nullptr);
 }
 
-// A chunk of 256 MiB in a file of less than one: more than opening it may decode.
+// A chunk of 256 MiB in a file of less than 1 MiB: more than opening may decode.
 std::vector<std::size_t> chunk_beyond_the_limit(std::size_t values_a_step, std::size_t rank) {
   std::vector<std::size_t> chunk(rank, 2);
   chunk[0] = (std::size_t{64} << 20) / values_a_step;
@@ -296,7 +296,7 @@ TEST(Omega, BecomesMetersPerSecondByTheTemperatureOfTheFile) {
   }
 }
 
-// What the standard name says is Pa s-1 where the file is silent. A picture turns it by its unit.
+// A missing unit follows from the standard name, Pa s-1. A picture converts by the unit.
 TEST(Omega, StaysWhenReadingTheTemperatureExceedsTheLimit) {
   const Folder folder;
   {
@@ -368,7 +368,7 @@ TEST(Heights, FromGeopotentialAndFromTheStandardAtmosphere) {
   const std::vector<float> expected{0, 1, 10, 100, 5000, 5000, 5000, 0};
   for (std::size_t i = 0; i < 8; ++i) EXPECT_FLOAT_EQ(height.values[i], expected[i]);
   const Volume standard = volume_of(**source, "standard_height");
-  EXPECT_NEAR(standard.values[0], 110.9, 0.1);   // ISO 2533: 1000 hPa lies at 111 m
+  EXPECT_NEAR(standard.values[0], 110.9, 0.1);   // ISO 2533: 1000 hPa is at 111 m
   EXPECT_NEAR(standard.values[7], 5574.4, 0.2);  // 500 hPa at 5574 m
 }
 

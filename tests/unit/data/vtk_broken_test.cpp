@@ -1,5 +1,5 @@
-// VTK files that are cut short or lie: each is an error, and none makes the reader take memory for
-// what the file cannot hold.
+// Truncated or inconsistent VTK files: each is an error, and none makes the reader allocate memory
+// for data the file cannot contain.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
@@ -42,7 +42,7 @@ TEST(VtkBroken, EveryTruncationIsAnError) {
   }
 }
 
-// Any changed byte yields an error or numbers, never a crash.
+// Any changed byte gives an error or values, never a crash.
 TEST(VtkBroken, AnyByteMayBeCorrupt) {
   const VtkFolder folder;
   for (const char* format : {"ascii", "appended-raw"}) {
@@ -88,7 +88,7 @@ TEST(VtkBroken, HugeSizesAreRefusedBeforeAllocation) {
   EXPECT_THAT(refusal(folder.write(
                   "a.vti", claim("-9223372036854775808 9223372036854775807 0 1 0 1", ascii))),
               HasSubstr("2^31"));
-  // A table that claims blocks of much more than its compressed bytes can become.
+  // A table that declares blocks much larger than its compressed bytes can produce.
   std::string table;
   for (const std::uint32_t n : {64U, 134217728U, 0U}) table += bytes_of_number(n, false);
   for (int b = 0; b < 64; ++b) table += bytes_of_number<std::uint32_t>(4, false);
@@ -108,7 +108,7 @@ TEST(VtkBroken, HugeSizesAreRefusedBeforeAllocation) {
   EXPECT_LT(peak_kilobytes() - before, 64 * 1024);
 }
 
-// Eight points and their values; the whole claims 301^3.
+// Eight points and their values; the declared extent is 301^3.
 TEST(VtkBroken, PiecesThatCannotFillTheWholeAreRefusedBeforeAllocation) {
   const VtkFolder folder;
   const long before = peak_kilobytes();

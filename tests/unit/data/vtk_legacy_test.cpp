@@ -39,7 +39,7 @@ class VtkLegacyFile : public testing::TestWithParam<bool> {
 };
 INSTANTIATE_TEST_SUITE_P(TextAndBytes, VtkLegacyFile, testing::Bool());
 
-// Nine bits fill two bytes; what follows is read from behind them. Old files call the spacing an
+// Nine bits fill two bytes; the following data are read after them. Old files call the spacing an
 // aspect ratio.
 TEST_P(VtkLegacyFile, BitsAreSkippedAndAnAspectRatioIsASpacing) {
   std::string file = head(GetParam()) + "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 3 1\n";

@@ -1,5 +1,5 @@
-// Meshes on an even lattice: linear fields come back as they are, the share of samples inside is
-// the mesh's share of its box, smooth fields converge with the square of the cells' size.
+// Meshes resampled on an even lattice: linear fields are reproduced, the share of inside samples is
+// the mesh's share of its box, smooth fields converge with the square of the cell size.
 #include <gmock/gmock.h>
 
 #include <functional>
@@ -27,7 +27,7 @@ struct TestMesh {
   }
 };
 
-// The unit cube in n^3 boxes, moved by `map`, each cut into what `cut` makes of its corners.
+// The unit cube in n^3 boxes, transformed by `map`, each split by `cut` into cells.
 TestMesh boxes(int n, const Map& map,
                const std::function<void(TestMesh&, const std::array<int, 8>&)>& cut) {
   TestMesh mesh;
@@ -149,7 +149,7 @@ class VtkResampling : public testing::Test {
   VtkFolder folder_;
 };
 
-// Turned about z by up to a third of a right angle with height: the faces between are not flat.
+// Rotated about z by up to a third of a right angle with height: the internal faces are not planar.
 Place twist(const Place& p) {
   const double angle = p[2] * std::numbers::pi / 6;
   const double x = p[0] - 0.5;
@@ -161,7 +161,7 @@ Place twist(const Place& p) {
 double linear(const Place& p) { return 3 * p[0] - 2 * p[1] + 0.5 * p[2] + 1; }
 
 TEST_F(VtkResampling, LinearFieldsAreExactOnTwistedCellsOfEveryShape) {
-  // The twist keeps areas at each height, so the volume is 2.
+  // The twist keeps the area at each height, so the volume is 2.
   for (const auto& cut : {as_hexahedron, as_voxel, as_wedges, as_tetrahedra, as_pyramids}) {
     const TestMesh mesh = boxes(12, twist, cut);
     const Outcome out = outcome(mesh, linear);
@@ -182,7 +182,7 @@ TEST_F(VtkResampling, SmoothFieldsConvergeWithTheSquareOfTheCellSize) {
   }
 }
 
-// A shell: what lies in its hole and outside of it is in no cell, and is not made up.
+// A shell: samples in its hole and outside are in no cell and must be masked.
 TEST_F(VtkResampling, ShareOfInsideSamplesIsThatOfTheMesh) {
   const Map shell = [](const Place& p) {
     const double angle = p[0] * 2 * std::numbers::pi;
@@ -249,7 +249,7 @@ TEST_F(VtkResampling, FlatMeshIsAPlane) {
   EXPECT_NEAR(out.inside, 0.75, 0.03);
 }
 
-// A model's grid: `n` levels that follow a hill from the ground to a lid, over 24 x 20 columns.
+// A model grid: `n` levels that follow a hill from the ground to a lid, over 24 x 20 columns.
 struct Terrain {
   static constexpr int columns = 24;
   static constexpr int rows = 20;
@@ -281,8 +281,8 @@ std::string terrain_vts(const Terrain& terrain, VtkXml& xml) {
   return xml.file("StructuredGrid", "WholeExtent=\"" + extent + "\"", inner);
 }
 
-// 460 km long and 15 km high: a spacing of the same length along all axes has three samples above
-// each other. Half the points and cells are about as many samples as cells, so as many layers.
+// 460 km long and 15 km high: equal spacing along all axes has three samples vertically. Half of
+// the points and cells gives about as many samples as cells, and as many layers.
 TEST_F(VtkResampling, LayersOfAShallowGridStayResolved) {
   const Terrain terrain{30};
   VtkXml xml({"appended-raw", "", false, 8});
@@ -310,7 +310,7 @@ TEST_F(VtkResampling, MoreLayersThanSamplesAreNoted) {
               HasSubstr("along z fewer samples than cells: 256 for about 399"));
 }
 
-// Layers 0.1 thick that rise by 0.5 from column to column: boxes around the cells are 0.6 high.
+// Layers 0.1 thick that rise by 0.5 from column to column: bounding boxes of cells are 0.6 high.
 TEST_F(VtkResampling, SlopesDoNotThickenLayers) {
   constexpr int n = 16;
   std::vector<double> points;
@@ -339,7 +339,7 @@ TEST_F(VtkResampling, SlopesDoNotThickenLayers) {
   EXPECT_LT(compare(*source, linear).worst, 1e-5);
 }
 
-// The same of wedges without indices: what is known is their boxes.
+// The same for wedges without indices: only their boxes are known.
 TEST_F(VtkResampling, SpacingFollowsTheCellsOfAMesh) {
   const Map flat = [](const Place& p) { return Place{1000 * p[0], 400 * p[1], 10 * p[2]}; };
   const TestMesh mesh = boxes(16, flat, as_wedges);
@@ -385,9 +385,8 @@ TEST_F(VtkResampling, CellDataAreThoseOfTheContainingCell) {
   }
 }
 
-// Tetrahedra along the diagonal, which have all samples in their boxes and few in themselves: just
-// those whose barycentric coordinates are not negative. The boxes hold 600 times the samples
-// wanted.
+// Tetrahedra along the diagonal, whose boxes contain all samples and which contain few: those with
+// nonnegative barycentric coordinates. The boxes contain 600 times the samples.
 TestMesh slivers(double width, int count) {
   TestMesh mesh;
   mesh.points = {0, 0, 0, width, 0, 0, 0, width, 0, 1, 1, 1};
@@ -435,7 +434,7 @@ TEST_F(VtkResampling, CellsWithExcessiveWorkForTheirFileAreRefused) {
     EXPECT_EQ(said.find("too thin and oblique to be resampled") != std::string::npos, count == 200)
         << said;
   }
-  // So thin that the lattice has all the samples that it may, whose rows are in every one's box.
+  // So thin that the lattice has the maximum number of samples, whose rows are in every box.
   const TestMesh thin = slivers(1e-4, 60);
   VtkXml xml;
   const auto data = xml.array("Float64", "a", 1, at_points(thin, linear));
@@ -443,7 +442,7 @@ TEST_F(VtkResampling, CellsWithExcessiveWorkForTheirFileAreRefused) {
               HasSubstr("too thin and oblique to be resampled"));
 }
 
-// As much overlap as a file can honestly have: a cell that lies in the cube a thousand times over.
+// The most overlap of a valid file: a cell repeated a thousand times.
 TEST_F(VtkResampling, OverlappingCellsWithinThatBoundAreRead) {
   TestMesh mesh = boxes(
       1, [](const Place& p) { return p; }, as_hexahedron);
@@ -453,7 +452,7 @@ TEST_F(VtkResampling, OverlappingCellsWithinThatBoundAreRead) {
   EXPECT_LT(out.worst, 1e-5);
 }
 
-// Every piece counts its points and cells from 0. A cell's value is its piece's number.
+// Every piece numbers its points and cells from 0. A cell's value is the number of its piece.
 TEST_F(VtkResampling, PiecesOfOneMeshAreOne) {
   const auto at_x = [](double from) {
     return [from](const Place& p) { return Place{from + p[0], p[1], p[2]}; };
@@ -472,7 +471,7 @@ TEST_F(VtkResampling, PiecesOfOneMeshAreOne) {
     }
     const auto source = opened(folder_.write("p.vtu", xml.file("UnstructuredGrid", "", inner)));
     ASSERT_TRUE(source);
-    // Samples on the face between belong to the cells that come first.
+    // Samples on a shared face belong to the cells that come first.
     const Outcome got = compare(*source, [&](const Place& p) {
       return of_cells ? (p[0] < 1 + 1e-6 ? 1.0 : 2.0) : linear(p);
     });
@@ -495,7 +494,7 @@ TEST_F(VtkResampling, HiddenCellsHoldNothing) {
   EXPECT_NEAR(compare(*source, linear).volume, 0.5, 0.01);
 }
 
-// At x = 0 the corners at x = 1 have no weight.
+// At x = 0 the corners at x = 1 have zero weight.
 TEST_F(VtkResampling, PointsOfZeroWeightMayBeMissing) {
   const TestMesh mesh = boxes(
       1, [](const Place& p) { return p; }, as_hexahedron);

@@ -1,4 +1,4 @@
-// Steps in files of their own: collections and patterns, their times, their common grid.
+// Steps in separate files: collections and patterns, their times, their common grid.
 #include <gmock/gmock.h>
 
 #include "vtk_maker.hpp"

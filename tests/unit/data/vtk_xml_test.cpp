@@ -1,4 +1,4 @@
-// VTK's XML grids: every way of writing numbers, extents, pieces, ghosts, directions, cells.
+// VTK XML grids: every encoding of numbers, extents, pieces, ghosts, directions, cells.
 #include <gmock/gmock.h>
 
 #include "vtk_maker.hpp"
@@ -63,7 +63,7 @@ TEST(VtkXmlFile, ValuesAreTheSameInEveryEncoding) {
   }
 }
 
-// Some writers end the header's base64 with its own padding, without a compressor too.
+// Some writers pad the base64 of the header separately, also without a compressor.
 TEST(VtkXmlFile, SeparatelyEncodedHeaderIsRead) {
   const VtkFolder folder;
   const std::string bytes = packed("Float32", even_ramp(samples), false);
@@ -86,11 +86,11 @@ TEST(VtkXmlFile, OriginSpacingAndExtentPlaceTheSamples) {
   ASSERT_TRUE(source);
   const auto& axes = source->info().grid.axes;
   EXPECT_THAT(axes[0].coordinates, ElementsAre(11, 11.5, 12, 12.5, 13));
-  // 20 - 2 * {-1 .. 2}, turned to ascend.
+  // 20 - 2 * {-1 .. 2}, reversed to ascend.
   EXPECT_THAT(axes[1].coordinates, ElementsAre(16, 18, 20, 22));
   EXPECT_THAT(axes[2].coordinates, ElementsAre(30, 34, 38));
   const Volume volume = volume_of(*source, "a");
-  EXPECT_EQ(volume.values[0], 16);  // j = 3 lies lowest
+  EXPECT_EQ(volume.values[0], 16);  // j = 3 is lowest
   EXPECT_EQ(volume.values[15], 1);
 }
 
@@ -188,7 +188,7 @@ TEST(VtkXmlFile, CellsBetweenPiecesAreMaskedAndNoted) {
   }
 }
 
-// x descends: the first piece lies in the east. Values are 10 times the world's x, plus y.
+// x descends: the first piece is in the east. Values are 10 times the world x, plus y.
 TEST(VtkXmlFile, PiecesAlongADescendingAxisKeepTheirPositions) {
   const VtkFolder folder;
   VtkXml xml;
@@ -279,7 +279,7 @@ TEST(VtkXmlFile, LzmaAndUnsupportedDataSetsAreRefusedWithTheReason) {
               HasSubstr("'PolyData'"));
 }
 
-// Numbers beyond a double's range are those of data all the same: infinite with their sign, or 0.
+// Numbers beyond the range of double are data: infinite with their sign, or 0.
 TEST(VtkXmlFile, TextBeyondTheNumericRangeIsMaskedOrZero) {
   const VtkFolder folder;
   VtkXml xml;

@@ -19,7 +19,7 @@ constexpr double no_limit = std::numeric_limits<double>::infinity();
 constexpr Micros frame_us = 33'000;
 const quality::Viewpoint viewpoint{1, {0, 1, 0}, 1280, 720};
 
-// Pixels decide the time, the prior the error.
+// Pixels decide the time, the prior decides the error.
 Forecasts surveyed(double full_ms) {
   Forecasts out = quality::Table(quality::Kind{}).forecasts(viewpoint);
   for (std::size_t i = 0; i < out.size(); ++i) {
@@ -37,7 +37,7 @@ struct Drag {
   protocol::View view;
   Micros now = 0;
 
-  // `count` frames; the settings drawn. A setting takes `slower` times what is forecast.
+  // Settings of `count` frames. A setting takes `slower` times its forecast.
   std::vector<std::size_t> run(const Forecasts& known, const quality::Aim& aim, int count,
                                const std::function<double(int frame)>& slower) {
     std::vector<std::size_t> drawn;
@@ -101,12 +101,12 @@ TEST(Chooser, FastestSettingWithinTheErrorIsChosen) {
   }
 }
 
-// Nothing is surveyed: what finer pictures take is only guessed, and each is tried in its turn.
+// Without a calibration run times of finer pictures are only estimates, tried one by one.
 TEST(Chooser, WithoutACalibrationRunFinerPicturesAreTriedOneByOne) {
   Drag drag;
   const Forecasts guessed = quality::Table(quality::Kind{}).forecasts(viewpoint);
   const quality::Aim aim{30.0, std::nullopt};
-  // Ten times as slow as guessed, and then a tenth of that.
+  // Ten times as slow as estimated, then a tenth of it.
   const auto slow = drag.run(guessed, aim, 20, [](int) { return 10.0; });
   std::vector<std::size_t> fast;
   for (int n = 0; n < 20; ++n) {

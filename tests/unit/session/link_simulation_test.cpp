@@ -1,4 +1,8 @@
-// Pacing on simulated links: how old frames are when they arrive, how many come, and what waits.
+// Pacing on simulated links: age of frames on arrival, frame rate, queueing. The age of a frame is
+// its arrival less t of the newest patch it shows, on the client's clock. Link time is the
+// transmission of that patch and of the frame: 2 delay, plus the bytes of the frame and its texts
+// over the rate. A render interval is the median time between starts of renders of moving frames.
+// Then p99(age - link time) <= 2 render intervals.
 //
 // Of a frame, `age` is its arrival less t of the newest patch it shows, on the viewer's clock. The
 // link's time is the way of that patch there and of the frame back, 2 delay, with the bytes of the
@@ -55,7 +59,7 @@ Told tell(const Viewer& viewer, const LinkOptions& link) {
 
 constexpr double whole = 1280 * 720;  // pixels
 
-// Median of what frames cost.
+// Median cost of frames.
 Micros drawing_time(const Told& told, Micros full) {
   std::vector<Micros> costs;
   for (const Shown& frame : told.moving) {
@@ -132,7 +136,7 @@ TEST(Simulated, MovingFramesLeaveTheLinkSoonAndAreGoodOnAFastLink) {
     const Micros begin = clock.now();
     viewer.drag(begin + 10 * second);
     clock.run_until(begin + 10 * second);
-    // The first frames went before anything was known of the link.
+    // The first frames were sent before the link was known.
     std::vector<Micros> on_link;
     for (std::size_t n = 3; n < viewer.frames.size(); ++n) {
       on_link.push_back(
@@ -142,7 +146,7 @@ TEST(Simulated, MovingFramesLeaveTheLinkSoonAndAreGoodOnAFastLink) {
     }
     ASSERT_FALSE(on_link.empty());
     EXPECT_LE(quantile(on_link, 1), 300 * milli);
-    // 1280x720 at quality 85 are some 80 kB: 6 ms at 100 Mbit/s, less than a quarter of 33 ms.
+    // 1280x720 at quality 85 are about 80 kB: 6 ms at 100 Mbit/s, less than a quarter of 33 ms.
     const Shown& last = viewer.frames.back();
     if (c.link.bytes_per_s >= 100 * mbit) {
       EXPECT_EQ(last.quality, 85);
@@ -153,7 +157,7 @@ TEST(Simulated, MovingFramesLeaveTheLinkSoonAndAreGoodOnAFastLink) {
     if (c.link.bytes_per_s <= mbit) {
       EXPECT_EQ(last.quality, 40);
       EXPECT_LE(last.pixels, whole / 16);
-      EXPECT_GE(last.pixels, whole / 40) << "not coarser than it must be";
+      EXPECT_GE(last.pixels, whole / 40) << "not coarser than necessary";
     }
   }
 }
@@ -178,7 +182,7 @@ TEST(Simulated, SlowingAndRecoveringLinkIsFollowed) {
     const bool good = frame.pixels == whole && frame.quality >= 75;
     if (frame.arrived > begin + 40 * second && good && recovered == 0) recovered = frame.arrived;
   }
-  EXPECT_GE(slow_frames, 18 * 7) << "a second seven or more";
+  EXPECT_GE(slow_frames, 18 * 7) << "at least seven per second";
   ASSERT_GT(recovered, 0);
   EXPECT_LE(recovered, begin + 43 * second);
 }
@@ -194,7 +198,7 @@ TEST(Simulated, ShortRestDoesNotFillASlowLinkWithAFinalFrame) {
     clock.run_until(begin + 10 * second);
     ASSERT_TRUE(viewer.frames.back().final);
     const std::size_t before = viewer.frames.size();
-    for (int n = 0; n < 8; ++n) {  // the hand moves for 1 s and rests for half of one
+    for (int n = 0; n < 8; ++n) {  // input for 1 s, then 0.5 s of rest
       viewer.drag(clock.now() + 1 * second);
       clock.run_until(clock.now() + 1500 * milli);
     }
@@ -245,7 +249,7 @@ TEST(Simulated, SlowSessionDoesNotSlowAnother) {
     count.push_back(static_cast<double>(told.back().moving.size()));
     EXPECT_EQ(other.frames.empty(), alone);
   }
-  // The other's few renders are all that is missing.
+  // Only the few renders of the other session are missing.
   EXPECT_GE(count[1], 0.9 * count[0]);
   EXPECT_LE(quantile(told[1].beyond, 0.99), 2 * told[1].interval + 20 * milli);
 }

@@ -10,7 +10,7 @@ namespace {
 
 constexpr Micros milli = 1000;
 
-// A link of `rate` bytes/s and `trip` there and back, on which one frame is at a time.
+// A link with `rate` bytes/s and round trip `trip` that carries one frame at a time.
 struct Known {
   double rate = 1e6;
   Micros trip = 40 * milli;
@@ -35,7 +35,7 @@ TEST(Link, HasNoEstimateBeforeAnAcknowledgement) {
   EXPECT_EQ(link.may_start_at(), 0);
   link.sent({1, 1000, 0, true}, 10);
   EXPECT_FALSE(link.known());
-  EXPECT_EQ(link.may_start_at(), 0) << "the credit alone holds it back";
+  EXPECT_EQ(link.may_start_at(), 0) << "only credit delays it";
   EXPECT_EQ(link.bytes_in_flight(), 1000U);
 }
 
@@ -70,7 +70,7 @@ TEST(Link, TwoSlowFramesLowerTheRate) {
   for (int n = 0; n < 20; ++n) known.send(link, 50'000);
   known.rate = 1e5;
   known.send(link, 50'000);
-  EXPECT_NEAR(link.bytes_per_s(), 1e6, 1e3) << "one may have been held up";
+  EXPECT_NEAR(link.bytes_per_s(), 1e6, 1e3) << "one frame may have been delayed";
   known.send(link, 50'000);
   EXPECT_NEAR(link.bytes_per_s(), 1e5, 1e2);
 }
@@ -84,7 +84,7 @@ TEST(Link, SmallFramesLowerNothingAndLargerOnesDo) {
   EXPECT_NEAR(link.bytes_per_s(), 2e6, 2e3);
   known.rate = 1e5;
   for (int n = 0; n < 8; ++n) known.send(link, 100'000);
-  EXPECT_NEAR(link.bytes_per_s(), 1e5, 1e2) << "it has become slow";
+  EXPECT_NEAR(link.bytes_per_s(), 1e5, 1e2) << "the link has become slow";
 }
 
 TEST(Link, WithoutPongsTheSmallestFrameGivesTheRoundTrip) {
@@ -120,7 +120,7 @@ TEST(Link, ConsecutiveFramesRevealTheRateHiddenByTheSecond) {
 }
 
 TEST(Link, NextFrameStartsSoThatTheLinkIsFree) {
-  Known known;  // 1 MB/s; frames are drawn in 10 ms
+  Known known;  // 1 MB/s; frames take 10 ms to render
   known.trip = 4 * milli;
   Link link;
   for (int n = 0; n < 4; ++n) known.send(link, 60'000);
@@ -141,7 +141,8 @@ TEST(Link, NextFrameStartsSoThatTheClientIsFree) {
   for (int n = 0; n < 12; ++n) known.send(link, 20'000);
   const Micros sent = known.now;
   link.sent({++known.seq, 20'000, sent - 10 * milli, true}, sent);
-  // It arrives 20 ms later, is decoded for 200 ms; the next takes 10 ms to draw, 20 to arrive.
+  // It arrives 20 ms later and takes 200 ms to decode; the next takes 10 ms to render, 20 to
+  // arrive.
   EXPECT_NEAR(static_cast<double>(link.may_start_at()),
               static_cast<double>(sent + (20 + 200 - 20 - 10) * milli), 1.0 * milli);
 }
@@ -160,7 +161,7 @@ TEST(Link, DistantClientsGetTheirTwoFramesEvenlySpaced) {
 
 // --- JPEG ---------------------------------------------------------------------------------------
 
-// A link of that rate on which nothing is in flight.
+// An idle link of that rate.
 Link link_of(double rate) {
   Known known;
   known.rate = rate;
@@ -172,7 +173,7 @@ Link link_of(double rate) {
 constexpr Micros budget = 33 * milli;
 constexpr double full = 1280 * 720;
 
-// Frames of a picture whose bytes obey the model with c = 0.7, at what is chosen for them.
+// Frames whose bytes follow the model with c = 0.7 at the chosen quality.
 int settled(JpegRate& jpeg, const Link& link, double pixels) {
   int quality = 0;
   for (int n = 0; n < 20; ++n) {
@@ -227,7 +228,7 @@ TEST(JpegRate, LevelChangesWhenTheLowestQualityIsTooLarge) {
     for (int n = 0; n < 5; ++n) level = jpeg.least_level(1280, 720, link, budget);
     EXPECT_LE(level, before);
     before = level;
-    // Just as many pixels as take moving_most_us, where any do.
+    // The most pixels that fit within moving_most_us, if any do.
     const double bytes = jpeg.predicted_bytes(most, JpegRate::quality_least) + 1700;
     if (rate > 5e4) {
       EXPECT_NEAR(bytes / rate, 0.125, 0.002) << rate;
@@ -237,14 +238,14 @@ TEST(JpegRate, LevelChangesWhenTheLowestQualityIsTooLarge) {
       EXPECT_LE(drawn, 1.25 * most);
     }
     if (level > 0) {
-      EXPECT_GT(4 * drawn, most) << "no coarser than it must be";
+      EXPECT_GT(4 * drawn, most) << "not coarser than necessary";
     }
   }
   EXPECT_EQ(before, 0);
 }
 
 TEST(JpegRate, SmallVariationsOfPicturesKeepTheLevel) {
-  // However near to a change of level the link happens to be.
+  // However near the rate is to a change of level.
   for (double rate = 1e5; rate < 3e5; rate *= 1.03) {
     JpegRate jpeg;
     const Link link = link_of(rate);

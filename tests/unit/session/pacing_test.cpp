@@ -22,7 +22,7 @@ TEST(Pacing, SinglePatchGivesAMovingAndThenTheFinalFrame) {
 
   driver.ack(1);
   driver.wait(100 * ms);
-  EXPECT_FALSE(driver.render) << "too early: the viewer may go on moving";
+  EXPECT_FALSE(driver.render) << "too early: motion may continue";
   driver.wait(60 * ms);
   ASSERT_TRUE(driver.render);
   EXPECT_EQ(driver.render->setting.half_level, 0);
@@ -35,7 +35,7 @@ TEST(Pacing, SinglePatchGivesAMovingAndThenTheFinalFrame) {
 
   driver.ack(2);
   driver.wait(5000 * ms);
-  EXPECT_FALSE(driver.render) << "nothing is left to draw";
+  EXPECT_FALSE(driver.render) << "nothing is left to render";
 }
 
 TEST(Pacing, MovingFramesUseKernelsAndFinalOnesTheRequestedMethod) {
@@ -98,7 +98,7 @@ TEST(Pacing, FinalFrameHasHighQualityOnAnyLink) {
   for (std::uint32_t rev = 2; rev < 12; ++rev) {
     driver.patch(rev, azimuth(static_cast<int>(rev)));
     driver.finish_render();
-    driver.wait(100 * ms);  // for not even 1 kB
+    driver.wait(100 * ms);  // insufficient even for 1 kB
     driver.ack(rev);
   }
   EXPECT_EQ(driver.frames.back().header.quality, 40);
@@ -120,7 +120,7 @@ TEST(Pacing, NoThirdFrameBeforeAnAcknowledgement) {
     driver.wait(50 * ms);
   }
   EXPECT_EQ(driver.frames.size(), 2U);
-  EXPECT_FALSE(driver.render) << "a frame that cannot be sent would be old when it can";
+  EXPECT_FALSE(driver.render) << "a frame without credit would be outdated when sent";
 
   driver.ack(2);  // stands for frame 1 too
   driver.finish_render();
@@ -156,7 +156,7 @@ TEST(Pacing, SteadyPatchesStarveNoSession) {
     if (driver.render) {
       busy += 10 * ms;
       EXPECT_FALSE(driver.cancelled && !driver.render->encoding.full_chroma)
-          << "moving frames are let finish";
+          << "moving frames are completed";
     }
     driver.wait(10 * ms);
     if (busy >= 30 * ms) {
@@ -166,12 +166,12 @@ TEST(Pacing, SteadyPatchesStarveNoSession) {
     }
   }
   const std::size_t moved = driver.frames.size() - before;
-  EXPECT_GE(moved, 40U) << "about one a render time";
+  EXPECT_GE(moved, 40U) << "about one per render time";
   for (std::size_t n = before + 1; n < driver.frames.size(); ++n) {
     EXPECT_GT(driver.frames[n].header.rev, driver.frames[n - 1].header.rev);
     EXPECT_FALSE(Driver::is_final(driver.frames[n]));
   }
-  EXPECT_GE(driver.frames.back().header.rev + 10, rev) << "and never far behind";
+  EXPECT_GE(driver.frames.back().header.rev + 10, rev) << "never far behind";
 }
 
 TEST(Pacing, AfterStoppingOnlyTheNewestViewIsShown) {
@@ -186,7 +186,7 @@ TEST(Pacing, AfterStoppingOnlyTheNewestViewIsShown) {
   for (std::size_t n = before; n < driver.frames.size(); ++n) {
     revs.push_back(driver.frames[n].header.rev);
   }
-  // The frame under way when the flow began, the newest while moving, the newest for good.
+  // The frame that was running at the start, the newest in motion, and the final one.
   EXPECT_THAT(revs, ElementsAre(2U, 30U, 30U));
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
@@ -201,7 +201,7 @@ TEST(Pacing, ChangeCancelsTheFinalFrameForAMovingOne) {
   driver.patch(2, azimuth(1));
   EXPECT_TRUE(driver.cancelled);
   driver.finish_render(1 * ms);
-  EXPECT_EQ(driver.frames.size(), 1U) << "what was given up is not sent";
+  EXPECT_EQ(driver.frames.size(), 1U) << "a cancelled frame is not sent";
   ASSERT_TRUE(driver.render);
   EXPECT_FALSE(driver.render->encoding.full_chroma);
   driver.finish_render();
@@ -269,7 +269,7 @@ TEST(Unchanged, EquivalentPatchIsAnsweredWithoutAFrame) {
 
   driver.patch(5, azimuth(2));
   driver.settle();
-  EXPECT_EQ(driver.frames.back().header.rev, 5U) << "the next change shows";
+  EXPECT_EQ(driver.frames.back().header.rev, 5U) << "the next change is visible";
   EXPECT_EQ(unchanged_revs(driver), (Revs{2, 3, 4}));
 }
 
@@ -305,7 +305,7 @@ TEST(Unchanged, ReturnToTheShownViewDuringARenderIsRenderedAgain) {
   driver.patch(2, azimuth(1));
   ASSERT_TRUE(driver.render);
   driver.patch(3, R"({"camera":{"eye":null}})");
-  EXPECT_TRUE(unchanged_revs(driver).empty()) << "the frame of rev 2 is still to come";
+  EXPECT_TRUE(unchanged_revs(driver).empty()) << "the frame of rev 2 is still pending";
   driver.settle();
   EXPECT_EQ(driver.frames.back().header.rev, 3U);
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
@@ -341,7 +341,7 @@ TEST(Unchanged, CameraMotionWithoutVisibleContentSendsNothing) {
   EXPECT_EQ(unchanged_revs(driver), (Revs{2, 3, 4, 5}));
   driver.patch(6, azimuth(3));
   driver.settle();
-  EXPECT_EQ(driver.frames.back().header.rev, 6U) << "now something shows";
+  EXPECT_EQ(driver.frames.back().header.rev, 6U) << "content is visible again";
   EXPECT_GT(driver.frames.size(), frames);
 }
 
@@ -355,7 +355,7 @@ TEST(Unchanged, EmptyMovingFrameDoesNotStandForTheFinalOne) {
   EXPECT_FALSE(driver.render->encoding.full_chroma) << "a moving frame is sent first";
   driver.finish_render(10 * ms);
   EXPECT_EQ(driver.frames.size(), frames);
-  EXPECT_TRUE(unchanged_revs(driver).empty()) << "that is not known yet";
+  EXPECT_TRUE(unchanged_revs(driver).empty()) << "not known yet";
   driver.settle(200 * ms);
   ASSERT_EQ(driver.frames.size(), frames + 1);
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
@@ -388,7 +388,7 @@ TEST(Unchanged, ReturnAfterARefusalAnswersOpenPatchesOnly) {
   driver.settle();
   ASSERT_EQ(driver.errors().size(), 1U);
   EXPECT_EQ(driver.errors()[0].rev, 2U);
-  EXPECT_TRUE(unchanged_revs(driver).empty()) << "rev 1 was answered long ago";
+  EXPECT_TRUE(unchanged_revs(driver).empty()) << "rev 1 was already answered";
 }
 
 TEST(Unchanged, EmptyViewDifferingInMoreThanTheCameraIsSent) {

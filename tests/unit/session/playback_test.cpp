@@ -11,7 +11,7 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-// A dataset of `steps` steps at rest at `step`, with nothing recorded of how it came there.
+// A dataset of `steps` steps at rest at `step`, with the recorded history cleared.
 void rest_at(Driver& driver, int step) {
   driver.patch(1, R"({"dataset":"wind","step":)" + std::to_string(step) + "}");
   driver.settle();
@@ -20,7 +20,7 @@ void rest_at(Driver& driver, int step) {
   driver.requests.clear();
 }
 
-// Draws each frame in `cost` and acknowledges it, for `duration`.
+// Renders each frame in `cost` and acknowledges it, for `duration`.
 void run_and_acknowledge(Driver& driver, Micros duration, Micros cost, bool loaded = false) {
   const Micros end = driver.now() + duration;
   while (driver.now() < end) {
@@ -70,7 +70,7 @@ TEST(Reverse, WithDropSkipsDownwardAndAcrossTheEnd) {
   driver.say(play(9, 0, 10, true, true));
   driver.wait(105 * ms);
   ASSERT_EQ(driver.render->view.step, 2);
-  driver.finish_render(500 * ms);  // the steps 1 to 0 and 9 to 7 go by
+  driver.finish_render(500 * ms);  // steps 1 to 0 and 9 to 7 are skipped
   EXPECT_EQ(driver.render->view.step, 7);
 }
 
@@ -82,13 +82,13 @@ TEST(Reverse, FromBeyondTheLastStepIsAnError) {
   EXPECT_EQ(driver.errors()[0].problem.errors.at(0).pointer, "/from");
 }
 
-// --- changes on the way -------------------------------------------------------------------------
+// --- changes during playback --------------------------------------------------------------------
 
 TEST(Seamless, FasterPaceContinuesFromThePresentStep) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 1, true, true));
-  run_and_acknowledge(driver, 1010 * ms, 5 * ms);  // step 1 came just now
+  run_and_acknowledge(driver, 1010 * ms, 5 * ms);  // step 1 was just shown
   driver.frames.clear();
   driver.say(play(0, 9, 10, true, true));
   run_and_acknowledge(driver, 350 * ms, 5 * ms);
@@ -121,7 +121,7 @@ TEST(Seamless, DroppingFromNowOnDoesNotSkipLateSteps) {
   driver.say(play(0, 9, 10, true, false));
   driver.wait(105 * ms);
   ASSERT_EQ(driver.render->view.step, 1);
-  driver.wait(600 * ms);  // still being drawn
+  driver.wait(600 * ms);  // still rendering
   driver.say(play(0, 9, 10, true, true));
   driver.finish_render(1 * ms);
   EXPECT_EQ(driver.render->view.step, 2);
@@ -183,7 +183,7 @@ TEST(Hidden, StepsWaitUntilVisible) {
   driver.say(play(0, 9, 10, true, true));
   run_and_acknowledge(driver, 210 * ms, 5 * ms);
   driver.say(protocol::VisibilityMessage{true});
-  driver.wait(3370 * ms);  // no whole number of rounds
+  driver.wait(3370 * ms);  // no whole number of loops
   driver.say(protocol::VisibilityMessage{false});
   driver.frames.clear();
   run_and_acknowledge(driver, 250 * ms, 5 * ms);
@@ -198,7 +198,7 @@ TEST(PlayStats, ReportThePaceAndThatNothingWasDropped) {
   driver.say(play(0, 9, 25, true, true));
   run_and_acknowledge(driver, 3200 * ms, 10 * ms);
   const auto stats = driver.texts_of<protocol::StatsMessage>();
-  ASSERT_EQ(stats.size(), 3U) << "one a second";
+  ASSERT_EQ(stats.size(), 3U) << "one per second";
   for (const auto& told : stats) EXPECT_NEAR(told.play_fps.value_or(0), 25, 0.5);
   EXPECT_EQ(stats.back().steps_dropped, 0U);
   EXPECT_EQ(stats.back().steps_not_ready, 0U);
@@ -221,7 +221,7 @@ TEST(PlayStats, ShownAndDroppedStepsAddUp) {
     rest_at(driver, 0);
     driver.say(play(0, 9, 20, true, true));
     run_and_acknowledge(driver, 4020 * ms, cost);
-    const int showing = driver.render ? 1 : 0;  // begun, so it will be shown
+    const int showing = driver.render ? 1 : 0;  // started, so it will be shown
     const auto shown = static_cast<std::int64_t>(moving_steps(driver).size()) + showing;
     driver.say(protocol::PauseMessage{});
     driver.settle();
@@ -246,7 +246,7 @@ TEST(PlayStats, CountStepsThatWaitedForLoading) {
   driver.say(play(0, 9, 10, true, true));
   run_and_acknowledge(driver, 305 * ms, 5 * ms, true);
   EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 2U, 3U));
-  driver.patch(2, R"({"camera":{"fovY":20}})");  // its frame is not the step's first
+  driver.patch(2, R"({"camera":{"fovY":20}})");  // its frame is not the first of the step
   run_and_acknowledge(driver, 20 * ms, 5 * ms, true);
   driver.say(protocol::PauseMessage{});
   driver.settle();

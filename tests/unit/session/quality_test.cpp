@@ -10,7 +10,7 @@ namespace {
 
 // --- settings -----------------------------------------------------------------------------------
 
-// As a survey would find them where a full picture by kernels takes `full_ms`: time goes with
+// Results of a calibration run where a full kernel picture takes `full_ms`: time is proportional to
 // pixels and samples, slabs take four times as long.
 quality::Forecasts surveyed(double full_ms) {
   quality::Forecasts out = quality::Table(quality::Kind{}).forecasts({1, {0, 1, 0}, 1280, 720});
@@ -24,7 +24,7 @@ quality::Forecasts surveyed(double full_ms) {
   return out;
 }
 
-// Drags for `count` frames whose cost follows the setting; the settings drawn.
+// Settings of `count` dragged frames whose cost depends on the setting.
 std::vector<quality::Setting> drag(Driver& driver, int count, std::uint32_t& rev,
                                    const std::function<Micros(const quality::Setting&)>& cost) {
   std::vector<quality::Setting> drawn;
@@ -39,7 +39,7 @@ std::vector<quality::Setting> drag(Driver& driver, int count, std::uint32_t& rev
   return drawn;
 }
 
-// What a setting takes on a machine that is `slower` than the one surveyed.
+// Time of a setting on a machine `slower` than the calibrated one.
 std::function<Micros(const quality::Setting&)> costs(const quality::Forecasts& known,
                                                      double slower = 1) {
   return [known, slower](const quality::Setting& setting) {
@@ -85,7 +85,7 @@ TEST(Setting, KeepsTheBudgetOnASlowedMachine) {
     for (std::size_t n = 10; n < drawn.size(); ++n) {
       EXPECT_LE(cost(drawn[n]), 1000 * budget) << "frame " << n << " at " << budget << " ms";
     }
-    // Of what the budget allows with room to spare, nothing errs less.
+    // Of the settings well within the budget none has a smaller error.
     const auto error = [&](const quality::Setting& setting) {
       return (*driver.surveyed)[quality::index_of(setting).value()].error;
     };
@@ -143,13 +143,13 @@ TEST(Setting, RequestedErrorReplacesTheBudget) {
   driver.finish_render(costs(*driver.surveyed)(driver.render->setting));
   driver.ack(1);
   const auto drawn = drag(driver, 20, rev, costs(*driver.surveyed));
-  EXPECT_EQ(drawn.back().method, protocol::MethodName::slab) << "whatever it takes";
+  EXPECT_EQ(drawn.back().method, protocol::MethodName::slab) << "at any cost";
   driver.patch(++rev, R"({"quality":{"budgetMs":16}})");
   const auto late = drag(driver, 20, rev, costs(*driver.surveyed));
-  EXPECT_EQ(late.back().method, protocol::MethodName::kernel) << "a budget comes first";
+  EXPECT_EQ(late.back().method, protocol::MethodName::kernel) << "a budget has precedence";
 }
 
-// Sixteen viewers of one kind: each waits for fifteen frames of the others, and all of them shrink.
+// Sixteen equal sessions: each waits for fifteen frames of the others, and all shrink their frames.
 TEST(Setting, FramesBecomeCheaperWhenManyWaitForTheRenderer) {
   Driver driver;
   driver.surveyed = surveyed(33);
@@ -168,7 +168,7 @@ TEST(Setting, FramesBecomeCheaperWhenManyWaitForTheRenderer) {
   EXPECT_GE(own, 4 * ms);
 }
 
-// --- the way to the final frame -----------------------------------------------------------------
+// --- refinement to the final frame ---------------------------------------------------------------
 
 TEST(Refining, LongFinalFrameIsPrecededByABetterOne) {
   Driver driver;
@@ -192,7 +192,7 @@ TEST(Refining, LongFinalFrameIsPrecededByABetterOne) {
   ASSERT_GE(drawn.size(), 2U);
   float before = driver.frames[moved - 1].header.error;
   for (std::size_t n = moved; n < driver.frames.size(); ++n) {
-    EXPECT_LE(driver.frames[n].header.error, 0.5F * before) << "each is worth its time";
+    EXPECT_LE(driver.frames[n].header.error, 0.5F * before) << "each refinement is worth its time";
     before = driver.frames[n].header.error;
     EXPECT_EQ(Driver::is_final(driver.frames[n]), n + 1 == driver.frames.size());
   }
@@ -217,7 +217,7 @@ TEST(Refining, IsCancelledByTheNextChange) {
 
 TEST(Refining, SlabsBecomeThinnerUntilTheRequestedErrorIsMet) {
   Driver driver;
-  driver.measured_error = 1e-3;  // a quarter of it with every halving
+  driver.measured_error = 1e-3;  // a quarter with every halving
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.0001}})");
   driver.settle();
   ASSERT_GE(driver.frames.size(), 3U);
@@ -236,7 +236,7 @@ TEST(Refining, EndsWhereThinnerSlabsDoNotHelp) {
   driver.settle();
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
   EXPECT_EQ(driver.frames.back().header.error, 1e-2F);
-  EXPECT_LE(driver.frames.size(), 3U) << "one moving, one halving tried";
+  EXPECT_LE(driver.frames.size(), 3U) << "one moving frame, one halving tried";
 }
 
 TEST(Setting, LateFrameOfAnotherDatasetIsIgnored) {
@@ -260,7 +260,7 @@ TEST(Refining, EndsWhereNoSlabIsThinEnough) {
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.000001}})");
   driver.settle();
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
-  EXPECT_GT(driver.frames.back().header.error, 1e-6F) << "and says that it is not";
+  EXPECT_GT(driver.frames.back().header.error, 1e-6F) << "reports that the error is not met";
 }
 
 TEST(Refining, LosslessFinalFrameIsAPng) {
@@ -285,7 +285,7 @@ TEST(Refining, ViewAtRestIsCalibratedOnce) {
     driver.ack(driver.frames.back().header.seq);
     driver.wait(10 * ms);
   }
-  EXPECT_EQ(driver.calibrations.size(), 1U) << "not while steps run";
+  EXPECT_EQ(driver.calibrations.size(), 1U) << "not during playback";
 }
 
 }  // namespace

@@ -28,14 +28,14 @@ TEST(Store, ChangedFileIsReopenedUnderItsName) {
 
   write_small(folder / "new.nc", 50);
   std::filesystem::rename(folder / "new.nc", folder / "rain.nc");
-  EXPECT_TRUE(store.look_for_changes(3600).empty()) << "it may still be being written";
+  EXPECT_TRUE(store.look_for_changes(3600).empty()) << "it may still be incomplete";
   EXPECT_EQ(store.look_for_changes(0), std::vector<std::string>{"rain"});
   const auto after = store.find("rain").value();
   EXPECT_NE(after, before);
   EXPECT_EQ(after->volume("f", 0).value()->values[3], 53.0F);
-  EXPECT_EQ(held->values[3], 3.0F) << "what was held stays what it was";
+  EXPECT_EQ(held->values[3], 3.0F) << "held volumes are unchanged";
 
-  std::ofstream(folder / "rain.nc", std::ios::trunc) << "no longer a file of numbers";
+  std::ofstream(folder / "rain.nc", std::ios::trunc) << "no longer a netCDF file";
   EXPECT_TRUE(store.look_for_changes(0).empty());
   EXPECT_EQ(store.find("rain").value(), after) << "the old data stay";
   EXPECT_NE(store.problem("rain").find("changed"), std::string::npos);
@@ -89,7 +89,7 @@ TEST(Store, OmittedFilesOfASeriesAreNoted) {
   EXPECT_EQ(store.note(id), "");
 }
 
-// Like a running model's output: the same file of the same size.
+// Like the output of a running model: the same file of the same size.
 TEST(Store, FileOverwrittenInPlaceIsReopened) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
@@ -128,7 +128,7 @@ TEST(Store, FailedReopenIsRetriedAfterAChange) {
   EXPECT_EQ(store.problem("rain"), "");
 }
 
-// A first view that fits no more would make every frame an error.
+// A first view that no longer fits would make every frame an error.
 TEST(Store, DatasetThatFailsTheCheckDoesNotReplaceAValidOne) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
@@ -179,7 +179,7 @@ TEST(Store, FailedDatasetIsOpenedWhenItsFileIsReplaced) {
     store.list_failed(name, store.add(name).error());
   }
   EXPECT_TRUE(store.look_for_changes(0).empty());
-  EXPECT_EQ(opened, 2) << "it may have changed while it was opened";
+  EXPECT_EQ(opened, 2) << "it may have changed while opening";
   EXPECT_TRUE(store.look_for_changes(0).empty());
   EXPECT_EQ(opened, 2);
   store.try_failed_again();
@@ -189,7 +189,7 @@ TEST(Store, FailedDatasetIsOpenedWhenItsFileIsReplaced) {
 
   write_small(rain, 50);
   write_small(snow, 50);
-  EXPECT_TRUE(store.look_for_changes(3600).empty()) << "they may still be being written";
+  EXPECT_TRUE(store.look_for_changes(3600).empty()) << "they may still be incomplete";
   EXPECT_EQ(store.look_for_changes(0), (std::vector<std::string>{"rain", "snow"}));
   EXPECT_TRUE(store.failed().empty());
   EXPECT_EQ(store.find("rain").value()->volume("f", 0).value()->values[3], 53.0F);
@@ -203,7 +203,7 @@ TEST(Store, DatasetOpenedByItsNewNameIsNoLongerFailed) {
   write_small(late, 50);
   const auto added = store.add(late);
   ASSERT_TRUE(added);
-  EXPECT_TRUE(store.look_for_changes(0).empty()) << "it was open already";
+  EXPECT_TRUE(store.look_for_changes(0).empty()) << "it was already open";
   EXPECT_TRUE(store.failed().empty());
   EXPECT_EQ(store.all().size(), 1U);
 }

@@ -1,4 +1,4 @@
-// What is loaded when: handles that never load, loading ahead of need, packed storage.
+// Loading of volumes: handles that never load, prefetch, packed storage.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -24,8 +24,8 @@ constexpr std::size_t edge = 10;
 constexpr std::uint64_t volume_bytes = edge * edge * edge * sizeof(float);
 constexpr std::size_t last_step = 99;
 
-// A field of 10 x 10 x 10 samples, 100 steps; sample n of step s is s + n / 1000, of the last one
-// s + n / 125. Notes what is read, and when.
+// A field of 10 x 10 x 10 samples, 100 steps; sample n of step s is s + n / 1000, of the last step
+// s + n / 125. Records what is read and when.
 class Series : public Source {
  public:
   struct Log {
@@ -115,7 +115,7 @@ struct Fixture {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
-  // Until so many volumes were read, or for ten seconds.
+  // Waits until that many volumes were read, or for ten seconds.
   void wait_for_reads(std::size_t count) const {
     for (int i = 0; i < 10000 && log->read().size() < count; ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -126,7 +126,7 @@ struct Fixture {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
-  // Time in which a thread that had something to load would have begun.
+  // Time in which a thread with pending loads would have started.
   static void settle() { std::this_thread::sleep_for(std::chrono::milliseconds(50)); }
 
   std::shared_ptr<Series::Log> log = std::make_shared<Series::Log>();
@@ -162,7 +162,7 @@ TEST(Resident, PrefetchRequestsAreLoadedSoonestFirst) {
   f.request_prefetch({8, 9, 10, 11});
   f.wait_for_reads(5);
   f.settle();
-  EXPECT_EQ(f.log->read().size(), 5U) << "what is there is not read again";
+  EXPECT_EQ(f.log->read().size(), 5U) << "a resident volume is not read again";
 }
 
 TEST(Resident, NewPrefetchRequestReplacesPendingOnes) {
@@ -187,7 +187,7 @@ TEST(Resident, PrefetchStaysWithinTheLimitAndKeepsRequestedVolumes) {
   EXPECT_EQ(f.store.counts().refusals, 1U) << "the fifth and sixth were not tried";
   EXPECT_LE(f.store.counts().bytes, 4 * volume_bytes);
   for (const std::size_t step : {1, 2, 3}) EXPECT_TRUE(f.is_resident(step)) << step;
-  // A demand takes the place of what is not wished for, or else of the least recently used.
+  // A demand evicts volumes without a prefetch request first, then the least recently used.
   f.request_prefetch({2, 3});
   ASSERT_TRUE(f.dataset->volume("f", 20));
   EXPECT_FALSE(f.is_resident(1));
@@ -195,7 +195,7 @@ TEST(Resident, PrefetchStaysWithinTheLimitAndKeepsRequestedVolumes) {
   EXPECT_TRUE(f.is_resident(3));
 }
 
-// Least-recently-used alone would take the oldest.
+// Least-recently-used alone would evict the oldest.
 TEST(Resident, UnrequestedVolumesAreEvictedBeforeOlderRequests) {
   Fixture f(3);
   for (const std::size_t step : {1, 2, 3}) ASSERT_TRUE(f.dataset->volume("f", step));
@@ -216,7 +216,7 @@ TEST(Resident, RequestedAverageStaysThoughItCouldBeRecomputed) {
   f.store.request_prefetch(1, {{*f.dataset, "f", 0, half}});
   ASSERT_TRUE(f.dataset->volume("f", 3));
   EXPECT_TRUE(f.dataset->resident_only().level("f", 0, half));
-  EXPECT_FALSE(f.is_resident(0)) << "the oldest that nobody wishes for";
+  EXPECT_FALSE(f.is_resident(0)) << "the oldest without a request";
 }
 
 TEST(Resident, OwnersOfPrefetchRequestsTakeTurns) {
@@ -242,8 +242,8 @@ TEST(Resident, RemovedDatasetIsNoLongerLoaded) {
   EXPECT_EQ(f.log->read(), std::vector<std::size_t>{1});
 }
 
-// A series larger than memory, played in a loop with the next steps wished for: every step is there
-// when it is shown, though least-recently-used alone would have evicted each before its return.
+// A series larger than memory, played in a loop with prefetch: every step is resident when shown,
+// though least-recently-used alone would evict each before its next use.
 TEST(Resident, SeriesLargerThanMemoryPlaysEveryStep) {
   Fixture f(8);
   constexpr std::size_t steps = 20;
@@ -260,7 +260,7 @@ TEST(Resident, SeriesLargerThanMemoryPlaysEveryStep) {
     EXPECT_EQ((*f.dataset->volume("f", step))->values[0], static_cast<float>(step));
     EXPECT_LE(f.store.counts().bytes, 8 * volume_bytes);
   }
-  EXPECT_LE(waited_for, 1U) << "but for the first";
+  EXPECT_LE(waited_for, 1U) << "except the first";
 }
 
 TEST(Resident, DemandedLoadPrecedesPrefetch) {
@@ -274,7 +274,7 @@ TEST(Resident, DemandedLoadPrecedesPrefetch) {
   waiting.join();
   const auto read = f.log->read();
   ASSERT_GE(read.size(), 2U);
-  EXPECT_EQ(read[1], 60U) << "right after the one in work";
+  EXPECT_EQ(read[1], 60U) << "right after the running one";
 }
 
 TEST(Resident, EvictionFreesUnreferencedVolumes) {
@@ -282,11 +282,11 @@ TEST(Resident, EvictionFreesUnreferencedVolumes) {
   const auto held = f.dataset->volume("f", 0);
   ASSERT_TRUE(f.dataset->volume("f", 1));
   f.dataset->evict();
-  EXPECT_EQ(f.log->cancelled, 1) << "whatever is being read is given up";
+  EXPECT_EQ(f.log->cancelled, 1) << "the running read is cancelled";
   EXPECT_EQ(f.dataset->resident_bytes(), volume_bytes);
   EXPECT_TRUE(f.is_resident(0));
   EXPECT_FALSE(f.is_resident(1));
-  EXPECT_EQ(f.dataset->seen("f", 1)->range[0], 1.0F) << "its range is remembered";
+  EXPECT_EQ(f.dataset->seen("f", 1)->range[0], 1.0F) << "its range is cached";
 }
 
 // The caller still waits, so the error states why the data were removed.
@@ -367,7 +367,7 @@ TEST(Resident, ValuesAreCachedByKeyAndFailuresAreNot) {
   EXPECT_EQ(made, 3);
 }
 
-// A moment of coarser frames must not cost the series what it has read.
+// A short phase of coarser frames must not evict the series.
 TEST(Resident, AveragesAreEvictedBeforeTheirSourceVolumes) {
   Fixture f(6);
   Coarsening half;
@@ -378,7 +378,7 @@ TEST(Resident, AveragesAreEvictedBeforeTheirSourceVolumes) {
   ASSERT_TRUE(f.dataset->volume("f", 5));
   for (std::size_t step = 0; step < 6; ++step) EXPECT_TRUE(f.is_resident(step)) << step;
   EXPECT_EQ(f.dataset->counts().averages, 5U);
-  ASSERT_TRUE(f.dataset->level("f", 5, half)) << "in place of a volume now";
+  ASSERT_TRUE(f.dataset->level("f", 5, half)) << "instead of a volume";
   EXPECT_FALSE(f.is_resident(0));
 }
 
@@ -411,11 +411,11 @@ TEST(Resident, ErrorOfPackedStorageIsTheMaximumOfAllSteps) {
   Fixture f(10, Storage::packed16);
   ASSERT_TRUE(f.dataset->volume("f", last_step));
   ASSERT_TRUE(f.dataset->volume("f", 1));
-  // Half of one of 65534 steps between the least and the greatest value.
+  // Half of one of 65534 steps between minimum and maximum.
   EXPECT_NEAR(f.dataset->storage_error("f"), 0.5 * (999.0 / 125) / 65534, 1e-9);
 }
 
-// Limit: three volumes. Two that are wished for, with their packed forms, fill it.
+// Limit: three volumes. Two requested ones with their packed forms fill it.
 TEST(Resident, PackedFormDoesNotReplaceAPrefetchRequest) {
   Fixture f(3, Storage::packed16);
   f.request_prefetch({1, 2});
@@ -451,7 +451,7 @@ TEST(Packed, MaskedConstantAndExtremeValues) {
   volume.components = 1;
   volume.values = std::vector<float>{-most, most, 0, 1};
   finish_volume(volume);
-  EXPECT_FALSE(pack(volume)) << "steps would leave the range of a float";
+  EXPECT_FALSE(pack(volume)) << "quantisation steps would exceed the range of float";
   volume.values = std::vector<float>(4, nan);
   finish_volume(volume);
   const auto empty = pack(volume);

@@ -1,4 +1,5 @@
-// The store's promises: once per field and step, one budget for all, what is held stays valid.
+// Guarantees of the store: one load per field and step, one budget for all, held volumes stay
+// valid.
 #include "server/data/resident/store.hpp"
 
 #include <gtest/gtest.h>
@@ -25,8 +26,8 @@ using test::write_small;
 
 constexpr std::uint64_t kVolumeBytes = 4000;  // 10 x 10 x 10 float32
 
-// A source of 10 x 10 x 10 volumes whose every sample tells field and step. It can be made to wait
-// at a gate, and to fail.
+// A source of 10 x 10 x 10 volumes whose samples encode field and step. It can block at a gate, and
+// fail.
 class FakeSource : public Source {
  public:
   FakeSource() {
@@ -74,7 +75,7 @@ class FakeSource : public Source {
     return volume;
   }
 
-  // Holds readers until it is opened.
+  // Blocks readers until it is opened.
   class Gate {
    public:
     void wait() {
@@ -208,7 +209,7 @@ TEST(Dataset, LoadAboveTheLimitIsRefusedWithFigures) {
   const auto dataset = make_dataset(3);
   auto a = dataset->volume("a", 0);
   auto b = dataset->volume("b", 0);
-  ASSERT_TRUE(dataset->volume("c", 0));  // resident, held by nobody
+  ASSERT_TRUE(dataset->volume("c", 0));  // resident, not held
   const auto vector = dataset->volume("v", 0);
   ASSERT_FALSE(vector);
   EXPECT_EQ(vector.error().kind, ErrorKind::out_of_memory);
@@ -236,7 +237,7 @@ TEST(Dataset, FailureReachesAllWaitersAndIsRetriedLater) {
   ASSERT_FALSE(first);
   EXPECT_EQ(first.error().message, "read failed");
   EXPECT_EQ(dataset.resident_bytes(), 0U);
-  EXPECT_TRUE(dataset.volume("a", 0));  // its reservation was given back
+  EXPECT_TRUE(dataset.volume("a", 0));  // its reservation was released
   EXPECT_EQ(dataset.loads(), 2U);
 }
 
@@ -265,7 +266,7 @@ TEST(Dataset, ManyThreadsWithASmallBudget) {
         const std::size_t step = (state >> 16) % 20;
         const auto volume = dataset->volume("b", step);
         if (!volume) {
-          ++refused;  // only possible if others hold everything
+          ++refused;  // only if others hold everything
         } else if ((*volume)->values[500] != static_cast<float>(1000 + step)) {
           ++wrong;
         }
@@ -393,7 +394,7 @@ TEST(Store, SameFilesAreOneDatasetWhenAddedAgain) {
   ASSERT_TRUE(store.remove(got[0]->info().id));
   EXPECT_FALSE(store.find(got[0]->info().id));
   ASSERT_TRUE(store.add(folder / "rain.nc"));
-  EXPECT_EQ(opened, 2) << "what was removed is opened anew";
+  EXPECT_EQ(opened, 2) << "a removed dataset is reopened";
 }
 
 TEST(Store, RefusedDatasetStaysFailedUntilItPasses) {
@@ -417,7 +418,7 @@ TEST(Store, RefusedDatasetStaysFailedUntilItPasses) {
   refuses = false;
   const auto added = store.add(file);
   ASSERT_TRUE(added) << added.error().message;
-  EXPECT_EQ((*added)->info().id, "rain") << "under the id by which it was listed";
+  EXPECT_EQ((*added)->info().id, "rain") << "under its listed id";
   EXPECT_TRUE(store.failed().empty());
 }
 
@@ -449,7 +450,7 @@ TEST(Store, ExceptionWhileOpeningIsAnErrorAndCanBeRetried) {
   EXPECT_TRUE(store.add(folder / "rain.nc"));
 }
 
-// Steps and places can be more than what is shown of them.
+// Steps and positions can take more memory than the shown data.
 TEST(Store, MetadataOfADatasetCountsInTheLimit) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
