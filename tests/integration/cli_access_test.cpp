@@ -25,7 +25,7 @@ class CliAccess : public testing::Test {
  protected:
   void SetUp() override { dataset = synth(folder, "tornado", "8x8x8"); }
 
-  // A secret of its owner's alone.
+  // A secret readable by its owner only.
   std::string secret(const std::string& name, const std::string& text) const {
     const std::string path = folder.file(name);
     write_file(path, text);
@@ -164,7 +164,7 @@ TEST_F(CliAccess, HealthcheckOverTlsUsesTheTrustedCertificates) {
   write_file(folder.file("none.pem"), "no certificate");
   EXPECT_EQ(run({"healthcheck", url, "--ca", folder.file("none.pem")}).code, 2);
   EXPECT_EQ(run({"healthcheck", url, "--ca", folder.file("absent.pem")}).code, 1);
-  // The same place by a name that the certificate does not have.
+  // The same address by a name that is not in the certificate.
   const std::string other_name =
       "https://127.1" + url.substr(std::string("https://127.0.0.1").size());
   const Outcome elsewhere = run({"healthcheck", other_name, "--ca", folder.file("cert.pem")});
@@ -213,7 +213,7 @@ TEST_F(CliAccess, CommandLineOverridesEnvironmentOverridesConfiguration) {
     return net_test::StreamClient(port, {{"Origin", origin}}).handshake().status;
   };
   EXPECT_EQ(from("https://b.example"), 101);
-  EXPECT_EQ(from("https://a.example"), 403) << "a list takes another's place, too";
+  EXPECT_EQ(from("https://a.example"), 403) << "a list replaces the earlier one";
   Process by_environment({"serve"}, {"WINDSPLAT_CONFIG=" + config});
   EXPECT_THAT(by_environment.read_until('\n'), HasSubstr("/from-config/"));
 }
@@ -310,7 +310,7 @@ TEST_F(CliAccess, SighupAppliesTheConfigurationWholeOrNotAtAll) {
   EXPECT_TRUE(eventually([&] { return from_friend() == 101; }));
   EXPECT_TRUE(says(daemon, "requires a restart"));
   EXPECT_THAT(daemon.messages(), HasSubstr("option=max-sessions"));
-  // One value at fault, and the others are not taken either.
+  // One value is invalid, so none is applied.
   secret("token", second_token);
   write(R"(, "max-sessions": "many")");
   daemon.send(SIGHUP);
@@ -410,7 +410,7 @@ TEST_F(CliAccess, NonLoopbackWithoutTokenAnswersOnlyKnownHostNames) {
   EXPECT_EQ(status_for(second, "evil.example"), 421);
   const std::string file = secret("token", first_token);
   Process guarded(with({"--token-file", file}));
-  EXPECT_EQ(status_for(port_of(guarded), "any.example"), 401) << "the token is asked for instead";
+  EXPECT_EQ(status_for(port_of(guarded), "any.example"), 401) << "the token is required instead";
   Process both(with({"--token-file", file, "--allow-host", "winds.example"}));
   const auto fourth = port_of(both);
   EXPECT_EQ(status_for(fourth, "any.example"), 421);
@@ -425,7 +425,7 @@ TEST_F(CliAccess, SighupBeforeStartupIsHandled) {
   const std::string large = folder.file("large.nc");
   ASSERT_EQ(run({"synth", "tornado", "--dims", "96x96x96", "--steps", "3", "-o", large}).code, 0);
   Process daemon(serve({"--token-file", file, large, "climate", "efield"}));
-  // "opened" of the first dataset: the others are still to be opened.
+  // "opened" of the first dataset: the others are still pending.
   ASSERT_TRUE(says(daemon, "opened"));
   for (int n = 0; n < 20; ++n) daemon.send(SIGHUP);
   const auto port = port_of(daemon);

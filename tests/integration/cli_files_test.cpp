@@ -174,7 +174,7 @@ TEST(CliFiles, AnyThreadCountGivesTheSameBytes) {
   EXPECT_EQ(one, draw("5"));
 }
 
-// No file may grow past a limit: to the libraries, what a full disk is.
+// A file size limit, which libraries report like a full disk.
 TEST(CliFiles, SynthReportsAFailedWriteAndLeavesNoFile) {
   const Folder folder;
   rlimit before{};
@@ -309,7 +309,7 @@ TEST(CliFiles, FullDiskIsReportedAndNoPartialFileLeft) {
   const Outcome outcome = run({"render", path, "--size", "8x8", "-o", full});
   EXPECT_EQ(outcome.code, 1);
   EXPECT_THAT(outcome.err, HasSubstr("full.png"));
-  EXPECT_TRUE(std::filesystem::is_symlink(full)) << "what is no regular file stays";
+  EXPECT_TRUE(std::filesystem::is_symlink(full)) << "a file that is not regular is kept";
 }
 
 TEST(CliFiles, ControlCharactersInNamesAreEscaped) {

@@ -20,7 +20,7 @@ using testing::MatchesRegex;
 using testing::Not;
 using testing::StartsWith;
 
-// A socket of ours on a free port of 127.0.0.1.
+// A listening socket on a free port of 127.0.0.1.
 class Port {
  public:
   Port() : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -130,7 +130,7 @@ TEST_F(CliServe, SigtermDoesNotWaitForAHangingLoader) {
   const std::string url = url_of(daemon);
   const auto port = port_of(url);
   const pid_t loader = child_of(daemon.id());
-  ASSERT_GT(loader, 1) << "files are read by a process of their own";
+  ASSERT_GT(loader, 1) << "files are read by a separate process";
   ASSERT_EQ(kill(loader, SIGSTOP), 0);
   net_test::Socket asking(port);
   asking.send(
@@ -199,14 +199,14 @@ TEST_F(CliServe, DatasetAboveTheMemoryLimitIsReportedWithTheOption) {
   const std::string url = url_of(daemon);
   const auto port = port_of(url);
   const std::string of = "/v1/datasets/" + large + '/';
-  // Small pictures are drawn of averages, which take turns in memory.
+  // Small pictures use averages, which need memory in turn.
   const auto picture = net_test::get(port, of + "frame.png?width=512&height=512");
   ASSERT_EQ(picture.status, 507);
   EXPECT_THAT(picture.body, HasSubstr("dataset '" + large + "'"));
   EXPECT_THAT(picture.body, HasSubstr("--memory-limit 192M leaves 68.0 MiB for data"));
   EXPECT_THAT(picture.body, HasSubstr("'wind' and 'cloud' need 75.0 MiB together"));
   EXPECT_EQ(limit_told(picture.body), "200M");
-  EXPECT_EQ(net_test::get(port, of + "fields/wind/range").status, 200) << "a field by itself fits";
+  EXPECT_EQ(net_test::get(port, of + "fields/wind/range").status, 200) << "a single field fits";
   daemon.send(SIGTERM);
   EXPECT_EQ(daemon.wait(), 0);
   EXPECT_THAT(daemon.messages(), HasSubstr("may be too small for a dataset's first view"));

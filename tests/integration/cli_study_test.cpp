@@ -1,4 +1,4 @@
-// windsplat study as a person runs it: a report, a second run that measures nothing, an interrupt.
+// windsplat study on the command line: a report, a second run without measurements, an interrupt.
 #include <gmock/gmock.h>
 
 #include <filesystem>

@@ -115,7 +115,7 @@ TEST(CliSystem, SynthInterruptedTwiceLeavesNoFile) {
     Process process({"synth", "tornado", "--dims", "96x96x96", "--steps", "100000", "-o", path});
     ASSERT_TRUE(begins_to_write(process, path)) << process.messages();
     process.send(SIGINT);
-    process.send(SIGTERM);  // one SIGINT that is not yet seen would swallow the next
+    process.send(SIGTERM);  // a second SIGINT would be merged with a pending one
     EXPECT_EQ(process.wait(), 130);
     EXPECT_TRUE(fs::is_empty(fs::path(path).parent_path()));
   }

@@ -140,7 +140,7 @@ TEST(CliUsage, UnknownWordIsReportedWithASuggestion) {
               HasSubstr("'extra' is an unexpected argument"));
 }
 
-// What a user's words bring into a message cannot pose as lines or colours of the program's own.
+// Text from arguments must not imitate lines or colours of the program's messages.
 TEST(CliUsage, MessagesEscapeControlCharactersOfArguments) {
   for (const Words& words : std::vector<Words>{
            {"x\ny\x1b[0m"}, {"serve", "--log-format", "x\nwindsplat: all well\x1b]0;t\a"}}) {
@@ -152,7 +152,7 @@ TEST(CliUsage, MessagesEscapeControlCharactersOfArguments) {
   EXPECT_THAT(run({"paint"}).err, HasSubstr("unknown command 'paint'"));
 }
 
-// A flag that would do nothing must not be taken.
+// A flag without effect must be refused.
 TEST(CliUsage, MissingDataRootIsRefused) {
   const Outcome outcome = run({"serve", "--data-root", "x"});
   EXPECT_EQ(outcome.code, 2);

@@ -1,5 +1,4 @@
-// docs/gallery: its view files drawn small by the program; its script, pictures and text against
-// each other.
+// docs/gallery: its view files rendered small, and consistency of its script, pictures and text.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -53,8 +52,8 @@ std::vector<Entry> script_entries() {
   return entries;
 }
 
-// Share of the pixels that the volume covers by a tenth at least, from a picture as .npy: little-
-// endian float32, [height, width, 4], after a header that ends in a line feed.
+// Share of pixels with a coverage of at least 0.1, from a picture as .npy: little-endian float32,
+// [height, width, 4], after a header that ends in a line feed.
 double covered(const std::string& npy, int width, int height) {
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   const std::size_t bytes = pixels * 4 * sizeof(float);

@@ -67,7 +67,7 @@ TEST(OpenedDatasets, DatasetsOfTheCommandLineAreKeptWhenPostedAgain) {
   EXPECT_EQ(get(server.port(), "/v1/datasets/small").status, 200);
 }
 
-// Files are opened once the gate is.
+// Files are opened when the gate is open.
 class SharedDataset : public testing::Test {
  protected:
   void SetUp() override {
@@ -123,7 +123,7 @@ TEST_F(SharedDataset, RemainsForTheSecondClientWhenTheFirstCancels) {
   EXPECT_EQ(finished_job(port(), second_)["state"], "done");
   EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 200);
   EXPECT_EQ(request(port(), "DELETE", "/v1/datasets/posted?forget=true").status, 204)
-      << "it was opened by POST all the same";
+      << "it was opened by POST nevertheless";
   EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 404);
 }
 
@@ -136,7 +136,7 @@ TEST_F(SharedDataset, IsReleasedWhenTheLastClientCancels) {
   EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 404);
 }
 
-// A disk that does not answer until the read is cancelled.
+// A disk that does not respond until the read is cancelled.
 class StuckSource : public data::Source {
  public:
   StuckSource(std::unique_ptr<data::Source> source, std::shared_ptr<Gate> gate)
@@ -154,7 +154,7 @@ class StuckSource : public data::Source {
   std::shared_ptr<Gate> gate_;
 };
 
-// Its client is there and waits, so 499 would not be true.
+// The client is still connected, so status 499 would be wrong.
 TEST(ForgottenDatasets, WaitingPictureReportsTheRemoval) {
   std::string name = (fs::temp_directory_path() / "windsplat-forgot-XXXXXX").string();
   ASSERT_NE(mkdtemp(name.data()), nullptr);
@@ -237,13 +237,13 @@ TEST(Loads, HangingDatasetDoesNotBlockOthers) {
   ASSERT_EQ(finished_job(server.port(), post_file(server.port(), "hangs.nc"))["state"], "done");
   const std::string probe = "/v1/datasets/hangs/probe?x=0&y=0&z=500&step=";
   std::vector<std::unique_ptr<Socket>> waiting;
-  for (int i = 0; i < 8; ++i) {  // as many as one address may have
+  for (int i = 0; i < 8; ++i) {  // the maximum for one address
     waiting.push_back(std::make_unique<Socket>(server.port()));
     waiting.back()->send("GET " + probe + std::to_string(i % small_steps) +
                          " HTTP/1.1\r\nHost: x\r\n\r\n");
   }
   ASSERT_TRUE(gate->wait_for(1));
-  // More of them than there are threads stand in line before any of these.
+  // More of them than threads are queued before any of these.
   EXPECT_EQ(get(server.port(), "/v1/datasets/small/probe?x=0&y=0&z=500&step=0").status, 200);
   EXPECT_EQ(get(server.port(), "/v1/datasets/small/frame.png?width=32&height=32").status, 200);
   EXPECT_EQ(get(server.port(), "/v1/datasets/small").status, 200);
@@ -278,12 +278,12 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesDoNotWait) {
   other_ran.get_future().wait();
   note(0);
   gate.open();
-  last_ran.get_future().wait();  // end() cancels what waits, and cancelled ones keep no order
+  last_ran.get_future().wait();  // end() cancels waiting jobs, and cancelled ones keep no order
   loads.end();
   EXPECT_THAT(order, testing::ElementsAre(0, 1, 2, 3));
 }
 
-// The line of one dataset is full: others still get in.
+// The queue of one dataset is full: others are still admitted.
 TEST(Loads, EveryDatasetHasItsOwnQueue) {
   Gate gate;
   net::LoadService loads(2, 2, "loads");
@@ -300,8 +300,8 @@ TEST(Loads, EveryDatasetHasItsOwnQueue) {
   gate.open();
 }
 
-// Views that say nothing of their fields' ranges, so that working out what they will need reads
-// the field they show; all but one in vain.
+// Views without ranges of their fields, so that their completion reads the shown field; all but one
+// are superseded.
 TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add("climate:32x16x6").value();
@@ -313,7 +313,7 @@ TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
   for (int i = 0; i < 2; ++i) {
     ASSERT_TRUE(services.backend.loads.submit({{}, [&] { gate.pass(); }}));
   }
-  ASSERT_TRUE(gate.wait_for(2)) << "both threads are taken";
+  ASSERT_TRUE(gate.wait_for(2)) << "both threads are busy";
   protocol::View of_scalar;
   of_scalar.dataset = dataset->info().id;
   protocol::View of_vector = of_scalar;
@@ -344,7 +344,7 @@ TEST(Drawings, AdmittedRequestIsNotRefusedAfterLoading) {
     if (after_load) told.set_value("drawn");
     return after_load;
   };
-  // While it loads, as many others come as may wait.
+  // During the load the queue is filled by others.
   drawing.load = [&](data::Dataset& /*dataset*/) -> Result<std::shared_ptr<const void>> {
     const auto hold = [&](std::int64_t /*queue_us*/) { gate.pass(); };
     const net::RenderService::Job job{net::RenderService::Kind::request, 1, {}, hold, false, 0};

@@ -11,8 +11,8 @@
 namespace net_test {
 namespace {
 
-// Takes frames and gives their credit back until the view is at rest, so that what is asked for
-// next is begun.
+// Receives and acknowledges frames until the view is at rest, so that the next request starts at
+// once.
 bool until_final(StreamClient& client) {
   while (const auto bytes = client.next_frame()) {
     const auto header = windsplat::protocol::parse_frame_header(
@@ -107,7 +107,7 @@ TEST(Drain, RunningPictureIsAnsweredWhileReadinessFails) {
   const auto closing = stream.next();
   ASSERT_TRUE(closing);
   const Answer ready = get(server.port(), "/readyz");
-  if (ready.status != 0) {  // else it had ended already
+  if (ready.status != 0) {  // otherwise it had already ended
     EXPECT_EQ(ready.status, 503);
     EXPECT_EQ(get(server.port(), "/v1").status, 503);
   }
@@ -119,7 +119,7 @@ TEST(Drain, RunningPictureIsAnsweredWhileReadinessFails) {
 
 TEST(Drain, PeerThatNeverReadsDoesNotDelayIt) {
   TestServer server;
-  // A picture of noise that no kernel buffer takes: its write is stuck when the drain begins.
+  // A picture of noise too large for kernel buffers: its write is blocked when the drain starts.
   StreamClient deaf(server.port(), {}, "/v1/stream", 4096);
   deaf.say(R"({"type":"patch","rev":1,"patch":{"dataset":"small",
               "image":{"width":32,"height":32}}})");

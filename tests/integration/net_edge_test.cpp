@@ -97,7 +97,7 @@ TEST_F(Edge, BodyOf100MbSentWithoutWaitingGets413) {
   socket.send("POST /v1/frames HTTP/1.1\r\nHost: x\r\nContent-Length: 104857600\r\n\r\n");
   const std::string megabyte(1 << 20, 'x');
   for (int n = 0; n < 100; ++n) {
-    if (!socket.send(megabyte)) break;  // the server has had enough
+    if (!socket.send(megabyte)) break;  // the server has refused the rest
   }
   EXPECT_EQ(read_answer(socket).status, 413);
 }
@@ -116,7 +116,7 @@ TEST_F(Edge, HeadersOfEverySizeAroundTheLimit) {
       expect_refused(bytes, 431);
     }
   }
-  // One that never ends.
+  // An endless header.
   Socket socket(port());
   socket.send(start);
   socket.send(std::string(100000, 'a'));
@@ -206,7 +206,7 @@ TEST_F(Edge, DisconnectCancelsTheRendering) {
         "GET /v1/datasets/small/frame.png?width=4096&height=4096 HTTP/1.1\r\n"
         "Host: x\r\n\r\n");
   }
-  // Were they all drawn, this would come after a minute of work.
+  // If all were rendered, this would take a minute.
   const Answer answer = get(port(), "/v1/datasets/small/frame.jpg?width=32&height=32");
   EXPECT_EQ(answer.status, 200);
 }

@@ -17,7 +17,7 @@ namespace {
 
 using testing::ElementsAre;
 
-// Holds jobs until it is opened.
+// Blocks jobs until it is opened.
 class Gate {
  public:
   void open() {
@@ -157,14 +157,14 @@ TEST(Jobs, WaitingAndRunningJobsCanBeCancelled) {
   EXPECT_TRUE(jobs.cancel(waiting));
   EXPECT_EQ(jobs.find(waiting)->state, "cancelled");
   EXPECT_TRUE(jobs.cancel(running));
-  EXPECT_EQ(jobs.find(running)->state, "running") << "until it notices";
+  EXPECT_EQ(jobs.find(running)->state, "running") << "until it checks for cancellation";
   gate.open();
   EXPECT_EQ(finished(jobs, running).state, "cancelled");
   EXPECT_FALSE(finished(jobs, running).problem);
   const auto last = submitted(jobs, [](const Jobs::Handle&) { return Result<std::string>("x"); });
   EXPECT_EQ(finished(jobs, last).state, "done");
   EXPECT_TRUE(jobs.cancel(last));
-  EXPECT_EQ(jobs.find(last)->state, "done") << "what is finished stays so";
+  EXPECT_EQ(jobs.find(last)->state, "done") << "a finished job stays finished";
   EXPECT_FALSE(second_ran);
 }
 

@@ -18,7 +18,7 @@ namespace {
 using testing::HasSubstr;
 using windsplat::net::ServerOptions;
 
-// Refused, saying so.
+// Refused with the reason.
 void expect_limit(const Answer& answer, int status, const std::string& words) {
   EXPECT_EQ(answer.status, status) << answer.body;
   EXPECT_EQ(answer.header("content-type"), "application/problem+json");
@@ -26,7 +26,7 @@ void expect_limit(const Answer& answer, int status, const std::string& words) {
   EXPECT_GE(std::atoi(answer.header("retry-after").c_str()), 1);
 }
 
-// Of an upgrade the client reads the head alone.
+// The client reads the head only of an upgrade.
 void expect_no_upgrade(const StreamClient& viewer, int status) {
   EXPECT_EQ(viewer.handshake().status, status);
   EXPECT_GE(std::atoi(viewer.handshake().header("retry-after").c_str()), 1);
@@ -45,7 +45,7 @@ bool comes_true(const std::function<bool()>& holds) {
   return false;
 }
 
-// Connections that are known to have been accepted; `busy`: with the beginning of a request.
+// Connections that have been accepted; `busy`: with the start of a request.
 std::vector<std::unique_ptr<Socket>> hold(std::uint16_t port, int count, bool busy = true) {
   std::vector<std::unique_ptr<Socket>> held;
   for (int n = 0; n < count; ++n) {
@@ -54,7 +54,7 @@ std::vector<std::unique_ptr<Socket>> hold(std::uint16_t port, int count, bool bu
     EXPECT_EQ(read_answer(*held.back()).status, 200);
     if (busy) held.back()->send("GET ");
   }
-  if (busy) std::this_thread::sleep_for(std::chrono::milliseconds(200));  // for it to arrive
+  if (busy) std::this_thread::sleep_for(std::chrono::milliseconds(200));  // time for it to arrive
   return held;
 }
 
@@ -91,10 +91,11 @@ TEST(Limits, SilentConnectionIsClosedSoon) {
   TestServer server;
   Socket silent(server.port());
   const auto kept = hold(server.port(), 1, false);
-  // 5 s; a machine that runs many tests at once gets six times that, half of an idle one's.
+  // 5 s; six times that on a machine that runs many tests at once, half the timeout of an idle
+  // connection.
   EXPECT_TRUE(silent.closed_by_peer(30'000));
   kept[0]->send("GET /livez HTTP/1.1\r\nHost: x\r\n\r\n");
-  EXPECT_EQ(read_answer(*kept[0]).status, 200) << "between requests there is more time";
+  EXPECT_EQ(read_answer(*kept[0]).status, 200) << "the timeout between requests is longer";
 }
 
 TEST(Limits, ConnectionsAboveTheirRateAreClosed) {
@@ -104,12 +105,12 @@ TEST(Limits, ConnectionsAboveTheirRateAreClosed) {
   const auto answered = [&] { return get(server.port(), "/livez").status == 200; };
   int taken = 0;
   while (answered() && taken < 50) ++taken;
-  EXPECT_GE(taken, 4);  // one may have looked whether the server is there
-  EXPECT_LT(taken, 20) << "the test itself takes a while";
+  EXPECT_GE(taken, 4);  // one may have been used to wait for the server
+  EXPECT_LT(taken, 20) << "the test itself takes time";
   EXPECT_TRUE(comes_true(answered));
 }
 
-// Nothing of it is understood, and yet it counts.
+// Malformed requests count, too.
 TEST(Limits, MalformedInputIsChargedLikeRequests) {
   ServerOptions options;
   options.limits.requests_per_address = 1;  // 10 at once
@@ -138,7 +139,7 @@ TEST(Limits, ConnectionsOfOneAddressAreLimited) {
   EXPECT_EQ(get(server.port(), "/readyz").status, 200);
 }
 
-// Silent connections hold their places for two seconds; others are closed meanwhile.
+// Silent connections hold their slots for two seconds; others are closed meanwhile.
 TEST(Limits, ReservedConnectionsAreBoundedAndReleased) {
   ServerOptions options;
   options.limits.connections = 1;
@@ -178,7 +179,7 @@ TEST(Limits, RequestsAboveTheirRateAreRefusedExceptHealth) {
   Answer last;
   while ((last = get(server.port(), "/v1")).status == 200 && answered < 100) ++answered;
   EXPECT_GE(answered, 20);
-  EXPECT_LT(answered, 60) << "the test itself takes a while";
+  EXPECT_LT(answered, 60) << "the test itself takes time";
   expect_limit(last, 429, "2 requests a second");
   EXPECT_EQ(get(server.port(), "/livez").status, 200);
   EXPECT_GE(refused(server.port(), "requests"), 1);
@@ -201,7 +202,8 @@ TEST(Limits, RenderingIsChargedAndItsDebtDelaysRequests) {
                        {{"Content-Type", "application/json"}}, R"({"dataset":"small"})"),
                429, "seconds of rendering");
   expect_no_upgrade(StreamClient(server.port()), 429);
-  EXPECT_EQ(get(server.port(), "/v1/datasets").status, 200) << "what draws nothing is answered";
+  EXPECT_EQ(get(server.port(), "/v1/datasets").status, 200)
+      << "requests without rendering are answered";
   EXPECT_EQ(refused(server.port(), "render"), 4);
 }
 
@@ -283,7 +285,7 @@ TEST(Limits, OversizeOrExpensivePicturesAreRefusedBeforeLoading) {
   ASSERT_TRUE(viewer.next_frame());
   viewer.texts.clear();
   viewer.say(R"({"type":"still","id":5,"width":200,"height":200,"format":"png","scale":1})");
-  // Frames that refine may come first, and take the credit until they are acknowledged.
+  // Refining frames may come first and use the credit until they are acknowledged.
   std::optional<std::string> still;
   for (int seq = 1; !still;) {
     viewer.say(R"({"type":"ack","decodeMs":1,"seq":)" + std::to_string(seq) + "}");
@@ -319,7 +321,7 @@ TEST(Limits, EveryResponseHasSecurityHeaders) {
   }
 }
 
-// Whatever is sent, there are as many series as ever.
+// The number of series is constant for any request.
 TEST(Limits, PathsMethodsAndRefusalsCreateNoMetricSeries) {
   ServerOptions options;
   options.limits.sessions_per_address = 1;
@@ -342,7 +344,7 @@ TEST(Limits, PathsMethodsAndRefusalsCreateNoMetricSeries) {
   EXPECT_EQ(series(), before);
 }
 
-// Pictures whose data is not there leave the renderer's queue for the loads': that has an end, too.
+// Pictures whose data are not resident wait in the load queue, which is bounded, too.
 TEST(Limits, PicturesWaitingForASlowDiskAreBounded) {
   namespace data = windsplat::data;
   const auto gate = std::make_shared<Gate>();
@@ -370,13 +372,13 @@ TEST(Limits, PicturesWaitingForASlowDiskAreBounded) {
     if (answer.status != 200) expect_limit(answer, 429, "try again");
     served += answer.status == 200 ? 1 : 0;
   }
-  EXPECT_GE(served, 8);  // half of the places: they are all of one address
+  EXPECT_GE(served, 8);  // half of the slots: all are from one address
   EXPECT_LE(served, 12);
 }
 
-// The renderer is free again soon after whoever wanted a picture of seconds has gone: with a byte
-// of a next request before the end, too, and from a stream. The requirement is 100 ms; machines
-// that run many tests at once get thirty times that.
+// The renderer is free soon after the client of an expensive picture disconnects, also with a byte
+// of another request before the close, and for a stream. The requirement is 100 ms; machines that
+// run many tests at once get thirty times that.
 TEST(Cancel, DisconnectCancelsTheRendering) {
   TestServer server;
   const std::string view = R"({"dataset":"small","image":{"width":4096,"height":4096},)"

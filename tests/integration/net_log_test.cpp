@@ -16,7 +16,7 @@ using testing::HasSubstr;
 using testing::MatchesRegex;
 using testing::Not;
 
-// The log of a server, whole: it has ended when its lines are asked for.
+// The complete log of a server, which has stopped before its lines are read.
 class Logged : public testing::Test {
  protected:
   void SetUp() override {
@@ -89,7 +89,7 @@ TEST_F(Logged, ProblemsContainTheirRequestId) {
   EXPECT_EQ(own.status, 404);
   EXPECT_EQ(json_of(own)["requestId"], "mine-1");
   EXPECT_EQ(json_of(own)["status"], 404);
-  // Also where nothing of the request was understood.
+  // Also for malformed requests.
   const Answer refused = raw(port(), "GET / HTTP/1.1\nHost: x\r\n\r\n");
   EXPECT_EQ(refused.status, 400);
   const std::string id = refused.header("x-request-id");

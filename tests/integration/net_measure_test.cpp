@@ -45,7 +45,7 @@ class Measures : public testing::Test {
   std::shared_ptr<const windsplat::data::Volume> volume(const std::string& name, int step) {
     return dataset_->volume(name, static_cast<std::size_t>(step)).value();
   }
-  // A place a little off the sample's own, as a query.
+  // A query for a position slightly off that of the sample.
   std::string near(int i, int j, int k) {
     std::string query = "?";
     const std::array<int, 3> index{i, j, k};
@@ -114,7 +114,7 @@ TEST_F(Measures, HistogramCountsEverySampleOnce) {
   }
 }
 
-// A share of 0.1 leaves out as many whole values at either end as there are in a tenth of all.
+// A share of 0.1 omits as many whole values at either end as a tenth of all contains.
 TEST_F(Measures, HistogramClipOmitsBothEnds) {
   const std::string name = field(windsplat::data::FieldKind::scalar).name;
   const auto there = volume(name, 2);
@@ -125,7 +125,7 @@ TEST_F(Measures, HistogramClipOmitsBothEnds) {
   const Json h = ask("fields/" + name + "/histogram?step=2&clip=0.1");
   EXPECT_EQ(h["range"][0].get<float>(), values[dropped]);
   EXPECT_EQ(h["range"][1].get<float>(), values[values.size() - 1 - dropped]);
-  EXPECT_LT(values.front(), values[dropped]) << "or this test shows nothing";
+  EXPECT_LT(values.front(), values[dropped]) << "otherwise this test shows nothing";
 }
 
 TEST_F(Measures, InvalidHistogramsAreRefused) {
@@ -188,7 +188,7 @@ TEST_F(Measures, RangeOfAllStepsIsReadOnce) {
   EXPECT_EQ(server_.loads(), 3U);
   EXPECT_EQ(request(port(), "DELETE", "/v1/datasets/small").status, 204);
   EXPECT_EQ(ask("fields/" + name + "/range?of=all"), all);
-  EXPECT_EQ(server_.loads(), 3U) << "remembered though evicted";
+  EXPECT_EQ(server_.loads(), 3U) << "cached though evicted";
   expect_problem_saying(refused("fields/" + name + "/range?of=most"), 422);
   expect_problem_saying(refused("fields/" + name + "/range?of=all&step=1"), 422);
 }
@@ -207,7 +207,7 @@ TEST_F(Measures, RangeOfAllStepsIsTheUnionOfTheSteps) {
     EXPECT_EQ(all["range"][1].get<float>(), range[1]) << info.name;
     wider_than_the_first += range != first ? 1 : 0;
   }
-  EXPECT_GT(wider_than_the_first, 0) << "or this test shows nothing";
+  EXPECT_GT(wider_than_the_first, 0) << "otherwise this test shows nothing";
 }
 
 TEST_F(Measures, EvictionKeepsDatasetsAndOnlyPostedOnesCanBeRemoved) {
@@ -240,7 +240,7 @@ class DataRoot : public testing::Test {
     fs::create_directories(root_ / "runs");
     fs::copy_file(small_file(), root_ / "runs/gcm.nc");
     fs::copy_file(small_file(), root_.parent_path() / "secret.nc");
-    std::ofstream(root_ / "broken.nc") << "this is no data";
+    std::ofstream(root_ / "broken.nc") << "not a data file";
     fs::create_symlink("../secret.nc", root_ / "out.nc");
     EXPECT_EQ(mkfifo((root_ / "pipe.nc").c_str(), 0600), 0);
     windsplat::net::ServerOptions options;

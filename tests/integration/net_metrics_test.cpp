@@ -36,7 +36,7 @@ class MetricsTest : public testing::Test {
  protected:
   [[nodiscard]] std::uint16_t port() const { return server_.port(); }
 
-  // What is counted once a peer has all of it may be counted a moment later.
+  // Counters updated after the last byte may change a moment later.
   Exposition scrape_until(const std::function<bool(const Exposition&)>& holds) const {
     Exposition read = scrape(port());
     for (int turns = 0; turns < 4000 && !holds(read); ++turns) {
@@ -72,7 +72,7 @@ TEST_F(MetricsTest, PictureIncrementsItsCountersByOne) {
   EXPECT_NEAR(moved(R"(windsplat_stage_seconds_sum{stage="render"})"), std::stod(render[1]) / 1000,
               1e-6);
   EXPECT_GE(moved(R"(windsplat_sent_bytes_total{over="http"})"), picture.body.size());
-  EXPECT_EQ(moved(frames("final")), 0) << "that is for viewers' frames";
+  EXPECT_EQ(moved(frames("final")), 0) << "only frames of sessions count";
 }
 
 TEST_F(MetricsTest, LoadsAndHitsAreCountedSeparately) {
@@ -130,8 +130,8 @@ TEST_F(MetricsTest, FramesOfASessionAreCountedByPurpose) {
   EXPECT_EQ(gone.value("windsplat_sessions_opened_total"), 1);
 }
 
-// Whatever they ask for, one frame waits for them, and a second one when they have taken it; the
-// kernel's buffers of a few hundred kilobytes are the rest.
+// One frame waits for such peers at any time, and a second one after they read; the rest are kernel
+// buffers of a few hundred kilobytes.
 TEST_F(MetricsTest, PeersThatNeverReadHoldOneFrameEach) {
   constexpr int peers = 5;  // a frame each before the first is given up as too slow
   const std::string image = R"("image":{"width":2000,"height":1500})";
@@ -139,7 +139,7 @@ TEST_F(MetricsTest, PeersThatNeverReadHoldOneFrameEach) {
                                  {{"Content-Type", "application/json"}, {"Accept", "image/png"}},
                                  R"({"dataset":"small",)" + image + "}");
   ASSERT_EQ(picture.status, 200);
-  ASSERT_GT(picture.body.size(), 3U << 18) << "more than a socket takes";
+  ASSERT_GT(picture.body.size(), 3U << 18) << "more than a socket buffer holds";
   std::vector<std::unique_ptr<StreamClient>> deaf;
   for (int i = 0; i < peers; ++i) {
     deaf.push_back(std::make_unique<StreamClient>(port(), Headers{}, "/v1/stream", 131072));
@@ -153,7 +153,7 @@ TEST_F(MetricsTest, PeersThatNeverReadHoldOneFrameEach) {
   scrape_until([&](const Exposition& now) {
     return now.value("windsplat_unsent_bytes") > peers * 0.5 * frame;
   });
-  // All that was asked for was drawn meanwhile, had it been allowed to.
+  // Unless refused, all requests were rendered meanwhile.
   ASSERT_EQ(get(port(), "/v1/datasets/small/frame.jpg?width=64&height=48").status, 200);
   EXPECT_LE(scrape(port()).value("windsplat_unsent_bytes"), peers * (1.2 * frame + 65536));
   deaf.clear();
@@ -190,10 +190,10 @@ TEST_F(MetricsTest, AreServedWhileTheRendererIsBusy) {
   Socket waiting(port());
   waiting.send(
       "GET /v1/datasets/small/frame.png?width=4096&height=4096 HTTP/1.1\r\nHost: x\r\n\r\n");
-  // The first frame of all was begun once the data is there.
+  // The first frame starts when the data are resident.
   scrape_until([](const Exposition& now) { return now.value("windsplat_resident_bytes") > 0; });
   for (int i = 0; i < 5; ++i) scrape(port());
-  EXPECT_EQ(waiting.receive(1), "") << "the picture is not there yet";
+  EXPECT_EQ(waiting.receive(1), "") << "the picture is not ready";
 }
 
 TEST_F(MetricsTest, OfTheProcessMatchTheSystem) {
@@ -203,7 +203,7 @@ TEST_F(MetricsTest, OfTheProcessMatchTheSystem) {
   const double open = now.value("process_open_fds");
   Socket one(port());
   Socket two(port());
-  // Both ends of each are this process's.
+  // Both ends of each connection are in this process.
   const Exposition later = scrape_until(
       [&](const Exposition& read) { return read.value("process_open_fds") >= open + 4; });
   EXPECT_LE(later.value("process_open_fds"), open + 6);

@@ -18,12 +18,12 @@ using testing::StartsWith;
 
 class Rest : public testing::Test {
  protected:
-  // Nobody else suffers from what a test did.
+  // Releases what a test loaded or saved.
   void TearDown() override {
     Answer good;
     for (int turns = 0; turns < 600; ++turns) {
       good = get(port(), "/v1/datasets/small/frame.jpg?width=32&height=32");
-      if (good.status != 429) break;  // busy is an answer too, for a moment
+      if (good.status != 429) break;  // busy is a valid answer for a moment
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
     EXPECT_EQ(good.status, 200) << good.body;
@@ -76,7 +76,7 @@ TEST_F(Rest, DatasetsAreListedBeforeAndDescribedAfterReading) {
   EXPECT_EQ(dataset["dims"], Json({{"x", 32}, {"y", 16}, {"z", 6}}));
   EXPECT_EQ(dataset["steps"]["count"], small_steps);
   EXPECT_EQ(dataset["defaultView"]["dataset"], "small");
-  // The default view shows two of the fields: others are neither loaded nor are their ranges known.
+  // The default view shows two fields: others are not loaded and have no known range.
   for (const Json& field : dataset["fields"]) {
     const bool shown = field["name"] == "wind" || field["name"] == "cloud";
     EXPECT_EQ(field["range"].is_array(), shown) << field;
@@ -194,13 +194,13 @@ TEST_F(Rest, SameViewHasTheSameTagAndBytesAndGets304) {
   EXPECT_THAT(etag, StartsWith("\""));
   const Answer second = post_view(port(), R"({"image":{"height":30,"width":40},"dataset":"small",
                                               "step":0})");
-  EXPECT_EQ(second.header("etag"), etag) << "spelled otherwise, the same view";
+  EXPECT_EQ(second.header("etag"), etag) << "the same view in another spelling";
   EXPECT_EQ(second.body, first.body);
   const Answer third = post_view(port(), view, {{"If-None-Match", "\"other\", " + etag}});
   EXPECT_EQ(third.status, 304);
   EXPECT_TRUE(third.body.empty());
   EXPECT_EQ(third.header("etag"), etag);
-  // What changes the bytes changes the tag.
+  // Any change of the bytes changes the tag.
   EXPECT_NE(post_view(port(), view, {{"Accept", "image/png"}}).header("etag"), etag);
   EXPECT_NE(post_view(port(), R"({"dataset":"small","step":1,"image":{"width":40,"height":30}})")
                 .header("etag"),
@@ -215,8 +215,7 @@ TEST_F(Rest, BudgetedPictureIsNotCacheable) {
   EXPECT_EQ(answer.header("etag"), "");
 }
 
-// Every picture says what it is thought to err, and one that is asked for by its error or its time
-// is drawn by what does.
+// Every picture reports its estimated error, and a requested error or time decides its setting.
 TEST_F(Rest, PictureReportsItsErrorAndMeetsErrorAndBudget) {
   const auto frame_of = [&](const std::string& quality) {
     const Answer answer =
@@ -332,9 +331,9 @@ TEST_F(Rest, HeadIsGetWithoutTheBody) {
 }
 
 TEST_F(Rest, FullQueueGets429AtOnce) {
-  // Resident, so that nothing is let in only to find that it has to be loaded first.
+  // Resident, so that no admitted request has to load first.
   ASSERT_EQ(get(port(), "/v1/datasets/small/frame.jpg?width=16&height=16").status, 200);
-  // More pictures than may wait, requested before the first is done.
+  // More pictures than the queue holds, requested before the first is done.
   const std::string slow =
       "GET /v1/datasets/small/frame.png?width=4096&height=4096 HTTP/1.1\r\nHost: x\r\n\r\n";
   std::vector<std::unique_ptr<Socket>> sockets;
@@ -342,7 +341,7 @@ TEST_F(Rest, FullQueueGets429AtOnce) {
     sockets.push_back(std::make_unique<Socket>(port()));
     sockets.back()->send(slow);
   }
-  // The last were refused while the first is still being drawn.
+  // The last were refused while the first was still rendering.
   const Answer refused = read_answer(*sockets.back());
   expect_problem(refused, 429);
   EXPECT_FALSE(refused.header("retry-after").empty());
@@ -380,10 +379,10 @@ TEST_F(Rest, PageIsServedWithSecurityAndCacheHeaders) {
   const Answer known =
       get(port(), "/", {{"Accept-Encoding", "gzip"}, {"If-None-Match", zipped.header("etag")}});
   EXPECT_EQ(known.status, 304);
-  // A browser lets a 304's headers replace those it kept: another policy would break the page.
+  // Headers of a 304 replace the cached ones in browsers: another policy would break the page.
   EXPECT_EQ(known.header("content-security-policy"), policy);
 
-  // What the page loads is there, and may be kept for good.
+  // Files of the page exist and are cacheable forever.
   const std::size_t at = page.body.find(".js\"");
   ASSERT_NE(at, std::string::npos);
   const std::size_t from = page.body.rfind('"', at) + 1;

@@ -1,4 +1,4 @@
-// The same server in TLS: requests, streams, deadlines, and certificates that change while it runs.
+// The server with TLS: requests, streams, deadlines, and certificates replaced while it runs.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -41,7 +41,7 @@ TEST_F(Tls, RequestsAreAnsweredWithStrictTransportSecurity) {
   EXPECT_THAT(server_.server().url(), testing::StartsWith("https://127.0.0.1:"));
   const Answer live = get(place(), "/livez");
   EXPECT_EQ(live.status, 200);
-  EXPECT_EQ(live.header("strict-transport-security"), "") << "loopback is others', too";
+  EXPECT_EQ(live.header("strict-transport-security"), "") << "loopback is shared with other users";
   Socket by_name(place());
   by_name.send("GET /livez HTTP/1.1\r\nHost: winds.example\r\n\r\n");
   EXPECT_EQ(read_answer(by_name).header("strict-transport-security"), "max-age=15552000");
@@ -87,7 +87,7 @@ TEST_F(Tls, ConnectionCarriesManyRequestsEvenPipelined) {
   EXPECT_TRUE(socket.closed_by_peer());
 }
 
-// Frames of every size come whole: small ones share a record, large ones take many.
+// Frames of every size arrive complete: small ones share a record, large ones take many.
 TEST_F(Tls, StreamSendsFrames) {
   StreamClient viewer(place(), {{"Sec-WebSocket-Protocol", "windsplat.v1"}});
   ASSERT_EQ(viewer.handshake().status, 101);
@@ -130,7 +130,7 @@ TEST_F(Tls, NoiseIsDisconnected) {
                                    std::string("\x16\x03\x01\x40\x00", 5)}) {
     Socket socket(plain());
     socket.send(noise);
-    EXPECT_TRUE(socket.closed_by_peer(20'000)) << "at the handshake's deadline at the latest";
+    EXPECT_TRUE(socket.closed_by_peer(20'000)) << "no later than the handshake deadline";
   }
 }
 
@@ -142,7 +142,7 @@ TEST_F(Tls, HandshakeHasADeadlineWhileOthersAreServed) {
   EXPECT_EQ(get(place(), "/livez").status, 200);
   EXPECT_TRUE(silent.closed_by_peer(20'000));
   EXPECT_TRUE(slow.closed_by_peer(20'000));
-  EXPECT_GT(Clock::now() - begin, std::chrono::seconds(3)) << "it is no refusal at once";
+  EXPECT_GT(Clock::now() - begin, std::chrono::seconds(3)) << "not refused at once";
 }
 
 TEST_F(Tls, SlowHeaderTimesOut) {
@@ -151,7 +151,7 @@ TEST_F(Tls, SlowHeaderTimesOut) {
   EXPECT_TRUE(slow.closed_by_peer(20'000));
 }
 
-// With a close_notify and without; were they all drawn, the last would come after a minute of work.
+// With and without close_notify; if all were rendered, the last would take a minute.
 TEST_F(Tls, DisconnectCancelsTheRendering) {
   for (int n = 0; n < 12; ++n) {
     Socket socket(place());
@@ -165,10 +165,10 @@ TEST_F(Tls, DisconnectCancelsTheRendering) {
       "windsplat_http_requests_total{route=\"/v1/datasets/{id}/frame\",status=\"4xx\"} ";
   const std::size_t at = metrics.find(left);
   ASSERT_NE(at, std::string::npos);
-  EXPECT_GE(std::stoi(metrics.substr(at + left.size())), 6) << "those that said goodbye";
+  EXPECT_GE(std::stoi(metrics.substr(at + left.size())), 6) << "those with close_notify";
 }
 
-// What comes in TLS is not always a request, or a client that goes.
+// TLS records are not always a request or a close.
 TEST_F(Tls, KeyUpdateDuringAPictureIsNoDisconnect) {
   Socket socket(place());
   socket.send(
@@ -189,7 +189,7 @@ TEST_F(Tls, KeyUpdateDuringAStreamIsNoDisconnect) {
   EXPECT_TRUE(viewer.next_text("opened"));
 }
 
-// A body that is not wanted, and sent all the same, does not cost the client its answer.
+// A client that sends a refused body still gets its response.
 TEST_F(Tls, OversizeBodyGets413) {
   Socket socket(place());
   socket.send("POST /v1/frames HTTP/1.1\r\nHost: x\r\nContent-Length: 104857600\r\n\r\n");
@@ -200,7 +200,7 @@ TEST_F(Tls, OversizeBodyGets413) {
   EXPECT_EQ(read_answer(socket).status, 413);
 }
 
-// The write deadline is 15 s and some more for the size.
+// The write deadline is 15 s plus a time for the size.
 TEST_F(Tls, SessionThatNeverReadsIsClosed) {
   StreamClient viewer(place(), {}, "/v1/stream", 4096);
   ASSERT_TRUE(viewer.next_text("hello"));

@@ -60,7 +60,7 @@ class Views : public testing::Test {
 };
 
 TEST_F(Views, PostedViewIsStoredInCanonicalFormAtItsLocation) {
-  // The dataset is none that the server has.
+  // The dataset does not exist on the server.
   const Answer made = post(R"({ "step": 3.0, "dataset": "elsewhere", "vector": {"field": null},
                                 "camera": {}, "quality": {"maxError": null} })");
   ASSERT_EQ(made.status, 201) << made.body;
@@ -309,7 +309,7 @@ TEST(ViewsOfAServer, WithAStateFolderTheySurviveARestart) {
   EXPECT_TRUE(fs::is_empty(folder.path / "views"));
 }
 
-// A view is what POST /v1/frames takes: what was kept draws the picture that was saved.
+// A saved view is valid for POST /v1/frames and gives the same picture.
 TEST(ViewsOfAServer, SavedViewRendersTheSamePicture) {
   const TestServer server;
   const std::string view = R"({"step":1,"dataset":"small","image":{"height":48,"width":64}})";
@@ -321,14 +321,14 @@ TEST(ViewsOfAServer, SavedViewRendersTheSamePicture) {
   EXPECT_EQ(direct.body, kept.body);
 }
 
-// A page that saves a few views at once is no load.
+// A page that saves a few views at once is within the limit.
 TEST(ViewChanges, AtMostTwentyWaitForASlowDisk) {
   windsplat::net::ServerOptions options;
   const auto views = SavedViews::open({}).value();
   options.views = views;
   TestServer server(std::move(options));
   const std::string id = views->add(windsplat::protocol::ViewDocument::parse("{}").value(), "")->id;
-  // Whoever changes views waits for this change.
+  // Other changes of views wait for this one.
   std::promise<void> begun;
   std::promise<void> let_go;
   std::thread slow([&] {
@@ -346,7 +346,8 @@ TEST(ViewChanges, AtMostTwentyWaitForASlowDisk) {
       return request(server.port(), "POST", "/v1/views", json_type, "{}");
     }));
   }
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // those refused would be by now
+  std::this_thread::sleep_for(
+      std::chrono::milliseconds(300));  // refusals would have arrived by now
   let_go.set_value();
   slow.join();
   for (auto& answer : answers) EXPECT_EQ(answer.get().status, 201);

@@ -28,7 +28,7 @@ std::optional<Frame> parse_frame(const std::optional<std::string>& bytes) {
   return Frame{*header, bytes->substr(protocol::frame_header_bytes)};
 }
 
-// A viewer that acknowledges what it is sent.
+// A session that acknowledges every frame.
 class Viewer : public StreamClient {
  public:
   using StreamClient::StreamClient;
@@ -117,7 +117,7 @@ TEST_F(Stream, PatchAndAcksSuffice) {
   const auto final = viewer.final_frame(1);
   ASSERT_TRUE(final);
   EXPECT_EQ(final->header.seq, 2U);
-  // Each was announced by what was chosen for it.
+  // Each was announced by a `chosen` message.
   std::vector<int> announced;
   for (const std::string& text : viewer.texts) {
     const Json json = Json::parse(text);
@@ -177,7 +177,7 @@ TEST_F(Stream, DragShowsMovingFramesAndEndsWithTheFinalFrame) {
       ++moved;
     }
   }
-  EXPECT_GE(moved, 5U) << "the picture follows the hand";
+  EXPECT_GE(moved, 5U) << "the picture follows the input";
   EXPECT_TRUE(viewer.final_frame(rev));
 }
 
@@ -245,7 +245,7 @@ TEST_F(Stream, TwoSessionsShareLoadedDataAndKeepTheirViews) {
   ASSERT_TRUE(second);
   EXPECT_EQ(first->header.width, 64);
   EXPECT_EQ(second->header.width, 96);
-  // The next step is read ahead, some time after the frames.
+  // The next step is prefetched some time after the frames.
   std::uint64_t loads = server_.loads();
   for (int quiet = 0; quiet < 20; ++quiet) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -312,7 +312,7 @@ TEST_F(Stream, ProtocolViolationsCloseWithTheirCode) {
     EXPECT_EQ(client.close_code(), 1009);
   }
   {
-    // In fragments of no length: none of them is too big, and there is no end to them.
+    // Empty fragments: none is too large, and they never end.
     StreamClient client(port());
     client.send_frame(Opcode::text, "", false);
     for (int n = 0; n < 60000; ++n) {
@@ -327,13 +327,13 @@ TEST_F(Stream, ProtocolViolationsCloseWithTheirCode) {
   }
 }
 
-// A ping between fragments is no sign of a message's end.
+// A ping between fragments does not end the message.
 TEST_F(Stream, EndlessMessageTimesOutDespitePings) {
   StreamClient client(port());
   ASSERT_TRUE(client.next_text("hello"));
   client.send_frame(Opcode::text, "", false);
   bool cut = false;
-  // A message may take 10 s; this would go on for three times as long.
+  // A message may take 10 s; this would take three times as long.
   for (int n = 0; n < 60 && !cut; ++n) {
     client.send_frame(Opcode::ping, "x");
     client.send_frame(Opcode::more, "", false);
@@ -354,13 +354,13 @@ TEST_F(Stream, PeerThatClosedIsNotWaitedFor) {
   StreamClient client(port());
   ASSERT_TRUE(client.next_text("hello"));
   const auto begin = std::chrono::steady_clock::now();
-  // At once: the server finds the close when it has begun to say its own.
+  // At once: the server finds the close when it has begun its own.
   const std::string mask(4, '\0');
   client.socket.send("\x82\x81" + mask + "x" + "\x88\x82" + mask + "\x03\xe8");
   EXPECT_EQ(client.close_code(), 4400);
   EXPECT_TRUE(client.socket.closed_by_peer());
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(1500))
-      << "one that says nothing is waited for 2 s";
+      << "a silent client is waited for 2 s";
 }
 
 TEST_F(Stream, MessageAtTheLimitIsRead) {
@@ -400,12 +400,12 @@ TEST_F(Stream, SessionsAboveTheLimitAreRefusedWithTheReason) {
     StreamClient three(server.port());
     EXPECT_EQ(three.close_code(), 1013);
   }
-  // Their places are free after they disconnect.
+  // Their slots are free after they disconnect.
   for (int turns = 0; turns < 100; ++turns) {
     StreamClient next(server.port());
     if (next.next_text("hello")) return;
   }
-  FAIL() << "no place came free";
+  FAIL() << "no slot was released";
 }
 
 TEST_F(Stream, SilenceClosesTheSession) {

@@ -19,7 +19,7 @@ namespace {
 
 using namespace windsplat;  // NOLINT(google-build-using-namespace)
 
-// Whether data was prepared for the frame, which the next of its kind need not do again.
+// Whether the frame prepared data that the next of its kind reuses.
 bool prepared(net::Viewer& viewer, std::uint64_t ticket, const protocol::View& view) {
   std::promise<bool> told;
   viewer.start(session::StartRender{ticket, view, {}, {}},
@@ -53,7 +53,7 @@ TEST(Viewer, WaitForAveragesIsReportedLikeAWaitForFields) {
   EXPECT_FALSE(prepared(viewer, 4, view));
 }
 
-// Data of one step and a half fit: every frame has to wait until those before it are drawn.
+// Memory for one and a half steps: every frame waits until earlier ones are rendered.
 TEST(Viewer, SessionsAtDifferentStepsGetFramesWhenOneStepFits) {
   constexpr std::uint64_t sample_bytes = 4 * sizeof(float);  // a wind and a cloud
   constexpr std::uint64_t step_bytes = std::uint64_t{32} * 16 * 6 * sample_bytes;
@@ -92,7 +92,7 @@ TEST(Viewer, SessionsAtDifferentStepsGetFramesWhenOneStepFits) {
   }
 }
 
-// One picture of more pixels than are always kept room for, and the data of one step and a half.
+// One picture with more pixels than are reserved, and the data of one and a half steps.
 class LargePictures : public testing::Test {
  protected:
   static constexpr std::uint64_t step_bytes = std::uint64_t{32} * 16 * 6 * 4 * sizeof(float);
@@ -107,7 +107,7 @@ class LargePictures : public testing::Test {
     services_ = std::make_unique<net::Services>(net::ServerOptions{}, store_,
                                                 std::make_shared<ThreadPool>(2));
   }
-  // Why there is no frame; empty: there is one.
+  // Why there is no frame; empty if there is one.
   std::future<std::string> fault_of(net::Viewer& viewer, const protocol::View& view) {
     const auto told = std::make_shared<std::promise<std::string>>();
     viewer.start(session::StartRender{++tickets_, view, {}, {}},

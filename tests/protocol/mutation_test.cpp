@@ -1,6 +1,5 @@
-// Property test: whatever becomes of a good document, the codec either takes it and gives a
-// canonical text that it takes again unchanged, or refuses it with words. Seeds are fixed: a
-// failure repeats.
+// Property test: for any mutation of a valid document the codec either accepts it and gives a
+// stable canonical text, or refuses it with a message. Seeds are fixed, so that failures repeat.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -127,7 +126,7 @@ TEST(Mutation, ViewIsAcceptedOrRefusedWithAMessage) {
         schema_complaints("view.schema.json", "", Json::parse(encode_view(document->view())));
     ASSERT_TRUE(complaints.empty()) << text << ": " << complaints.front();
   }
-  EXPECT_GT(taken, 1000) << "mutations too coarse to tell anything";
+  EXPECT_GT(taken, 1000) << "mutations too coarse to test anything";
   EXPECT_GT(refused, 5000);
 }
 
@@ -153,7 +152,7 @@ TEST(Mutation, PatchGivesAValidViewOrNone) {
     ASSERT_EQ(again->canonical(), next->canonical()) << patch;
     const auto twice = next->patched(patch);
     ASSERT_TRUE(twice.has_value()) << patch;
-    ASSERT_EQ(twice->canonical(), next->canonical()) << "a merge patch applied twice is as once";
+    ASSERT_EQ(twice->canonical(), next->canonical()) << "applying a merge patch twice equals once";
     view = *next;
   }
   EXPECT_GT(applied, 1000);
@@ -201,7 +200,7 @@ TEST(Mutation, ParsedHeaderEncodesToItself) {
     ++parsed;
     const auto again = encode_frame_header(*read);
     for (std::size_t i = 0; i < again.size(); ++i) {
-      // A signalling NaN may come back as a quiet one; every other byte is what it was.
+      // A signalling NaN may come back quiet; every other byte is unchanged.
       const bool in_float = i >= 32 && i < 40;
       ASSERT_TRUE(in_float || again[i] == bytes[i]) << "byte " << i;
     }

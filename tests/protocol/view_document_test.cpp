@@ -189,9 +189,9 @@ TEST(MergePatch, InvalidPatchLeavesTheViewUnchanged) {
     EXPECT_FALSE(before.patched(patch).has_value()) << patch;
     EXPECT_EQ(before.canonical(), text) << patch;
   }
-  // r1 fits the r2 that was said before, though not the default.
+  // r1 fits the r2 set before, though not the default.
   EXPECT_TRUE(before.patched(R"({"vector":{"r1":1.9}})").has_value());
-  // Taking r2 away brings its default back, which r1 no longer fits.
+  // Removing r2 restores its default, which r1 no longer fits.
   const auto wide = before.patched(R"({"vector":{"r1":1.9}})");
   EXPECT_FALSE(wide->patched(R"({"vector":{"r2":null}})").has_value());
 }
@@ -272,7 +272,7 @@ TEST(TextLimits, DepthIsLimitedExactly) {
   };
   const auto fits = ViewDocument::parse(nested(limits::json_depth_max));
   ASSERT_FALSE(fits.has_value());
-  EXPECT_EQ(fits.error().kind, ErrorKind::invalid) << "read, but an unknown key";
+  EXPECT_EQ(fits.error().kind, ErrorKind::invalid) << "syntactically valid, with an unknown key";
   const auto deep = ViewDocument::parse(nested(limits::json_depth_max + 1));
   ASSERT_FALSE(deep.has_value());
   EXPECT_EQ(deep.error().kind, ErrorKind::malformed);

@@ -1,4 +1,4 @@
-// Errors as values, text made fit to print, and the cancel flag.
+// Errors as values, escaping of text, and cancel tokens.
 #include "server/base/error.hpp"
 
 #include <gtest/gtest.h>
@@ -87,7 +87,7 @@ TEST(Printable, TruncatesAtWholeCharactersWithAMark) {
   EXPECT_EQ(printable("abcdef", 0), "");
 }
 
-// Whatever comes in: within the cap, no control byte, and printing it again changes nothing.
+// For any input: within the limit, no control bytes, and idempotent.
 TEST(Printable, InvariantsHoldForRandomBytes) {
   std::mt19937 random(7);
   for (int round = 0; round < 20000; ++round) {

@@ -1,4 +1,4 @@
-// Log lines: one event is one line whatever it holds, in text and in JSON.
+// Log lines: one event is one line whatever it contains, in text and in JSON.
 #include "server/base/log.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The pool runs every index once, keeps its workers apart, and survives what its loops throw.
+// The pool runs every index once, separates its workers, and survives exceptions.
 #include "server/base/thread_pool.hpp"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ TEST_P(EveryPoolSize, RunsEachIndexOnce) {
   }
 }
 
-// A worker's number may index scratch memory: no two threads may hold the same one at a time.
+// A worker number may index scratch memory: no two threads may have the same one at a time.
 TEST_P(EveryPoolSize, WorkerNumbersAreSmallAndExclusive) {
   std::vector<std::atomic<int>> holders(GetParam());
   std::atomic<bool> shared = false;
@@ -45,8 +45,8 @@ TEST_P(EveryPoolSize, WorkerNumbersAreSmallAndExclusive) {
   EXPECT_FALSE(out_of_range);
 }
 
-// What the body writes is seen by the caller without further synchronisation, in loops too short
-// for every worker to take part, one right after another.
+// Writes of the body are visible to the caller without further synchronisation, even in consecutive
+// loops too short for every worker.
 TEST_P(EveryPoolSize, ManyShortLoopsKeepTheirResults) {
   std::vector<std::size_t> plain(5);
   std::size_t sum = 0;
@@ -85,7 +85,7 @@ TEST_P(EveryPoolSize, IndicesStopSoonAfterAnException) {
                           throw std::runtime_error("first");
                         }),
                std::runtime_error);
-  EXPECT_LE(visits, GetParam());  // each thread can have drawn one at most
+  EXPECT_LE(visits, GetParam());  // each thread can have taken one at most
 }
 
 TEST_P(EveryPoolSize, NestedLoopIsRefusedInsteadOfDeadlocking) {
@@ -153,7 +153,7 @@ TEST(ThreadPool, ZeroMeansOneThreadPerHardwareThread) {
   EXPECT_EQ(ThreadPool(0).size(), std::max(1U, std::thread::hardware_concurrency()));
 }
 
-// Two indices that wait for each other end only if two threads work at the same time.
+// Two indices that wait for each other end only if two threads run concurrently.
 TEST(ThreadPool, WorkersRunConcurrently) {
   ThreadPool pool(2);
   std::atomic<int> arrived = 0;

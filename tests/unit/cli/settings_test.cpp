@@ -91,10 +91,10 @@ TEST(Errand, DoesNotBlockRequestersOrShutdown) {
   errand.want();
   ASSERT_TRUE(gate.is_reached());
   errand.want();
-  EXPECT_FALSE(errand.end(milliseconds(1))) << "it is still under way";
+  EXPECT_FALSE(errand.end(milliseconds(1))) << "it is still running";
   gate.open();
   EXPECT_TRUE(errand.end(patience));
-  EXPECT_EQ(calls, 1) << "none is begun after the end";
+  EXPECT_EQ(calls, 1) << "none starts after the end";
 }
 
 TEST(Errand, RunsOnceMoreForMissedRequestsAndSurvivesExceptions) {

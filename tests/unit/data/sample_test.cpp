@@ -336,7 +336,7 @@ TEST(Climate, CloudIsAFractionAndFollowsTheWeather) {
     }
     return sum / count;
   };
-  // Tropical towers and storm tracks are over the clear subtropics, and the stratosphere is empty.
+  // Tropical towers and storm tracks are cloudier than the subtropics; the stratosphere is clear.
   EXPECT_GT(cover(-8, 6, 700, 250), 2.0 * cover(17, 24, 700, 250));
   EXPECT_GT(cover(42, 58, 700, 300), 2.0 * cover(17, 24, 700, 300));
   EXPECT_GT(cover(-60, -44, 700, 300), 2.0 * cover(-24, -17, 700, 300));

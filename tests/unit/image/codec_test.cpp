@@ -21,7 +21,7 @@ struct Picture {
   std::vector<std::uint8_t> rgb;
 };
 
-// Smooth, with every channel on its own course: what JPEG is made for.
+// Smooth, with different channels: the typical content of JPEG.
 Picture smooth_picture(int width, int height) {
   Picture picture{width, height, -1, {}};
   for (int y = 0; y < height; ++y) {
@@ -34,7 +34,7 @@ Picture smooth_picture(int width, int height) {
   return picture;
 }
 
-// No two neighbours alike: any pixel out of its place shows.
+// No two neighbours are equal: any misplaced pixel is visible.
 Picture busy_picture(int width, int height) {
   Picture picture{width, height, -1, {}};
   std::uint32_t state = 12345;
@@ -117,7 +117,7 @@ TEST(Png, IsLossless) {
   }
 }
 
-// Whoever shows the picture is told that it is sRGB, to be mapped by relative colorimetry.
+// The picture declares sRGB with relative colorimetric intent.
 TEST(Png, HasTheExpectedChunks) {
   const auto bytes = encode_png(busy_picture(200, 200).rgb, 200, 200);
   ASSERT_TRUE(bytes) << bytes.error().message;

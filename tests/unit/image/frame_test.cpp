@@ -1,4 +1,4 @@
-// frame::produce on a built-in sample: sizes, levels, formats, report; and what is told of a frame.
+// frame::produce on a built-in sample: sizes, levels, formats, reports, and frame infos.
 #include "server/frame/frame.hpp"
 
 #include <gtest/gtest.h>
@@ -61,13 +61,13 @@ TEST_F(Produce, LevelHalvesBothSidesAndKeepsAtLeastOnePixel) {
     ASSERT_TRUE(frame) << frame.error().message;
     EXPECT_EQ(frame->width, width) << level;
     EXPECT_EQ(frame->height, height) << level;
-    EXPECT_EQ(frame->view.image.width, 96) << "the view told is the one asked for";
+    EXPECT_EQ(frame->view.image.width, 96) << "the reported view is the requested one";
   }
   EXPECT_EQ(produce_as(Format::png, -1).error().kind, ErrorKind::invalid);
   EXPECT_EQ(produce_as(Format::png, 16).error().kind, ErrorKind::invalid);
 }
 
-// Coverage is a mean over the picture: resolution must not change how much of it is lit.
+// Mean coverage must not depend on the resolution.
 TEST_F(Produce, LowerLevelShowsTheSamePicture) {
   view.image.width = 256;
   view.image.height = 192;
@@ -147,7 +147,7 @@ TEST_F(Produce, AnyThreadCountGivesTheSameBytes) {
   EXPECT_EQ(alone->bytes, shared->bytes);
 }
 
-// The two ways from the engine to bytes: a JPEG's tile by tile, the PNG's by way of an image.
+// The two paths from the engine to bytes: JPEG tile by tile, PNG from an image.
 TEST_F(Produce, JpegShowsWhatPngShows) {
   view.image.background = "#305070";
   for (const auto& [width, height] : {std::pair{96, 64}, {131, 67}, {1, 1}, {3, 70}}) {
@@ -171,7 +171,7 @@ TEST_F(Produce, JpegShowsWhatPngShows) {
   }
 }
 
-// A workspace that other frames were drawn into gives what a new one gives, and a step apart too.
+// A workspace used for other frames gives the same as a new one, as does a frame rendered in steps.
 TEST_F(Produce, WorkspaceKeepsNoStateBetweenPictures) {
   Workspace used;
   ThreadPool one(1);
@@ -211,7 +211,7 @@ TEST_F(Produce, InvalidViewsAndCancelledFramesAreErrors) {
   EXPECT_EQ(cancelled.error().kind, ErrorKind::cancelled);
 }
 
-// Who waits for the renderer with others is refused what takes minutes.
+// A request that shares the renderer is refused if it takes minutes.
 TEST_F(Produce, ReferenceIsRenderedOnlyWhereAllowed) {
   view.method.name = protocol::MethodName::reference;
   const auto refused = produce_as(Format::png);
@@ -222,7 +222,7 @@ TEST_F(Produce, ReferenceIsRenderedOnlyWhereAllowed) {
   EXPECT_EQ(dataset->loads(), 0U);
 }
 
-// Fields of colour and of heights are among those touched, each once however often it is used.
+// Fields of colour and of heights are listed, each once.
 TEST(ProduceFields, OfColorAndHeightAreListedOnce) {
   auto source = std::make_unique<scene::FakeSource>(
       scene::atmosphere_grid(),
@@ -252,7 +252,7 @@ TEST(ProduceFields, OfColorAndHeightAreListedOnce) {
   EXPECT_EQ(fields(), (Names{"wind", "z"}));
 }
 
-// The source is asked for what is shown and for nothing else, whatever draws it.
+// The source is asked for the shown fields only, for every method.
 TEST(ProduceFields, UnusedFieldsAreNeverRead) {
   using Reads = scene::FakeSource::Reads;
   for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
@@ -308,7 +308,7 @@ TEST(ProduceFields, UnusedFieldsAreNeverRead) {
                 view.vector.color.field = "q";
               }),
               Reads{})
-        << "the colour of lines that are not drawn";
+        << "the colour field of hidden lines";
   }
 }
 

@@ -1,4 +1,5 @@
-// JPEGs of strips: against a JPEG of the same planes in one piece, and read by ITU-T T.81.
+// JPEGs from strips: compared with a JPEG of the same planes in one piece, and parsed by ITU-T
+// T.81.
 #include <gtest/gtest.h>
 #include <turbojpeg.h>
 
@@ -75,7 +76,7 @@ Bytes decode(const Bytes& jpeg, int width, int height, int subsampling) {
   return rgb;
 }
 
-// What a reader finds: the interval of DRI (0 without), and the restart markers in order.
+// What a reader finds: the DRI interval (0 without), and the restart markers in order.
 struct Restarts {
   int interval = 0;
   std::vector<int> markers;
@@ -127,7 +128,7 @@ TEST(JpegStrips, DecodeLikeOnePiece) {
   }
 }
 
-// Every interval but the last is whole, markers count modulo 8, and large pictures have enough
+// Every interval but the last is complete, markers count modulo 8, and large pictures have enough
 // strips for many threads.
 TEST(JpegStrips, RestartMarkersMarkTheEndsOfStrips) {
   ThreadPool pool(1);
@@ -153,7 +154,7 @@ TEST(JpegStrips, RestartMarkersMarkTheEndsOfStrips) {
       for (int m = 0; m < strips - 1; ++m) EXPECT_EQ(found.markers[m], m % 8);
     }
   }
-  EXPECT_GT(most, 8U) << "no picture here has come round to marker 0 again";
+  EXPECT_GT(most, 8U) << "no picture here wraps around to marker 0";
 }
 
 TEST(JpegStrips, AnyThreadCountGivesTheSameBytes) {
@@ -175,7 +176,7 @@ TEST(JpegStrips, AnyThreadCountGivesTheSameBytes) {
   }
 }
 
-// The frame loop keeps its memory: neither the bytes' storage nor the planes' moves.
+// The frame loop keeps its memory: neither the output nor the planes are reallocated.
 TEST(JpegStrips, StorageIsReused) {
   ThreadPool pool(2);
   JpegEncoder encoder;
@@ -187,7 +188,7 @@ TEST(JpegStrips, StorageIsReused) {
   const std::size_t size = bytes.size();
   picture.reset(640, 480, Subsampling::s420, {0.5F, 0.5F, 0.5F});
   ASSERT_TRUE(encoder.encode(picture, 80, pool, bytes));
-  EXPECT_LT(bytes.size(), size / 4) << "an even picture is small";
+  EXPECT_LT(bytes.size(), size / 4) << "a uniform picture is small";
   EXPECT_EQ(bytes.data(), storage);
   EXPECT_EQ(picture.planes()[0].samples, luma);
 }
@@ -204,7 +205,7 @@ TEST(JpegStrips, RefuseSizesTheFormatCannotHold) {
   EXPECT_EQ(encoder.encode(picture, 80, pool, bytes).error().kind, ErrorKind::too_large);
 }
 
-// Its MCUs reach beyond what the library takes.
+// Its MCUs extend beyond the limit of the library.
 TEST(JpegStrips, SupportTheLongestEdgeOfTheFormat) {
   ThreadPool pool(1);
   JpegEncoder encoder;
@@ -223,7 +224,7 @@ TEST(JpegStrips, SupportTheLongestEdgeOfTheFormat) {
   }
 }
 
-// A decoder reads all of them by the first one's tables.
+// A decoder reads all strips with the tables of the first.
 TEST(JpegStitch, RefusesStripsWithOtherTables) {
   ThreadPool pool(1);
   JpegEncoder encoder;
@@ -237,7 +238,7 @@ TEST(JpegStitch, RefusesStripsWithOtherTables) {
       stitch(std::vector<std::span<const std::uint8_t>>{first, other}, {64, 32, 4}, out);
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().kind, ErrorKind::internal);
-  // A last strip of another height is as it should be.
+  // A last strip of another height is valid.
   ASSERT_TRUE(encoder.encode(waves(64, 9, Subsampling::s420), 80, pool, other));
   EXPECT_TRUE(stitch(std::vector<std::span<const std::uint8_t>>{first, other}, {64, 25, 4}, out));
 }

@@ -1,5 +1,5 @@
-// frame::ReferenceDrawing: what is drawn in bits, with others in between, is the picture drawn at
-// once; and how far the view's own one is from it.
+// frame::ReferenceDrawing: rendering in interrupted pieces equals one pass; and the error of the
+// view's own picture.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -73,7 +73,7 @@ TEST_F(Drawing, InterruptedStripsGiveThePictureRenderedAtOnce) {
   while ((*drawing)->done() < 1 && strips < 10000) {
     const CancelToken stop;
     std::atomic<int> asked{0};
-    // Every other strip is ended by other work instead.
+    // Every other strip is interrupted.
     const auto enough = [&] {
       if (++asked < 4) return false;
       if (strips % 2 == 1) stop.cancel();
@@ -126,9 +126,9 @@ TEST_F(Drawing, MemoryOfListsIsCountedAndRefusedByPictureSize) {
   view.vector.r2 = 64;
   ASSERT_TRUE(begin());
   const std::uint64_t wide = reserved;
-  EXPECT_GT(wide, narrow + 4 * 100 * 200) << "100 lines in the middle at least";
+  EXPECT_GT(wide, narrow + 4 * 100 * 200) << "at least 100 lines in the middle";
   limit = wide;
-  EXPECT_TRUE(begin()) << "so much is enough";
+  EXPECT_TRUE(begin()) << "that much suffices";
   limit = wide - 1;
   const auto refused = begin();
   ASSERT_FALSE(refused);

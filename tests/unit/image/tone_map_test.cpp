@@ -41,7 +41,7 @@ TEST(ToneMap, EveryCodeSurvivesARoundTrip) {
   }
 }
 
-// Half a code is the error of perfect rounding.
+// Half a code is the error of exact rounding.
 TEST(ToneMap, RoundsToTheNearestCodeEverywhere) {
   constexpr int count = 1 << 20;
   std::vector<float> linear(count + 1);
@@ -93,7 +93,7 @@ TEST(ToneMap, PremultipliedPixelsAreCompositedOverTheBackground) {
   }
 }
 
-// Pixels are worked on in blocks: every size must see each pixel once and in its place.
+// Pixels are processed in blocks: every size must process each pixel once, in its position.
 TEST(ToneMap, EverySizeKeepsEveryPixelPosition) {
   for (const auto& [width, height] :
        {std::pair{1, 1}, {1, 67}, {67, 1}, {255, 1}, {256, 1}, {257, 1}, {33, 31}, {0, 5}}) {

@@ -1,6 +1,5 @@
-// A frame loop in its steady state allocates nothing; from a view to a JPEG only what is small: the
-// view's copies, its scene and the bytes that are sent. Every allocation of this program is
-// counted.
+// A frame loop allocates nothing in its steady state; from a view to a JPEG only small blocks:
+// copies of the view, its scene and the output. Every allocation of this program is counted.
 #include <gtest/gtest.h>
 #include <malloc.h>
 
@@ -58,7 +57,7 @@ void* counted(std::size_t size, std::align_val_t alignment) {
 
 }  // namespace
 
-// Arrays and the form that does not throw would go through these, but not under every sanitizer.
+// Array and nothrow forms would use these, but not under every sanitizer.
 void* operator new[](std::size_t size) { return counted(size); }
 void operator delete[](void* at) noexcept { give_up(at); }
 void operator delete[](void* at, std::size_t /*size*/) noexcept { give_up(at); }
@@ -136,7 +135,7 @@ class SteadyState : public testing::TestWithParam<Look> {
   engine::RenderSpace space_;
 };
 
-// The second time round, and the third, whatever the picture's size and the data's.
+// The second and third round, for any picture size and dataset.
 TEST_P(SteadyState, FramesAllocateNothing) {
   struct Size {
     std::array<int, 3> dims;
@@ -145,7 +144,7 @@ TEST_P(SteadyState, FramesAllocateNothing) {
   for (const Size& size : {Size{{40, 24, 8}, 160, 120}, Size{{64, 40, 12}, 240, 180}}) {
     const auto scenes = orbit(GetParam(), size.dims, size.width, size.height);
     const Spent first = spent_by([&] { draw(scenes); });
-    EXPECT_GT(first.blocks, 0) << "what is kept was made once";
+    EXPECT_GT(first.blocks, 0) << "kept memory was allocated once";
     for (int round = 2; round < 4; ++round) {
       const Spent spent = spent_by([&] { draw(scenes); });
       EXPECT_EQ(spent.blocks, 0) << "round " << round << ", " << spent.bytes << " bytes";
@@ -153,8 +152,8 @@ TEST_P(SteadyState, FramesAllocateNothing) {
   }
 }
 
-// A camera that goes where it never was finds almost everything there: what still grows is far less
-// than a picture a frame.
+// A camera at new positions reuses almost all memory: the remaining growth is far less than a
+// picture per frame.
 TEST_P(SteadyState, NewPathCostsFewAllocations) {
   const std::array<int, 3> dims{64, 40, 12};
   const auto warm = orbit(GetParam(), dims, 240, 180);
@@ -171,7 +170,7 @@ INSTANTIATE_TEST_SUITE_P(Looks, SteadyState,
                          testing::Values(Look::kernel, Look::slab, Look::globe, Look::winds,
                                          Look::clouds));
 
-// From a view to a JPEG: no picture, no planes, no strips, but the bytes that are sent.
+// From a view to a JPEG: no picture, planes or strips, only the output.
 TEST(SteadyStateItself, JpegAllocatesItsOwnBytesOnly) {
   data::Dataset dataset(data::open_sample("climate", {64, 40, 12}, 1).value(), "climate",
                         std::uint64_t{1} << 30U);
@@ -200,8 +199,8 @@ TEST(SteadyStateItself, JpegAllocatesItsOwnBytesOnly) {
     };
     draw();
     const Spent spent = spent_by(draw);
-    // The view, two colour tables of 3 kB, some numbers a stop of each axis, and what the report
-    // names; the planes alone would be 115 kB.
+    // The view, two colour tables of 3 kB, some numbers per kernel position of each axis, and names
+    // of the report; the planes alone would be 115 kB.
     EXPECT_LE(spent.bytes, turns * 16384 + sent);
     EXPECT_GE(spent.bytes, sent);
     EXPECT_LE(spent.blocks, turns * 60);
@@ -240,7 +239,7 @@ TEST(HugePicture, FloatsOfAPngAreReleasedAfterEncoding) {
   }
 }
 
-// What a workspace of planes and strips holds after one huge picture and a small one.
+// The planes and strips that a workspace keeps after one huge and one small picture.
 TEST(HugePicture, PlanesAndStripsAreReleasedByTheNextSmallerPicture) {
   ThreadPool pool(2);
   for (const auto subsampling : {image::Subsampling::s420, image::Subsampling::s444}) {
@@ -255,15 +254,15 @@ TEST(HugePicture, PlanesAndStripsAreReleasedByTheNextSmallerPicture) {
     const std::int64_t small = held;
     encode(4 * huge_width, huge_height);
     const std::int64_t huge = held;
-    EXPECT_GT(huge - small, 4 * huge_pixels) << "what is given back is worth the trouble";
+    EXPECT_GT(huge - small, 4 * huge_pixels) << "a substantial amount is released";
     planes.reset(160, 120, subsampling, {});
     const std::int64_t without_planes = held;
-    EXPECT_LE(without_planes, huge - 4 * huge_pixels) << "one sample a pixel at least";
+    EXPECT_LE(without_planes, huge - 4 * huge_pixels) << "at least one sample per pixel";
     encode(160, 120);
     EXPECT_LE(held, without_planes - 4 * huge_pixels) << "strips";
     jpeg = image::Bytes();
     EXPECT_LE(held, small + 65536);
-    // A picture of a common size stays, whatever is drawn between.
+    // Memory for common picture sizes is kept whatever is rendered in between.
     encode(1920, 1080);
     const std::int64_t common = held;
     encode(960, 540);
@@ -271,12 +270,12 @@ TEST(HugePicture, PlanesAndStripsAreReleasedByTheNextSmallerPicture) {
   }
 }
 
-// What a daemon that has no memory left does as it ends, and destructors of its sessions do.
+// Shutdown of a daemon without memory, and the destructors of its sessions.
 TEST(WithoutMemory, PrefetchRequestsAreWithdrawnAndAStoreIsDestroyed) {
   data::Store store(std::uint64_t{1} << 30U);
   const auto dataset = store.add("climate:16x16x8").value();
   const std::string field = dataset->info().fields.front().name;
-  ASSERT_TRUE(dataset->volume(field, 0)) << "so that no thread has anything to do for a wish";
+  ASSERT_TRUE(dataset->volume(field, 0)) << "so that no thread works on a prefetch request";
   store.request_prefetch(1, {{*dataset, field, 0, {}}});
   const Spent spent = spent_by([&] {
     store.request_prefetch(2, {});
@@ -286,7 +285,7 @@ TEST(WithoutMemory, PrefetchRequestsAreWithdrawnAndAStoreIsDestroyed) {
   EXPECT_EQ(spent.blocks, 0);
 }
 
-// Whichever allocation fails, of libpng, of zlib or of the bytes: an error, and nothing is leaked.
+// A failure of any allocation, by libpng, zlib or for the output, is an error without leaks.
 TEST(WithoutMemory, PngIsAnError) {
   constexpr int edge = 200;
   std::vector<std::uint8_t> noise(std::size_t{3} * edge * edge);
@@ -314,7 +313,7 @@ TEST(WithoutMemory, PngIsAnError) {
   EXPECT_GE(failures, 8) << "two structures, five blocks of zlib's, some of the bytes";
 }
 
-// The counter counts: a vector as large as a picture would be seen.
+// Checks the counter: an allocation of picture size is counted.
 TEST(SteadyStateItself, CountsTheAllocationOfAVector) {
   const Spent spent = spent_by([] {
     std::vector<float> picture(4UL * 320 * 240);

@@ -1,4 +1,4 @@
-// Where samples stand on a globe, on a curvilinear map and along terrain: closed forms.
+// Sample positions on a globe, on a curvilinear map and along terrain, against closed forms.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +17,7 @@ using protocol::GeometryMapping;
 using protocol::GeometryView;
 using protocol::View;
 
-constexpr double tolerance = 1e-6;  // places are floats
+constexpr double tolerance = 1e-6;  // positions are floats
 constexpr double degree = std::numbers::pi / 180;
 
 std::vector<double> steps(double first, double step, int count) {
@@ -88,7 +88,7 @@ TEST(Sphere, RectilinearLatticeHasTheMeanCellsOfTheCurvedOne) {
     EXPECT_NEAR(lattice->spacing[2][at], (1 - inner) / 3, 1e-12);
     EXPECT_NEAR(lattice->positions[2][at], radius(k) - middle, 1e-12);
   }
-  // Half the chord over two steps within, a whole chord over one at the poles.
+  // Half the chord over two steps inside, a whole chord over one step at the poles.
   EXPECT_NEAR(lattice->spacing[1][3], middle * std::sin(30 * degree), tolerance);
   EXPECT_NEAR(lattice->spacing[1][0], middle * 2 * std::sin(15 * degree), tolerance);
   EXPECT_NEAR(lattice->positions[1][3], 0, tolerance);
@@ -155,7 +155,7 @@ TEST(Sphere, IsFramedFromEveryDirection) {
   }
 }
 
-// A view begins opposite the part of the globe that the data cover.
+// A view starts above the part of the globe covered by the data.
 TEST(Sphere, PartIsViewedFromAboveItself) {
   data::Grid grid = globe();
   grid.axes[0].coordinates = steps(120, 5, 7);
@@ -278,7 +278,7 @@ TEST(HeightField, MaskedHeightIsTheMeanOfItsLevel) {
   const auto placed = place_dataset(with_heights(), *dataset);
   ASSERT_TRUE(placed);
   const Lattice& lattice = (*placed)->lattice;
-  // One of the seven heights that are there is 17, the others are 10.
+  // One of the seven present heights is 17, the others are 10.
   const double one = place(lattice, 0, 0, 1).z - place(lattice, 2, 0, 1).z;
   EXPECT_NEAR(place(lattice, 1, 0, 1).z - place(lattice, 2, 0, 1).z, one / 7, tolerance);
   EXPECT_NEAR(place(lattice, 1, 0, 1).z, lattice.positions[2][1], tolerance);
@@ -345,7 +345,7 @@ TEST(HeightField, IsLoadedOnceAndOnlyIfNamed) {
   EXPECT_TRUE(scene->lattice.places);
   EXPECT_EQ((*reads)["z@0"], 1);
   EXPECT_EQ(reads->count("z@1"), 0U);
-  // The next frame has the same places, not others like them.
+  // The next frame has the same positions, not equal copies.
   const auto again = build_scene(*complete_view(view, *dataset), *dataset);
   EXPECT_EQ(again->lattice.places, scene->lattice.places);
   view.geometry.scale = {1, 1, 2};
@@ -353,7 +353,7 @@ TEST(HeightField, IsLoadedOnceAndOnlyIfNamed) {
   EXPECT_NE(taller->lattice.places, scene->lattice.places);
 }
 
-// A metre is as long anywhere on a globe: the shell's middle radius over the Earth's.
+// A metre has the same length anywhere on a globe: the middle radius of the shell over the Earth's.
 TEST(WorldRates, OnTheGlobeAreLengthsPerMeter) {
   auto dataset = dataset_of(
       std::make_unique<FakeSource>(globe(), std::vector<data::FieldInfo>{wind_info()}, 1));
@@ -372,7 +372,7 @@ TEST(WorldRates, OnTheGlobeAreLengthsPerMeter) {
   for (const double z : scene->vector->rate_z) EXPECT_NEAR(z, up, 1e-9 * up);
 }
 
-// 10 degrees of longitude at the equator and 5 of latitude are as long as the map says.
+// 10 degrees of longitude at the equator and 5 of latitude have the lengths of the map.
 TEST(WorldRates, OnACurvilinearMapAreThoseOfDegrees) {
   auto dataset = dataset_of(
       std::make_unique<FakeSource>(sheared(), std::vector<data::FieldInfo>{wind_info()}, 1));

@@ -1,5 +1,5 @@
-// From a completed view to the engine's input: only what is shown is loaded, radii, tables, rates,
-// presets, and the description of a dataset.
+// From a completed view to the input of the engine: only shown fields are loaded; radii, tables,
+// rates, presets, and the description of a dataset.
 #include "server/scene/build.hpp"
 
 #include <gmock/gmock.h>
@@ -36,7 +36,7 @@ TEST(BuildScene, LoadsOnlyWhatIsShown) {
   Scene scene = built(view, *dataset);
   EXPECT_TRUE(scene.vector);
   EXPECT_EQ(scene.scalars.size(), 1U);
-  // Ranges come from step 0, the picture from step 2; nobody asked for the temperature.
+  // Ranges are those of step 0, the picture of step 2; the temperature is not used.
   EXPECT_EQ(*reads, (Reads{{"wind@0", 1}, {"wind@2", 1}, {"cloud@0", 1}, {"cloud@2", 1}}));
 
   reads = std::make_shared<Reads>();
@@ -175,7 +175,7 @@ TEST(WorldRates, OmegaRisesWherePressureFalls) {
   }
 }
 
-// Low pressure is high in the picture, whatever a line's direction is made of.
+// Low pressure is at the top of the picture for any source of the line direction.
 TEST(BuildScene, ComponentsPointUpWhereAirRises) {
   View view;
   view.vector.scale = {1, 2, 3};
@@ -188,7 +188,7 @@ TEST(BuildScene, ComponentsPointUpWhereAirRises) {
   }
 }
 
-// Level 1 may be the highest or the lowest: then omega is drawn as it stands.
+// Level 1 may be the highest or the lowest: then omega is used unchanged.
 TEST(BuildScene, OmegaOnNumberedLevelsIsNotTurned) {
   data::Grid grid = atmosphere_grid();
   grid.axes[2] = axis(data::AxisKind::level, "", {1, 2, 3});

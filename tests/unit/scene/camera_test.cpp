@@ -1,4 +1,4 @@
-// The camera: which way is east and up in the picture, orbits, framing, refusals.
+// The camera: orientation of the picture, orbits, framing, invalid cameras.
 #include "server/scene/camera.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ struct Pixel {
   double x, y, depth;
 };
 
-// Pixel coordinates of a world point, row 0 on top: written from the Camera's own description.
+// Pixel coordinates of a world point, top row first, by the documented definition of the camera.
 Pixel project(const Camera& camera, const glm::dvec3& point) {
   const glm::dvec3 p = point - camera.eye;
   const double depth = glm::dot(p, camera.forward);

@@ -1,4 +1,4 @@
-// Colour maps: their ends, their lightness, and colours told as text.
+// Colour maps: their end colours, their lightness, and colours as text.
 #include "server/scene/colormap.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ TEST(ColorMap, EndColorsMatchThePublication) {
 }
 
 TEST(ColorMap, PassesThroughItsControlPoints) {
-  // The eleven stops of viridis fall on every tenth of 1001 entries' way.
+  // The eleven control points of viridis are at every tenth of 1001 entries.
   EXPECT_EQ(color_map_srgb("viridis", 11)[5], (std::array<unsigned char, 3>{0x21, 0x91, 0x8c}));
 }
 
@@ -70,7 +70,7 @@ std::array<double, 3> oklab(const std::array<float, 3>& c) {
 
 TEST(ColorMap, EqualValueDifferencesAreEqualColorDifferences) {
   for (const ColorMap& map : color_maps()) {
-    if (map.kind == "cyclic") continue;  // its quarters are the bearings'
+    if (map.kind == "cyclic") continue;  // its quarters are the compass quarters
     const auto entries = color_map_linear(map.name, 257);
     std::vector<double> steps;
     for (std::size_t n = 8; n < entries.size(); n += 8) {
@@ -79,7 +79,7 @@ TEST(ColorMap, EqualValueDifferencesAreEqualColorDifferences) {
       steps.push_back(std::hypot(after[0] - before[0], after[1] - before[1], after[2] - before[2]));
     }
     const auto [least, most] = std::minmax_element(steps.begin(), steps.end());
-    // Those that are published were made even by another measure (CAM02-UCS).
+    // Published maps were made uniform in another measure (CAM02-UCS).
     const bool published =
         std::set<std::string>{"viridis", "magma", "inferno", "plasma", "cividis"}.count(map.name) !=
         0;

@@ -1,4 +1,4 @@
-// Defaults and refusals: what a view becomes for a dataset, and what is refused by name.
+// Defaults and errors: completion of a view for a dataset, and named errors.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ View completed(const View& view, data::Dataset& dataset) {
   return std::move(*full);
 }
 
-// Every optional of a view as text, to compare two of them.
+// Every optional of a view as text, for comparison.
 std::string told(const View& view) {
   const auto vec = [](const protocol::Vec3& v) {
     return std::to_string(v[0]) + " " + std::to_string(v[1]) + " " + std::to_string(v[2]) + ";";
@@ -111,7 +111,7 @@ TEST(CompleteView, KeepsGivenValues) {
   ASSERT_EQ(full.scalars->size(), 1U);
   EXPECT_EQ((*full.scalars)[0].color.range, (protocol::Range{300, 200}));
   EXPECT_EQ((*full.scalars)[0].color.map, "ice");
-  EXPECT_EQ(dataset->loads(), 0U);  // every range was told
+  EXPECT_EQ(dataset->loads(), 0U);  // every range was given
 }
 
 TEST(CompleteView, RangesComeFromTheFirstStep) {

@@ -58,7 +58,7 @@ TEST(Slice, BeyondTheGridIsRefusedWithItsLimit) {
   }
 }
 
-// A full volume hides itself unless weak lines are left out; a slice does not.
+// A full volume occludes itself unless weak lines are omitted; a slice does not.
 TEST(Slice, KeepsItsLinesByDefault) {
   auto dataset = sample_dataset("climate", {96, 48, 19});
   const View whole = *default_view(*dataset);
@@ -74,7 +74,8 @@ TEST(Slice, KeepsItsLinesByDefault) {
   }
 }
 
-// Of many lines in one layer only the strongest of that layer are shown, wherever the others are.
+// Of many lines in one layer only the strongest of that layer are shown, independent of other
+// layers.
 TEST(Slice, CountsItsOwnLinesOnly) {
   data::Grid grid;
   std::vector<double> many(900);
@@ -84,7 +85,7 @@ TEST(Slice, CountsItsOwnLinesOnly) {
                axis(data::AxisKind::cartesian, "m", {0, 1})};
   auto source =
       std::make_unique<FakeSource>(std::move(grid), std::vector<data::FieldInfo>{wind_info()}, 1);
-  // Magnitudes of the lower layer spread evenly up to 1, of the upper up to 100.
+  // Magnitudes of the lower layer are uniform up to 1, of the upper up to 100.
   source->values = [](const std::string&, std::size_t n) {
     const bool upper = n >= std::size_t{900} * 900;
     const double share = std::fmod(static_cast<double>(n) * 0.7548776662466927, 1.0);
@@ -97,8 +98,8 @@ TEST(Slice, CountsItsOwnLinesOnly) {
   const auto full = complete_view(view, *dataset);
   ASSERT_TRUE(full);
   // The layer is 2 by 2; seen from 35 degrees above, 720 pixels are 2.08 (sin 35 + 0.01) high, so
-  // 900 x 900 lines of three quarters of five spacings by 2 pixels are there to cover three times
-  // that area.
+  // that 900 x 900 lines of three quarters of five spacings by 2 pixels cover three times that
+  // area.
   const double pixel = 2.08 * (std::sin(35 * std::numbers::pi / 180) + 0.005) / 720;
   const double wanted = 1 - 3 * 4 / (0.75 * 0.011 * 2 * pixel * 810000);
   EXPECT_NEAR(*full->vector.min_magnitude, wanted, 0.06);
@@ -112,7 +113,7 @@ TEST(Slice, LinesAndMediumAreScaledToTheLayer) {
   const Scene whole = built(view, *dataset);
   view.geometry.slice = SliceView{GridAxis::z, 1};
   const Scene slice = built(view, *dataset);
-  // One of three even layers: dense parts are as opaque through it as through all three.
+  // One of three equal layers: dense parts are as opaque through it as through all three.
   const auto top = [](const Scene& scene) { return scene.scalars.at(0).extinction.back()[1]; };
   EXPECT_NEAR(top(slice) / top(whole), 3, 0.6);  // both are rounded up to nice numbers
   // Across x, lines are as long as y is coarse: 5 cells of 10 degrees on a scale of 40 to 2.

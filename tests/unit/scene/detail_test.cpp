@@ -1,4 +1,4 @@
-// Levels of detail: which a camera gets, in closed form, and what becomes of lattice and lines.
+// Levels of detail: the level for a camera, in closed form, and its effect on lattice and lines.
 #include "server/scene/detail.hpp"
 
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ Lattice cube(int side) {
   return box({even, even, even});
 }
 
-// Looks north from so far before the nearest face of a box of edge 2: 100 pixels a unit there.
+// Looks north at the nearest face of a box of edge 2 from that distance: 100 pixels per unit there.
 Camera before(double distance) {
   Camera camera;
   camera.eye = {0, -1 - distance, 0};
@@ -155,7 +155,7 @@ TEST(MergeLines, AddUpTheirOpacityAndThenTheirWidth) {
   EXPECT_EQ(merged.r1, layer.r1);
   EXPECT_EQ(merged.r2, layer.r2);
 
-  // Eight times 0.15 are 1.2 lines of one: a fifth wider than r1 + r2 = 2.
+  // Eight times 0.15 are 1.2 lines: a fifth wider than r1 + r2 = 2.
   merged = layer;
   merged.opacity = 0.15;
   merge_lines(lattice, {1, 1, 1}, 50, merged);
@@ -163,7 +163,7 @@ TEST(MergeLines, AddUpTheirOpacityAndThenTheirWidth) {
   EXPECT_NEAR(merged.r1 + merged.r2, 2.4, 1e-12);
   EXPECT_NEAR(merged.r2 - merged.r1, 1, 1e-12);
 
-  // Samples half a pixel apart cannot cover more than half a pixel beside the line.
+  // Samples half a pixel apart cover at most half a pixel beside the line.
   merged = layer;
   merged.opacity = 1;
   merge_lines(lattice, {1, 1, 1}, 50, merged);
@@ -216,7 +216,7 @@ TEST_F(LevelOfAScene, IsFullWhereViewMethodOrStrideRequireIt) {
     EXPECT_EQ(scene.level, (Level{0, 0, 0})) << why;
     EXPECT_EQ(scene.lattice.dims, (std::array{64, 64, 64})) << why;
     EXPECT_EQ(scene.vector->field->dims, scene.lattice.dims) << why;
-    EXPECT_EQ(dataset->resident_bytes(), resident) << why << ": no level is made";
+    EXPECT_EQ(dataset->resident_bytes(), resident) << why << ": no level is computed";
   };
   view.method.detail = protocol::Detail::full;
   expect_full("full");
@@ -249,7 +249,7 @@ TEST_F(LevelOfAScene, AveragesNoHiddenFields) {
   EXPECT_EQ(dataset->resident_bytes(), fine + (fine >> (3 * scene.level[0])));
 }
 
-// The cloud alone, of 64^3 samples, in a store of so many bytes.
+// The cloud only, of 64^3 samples, in a store of that many bytes.
 class LevelWithin : public LevelOfAScene {
  protected:
   static constexpr std::uint64_t fine = 4ULL * 64 * 64 * 64;

@@ -1,4 +1,4 @@
-// Where samples stand: closed forms of placement, proportion and scale.
+// Sample positions: closed forms of placement, proportion and scale.
 #include <gtest/gtest.h>
 
 #include <cmath>

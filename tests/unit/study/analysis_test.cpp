@@ -1,4 +1,4 @@
-// Front, orders and medians of curves made by hand.
+// Fronts, orders and medians of synthetic curves.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// What a calibration compares, and what is said of it, with numbers made up.
+// Comparisons of the calibration report, with synthetic numbers.
 #include "server/study/calibration.hpp"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ Compared compared(double told, double truth, std::size_t setting = 0, std::size_
   one.look = look;
   one.setting = setting;
   one.error = truth;
-  one.forecast = {told, std::log(2.0) / 1.65, 1, true};  // bounded by twice what is told
+  one.forecast = {told, std::log(2.0) / 1.65, 1, true};  // bounded by twice the estimate
   one.prior = {10 * truth, 0, 1, false};
   return one;
 }
@@ -129,7 +129,7 @@ TEST(Calibrate, ComparesEverySettingOfEveryHeldOutView) {
     EXPECT_LE(aimed.promised_kept, aimed.promised);
     EXPECT_LE(aimed.possible_kept, aimed.possible);
   }
-  // An even grey is no truth of it.
+  // A uniform grey picture is not a valid reference.
   EXPECT_EQ(asked, 2);
   ASSERT_EQ(made.checks.size(), 2U);
   EXPECT_GT(made.checks[0].apart, 0.1);
@@ -171,7 +171,7 @@ TEST(CalibrationReport, IsPartOfTheJsonThePageAndThePlot) {
     for (std::size_t at = svg.find(what); at != std::string::npos; at = svg.find(what, at + 1)) ++n;
     return n;
   };
-  EXPECT_EQ(count("r=\"2.4\""), 4) << "one a comparison";
+  EXPECT_EQ(count("r=\"2.4\""), 4) << "one per comparison";
   EXPECT_EQ(svg.find("a<b"), std::string::npos);
   EXPECT_EQ(svg.find("nan"), std::string::npos);
   const std::string page = report_page(report).value();

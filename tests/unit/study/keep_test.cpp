@@ -1,4 +1,4 @@
-// What a study keeps and when it takes it up again: keys, truths and foreign files.
+// The cache of a study and its reuse: keys, references and foreign files.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -63,7 +63,7 @@ TEST(Keys, ChangeWithEveryInputOfAPoint) {
   EXPECT_EQ(keys.size(), 10U);
 }
 
-// Not with what only the time depends on.
+// Independent of inputs that affect only the time.
 TEST(Keys, OfAReferenceChangeWithToleranceAndProgramOnly) {
   const Subject subject = standard_subject("vectors", true).value();
   const Machine machine = this_machine(2).value();

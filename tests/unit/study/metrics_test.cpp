@@ -1,4 +1,4 @@
-// Errors in linear light against sums by hand, and FLIP by its known properties.
+// Errors in linear light against manual sums, and FLIP by its known properties.
 #include "server/study/metrics.hpp"
 
 #include <gtest/gtest.h>
@@ -123,8 +123,8 @@ TEST(Flip, OneCodeIsSmallAndGrowsWithNoise) {
   }
 }
 
-// The eye blurs fine patterns: a checkerboard of single pixels is nearer to its own mean light than
-// one of coarse squares.
+// The eye blurs fine patterns: a checkerboard of single pixels is closer to its mean light than one
+// of coarse squares.
 TEST(Flip, IgnoresInvisiblyFineDetail) {
   const auto checker = [](int cell) {
     Rgb rgb;
@@ -140,8 +140,8 @@ TEST(Flip, IgnoresInvisiblyFineDetail) {
   EXPECT_LT(flip(mean, checker(1)), 0.5 * flip(mean, checker(12)));
 }
 
-// Stripes differ from an even ground in as many pixels as one half that is brighter, and blurring
-// by the eye (about a pixel) changes little at 8 pixels a stripe; but they have more edges.
+// Stripes differ from a uniform background in as many pixels as one brighter half, and blurring
+// (about a pixel) changes little at 8 pixels per stripe; but they have more edges.
 TEST(Flip, WeightsDifferencesAtEdges) {
   const auto stripes = [](int wide) {
     Rgb rgb;

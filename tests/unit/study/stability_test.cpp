@@ -1,4 +1,5 @@
-// The stiffness sweep through the engine: what the formulas of one kernel say of every compositing.
+// The stiffness sweep through the engine: predictions of the one-kernel formulas for every
+// compositing.
 #include "server/study/stability.hpp"
 
 #include <gtest/gtest.h>
@@ -32,7 +33,7 @@ TEST(Stability, AnalyticIsExactBoundedAndMonotoneAtEveryStiffness) {
   }
 }
 
-// No slack here but a float's rounding: what is bounded is so at every optical depth.
+// No tolerance beyond float rounding: bounded methods are bounded at every optical depth.
 TEST(Stability, CorrectedAndAnalyticStayWithinTheUnitInterval) {
   constexpr double rounding = 1e-6;
   for (const Compositing compositing : {Compositing::cd, Compositing::analytic}) {
@@ -62,7 +63,7 @@ TEST(Stability, ChordOfCorrectedDeviatesByAtMostAnEighthOfTheSquare) {
 }
 
 // The transmittance of n layers is (1 - tau)^n: beyond 1 the first layer leaves [0, 1], below 2
-// those behind it heal that, from 2 on they make it no better or worse.
+// later layers correct that, from 2 on they make it no better or worse.
 TEST(Stability, EulerLeavesTheUnitIntervalAboveOneAndDivergesFromTwo) {
   for (const Stiffness& s : sweep_of(Compositing::cd_euler)) {
     EXPECT_EQ(s.bounded, s.tau <= 1) << s.tau;

@@ -1,4 +1,4 @@
-// A whole study with a stand-in for the integral: what it keeps, skips and reports.
+// A whole study with a substitute for the integral: caching, skipping and reports.
 #include "server/study/study.hpp"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ std::string read(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-// An even grey; counts how often it was asked.
+// A uniform grey picture; counts its evaluations.
 Truth grey(int& asked) {
   return [&asked](const scene::Scene& scene) -> Result<Picture> {
     ++asked;
@@ -132,7 +132,7 @@ TEST(Study, NonFiniteReferenceIsAnErrorAndNotKept) {
   EXPECT_EQ(asked, 2);
 }
 
-// Seconds that nobody knows are null, as is the tolerance of what is no integral.
+// Unknown times are null, as is the tolerance of a reference that is not an integral.
 TEST(Study, UnknownValuesAreNull) {
   Report report;
   report.scenes.emplace_back();
@@ -144,7 +144,7 @@ TEST(Study, UnknownValuesAreNull) {
   EXPECT_TRUE(reference.at("tolerance").is_null());
 }
 
-// The page opens with both methods at the view's own thickness, which is not the default's.
+// The page opens with both methods at the thickness of the view, which is not the default.
 TEST(Page, SummaryUsesTheParametersOfTheView) {
   Report report;
   SceneReport scene;
@@ -238,7 +238,7 @@ TEST(PointsFile, KeepsEveryDigitAndNonFiniteValues) {
   EXPECT_FALSE(PointsFile::open(path).value().find(key_of("b")));
 }
 
-// A line that a crash cut off anywhere is measured again, and what follows it is not spoilt.
+// A line truncated by a crash is measured again, and later lines are unaffected.
 TEST(PointsFile, OmitsATruncatedLine) {
   const Folder folder;
   const std::filesystem::path path = folder.path / "points.csv";
@@ -266,7 +266,7 @@ TEST(Key, IsFnv1a) {
   EXPECT_EQ(key_of("a"), "af63dc4c8601ec8c");
 }
 
-// Two curves of one colour each; the mark of what is unstable is a cross, not a disc.
+// Two curves of one colour each; unstable points are marked by crosses instead of discs.
 TEST(Plot, DrawsDiscsRingsAndCrosses) {
   SceneReport scene;
   scene.name = "a<b";

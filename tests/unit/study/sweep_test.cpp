@@ -1,4 +1,4 @@
-// What is swept, how a point is measured against a truth, and the floor of splats.
+// The swept settings, the error of a point against a reference, and the error floor of splats.
 #include "server/study/sweep.hpp"
 
 #include <gtest/gtest.h>
@@ -106,7 +106,7 @@ TEST(Scene, HasTheNamedOpticalDepth) {
   }
 }
 
-// A truth that is the setting's own picture but for a known amount in one channel.
+// A reference equal to the setting's own picture except for a known amount in one channel.
 TEST(Measure, IsTheDistanceFromTheGivenReference) {
   const Subject subject = standard_subject("soft", true).value();
   const Setting setting{Method::kernel, Compositing::analytic, own_knobs(subject)};
@@ -142,7 +142,7 @@ TEST(Measure, SmallerPictureIsComparedAtTheReferenceSize) {
 }
 
 // Overlapping footprints ripple by 1 % peak to peak on axis to 4 % at 45 degrees, of tau = 1: an
-// error of alpha below 4 % / e, and not nothing.
+// error of alpha below 4 % / e, and above zero.
 TEST(Ripple, IsBetweenZeroAndTheRippleOfTheFootprint) {
   ThreadPool pool(1);
   const double floor =
@@ -163,7 +163,7 @@ TEST(Ripple, IsAbsentForCurvedLatticesAndSlices) {
   EXPECT_TRUE(std::isnan(reconstruction_ripple(slice, pool, CancelToken()).value()));
 }
 
-// Heights bend the lattice and its box; the study's own orbit looks at that box.
+// Heights bend the lattice and its box; the orbit of the study views that box.
 TEST(Scene, FramesHeightsUnlessTheViewSetsItsFrame) {
   const auto terrain = [] {
     auto source = std::make_unique<scene::FakeSource>(

@@ -79,7 +79,7 @@ TEST(SavedViewsInMemory, AreFoundByTheirIds) {
     EXPECT_EQ(views->find(saved->id)->created, time_of_all);
   }
   EXPECT_EQ(ids.size(), 100U);
-  // Chance that is none would leave letters out: 1000 of them miss one of 32 once in 10^12 runs.
+  // A poor random generator would omit letters: 1000 ids miss one of 32 once in 10^12 runs.
   std::set<char> letters;
   for (const std::string& id : ids) letters.insert(id.begin(), id.end());
   EXPECT_EQ(letters.size(), 32U);
@@ -107,7 +107,7 @@ TEST(SavedViewsInMemory, FullStoreRefusesAndKeepsItsViews) {
   for (int step = 0; step < 3; ++step) {
     EXPECT_EQ(views->find(ids[static_cast<std::size_t>(step)])->view.view().step, step);
   }
-  EXPECT_TRUE(set_step(*views, ids[0], 9)) << "needs no room";
+  EXPECT_TRUE(set_step(*views, ids[0], 9)) << "needs no space";
   EXPECT_TRUE(views->remove(ids[1], always).value());
   EXPECT_TRUE(views->add(view_of_step(3), time_of_all));
   EXPECT_FALSE(views->add(view_of_step(4), time_of_all));
@@ -126,7 +126,7 @@ TEST(SavedViewsInMemory, BytesFollowAdditionsChangesAndRemovals) {
   EXPECT_FALSE(set_step(*views, second, 10)) << "and now none";
   EXPECT_EQ(views->find(second)->view.view().step, 2);
   EXPECT_TRUE(set_step(*views, first, 1));
-  EXPECT_TRUE(set_step(*views, second, 10)) << "it is left again";
+  EXPECT_TRUE(set_step(*views, second, 10)) << "it is available again";
   EXPECT_TRUE(views->remove(first, always).value());
   EXPECT_TRUE(views->add(view_of_step(3), time_of_all));
 }
@@ -136,7 +136,7 @@ TEST(SavedViewsInMemory, ConditionalChangeIsMadeOnlyWhenItsConditionHolds) {
   const std::string id = views->add(view_of_step(1), time_of_all)->id;
   const auto never = [](const SavedView&) { return false; };
   const auto kept = views->replace(id, never, [](const ViewDocument&) -> Result<ViewDocument> {
-    ADD_FAILURE() << "asked though it may not change";
+    ADD_FAILURE() << "requested though it may not change";
     return view_of_step(2);
   });
   ASSERT_TRUE(kept);
@@ -158,7 +158,7 @@ TEST(SavedViewsInMemory, ManyThreadsAddChangeAndReadConcurrently) {
       for (int i = 0; i < 200; ++i) {
         const auto own = views->add(view_of_step(i), time_of_all);
         if (!own || views->find(own->id)->view.view().step != i) ++bad;
-        // Each adds one to what it finds: none of them may be lost.
+        // Each adds one to the value it finds: no increment may be lost.
         const auto add = [](const ViewDocument& now) { return view_of_step(now.view().step + 1); };
         if (!views->replace(shared, always, add)) ++bad;
         if (i % 2 == 0 && !views->remove(own->id, always)) ++bad;
@@ -181,7 +181,7 @@ class SavedViewsOnDisk : public testing::Test {
   [[nodiscard]] Result<std::shared_ptr<SavedViews>> open() const {
     return SavedViews::open({state()});
   }
-  // Every file below the folder of views with what it holds; of what is none, its kind.
+  // Every file below the views folder with its content, or the kind of other entries.
   [[nodiscard]] std::map<std::string, std::string> files() const {
     std::map<std::string, std::string> out;
     for (const auto& entry : fs::directory_iterator(state() / "views")) {
@@ -211,7 +211,7 @@ TEST_F(SavedViewsOnDisk, SurviveARestart) {
     gone = told.rbegin()->first;
     EXPECT_TRUE(views->remove(gone, always).value());
     told.erase(gone);
-    EXPECT_EQ(files().size(), told.size()) << "one file a view, and nothing besides";
+    EXPECT_EQ(files().size(), told.size()) << "one file per view, and nothing else";
   }
   const auto views = open().value();
   for (const auto& [id, text] : told) {
@@ -240,7 +240,7 @@ TEST_F(SavedViewsOnDisk, CountAgainstTheLimitsAfterARestart) {
   EXPECT_FALSE(set_step(*views, id, 10));
 }
 
-// A lower bound than before: what there is no room for stays on the disk.
+// A lower limit than before: views above it stay on the disk.
 TEST_F(SavedViewsOnDisk, NoneIsRemovedToMeetALimit) {
   {
     const auto views = open().value();
@@ -267,7 +267,7 @@ TEST_F(SavedViewsOnDisk, TruncatedAndForeignFilesAreIgnoredAndKept) {
   };
   write("0000000000.json", renamed("0000000000").substr(0, text.size() / 2));  // torn
   write("1111111111.json", "");
-  write("2222222222.json", renamed("bbbbbbbbbb"));  // another's id
+  write("2222222222.json", renamed("bbbbbbbbbb"));  // id of another view
   write("3333333333.json", renamed("3333333333") + std::string(70000, ' '));
   write("4444444444.json.part", renamed("4444444444"));
   write("notes.json.1234.part", renamed("4444444444"));
@@ -322,15 +322,15 @@ TEST_F(SavedViewsOnDisk, FailedWriteChangesNothing) {
   ASSERT_FALSE(changed);
   for (const Error& error : {added.error(), changed.error()}) {
     EXPECT_EQ(error.message.find(root_.path().native()), std::string::npos)
-        << "no client's business";
+        << "paths are not shown to clients";
   }
   EXPECT_EQ(files(), before);
   EXPECT_EQ(views->find(id)->view.view().step, 1);
-  EXPECT_TRUE(views->add(view_of_step(2), time_of_all)) << "what failed takes no room";
+  EXPECT_TRUE(views->add(view_of_step(2), time_of_all)) << "a failed view takes no space";
   EXPECT_FALSE(views->add(view_of_step(3), time_of_all));
 }
 
-// The folder and the one of views can be read and not written to, also by root.
+// Both folders can be read but not written, also by root.
 class ReadOnly {
  public:
   explicit ReadOnly(const fs::path& root) : root_(root), user_(::geteuid()) {
@@ -372,7 +372,7 @@ TEST_F(SavedViewsOnDisk, ReadOnlyFolderServesItsViewsAndRefusesChangesWithTheRea
       EXPECT_EQ(error.message.find(root_.path().native()), std::string::npos);
     }
   }
-  EXPECT_TRUE(set_step(*views, id, 3)) << "it can be written to again";
+  EXPECT_TRUE(set_step(*views, id, 3)) << "it is writable again";
 }
 
 TEST_F(SavedViewsOnDisk, MissingFolderIsCreatedByTheFirstChange) {
@@ -399,7 +399,7 @@ TEST_F(SavedViewsOnDisk, IdOfAnExistingFileIsNotReused) {
   const auto views = open().value();
   const std::string id = views->add(view_of_step(1), time_of_all)->id;
   fs::remove(file_of(id));
-  EXPECT_TRUE(views->remove(id, always).value()) << "somebody removed its file";
+  EXPECT_TRUE(views->remove(id, always).value()) << "its file was removed externally";
   EXPECT_FALSE(views->find(id));
 }
 
