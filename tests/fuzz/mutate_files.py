@@ -191,7 +191,7 @@ def refusal(problem, status=None):
 
 
 def check_numbers(value, where):
-    """Every number is one; null may stand for what is not there."""
+    """Every number is finite; null marks missing values."""
     if isinstance(value, bool) or value is None or isinstance(value, str):
         return
     if isinstance(value, (int, float)):
@@ -316,7 +316,7 @@ def case_of(number, options, kinds):
 
 
 class Run:
-    """Outcomes by format, and what failed."""
+    """Outcomes by format, and failures."""
 
     def __init__(self, options, daemon, root, watch):
         self.options = options
@@ -402,7 +402,7 @@ class Run:
 
 
 def plain(reason):
-    """A reason without what differs from file to file."""
+    """A reason without the parts that depend on the file."""
     return re.sub(r"-?\d+(\.\d+)?(e[+-]?\d+)?", "N", re.sub(r"'[^']*'", "'...'", reason))[:150]
 
 

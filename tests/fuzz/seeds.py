@@ -439,7 +439,7 @@ def real_seeds(folder):
 # --- seeds that try to get out -------------------------------------------------------------------
 
 def write_outside(folder):
-    """Files that nobody may open, each fit for what the seeds below ask for."""
+    """Files that must not be opened, each valid for the reference of a seed below."""
     folder.mkdir()
     mark = [MARK_NUMBER] * (3 * COUNT)
     (folder / "mark.raw").write_bytes(floats(mark) * 2)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks what CONTRIBUTING.md says of size and wording: long lines, functions and files, notes of
-work put off, paths of somebody's machine, test folders without a test.
+"""Checks the style rules of CONTRIBUTING.md: long lines, functions and files, notes of postponed
+work, paths of one machine, names of C++ tests, test folders without a test.
 
 Usage: check_style.py [ROOT]"""
 import pathlib
@@ -86,7 +86,7 @@ def complaints_about(path, content):
 
 
 def empty_test_folders(root, files):
-    """CMake passes over a folder of tests without a source; nobody would miss it."""
+    """CMake silently accepts a folder of tests without a source."""
     listing = root / "tests" / "CMakeLists.txt"
     if listing.exists():
         for name, folder in re.findall(r"^windsplat_test\((\w+) (\S+)", listing.read_text(), re.M):
