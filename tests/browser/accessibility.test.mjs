@@ -12,7 +12,7 @@ const { withPage } = sharedDaemon();
 
 async function violations(page) {
   await page.evaluate(axe);
-  // What fades in or out is not yet what is read.
+  // Contrast during a fade differs from the final one.
   await page.evaluate(() =>
     Promise.allSettled(document.getAnimations().map(({ finished }) => finished)),
   );
@@ -39,7 +39,7 @@ const windows = [
   ["light phone", { colorScheme: "light", viewport: { width: 390, height: 844 } }],
 ];
 
-// As a user opens each dialog, with all that comes to be in it.
+// Opens each dialog as a user does, with its complete content.
 const openers = {
   datasets: async (page) => {
     await page.keyboard.press("d");

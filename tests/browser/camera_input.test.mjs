@@ -186,7 +186,7 @@ test("a burst of wheel events reaches the right zoom with few patches and no scr
     assert.ok(frames.length >= 1);
     await page.keyboard.press("Control+z");
     await until(page, "distance", start.toFixed(4));
-    // A trackpad's pinch comes as a wheel with ctrl, which would zoom the page.
+    // A trackpad sends a pinch as a wheel event with ctrl, which would zoom the page.
     await page.evaluate(() => {
       const picture = document.querySelector("#picture");
       for (let n = 0; n < 10; n++) {

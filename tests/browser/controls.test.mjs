@@ -26,7 +26,7 @@ const lastPatch = (page, ...path) =>
     return window.patches.map(({ patch }) => inner(patch)).findLast((v) => v !== undefined);
   }, path);
 
-// The link says this, sooner or later.
+// Waits until the link contains this.
 async function linkSays(page, ...pathAndValue) {
   const wanted = pathAndValue.pop();
   await page.waitForFunction(
@@ -39,7 +39,7 @@ async function linkSays(page, ...pathAndValue) {
   );
 }
 
-// Number boxes and sliders: folder, label, value, where it goes.
+// Number boxes and sliders: folder, label, value, pointer in the view.
 const numbers = [
   ["Lines", "length", 0.08, "vector", "length"],
   ["Lines", "opacity", 0.4, "vector", "opacity"],

@@ -69,7 +69,7 @@ function frame(picture, { seq, rev, flags, width, height, error = NaN, jpegError
   return Buffer.concat([header, picture]);
 }
 
-// Between the page and the daemon. While it is `closed` no frame of the daemon's comes through.
+// A proxy between the page and the daemon. While `closed` it holds frames of the daemon back.
 class Between {
   closed = false;
   patches = 0;
@@ -94,7 +94,7 @@ class Between {
     });
   }
 
-  // Slips a frame in, of the newest view unless `rev` says otherwise.
+  // Inserts a frame, of the newest view unless `rev` is given.
   async show(page, { width, height, picture = quarters(width, height), flags = 0, ...header }) {
     this.closed = true;
     this.last = (this.last ?? this.seq + 1000) + 1;
@@ -204,7 +204,7 @@ test("frames at rest refine the view until the final one", () =>
 test("the HUD has no live region", () =>
   withPage(async (page) => {
     const live = await page.locator("#hud").evaluate((hud) => {
-      // But for the word that a reference is ready, which somebody asked for and waits for.
+      // Except the notice that a requested reference is ready.
       const parts = [hud, ...hud.querySelectorAll("*:not(#reference-words)")];
       const loud = (one) => one.ariaLive !== null || /status|alert|log/.test(one.role ?? "");
       return [parts.some(loud), hud.closest("[aria-live], [role=status], [role=alert]") !== null];

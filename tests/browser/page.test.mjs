@@ -67,7 +67,7 @@ test("a drag rotates the volume and ends in a final frame", () =>
     await drag(page, 160, 60);
     await finalPicture(page);
     const after = await state(page);
-    // The volume follows the hand: to the right is the eye going west, down is going up.
+    // The volume follows the pointer: dragging right moves the eye west, dragging down moves it up.
     assert.ok(Number(after.azimuth) < Number(before.azimuth) - 10, `${after.azimuth}`);
     assert.ok(Number(after.elevation) > Number(before.elevation) + 5, `${after.elevation}`);
     assert.ok(

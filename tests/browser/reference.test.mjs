@@ -47,7 +47,7 @@ const apart = (page) =>
     };
   });
 
-// The pixels of the picture's part of the page, as they are seen, away from what lies over it.
+// The displayed pixels of the picture, without the areas covered by other elements.
 async function seen(page) {
   const box = await page.locator("#picture").boundingBox();
   const clip = { x: box.x + 100, y: box.y + 120, width: 220, height: 100 };
@@ -127,7 +127,7 @@ test("a view change discards the reference and its job", () =>
     assert.equal((await cancelled).status(), 204);
     await finalPicture(page);
     assert.equal(await page.locator("#reference").isVisible(), false);
-    // Escape does the same, and the next hold begins anew.
+    // Escape does the same, and the next hold starts again.
     await page.keyboard.press("r");
     await page.waitForFunction(() =>
       /: \d+ %/.test(document.querySelector("#reference").textContent),

@@ -359,7 +359,7 @@ test("a hidden page gets no frames, and the newest one when visible again", () =
       }, hidden);
     const headers = () => page.evaluate(() => window.frameHeaders.length);
     const quiet = async () => {
-      // What was on its way comes still; then a second without a frame.
+      // Frames in flight still arrive; then a second without a frame.
       let last = -1;
       for (let n = 0; n < 10 && (await headers()) !== last; n++) {
         last = await headers();
