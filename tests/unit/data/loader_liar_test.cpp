@@ -313,10 +313,10 @@ TEST_F(FaultyLoader, ProgressIsReported) {
       "send('filled')\nreceive()\n");
   auto source = opened();
   ASSERT_TRUE(source) << source.error().message;
-  std::vector<double> heard;
-  (*source)->on_progress([&](double done) { heard.push_back(done); });
+  std::vector<double> reported;
+  (*source)->on_progress([&](double done) { reported.push_back(done); });
   ASSERT_TRUE((*source)->read(0, 0));
-  EXPECT_EQ(heard, (std::vector<double>{0, 0.5, 1}));
+  EXPECT_EQ(reported, (std::vector<double>{0, 0.5, 1}));
 }
 
 TEST_F(FaultyLoader, ResizedMemoryIsRefused) {
