@@ -1,5 +1,5 @@
-# What makes a fault in memory end the program instead of serving whoever provoked it. What came of
-# it in the program is looked at by tests/tidy/check_hardening.py.
+# Hardening against memory errors: they end the program instead of being exploitable.
+# tests/tidy/check_hardening.py checks the result in the program.
 include(CheckPIESupported)
 check_pie_supported()
 
@@ -17,8 +17,8 @@ if(NOT WINDSPLAT_SANITIZE)
 endif()
 add_link_options(-Wl,-z,relro -Wl,-z,now -Wl,-z,noexecstack -Wl,-z,separate-code)
 
-# The bounds of the standard library's containers, wherever bytes from outside are met. The engine
-# and the pictures' codes get checked values and no bytes.
+# Bounds checks of standard containers, wherever external data are parsed. The engine and the image
+# codecs get validated values only.
 function(windsplat_check_containers target)
   target_compile_definitions(${target} PRIVATE $<$<CONFIG:Release>:_GLIBCXX_ASSERTIONS>)
 endfunction()

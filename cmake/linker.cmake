@@ -1,5 +1,5 @@
-# The linker. The sanitized presets ask for mold, which takes a tenth of the time; what is shipped
-# is linked by the compiler's own.
+# The linker. The sanitizer presets use mold, which takes a tenth of the time; releases use the
+# default linker of the compiler.
 set(WINDSPLAT_LINKER "" CACHE STRING "mold, lld, gold or bfd; empty: the compiler's own")
 if(WINDSPLAT_LINKER)
   find_program(WINDSPLAT_LINKER_PROGRAM NAMES ${WINDSPLAT_LINKER} ld.${WINDSPLAT_LINKER})

@@ -15,7 +15,7 @@ fail() {
   exit 1
 }
 for tool in buildah debootstrap; do
-  command -v "$tool" >/dev/null || fail "no $tool; say: apt-get install buildah debootstrap"
+  command -v "$tool" >/dev/null || fail "$tool not found; run apt-get install buildah debootstrap"
 done
 [ "$(id -u)" = 0 ] || fail "debootstrap and the chroot need root"
 

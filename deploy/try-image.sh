@@ -14,7 +14,7 @@ fail() {
   exit 1
 }
 for tool in buildah python3 curl; do
-  command -v "$tool" >/dev/null || fail "no $tool; say: apt-get install $tool"
+  command -v "$tool" >/dev/null || fail "$tool not found; run apt-get install $tool"
 done
 [ "$(id -u)" = 0 ] || fail "chroot needs root"
 buildah=(buildah --storage-driver vfs --root "$work/storage" --runroot "$work/run")

@@ -1,5 +1,5 @@
-// The global operator new and delete, counting. The C heap behind them is asked how large a block
-// really is, so that deletes without a size balance.
+// Counting replacements of the global operator new and delete. Block sizes are those of the C heap,
+// so that deletes without a size balance.
 #include "tests/bench/allocations.hpp"
 
 #include <malloc.h>
@@ -51,7 +51,7 @@ void forget_peak() { live_peak = live.load(); }
 
 }  // namespace windsplat::bench
 
-// The nothrow forms and those of arrays call these.
+// The nothrow and array forms call these.
 void* operator new(std::size_t size) { return take(size); }
 void* operator new(std::size_t size, std::align_val_t alignment) { return take(size, alignment); }
 void operator delete(void* block) noexcept { give(block); }

@@ -1,4 +1,4 @@
-// What a program takes from operator new: linked in, it replaces the global one and counts.
+// Counts allocations of a program by operator new: linked in, it replaces the global one.
 #pragma once
 
 #include <cstdint>

@@ -36,7 +36,7 @@ std::string named(const std::string& what, const Size& size) {
   return what + " " + std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-// The same scene by method slab: no naive row, because the naive renderer is one of kernels.
+// The same scene by method slab: no naive row, because the naive renderer is kernel-based.
 Workload by_slab(Workload workload) {
   workload.name += " slab";
   workload.method = protocol::MethodName::slab;
@@ -44,7 +44,7 @@ Workload by_slab(Workload workload) {
   return workload;
 }
 
-// Samples closer than a pixel averaged, as a view's default has it; against the row of all of them.
+// Samples closer than a pixel are averaged, as by default; compared with the row of full detail.
 Workload with_auto_detail(Workload workload) {
   workload.name += " auto detail";
   workload.detail = protocol::Detail::automatic;
@@ -131,7 +131,7 @@ std::vector<Workload> all_workloads() {
   return out;
 }
 
-// One tiny frame, so that the program is known to run. Its cells are smaller than a pixel.
+// One tiny frame to check that the program runs. Its cells are smaller than a pixel.
 std::vector<Workload> smoke_workloads() {
   Workload workload;
   workload.name = "winds+clouds 64x48";
@@ -151,7 +151,7 @@ void engine_frame(benchmark::State& state, const Workload& workload, unsigned th
   const scene::Scene scene = bench::scene_of(workload);
   ThreadPool pool(threads);
   const CancelToken cancel;
-  // Touches the memory and the samples once.
+  // Reads memory and samples once, untimed.
   engine::RenderSpace space;
   engine::WorkReport work = value_or_give_up(engine::render(scene, pool, cancel, space));
   while (state.KeepRunning()) {
@@ -161,7 +161,7 @@ void engine_frame(benchmark::State& state, const Workload& workload, unsigned th
   count_work(state, work);
 }
 
-// How far two pictures are apart as they are displayed.
+// Difference of two displayed pictures.
 struct Apart {
   int codes = 0;      // of 255, in the worst channel of the worst pixel
   double beyond = 0;  // channels that are more than one code apart, of a million
@@ -187,7 +187,7 @@ void naive_frame(benchmark::State& state, const Workload& workload) {
     auto picture = naive::render<float>(scene);
     benchmark::DoNotOptimize(picture.rgba.data());
   }
-  // In double precision: the difference is then the engine's own.
+  // In double precision, so that the difference is the engine's own.
   const naive::Picture<double> exact = naive::render<double>(scene);
   ThreadPool pool(0);
   const auto engine = value_or_give_up(engine::render(scene, pool, CancelToken()));
@@ -205,7 +205,7 @@ std::string threads_label(unsigned threads) {
   return std::to_string(threads) + (threads == 1 ? " thread" : " threads");
 }
 
-// Console output as ever, and the medians for the table.
+// Normal console output, and the medians for the table.
 class Reporter : public benchmark::ConsoleReporter {
  public:
   Reporter() : ConsoleReporter(OO_Tabular) {}
@@ -220,8 +220,8 @@ class Reporter : public benchmark::ConsoleReporter {
     ConsoleReporter::ReportRuns(runs);
   }
 
-  // Wall times; the ratio to the naive renderer by processor time, which other programs on the
-  // machine disturb less.
+  // Wall times; the ratio to the naive renderer by processor time, which other programs disturb
+  // less.
   [[nodiscard]] bench::Table table(const std::vector<Workload>& workloads) const {
     bench::Row head{"frame, ms", "naive"};
     const std::vector<unsigned> counts = bench::thread_counts();
@@ -236,7 +236,7 @@ class Reporter : public benchmark::ConsoleReporter {
     return out;
   }
 
-  // Whether a row visited every sample of its dataset: all but those of automatic detail shall.
+  // Whether a row visited every sample of its dataset: required of all but automatic detail.
   [[nodiscard]] bool drew_all_of(const Workload& workload) const {
     const Frame* frame = find(workload, threads_label(1));
     double samples = 1;
@@ -328,7 +328,7 @@ int run(int argc, char** argv) {
     bench::write_file(markdown, bench::machine_line() + bench::markdown(table));
   benchmark::Shutdown();
   if (!smoke) return 0;
-  // A smoke run must have drawn what it was to draw.
+  // A smoke run must have rendered its content.
   const bool each_right = std::all_of(workloads.begin(), workloads.end(), [&](const Workload& row) {
     return reporter.drew_all_of(row) == (row.detail == protocol::Detail::full);
   });

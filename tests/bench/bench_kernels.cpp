@@ -32,7 +32,7 @@ namespace {
 using bench::Workload;
 using engine::kernels::Table;
 
-// Ticks of the time-stamp counter a nanosecond; 0 where there is none.
+// Ticks of the time-stamp counter per nanosecond; 0 without a counter.
 double ticks_per_ns() {
 #if defined(__x86_64__)
   using Clock = std::chrono::steady_clock;
@@ -47,7 +47,7 @@ double ticks_per_ns() {
 #endif
 }
 
-// Runs `body` until the benchmark has enough; it says how many items it did. Processor time.
+// Runs `body`, which returns its number of items, until the benchmark has enough. Processor time.
 template <class Body>
 void time_items(benchmark::State& state, const Body& body) {
   double items = 0;
@@ -57,7 +57,7 @@ void time_items(benchmark::State& state, const Body& body) {
   state.counters["items"] = items / static_cast<double>(state.iterations());
 }
 
-// Optical depths as frames have them: many thin, some thick.
+// Optical depths typical of frames: many thin, some thick.
 void attenuate(benchmark::State& state, const Table& table) {
   constexpr int count = 4096;
   std::vector<float> tau, absorbed(count), transmitted(count);
@@ -88,7 +88,7 @@ void jitter(benchmark::State& state, const Table& table) {
   });
 }
 
-// A scene made ready up to its tiles.
+// A scene prepared up to its tiles.
 struct Ready {
   Ready(const Workload& workload, const Table& table) : scene(bench::scene_of(workload)), pool(1) {
     engine::make_plan(scene, plan);
@@ -103,10 +103,10 @@ struct Ready {
   const engine::Bins* bins = nullptr;  // in bin_space
 };
 
-// Per stop of the bricks that are in the picture.
+// Per kernel position of the visible bricks.
 void summarise(benchmark::State& state, const Table& table, const Workload& workload) {
   const Ready ready(workload, table);
-  // Pixels a world unit somewhere in the box.
+  // Typical pixels per world unit.
   const auto scale = static_cast<float>(workload.height);
   time_items(state, [&] {
     std::int64_t stops = 0;
@@ -120,7 +120,7 @@ void summarise(benchmark::State& state, const Table& table, const Workload& work
   });
 }
 
-// Bricks culled, summarised and listed: per stop of the scene.
+// Bricks culled, summarised and listed: per kernel position of the scene.
 void bin(benchmark::State& state, const Table& table, const Workload& workload) {
   Ready ready(workload, table);
   time_items(state, [&] {
@@ -132,7 +132,7 @@ void bin(benchmark::State& state, const Table& table, const Workload& workload) 
   });
 }
 
-// Everything that tiles do, per stop of the scene.
+// All work of tiles, per kernel position of the scene.
 void draw(benchmark::State& state, const Table& table, const Workload& workload) {
   Ready ready(workload, table);
   engine::Image image{workload.width, workload.height, {}};
@@ -178,7 +178,7 @@ std::vector<Case> cases(bool smoke) {
   return out;
 }
 
-// Console output as ever, and nanoseconds an item of each target for the table.
+// Normal console output, and nanoseconds per item of each target for the table.
 class Reporter : public benchmark::ConsoleReporter {
  public:
   Reporter() : ConsoleReporter(OO_Tabular) {}

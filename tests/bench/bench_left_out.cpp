@@ -42,7 +42,7 @@ struct Feature {
   std::string dataset;
   Change with;
   Change without;
-  bool alike = false;  // the picture should hardly change: how far it did is measured
+  bool alike = false;  // the picture should hardly change: the difference is measured
 };
 
 [[noreturn]] void give_up(const Error& error) {
@@ -138,7 +138,7 @@ void globe(View& view) {
 }
 void one_layer(View& view) { view.geometry.slice = {protocol::GridAxis::z, 8}; }
 
-// Every wind is drawn but where that is the feature, as in the paper's figures.
+// Every wind is rendered except where that is the feature, as in the figures of the paper.
 std::vector<Feature> features() {
   using protocol::Compositing;
   const Change all = weakest_line(1e-3);
@@ -186,7 +186,7 @@ View make_view(const Feature& feature, const Change& change, protocol::MethodNam
   return value_or_give_up(scene::complete(view, dataset)).view();
 }
 
-// The report as a frame has it; the picture is the end of an NPY file.
+// The report of a frame; the picture is the end of an NPY file.
 void draw_once(const View& view, data::Dataset& dataset, Half& half) {
   ThreadPool pool(1);
   frame::Encoding encoding;
@@ -197,7 +197,7 @@ void draw_once(const View& view, data::Dataset& dataset, Half& half) {
   half.rgba = bench::npy_values(drawn.bytes, drawn.width, drawn.height);
 }
 
-// One thread's processor time: what else runs on the machine disturbs it least.
+// Processor time of one thread, which other programs disturb least.
 double time_frame(const scene::Scene& scene, ThreadPool& pool, engine::RenderSpace& space) {
   const auto now = [] {
     timespec at{};
@@ -210,7 +210,7 @@ double time_frame(const scene::Scene& scene, ThreadPool& pool, engine::RenderSpa
   return now() - start;
 }
 
-// With, without, without, with: whatever drifts hurts both alike.
+// With, without, without, with: drift affects both equally.
 void run_pair(benchmark::State& state, const Feature& feature, protocol::MethodName method,
               Pair& pair) {
   data::Dataset& dataset = dataset_of(feature.dataset);

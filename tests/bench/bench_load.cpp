@@ -123,7 +123,7 @@ void write_raw(const std::string& folder, data::Source& source) {
                {"name": "cloud"}]})";
 }
 
-// Seconds that `work` takes, the least of the rounds after one that is not timed.
+// Seconds of `work`: the minimum of the rounds after an untimed one.
 double least_seconds(int rounds, const std::function<void()>& work) {
   work();
   double least = 1e30;
@@ -135,7 +135,7 @@ double least_seconds(int rounds, const std::function<void()>& work) {
   return least;
 }
 
-// What was read stays for as long as a round lasts, as in a program that wants to use it.
+// Volumes are kept for a round, as in a program that uses them.
 using Kept = std::vector<std::unique_ptr<float[]>>;
 
 float* take(Kept& kept, std::size_t floats) {
@@ -189,7 +189,7 @@ void read_all(data::Source& source) {
 
 bench::Row measure(const std::string& name, const std::string& path, const Options& options,
                    const std::function<void()>& bare) {
-  // First of all: HDF5 would share the chunks that another opening of the file has unpacked.
+  // First: HDF5 would share unpacked chunks of an earlier opening of the file.
   const double plain = least_seconds(options.rounds, bare);
   const auto here = bench::value_or_give_up(data::open_file(path));
   const auto apart =
@@ -208,7 +208,7 @@ bench::Row measure(const std::string& name, const std::string& path, const Optio
 }  // namespace
 
 int main(int argc, char** argv) {
-  ::mallopt(M_MMAP_THRESHOLD, 1 << 20);  // and stays there: memory given back is not given again
+  ::mallopt(M_MMAP_THRESHOLD, 1 << 20);  // and is kept: memory is not released and reallocated
   const Options options = options_of(argc, argv);
   data::loader::set_program(options.program);
   const std::string folder =

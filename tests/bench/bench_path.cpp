@@ -48,7 +48,7 @@ void draw(data::Dataset& dataset, const std::vector<protocol::View>& views, unsi
           const std::string& picture) {
   ThreadPool pool(threads);
   const CancelToken cancel;
-  frame::Workspace workspace;  // kept from frame to frame, as a daemon does
+  frame::Workspace workspace;  // kept between frames, as by a daemon
   frame::Encoding encoding;
   encoding.quality = 80;
   encoding.subsampling = image::Subsampling::s420;

@@ -41,7 +41,7 @@ constexpr Setting settings[] = {{"420 q80", Subsampling::s420, 80},
 constexpr std::array<float, 3> background{0.01F, 0.02F, 0.03F};
 constexpr int tile = 64;
 
-// Fine lines over soft clouds, as the pictures that are sent: nothing of it is empty.
+// Fine lines over soft clouds, as in typical pictures; no part is empty.
 std::vector<float> scene(Size size) {
   std::vector<float> rgba;
   rgba.reserve(std::size_t{4} * size.width * size.height);
@@ -74,7 +74,7 @@ void tell(benchmark::State& state, Size size) {
       benchmark::Counter(pixels, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
-// A tile's pixels are near when they are converted; here every tile is read from the same place.
+// Pixels of a tile are in the cache when converted; here every tile is read from the same memory.
 void fill(const std::vector<float>& tile_rgba, Size size, ThreadPool& pool, YccPicture& picture) {
   const int columns = (size.width + tile - 1) / tile;
   const int rows = (size.height + tile - 1) / tile;
@@ -135,7 +135,7 @@ void jpeg_rgb(benchmark::State& state, Size size, Setting setting) {
   state.counters["bytes"] = static_cast<double>(bytes);
 }
 
-// The climate sample as it moves, `frames` of them an iteration.
+// The climate sample in motion, `frames` frames per iteration.
 class Loop {
  public:
   Loop(Size size, unsigned threads) : pool_(threads) {
@@ -175,7 +175,7 @@ class Loop {
     }
   }
 
-  // The last frame is encoded by a thread of its own while all threads draw the next.
+  // The last frame is encoded by its own thread while all threads render the next.
   void side_by_side() {
     draw(spaces_[0]);
     for (std::size_t n = 1; n <= frames; ++n) {

@@ -18,7 +18,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Arguments: threads, microseconds that the caller does something else between two loops, alone.
+// Arguments: threads, microseconds of other work by the caller between two loops, alone.
 void round_trip(benchmark::State& state) {
   windsplat::ThreadPool pool(static_cast<unsigned>(state.range(0)));
   const std::chrono::microseconds pause(state.range(1));

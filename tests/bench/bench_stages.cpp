@@ -33,13 +33,13 @@ using bench::value_or_give_up;
 using bench::Workload;
 using Clock = std::chrono::steady_clock;
 
-constexpr int jpeg_quality = 80;  // as frames of a moving camera are sent, 4:2:0
+constexpr int jpeg_quality = 80;  // as frames in motion are sent, 4:2:0
 
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-// Values by name, one a frame; told as medians.
+// Values by name, one per frame; reported as medians.
 class Series {
  public:
   void add(const std::string& name, double value) { values_[name].push_back(value); }
@@ -51,11 +51,11 @@ class Series {
   std::map<std::string, std::vector<double>> values_;
 };
 
-// Pixels become codes of YCbCr as a tile is finished.
+// Pixels are converted to YCbCr codes as a tile is finished.
 constexpr std::array<const char*, 7> stages = {"view",         "scene",           "plan", "bins",
                                                "clear planes", "tiles, tone map", "JPEG"};
 
-// What a daemon's renderer keeps, and the same for the frame that is drawn stage by stage.
+// Memory of a daemon's renderer, and the same for the frame rendered stage by stage.
 struct Kept {
   frame::Workspace whole;
   engine::RenderSpace engine;
@@ -104,7 +104,7 @@ void staged_frame(const protocol::View& asked, const Workload& workload, ThreadP
   benchmark::DoNotOptimize(jpeg.data());
 }
 
-// The same as the stream has it, and what it takes from the heap.
+// The same as in a stream, and its allocations.
 void whole_frame(const protocol::View& view, const Workload& workload, ThreadPool& pool, Kept& kept,
                  Series& series) {
   frame::Encoding encoding;
@@ -123,7 +123,7 @@ void whole_frame(const protocol::View& view, const Workload& workload, ThreadPoo
   series.add("JPEG kB", 1e-3 * static_cast<double>(frame.bytes.size()));
 }
 
-// The engine alone, which the steady state of a frame loop should not make allocate.
+// The engine alone, which must not allocate in the steady state.
 void engine_frame(const protocol::View& view, const Workload& workload, ThreadPool& pool,
                   Kept& kept, Series& series) {
   const scene::Scene scene =
@@ -161,7 +161,7 @@ void frames(benchmark::State& state, const Workload& workload, unsigned threads)
                                     static_cast<double>(dataset.info().grid.samples());
 }
 
-// Console output as ever, and every run for the tables.
+// Normal console output, and every run for the tables.
 class Reporter : public benchmark::ConsoleReporter {
  public:
   Reporter() : ConsoleReporter(OO_None) {}

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Whether moving frames keep their budget: a daemon, a viewer that orbits, and for every budget
-what frames took, what they say they err and what they were drawn by. Markdown on stdout.
+"""Whether moving frames keep their budget: a daemon, a client that orbits, and for every budget the
+times, reported errors and settings of frames. Markdown on stdout.
 
 Usage: budgets.py [--program=windsplat] [--dataset=climate ...] [--size=640x480]
        [--budgets=16,33,66,100] [--max-errors=0.05,0.02,0.005] [--frames=120] [--check]
 
-A dataset is whatever `windsplat serve` takes. Before the orbits the view rests, so that the daemon
-can survey it. With --check the exit code is 1 where more than one frame in twenty took more than
-1.2 times its budget to draw, or where a larger budget errs more."""
+A dataset is any argument of `windsplat serve`. Before the orbits the view rests, so that the daemon
+can calibrate it. With --check the exit code is 1 if more than one frame in twenty took more than
+1.2 times its budget to render, or a larger budget has a larger error."""
 import argparse
 import collections
 import json
@@ -95,7 +95,7 @@ class Orbit:
 
 
 def wait_for_survey(port, seconds):
-    """Until the daemon has surveyed the view; says so where it does not in time."""
+    """Waits until the daemon has calibrated the view; prints a message on a timeout."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics") as answer:

@@ -1,4 +1,4 @@
-// Pairs of frames with and without a feature -> tables of text: what each cost, what was saved.
+// Pairs of frames with and without a feature -> tables of text: costs and savings.
 #pragma once
 
 #include <algorithm>
@@ -60,7 +60,7 @@ inline std::string touched(const engine::WorkReport& work) {
   return text;
 }
 
-// Saved: the median over the rounds of what each pair says, in which drift cancels.
+// Savings: the median over the rounds of each pair, in which drift cancels.
 inline double saved_percent(const Pair& pair) {
   std::vector<double> ratios;
   for (std::size_t i = 0; i < pair.with.ms.size(); ++i) {
@@ -90,7 +90,7 @@ struct Apart {
   double mean = 0, max = 0, rmse = 0;
 };
 
-// Mean over pixels of the channel that changes most: what skipped_bound speaks of.
+// Mean over pixels of the channel that changes most, which skipped_bound limits.
 inline Apart apart(const std::vector<float>& a, const std::vector<float>& b) {
   Apart out;
   const std::size_t pixels = std::min(a.size(), b.size()) / 4;
@@ -120,7 +120,7 @@ inline Row error_row(const Pair& pair) {
           number("%.2g", found.rmse)};
 }
 
-// What each costs, and of pictures that should stay alike how far apart they are.
+// Cost of each, and the difference of pictures that should be equal.
 inline std::vector<Table> tables(const std::vector<Pair>& pairs) {
   Table costs{{"left out", "method", "with, ms", "without, ms", "saved", "exponentials, M",
                "pixel updates, M", "fields touched", "samples, M", "kernels skipped, M"}};

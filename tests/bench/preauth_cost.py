@@ -33,7 +33,7 @@ GROUPS = ["X25519", "P-256", "P-384", "ffdhe2048", "ffdhe8192"]
 
 
 def cpu_s(pid):
-    """Of all threads that live. A tick of /proc/PID/stat is longer than most of what is timed."""
+    """Of all running threads. A tick of /proc/PID/stat is longer than most measured intervals."""
     total = 0
     for task in os.listdir(f"/proc/{pid}/task"):
         with contextlib.suppress(FileNotFoundError):
@@ -42,7 +42,7 @@ def cpu_s(pid):
 
 
 def plain(*parts, pause_s=0.0):
-    """Sends parts, takes all that comes; how much was sent."""
+    """Sends parts and discards responses; returns the number of bytes sent."""
     def once(port):
         with tls_peer.connect_from(tls_peer.ATTACKER, port) as one:
             for part in parts:

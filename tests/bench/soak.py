@@ -1,24 +1,22 @@
 #!/usr/bin/env python3
-"""Hundreds of viewers for many minutes, a tenth of them hostile, a tenth that never read: what the
-daemon holds of memory, descriptors and threads, and whether it grows. Markdown on stdout. Linux
-only.
+"""Hundreds of sessions for many minutes, a tenth of them hostile, a tenth that never read: memory,
+descriptors and threads of the daemon, and their growth. Markdown on stdout. Linux only.
 
 Usage: soak.py [--program=windsplat] [--dataset=tornado:32x32x32] [--minutes=20] [--sessions=200]
        [--mix=normal:8,hostile:1,deaf:1] [--stay=30] [--size=160x120] [--every=5] [--max-slope=8]
        [--samples=FILE] [--tls] [--smoke] [-- options of serve]
 
-So many sessions at a time; each stays for about --stay seconds and another one of its kind takes
-its place. Normal ones change their view, wait for frames and acknowledge them, now and then ask
-for a still, save a view or ask by HTTP. Hostile ones send frames that are none, broken JSON,
-floods, half a message and a reset, headers letter by letter, half-open connections. Deaf ones ask
-and never read. --mix can also ask for `drag`, who change their view all the time, `slow`, who read
-20 kB/s, and `cut`, whose connection is reset within seconds; the numbers are shares of the
-sessions. --tls: all of it over TLS, by a certificate that openssl makes; hostile ones then
-also leave in the middle of a handshake or speak no TLS. Memory is looked at every --every seconds.
-The slope is the least squares' line through the least of each of twelve stretches of the samples
-after the first quarter (the warm-up), with its 95 % confidence interval: a large picture takes some
-15 MB for a moment, and whether one is drawn when the clock strikes is chance; what stays shows
-between them. The line through the stretches' means, chance and all, is printed beside it.
+--sessions run concurrently; each lasts about --stay seconds and is replaced by one of its kind.
+Normal ones change their view, wait for frames and acknowledge them, and sometimes request a still,
+save a view or use HTTP. Hostile ones send invalid frames, broken JSON, floods, half a message and a
+reset, headers byte by byte, half-open connections. Deaf ones send requests and never read. --mix
+also accepts `drag` (permanent view changes), `slow` (reads 20 kB/s) and `cut` (reset within
+seconds); the numbers are shares of the sessions. --tls: everything over TLS, with a certificate
+made by openssl; hostile ones then also abort handshakes or send plain text. Memory is sampled every
+--every seconds. The slope is the least-squares line through the minima of twelve intervals of the
+samples after the first quarter (the warm-up), with its 95 % confidence interval: a large picture
+takes about 15 MB for a moment, which a sample hits by chance; minima show what remains allocated.
+The line through the means of the intervals is printed beside it.
 
 Failures: a daemon that dies, stops answering /livez or ends with another code than 0; a slope
 above its interval's half width and above --max-slope MB/hour; descriptors, threads or sessions
@@ -120,7 +118,7 @@ def slope(samples, of_stretch):
 
 
 def settle(options, daemon, before, failures):
-    """Waits until what sessions held is given back."""
+    """Waits until the memory of sessions is released."""
     end = time.monotonic() + LEAVE_S
     while True:
         now, sessions = state(daemon.child.pid), metric(options, daemon.port, "windsplat_sessions")
@@ -221,7 +219,7 @@ def measure(options, folder):
     daemon = Daemon(options.program, options.dataset, "--max-sessions", str(2 * options.sessions),
                     *tls, *options.further)
     counts, samples, failures = Counts(), [], []
-    # A picture first: what is made once is there before anything is counted.
+    # A picture first, so that one-time allocations are not counted.
     fetch(options, daemon.port, f"/v1/datasets/{options.dataset}/frame.jpg?width=64&height=48")
     metric(options, daemon.port, "windsplat_sessions")
     time.sleep(0.3)

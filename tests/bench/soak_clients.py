@@ -1,4 +1,4 @@
-"""The clients of soak.py: how each kind behaves, and who takes whose place."""
+"""The clients of soak.py: behaviour of each kind, and replacement of ended ones."""
 import asyncio
 import json
 import math

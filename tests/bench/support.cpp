@@ -1,4 +1,4 @@
-// Workload -> dataset -> view -> scene, and the machine's names.
+// Workload -> dataset -> view -> scene, and the description of the machine.
 #include "tests/bench/support.hpp"
 
 #include <benchmark/benchmark.h>
@@ -48,7 +48,7 @@ protocol::View view_of(const Workload& workload) {
   view.dataset = dataset.info().id;
   view.image.width = workload.width;
   view.image.height = workload.height;
-  // Before defaults are looked for, so that a field which is not drawn is never loaded.
+  // Before defaults are computed, so that hidden fields are never loaded.
   const std::string preset = workload.preset;
   if (preset == "clouds") view.vector.field = {protocol::FieldChoice::Kind::none, ""};
   view = value_or_give_up(scene::complete(view, dataset)).view();
@@ -85,7 +85,7 @@ std::vector<unsigned> thread_counts() {
 
 namespace {
 
-// The value after the colon of the first line that begins so.
+// The value after the colon of the first line with this prefix.
 std::string line_of(const std::string& path, const std::string& key) {
   std::ifstream file(path);
   std::string line;

@@ -1,5 +1,4 @@
-// What the benchmarks share: datasets and views of the workloads, the machine they ran on, and an
-// end with a word where something fails.
+// Shared by the benchmarks: datasets and views of the workloads, the machine, and fatal errors.
 #pragma once
 
 #include <array>
@@ -23,7 +22,7 @@ T value_or_give_up(Result<T> result) {
   return std::move(*result);
 }
 
-// A built-in sample at a size; {0, 0, 0} is its own.
+// A built-in sample at a size; {0, 0, 0} is its default.
 struct Sample {
   const char* name;
   std::array<int, 3> dims{0, 0, 0};
@@ -33,8 +32,8 @@ inline constexpr Sample climate{"climate"};
 inline constexpr Sample tornado_256{"tornado", {256, 256, 256}};
 inline constexpr Sample tornado_512{"tornado", {512, 512, 512}};
 
-// every_line: every wind above a thousandth of the range has its line, as in the paper's figures,
-// whatever the view's default would leave out for clarity.
+// every_line: every wind above a thousandth of the range has its line, as in the figures of the
+// paper, instead of the default of the view.
 struct Workload {
   std::string name;
   Sample sample = climate;
@@ -48,7 +47,7 @@ struct Workload {
   bool heavy = false;  // seconds a frame by the naive renderer, or a gigabyte of data
 };
 
-// The first step, opened once and kept until another sample is asked for.
+// The first step, opened once and kept until another sample is requested.
 data::Dataset& dataset_of(const Sample& sample);
 
 // The completed view of the workload: the preset from azimuth 20, elevation 35 (degrees).
@@ -59,10 +58,10 @@ void turn(protocol::View& view, const Workload& workload, double azimuth);
 
 scene::Scene scene_of(const Workload& workload);
 
-// 1, 2, 4, ... and as many as the hardware has.
+// 1, 2, 4, ... and the number of hardware threads.
 std::vector<unsigned> thread_counts();
 
-// As JSON's "context" tells it: name and value of processor, compiler, targets, version.
+// As in "context" of the JSON: name and value of processor, compiler, targets, version.
 std::vector<std::pair<std::string, std::string>> machine();
 
 // The same as a line above a table, Markdown.
@@ -71,11 +70,11 @@ std::string machine_line();
 // Adds machine() to Google Benchmark's context.
 void add_context();
 
-// The value of `--name=value`, or "set" of a bare `--name`; empty where it is absent. The argument
-// is taken out of argv.
+// The value of `--name=value`, or "set" for `--name`; empty if absent. The argument is removed from
+// argv.
 std::string take_option(int& argc, char** argv, const std::string& name);
 
-// Bytes from /proc/self/status, for example of "VmHWM"; 0 where the system has none.
+// Bytes from /proc/self/status, for example of "VmHWM"; 0 if not available.
 std::size_t process_bytes(const std::string& key);
 
 void write_file(const std::string& path, const std::string& text);

@@ -1,4 +1,4 @@
-// Rows of text -> Markdown or an aligned table for a terminal, and what fills them.
+// Rows of text -> Markdown or an aligned table for a terminal, and formatting of numbers.
 #pragma once
 
 #include <algorithm>

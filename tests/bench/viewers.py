@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
-"""Many viewers of the same data who all turn the camera: what each gets, how late, how evenly, and
-what they cost. Tables as Markdown on stdout. Linux only (/proc).
+"""Many sessions with the same data and rotating cameras: rate, latency and fairness of frames, and
+their cost. Tables as Markdown on stdout. Linux only (/proc).
 
 Usage: viewers.py [--program=windsplat] [--dataset=climate] [--viewers=16] [--seconds=20]
        [--size=640x480] [--mixed] [--deaf=20] [--ended=200]
        [--min-jain=0.95] [--smoke]
 
-A viewer sends the next camera with every frame it receives. --mixed adds one viewer at 1920x1080
-and one that never reads. --deaf: sessions that ask for frames of 2560x1440 and never read, for the
-memory of each. --ended: sessions that come, look and go, for what they leave behind. 0: none.
-Exit 1 where Jain's index of the viewers' frame rates, (sum x)^2 / (n sum x^2), is below --min-jain,
-or a deaf session costs more than two frames and 256 KiB.
---smoke: small and short; it fails only where nothing works."""
+A session sends the next camera with every frame it receives. --mixed adds one session at 1920x1080
+and one that never reads. --deaf: sessions that request frames of 2560x1440 and never read, for the
+memory of each. --ended: short sessions, for the memory that they leave allocated. 0: none.
+Exit 1 if Jain's index of the frame rates, (sum x)^2 / (n sum x^2), is below --min-jain, or a deaf
+session takes more than two frames and 256 KiB.
+--smoke: small and short; fails only if nothing works."""
 import argparse
 import json
 import math
@@ -37,7 +37,7 @@ def camera(angle):
 
 
 class Orbit(threading.Thread):
-    """A viewer that turns the camera until told to stop."""
+    """A client that rotates the camera until stopped."""
 
     def __init__(self, port, dataset, size, first_angle):
         super().__init__(daemon=True)

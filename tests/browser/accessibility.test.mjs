@@ -12,7 +12,7 @@ const { withPage } = sharedDaemon();
 
 async function violations(page) {
   await page.evaluate(axe);
-  // What fades in or out is not yet what is read.
+  // Contrast during a fade differs from the final one.
   await page.evaluate(() =>
     Promise.allSettled(document.getAnimations().map(({ finished }) => finished)),
   );
@@ -39,7 +39,7 @@ const windows = [
   ["light phone", { colorScheme: "light", viewport: { width: 390, height: 844 } }],
 ];
 
-// As a user opens each dialog, with all that comes to be in it.
+// Opens each dialog as a user does, with its complete content.
 const openers = {
   datasets: async (page) => {
     await page.keyboard.press("d");
@@ -81,7 +81,7 @@ for (const [name, options] of windows) {
 }
 
 // A busy browser reports late that a plot is visible; until then the plot is not drawn.
-test("axe finds nothing while plots wait to be seen", () =>
+test("axe reports nothing while plots wait to become visible", () =>
   withPage(
     async (page) => {
       await unfoldAll(page);
@@ -90,7 +90,7 @@ test("axe finds nothing while plots wait to be seen", () =>
     { initScript: () => (IntersectionObserver.prototype.observe = () => {}) },
   ));
 
-test("axe's rules are looked at: a button without a name is found", () =>
+test("axe reports a button without a name", () =>
   withPage(async (page) => {
     await page.evaluate(() =>
       document.querySelector("header").append(document.createElement("button")),
@@ -119,7 +119,7 @@ const focused = (page) =>
     };
   });
 
-test("the tab key reaches every control once around, and one sees where it is", () =>
+test("the tab key reaches every control once with visible focus", () =>
   withPage(async (page) => {
     const expected = await page.evaluate(
       () =>
@@ -154,7 +154,7 @@ test("the tab key reaches every control once around, and one sees where it is", 
     );
   }));
 
-test("a visit by the keyboard alone: another dataset, a turn, longer lines, the help", () =>
+test("keyboard alone opens a dataset, rotates, lengthens lines and shows the help", () =>
   withPage(async (page) => {
     const tabTo = async (selector) => {
       for (let n = 0; n < 200; n++) {
@@ -195,7 +195,7 @@ test("a visit by the keyboard alone: another dataset, a turn, longer lines, the 
     assert.equal(await page.evaluate(() => document.activeElement.id), "help-button");
   }));
 
-test("with reduced motion nothing moves by itself", () =>
+test("with reduced motion nothing moves on its own", () =>
   withPage(
     async (page) => {
       const moving = await page.evaluate(() =>

@@ -17,7 +17,7 @@ const watchAddress = () => {
 };
 
 // The server never answers, and the deadline is near.
-test("a stored view that never comes: the default, the reason, and the link until a change", () => {
+test("a stored view that fails to load shows the default and the reason", () => {
   const hurry = () => {
     const timeout = AbortSignal.timeout.bind(AbortSignal);
     AbortSignal.timeout = (ms) => timeout(ms / 20);
@@ -43,7 +43,7 @@ test("a stored view that never comes: the default, the reason, and the link unti
   );
 });
 
-test("a refreshed list leaves cards, their pictures and the focus as they are", () => {
+test("a refreshed dataset list keeps cards, pictures and focus", () => {
   const previews = [];
   let release;
   const held = new Promise((resolve) => (release = resolve));

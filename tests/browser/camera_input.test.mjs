@@ -46,7 +46,7 @@ const settled = (page) =>
 
 // --- axes and roll ---------------------------------------------------------------------------
 
-test("each end of the axes looks from there, by a turn or at once", async () => {
+test("each axis end sets its view direction, animated or at once", async () => {
   const ways = [
     ["View from the east", "90.0", "0.0"],
     ["View from the north", "180.0", "0.0"],
@@ -90,7 +90,7 @@ test("each end of the axes looks from there, by a turn or at once", async () => 
   );
 });
 
-test("a hand on the picture ends a turn", () =>
+test("touching the picture ends a camera animation", () =>
   withPage(async (page) => {
     await page.locator("#picture").focus();
     await page.keyboard.press("2");
@@ -103,7 +103,7 @@ test("a hand on the picture ends a turn", () =>
     assert.ok(sent.length < 30);
   }));
 
-test("the picture rolls by keys, turns as before with the roll, and 0 puts it upright", () =>
+test("keys roll the picture, orbiting keeps the roll, and 0 resets it", () =>
   withPage(async (page) => {
     const start = await state(page);
     const first = await hashOf(page);
@@ -126,7 +126,7 @@ test("the picture rolls by keys, turns as before with the roll, and 0 puts it up
 
 const upOf = async (page) => (await cameras(page)).at(-1).up;
 
-test("two fingers that twist roll the camera by their angle", () =>
+test("twisting two fingers rolls the camera by their angle", () =>
   withPage(
     async (page) => {
       await page.keyboard.press("1"); // from the south: up is z, right is x
@@ -167,7 +167,7 @@ test("two fingers that twist roll the camera by their angle", () =>
     { hasTouch: true, viewport: { width: 390, height: 700 }, isMobile: true },
   ));
 
-test("a burst of the wheel lands at the right zoom by a few patches, and nothing scrolls", () =>
+test("a burst of wheel events reaches the right zoom with few patches and no scrolling", () =>
   withPage(async (page) => {
     const start = Number((await state(page)).distance);
     const before = (await cameras(page)).length;
@@ -186,7 +186,7 @@ test("a burst of the wheel lands at the right zoom by a few patches, and nothing
     assert.ok(frames.length >= 1);
     await page.keyboard.press("Control+z");
     await until(page, "distance", start.toFixed(4));
-    // A trackpad's pinch comes as a wheel with ctrl, which would zoom the page.
+    // A trackpad sends a pinch as a wheel event with ctrl, which would zoom the page.
     await page.evaluate(() => {
       const picture = document.querySelector("#picture");
       for (let n = 0; n < 10; n++) {
@@ -199,7 +199,7 @@ test("a burst of the wheel lands at the right zoom by a few patches, and nothing
     assert.ok(Math.abs(pinched / (start / 1.01 ** 70) - 1) < 2e-3, `${start} to ${pinched}`);
   }));
 
-test("one finger turns, two fingers move and pinch", () =>
+test("one finger orbits, two fingers pan and pinch", () =>
   withPage(async (page) => {
     const cdp = await page.context().newCDPSession(page);
     const box = await pictureBox(page);

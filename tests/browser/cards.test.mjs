@@ -47,7 +47,7 @@ function withPage(run, { alter, ...options } = {}) {
 
 const card = (page, title) => page.locator(".card", { hasText: title });
 
-test("a first visit shows a picture; the cards are one press away and open what they say", () =>
+test("a first visit shows a picture, and each card opens its dataset", () =>
   withPage(async (page) => {
     assert.equal(await page.locator("#datasets").isVisible(), false);
     await page.locator("#datasets-button").click();
@@ -69,7 +69,7 @@ test("a first visit shows a picture; the cards are one press away and open what 
     assert.equal(drawn, "tornado");
   }));
 
-test("pictures come one at a time, and one that fails says why on its card", () => {
+test("card pictures load one at a time, and a failure is shown on its card", () => {
   let running = 0;
   let most = 0;
   return withPage(
@@ -97,7 +97,7 @@ test("pictures come one at a time, and one that fails says why on its card", () 
   );
 });
 
-test("cards by keys alone: arrows, Enter, Escape", () =>
+test("cards are usable by arrow keys, Enter and Escape", () =>
   withPage(async (page) => {
     await page.locator("#picture").focus();
     await page.keyboard.press("d");
@@ -116,7 +116,7 @@ test("cards by keys alone: arrows, Enter, Escape", () =>
     await finalPicture(page);
   }));
 
-test("closed and opened again within a frame, the cards keep the focus that they are given", () =>
+test("cards closed and reopened within a frame keep the focus", () =>
   withPage(async (page) => {
     await page.evaluate(() => {
       const [button, dialog] = ["datasets-button", "datasets"].map((id) =>
@@ -131,7 +131,7 @@ test("closed and opened again within a frame, the cards keep the focus that they
     assert.match(await page.evaluate(() => document.activeElement.textContent), /^Global/);
   }));
 
-test("a server without datasets shows how to add one", () =>
+test("a server without datasets explains how to add one", () =>
   withPage(
     async (page) => {
       await page.getByText("The server has no dataset yet.").waitFor();
@@ -147,7 +147,7 @@ test("a server without datasets shows how to add one", () =>
     },
   ));
 
-test("a dataset that takes its time has a bar, and Cancel goes back to the view before", () =>
+test("a slow dataset has a progress bar, and Cancel returns to the previous view", () =>
   withPage(
     async (page, wire) => {
       await drag(page, 80, 20);
@@ -177,7 +177,7 @@ test("a dataset that takes its time has a bar, and Cancel goes back to the view 
     { alter: () => true },
   ));
 
-test("what was cancelled does not come back, whatever the server still says of it", () =>
+test("a cancelled dataset stays closed despite late messages", () =>
   withPage(
     async (page, wire) => {
       await page.locator("#dataset").selectOption("tornado");
@@ -203,7 +203,7 @@ test("what was cancelled does not come back, whatever the server still says of i
     },
   ));
 
-test("a lost connection: the mark says offline, the text why, and the button retries at once", () =>
+test("a lost connection is shown as offline with the reason, and the button retries at once", () =>
   withPage(
     async (page, wire) => {
       const before = await pixels(page);

@@ -26,7 +26,7 @@ const lastPatch = (page, ...path) =>
     return window.patches.map(({ patch }) => inner(patch)).findLast((v) => v !== undefined);
   }, path);
 
-// The link says this, sooner or later.
+// Waits until the link contains this.
 async function linkSays(page, ...pathAndValue) {
   const wanted = pathAndValue.pop();
   await page.waitForFunction(
@@ -39,7 +39,7 @@ async function linkSays(page, ...pathAndValue) {
   );
 }
 
-// Number boxes and sliders: folder, label, value, where it goes.
+// Number boxes and sliders: folder, label, value, pointer in the view.
 const numbers = [
   ["Lines", "length", 0.08, "vector", "length"],
   ["Lines", "opacity", 0.4, "vector", "opacity"],
@@ -59,7 +59,7 @@ const numbers = [
   ["Quality", "moving budget \\(ms\\)", 60, "quality", "budgetMs"],
 ];
 
-test("every number goes out under its key and into the link", () =>
+test("every number is sent under its key and kept in the link", () =>
   withPage(async (page) => {
     await unfold(page, ...new Set(numbers.map(([folder]) => folder)));
     for (const [, label, value, ...path] of numbers) {
@@ -81,7 +81,7 @@ const visible = [
   ["Camera and depth", "depth cue", 1],
 ];
 
-test("what the lines' numbers change is seen", () =>
+test("line settings change the picture", () =>
   withPage(async (page) => {
     await unfold(page, ...new Set(visible.map(([folder]) => folder)));
     let { hash } = await pixels(page);
@@ -109,7 +109,7 @@ test("near and far of the depth cue cannot cross", () =>
     assert.equal(await control(page, "darkens from", "input").isDisabled(), false);
   }));
 
-test("a medium's stride and least optical depth go out with it", () =>
+test("stride and minimum optical depth of a medium are sent", () =>
   withPage(async (page) => {
     const first = await pixels(page);
     await type(page, "min optical depth", 0.02);
@@ -118,7 +118,7 @@ test("a medium's stride and least optical depth go out with it", () =>
     assert.notEqual((await pixels(page)).hash, first.hash);
   }));
 
-test("lines that are off take their controls with them", () =>
+test("lines that are switched off hide their controls", () =>
   withPage(async (page) => {
     const shown = control(page, "shown", "input");
     await shown.uncheck();
@@ -130,7 +130,7 @@ test("lines that are off take their controls with them", () =>
     assert.equal(await isShown(page, "colour by"), true);
   }));
 
-test("kernels that do not overlap have no span, no jitter no pattern", () =>
+test("without overlap there is no span, without jitter no pattern", () =>
   withPage(async (page) => {
     await unfold(page, "Kernels and jitter");
     const disabled = (label) => control(page, label, "input").isDisabled();
@@ -147,7 +147,7 @@ test("kernels that do not overlap have no span, no jitter no pattern", () =>
     assert.equal(await disabled("new each step"), true);
   }));
 
-test("the slab's thickness is asked for only of slabs, and each compositing is explained", () =>
+test("slab thickness is offered for slabs only, and each compositing is explained", () =>
   withPage(async (page) => {
     await unfold(page, "Method");
     const note = (text) => page.locator("#panel .panel-note", { hasText: text });
@@ -181,7 +181,7 @@ test("the slab's thickness is asked for only of slabs, and each compositing is e
     await note(/Every sample/).waitFor();
   }));
 
-test("a slice is chosen by axis and layer, and taken away again", () =>
+test("a slice is selected by axis and layer and can be removed", () =>
   withPage(async (page) => {
     await unfold(page, "Geometry");
     assert.equal(await isShown(page, "layer", "input"), false);
@@ -200,7 +200,7 @@ test("a slice is chosen by axis and layer, and taken away again", () =>
     assert.equal(await lastPatch(page, "geometry", "slice"), null);
   }));
 
-test("a globe is offered where there are longitudes, and the vertical axis yields to heights", () =>
+test("a globe is offered for longitudes, and heights replace the vertical axis", () =>
   withPage(async (page) => {
     await unfold(page, "Geometry");
     await choose(page, "shape", /^sphere/);
@@ -252,7 +252,7 @@ const moves = (page) =>
       .map(({ at, rev, patch }) => ({ at, rev, time: patch.vector.motion.time })),
   );
 
-test("lines flow at the pace of the frames, and the link waits until they rest", () =>
+test("line motion follows the frame rate, and the link is updated when it stops", () =>
   withPage(async (page) => {
     await unfold(page, "Motion");
     assert.equal(await isShown(page, "cycles a step", "input"), false);
@@ -277,7 +277,7 @@ test("lines flow at the pace of the frames, and the link waits until they rest",
     await finalPicture(page);
   }));
 
-test("a hidden page does not let its lines flow; still lines do not", () =>
+test("a hidden page stops line motion", () =>
   withPage(async (page) => {
     await unfold(page, "Motion");
     await control(page, "animate lines", "input").check();

@@ -44,7 +44,7 @@ const viewport = { width: 1280, height: 800 };
 
 const texts = (page) => page.locator("#dataset option").allTextContents();
 
-test("why a dataset of the picker cannot be shown stays to be read", async (t) => {
+test("the reason why a dataset cannot be shown stays visible", async (t) => {
   const files = [writeCube("ok.nrrd", 12), writeCube("big.nrrd", 190)];
   files.push(writeCube("torn.nrrd", 12, true));
   const args = ["--memory-limit", "192M", ...files];
@@ -72,7 +72,7 @@ test("why a dataset of the picker cannot be shown stays to be read", async (t) =
   assert.deepEqual(page.faults, []);
 });
 
-test("the page follows files that change: their steps, and that they cannot be read", async (t) => {
+test("the page follows changed files, their steps and their errors", async (t) => {
   let opened;
   let say;
   const listen = (socket) => {
@@ -119,7 +119,7 @@ test("the page follows files that change: their steps, and that they cannot be r
   assert.deepEqual(page.faults, []);
 });
 
-test("the legend says what is too slow, and the probe's ends are times", async (t) => {
+test("the legend states the slow limit, and the probe labels times", async (t) => {
   const path = '#!{"dataset":"climate","vector":{"minMagnitude":3}}';
   const { page } = await ownPage(t, browser, { args: ["climate"], path, viewport });
   await finalPicture(page);

@@ -17,7 +17,7 @@ const { withPage } = sharedDaemon({ page: { initScript: watchFrames, unfolded: [
 
 const lastFrame = (page) => page.evaluate(() => window.frameHeaders.at(-1));
 
-test("moving frames say what they are estimated to err, the final one what was measured", () =>
+test("moving frames show an estimated error, final frames a measured one", () =>
   withPage(async (page) => {
     const frames = await framesOf(page, () => drag(page, 90, 20, 30));
     const final = frames.at(-1);
@@ -33,7 +33,7 @@ test("moving frames say what they are estimated to err, the final one what was m
     assert.match(await page.locator("#hud-encoding").textContent(), /^ · JPEG [\d.e-]+$/);
   }));
 
-test("a requested error is met, by no more pixels than it takes", () =>
+test("a requested error is met without more pixels than needed", () =>
   withPage(async (page) => {
     await type(page, "moving budget \\(ms\\)", 500);
     const moving = async () => movingOf(await framesOf(page, () => drag(page, 90, 20, 60)));
@@ -56,7 +56,7 @@ test("a requested error is met, by no more pixels than it takes", () =>
     }
   }));
 
-test("a lossless final frame has the pixels that the daemon draws, a JPEG has not", () =>
+test("a lossless final frame equals the pixels of the daemon, a JPEG does not", () =>
   withPage(async (page) => {
     // How many pixels differ from a PNG of the same view that was asked for apart.
     const differing = () =>

@@ -131,7 +131,7 @@ const addressView = (page) =>
 
 const turned = { dataset: "climate", step: 3, camera: { eye: [2, -2, 1], target: [0, 0, 0.1] } };
 
-test("a saved picture is the view's own, n times as large, with its view inside", () =>
+test("a saved picture is n times as large as the view and contains the view", () =>
   withPage(async (page) => {
     const size = await page.locator("#picture").evaluate((c) => [c.clientWidth, c.clientHeight]);
     for (const scale of [1, 2]) {
@@ -151,7 +151,7 @@ test("a saved picture is the view's own, n times as large, with its view inside"
     await shot(page, "save-dark");
   }, linkTo(turned)));
 
-test("the legend is in the picture where the page shows it, at every scale", () =>
+test("a saved picture contains the visible legend at every scale", () =>
   withPage(async (page) => {
     const stage = await page.locator("#picture").boundingBox();
     const legend = await page.locator("#legend").boundingBox();
@@ -172,7 +172,7 @@ test("the legend is in the picture where the page shows it, at every scale", () 
     }
   }, linkTo(turned)));
 
-test("a picture dropped on another page brings its view back, pixel for pixel", async () => {
+test("a picture dropped on another page restores its view exactly", async () => {
   let bytes;
   let before;
   await withPage(
@@ -260,7 +260,7 @@ async function setAnimation(page, choices) {
   }
 }
 
-test("an animation over steps is a ZIP of the right frames, at most two asked for at once", () =>
+test("an animation over steps is a ZIP of the right frames, requested two at a time", () =>
   withPage(async (page) => {
     let under = 0;
     let most = 0;
@@ -291,7 +291,7 @@ test("an animation over steps is a ZIP of the right frames, at most two asked fo
     assert.notEqual(difference(pictures[1], pictures[2]), null);
   }));
 
-test("one orbit around the volume looks from all sides", () =>
+test("one orbit shows the volume from all sides", () =>
   withPage(
     async (page) => {
       await setAnimation(page, { over: "turn", legend: false, frames: 4 });
@@ -308,7 +308,7 @@ test("one orbit around the volume looks from all sides", () =>
     linkTo({ dataset: "tornado" }),
   ));
 
-test("a WebM video plays, in the frames' size and for their time", () =>
+test("a WebM video has the size and duration of its frames", () =>
   withPage(async (page) => {
     await setAnimation(page, { as: "webm", to: 5, fps: 4 });
     const { name, bytes } = await saved(page, "#save-animation");
@@ -344,7 +344,7 @@ test("a WebM video plays, in the frames' size and for their time", () =>
     assert.ok(played.seen >= 4, `${played.seen} pictures of 6 steps`);
   }));
 
-test("Cancel ends the requests, and nothing is saved", () =>
+test("cancel stops the requests and saves nothing", () =>
   withPage(async (page) => {
     const asked = [];
     const failed = [];
@@ -375,7 +375,7 @@ test("Cancel ends the requests, and nothing is saved", () =>
     page.faults = page.faults.filter((fault) => !/net::ERR_/.test(fault));
   }));
 
-test("a refusal of the server is shown in the dialog in its text", () =>
+test("an error of the server is shown in the dialog", () =>
   withPage(async (page) => {
     let tries = 0;
     await page.route("**/v1/frames", (route) => {
@@ -394,7 +394,7 @@ test("a refusal of the server is shown in the dialog in its text", () =>
     page.faults = page.faults.filter((fault) => !/429|507/.test(fault));
   }));
 
-test("behind an open dialog the page's keys do nothing, wherever the focus is", () =>
+test("shortcuts are disabled while a dialog is open", () =>
   withPage(async (page) => {
     await page.keyboard.press("s");
     await page.evaluate(() => document.activeElement.blur());
@@ -416,7 +416,7 @@ test("behind an open dialog the page's keys do nothing, wherever the focus is", 
     );
   }));
 
-test("the dialog fits a phone in either theme, by keyboard alone", async () => {
+test("the dialog fits a phone in both themes and works by keyboard", async () => {
   for (const colorScheme of ["dark", "light"]) {
     await withPage(
       async (page) => {

@@ -69,7 +69,7 @@ function frame(picture, { seq, rev, flags, width, height, error = NaN, jpegError
   return Buffer.concat([header, picture]);
 }
 
-// Between the page and the daemon. While it is `closed` no frame of the daemon's comes through.
+// A proxy between the page and the daemon. While `closed` it holds frames of the daemon back.
 class Between {
   closed = false;
   patches = 0;
@@ -94,7 +94,7 @@ class Between {
     });
   }
 
-  // Slips a frame in, of the newest view unless `rev` says otherwise.
+  // Inserts a frame, of the newest view unless `rev` is given.
   async show(page, { width, height, picture = quarters(width, height), flags = 0, ...header }) {
     this.closed = true;
     this.last = (this.last ?? this.seq + 1000) + 1;
@@ -150,7 +150,7 @@ const middles = [
 
 // --- tests --------------------------------------------------------------------------------------
 
-test("a PNG frame comes to the canvas as it is, pixel by pixel", () =>
+test("a PNG frame is drawn without any change of pixels", () =>
   withPage(async (page, between, { width, height }) => {
     await between.show(page, { width, height, flags: 1 });
     const shown = await looks(page, middles);
@@ -161,7 +161,7 @@ test("a PNG frame comes to the canvas as it is, pixel by pixel", () =>
     assert.ok(between.acks.includes(between.last), "its credit went back");
   }));
 
-test("smaller frames of any size fill the canvas, smoothly", () =>
+test("smaller frames fill the canvas smoothly", () =>
   withPage(async (page, between, { width, height }) => {
     for (const share of [0.71, 0.5, 0.25, 0.06]) {
       const size = { width: Math.ceil(share * width), height: Math.ceil(share * height) };
@@ -172,7 +172,7 @@ test("smaller frames of any size fill the canvas, smoothly", () =>
     }
   }));
 
-test("what comes while the view rests refines it, and then it is final", () =>
+test("frames at rest refine the view until the final one", () =>
   withPage(async (page, between, { width, height }) => {
     const mark = () => page.locator("#mark").textContent();
     const half = { width: Math.ceil(width / 2), height: Math.ceil(height / 2) };
@@ -201,10 +201,10 @@ test("what comes while the view rests refines it, and then it is final", () =>
     assert.equal(await page.locator("#alert").isVisible(), false);
   }));
 
-test("nothing in the HUD announces itself to those who listen", () =>
+test("the HUD has no live region", () =>
   withPage(async (page) => {
     const live = await page.locator("#hud").evaluate((hud) => {
-      // But for the word that a reference is ready, which somebody asked for and waits for.
+      // Except the notice that a requested reference is ready.
       const parts = [hud, ...hud.querySelectorAll("*:not(#reference-words)")];
       const loud = (one) => one.ariaLive !== null || /status|alert|log/.test(one.role ?? "");
       return [parts.some(loud), hud.closest("[aria-live], [role=status], [role=alert]") !== null];
@@ -212,7 +212,7 @@ test("nothing in the HUD announces itself to those who listen", () =>
     assert.deepEqual(live, [false, false]);
   }));
 
-test("the canvas never is empty between frames of different sizes", () =>
+test("the canvas is never empty between frames of different sizes", () =>
   withPage(async (page, between, { width, height }) => {
     await between.show(page, { width, height });
     // The darkest of a few pixels at each display frame.
@@ -253,7 +253,7 @@ test("the canvas never is empty between frames of different sizes", () =>
     assert.ok(darkest >= 190, `a pixel as dark as ${darkest}`);
   }));
 
-test("while the window has another shape than the picture, the picture keeps its own", () =>
+test("a picture keeps its aspect ratio in a window of another shape", () =>
   withPage(async (page, between, { width, height }) => {
     await between.show(page, { width, height, flags: 1 });
     const before = await pictureBox(page);

@@ -89,7 +89,7 @@ const echoes = (page, count) =>
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-// The log of what `act` made happen.
+// The log of the events caused by `act`.
 async function watched(page, act) {
   await finalPicture(page);
   await page.evaluate(() => Object.values(window.way).forEach((list) => (list.length = 0)));

@@ -27,7 +27,7 @@ async function logIn(page, text) {
 // The 401 of the first page is one, as the browser sees it.
 const faultsBut401 = (page) => page.faults.filter((fault) => !/status of 401/.test(fault));
 
-test("the login leads to the page, and its stream works by the cookie", () =>
+test("login opens the page, and its stream is authenticated by the cookie", () =>
   withPage(async (page) => {
     assert.equal(await page.title(), "windsplat: log in");
     await shot(page, "login");
@@ -82,7 +82,7 @@ test("the view of a shared link survives the login", async () => {
   );
 });
 
-test("without scripts the form works, too", () =>
+test("the login form works without scripts", () =>
   withPage(
     async (page) => {
       await logIn(page, token);

@@ -29,7 +29,7 @@ const mapsAreShown = (page) =>
     /linear-gradient/.test(document.querySelector(".legend-strip").style.background),
   );
 
-test("the climate sample is there within 3 s of load, and soon its final picture", (t) =>
+test("the climate sample is shown within 3 s of load and its final frame soon after", (t) =>
   withPage(
     async (page) => {
       const loaded = Date.now();
@@ -49,7 +49,7 @@ test("the climate sample is there within 3 s of load, and soon its final picture
     { settle: false },
   ));
 
-test("a server that draws small pictures is asked for no larger ones", async (t) => {
+test("a server with a pixel limit is not asked for larger pictures", async (t) => {
   const args = ["tornado", "--max-pixels", "1000000"];
   const viewport = { width: 1920, height: 1080 };
   const { page } = await ownPage(t, shared.browser, { args, viewport });
@@ -60,14 +60,14 @@ test("a server that draws small pictures is asked for no larger ones", async (t)
   assert.equal(await page.locator("#alert").isVisible(), false);
 });
 
-test("a drag turns the volume at once and ends in a final picture", () =>
+test("a drag rotates the volume and ends in a final frame", () =>
   withPage(async (page) => {
     const before = await state(page);
     const first = await pixels(page);
     await drag(page, 160, 60);
     await finalPicture(page);
     const after = await state(page);
-    // The volume follows the hand: to the right is the eye going west, down is going up.
+    // The volume follows the pointer: dragging right moves the eye west, dragging down moves it up.
     assert.ok(Number(after.azimuth) < Number(before.azimuth) - 10, `${after.azimuth}`);
     assert.ok(Number(after.elevation) > Number(before.elevation) + 5, `${after.elevation}`);
     assert.ok(
@@ -80,7 +80,7 @@ test("a drag turns the volume at once and ends in a final picture", () =>
     await shot(page, "dragged");
   }));
 
-test("the right button moves the volume, the wheel brings it nearer", () =>
+test("the right button pans, the wheel zooms", () =>
   withPage(async (page) => {
     const before = await state(page);
     const box = await pictureBox(page);
@@ -126,7 +126,7 @@ test("every dataset of the picker can be shown", () =>
     assert.equal(hashes.size, ids.length, "each looks different");
   }));
 
-test("playing moves the step, the slider and the time; pausing keeps the step", () =>
+test("playback updates step, slider and time; pausing keeps the step", () =>
   withPage(async (page) => {
     const firstTime = await page.locator("#time-label").textContent();
     const first = await pixels(page);
@@ -225,7 +225,7 @@ test("a link restores the same pixels in another window", () =>
     );
   }));
 
-test("a page that was here before comes back on reload and in a second tab", () =>
+test("the view is restored on reload and in a second tab", () =>
   withPage(async (page) => {
     await page.reload({ waitUntil: "load" });
     await finalPicture(page);
@@ -249,7 +249,7 @@ test("a link to an unknown dataset is an error, and the default is shown", () =>
     { path: '#!{"dataset":"nowhere"}' },
   ));
 
-test("a link with a value out of range names it and shows the rest by default", () =>
+test("a link with a value out of range names it and shows the remaining view", () =>
   withPage(
     async (page) => {
       await page.locator("#alert").waitFor();
@@ -260,7 +260,7 @@ test("a link with a value out of range names it and shows the rest by default", 
     { path: '#!{"dataset":"climate","vector":{"length":-5}}', alert: true },
   ));
 
-test("a killed server: the picture stays, dimmed, and comes back by itself", async (t) => {
+test("after a server is killed the picture stays dimmed and the page reconnects", async (t) => {
   const { daemon, page } = await ownPage(t, shared.browser, {
     initScript: [watchFrames, watchPatches],
   });
@@ -307,7 +307,7 @@ test("a killed server: the picture stays, dimmed, and comes back by itself", asy
   assert.deepEqual(others, []);
 });
 
-test("a server that comes back with other datasets shows one, without a storm", async (t) => {
+test("a restarted server with other datasets shows one without repeated requests", async (t) => {
   const { daemon, page } = await ownPage(t, shared.browser, { args: ["tornado"] });
   let messages = 0;
   page.on("websocket", (socket) => socket.on("framesent", () => (messages += 1)));
@@ -344,7 +344,7 @@ test("the picture keeps its size while a dataset opens", async () => {
   }
 });
 
-test("everything by the keyboard", () =>
+test("every function is usable by keyboard", () =>
   withPage(async (page) => {
     const start = await state(page);
     const until = (key, value) =>
@@ -408,7 +408,7 @@ test("under a base path", async (t) => {
   assert.deepEqual(page.faults, []);
 });
 
-test("on a dense screen the picture has its pixels", () =>
+test("on a high-density screen the picture has its device pixels", () =>
   withPage(
     async (page) => {
       const box = await pictureBox(page);
@@ -421,7 +421,7 @@ test("on a dense screen the picture has its pixels", () =>
     { viewport: { width: 900, height: 600 }, deviceScaleFactor: 2 },
   ));
 
-test("a window that changes its size gets a picture of that size", () =>
+test("a resized window gets a picture of that size", () =>
   withPage(async (page) => {
     await page.setViewportSize({ width: 1000, height: 700 });
     const box = await pictureBox(page);
@@ -433,7 +433,7 @@ test("a window that changes its size gets a picture of that size", () =>
     assertDrawn(await pixels(page));
   }));
 
-test("every control has a name, and nothing sticks out of a narrow window", async () => {
+test("every control has a name, and nothing overflows a narrow window", async () => {
   for (const width of [1440, 360]) {
     await withPage(
       async (page) => {

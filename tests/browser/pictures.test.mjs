@@ -25,7 +25,7 @@ async function picture(page, name) {
 
 const head = (page) => page.locator("#hud-head").textContent();
 
-test("slabs look different, their thickness matters, and the HUD names them", () =>
+test("slabs change the picture, as does their thickness, and the HUD names them", () =>
   withPage(async (page) => {
     await unfold(page, "Method");
     await choose(page, "method", /^kernel$/);
@@ -42,7 +42,7 @@ test("slabs look different, their thickness matters, and the HUD names them", ()
     assert.equal((await picture(page, "kernel-again")).hash, kernel.hash);
   }));
 
-test("every compositing looks different", () =>
+test("every compositing changes the picture", () =>
   withPage(async (page) => {
     await unfold(page, "Method");
     const hashes = new Set([(await pixels(page)).hash]);
@@ -103,7 +103,7 @@ test("a globe is about as high as wide", () =>
     assert.ok(ratio > 0.6 && ratio < 1.7, `${box.width} x ${box.height}`);
   }));
 
-test("lines tell their direction and a scalar by their colour", () =>
+test("line colours show direction and scalars", () =>
   withPage(async (page) => {
     await choose(page, "colour by", /^direction$/);
     const direction = await picture(page, "direction");
@@ -118,7 +118,7 @@ test("lines tell their direction and a scalar by their colour", () =>
     assert.notEqual((await picture(page, "one-color")).hash, scalar.hash);
   }));
 
-test("the texture moves with its time, flows while it is let, and rests when still", () =>
+test("the texture follows its phase, moves during motion and stops with it", () =>
   withPage(async (page) => {
     const still = await pixels(page);
     await unfold(page, "Motion");

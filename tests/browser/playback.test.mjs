@@ -68,7 +68,7 @@ function assertInOrder(steps, way, count, hint) {
 
 const label = (page, id) => page.locator(id).getAttribute("aria-label");
 
-test("every step forward, then backward without a jump, then a pause", async () => {
+test("every step is shown forward, then backward without a jump, until a pause", async () => {
   await withPage(async (page) => {
     const count = await stepCount(page);
     assert.ok(count > 4, "a sample with steps");
@@ -96,7 +96,7 @@ test("every step forward, then backward without a jump, then a pause", async () 
   });
 });
 
-test("the pace reached is shown while steps run", async () => {
+test("the achieved pace is shown during playback", async () => {
   await withPage(async (page) => {
     await page.locator("#time-fps").selectOption("5");
     await page.locator("#time-play").click();
@@ -112,7 +112,7 @@ test("the pace reached is shown while steps run", async () => {
   });
 });
 
-test("without loop it ends where its way ends", async () => {
+test("without loop playback ends at its last step", async () => {
   await withPage(async (page) => {
     await page.locator("#time-loop").uncheck();
     await page.locator("#time-fps").selectOption("30");
@@ -137,7 +137,7 @@ test("without loop it ends where its way ends", async () => {
   });
 });
 
-test("the slider holds time while it is dragged, then lets it run on", async () => {
+test("dragging the slider pauses playback until release", async () => {
   await withPage(async (page) => {
     await page.locator("#time-fps").selectOption("2");
     await page.locator("#time-play").click();
@@ -235,7 +235,7 @@ const lastRange = (page) =>
       null,
   );
 
-test("a histogram is read when it is seen; a drag over its colours sets their range", async () => {
+test("a histogram loads when visible, and a drag over its colours sets their range", async () => {
   await withPage(
     async (page) => {
       const medium = page.locator("#panel .lil-gui", { hasText: /^Medium/ }).last();
@@ -273,7 +273,7 @@ test("a histogram is read when it is seen; a drag over its colours sets their ra
   );
 });
 
-test("the range of all steps is written into the view and taken out of it", async () => {
+test("the range of all steps is added to the view and removed from it", async () => {
   await withPage(
     async (page) => {
       const medium = page.locator("#panel .lil-gui", { hasText: /^Medium/ }).last();
@@ -294,7 +294,7 @@ test("the range of all steps is written into the view and taken out of it", asyn
   );
 });
 
-test("the probe reads a place, follows the step and draws its course", async () => {
+test("the probe reads a position, follows the step and plots the series", async () => {
   await withPage(
     async (page) => {
       await page.locator("#probe-button").click();
@@ -332,7 +332,7 @@ test("the probe reads a place, follows the step and draws its course", async () 
   );
 });
 
-test("alt + click asks for a place even while the probe is off", async () => {
+test("alt + click probes a position while the probe is off", async () => {
   await withPage(
     async (page) => {
       await page.locator("#picture").click({ modifiers: ["Alt"] });

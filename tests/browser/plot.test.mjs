@@ -61,7 +61,7 @@ async function open(page) {
   await page.locator(".forecast circle").first().waitFor();
 }
 
-test("the plot is asked for when it is seen and the view rests, and describes each setting", () =>
+test("the plot loads when visible and at rest, and describes each setting", () =>
   withPage(async (page) => {
     assert.deepEqual(page.asked, [], "not while hidden");
     await open(page);
@@ -95,7 +95,7 @@ test("the plot is asked for when it is seen and the view rests, and describes ea
     await shot(page, "plot");
   }));
 
-test("what goes on at rest is asked for once more, and then no more", () =>
+test("an incomplete forecast at rest is requested once more only", () =>
   withPage(async (page) => {
     await open(page);
     const until = Date.now() + 9000 * patience;
@@ -105,7 +105,7 @@ test("what goes on at rest is asked for once more, and then no more", () =>
     assert.equal(page.asked.length, 2);
   }));
 
-test("the budget's handle is the moving budget: by hand, by keys, and in the frames' size", () =>
+test("the budget handle sets the budget of moving frames by pointer and keys", () =>
   withPage(async (page) => {
     await open(page);
     const moving = async () => movingOf(await framesOf(page, () => drag(page, 90, 20, 40)));
@@ -136,7 +136,7 @@ test("the budget's handle is the moving budget: by hand, by keys, and in the fra
     assert.ok(least(quick) < least(slow), `${least(quick)} < ${least(slow)}`);
   }));
 
-test("a limit of the error is a line that is dragged, in the metric of every error", () =>
+test("the error limit is a draggable line in every error metric", () =>
   withPage(async (page) => {
     await open(page);
     assert.equal(await handle(page, "max error").count(), 0);
@@ -163,7 +163,7 @@ test("a limit of the error is a line that is dragged, in the metric of every err
     assert.equal(shown, "1e-6", "readable in a narrow box");
   }));
 
-test("a server that cannot tell says why", () =>
+test("a server without a forecast shows the reason", () =>
   withPage(
     async (page) => {
       await unfold(page, "Quality");

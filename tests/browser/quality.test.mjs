@@ -31,7 +31,7 @@ const qualities = (page) =>
 const linkedQuality = (page) =>
   page.evaluate(() => JSON.parse(decodeURIComponent(location.hash.slice(2)) || "{}").quality);
 
-test("a small budget makes moving frames small, a large one lets them be whole", () =>
+test("a small budget reduces moving frames, a large one keeps their full size", () =>
   withPage(async (page) => {
     const full = await widthOf(page);
     const widths = {};
@@ -53,7 +53,7 @@ test("a small budget makes moving frames small, a large one lets them be whole",
     assert.ok(widths[5] < widths[500], `${widths[5]} px, ${widths[500]} px of ${full}`);
   }));
 
-test("an error is asked for by a switch, and by its magnitude", () =>
+test("an error limit is set by a switch and its magnitude", () =>
   withPage(async (page) => {
     assert.equal(await control(page, limit, "input").isVisible(), false, "none by default");
     await control(page, limited, "input").check();
@@ -79,7 +79,7 @@ test("an error is asked for by a switch, and by its magnitude", () =>
     assert.deepEqual((await qualities(page)).at(-1), { maxError: 0.0234 }, "the last one again");
   }));
 
-test("a link carries budget, error and lossless, and `All defaults` takes them away", () =>
+test("a link contains budget, error and lossless, and `All defaults` removes them", () =>
   withPage(
     async (page) => {
       assert.equal(await control(page, budget, "input").inputValue(), "66");

@@ -47,14 +47,14 @@ const apart = (page) =>
     };
   });
 
-// The pixels of the picture's part of the page, as they are seen, away from what lies over it.
+// The displayed pixels of the picture, without the areas covered by other elements.
 async function seen(page) {
   const box = await page.locator("#picture").boundingBox();
   const clip = { x: box.x + 100, y: box.y + 120, width: 220, height: 100 };
   return (await page.screenshot({ clip })).toString("base64");
 }
 
-test("r asks for the reference, shows it while it is held and no longer", () =>
+test("r requests the reference and shows it while held", () =>
   withPage(async (page) => {
     const before = await pixels(page);
     const seenBefore = await seen(page);
@@ -90,7 +90,7 @@ test("r asks for the reference, shows it while it is held and no longer", () =>
     assert.equal((await pixels(page)).hash, before.hash);
   }));
 
-test("the error shown is the true one of the picture", () =>
+test("the shown error is the true error of the picture", () =>
   withPage(async (page) => {
     await page.keyboard.press("r");
     await ready(page);
@@ -108,7 +108,7 @@ test("the error shown is the true one of the picture", () =>
     assert.ok(mean / 255 < 13 * truth.value + 0.01, `${mean} for ${truth.value}`);
   }));
 
-test("another view drops it: what is there, and what is being drawn", () =>
+test("a view change discards the reference and its job", () =>
   withPage(async (page) => {
     await page.keyboard.press("r");
     await ready(page);
@@ -127,7 +127,7 @@ test("another view drops it: what is there, and what is being drawn", () =>
     assert.equal((await cancelled).status(), 204);
     await finalPicture(page);
     assert.equal(await page.locator("#reference").isVisible(), false);
-    // Escape does the same, and the next hold begins anew.
+    // Escape does the same, and the next hold starts again.
     await page.keyboard.press("r");
     await page.waitForFunction(() =>
       /: \d+ %/.test(document.querySelector("#reference").textContent),
@@ -140,7 +140,7 @@ test("another view drops it: what is there, and what is being drawn", () =>
     await ready(page);
   }));
 
-test("the button is held by mouse, finger or space", () =>
+test("the button can be held by mouse, finger or space", () =>
   withPage(
     async (page) => {
       const button = page.getByRole("button", { name: "Reference: hold to show it" });

@@ -14,7 +14,7 @@ const addressView = (page) =>
 
 const turned = { dataset: "climate", step: 3, camera: { eye: [2, -2, 1], target: [0, 0, 0.1] } };
 
-test("views are saved by name, and are there after a reload", () =>
+test("views are saved by name and restored after a reload", () =>
   withPage(async (page) => {
     const before = await pixels(page);
     await page.keyboard.press("s");
@@ -38,7 +38,7 @@ test("views are saved by name, and are there after a reload", () =>
     assert.equal(await page.locator("#kept li").count(), 0);
   }, linkTo(turned)));
 
-test("a renamed view's row stays, with the focus and the button under the mouse", () =>
+test("renaming a view keeps its row, the focus and the button under the pointer", () =>
   withPage(async (page) => {
     await page.keyboard.press("s");
     for (const name of ["one", "two"]) {
@@ -58,7 +58,7 @@ test("a renamed view's row stays, with the focus and the button under the mouse"
     assert.equal(await page.locator("#kept li input").inputValue(), "two");
   }));
 
-test("a link with a malformed view is an error, and the page stays as it was", () =>
+test("a link with a malformed view is an error and changes nothing", () =>
   withPage(
     async (page) => {
       const before = await pixels(page);
@@ -102,7 +102,7 @@ const share = async (page) => {
   return page.evaluate(() => navigator.clipboard.readText());
 };
 
-test("Share copies the link; a long one becomes a short one that restores the same pixels", () =>
+test("share copies the link, and shortens a long one to one that restores the same pixels", () =>
   withPage(async (page) => {
     assert.ok((await page.evaluate(() => location.href.length)) > 2000);
     const before = await pixels(page);
@@ -120,7 +120,7 @@ test("Share copies the link; a long one becomes a short one that restores the sa
     );
   }, linkTo(long)));
 
-test("where the server stores no views the long link is copied, with the reason", () =>
+test("share copies the long link with the reason if the server stores no views", () =>
   withPage(async (page) => {
     const problem = { type: "about:blank", title: "No", status: 507, detail: "no room for views" };
     await page.route("**/v1/views", (route) => route.fulfill({ status: 507, json: problem }));

@@ -153,7 +153,7 @@ export function sharedDaemon({ basePath = "/", args = [], page: usual = {} } = {
   return shared;
 }
 
-// A daemon of the test's own and a page on it; both are gone when the test is over, pass or fail.
+// A daemon and a page for one test; both are closed when it ends, pass or fail.
 // options: openPage's, and the daemon's and `path` as above.
 export async function ownPage(t, browser, { basePath, args = [], path = "", ...options } = {}) {
   const daemon = new Daemon(await freePort(), basePath);
@@ -266,7 +266,7 @@ export const watchPatches = () => {
   };
 };
 
-// The same for what comes in: the frames' headers, and what `chosen` says of each.
+// The same for received data: frame headers, and the `chosen` message of each.
 export const watchFrames = () => {
   const chosen = new Map();
   window.frameHeaders = [];

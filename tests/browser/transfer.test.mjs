@@ -54,7 +54,7 @@ const table = (page) =>
       rows.map((row) => [...row.querySelectorAll("input")].map((input) => Number(input.value))),
     );
 
-test("a point dragged up makes the medium more opaque, down less, and frames say how far", () =>
+test("dragging a point up increases opacity, down decreases it", () =>
   withPage(async (page) => {
     const before = await pixels(page);
     const curve = await drawnCurve(page);
@@ -76,7 +76,7 @@ test("a point dragged up makes the medium more opaque, down less, and frames say
     assert.equal((await drawnCurve(page))[1][1], 0, "the lower edge is clear");
   }));
 
-test("while a point is dragged one patch goes out a display frame at most", () =>
+test("dragging a point sends at most one patch per display frame", () =>
   withPage(async (page) => {
     const [x, y] = await center(points(page).nth(1));
     await page.mouse.move(x, y);
@@ -103,7 +103,7 @@ test("while a point is dragged one patch goes out a display frame at most", () =
     await finalPicture(page);
   }));
 
-test("a press on an empty place adds a point, a double click or Delete takes it away", () =>
+test("a press on an empty position adds a point, double click or Delete removes it", () =>
   withPage(async (page) => {
     const box = await page.locator(".transfer-points").boundingBox();
     await page.mouse.click(box.x + 0.5 * box.width, box.y + 0.3 * box.height);
@@ -131,7 +131,7 @@ test("a press on an empty place adds a point, a double click or Delete takes it 
     assert.equal((await drawnCurve(page)).length, 1, "the last one stays");
   }));
 
-test("arrow keys move the point in focus, finer with shift, and the volume stands still", () =>
+test("arrow keys move the focused point, finer with shift, and not the volume", () =>
   withPage(async (page) => {
     const azimuth = await page.locator("#picture").getAttribute("data-azimuth");
     await points(page).nth(1).focus();
@@ -147,7 +147,7 @@ test("arrow keys move the point in focus, finer with shift, and the volume stand
     assert.equal(await page.locator("#picture").getAttribute("data-azimuth"), azimuth);
   }));
 
-test("the table of numbers and the picture are one curve", () =>
+test("the table and the plot show the same curve", () =>
   withPage(async (page) => {
     await page.getByText("Points as numbers").click();
     assert.deepEqual(await table(page), await drawnCurve(page));
@@ -181,7 +181,7 @@ test("the table of numbers and the picture are one curve", () =>
     await shot(page, "transfer-table");
   }));
 
-test("density scales every point of any curve; a logarithmic scale shows small ones higher", () =>
+test("density scales every curve, and a logarithmic scale magnifies small values", () =>
   withPage(async (page) => {
     await dragPoint(page, 1, 30, -20);
     const before = await drawnCurve(page);
@@ -202,7 +202,7 @@ test("density scales every point of any curve; a logarithmic scale shows small o
     await shot(page, "transfer-log");
   }));
 
-test("the range by step follows the steps, of all steps it stays, by hand it is custom", () =>
+test("the range follows the step, stays with all steps, and is custom by hand", () =>
   withPage(
     async (page) => {
       const range = page.locator(".range-choice select").last();
@@ -263,7 +263,7 @@ test("the range by step follows the steps, of all steps it stays, by hand it is 
     { path: '#!{"dataset":"tornado","vector":{"field":null},"scalars":[{"field":"vorticity"}]}' },
   ));
 
-test("the lines' colours by magnitude go by step, too", () =>
+test("colour ranges of lines by magnitude can follow the step", () =>
   withPage(
     async (page) => {
       await page
@@ -284,7 +284,7 @@ test("the lines' colours by magnitude go by step, too", () =>
     { path: '#!{"dataset":"tornado","vector":{"color":{"by":"magnitude"}}}' },
   ));
 
-test("on a phone the editor fits and a finger moves its points", () =>
+test("on a phone the editor fits and its points can be dragged", () =>
   withPage(
     async (page) => {
       const wide = await page.evaluate(() => {

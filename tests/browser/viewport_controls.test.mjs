@@ -37,7 +37,7 @@ const until = (page, key, value) =>
   );
 // --- undo and redo ---------------------------------------------------------------------------
 
-test("undo of a drag restores the very pixels, and redo what it undid", () =>
+test("undo of a drag restores the exact pixels, and redo reverts it", () =>
   withPage(async (page) => {
     const undo = page.locator("#undo-button");
     const redo = page.locator("#redo-button");
@@ -62,7 +62,7 @@ test("undo of a drag restores the very pixels, and redo what it undid", () =>
     assert.equal(await redo.getAttribute("aria-disabled"), "true");
   }));
 
-test("a slider's run is one entry, and the panel follows what is undone", () =>
+test("one slider movement is one undo entry, and the panel follows undo", () =>
   withPage(async (page) => {
     const before = await hashOf(page);
     const number = control(page, "opacity", "input");
@@ -82,7 +82,7 @@ test("a slider's run is one entry, and the panel follows what is undone", () =>
     assert.equal(await page.locator("#undo-button").getAttribute("aria-disabled"), "true");
   }));
 
-test("undo brings the former dataset back as it was seen", () =>
+test("undo restores the previous dataset with its view", () =>
   withPage(async (page) => {
     await drag(page, 80, 20);
     const before = await hashOf(page);
@@ -94,7 +94,7 @@ test("undo brings the former dataset back as it was seen", () =>
     assert.equal(await hashOf(page), before);
   }));
 
-test("steps that were played stay when the camera is undone, and a size is no entry", () =>
+test("undo of the camera keeps the played step, and a resize is no entry", () =>
   withPage(async (page) => {
     const start = await state(page);
     await drag(page, 80, 20);
@@ -119,7 +119,7 @@ test("steps that were played stay when the camera is undone, and a size is no en
 
 // --- the value under the cursor --------------------------------------------------------------
 
-test("the value under the cursor is the one that the server probes there", () =>
+test("the value under the cursor equals the probe of the server", () =>
   withPage(async (page) => {
     const asked = [];
     page.on("request", (request) => {
@@ -161,7 +161,7 @@ test("the value under the cursor is the one that the server probes there", () =>
     await hover.waitFor({ state: "hidden" });
   }));
 
-test("nothing is asked while the mouse drags, none when it is switched off", () =>
+test("no hover requests during a drag or when switched off", () =>
   withPage(async (page) => {
     const hover = page.locator("#hover");
     const box = await pictureBox(page);
@@ -194,7 +194,7 @@ test("nothing is asked while the mouse drags, none when it is switched off", () 
     await hover.waitFor();
   }));
 
-test("a probe that the server refuses is no alert", () =>
+test("a refused hover probe raises no alert", () =>
   withPage(async (page) => {
     let refused = 0;
     await page.route(/\/probe\?/, (route) => {
@@ -225,7 +225,7 @@ const watchDensities = () => {
   };
 };
 
-test("on a dense screen it is sharp at rest, and moves in frames that the budget allows", () =>
+test("a high-density screen is sharp at rest and keeps the budget in motion", () =>
   withPage(
     async (page) => {
       const box = await pictureBox(page);
@@ -271,7 +271,7 @@ test("on a dense screen it is sharp at rest, and moves in frames that the budget
 
 // --- keys ------------------------------------------------------------------------------------
 
-test("keys work right after a control of the panel was used, not while one types", () =>
+test("shortcuts work after using a control but not while typing", () =>
   withPage(async (page) => {
     await control(page, "shown", "input").uncheck();
     await page.keyboard.press("]");
@@ -301,7 +301,7 @@ test("keys work right after a control of the panel was used, not while one types
     assert.equal((await state(page)).azimuth, azimuth);
   }));
 
-test("arrows on a handle of the panel move that, not the volume", () =>
+test("arrow keys on a panel handle move the handle, not the volume", () =>
   withPage(async (page) => {
     const handle = page.locator('#panel [role="slider"]').first();
     if (!(await handle.isVisible())) await unfold(page, "Opacity and colours");
@@ -316,7 +316,7 @@ test("arrows on a handle of the panel move that, not the volume", () =>
     await until(page, "step", "1");
   }));
 
-test("what is typed into a box is one entry", () =>
+test("text typed into a box is one undo entry", () =>
   withPage(async (page) => {
     const box = control(page, "length", "input");
     const before = await box.inputValue();
@@ -350,7 +350,7 @@ test("e shows errors in dB, and the help lists every key", () =>
 
 // --- hidden ----------------------------------------------------------------------------------
 
-test("a hidden page gets no frames, and the newest when it is shown again", () =>
+test("a hidden page gets no frames, and the newest one when visible again", () =>
   withPage(async (page) => {
     const hide = (hidden) =>
       page.evaluate((value) => {
@@ -359,7 +359,7 @@ test("a hidden page gets no frames, and the newest when it is shown again", () =
       }, hidden);
     const headers = () => page.evaluate(() => window.frameHeaders.length);
     const quiet = async () => {
-      // What was on its way comes still; then a second without a frame.
+      // Frames in flight still arrive; then a second without a frame.
       let last = -1;
       for (let n = 0; n < 10 && (await headers()) !== last; n++) {
         last = await headers();
@@ -390,7 +390,7 @@ test("a hidden page gets no frames, and the newest when it is shown again", () =
     await finalPicture(page);
   }));
 
-test("nothing is there to undo or redo at first", () =>
+test("undo and redo are empty at first", () =>
   withPage(async (page) => {
     await page.keyboard.press("Control+z");
     await saysStatus(page, "nothing to undo");

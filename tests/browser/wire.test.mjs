@@ -42,7 +42,7 @@ async function byteProxy(port) {
   };
 }
 
-test("page and frames that come a byte at a time are the same page and frames", (t) =>
+test("page and frames received one byte at a time are unchanged", (t) =>
   withPage(async (whole) => {
     const proxy = await byteProxy(shared.daemon.port);
     t.after(proxy.close);
@@ -64,7 +64,7 @@ test("page and frames that come a byte at a time are the same page and frames", 
     assert.deepEqual(await pixels(torn), await pixels(whole), "after a turn too");
   }));
 
-// Runs in a page first: records every message that comes in and what goes out between.
+// Injected before the page: records every received message and those sent in between.
 const record = () => {
   window.tape = [];
   const Native = window.WebSocket;

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Three attacks that once worked on what windsplat is built of, each against a real daemon: a long
-chunked trailer, HDF5 files that name other files, and paths that are addresses.
+"""Three attacks that once succeeded through libraries of windsplat, against a real daemon: a long
+chunked trailer, HDF5 files that refer to other files, and paths that are URLs.
 
     tests/edge/attacks.py                          # all three
     tests/edge/attacks.py --attack=url_paths       # or chunked_trailer, external_files
     tests/edge/attacks.py --strace=no              # canaries alone (a socket that listens, files)
 
-No other file may be opened and no connection made: a socket listens where the addresses lead,
-inotify watches the files that they name, and strace, where it works, sees every call of the daemon
-and of its loaders. Exit code 0: nothing got through."""
+No other file may be opened and no connection made: a socket listens at the addresses, inotify
+watches the files, and strace, if it works, records every call of the daemon and its loaders.
+Exit code 0: every attack failed."""
 import argparse
 import json
 import pathlib
@@ -33,7 +33,7 @@ ROUNDS = 50
 
 
 class Canary(threading.Thread):
-    """Listens on loopback and counts who comes."""
+    """Listens on loopback and counts connections."""
 
     def __init__(self):
         super().__init__(daemon=True)
@@ -65,7 +65,7 @@ def strace_works():
 
 
 class Scene:
-    """A daemon with a data root, files outside that nobody may open, and canaries."""
+    """A daemon with a data root, files outside that must not be opened, and canaries."""
 
     def __init__(self, options, folder):
         self.folder, self.root, self.outside = folder, folder / "root", folder / "outside"

@@ -72,7 +72,7 @@ def main():
     parser.add_argument("--kind", default="")
     options = parser.parse_args()
     daemon = Watched(options)
-    for _ in range(3):  # what is made once is no growth
+    for _ in range(3):  # one-time allocations are no growth
         daemon.check_good_client()
     chance = random.Random(options.seed)
     limits = request(daemon.target, "GET", "v1").json()["limits"]

@@ -44,7 +44,7 @@ VIEW = {"image": {"width": 96, "height": 64}}
 
 
 def attack(port, hello, until, answered, refused, nice):
-    """In a process of its own, which leaves the processor to what is measured."""
+    """In a separate process with low priority, so that it does not disturb the measurement."""
     os.nice(nice)
     context = tls_peer.trusting_context()
     lock = threading.Lock()

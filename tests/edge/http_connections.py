@@ -257,7 +257,7 @@ def crowd(target, count):
 
 
 def half_closed(target, data, statuses):
-    """Nothing is said of it in RFC 9112: answered, or ended; not left open."""
+    """Unspecified in RFC 9112: answered or closed, but not left open."""
     with Connection(target) as connection:
         connection.raw(fill(target, data))
         connection.half_close()

@@ -1,5 +1,5 @@
-"""Runs groups of cases against one daemon and watches it: after every group it must live, hold no
-more than a megabyte more, and serve a good client."""
+"""Runs groups of cases against one daemon. After every group it must be alive, hold at most 1 MiB
+more memory, and serve a well-behaved client."""
 import argparse
 import collections
 import json
@@ -11,14 +11,14 @@ import time
 
 from wire_client import Closed, Daemon, Target, WebSocket, request, status_bytes
 
-# `section` is where it stands (an RFC's, or ours), `expected` what must come; `run(target)` raises
-# where something else came. Slow ones run beside each other.
+# `section`: of the RFC or of our documents; `expected`: the required reaction; `run(target)` raises
+# on any other reaction. Slow cases run concurrently.
 Case = collections.namedtuple("Case", "id section what expected run slow", defaults=(False,))
 KIB = 1024
 
 
 class Wrong(AssertionError):
-    """Something else came than what must."""
+    """The reaction differs from the expected one."""
 
 
 def require(truth, what):
@@ -176,7 +176,7 @@ def main(groups, options):
         return 0
     daemon = Watched(options)
     run = Run(daemon, options)
-    for _ in range(3):  # what is made once is no growth
+    for _ in range(3):  # one-time allocations are no growth
         daemon.check_good_client()
     for name, cases in groups:
         run.group(name, cases)

@@ -1,6 +1,6 @@
-"""The one client of the tests written in Python: where a daemon is, raw bytes to it, HTTP answers,
-WebSocket frames. Python's own library alone; nothing here is polite for the peer, so that the tests
-can send what no good client would."""
+"""Client of the Python tests: address of a daemon, raw bytes, HTTP responses, WebSocket frames.
+Uses the standard library only and enforces no protocol rules, so that tests can send invalid
+data."""
 import base64
 import hashlib
 import json
@@ -31,7 +31,7 @@ class Closed(RuntimeError):
 
 
 class Target:
-    """Where a daemon listens, and what it wants of those who come."""
+    """Address of a daemon, and the credentials and headers that it requires."""
 
     def __init__(self, host, port, tls=None, token=None, base="/"):
         self.host, self.port, self.tls, self.token, self.base = host, port, tls, token, base
@@ -279,7 +279,7 @@ def status_bytes(pid, key):
 
 
 class Daemon:
-    """One on a free port, until stop(). `errors` is the file its log goes to."""
+    """A daemon on a free port, until stop(). `errors` is the file of its log."""
 
     def __init__(self, program, dataset, *options, errors=subprocess.DEVNULL, target=None):
         self.child = subprocess.Popen(

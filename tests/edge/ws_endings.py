@@ -1,4 +1,4 @@
-"""Cases of RFC 6455, chapters 7 and 8: close codes, what comes after a close, and UTF-8."""
+"""Cases of RFC 6455, chapters 7 and 8: close codes, data after a close, and UTF-8."""
 import functools
 import struct
 
@@ -10,7 +10,7 @@ from ws_frames import CONTINUE, closing, custom, living, question, require_close
 BAD_CODES = (0, 1, 999, 1004, 1005, 1006, 1015, 1016, 1100, 1999, 2000, 2500, 2999)
 GOOD_CODES = (1000, 1001, 1002, 1003, 1007, 1008, 1009, 1010, 1011, 1012, 1013, 3000, 3001, 3500,
               3999, 4000, 4001, 4400, 4410, 4999)
-# Registered after the RFC, or beyond what it knows: nothing is said of what must come.
+# Registered after the RFC, or beyond its ranges: the reaction is unspecified.
 OPEN_CODES = (1014, 5000, 32768, 65535)
 
 # By the first and last letters of each length, and those about the surrogates.
@@ -67,7 +67,7 @@ def code_cases():
 
 
 def silence_after(viewer, data):
-    """What comes after a close is not answered; the close is, once."""
+    """Data after a close are not answered; the close is, once."""
     viewer.raw(goodbye(1000) + data)
     closes, texts = 0, []
     try:

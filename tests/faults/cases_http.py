@@ -176,7 +176,7 @@ def leave(world, count):
 
 @case("control characters in request ids and targets", 60, 12)
 def control_characters(world, count):
-    """CR, LF and ESC in what clients say: log lines stay single and plain."""
+    """CR, LF and ESC in client input: log lines stay single and printable."""
     daemon = world.start("--data-root", str(world.new_folder()), SAMPLE)
     evil = ["a%0d%0ainjected%20line", "%1b%5b31mred", "%00", "%0a", "%e2%80%ae", "x" * 3000]
     for n in range(count):

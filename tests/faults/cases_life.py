@@ -1,4 +1,4 @@
-"""Signals under load: an orderly end, a sudden one, a config read anew (loops: signals.py)."""
+"""Signals under load: orderly shutdown, kill, reload of the configuration (loops: signals.py)."""
 import signals
 from support import case
 

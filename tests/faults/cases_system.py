@@ -191,7 +191,7 @@ def faked_clock(world, count):
 
 @case("no file descriptors left", 200, 60)
 def no_descriptors(world, count):
-    """More connections than descriptors; the listening socket must not be looked at in a loop."""
+    """More connections than descriptors; the listening socket must not be polled in a loop."""
     limit = 40
     if is_sanitized(world.program):
         raise Untried("a build with sanitizers: UBSan asks by a pipe whether memory can be read, "
@@ -253,7 +253,7 @@ def killed_loader(world, count):
 
 @case("a loader that is stopped", 3, 1)
 def stopped_loader(world, count):
-    """By SIGSTOP, in the middle of playback as it were; another dataset's goes on meanwhile."""
+    """By SIGSTOP, as if during playback; other datasets are served meanwhile."""
     folder = world.new_folder()
     for name in ("wind", "other"):
         subprocess.run([world.program, "synth", "tornado", "--dims", "32x32x32", "--steps", "12",

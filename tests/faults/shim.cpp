@@ -34,7 +34,7 @@ void* __libc_memalign(size_t alignment, size_t bytes);
 
 namespace {
 
-// The order is shim.py's.
+// The order is that of shim.py.
 enum Kind {
   k_malloc,
   k_send,
@@ -102,11 +102,11 @@ __attribute__((constructor)) void start() {
   backtrace(frames.data(), frames.size());  // it loads what it needs on its first call
   auto* mapped = static_cast<Control*>(page);
   std::int64_t nobody = 0;
-  // The first process alone: its children are others.
+  // The first process only, not its children.
   if (mapped->process.compare_exchange_strong(nobody, ::getpid())) control = mapped;
 }
 
-// True the first time that this place, the innermost callers' addresses, is seen.
+// True the first time that this call site, the addresses of the innermost callers, is seen.
 bool is_new_site(Kind kind, Counter& counter) {
   constexpr int frames_max = 24;
   constexpr int own_frames = 3;
@@ -132,7 +132,7 @@ bool is_new_site(Kind kind, Counter& counter) {
   return false;
 }
 
-// FAULTS_TELL=1: says which call fails: places in the program's file, for addr2line.
+// FAULTS_TELL=1: logs the failing call by program addresses, for addr2line.
 void tell_stack() {
   std::array<void*, 32> frames{};
   inside = true;
@@ -140,7 +140,7 @@ void tell_stack() {
   inside = false;
 }
 
-// Whether this call is one to fail; errno is then set.
+// Whether this call must fail; errno is then set.
 bool fails(Kind kind, const void* caller) {
   if (!begun || control == nullptr || inside) return false;
   Counter& counter = control->kinds[kind];
@@ -180,7 +180,7 @@ Function* next(const char* name) {
   return found;
 }
 
-// Disks and peers fail; events and signals, which are read and written as well, do not.
+// Disks and peers fail; events and signals, which are also read and written, do not.
 bool is_file(int file) {
   struct stat status {};
   return fstat(file, &status) == 0 && (S_ISREG(status.st_mode) || S_ISSOCK(status.st_mode));
@@ -374,7 +374,7 @@ int __libc_start_main(Main* main, int count, char** words, void (*first)(), void
   return real(main_begins, count, words, first, last, loader_last, stack);
 }
 
-// Says where the program gave up: places in its file, for addr2line.
+// Logs the place of an abort by program addresses, for addr2line.
 void abort() noexcept {
   NEXT(abort);
   tell_stack();

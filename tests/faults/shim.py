@@ -38,7 +38,7 @@ class Shim:
             self.page = mmap.mmap(file.fileno(), BYTES)
 
     def start(self, program, *arguments, must_start=True, env=None, **how):
-        """A daemon that has this shim's page; the one before is gone."""
+        """Starts a daemon with this shim's page, in place of the previous one."""
         struct.pack_into("q", self.page, 0, 0)
         more = dict(env or os.environ, LD_PRELOAD=self.library, FAULTS_CONTROL=str(self.path))
         return Daemon(program, *arguments, env=more, must_start=must_start, prepare=plain_addresses,

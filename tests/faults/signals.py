@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""SIGTERM, SIGKILL and SIGHUP to a daemon under load, again and again. A Markdown table on stdout.
+"""SIGTERM, SIGKILL and SIGHUP to a daemon under load, repeatedly. A Markdown table on stdout.
 Linux only.
 
 Usage: signals.py [--program=build/release/windsplat] [--rounds=50] [--signal=TERM]... [--quick]
        [--slack=1]
 
-TERM: /readyz fails first, streams are closed by 1001, the daemon ends with 0 within 10 s. KILL:
-the next one on the same state folder has every view that was said to be saved, and none that is
-half written; a viewer that connects again and sends its view gets the same picture. HUP: with a
-config that is spoiled the old one stays and the log says so. Exit code 0: all of it."""
+TERM: /readyz fails first, streams are closed with 1001, the daemon exits with 0 within 10 s. KILL:
+the next daemon on the same state folder has every acknowledged view and no partial one; a client
+that reconnects and sends its view gets the same picture. HUP: an invalid configuration is logged
+and the old one stays. Exit code 0: all of this holds."""
 import argparse
 import http.client
 import json
@@ -32,7 +32,7 @@ LOST = (OSError, http.client.HTTPException, Closed, Failed)
 
 
 class Load(threading.Thread):
-    """One that asks for pictures, turns a view in a stream, or saves views, until told to stop."""
+    """A client that requests pictures, rotates a view of a stream or saves views until stopped."""
 
     def __init__(self, port, number):
         super().__init__(daemon=True)
@@ -67,7 +67,7 @@ class Load(threading.Thread):
                 self.done += 1
 
     def views(self):
-        """Saves a view, changes it, keeps in mind what it was told."""
+        """Saves a view, changes it, and records the acknowledged states."""
         got = ask(self.port, "POST", "/v1/views", {"dataset": SAMPLE, "step": 0}, timeout=20)
         if got.status != 201:
             return
@@ -158,7 +158,7 @@ def free_port():
 
 
 def saved_views(port, loads, tell):
-    """Every view that was acknowledged is there, as it was told or as the last request made it."""
+    """Every acknowledged view exists, in its acknowledged state or that of the last request."""
     kept = 0
     for name, steps in ((n, s) for one in loads for n, s in one.saved.items()):
         got = ask(port, "GET", f"/v1/views/{name}")
@@ -217,7 +217,7 @@ ORIGINS = ["https://first.example", "https://second.example"]
 
 
 def hang_up(program, folder, rounds, _slack=1):
-    """SIGHUP under load with a config that is good, spoiled, gone."""
+    """SIGHUP under load with a valid, an invalid and a missing configuration."""
     text = subprocess.run([program, "serve", "--help"], capture_output=True, text=True,
                           check=True).stdout
     if "--config" not in text:

@@ -1,5 +1,5 @@
-"""What the fault scripts share: a daemon with its log, requests, a stream by its bytes, and what
-/proc says of a process. Python's own library alone. Linux only."""
+"""Shared by the fault scripts: a daemon with its log, requests, a stream by its bytes, and /proc
+entries of a process. Standard library only. Linux only."""
 import collections
 import http.client
 import json
@@ -168,7 +168,7 @@ def ask(port, method, target, body=None, headers=None, timeout=PATIENCE_S):
 
 
 def talk(port, request, timeout=PATIENCE_S, pieces=1 << 30):
-    """All that comes back for these bytes until the daemon closes, and the seconds it took."""
+    """The response to these bytes until the daemon closes, and its time in seconds."""
     since = time.monotonic()
     got = b""
     with socket.create_connection(("127.0.0.1", port), timeout=timeout) as one:
@@ -176,7 +176,7 @@ def talk(port, request, timeout=PATIENCE_S, pieces=1 << 30):
             for at in range(0, len(request), pieces):
                 one.sendall(request[at:at + pieces])
         except OSError:
-            pass  # it may have heard enough
+            pass  # it may have closed already
         try:
             while piece := one.recv(65536):
                 got += piece
@@ -208,7 +208,7 @@ def picture(port, dataset=SAMPLE, size=(64, 48), azimuth=0.0, timeout=PATIENCE_S
 
 
 def check_good(port, dataset=SAMPLE):
-    """A good request works: a picture, after what is still drawn for others."""
+    """A valid request gets a picture, after those still rendering for others."""
     end = time.monotonic() + PATIENCE_S
     while True:
         got = picture(port, dataset, azimuth=time.monotonic() % 360)
@@ -334,7 +334,7 @@ class Stream:
         raise Failed(f"the answer to the upgrade has no X-Request-Id: {self.head!r}")
 
     def until_closed(self):
-        """The code by which the daemon ends it; what comes before is thrown away."""
+        """The close code of the daemon; earlier messages are discarded."""
         try:
             while True:
                 self.message()

@@ -89,8 +89,7 @@ class Transcript {
     return wind;
   }
 
-  // The earliest of what happens by itself: a render ends, an acknowledgement arrives, or the
-  // session wakes.
+  // The earliest event: a render ends, an acknowledgement arrives, or the session wakes.
   void advance(Micros end) {
     while (true) {
       const Micros never = end + 1;
@@ -192,7 +191,7 @@ class Transcript {
 
   Micros now_ = 0;
   std::uint32_t described_ = 0;
-  std::optional<StartRender> render_;  // the newest
+  std::optional<StartRender> render_;  // the newest while it is running
   std::optional<Micros> render_end_;   // while it is under way
   std::optional<Micros> ack_at_;
   std::uint32_t sent_ = 0;  // the newest frame's seq

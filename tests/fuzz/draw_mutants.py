@@ -50,7 +50,7 @@ METHODS = ("kernel", "slab")
 
 
 class Process:
-    """A daemon, and what it has used."""
+    """A daemon and its resource usage."""
 
     def __init__(self, options, root, folder, threads):
         folder.mkdir()

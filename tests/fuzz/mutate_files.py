@@ -68,7 +68,7 @@ def case_of(number, options, kinds):
 
 
 class Run:
-    """Outcomes by format, and what failed."""
+    """Outcomes by format, and failures."""
 
     def __init__(self, options, daemon, root, watch):
         self.options = options

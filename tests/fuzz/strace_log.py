@@ -1,4 +1,4 @@
-"""Judges what strace wrote down: which files the daemon and its loaders opened, and which sockets.
+"""Checks a log of strace: which files the daemon and its loaders opened, and which sockets.
 
 A process is the daemon until it becomes a loader (execve of "... load"), and a loader is confined
 from its seccomp call on. Calls that the filter traps show the call's number as their result and a

@@ -1,4 +1,4 @@
-// Certificates for the tests of TLS: made here, signed by themselves, for localhost and 127.0.0.1.
+// Self-signed certificates for the TLS tests, for localhost and 127.0.0.1.
 #pragma once
 
 #include <string>
@@ -10,8 +10,7 @@ struct Certificate {
   std::string key;
 };
 
-// `name` is its subject, by which a client tells it from another. `days` before or after now it
-// ends.
+// `name` is the subject, which distinguishes certificates. `days`: expiry relative to now, in days.
 Certificate make_certificate(const std::string& name, int days = 2);
 
 }  // namespace net_test

@@ -24,7 +24,7 @@ namespace cli_test {
 
 using Words = std::vector<std::string>;
 
-// A folder for one test's files, removed with it.
+// A folder for the files of one test, removed with it.
 class Folder {
  public:
   Folder() {
@@ -51,7 +51,7 @@ inline void write_file(const std::string& path, const std::string& bytes) {
   std::ofstream(path, std::ios::binary) << bytes;
 }
 
-// The program while it runs. `environment` is added to ours, less its WINDSPLAT_ variables.
+// A running program. `environment` is added to the current one, without its WINDSPLAT_ variables.
 class Process {
  public:
   explicit Process(const Words& arguments, const Words& environment = {}) {
@@ -98,7 +98,7 @@ class Process {
     if (pid_ > 0) {
       kill(pid_, signal);
     } else {
-      ADD_FAILURE() << "the program does not run";
+      ADD_FAILURE() << "the program is not running";
     }
   }
 
@@ -106,10 +106,10 @@ class Process {
   std::string read_until(char stop) { return read_stdout(&stop); }
   std::string read_all() { return read_stdout(nullptr); }
 
-  // The exit code; 128 + n when ended by signal n. Ends a program that takes more than a minute.
+  // The exit code; 128 + n when ended by signal n. Kills a program that takes more than a minute.
   int wait() {
     if (pid_ <= 0) {
-      ADD_FAILURE() << "the program does not run";
+      ADD_FAILURE() << "the program is not running";
       return -1;
     }
     int status = 0;
@@ -146,7 +146,7 @@ class Process {
     while (stop == nullptr || text.empty() || text.back() != *stop) {
       pollfd event{stdout_, POLLIN, 0};
       if (poll(&event, 1, 60000) <= 0) {
-        ADD_FAILURE() << "the program says nothing; so far: " << text;
+        ADD_FAILURE() << "no output from the program; so far: " << text;
         break;
       }
       const ssize_t got = read(stdout_, buffer, stop == nullptr ? sizeof buffer : 1);

@@ -14,7 +14,7 @@ namespace net_test {
 
 using Headers = std::vector<std::pair<std::string, std::string>>;
 
-inline constexpr int patience_ms = 60'000;  // a test that waits longer has failed
+inline constexpr int patience_ms = 60'000;  // a longer wait is a failure
 
 // A port of this machine, and whether TLS is spoken there.
 struct Place {
@@ -41,13 +41,13 @@ class Socket {
   bool closed_by_peer(int timeout_ms = patience_ms);
   void half_close() const;
 
-  // Of TLS: whether the handshake came to its end, the common name of the peer's certificate, and
-  // what was agreed on ("TLSv1.3", "http/1.1").
+  // For TLS: whether the handshake completed, the common name of the peer's certificate, and the
+  // negotiated versions ("TLSv1.3", "http/1.1").
   [[nodiscard]] bool shaken() const { return shaken_; }
   [[nodiscard]] std::string peer_name() const;
   [[nodiscard]] std::string version() const;
   [[nodiscard]] std::string protocol() const;
-  void say_goodbye();  // close_notify
+  void say_goodbye();  // close_notify of TLS 1.3: a record without application data
   bool change_key();   // of TLS 1.3: a record that holds nothing for HTTP
 
  private:
@@ -70,7 +70,7 @@ struct Answer {
 // Reads one response. `head`: it has no body regardless of its length.
 Answer read_answer(Socket& socket, bool head = false);
 
-// One request on a connection of its own.
+// One request on its own connection.
 Answer request(Place place, const std::string& method, const std::string& target,
                const Headers& headers = {}, const std::string& body = "");
 Answer get(Place place, const std::string& target, const Headers& headers = {});
@@ -86,7 +86,7 @@ struct Message {
   int close_code = 0;  // of a close; 0 if absent
 };
 
-// A WebSocket. Answers pings by itself; acknowledges nothing.
+// A WebSocket. Answers pings automatically; acknowledges nothing.
 class StreamClient {
  public:
   explicit StreamClient(Place place, const Headers& headers = {},
@@ -98,9 +98,9 @@ class StreamClient {
   bool send_frame(Opcode opcode, std::string_view payload, bool fin = true);
   // Text, binary or close; none if the connection ended otherwise or the deadline passed.
   std::optional<Message> next(int timeout_ms = patience_ms);
-  // The next text message of that type, others passed over.
+  // The next text message of that type; others are skipped.
   std::optional<std::string> next_text(const std::string& type, int timeout_ms = patience_ms);
-  // The next frame, texts passed over (kept in `texts`).
+  // The next frame; texts are skipped and kept in `texts`.
   std::optional<std::string> next_frame(int timeout_ms = patience_ms);
   // The code of the next close, skipping earlier messages; 0 if there is none.
   int close_code(int timeout_ms = patience_ms);

@@ -31,7 +31,7 @@ class Bill(unittest.TestCase):
         version = output_of(PROGRAM, "--version").split()[-1]
         self.assertEqual(self.bill["metadata"]["component"]["version"], version)
 
-    def test_every_library_that_is_loaded_is_there_in_its_version(self):
+    def test_loaded_libraries_are_listed_with_versions(self):
         loaded = set(re.findall(r"(/\S+) \(0x", output_of("ldd", PROGRAM)))
         self.assertGreater(len(loaded), 10)
         for path in loaded:
@@ -42,12 +42,12 @@ class Bill(unittest.TestCase):
             version = output_of("dpkg-query", "-W", "-f", "${Version}\n", package).split()[0]
             self.assertEqual(self.required[package]["version"], version, path)
 
-    def test_headers_that_are_compiled_in_are_there(self):
+    def test_compiled_in_headers_are_listed(self):
         for name in ("libboost1.81-dev", "nlohmann-json3-dev", "libglm-dev", "libcli11-dev"):
             self.assertIn(name, self.required)
         self.assertNotIn("libgtest-dev", self.required)
 
-    def test_of_the_modules_those_in_the_page_alone_are_required(self):
+    def test_only_bundled_modules_are_required(self):
         lock = json.loads((ROOT / "web/package-lock.json").read_text())["packages"]
         self.assertEqual(self.required["lil-gui"]["version"],
                          lock["node_modules/lil-gui"]["version"])
@@ -57,7 +57,7 @@ class Bill(unittest.TestCase):
         modules = [one for one in self.bill["components"] if one["purl"].startswith("pkg:npm/")]
         self.assertEqual(len(modules), len(lock) - 1)
 
-    def test_references_are_unique_and_the_text_is_the_same_again(self):
+    def test_references_are_unique_and_output_is_reproducible(self):
         names = [one["bom-ref"] for one in self.bill["components"]]
         self.assertEqual(len(names), len(set(names)))
         self.assertEqual(self.text, output_of(str(ROOT / "scripts/sbom"), PROGRAM))

@@ -1,4 +1,4 @@
-// The errors that frames are told against true ones, at views that nothing was measured of.
+// Forecast errors of frames against their true errors, at viewpoints without measurements.
 #include "server/study/calibration.hpp"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ Subject small_tornado() {
   return make_subject("tornado", dataset, view, {48, 36}).value();
 }
 
-// Two surveyed views of each of five looks, three held out.
+// Two calibrated and three held-out viewpoints of each of five scenes.
 const Calibration& calibrated() {
   static const Calibration made = [] {
     ThreadPool pool(2);
@@ -47,27 +47,27 @@ TEST(Calibration, EstimatesAreWithinAFactorOfTwoForNineInTenHeldOutViews) {
   EXPECT_LT(told.median, 1.25);
 }
 
-TEST(Calibration, NineteenInTwentyKeepTheBoundThatTheyAreChosenBy) {
+TEST(Calibration, NineteenInTwentyKeepTheRequestedBound) {
   EXPECT_GE(agreement(calibrated()).bounded, 0.95);
 }
 
-TEST(Calibration, SurveysMakeEstimatesBetter) {
+TEST(Calibration, CalibrationRunsImproveEstimates) {
   EXPECT_GT(agreement(calibrated()).within_two, agreement_of_priors(calibrated()).within_two);
 }
 
-TEST(Calibration, MeasuredErrorsAreTrueOnes) {
+TEST(Calibration, MeasuredErrorsMatchTheReference) {
   const Agreement measured = agreement_of_measured(calibrated());
   EXPECT_EQ(measured.count, 2U * 5 * 3);
   EXPECT_GE(measured.within_two, 0.95);
   EXPECT_NEAR(measured.median, 1, 0.1);
 }
 
-TEST(Calibration, ErrorsOfJpegsAreWithinAFactorOfTwoAfterOneWasMeasured) {
+TEST(Calibration, JpegErrorsAreWithinAFactorOfTwoAfterOneMeasurement) {
   EXPECT_GE(agreement_of_encodings(calibrated()).within_two, 0.85);
 }
 
-// Two ways to the truth, one of them the integral.
-TEST(Calibration, TheTruthIsTheIntegral) {
+// Two independent computations of the reference; one is the integral.
+TEST(Calibration, ReferenceEqualsTheIntegral) {
   ASSERT_EQ(calibrated().checks.size(), 5U);
   for (const TruthCheck& check : calibrated().checks) {
     EXPECT_LT(check.apart, 5e-5) << calibrated().looks[check.look];

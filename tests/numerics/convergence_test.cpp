@@ -1,4 +1,4 @@
-// Orders of convergence: of the reference's rule, and of what each compositing makes of a cell.
+// Orders of convergence of the reference's quadrature and of every compositing rule for a cell.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@ using scene::Compositing;
 
 // ---- a medium on [0, 1] with lines in it ----
 
-constexpr double edge = 0.4371;  // where the stepped medium jumps
+constexpr double edge = 0.4371;  // discontinuity of the medium
 
 struct Haze {
   bool stepped = false;
@@ -90,7 +90,7 @@ double uniform_error(int nodes, int pieces) {
   return distance(light, truth(haze, {}));
 }
 
-TEST(ReferenceRule, ConvergesWithTwiceItsNodes) {
+TEST(ReferenceRule, ConvergesWhenItsNodesAreDoubled) {
   for (const int nodes : {2, 3}) {
     std::vector<double> width;
     std::vector<double> error;
@@ -215,21 +215,21 @@ double order(const Haze& haze, const std::vector<Surface>& lines, Rule rule, boo
   return slope(width, error);
 }
 
-TEST(CellOrder, EulerAndLinesAtTheirCellsBackAreOfFirstOrder) {
+TEST(CellOrder, EulerAndLinesAtTheBackOfTheirCellAreFirstOrder) {
   EXPECT_NEAR(order({}, some_lines(), Rule::euler, false), 1, 0.3);
   EXPECT_NEAR(order({}, some_lines(), Rule::snapped, false), 1, 0.3);
 }
 
-TEST(CellOrder, CorrectedAndExactCellsAreOfSecondOrder) {
+TEST(CellOrder, CorrectedAndExactCellsAreSecondOrder) {
   EXPECT_NEAR(order({}, some_lines(), Rule::corrected, false), 2, 0.3);
   EXPECT_NEAR(order({}, some_lines(), Rule::exact, false), 2, 0.3);
 }
 
-TEST(CellOrder, MidpointCellsSplitAtLinesAreOfSecondOrder) {
+TEST(CellOrder, MidpointCellsSplitAtLinesAreSecondOrder) {
   EXPECT_NEAR(order({}, some_lines(), Rule::split_at_lines, false), 2, 0.3);
 }
 
-TEST(CellOrder, AStepCostsAnOrderUnlessCellsAreSplitThere) {
+TEST(CellOrder, DiscontinuityCostsAnOrderUnlessCellsAreSplitThere) {
   const Haze stepped{true};
   for (const Rule rule : {Rule::exact, Rule::corrected, Rule::split_at_lines}) {
     EXPECT_NEAR(order(stepped, some_lines(), rule, false), 1, 0.3);
@@ -237,9 +237,9 @@ TEST(CellOrder, AStepCostsAnOrderUnlessCellsAreSplitThere) {
   }
 }
 
-// ---- bounds that the formulas promise ----
+// ---- bounds implied by the formulas ----
 
-TEST(CellRules, CorrectedErrsByAnEighthOfTauSquaredAtMost) {
+TEST(CellRules, CorrectedDeviatesByAtMostAnEighthOfTauSquared) {
   for (const double tau : {1e-4, 0.01, 0.3, 1.0, 3.0}) {
     for (int i = 0; i <= 20; ++i) {
       Cell cell{tau, i / 20.0, 0.8, {1, 0, 0.5}, {0, 1, 0.25}};
@@ -254,7 +254,7 @@ TEST(CellRules, CorrectedErrsByAnEighthOfTauSquaredAtMost) {
   }
 }
 
-TEST(CellRules, NaiveLosesAQuarterOfTheMediumsLightRoundALine) {
+TEST(CellRules, NaiveLosesAQuarterOfTheLightOfTheMediumAroundALine) {
   for (const double tau : {0.1, 2.0, 50.0}) {
     const double absorbed = -std::expm1(-tau);
     const Cell cell{tau, 0.5, 0, {1, 0.5, 0}, {0, 0, 0}};
@@ -309,7 +309,7 @@ void expect_cells(Compositing compositing, double rho) {
   }
 }
 
-TEST(EngineCell, EveryCompositingIsItsFormula) {
+TEST(EngineCell, EveryCompositingEqualsItsFormula) {
   for (const Compositing by :
        {Compositing::simple, Compositing::cd_naive, Compositing::cd, Compositing::analytic}) {
     for (const double rho : {0.01, 0.7, 3.0, 60.0}) expect_cells(by, rho);

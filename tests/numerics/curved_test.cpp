@@ -1,4 +1,4 @@
-// Curved lattices: each sample has its own place and cell.
+// Curved lattices: each sample has its own position and cell.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -70,7 +70,7 @@ std::vector<double> truth_of(const Scene& scene) {
   return picture->rgba;
 }
 
-TEST(Curved, StraightPlacesDrawWhatTheRectilinearLatticeDoes) {
+TEST(Curved, StraightPositionsRenderLikeTheRectilinearLattice) {
   for (const bool perspective : {true, false}) {
     Scene scene = flat_scene(true, perspective);
     scene.method = scene::Method::slab;
@@ -88,7 +88,7 @@ TEST(Curved, StraightPlacesDrawWhatTheRectilinearLatticeDoes) {
   }
 }
 
-TEST(Curved, BentLatticesApproachTheReference) {
+TEST(Curved, CurvedLatticesApproachTheReference) {
   const Bend shell = [](const glm::dvec3& p) {
     const double r = 0.7 + 0.6 * p.z;
     return glm::dvec3{r * std::cos(1.2 * p.y) * std::sin(2 * p.x),

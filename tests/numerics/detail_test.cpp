@@ -1,4 +1,4 @@
-// A picture at a coarser level against the same picture of every sample: how far they are apart.
+// Pictures at a coarser level compared with pictures at full detail.
 #include "server/scene/detail.hpp"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace {
 
 using Level = std::array<int, 3>;
 
-// A cube of 128 samples a side as wide as the picture of 64 pixels: half a pixel a cell.
+// A cube of 128 samples per side, as wide as a picture of 64 pixels: half a pixel per cell.
 scene::Scene small_picture() {
   scene::Scene scene;
   const double cell = 2.0 / 128;
@@ -59,7 +59,7 @@ double mean_alpha(const engine::Image& image) {
   return 4 * sum / static_cast<double>(image.rgba.size());
 }
 
-TEST(Detail, ASmoothBlobLooksTheSameAtAnEighthOfItsSamples) {
+TEST(Detail, SmoothBlobLooksTheSameAtAnEighthOfItsSamples) {
   scene::Scene full = small_picture();
   const auto blob = [](int, double x, double y, double z) {
     return static_cast<float>(4 * std::exp(-6 * (x * x + y * y + z * z)));
@@ -76,13 +76,13 @@ TEST(Detail, ASmoothBlobLooksTheSameAtAnEighthOfItsSamples) {
     EXPECT_EQ(8 * coarse.work.samples, whole.work.samples);
     const double error = rmse(whole.image, coarse.image);
     EXPECT_LT(error, 2e-3);
-    // Two levels too many show: the bound above can fail.
+    // Two additional levels exceed the bound, so the check above can fail.
     EXPECT_GT(rmse(whole.image, render(at_level(full, {3, 3, 3})).image), 3 * error);
   }
 }
 
-// Extinction is per length, so that averages of it keep the light: here at the far end of what a
-// box filter does to unsmooth data, noise from sample to sample.
+// Extinction is per length, so that averaging preserves the transmitted light. White noise is the
+// worst case of a box filter.
 TEST(Detail, NoiseKeepsItsMeanOpacity) {
   scene::Scene full = small_picture();
   std::mt19937 random(5);
@@ -98,7 +98,7 @@ TEST(Detail, NoiseKeepsItsMeanOpacity) {
 TEST(Detail, SmallLinesKeepTheirMeanOpacity) {
   for (const double opacity : {0.002, 0.02, 0.2}) {
     scene::Scene full = small_picture();
-    // Every sample has a line of a few pixels, each in a direction that turns slowly.
+    // Every sample has a line of a few pixels whose direction varies slowly.
     const auto swirl = [](int c, double x, double y, double z) {
       const std::array<double, 3> v{-y, x, 0.5 * std::cos(2 * z)};
       const double length = std::sqrt(x * x + y * y + 0.25 * std::cos(2 * z) * std::cos(2 * z));
@@ -118,7 +118,7 @@ TEST(Detail, SmallLinesKeepTheirMeanOpacity) {
   }
 }
 
-// A thin layer of opaque lines, which leave gaps: merged ones must not let more through.
+// A thin layer of opaque lines with gaps: merged lines must not transmit more light.
 TEST(Detail, OpaqueLinesInOneLayerKeepTheirMeanOpacity) {
   scene::Scene full = small_picture();
   const auto few = [](int c, double x, double y, double z) {

@@ -1,4 +1,4 @@
-// Stiff and extreme scenes, each with the picture that it must give.
+// Stiff and extreme scenes with known pictures.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,8 +17,8 @@ namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-// A line across the middle of a splat, tilted so that at the right it leaves its cell's back; red
-// medium, blue line.
+// A line across the middle of a splat, tilted so that its right end leaves the back of the cell;
+// red medium, blue line.
 scene::Scene line_in_cell(float rho, double opacity, float away) {
   scene::Scene scene;
   scene.lattice = even_lattice({1, 1, 1}, {2, 2, 2});
@@ -51,7 +51,7 @@ double worst_error(const scene::Scene& scene) {
   return worst;
 }
 
-TEST(Stiff, AnOpaqueCellHidesTheLineBehindItAndNoLineBefore) {
+TEST(Stiff, OpaqueCellHidesLinesBehindItOnly) {
   for (const float rho : {1e4F, 1e10F, 1e30F, 3e38F, infinity}) {
     scene::Scene scene = line_in_cell(1, 0.8, 2.0F);
     scene.scalars[0].extinction = {{0, static_cast<double>(rho)}, {2, static_cast<double>(rho)}};
@@ -62,26 +62,26 @@ TEST(Stiff, AnOpaqueCellHidesTheLineBehindItAndNoLineBefore) {
     EXPECT_EQ(behind[1], 0.5F) << rho;
     EXPECT_EQ(behind[2], 0.0F) << rho;
     EXPECT_EQ(behind[3], 1.0F) << rho;
-    const float* before = pixel(image, 9, 20);  // at its cell's very front: nothing attenuates it
+    const float* before = pixel(image, 9, 20);  // at the front of its cell
     EXPECT_NEAR(before[2], 0.8, 1e-6) << rho;
     EXPECT_NEAR(before[0], 0.2, 1e-6) << rho;
     EXPECT_EQ(before[3], 1.0F) << rho;
   }
 }
 
-TEST(Stiff, AnOpaqueLineEndsTheRay) {
+TEST(Stiff, OpaqueLineEndsTheRay) {
   for (const float rho : {0.0F, 1e-30F, 1.0F, 50.0F, 1e30F}) {
     const engine::Image image = render(line_in_cell(rho, 1, 0.0F)).image;
     const float* middle = pixel(image, 20, 20);
     EXPECT_EQ(middle[3], 1.0F) << rho;
     const double passed = std::exp(-static_cast<double>(rho) / footprint_integral);
-    EXPECT_NEAR(middle[0], 1 - passed, 1e-6) << rho;  // half its cell is before it
+    EXPECT_NEAR(middle[0], 1 - passed, 1e-6) << rho;  // half of its cell is in front of it
     EXPECT_NEAR(middle[2], passed, 1e-6) << rho;
   }
 }
 
-// Where one kernel alone is seen and its line lies in the middle, the method is exact.
-TEST(Stiff, OneKernelWithALineInItsMiddleIsTheTruth) {
+// For a single kernel with a line in its middle the method is exact.
+TEST(Stiff, OneKernelWithACentralLineEqualsTheReference) {
   for (const float rho : {0.0F, 1e-30F, 1e-3F, 1.0F, 50.0F, 1e4F, 1e30F}) {
     EXPECT_LT(worst_error(line_in_cell(rho, 0.8, 0.0F)), 1e-5) << rho;
   }
@@ -102,7 +102,7 @@ scene::Scene small_scene(const scene::Lattice& lattice, float wind, float rho) {
 }
 
 #if defined(__SSE__)
-TEST(Extremes, DenormalsDrawTheSameWhetherTheyAreFlushedOrNot) {
+TEST(Extremes, DenormalsRenderTheSameFlushedOrNot) {
   for (const float tiny : {1e-45F, 1e-41F, 1e-38F}) {
     const scene::Scene scene =
         small_scene(even_lattice({5, 5, 5}, {0.3, 0.3, 0.3}), tiny, 1e3F * tiny);
@@ -117,7 +117,7 @@ TEST(Extremes, DenormalsDrawTheSameWhetherTheyAreFlushedOrNot) {
 }
 #endif
 
-TEST(Extremes, AKernelThatCoversTheScreenIsItsFootprint) {
+TEST(Extremes, KernelThatCoversTheScreenEqualsItsFootprint) {
   scene::Scene scene;
   scene.lattice = even_lattice({1, 1, 1}, {2, 2, 2});
   scene.scalars.push_back(medium(uniform(scene.lattice, 0.8F), {1.0F, 0.5F, 0.25F}));
@@ -131,7 +131,7 @@ TEST(Extremes, AKernelThatCoversTheScreenIsItsFootprint) {
         const double r = distance * off / std::hypot(1.0, off) / 2;
         ASSERT_LT(r, 0.48);
         const double whole = 0.8 * (1 - r * r / (0.48 * 1.37)) * 2 / footprint_integral;
-        // Of a kernel that the eye stands in, what lies behind the near plane does not count.
+        // For a kernel that contains the eye, only the part beyond the near plane counts.
         const double ray = std::hypot(1.0, off);
         const double beyond = 0.5 + (distance / (ray * ray) - scene.camera.near) * ray / 2;
         const double tau = whole * std::min(beyond, 1.0);
@@ -141,27 +141,27 @@ TEST(Extremes, AKernelThatCoversTheScreenIsItsFootprint) {
   }
 }
 
-TEST(Extremes, AVeryFarEyeSeesWhatANearOneDoes) {
+TEST(Extremes, VeryFarEyeRendersLikeANearOne) {
   scene::Scene scene = small_scene(even_lattice({6, 5, 4}, {0.3, 0.3, 0.3}), 1.0F, 2.0F);
   scene.camera = look({0, 0, 0}, {0.3, 1, -0.4}, 4, 64, 48, false, 1);
   const engine::Image near = render(scene).image;
   scene.camera = look({0, 0, 0}, {0.3, 1, -0.4}, 1e5, 64, 48, false, 1);
   const engine::Image far = render(scene).image;
-  // Through a lens that narrows as the eye draws back, perspective becomes orthographic.
+  // With a field of view that narrows as the eye recedes, perspective converges to orthographic.
   scene.camera = look({0, 0, 0}, {0.3, 1, -0.4}, 1e5, 64, 48, true, 1e-5);
   const engine::Image narrow = render(scene).image;
   float brightest = 0;
   for (std::size_t i = 0; i < near.rgba.size(); ++i) {
     ASSERT_NEAR(near.rgba[i], far.rgba[i], 1e-5);
-    // A hundred-thousandth of a line's place, at its edge's slope.
+    // A position error of 1e-5 of the line, times the slope of its edge.
     ASSERT_NEAR(near.rgba[i], narrow.rgba[i], 5e-3);
     brightest = std::max(brightest, near.rgba[i]);
   }
   EXPECT_GT(brightest, 0.3F);
 }
 
-// Optical depths of a column add to tau = 2; accumulated in float, the sum errs by 8e-3 at most.
-TEST(Extremes, AMillionLayersAddUp) {
+// Optical depths of a column add up to tau = 2; accumulation in float deviates by at most 8e-3.
+TEST(Extremes, MillionLayersAddUp) {
   for (const int layers : {1000, 100000, 1000000}) {
     scene::Scene scene;
     scene.lattice = even_lattice({1, 1, layers}, {1, 1, 2.0 / layers});
@@ -175,7 +175,7 @@ TEST(Extremes, AMillionLayersAddUp) {
   }
 }
 
-TEST(Extremes, AnAllEqualFieldHasTheTablesFirstColour) {
+TEST(Extremes, ConstantFieldHasTheFirstColorOfTheTable) {
   scene::Scene scene = small_scene(even_lattice({1, 1, 1}, {2, 2, 2}), 1.0F, 1.0F);
   scene.scalars[0] = medium(uniform(scene.lattice, 3.0F), {0, 0, 0});
   scene.scalars[0].color = ramp_color(3, 3, {0.5F, 0.25F, 1.0F}, {1.0F, 0.0F, 0.0F});
@@ -194,7 +194,7 @@ TEST(Extremes, AnAllEqualFieldHasTheTablesFirstColour) {
   EXPECT_NEAR(middle[2], middle[3], 1e-6);
 }
 
-TEST(Extremes, ACellAMillionTimesFlatterIsDrawnRight) {
+TEST(Extremes, CellFlattenedAMillionTimesIsCorrect) {
   for (const auto& cell :
        {glm::dvec3(2e-6, 2, 2), glm::dvec3(2, 2e-6, 2), glm::dvec3(2, 2, 2e-6)}) {
     scene::Scene scene;
@@ -207,16 +207,16 @@ TEST(Extremes, ACellAMillionTimesFlatterIsDrawnRight) {
   }
 }
 
-TEST(Extremes, AnEyeInsideTheVolumeSeesAFinitePictureNearTheTruth) {
+TEST(Extremes, EyeInsideTheVolumeGivesAFinitePictureNearTheReference) {
   scene::Scene scene = small_scene(even_lattice({12, 12, 12}, {0.15, 0.15, 0.15}), 1.0F, 2.0F);
   scene.vector->length = 0.1;
   scene.camera = look({0.013, 0.004, 0.009}, {0.3, 1, -0.4}, 0, 40, 30, true, 1);
   scene.camera.near = 0.05;
-  // The engine takes or leaves a whole splat at the eye: the error of a few cells of rho h = 0.4.
+  // The engine keeps or drops whole splats at the eye: an error of a few cells of rho h = 0.4.
   EXPECT_LT(worst_error(scene), 0.35);
 }
 
-TEST(Extremes, APictureAsLargeAsTheWireAllows) {
+TEST(Extremes, PictureOfTheMaximumSize) {
   scene::Scene scene = small_scene(even_lattice({3, 3, 3}, {0.3, 0.3, 0.3}), 1.0F, 2.0F);
   for (const auto& size : {std::array<int, 2>{4096, 4096}, {8192, 1}, {1, 8192}}) {
     scene.camera.width = size[0];

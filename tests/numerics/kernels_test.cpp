@@ -1,4 +1,4 @@
-// The kernels by themselves: exponentials, jitter, and every target against the portable body.
+// Kernels in isolation: exponentials, jitter, and every target against the portable code.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -30,7 +30,7 @@ Pair attenuate(const Table& table, float tau) {
   return pair;
 }
 
-TEST(Attenuation, HoldsFromNothingToInfinity) {
+TEST(Attenuation, HoldsFromZeroToInfinity) {
   for (const Table* table : usable_tables()) {
     SCOPED_TRACE(table->name);
     EXPECT_EQ(attenuate(*table, 0.0F).absorbed, 0.0F);
@@ -62,8 +62,8 @@ TEST(Attenuation, IsAccurateEverywhere) {
   }
 }
 
-// One number of the six at every stop of a small lattice, and what distinguishes noise from a
-// pattern: mean, variance and correlation with a neighbour.
+// One of the six random numbers at every position of a small lattice, with the statistics that
+// distinguish noise from a pattern: mean, variance, correlation with a neighbour.
 struct Statistics {
   double mean = 0, variance = 0, correlation = 0;
 };
@@ -105,7 +105,7 @@ TEST(Jitter, IsWhiteOverTheLattice) {
   }
 }
 
-TEST(Jitter, NumbersOfOneStopAreIndependent) {
+TEST(Jitter, NumbersOfOneKernelPositionAreIndependent) {
   const Table& table = engine::kernels::portable_table();
   for (int a = 0; a < 6; ++a) {
     for (int b = 0; b < a; ++b) {
@@ -163,8 +163,8 @@ float largest_difference(const engine::Rendered& a, const engine::Rendered& b) {
   return most;
 }
 
-// Lane by lane without fused multiply-add, and as wide as the processor can: what differs is
-// rounded otherwise. Targets that fuse differ by the processor's guesses of inverse roots alone.
+// Lane by lane without fused multiply-add, at the full vector width: differences are due to
+// rounding. Targets with FMA also differ by the processor's estimates of reciprocal square roots.
 TEST(Targets, AgreeAtAwkwardSizes) {
   const auto tables = usable_tables();
   for (int size = 1; size <= 67; ++size) {
@@ -187,8 +187,8 @@ TEST(Targets, AgreeAtAwkwardSizes) {
   }
 }
 
-// Whole numbers, so that lengths are whole and as long as the tolerance says.
-TEST(Targets, DrawLinesThatAreJustAsStrongAsTheTolerance) {
+// Whole numbers give integer lengths, some equal to the tolerance.
+TEST(Targets, RenderLinesExactlyAtTheTolerance) {
   for (const Table* table : usable_tables()) {
     int drawn = 0;
     for (int part = 1; part <= 100; ++part) {
@@ -223,7 +223,7 @@ TEST(Targets, MeasureVectorsOfAnySize) {
   }
 }
 
-TEST(Targets, VariantNamesTheOneInUse) {
+TEST(Targets, VariantNamesTheActiveTarget) {
   const auto table = engine::kernels::chosen_table();
   ASSERT_TRUE(table);
   const engine::Rendered rendered = render(busy_scene(8, 8, true));

@@ -1,5 +1,5 @@
-// What a scene does not show costs nothing, and what tolerances and early stops leave out changes
-// the picture by no more than the report says.
+// Hidden content costs nothing, and tolerances and early termination change the picture by at most
+// the reported bound.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ Scene wind_and_cloud(Method method) {
       medium(make_volume(scene.lattice, 1, [](int, double, double, double) { return 0.8F; }),
              {0.5F, 0.7F, 1.0F}));
   scene.method = method;
-  scene.stop_transmittance = 0;  // lines hide nothing: counts with and without them compare
+  scene.stop_transmittance = 0;  // lines hide nothing: the counts are comparable
   return scene;
 }
 
@@ -40,7 +40,7 @@ bool names(const engine::Variant& variant, const std::string& word) {
 
 class EitherMethod : public testing::TestWithParam<Method> {};
 
-TEST_P(EitherMethod, WithoutAScalarNothingOfAMediumIsPlannedOrComputed) {
+TEST_P(EitherMethod, WithoutAScalarNoMediumIsPreparedOrComputed) {
   Scene scene = wind_and_cloud(GetParam());
   const engine::WorkReport both = render(scene).work;
   EXPECT_GT(both.exponentials, 0);
@@ -51,9 +51,9 @@ TEST_P(EitherMethod, WithoutAScalarNothingOfAMediumIsPlannedOrComputed) {
   ASSERT_EQ(plan.passes.size(), 1U);
   EXPECT_EQ(plan.passes[0].kernel.has_medium, 0);
   EXPECT_EQ(plan.passes[0].kernel.medium.layers, 0);
-  EXPECT_EQ(plan.passes[0].kernel.partial, nullptr) << "footprints are of splats";
+  EXPECT_EQ(plan.passes[0].kernel.partial, nullptr) << "only splats have footprints";
   EXPECT_TRUE(plan.passes[0].layers.empty());
-  EXPECT_FALSE(plan.perspective_medium) << "lengths of rays are of a medium";
+  EXPECT_FALSE(plan.perspective_medium) << "only a medium has ray lengths";
   for (const auto compositing : {Compositing::simple, Compositing::cd_naive, Compositing::cd,
                                  Compositing::analytic, Compositing::cd_euler}) {
     scene.compositing = compositing;
@@ -67,7 +67,7 @@ TEST_P(EitherMethod, WithoutAScalarNothingOfAMediumIsPlannedOrComputed) {
   }
 }
 
-TEST_P(EitherMethod, WithoutAVectorNothingOfALineIsPlannedOrComputed) {
+TEST_P(EitherMethod, WithoutAVectorNoLineIsPreparedOrComputed) {
   Scene scene = wind_and_cloud(GetParam());
   const engine::WorkReport both = render(scene).work;
   scene.vector.reset();
@@ -82,16 +82,16 @@ TEST_P(EitherMethod, WithoutAVectorNothingOfALineIsPlannedOrComputed) {
   EXPECT_EQ(work.skipped_vector, 0);
   EXPECT_LE(work.pixel_updates, both.pixel_updates);
   EXPECT_FALSE(names(work.variant, "vector")) << engine::text_of(work.variant);
-  // One exponential an update and no more: those inside lines are gone.
+  // At most one exponential per update; those of lines are excluded.
   EXPECT_GT(work.exponentials, 0);
   EXPECT_LT(work.exponentials, both.exponentials);
   EXPECT_LE(work.exponentials, work.pixel_updates);
   scene.compositing = Compositing::cd;
-  EXPECT_EQ(render(scene).work.exponentials, work.exponentials) << "a line's own rule was asked";
+  EXPECT_EQ(render(scene).work.exponentials, work.exponentials)
+      << "the rule of a line was evaluated";
 }
 
-// The exact integral inside a line costs a second exponential; the rules that do without it are
-// seen to.
+// The exact integral inside a line needs a second exponential; the other rules must not use it.
 TEST_P(EitherMethod, OnlyTheAnalyticRuleEvaluatesASecondExponential) {
   Scene scene = wind_and_cloud(GetParam());
   const auto exponentials = [&](Compositing compositing) {
@@ -103,7 +103,7 @@ TEST_P(EitherMethod, OnlyTheAnalyticRuleEvaluatesASecondExponential) {
   EXPECT_GT(exponentials(Compositing::analytic), one);
 }
 
-TEST_P(EitherMethod, ASliceVisitsItsLayerAlone) {
+TEST_P(EitherMethod, SliceVisitsItsLayerOnly) {
   Scene scene = wind_and_cloud(GetParam());
   const int dims[3] = {12, 10, 6};
   for (int axis = 0; axis < 3; ++axis) {
@@ -117,7 +117,7 @@ INSTANTIATE_TEST_SUITE_P(LeftOut, EitherMethod, testing::Values(Method::kernel, 
                            return test.param == Method::kernel ? "kernel" : "slab";
                          });
 
-// Random lattices, winds, clouds and cameras, a good part of them below tolerance.
+// Random lattices, winds, clouds and cameras; many values are below tolerance.
 class Weak {
  public:
   explicit Weak(std::uint32_t seed) : random_(seed) {}
@@ -126,7 +126,7 @@ class Weak {
     Scene scene;
     std::array<std::vector<double>, 3> spacing;
     for (auto& axis : spacing) {
-      const double cell = std::pow(10.0, between(-2.7, -0.9));  // below a pixel and far above
+      const double cell = std::pow(10.0, between(-2.7, -0.9));  // from below one pixel to far above
       for (int n = whole(1, 14); n >= 0; --n) axis.push_back(cell * between(0.7, 1.3));
     }
     scene.lattice = make_lattice(spacing);
@@ -162,7 +162,7 @@ class Weak {
   }
 
  private:
-  // Shears and waves: cells no longer stand upright.
+  // Shears and waves, so that cells are not upright.
   void bend(scene::Lattice& lattice) {
     auto places = std::make_shared<std::vector<std::array<float, 3>>>();
     const double wave = between(0, 0.1);
@@ -193,7 +193,7 @@ class Weak {
 };
 
 struct Change {
-  double mean = 0;     // over pixels, of the channel that changes most
+  double mean = 0;     // maximum over pixels and channels
   double largest = 0;  // of any channel
 };
 
@@ -214,7 +214,7 @@ Change between(const engine::Image& a, const engine::Image& b) {
 // Sums of a few hundred floats in [0, 1].
 constexpr double float_noise = 2e-6;
 
-TEST(LeftOut, WeakLinesAndThinMediaChangeThePictureByNoMoreThanTheirBound) {
+TEST(LeftOut, WeakLinesAndThinMediaStayWithinTheirBound) {
   int tight = 0;
   int changed = 0;
   for (std::uint32_t seed = 0; seed < 240; ++seed) {
@@ -223,7 +223,7 @@ TEST(LeftOut, WeakLinesAndThinMediaChangeThePictureByNoMoreThanTheirBound) {
     if (scene.vector) scene.vector->min_magnitude = 0;
     for (auto& scalar : scene.scalars) scalar.min_optical_depth = 0;
     const engine::Rendered full = render(scene, 2);
-    EXPECT_EQ(full.work.skipped_bound, 0) << "nothing is left out: " << seed;
+    EXPECT_EQ(full.work.skipped_bound, 0) << "nothing was omitted: " << seed;
     const Change change = between(less.image, full.image);
     const double bound = less.work.skipped_bound;
     EXPECT_LE(change.mean, bound + float_noise)
@@ -231,12 +231,12 @@ TEST(LeftOut, WeakLinesAndThinMediaChangeThePictureByNoMoreThanTheirBound) {
     if (change.mean > 1e-4) ++changed;
     if (change.mean > 1e-4 && change.mean > 0.1 * bound) ++tight;
   }
-  EXPECT_GT(changed, 40) << "the scenes have little below tolerance";
-  EXPECT_GT(tight, changed / 4) << "a bound that is never near tells nothing";
+  EXPECT_GT(changed, 40) << "the scenes contain little below tolerance";
+  EXPECT_GT(tight, changed / 4) << "the bound is never approached";
 }
 
-// A pixel whose centre meets a splat narrower than itself shows its peak, far more than its share.
-TEST(LeftOut, ASplatNarrowerThanAPixelIsBoundByItsPeak) {
+// A pixel whose centre hits a splat smaller than itself shows the peak of the splat.
+TEST(LeftOut, SplatNarrowerThanAPixelIsBoundedByItsPeak) {
   for (const bool perspective : {false, true}) {
     for (const double cell : {0.1, 0.01, 0.001}) {
       Scene scene;
@@ -258,7 +258,7 @@ TEST(LeftOut, ASplatNarrowerThanAPixelIsBoundByItsPeak) {
   }
 }
 
-TEST(LeftOut, StoppingEarlyChangesNoPixelByMoreThanItsBound) {
+TEST(LeftOut, EarlyTerminationStaysWithinItsBound) {
   int stopped = 0;
   for (std::uint32_t seed = 200; seed < 260; ++seed) {
     Scene scene = Weak(seed).make(seed % 3 != 1, true, seed % 2 == 0);
@@ -273,7 +273,7 @@ TEST(LeftOut, StoppingEarlyChangesNoPixelByMoreThanItsBound) {
     EXPECT_LE(less.work.stop_bound, scene.stop_transmittance * (1 + 1e-6));
     if (change.largest > 0.01 * less.work.stop_bound) ++stopped;
   }
-  EXPECT_GT(stopped, 15) << "the scenes are not dense enough to stop in";
+  EXPECT_GT(stopped, 15) << "the scenes are not dense enough for early termination";
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ TEST(Line, OpacityRampsFromInnerToOuterRadius) {
   }
 }
 
-TEST(Line, IsAsLongAsItsMagnitudeSaysAndNoLongerThanFull) {
+TEST(Line, LengthFollowsTheMagnitudeUpToFullLength) {
   const auto half_length = [](float u) {
     const engine::Image image = render(one_line(u, 0, 0)).image;
     // The rounded end: opacity ramps about 2.5 pixels beyond the segment's end.
@@ -50,7 +50,7 @@ TEST(Line, IsAsLongAsItsMagnitudeSaysAndNoLongerThanFull) {
   EXPECT_NEAR(half_length(1000), 20, 0.01);
 }
 
-TEST(Line, AlongTheViewIsADotOfTheOuterRadius) {
+TEST(Line, AlongTheViewIsADiscOfTheOuterRadius) {
   for (const bool perspective : {false, true}) {
     scene::Scene scene = one_line(0, 10, 0);
     scene.vector->length = 0.5;
@@ -63,7 +63,7 @@ TEST(Line, AlongTheViewIsADotOfTheOuterRadius) {
         const double distance = std::hypot(x - 40, y - 40);
         const double part = std::clamp((3.5 - distance) / 2, 0.0, 1.0);
         ASSERT_NEAR(pixel(image, x, y)[3], 0.75 * part, 1e-5) << x << " " << y;
-        // Neither head nor tail: its middle is what is seen.
+        // Neither head nor tail: the middle is visible.
         const double grey = 0.5 * 0.5;
         ASSERT_NEAR(pixel(image, x, y)[0], 0.75 * part * (0.2 + grey * 0.6), 0.01) << x << " " << y;
       }
@@ -71,7 +71,7 @@ TEST(Line, AlongTheViewIsADotOfTheOuterRadius) {
   }
 }
 
-TEST(Line, TurnsGreyTowardsItsHead) {
+TEST(Line, TurnsGrayTowardsItsHead) {
   scene::Scene scene = one_line(10, 0, 0);
   scene.vector->head_desaturation = 0.5;
   const engine::Image image = render(scene).image;
@@ -94,7 +94,7 @@ TEST(Line, IsClippedToItsKernelBox) {
   EXPECT_NEAR(pixel(render(scene).image, 59, 40)[3], 0.75, 1e-5);
 }
 
-TEST(Line, DimsByMagnitudeAndByDistance) {
+TEST(Line, DimsByMagnitudeAndDistance) {
   scene::Scene scene = one_line(5, 0, 0);
   scene.vector->magnitude_range = {0, 10};
   scene.vector->magnitude_intensity = 0.6;
@@ -105,7 +105,7 @@ TEST(Line, DimsByMagnitudeAndByDistance) {
   EXPECT_NEAR(pixel(image, 40, 40)[3], 0.75, 1e-6);
 }
 
-TEST(Line, ColourFollowsWhatTheStyleNames) {
+TEST(Line, ColorFollowsTheConfiguredSource) {
   scene::Scene scene = one_line(6, 0, 8);
   scene.vector->color = ramp_color(0, 10, {0.0F, 0.0F, 0.0F}, {1.0F, 1.0F, 1.0F});
   const auto brightness = [&](scene::LineColor by, double low, double high) {
@@ -121,7 +121,7 @@ TEST(Line, ColourFollowsWhatTheStyleNames) {
   EXPECT_NEAR(brightness(scene::LineColor::rise, 0, 1), 0.75 * 0.5 + 0.25 * 0.9, 1e-5);
 }
 
-TEST(Line, DirectionIsRightForHugeAndTinyMagnitudes) {
+TEST(Line, DirectionIsCorrectForHugeAndTinyMagnitudes) {
   const auto at = [](float m) {
     scene::Scene scene = one_line(m * 0.6F, 0, m * 0.8F);
     scene.vector->magnitude_range = {0, static_cast<double>(m)};
@@ -137,7 +137,7 @@ TEST(Line, DirectionIsRightForHugeAndTinyMagnitudes) {
 
 // A line inside its own cell: I = c_s A + a exp(-tf) (c_v - c_s), A = -expm1(-tau) + a exp(-tau),
 // tf = tau x, x the line's place in its cell.
-TEST(Line, InsideItsCellOfMediumHasTheClosedForm) {
+TEST(Line, InsideItsMediumCellHasTheClosedForm) {
   for (const double rho : {0.01, 0.7, 3.0, 60.0}) {
     for (const float slope : {0.0F, 4.0F, -9.0F}) {
       scene::Scene scene = one_line(10, slope, 0);

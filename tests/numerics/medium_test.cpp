@@ -1,4 +1,4 @@
-// Physics of the medium: what a splat and a lattice of splats absorb.
+// Physics of the medium: absorption of a splat and of a lattice of splats.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -59,12 +59,12 @@ TEST(Splat, AbsorbsByItsFootprintInAnisotropicCells) {
   }
 }
 
-TEST(Splat, OpticalDepthFromAlmostNothingToInfinity) {
+TEST(Splat, OpticalDepthFromNearZeroToInfinity) {
   const auto centre = [](double rho) {
     const engine::Image image = render(one_splat(rho, {1, 1, 1}, {0, 1, 0}, false)).image;
     return std::array<float, 2>{pixel(image, 31, 31)[0], pixel(image, 31, 31)[3]};
   };
-  // Colour adds up from nothing; alpha is what is missing from 1 of the light let through.
+  // Colour accumulates from zero; alpha is one minus the transmittance.
   const double faint = 1e-30;
   EXPECT_NEAR(centre(faint)[0] / (faint / footprint_integral), 1, 1e-6);
   EXPECT_NEAR(centre(faint)[1], 0, 6e-8);
@@ -76,15 +76,14 @@ TEST(Splat, OpticalDepthFromAlmostNothingToInfinity) {
   }
 }
 
-TEST(Splat, NoOpticalDepthLeavesThePixelAlone) {
+TEST(Splat, ZeroOpticalDepthLeavesThePixelUnchanged) {
   scene::Scene scene = one_splat(2, {1, 1, 1}, {0, 1, 0}, true);
   const engine::Image before = render(scene).image;
   scene.scalars.push_back(medium(uniform(scene.lattice, 0.0F), {0.3F, 1.0F, 1.0F}));
   EXPECT_EQ(before.rgba, render(scene).image.rgba);
 }
 
-// Relative deviation of the optical depth from rho L over pixels whose rays cross the slab from
-// face to face.
+// Relative deviation of the optical depth from rho L, over pixels whose rays cross the whole slab.
 struct Ripple {
   double peak_to_peak = 0, rms = 0, mean = 0;
 };
@@ -133,7 +132,7 @@ TEST(UniformMedium, AbsorbsOneMinusExpWithinTheFootprintsRipple) {
   EXPECT_NEAR(generic.mean, 0, 0.002);
 }
 
-TEST(UniformMedium, AStrideOfTwoAbsorbsTheSame) {
+TEST(UniformMedium, StrideOfTwoAbsorbsTheSame) {
   scene::Scene scene;
   scene.lattice = even_lattice({40, 40, 16}, {1, 1, 1});
   scene.camera = look({0, 0, 0}, {0.31, 0.17, -1}, 100, 32, 32, false, 3);
@@ -148,9 +147,9 @@ TEST(UniformMedium, AStrideOfTwoAbsorbsTheSame) {
   }
 }
 
-// Seen along z a splat's optical depth is that of its whole cell, so whatever number of layers a
-// stop stands for, the mean over a cell is extinction times thickness.
-TEST(UniformMedium, AnyStrideAbsorbsWhatTheBoxHolds) {
+// Along z the optical depth of a splat is that of its whole cell; for any number of layers per
+// kernel position the mean over a cell is extinction times thickness.
+TEST(UniformMedium, AnyStrideAbsorbsLikeTheBox) {
   for (const int layers : {1, 3, 19}) {
     for (const int stride : {1, 2, 4, 8}) {
       scene::Scene scene;
@@ -168,7 +167,7 @@ TEST(UniformMedium, AnyStrideAbsorbsWhatTheBoxHolds) {
   }
 }
 
-TEST(Media, ExtinctionsAddAndColoursMixByThem) {
+TEST(Media, ExtinctionsAddAndWeightTheirColors) {
   scene::Scene scene = one_splat(0.6, {1, 1, 1}, {0, 1, 0}, false);
   scene.scalars.push_back(medium(uniform(scene.lattice, 1.8F), {0.0F, 0.1F, 1.0F}));
   const engine::Image image = render(scene).image;
@@ -179,7 +178,7 @@ TEST(Media, ExtinctionsAddAndColoursMixByThem) {
   EXPECT_NEAR(pixel(image, 31, 31)[2], alpha * (0.25 * 0.25 + 0.75), 1e-6);
 }
 
-TEST(Media, ExtinctionStepsWhereItsPointsCoincide) {
+TEST(Media, ExtinctionIsDiscontinuousWhereItsPointsCoincide) {
   scene::Scene scene = one_splat(1, {1, 1, 1}, {0, 1, 0}, false);
   const auto alpha_at = [&](float value) {
     scene.scalars[0].field = uniform(scene.lattice, value);

@@ -1,5 +1,5 @@
-// What each method errs, against the integral: slab beats kernel, lines alone are exact, order in
-// the slab's thickness, and the seam round a line that naive compositing shows.
+// Errors of each method against the integral: slab below kernel, lines alone exact, order in slab
+// thickness, and the seam around a line with naive compositing.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using scene::Compositing;
 using scene::Method;
 using scene::Scene;
 
-// A standard scene of the study at a stride; nothing is left out behind what is dark.
+// A standard scene of the study at a stride, without occlusion culling.
 Scene standard_scene(const char* name, int stride) {
   const study::Subject subject = study::standard_subject(name, true).value();
   study::Setting setting{Method::kernel, Compositing::analytic, study::own_knobs(subject)};
@@ -42,7 +42,7 @@ frame::Difference error_of(Scene scene, Method method, double thickness,
   return frame::difference_of(render(scene, 2).image.rgba, truth);
 }
 
-TEST(MethodError, SlabsOfOneCellErrAFifthOfKernelsAtMostAtEqualStride) {
+TEST(MethodError, OneCellSlabsHaveAtMostAFifthOfTheKernelErrorAtEqualStride) {
   for (const auto& [name, strides] :
        {std::pair{"soft", std::vector{1, 2}}, std::pair{"dense", std::vector{1}}}) {
     for (const int stride : strides) {
@@ -55,16 +55,16 @@ TEST(MethodError, SlabsOfOneCellErrAFifthOfKernelsAtMostAtEqualStride) {
   }
 }
 
-// A slab of thickness 1 is twice as deep at stride 2, which a dense medium shows.
-TEST(MethodError, SlabsAsThickAsAtStrideOneErrAFifthAtMostInADenseMediumToo) {
+// At stride 2 a slab of thickness 1 is twice as deep, which is visible in a dense medium.
+TEST(MethodError, StrideOneSlabsHaveAtMostAFifthOfTheErrorInADenseMedium) {
   const Scene scene = standard_scene("dense", 2);
   const std::vector<double> truth = integral(scene);
   EXPECT_GE(error_of(scene, Method::kernel, 1, truth).rmse,
             5 * error_of(scene, Method::slab, 0.5, truth).rmse);
 }
 
-// Every line at its own depth in every pixel, whatever the slabs are.
-TEST(MethodError, SlabsOfLinesAloneAreTheIntegralItself) {
+// Every line has its own depth in every pixel, independent of slabs.
+TEST(MethodError, SlabsOfLinesOnlyEqualTheIntegral) {
   const Scene scene = standard_scene("vectors", 1);
   const std::vector<double> truth = integral(scene);
   for (const double thickness : {2.0, 1.0, 0.37}) {
@@ -73,7 +73,7 @@ TEST(MethodError, SlabsOfLinesAloneAreTheIntegralItself) {
   EXPECT_GT(error_of(scene, Method::kernel, 1, truth).max, 1e-2);
 }
 
-TEST(MethodError, SlabsAreOfSecondOrderInTheirThickness) {
+TEST(MethodError, SlabsAreSecondOrderInTheirThickness) {
   const Scene scene = standard_scene("soft", 1);
   const std::vector<double> truth = integral(scene);
   const std::vector<double> thickness{2, 1, 0.5};
@@ -82,8 +82,8 @@ TEST(MethodError, SlabsAreOfSecondOrderInTheirThickness) {
   EXPECT_NEAR(study::log_slope(thickness, rmse), 2.0, 0.3);
 }
 
-// Cells of medium behind each other with optical depth tau each along the middle ray, and in each a
-// line at right angles to the view through its middle, so that it lies at x = 1/2.
+// Cells of medium in a row with optical depth tau each along the middle ray; each contains a line
+// through its centre, perpendicular to the view, so that x = 1/2.
 Scene cells_with_lines(int cells, double tau, double line_opacity, Compositing compositing) {
   Scene scene;
   scene.lattice = even_lattice({1, cells, 1}, {1, 1, 1});
@@ -106,11 +106,11 @@ Scene cells_with_lines(int cells, double tau, double line_opacity, Compositing c
   return scene;
 }
 
-// How much less than the medium alone the middle pixel is where a line of next to no opacity
-// crosses it, as a share: of alpha, and of red.
+// Relative loss of the middle pixel, in alpha and in red, where a line of nearly zero opacity
+// crosses the medium.
 std::array<double, 2> seam(double tau, Compositing compositing, Method method) {
   const Scene with = [&] {
-    // Slabs begin at the box's middle: of two cells, each is one slab thick.
+    // Slabs start at the middle of the box: each of the two cells is one slab thick.
     Scene scene = cells_with_lines(method == Method::slab ? 2 : 1, tau, 1e-6, compositing);
     scene.method = method;
     return scene;
@@ -125,7 +125,7 @@ std::array<double, 2> seam(double tau, Compositing compositing, Method method) {
 }
 
 // Attenuated twice, by x a_s and by (1 - x) a_s: the product of both, x (1 - x) a_s^2, is lost.
-TEST(Seam, NaiveLosesUpToAQuarterOfTheMediumRoundALineThatHardlyIs) {
+TEST(Seam, NaiveLosesUpToAQuarterOfTheMediumAroundAFaintLine) {
   for (const double tau : {0.2, 1.0, 3.0, 100.0}) {
     const double absorbed = -std::expm1(-tau);
     const auto lost = seam(tau, Compositing::cd_naive, Method::kernel);
@@ -146,7 +146,7 @@ TEST(Seam, CorrectedAndAnalyticHaveNone) {
   }
 }
 
-TEST(Seam, NaiveSlabsShowOneToo) {
+TEST(Seam, NaiveSlabsShowASeam) {
   EXPECT_GT(seam(3, Compositing::cd_naive, Method::slab)[0], 0.02);
 }
 

@@ -34,8 +34,8 @@ Vec<Real> cross(const Vec<Real>& a, const Vec<Real>& b) {
 
 // ---- order ----
 
-// Where a stop comes along its axis: bricks of eight outward from the eye's, upward first; inside
-// a brick outward from the stop nearest the eye's, upward first.
+// Rank of a kernel position along its axis: bricks of eight outward from the brick of the eye,
+// upper side first; within a brick outward from the position nearest to the eye, upper side first.
 std::tuple<bool, int, bool, int> place_in_bricks(int stop, int eye, int count) {
   const int brick = stop / 8;
   const int eye_brick = eye / 8;
@@ -46,7 +46,7 @@ std::tuple<bool, int, bool, int> place_in_bricks(int stop, int eye, int count) {
 struct AxisStops {
   std::vector<AxisStop> stops;
   int eye = 0;
-  std::vector<int> order;  // stops, first drawn first
+  std::vector<int> order;  // kernel positions in rendering order
 };
 
 AxisStops order_axis(const Scene& scene, int a, const std::vector<AxisStop>& stops) {
@@ -54,7 +54,7 @@ AxisStops order_axis(const Scene& scene, int a, const std::vector<AxisStop>& sto
   axis.stops = stops;
   const int count = static_cast<int>(stops.size());
   if (scene.camera.perspective) {
-    // The stop whose cell, bounded midway to its neighbours, holds the eye.
+    // The kernel position whose cell, bounded midway to its neighbours, contains the eye.
     for (int i = 1; i < count; ++i) {
       const double border = (scene.lattice.positions[a][stops[i - 1].sample] +
                              scene.lattice.positions[a][stops[i].sample]) /
@@ -88,7 +88,7 @@ std::vector<Group> order_groups(const Scene& scene) {
   return groups;
 }
 
-// The axis along which the view crosses most cells per unit of length.
+// The axis along which the view crosses most cells per unit length.
 int major_axis(const Scene& scene) {
   int best = 0;
   double most = -1;
@@ -114,7 +114,7 @@ struct Slab {
   }
 };
 
-// The sample whose cell holds the eye, of the whole lattice.
+// The sample of the full lattice whose cell contains the eye.
 int eye_sample(const Scene& scene, int a) {
   const auto& at = scene.lattice.positions[a];
   const int last = static_cast<int>(at.size()) - 1;
@@ -139,7 +139,7 @@ std::vector<Slab> order_slabs(const std::vector<Group>& groups, int major, int e
   return slabs;
 }
 
-// ---- what is at a stop ----
+// ---- content of a kernel position ----
 
 template <class Real>
 using Line = engine::reference::BasicRibbon<Real>;
@@ -254,7 +254,7 @@ class Renderer {
     if (drawn || medium.drawn) composite(drawn ? &line : nullptr, medium);
   }
 
-  // A splat below every layer's tolerance, over all view directions, is left out.
+  // A splat below the tolerance of every layer, for all view directions, is omitted.
   Medium<Real> make_medium(const Group& group) const {
     const auto density = engine::reference::make_density(group.layers.media, stop_);
     if (density.rho <= 0) return {};
@@ -312,7 +312,8 @@ class Renderer {
     Real tau = 0;
     Real closest = centre_[2];  // the view depth at which the ray passes nearest to the sample
     if (medium.drawn) {
-      // From the eye in perspective; from the pixel's point of the eye's plane in orthographic.
+      // From the eye in perspective, from the pixel's point of the eye plane in orthographic
+      // projection.
       Vec<Real> o{};
       for (int a = 0; a < 3; ++a) {
         Real from = from_eye_[a];
@@ -324,7 +325,8 @@ class Renderer {
       closest = dot(o, d) / dot(d, d);
       const Real r = std::sqrt(dot(c, c)) / cells;
       tau = medium.rho * footprint(r) * std::sqrt(dot(ray, ray)) / (Real(1.4476982547) * cells);
-      // What lies before the near plane does not count, as if the splat were even over one cell.
+      // The part in front of the near plane is excluded, as if the splat were uniform over one
+      // cell.
       const auto near = static_cast<Real>(scene_.camera.near);
       if (scene_.camera.perspective) {
         tau *= std::clamp(Real(0.5) + (closest - near) * cells, Real(0), Real(1));
@@ -343,7 +345,8 @@ class Renderer {
     return {dot(inverse_[0], v), dot(inverse_[1], v), dot(inverse_[2], v)};
   }
 
-  // The paper's three pieces, one over the other: medium before the line, line, medium behind it.
+  // The three pieces of the paper composited in order: medium before the line, line, medium behind
+  // it.
   void add_pieces(std::size_t index, Real absorbed, Real opacity, Real place,
                   const Vec<Real>& medium, const Vec<Real>& line) {
     const Real alphas[3] = {place * absorbed, opacity, (1 - place) * absorbed};
@@ -360,8 +363,8 @@ class Renderer {
     t *= 1 - alpha;
   }
 
-  // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tau x) (c_v - c_s), `over` front to back;
-  // the other rules put a chord for the second exponential, nothing for it, or tau for A itself.
+  // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tau x) (c_v - c_s), `over` front to back.
+  // The other rules replace the second exponential by a chord or by nothing, or A by tau.
   void add(std::size_t index, Real tau, Real opacity, Real place, const Vec<Real>& medium,
            const Vec<Real>& line) {
     using scene::Compositing;
@@ -390,7 +393,7 @@ class Renderer {
   std::vector<Real> transmittance_;
   Vec<Real> right_{}, down_{}, forward_{};
   Real pixel_ = 1;
-  // The kernel at hand.
+  // The current kernel.
   Stop stop_;
   Vec<Real> cell_{}, from_eye_{}, centre_{};
   std::array<Vec<Real>, 3> inverse_{};

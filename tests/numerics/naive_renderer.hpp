@@ -1,6 +1,6 @@
-// The oracle of the engine: every kernel in visibility order, every pixel of its bounding box, the
-// formulas as docs/design/rendering-model.md states them. No tiles, no bricks, no tables of its
-// own, no early stop.
+// Reference implementation for the engine: every kernel in visibility order, every pixel of its
+// bounding box, the formulas of docs/design/rendering-model.md. No tiles, bricks, tables or early
+// termination.
 #pragma once
 
 #include <vector>
@@ -13,7 +13,7 @@ template <class Real>
 struct Picture {
   int width = 0;
   int height = 0;
-  std::vector<Real> rgba;  // linear premultiplied, row 0 on top
+  std::vector<Real> rgba;  // linear premultiplied, top row first
 };
 
 // Instantiated for double (the oracle) and float (what the benchmark measures against).

@@ -153,19 +153,20 @@ TEST_P(RandomView, EqualsTheNaiveRenderer) {
   const bool inside = perspective && seed % 5 == 4;
   const Scene scene = SceneMaker(seed).make(what, perspective, inside);
   const Difference d = compare(render(scene, 2).image, naive::render<double>(scene));
-  // Stopping at T = 1.5e-4 costs at most that; float accumulation the rest. Far below 1/255.
+  // Termination at T = 1.5e-4 costs at most that much, float accumulation the rest; far below
+  // 1/255.
   EXPECT_LE(d.linear, 5e-4) << "inside " << inside;
   EXPECT_LE(d.codes, 1);
-  // A slice or a look outward from inside may miss what there is; the others may not.
+  // A slice or a view outward from inside may be empty; the others may not.
   if (!scene.slice && !inside) {
-    EXPECT_GT(d.brightest, 0.02) << "a view of nothing tests nothing";
+    EXPECT_GT(d.brightest, 0.02) << "an empty view tests nothing";
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomView, testing::Range(1U, 85U));
 
-// Rows that are not full, and rows whose first and last sample lie as far apart as in a full one of
-// neighbours: nothing between them may be read.
+// Partial rows, and rows whose first and last samples are as far apart as in a full row: samples in
+// between must not be read.
 struct Rows {
   std::array<int, 3> dims;
   int stride;
@@ -194,9 +195,9 @@ INSTANTIATE_TEST_SUITE_P(
                     Rows{{14, 13, 12}, 7, {0.1, 0.2, -1}}, Rows{{14, 13, 22}, 8, {0.2, 1, 0.1}},
                     Rows{{15, 9, 22}, 9, {0.1, 0.2, 1}}));
 
-// From inside a medium, through a narrow picture: most of the cells that fill it have their middles
-// elsewhere, and some the eye is in.
-TEST(Inside, CellsWhoseMiddlesAreElsewhereFillThePicture) {
+// Inside a medium with a narrow picture: the centres of most visible cells are outside of it, and
+// some cells contain the eye.
+TEST(Inside, CellsWithOffsetCentersFillThePicture) {
   for (std::uint32_t seed = 1; seed <= 24; ++seed) {
     Scene scene = SceneMaker(seed).make(What::scalars, true, true);
     scene.slice.reset();
@@ -210,9 +211,9 @@ TEST(Inside, CellsWhoseMiddlesAreElsewhereFillThePicture) {
   }
 }
 
-// Lines that point almost at the eye: hundredths of a pixel long, grey at the one end. Which end a
-// pixel is nearer to must not hang on the last digits of its place in the picture.
-TEST(EndOn, LinesKeepTheirColours) {
+// Lines pointing almost at the eye, hundredths of a pixel long, with one grey end. Rounding of the
+// pixel position must not decide which end is nearer.
+TEST(EndOn, LinesKeepTheirColors) {
   Scene scene;
   scene.lattice = even_lattice({24, 18, 6}, {0.1, 0.1, 0.1});
   const glm::dvec3 eye{0.3, -3, 0.4};
@@ -234,8 +235,8 @@ TEST(EndOn, LinesKeepTheirColours) {
   EXPECT_GT(d.brightest, 0.3);
 }
 
-// Forward Euler doubles what differs wherever tau passes 1: compared below that.
-TEST(Euler, EqualsTheNaiveRendererWhereItIsStable) {
+// Forward Euler amplifies differences where tau exceeds 1: compared below that.
+TEST(Euler, EqualsTheNaiveRendererWhereStable) {
   for (const std::uint32_t seed : {2U, 3U, 8U, 15U}) {
     Scene scene = SceneMaker(seed).make(What::both, seed != 3, false);
     scene.compositing = scene::Compositing::cd_euler;
@@ -246,9 +247,9 @@ TEST(Euler, EqualsTheNaiveRendererWhereItIsStable) {
   }
 }
 
-// Lines that cross come in another order in some pixel than in the middle of their block: a slab
-// may end early only where all that is left lies behind.
-TEST(Slabs, EndEarlyWithinTheBoundTheyReport) {
+// Crossing lines may change order between a pixel and the middle of its block: a slab may terminate
+// early only if everything left is behind.
+TEST(Slabs, TerminateWithinTheirReportedBound) {
   int ended = 0;
   for (std::uint32_t seed = 1; seed <= 120; ++seed) {
     Scene scene = SceneMaker(seed).make(What::both, seed % 2 == 0, false);
@@ -277,7 +278,7 @@ TEST(Slabs, EndEarlyWithinTheBoundTheyReport) {
   EXPECT_GT(ended, 20);
 }
 
-TEST(Threads, AnyNumberGivesTheSameBits) {
+TEST(Threads, AnyCountGivesTheSameBits) {
   for (const std::uint32_t seed : {2U, 5U, 16U, 23U}) {
     Scene scene = SceneMaker(seed).make(What::both, seed != 5, false);
     if (seed > 10) scene.method = scene::Method::slab;

@@ -1,4 +1,4 @@
-// The reference drawn bit by bit: the same picture, of memory that is asked for first.
+// The reference rendered in pieces: the same picture, with memory requested in advance.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,8 +17,9 @@ namespace {
 
 namespace reference = engine::reference;
 
-// From the last piece to the first, by workers in turn, one piece cut short and drawn again.
-TEST(ReferencePainting, APaintingInPiecesIsTheWholePicture) {
+// From the last piece to the first, by alternating workers, with one piece interrupted and
+// repeated.
+TEST(ReferencePainting, RenderingInPiecesEqualsTheWholePicture) {
   const scene::Scene scene = cloudy_scene(8, 33);
   ThreadPool pool(1);
   const auto at_once = reference::render(scene, pool, {});
@@ -47,10 +48,10 @@ TEST(ReferencePainting, APaintingInPiecesIsTheWholePicture) {
   EXPECT_EQ(painting.evaluations(), whole.evaluations);
 }
 
-TEST(ReferencePainting, AsksForMemoryBeforeItTakesAnyAndStopsWhereItIsUnwanted) {
+TEST(ReferencePainting, RequestsMemoryBeforeUseAndStopsWhenCancelled) {
   const scene::Scene scene = cloudy_scene(8, 33);
   std::vector<std::uint64_t> asked;
-  // The error, if any, where the n-th question is refused, or cancels.
+  // The error, if any, when the n-th memory request is refused or cancels.
   const auto error_at = [&](std::size_t n, bool refuses, const CancelToken& cancel) {
     asked.clear();
     const auto begun = reference::Painting::begin(
@@ -70,7 +71,7 @@ TEST(ReferencePainting, AsksForMemoryBeforeItTakesAnyAndStopsWhereItIsUnwanted) 
                           kernels.ribbons.size() * sizeof(reference::Ribbon));
   for (const std::size_t n : {1U, 2U}) {
     EXPECT_EQ(error_at(n, true, {}), ErrorKind::out_of_memory);
-    EXPECT_EQ(asked.size(), n) << "nothing is asked for after that";
+    EXPECT_EQ(asked.size(), n) << "no request after a refusal";
     EXPECT_EQ(error_at(n, false, {}), ErrorKind::cancelled);
     EXPECT_EQ(asked.size(), n);
   }
@@ -80,8 +81,8 @@ TEST(ReferencePainting, AsksForMemoryBeforeItTakesAnyAndStopsWhereItIsUnwanted) 
   EXPECT_TRUE(asked.empty()) << "cancelled before";
 }
 
-TEST(ReferenceGrid, ListsByTileWhatWasCountedAndNoticesAtEachBoxThatItIsUnwanted) {
-  // 20 by 12 pixels: 3 by 2 tiles of 8. All, one tile, none, the middle column.
+TEST(ReferenceGrid, ListsCountedKernelsByTileAndStopsWhenCancelled) {
+  // 20 x 12 pixels: 3 x 2 tiles of 8. Boxes: the whole picture, one tile, none, the middle column.
   const std::vector<reference::ScreenBox> boxes{
       {0, 20, 0, 12}, {2, 5, 9, 11}, {30, 40, 0, 12}, {9, 15, 2, 11}};
   reference::ScreenGrid grid(20, 12);

@@ -37,7 +37,7 @@ TEST(Kernel3d, ItsLineIntegralIsTheFootprint) {
   }
 }
 
-TEST(Kernel3d, HoldsItsMassAndIsNowhereNegative) {
+TEST(Kernel3d, ConservesMassAndIsNonnegative) {
   const auto shell = [](double r) { return 4 * pi * r * r * reference::kernel_3d(r); };
   EXPECT_NEAR(simpson(shell, 0, s) + simpson(shell, s, t), footprint_integral, 1e-9);
   for (int i = 0; i <= 20000; ++i) EXPECT_GE(reference::kernel_3d(1e-4 * i), 0);
@@ -47,7 +47,7 @@ TEST(Kernel3d, HoldsItsMassAndIsNowhereNegative) {
   EXPECT_NEAR(reference::kernel_3d(s - 1e-9), reference::kernel_3d(s + 1e-9), 1e-8);
 }
 
-TEST(Kernel3d, ItsTableErrsLessThanOnePartInATrillion) {
+TEST(Kernel3d, TableErrorIsBelowOneInATrillion) {
   const reference::Profile profile;
   double worst = 0;
   for (int i = 0; i <= 300000; ++i) {
@@ -117,7 +117,7 @@ TEST(Ray, SlabRampAndBlobHaveTheirClosedForms) {
   }
 }
 
-TEST(Ray, AColourThatChangesEvenlyHasTheFormOfPhi) {
+TEST(Ray, LinearColorHasTheClosedFormOfPhi) {
   const Rgb to{0.2, 1.0, 0.0};
   for (const double tau : {1e-6, 0.01, 0.5, 4.0, 30.0, 1e3, 1e6}) {
     const Formula medium{[=](double) { return tau / 2; },
@@ -169,7 +169,7 @@ TEST(Ray, SheetsInASlabHaveTheirClosedForm) {
   }
 }
 
-TEST(Ray, ACheckeredRayIsCompositedPieceByPiece) {
+TEST(Ray, CheckeredRayIsCompositedPieceByPiece) {
   const auto odd = [](double z) { return static_cast<int>(std::floor(z)) % 2 == 1; };
   const Rgb other{0.1, 0.2, 1.0};
   const Formula medium{[&](double z) { return odd(z) ? 2.0 : 0.5; },

@@ -1,4 +1,5 @@
-// Whole pictures of the reference against closed forms.
+// The reference against closed forms: its kernel, its quadrature along one ray, and whole pictures.
+
 #include "server/engine/reference/reference.hpp"
 
 #include <gtest/gtest.h>
@@ -82,7 +83,7 @@ TEST(Reference, OneSplatIsItsFootprintInAnisotropicCells) {
 
 TEST(Reference, SplatsApartAreCompositedByOver) {
   scene::Scene scene;
-  scene.lattice = even_lattice({1, 2, 1}, {1, 3, 1});  // their middles lie 3 apart, 1.37 * 3 wide
+  scene.lattice = even_lattice({1, 2, 1}, {1, 3, 1});  // their centres are 3 apart, 1.37 * 3 wide
   scene.lattice.positions[1] = {-5, 5};
   const auto red = make_volume(scene.lattice, 1,
                                [](int, double, double y, double) { return y < 0 ? 1.0F : 0.0F; });
@@ -105,9 +106,9 @@ TEST(Reference, SplatsApartAreCompositedByOver) {
   }
 }
 
-// A line through a splat: I = c_s A + a exp(-tf) (c_v - c_s), tf the part of tau before it, by the
-// kernel's partial integral.
-TEST(Reference, ALineInASplatSeesTheSplatsPartBeforeIt) {
+// A line through a splat: I = c_s A + a exp(-tf) (c_v - c_s), tf the part of tau in front of it, by
+// the partial integral of the kernel.
+TEST(Reference, LineInASplatSeesThePartOfTheSplatInFront) {
   for (const double rho : {0.01, 0.7, 3.0, 60.0}) {
     for (const float slope : {0.0F, 4.0F, -9.0F, 30.0F}) {
       scene::Scene scene;
@@ -148,13 +149,13 @@ TEST(Reference, ALineInASplatSeesTheSplatsPartBeforeIt) {
   }
 }
 
-TEST(Reference, RaysBeginAtTheNearPlane) {
+TEST(Reference, RaysStartAtTheNearPlane) {
   scene::Scene scene;
   scene.lattice = even_lattice({1, 1, 1}, {1, 1, 1});
   scene.scalars = {medium(constant_scalar(scene.lattice, 2), {1.0F, 1.0F, 1.0F})};
   scene.camera = look({0, 0, 0}, {0, 1, 0}, 0.5, 1, 1, true, 0.1);
   for (const double near : {1e-3, 0.2, 0.45}) {
-    scene.camera.near = near;  // the splat's middle is 0.5 away
+    scene.camera.near = near;  // the centre of the splat is 0.5 away
     const double tau = 2 * (footprint(0) - partial_footprint(0, near - 0.5)) / footprint_integral;
     EXPECT_NEAR(truth(scene).rgba[3], -std::expm1(-tau), 1e-9) << near;
   }
@@ -162,7 +163,7 @@ TEST(Reference, RaysBeginAtTheNearPlane) {
   EXPECT_EQ(truth(scene).rgba[3], 0);
 }
 
-TEST(Reference, AUniformLatticeAbsorbsWithinTheFootprintsRipple) {
+TEST(Reference, UniformLatticeAbsorbsWithinTheFootprintsRipple) {
   scene::Scene scene;
   scene.lattice = even_lattice({24, 24, 9}, {1, 1, 1});
   scene.scalars = {medium(constant_scalar(scene.lattice, 0.1), {1.0F, 1.0F, 1.0F})};
@@ -181,8 +182,8 @@ TEST(Reference, AUniformLatticeAbsorbsWithinTheFootprintsRipple) {
   }
 }
 
-// Lines alone, which no pair of kernels can put in the wrong order, are what the naive renderer
-// draws; and so is a medium of one colour, for optical depths add in any order.
+// Lines alone, whose order is unambiguous, and a medium of one colour, whose optical depths add in
+// any order, equal the naive renderer.
 TEST(Reference, EqualsTheNaiveRendererWhereThatIsExact) {
   scene::Scene scene;
   scene.lattice = make_lattice({{{0.1, 0.12, 0.09, 0.1, 0.3}, {0.1, 0.1, 0.12, 0.1}, {0.2, 0.15}}});
@@ -215,7 +216,7 @@ TEST(Reference, EqualsTheNaiveRendererWhereThatIsExact) {
       double brightest = 0;
       double alpha = 0;
       for (std::size_t i = 0; i < drawn.rgba.size(); ++i) {
-        // Where lines of neighbouring cells cross, only the opacity does not tell their order.
+        // Where lines of neighbouring cells cross, only opacity is independent of their order.
         if (i % 4 == 3) alpha = std::max(alpha, std::abs(lines.rgba[i] - drawn.rgba[i]));
         brightest = std::max(brightest, drawn.rgba[i]);
       }
@@ -225,8 +226,8 @@ TEST(Reference, EqualsTheNaiveRendererWhereThatIsExact) {
   }
 }
 
-// A lattice that is bent by nothing but a turn, seen by an eye that turns with it.
-TEST(Reference, TurnedPlacesSeenFromATurnedEyeLookTheSame) {
+// A rotated lattice seen by an eye rotated with it.
+TEST(Reference, RotatedPositionsAndEyeGiveTheSamePicture) {
   scene::Scene scene = cloudy_scene(4, 24);
   scene.lattice = even_lattice({4, 3, 1}, {0.3, 0.4, 0.5});
   const auto wave = [](int c, double x, double y, double) {
@@ -259,13 +260,13 @@ TEST(Reference, TurnedPlacesSeenFromATurnedEyeLookTheSame) {
     scene.camera.forward = turn(scene.camera.forward);
     const reference::Picture turned = truth(scene);
     for (std::size_t i = 0; i < straight.rgba.size(); ++i) {
-      ASSERT_NEAR(straight.rgba[i], turned.rgba[i], 1e-5);  // places are floats
+      ASSERT_NEAR(straight.rgba[i], turned.rgba[i], 1e-5);  // positions are floats
     }
     EXPECT_GT(straight.rgba[4 * (12 * 24 + 12) + 3], 0.3);
   }
 }
 
-TEST(Reference, ASliceDrawsTheMediumOfItsLayerAlone) {
+TEST(Reference, SliceRendersTheMediumOfItsLayerOnly) {
   scene::Scene scene = cloudy_scene(5, 24);
   scene.vector.reset();
   scene.slice = scene::Slice{2, 3};
@@ -285,7 +286,7 @@ TEST(Reference, ASliceDrawsTheMediumOfItsLayerAlone) {
   EXPECT_GT(brightest, 0.1);
 }
 
-TEST(Reference, ASliceDropsAVectorsPartAcrossItAndKeepsTheRestAsLong) {
+TEST(Reference, SliceDropsTheNormalComponentAndKeepsTheRest) {
   scene::Scene scene;
   scene.lattice = even_lattice({2, 2, 3}, {1, 1, 1});
   scene.camera = look({0, 0, 0}, {0, 1, 0}, 5, 10, 10, false, 2);
@@ -305,7 +306,7 @@ TEST(Reference, ASliceDropsAVectorsPartAcrossItAndKeepsTheRestAsLong) {
   }
 }
 
-TEST(Reference, AnyNumberOfThreadsGivesTheSameBits) {
+TEST(Reference, AnyThreadCountGivesTheSameBits) {
   const scene::Scene scene = cloudy_scene(8, 33);
   const reference::Picture one = truth(scene, 1e-10, 1);
   const reference::Picture three = truth(scene, 1e-10, 3);
@@ -315,7 +316,7 @@ TEST(Reference, AnyNumberOfThreadsGivesTheSameBits) {
   EXPECT_GT(one.evaluations, one.pieces);
 }
 
-TEST(Reference, TellsProgressAndStopsWhenCancelled) {
+TEST(Reference, ReportsProgressAndStopsWhenCancelled) {
   const scene::Scene scene = cloudy_scene(6, 20);
   ThreadPool pool(2);
   const CancelToken cancel;

@@ -1,5 +1,5 @@
-// Memory kept between frames holds nothing over: whatever was drawn before, a frame is the one that
-// its scene alone makes, to the last bit of its picture and its report.
+// Memory reused between frames carries no state: picture and report of a frame depend on its scene
+// only, to the last bit.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -52,7 +52,7 @@ void lean(scene::Lattice& lattice, double slope) {
 
 class Reuse : public testing::Test {
  protected:
-  // Draws with what earlier frames left, and by itself.
+  // Renders with the state of earlier frames and with a fresh one.
   void expect_same(const Scene& scene, const std::string& what) {
     const auto work = engine::render(scene, pool_, cancel_, space_);
     ASSERT_TRUE(work) << what;
@@ -72,7 +72,7 @@ class Reuse : public testing::Test {
 
   using Change = std::pair<std::string, std::function<void(Scene&)>>;
 
-  // A plain scene before each, so that what a change brought has to go again.
+  // Alternates with a plain scene, so that every change also has to be undone.
   void expect_to_show(const std::vector<Change>& changes) {
     const Scene first = plain_scene();
     for (const auto& [what, change] : changes) {
@@ -89,7 +89,7 @@ class Reuse : public testing::Test {
   engine::RenderSpace space_;
 };
 
-TEST_F(Reuse, EveryChangeOfASceneShowsAtOnce) {
+TEST_F(Reuse, EverySceneChangeTakesEffectAtOnce) {
   expect_to_show({
       {"the same", [](Scene&) {}},
       {"camera",
@@ -152,8 +152,8 @@ TEST_F(Reuse, EveryChangeOfASceneShowsAtOnce) {
   });
 }
 
-// What a plan of another kind says must not stay.
-TEST_F(Reuse, EveryOtherKindOfSceneShowsAtOnce) {
+// Preparations of another kind of scene must not persist.
+TEST_F(Reuse, EverySceneKindTakesEffectAtOnce) {
   expect_to_show({
       {"nothing",
        [](Scene& s) {
@@ -196,8 +196,8 @@ TEST_F(Reuse, EveryOtherKindOfSceneShowsAtOnce) {
   });
 }
 
-// A step that replaces another often takes its very place in memory.
-TEST_F(Reuse, AnotherFieldAtTheSameAddressIsAnotherField) {
+// A step that replaces another often reuses its memory address.
+TEST_F(Reuse, NewFieldAtTheSameAddressIsDetected) {
   Scene scene = plain_scene();
   scene.vector.reset();
   for (int step = 0; step < 20; ++step) {
@@ -209,8 +209,8 @@ TEST_F(Reuse, AnotherFieldAtTheSameAddressIsAnotherField) {
   }
 }
 
-// Fields whose memory is reused for certain, by an owner of their own.
-TEST_F(Reuse, AFieldWithoutAnOwnerIsReadAnew) {
+// Fields with guaranteed reuse of their memory, each with its own owner.
+TEST_F(Reuse, FieldWithoutAnOwnerIsReadAgain) {
   data::Volume place = *make_volume(plain_scene().lattice, 1, wave);
   Scene scene = plain_scene();
   scene.vector.reset();
@@ -220,7 +220,7 @@ TEST_F(Reuse, AFieldWithoutAnOwnerIsReadAnew) {
   expect_same(scene, "after");
 }
 
-TEST_F(Reuse, MoreScenesThanAreRemembered) {
+TEST_F(Reuse, MoreScenesThanTheCacheHolds) {
   std::vector<Scene> scenes;
   for (int n = 0; n < 20; ++n) {
     scenes.push_back(plain_scene());
@@ -231,8 +231,8 @@ TEST_F(Reuse, MoreScenesThanAreRemembered) {
   }
 }
 
-// Mostly nothing: whole cubes of 8 x 8 x 8 samples are passed over, and counted as what they are.
-TEST_F(Reuse, BlankRegionsAreCountedSampleBySample) {
+// Mostly empty: whole cubes of 8 x 8 x 8 samples are skipped and counted as blank.
+TEST_F(Reuse, BlankRegionsAreCountedPerSample) {
   Scene scene;
   scene.lattice = even_lattice({40, 40, 40}, {0.05, 0.05, 0.05});
   std::int64_t dense = 0;
@@ -252,14 +252,14 @@ TEST_F(Reuse, BlankRegionsAreCountedSampleBySample) {
     EXPECT_EQ(work->culled, 0);
     EXPECT_EQ(work->skipped_scalar, 40 * 40 * 40 - dense);
     EXPECT_EQ(work->skipped_both, 40 * 40 * 40 - dense);
-    // Part of it outside the picture.
+    // Partly outside the picture.
     scene.camera =
         look({0.6, 0.2, 0}, {std::sin(angle), std::cos(angle), -0.3}, 2, 80, 80, true, 0.2);
     expect_same(scene, std::to_string(turn));
   }
 }
 
-TEST_F(Reuse, ACancelledFrameLeavesNothingBehind) {
+TEST_F(Reuse, CancelledFrameLeavesNoState) {
   const Scene scene = plain_scene();
   expect_same(scene, "before");
   const CancelToken cancelled;
@@ -271,7 +271,7 @@ TEST_F(Reuse, ACancelledFrameLeavesNothingBehind) {
   expect_same(scene, "the first again");
 }
 
-TEST(StableSort, SortsAndKeepsTheOrderOfEquals) {
+TEST(StableSort, KeepsTheOrderOfEqualElements) {
   for (const std::size_t count : {0U, 1U, 7U, 8U, 9U, 16U, 17U, 100U, 1000U}) {
     std::vector<std::pair<int, std::size_t>> items;
     for (std::size_t i = 0; i < count; ++i) items.emplace_back(i * 7919 % 13, i);

@@ -1,4 +1,4 @@
-// Scenes made by hand for the numerical tests.
+// Synthetic scenes for the numerical tests.
 #include "tests/numerics/scenes.hpp"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Scenes made by hand for the numerical tests.
+// Synthetic scenes for the numerical tests.
 #pragma once
 
 #include <cstdint>
@@ -27,10 +27,10 @@ std::shared_ptr<const data::Volume> make_volume(
     const scene::Lattice& lattice, int components,
     const std::function<float(int, double, double, double)>& value);
 
-// A scalar of one value.
+// A constant scalar.
 std::shared_ptr<const data::Volume> uniform(const scene::Lattice& lattice, float value);
 
-// Looks along `forward` at `target` from `distance` away; any up that is not along the view.
+// Looks along `forward` at `target` from `distance` away, with any up vector not parallel to it.
 scene::Camera look(const glm::dvec3& target, const glm::dvec3& forward, double distance, int width,
                    int height, bool perspective, double half_height);
 
@@ -38,14 +38,14 @@ scene::ColorTable constant_color(std::array<float, 3> rgb);
 scene::ColorTable ramp_color(double low, double high, std::array<float, 3> from,
                              std::array<float, 3> to);
 
-// A medium of one colour, rho over values as they stand: extinction(v) = v in [0, top].
+// A medium of one colour with extinction(v) = v in [0, top].
 scene::ScalarLayer medium(std::shared_ptr<const data::Volume> field, std::array<float, 3> rgb,
                           double top = 1e30);
 
 // Lines of one colour: no jitter, no dimming, no heads.
 scene::VectorLayer plain_lines(std::shared_ptr<const data::Volume> field, std::array<float, 3> rgb);
 
-// Lines of all kinds in a coloured medium, side^3 samples from -1 to 1, in perspective from
+// All kinds of lines in a coloured medium, side^3 samples from -1 to 1, in perspective from
 // outside; a picture of size x size.
 scene::Scene cloudy_scene(int side, int size);
 

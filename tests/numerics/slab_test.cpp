@@ -1,5 +1,5 @@
-// The slab method: partial footprints, order in the slab's thickness, no popping when the view
-// turns, lines at their depth.
+// The slab method: partial footprints, order in slab thickness, no popping during rotation, lines
+// at their depth.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -49,7 +49,7 @@ Scene blobs(double density, int size, double azimuth, bool perspective) {
   return scene;
 }
 
-TEST(PartialFootprint, EndsAtNothingAndAllAndGrows) {
+TEST(PartialFootprint, RisesMonotonicallyFromZeroToAll) {
   const auto& table = engine::partial_footprints();
   constexpr int columns = engine::kernels::partial_columns - 1;
   constexpr auto one = static_cast<std::int32_t>(engine::kernels::partial_one);
@@ -67,7 +67,7 @@ TEST(PartialFootprint, EndsAtNothingAndAllAndGrows) {
   }
 }
 
-TEST(Slab, OneSplatAbsorbsWhatItsKernelDoes) {
+TEST(Slab, OneSplatAbsorbsLikeItsKernel) {
   for (const bool perspective : {false, true}) {
     Scene scene = blobs(3, 48, 0.4, perspective);
     scene.lattice = even_lattice({1, 1, 1}, {0.5, 0.3, 0.7});
@@ -102,8 +102,8 @@ TEST(Slab, HalvingTheThicknessQuartersTheError) {
   }
 }
 
-// Lines are in exact order whatever the slabs: also where a brick lies in hundreds of them, and
-// where all lines lie in one.
+// Lines are in exact order for any slabs: when a brick spans hundreds of slabs, and when one slab
+// contains all lines.
 TEST(Slab, LinesDoNotDependOnTheThickness) {
   for (const bool perspective : {false, true}) {
     Scene scene = blobs(6, 64, 0.4, perspective);
@@ -127,7 +127,7 @@ TEST(Slab, LinesDoNotDependOnTheThickness) {
   }
 }
 
-TEST(Slab, TurningByAMicroradianHardlyChangesAMedium) {
+TEST(Slab, RotationByAMicroradianBarelyChangesAMedium) {
   for (const bool perspective : {false, true}) {
     for (int step = 0; step < 4; ++step) {
       const double azimuth = (2 * step + (perspective ? 1 : 0)) * 3.14159265358979 / 8;

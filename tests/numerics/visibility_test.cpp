@@ -1,4 +1,4 @@
-// What is nearer hides what is farther, from every side and from inside.
+// Nearer content hides farther content, from every direction and from inside.
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
@@ -8,8 +8,8 @@
 namespace windsplat::test {
 namespace {
 
-// Two opaque splats, red at sample a and green at b; which one the pixel at the middle shows when
-// the view goes along the line through both.
+// Two opaque splats, red at sample a and green at b; the centre pixel shows one of them when the
+// view direction is the line through both.
 scene::Scene two_splats(const scene::Lattice& lattice, std::array<int, 3> red,
                         std::array<int, 3> green) {
   scene::Scene scene;
@@ -35,7 +35,7 @@ glm::dvec3 place(const scene::Lattice& lattice, std::array<int, 3> at) {
   return {lattice.positions[0][at[0]], lattice.positions[1][at[1]], lattice.positions[2][at[2]]};
 }
 
-TEST(Visibility, NearerHidesFartherFromTwentySixSides) {
+TEST(Visibility, NearerHidesFartherFromTwentySixDirections) {
   const scene::Lattice lattice = even_lattice({21, 21, 21}, {0.1, 0.07, 0.15});
   for (int dx = -1; dx <= 1; ++dx) {
     for (int dy = -1; dy <= 1; ++dy) {
@@ -46,7 +46,7 @@ TEST(Visibility, NearerHidesFartherFromTwentySixSides) {
         scene::Scene scene = two_splats(lattice, red, green);
         const glm::dvec3 forward = place(lattice, green) - place(lattice, red);
         for (const bool perspective : {false, true}) {
-          // From outside, and from inside the box between its middle and the red splat's side.
+          // From outside, and from inside the box between its centre and the face of the red splat.
           for (const double distance : {4.0, 0.9 * glm::length(forward)}) {
             scene.camera = look(place(lattice, green), forward, distance, 15, 15, perspective, 0.1);
             const bool behind_eye = perspective && distance < glm::length(forward);
@@ -62,7 +62,7 @@ TEST(Visibility, NearerHidesFartherFromTwentySixSides) {
   }
 }
 
-TEST(Visibility, HoldsForEveryPairSeenFromAnEyeInTheMiddle) {
+TEST(Visibility, HoldsForEveryPairSeenFromTheCenter) {
   const scene::Lattice lattice = even_lattice({17, 17, 17}, {0.1, 0.1, 0.1});
   const glm::dvec3 eye{0.01, -0.02, 0.03};
   std::mt19937 random(5);
@@ -72,7 +72,7 @@ TEST(Visibility, HoldsForEveryPairSeenFromAnEyeInTheMiddle) {
     const std::array<int, 3> near{at(random), at(random), at(random)};
     const glm::dvec3 to = place(lattice, near) - eye;
     if (glm::length(to) < 0.25 || glm::length(to) > 0.4) continue;
-    // The sample nearest twice as far in the same direction.
+    // The nearest sample at twice the distance in the same direction.
     std::array<int, 3> far{};
     bool inside = true;
     for (int a = 0; a < 3; ++a) {
@@ -90,7 +90,7 @@ TEST(Visibility, HoldsForEveryPairSeenFromAnEyeInTheMiddle) {
   }
 }
 
-TEST(Visibility, AnOpaqueMediumHidesLinesBehindIt) {
+TEST(Visibility, OpaqueMediumHidesLinesBehindIt) {
   scene::Scene scene;
   scene.lattice = even_lattice({9, 9, 9}, {0.2, 0.2, 0.2});
   const auto wind = make_volume(scene.lattice, 3, [](int c, double, double y, double) {

@@ -1,4 +1,4 @@
-// The work report, cancelling, and scenes with little or nothing in them.
+// The work report, cancellation, and empty or small scenes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
-// Eight by eight by four samples in sight; the wind grows with x, the cloud with y.
+// Eight by eight by four visible samples; the wind grows with x, the cloud with y.
 scene::Scene counted_scene() {
   scene::Scene scene;
   scene.lattice = even_lattice({8, 8, 4}, {0.2, 0.2, 0.2});
@@ -35,7 +35,7 @@ scene::Scene counted_scene() {
   return scene;
 }
 
-TEST(Work, CountsWhatToleranceLeavesOut) {
+TEST(Work, CountsWorkOmittedByTolerance) {
   const scene::Scene scene = counted_scene();
   const engine::WorkReport work = render(scene).work;
   EXPECT_EQ(work.samples, 8 * 8 * 4);
@@ -47,7 +47,7 @@ TEST(Work, CountsWhatToleranceLeavesOut) {
   EXPECT_GT(work.exponentials, 0);
 }
 
-TEST(Work, OpticalDepthToleranceIsOverAllViewDirections) {
+TEST(Work, OpticalDepthToleranceCoversAllViewDirections) {
   scene::Scene scene = counted_scene();
   scene.vector.reset();
   // rho h / C with h = 0.2: below 3.5 for rho = 0, 1, 2, 3.
@@ -67,7 +67,7 @@ TEST(Work, SamplesOutsideThePictureAreCulled) {
   EXPECT_EQ(away.work.tiles, 0);
 }
 
-TEST(Work, WithoutAMediumThereIsNotOneExponential) {
+TEST(Work, WithoutAMediumThereIsNoExponential) {
   scene::Scene scene = counted_scene();
   scene.scalars.clear();
   const engine::WorkReport work = render(scene).work;
@@ -76,7 +76,7 @@ TEST(Work, WithoutAMediumThereIsNotOneExponential) {
   EXPECT_EQ(work.skipped_both, work.skipped_vector);
 }
 
-TEST(Work, AnEmptySceneTouchesNoPixel) {
+TEST(Work, EmptySceneTouchesNoPixel) {
   scene::Scene scene = counted_scene();
   scene.scalars.clear();
   scene.vector.reset();
@@ -86,7 +86,7 @@ TEST(Work, AnEmptySceneTouchesNoPixel) {
   EXPECT_EQ(nothing.image.rgba, std::vector<float>(4UL * 70 * 50, 0.0F));
 }
 
-TEST(Work, OpaqueTilesStopEarlyAndLookTheSame) {
+TEST(Work, OpaqueTilesTerminateEarlyAndLookTheSame) {
   scene::Scene scene;
   scene.lattice = even_lattice({24, 60, 24}, {0.08, 0.03, 0.08});
   const auto fog = make_volume(scene.lattice, 1, [](int, double, double, double) { return 60.0F; });
@@ -104,7 +104,7 @@ TEST(Work, OpaqueTilesStopEarlyAndLookTheSame) {
 }
 
 TEST(Cancel, BeforeAndDuringAFrame) {
-  // So much work that a thread that wakes late still cancels in its midst.
+  // Enough work that a thread that wakes late still cancels before the end.
   scene::Scene scene;
   scene.lattice = even_lattice({80, 80, 80}, {0.024, 0.024, 0.024});
   const auto wind = make_volume(scene.lattice, 3, [](int, double, double, double) { return 1.0F; });
@@ -136,7 +136,7 @@ TEST(Cancel, BeforeAndDuringAFrame) {
   canceller.join();
   ASSERT_FALSE(cut_short);
   EXPECT_EQ(cut_short.error().kind, ErrorKind::cancelled);
-  EXPECT_LT(part / whole, 0.75) << "cancelled at a fifth of its time, yet drawn on";
+  EXPECT_LT(part / whole, 0.75) << "cancelled at a fifth of its time, yet rendering continued";
 }
 
 bool all_finite(const engine::Image& image) {
@@ -159,9 +159,8 @@ scene::Scene both(const scene::Lattice& lattice, float wind, float rho) {
   return scene;
 }
 
-// Tiles: once each, cut at even pixels, clear where none comes, and the very bits of the image;
-// none comes where the camera sees nothing.
-TEST(Tiles, AreDeliveredOnceAndAreTheImage) {
+// Tiles are delivered once, at even pixels, with the bits of the image; blank tiles are omitted.
+TEST(Tiles, AreDeliveredOnceAndFormTheImage) {
   for (const auto& [width, height] : {std::pair{1, 1}, {67, 65}, {300, 201}}) {
     for (const auto method : {scene::Method::kernel, scene::Method::slab}) {
       scene::Scene scene = both(even_lattice({9, 9, 9}, {0.1, 0.1, 0.1}), 0.7F, 2.0F);
@@ -241,11 +240,11 @@ TEST(Extremes, EyeInsideTheVolumeHasBoundedWork) {
   const engine::Rendered rendered = render(scene);
   EXPECT_TRUE(all_finite(rendered.image));
   EXPECT_GT(pixel(rendered.image, 80, 60)[3], 0.8F);
-  // The few kernels about the eye may cover the screen; a kernel beside it must not.
+  // The few kernels around the eye may cover the screen; a kernel beside it must not.
   EXPECT_LT(rendered.work.pixel_updates, 100L * 160 * 120 + 64L * 64 * 64 * 150);
 }
 
-TEST(Extremes, AStrideThatDoesNotDivideAnAxisLeavesNothingOut) {
+TEST(Extremes, StrideThatDoesNotDivideAnAxisOmitsNothing) {
   scene::Scene scene = both(even_lattice({30, 30, 3}, {0.06, 0.06, 0.06}), 0.7F, 2.0F);
   scene.vector->stride = scene.scalars[0].stride = 9;
   scene.camera = look({0, 0, 0}, {0.3, 1, -0.4}, 3, 40, 30, true, 0.3);

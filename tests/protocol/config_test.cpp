@@ -9,7 +9,7 @@ namespace {
 using testing::HasSubstr;
 using Kind = ConfigEntry::Kind;
 
-TEST(Config, holds_texts_numbers_booleans_and_lists) {
+TEST(Config, HoldsTextsNumbersBooleansAndLists) {
   const auto config = parse_config(
       R"({"listen": "[::1]:80", "max-sessions": 5, "rate": 1e3, "share": 0.25, "allow-remote": true,
           "allow-origin": ["https://a.example", "https://b.example"], "none": [], "off": false})");
@@ -32,7 +32,7 @@ TEST(Config, holds_texts_numbers_booleans_and_lists) {
   EXPECT_TRUE(parse_config("{}")->entries.empty());
 }
 
-TEST(Config, refuses_with_a_pointer) {
+TEST(Config, RefusesWithAPointer) {
   struct Case {
     std::string text;
     std::string pointer;
@@ -63,7 +63,7 @@ TEST(Config, refuses_with_a_pointer) {
   }
 }
 
-TEST(Config, has_the_limits_of_every_document) {
+TEST(Config, HasTheLimitsOfEveryDocument) {
   std::string list = "{\"a\": [";
   for (int i = 0; i < 257; ++i) list += i == 0 ? "\"x\"" : ",\"x\"";
   EXPECT_FALSE(parse_config(list + "]}"));
@@ -75,7 +75,7 @@ TEST(Config, has_the_limits_of_every_document) {
   EXPECT_THAT(deep.error().message, HasSubstr("32 levels"));
 }
 
-TEST(Config, names_every_value_at_fault) {
+TEST(Config, ReportsEveryInvalidValue) {
   const auto config = parse_config(R"({"a": null, "b": 1, "c": {}})");
   ASSERT_FALSE(config);
   ASSERT_EQ(config.error().at.size(), 2U);

@@ -87,7 +87,7 @@ TEST(FrameHeader, ParsesTheBytesOfTheVectors) {
   }
 }
 
-TEST(FrameHeader, RefusesWhatIsNoHeader) {
+TEST(FrameHeader, RefusesInvalidHeaders) {
   int seen = 0;
   for (const Vector& vector : read_vectors("invalid")) {
     if (vector.kind() != "frameHeader") continue;
@@ -100,7 +100,7 @@ TEST(FrameHeader, RefusesWhatIsNoHeader) {
   EXPECT_GE(seen, 8);
 }
 
-TEST(FrameHeader, APayloadMayFollow) {
+TEST(FrameHeader, PayloadMayFollow) {
   const auto bytes = encode_frame_header(FrameHeader{});
   std::string message(bytes.begin(), bytes.end());
   message += "\xff\xd8 and a picture";

@@ -25,7 +25,7 @@ PositionDescription position() {
   return {{1, 0, 2}, {10, -45.5, 850}, {"degrees_east", "degrees_north", "hPa"}};
 }
 
-TEST(Measurements, AProbeTellsEveryFieldWithItsUnitsAndNullWhereItIsMasked) {
+TEST(Measurements, ProbeReportsEveryFieldWithUnitsAndNullWhereMasked) {
   ProbeDescription probe;
   probe.position = position();
   probe.step = 3;
@@ -70,7 +70,7 @@ TEST(Measurements, SeriesHistogramAndRangeHaveTheirShapes) {
             (Json{{"range", nullptr}, {"masked", 5}, {"rangeOf", "step"}}));
 }
 
-TEST(Measurements, AForecastHasItsShape) {
+TEST(Measurements, ForecastHasItsShape) {
   ForecastPoint coarse;
   coarse.method = "kernel";
   coarse.width = 320;
@@ -124,7 +124,7 @@ TEST(Measurements, JobsHaveTheirShape) {
   expect_shape("jobs", encode_jobs({}));
 }
 
-TEST(Measurements, ARequestForADatasetIsItsPathAlone) {
+TEST(Measurements, DatasetRequestIsAPathOnly) {
   EXPECT_EQ(*parse_dataset_request(R"({"path":"a/b.nc"})"), "a/b.nc");
   const std::string longest(limits::path_chars_max, 'p');
   EXPECT_TRUE(parse_dataset_request(R"({"path":")" + longest + "\"}"));
@@ -148,7 +148,7 @@ TEST(Measurements, ARequestForADatasetIsItsPathAlone) {
   }
 }
 
-TEST(Views, AnUnknownKeyIsToldWhichAreKnown) {
+TEST(Views, UnknownKeyIsReportedWithTheKnownOnes) {
   const auto refused = ViewDocument::parse(R"({"depthCue":{"strenght":1}})");
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message, HasSubstr("strength"));

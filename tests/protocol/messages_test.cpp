@@ -126,7 +126,7 @@ TEST(ClientMessages, DefaultsAreThoseOfTheSchema) {
   EXPECT_EQ(fallback("ack", "decodeMs"), read<AckMessage>(R"({"type":"ack","seq":1})").decode_ms);
 }
 
-TEST(ClientMessages, APatchArrivesReadyToBeApplied) {
+TEST(ClientMessages, PatchIsParsedReadyToApply) {
   const auto patch = read<PatchMessage>(
       R"({"type":"patch","rev":1,"patch":{"vector":{"field":null},"camera":{"eye":[0,-3,2]}}})");
   const auto view = ViewDocument{}.patched(patch.patch_json);
@@ -134,7 +134,7 @@ TEST(ClientMessages, APatchArrivesReadyToBeApplied) {
   EXPECT_EQ(view->canonical(), R"({"camera":{"eye":[0,-3,2]},"vector":{"field":null}})");
 }
 
-TEST(ClientMessages, AStillIsMeasuredAfterScaling) {
+TEST(ClientMessages, StillSizeIsCheckedAfterScaling) {
   EXPECT_TRUE(
       parse_client_message(R"({"type":"still","id":1,"width":2048,"height":1080,"scale":4})")
           .has_value());
@@ -148,7 +148,7 @@ TEST(ClientMessages, AStillIsMeasuredAfterScaling) {
   EXPECT_EQ(area.error().kind, ErrorKind::too_large);
 }
 
-TEST(ClientMessages, ARefusedMessageStillTellsWhoseItWas) {
+TEST(ClientMessages, RefusedMessageKeepsItsIdentification) {
   const auto tag = message_tag(R"({"type":"still","id":9,"scale":99})");
   EXPECT_EQ(tag.id, 9U);
   EXPECT_FALSE(tag.rev.has_value());
@@ -159,7 +159,7 @@ TEST(ClientMessages, ARefusedMessageStillTellsWhoseItWas) {
   }
 }
 
-TEST(ServerMessages, FitTheSchemaAndSayTheirType) {
+TEST(ServerMessages, FitTheSchemaAndNameTheirType) {
   const std::vector<std::pair<std::string, ServerMessage>> messages{
       {"hello", HelloMessage{"0.1.0", "s-1", {climate()}}},
       {"opened", OpenedMessage{3, climate()}},
@@ -210,7 +210,7 @@ TEST(ServerMessages, ChosenIsTheFrameInfoWithSeqAndView) {
   EXPECT_EQ(chosen, expected);
 }
 
-TEST(ServerMessages, AnErrorNamesOnlyWhatItKnows) {
+TEST(ServerMessages, ErrorHasOnlyKnownMembers) {
   const Problem problem = problem_from(make_error_at(ErrorKind::invalid, "/step", "too large"));
   const Json neither = Json::parse(encode(ErrorMessage{std::nullopt, std::nullopt, problem}));
   EXPECT_FALSE(neither.contains("id"));
@@ -242,7 +242,7 @@ TEST(Shapes, DatasetInFull) {
   EXPECT_EQ(dataset["defaultView"].dump(), encode_view(climate().default_view));
 }
 
-TEST(Shapes, ADatasetNotReadYetTellsNoRangesAndNoView) {
+TEST(Shapes, UnreadDatasetHasNoRangesAndNoView) {
   DatasetDescription dataset = climate();
   dataset.default_view = View{};
   dataset.fields[0].range.reset();
@@ -256,7 +256,7 @@ TEST(Shapes, ADatasetNotReadYetTellsNoRangesAndNoView) {
   EXPECT_TRUE(told["fields"][0]["masked"].is_null());
 }
 
-TEST(Shapes, DatasetListIsOfShortForms) {
+TEST(Shapes, DatasetListHasShortForms) {
   const std::string json = encode_dataset_list({climate()});
   expect_shape("datasets", json);
   const Json list = Json::parse(json)["datasets"];
@@ -266,7 +266,7 @@ TEST(Shapes, DatasetListIsOfShortForms) {
   EXPECT_EQ(encode_dataset_list({}), R"({"datasets":[]})");
 }
 
-TEST(Shapes, FrameInfoTellsEveryCount) {
+TEST(Shapes, FrameInfoContainsEveryCount) {
   FrameInfo info = frame_info();
   info.error_value = 0.002;
   info.error_kind = "measured";
@@ -291,7 +291,7 @@ TEST(Shapes, FrameInfoTellsEveryCount) {
               "fields":["wind"],"bytes":3891200,"variant":"vector perspective"}})"));
 }
 
-TEST(Shapes, AReportIsTheFrameInfoWithItsTimes) {
+TEST(Shapes, ReportIsTheFrameInfoWithItsTimes) {
   Json expected = Json::parse(encode_frame_info(frame_info()));
   expected["renderMs"] = 12.5;
   expected["encodeMs"] = 0.25;
@@ -310,7 +310,7 @@ TEST(Shapes, NumbersThatAreNotFiniteAreNull) {
   EXPECT_TRUE(Json::parse(json)["work"]["skippedBound"].is_null());
 }
 
-TEST(Shapes, TextThatIsNoUtf8IsMendedNotThrown) {
+TEST(Shapes, InvalidUtf8IsReplacedWithoutThrowing) {
   DatasetDescription dataset = climate();
   dataset.title = "caf\xe9 \xff";
   EXPECT_EQ(Json::parse(encode_dataset(dataset))["title"], "caf\xef\xbf\xbd \xef\xbf\xbd");

@@ -1,6 +1,5 @@
-// Property test: whatever becomes of a good document, the codec either takes it and gives a
-// canonical text that it takes again unchanged, or refuses it with words. Seeds are fixed: a
-// failure repeats.
+// Property test: for any mutation of a valid document the codec either accepts it and gives a
+// stable canonical text, or refuses it with a message. Seeds are fixed, so that failures repeat.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -103,7 +102,7 @@ void expect_words(const Error& error, const std::string& input) {
   ASSERT_TRUE(Json::accept(encode_problem(problem_from(error)))) << input;
 }
 
-TEST(Mutation, AViewIsTakenForGoodOrRefusedWithWords) {
+TEST(Mutation, ViewIsAcceptedOrRefusedWithAMessage) {
   const auto good = corpus("valid", "view");
   const auto bad = corpus("invalid", "view");
   Mutator mutator(20240611);
@@ -127,11 +126,11 @@ TEST(Mutation, AViewIsTakenForGoodOrRefusedWithWords) {
         schema_complaints("view.schema.json", "", Json::parse(encode_view(document->view())));
     ASSERT_TRUE(complaints.empty()) << text << ": " << complaints.front();
   }
-  EXPECT_GT(taken, 1000) << "mutations too coarse to tell anything";
+  EXPECT_GT(taken, 1000) << "mutations too coarse to test anything";
   EXPECT_GT(refused, 5000);
 }
 
-TEST(Mutation, APatchGivesAGoodViewOrNone) {
+TEST(Mutation, PatchGivesAValidViewOrNone) {
   const auto good = corpus("valid", "view");
   const auto bad = corpus("invalid", "view");
   Mutator mutator(7);
@@ -153,13 +152,13 @@ TEST(Mutation, APatchGivesAGoodViewOrNone) {
     ASSERT_EQ(again->canonical(), next->canonical()) << patch;
     const auto twice = next->patched(patch);
     ASSERT_TRUE(twice.has_value()) << patch;
-    ASSERT_EQ(twice->canonical(), next->canonical()) << "a merge patch applied twice is as once";
+    ASSERT_EQ(twice->canonical(), next->canonical()) << "applying a merge patch twice equals once";
     view = *next;
   }
   EXPECT_GT(applied, 1000);
 }
 
-TEST(Mutation, AClientMessageIsTakenAsTheSchemaSaysOrRefusedWithWords) {
+TEST(Mutation, ClientMessageFollowsTheSchemaOrIsRefusedWithAMessage) {
   const auto good = corpus("valid", "clientMessage");
   const auto bad = corpus("invalid", "clientMessage");
   Mutator mutator(99);
@@ -181,7 +180,7 @@ TEST(Mutation, AClientMessageIsTakenAsTheSchemaSaysOrRefusedWithWords) {
   EXPECT_GT(taken, 1000);
 }
 
-TEST(Mutation, AHeaderThatParsesEncodesToItself) {
+TEST(Mutation, ParsedHeaderEncodesToItself) {
   Mutator mutator(5);
   FrameHeader header;
   header.seq = 3;
@@ -201,7 +200,7 @@ TEST(Mutation, AHeaderThatParsesEncodesToItself) {
     ++parsed;
     const auto again = encode_frame_header(*read);
     for (std::size_t i = 0; i < again.size(); ++i) {
-      // A signalling NaN may come back as a quiet one; every other byte is what it was.
+      // A signalling NaN may come back quiet; every other byte is unchanged.
       const bool in_float = i >= 32 && i < 40;
       ASSERT_TRUE(in_float || again[i] == bytes[i]) << "byte " << i;
     }

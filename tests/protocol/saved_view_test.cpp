@@ -16,7 +16,7 @@ SavedView sample() {
           ViewDocument::parse(R"({"vector":{"field":null},"step":2.0,"dataset":"t"})").value()};
 }
 
-TEST(SavedViews, AnAnswerHasItsShapeAndTheViewInCanonicalForm) {
+TEST(SavedViews, AnswerHasItsShapeAndTheCanonicalView) {
   for (const char* kept : {"memory", "disk"}) {
     expect_shape("savedView", encode_saved_view(sample(), kept));
     EXPECT_EQ(Json::parse(encode_saved_view(sample(), kept))["kept"], kept);
@@ -26,7 +26,7 @@ TEST(SavedViews, AnAnswerHasItsShapeAndTheViewInCanonicalForm) {
             std::string::npos);
 }
 
-TEST(SavedViews, AFileIsReadBackAsItWasWritten) {
+TEST(SavedViews, FileIsReadBackAsWritten) {
   const auto read = parse_view_file(encode_view_file(sample()));
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->id, sample().id);
@@ -34,7 +34,7 @@ TEST(SavedViews, AFileIsReadBackAsItWasWritten) {
   EXPECT_EQ(read->view.canonical(), sample().view.canonical());
 }
 
-TEST(SavedViews, FilesThatSayAnythingElseAreRefused) {
+TEST(SavedViews, FilesWithOtherContentAreRefused) {
   const Json good = Json::parse(encode_view_file(sample()));
   ASSERT_TRUE(parse_view_file(good.dump()));
   for (const char* key : {"id", "created", "view"}) {
@@ -76,8 +76,8 @@ TEST(SavedViews, IdsAreTenLettersOfBase32) {
   EXPECT_FALSE(is_view_id(std::string_view("012345678\0", 10)));
 }
 
-// A view of every list at its longest and every name and number as long as can be is kept whole.
-TEST(SavedViews, TheLongestViewFitsAFile) {
+// A view with every list, name and number at its longest is stored completely.
+TEST(SavedViews, LongestViewFitsAFile) {
   std::string name;
   for (std::size_t i = 0; i < limits::name_chars_max; ++i) name += "\xf0\x9f\x8c\x80";
   constexpr double longest = -1.2345678901234567e-29;

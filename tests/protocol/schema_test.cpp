@@ -17,9 +17,8 @@ using ::testing::IsEmpty;
 
 using Visit = std::function<void(const std::string& pointer, const Json& schema)>;
 
-// Calls `visit` for every property of the schema that is not an object itself, with the JSON
-// pointer it has in a view; for an object that may be null also for itself. Elements of /scalars
-// stand at index 0.
+// Calls `visit` for every property of the schema that is not an object, with its JSON pointer in a
+// view; for an object that may be null also for the object. Elements of /scalars have index 0.
 void walk(const Json& schema, const std::string& pointer, const Visit& visit) {
   for (const auto& [key, property] : schema.at("properties").items()) {
     const std::string at = under(pointer, key);
@@ -34,7 +33,7 @@ bool in_slice(const std::string& pointer) { return pointer.starts_with("/geometr
 
 Json with_scalar() { return Json{{"scalars", {{{"field", "q"}}}}}; }
 
-// A view with one value set, and whatever else that value needs to make sense.
+// A view with one value set, and others that it requires.
 Json view_with(const std::string& pointer, const Json& value) {
   Json view = pointer.starts_with("/scalars/") ? with_scalar() : Json::object();
   if (pointer == "/vector/r1") view["vector"]["r2"] = limits::radius_max;
@@ -74,7 +73,7 @@ TEST(Schema, StaticDefaultsAreThoseOfTheStructs) {
       EXPECT_EQ(encoded.at(pointer), schema["default"]) << at;
       ++compared;
     } else if (at == "/vector/field") {
-      EXPECT_FALSE(encoded.contains(pointer)) << "null would mean no lines";
+      EXPECT_FALSE(encoded.contains(pointer)) << "null means no lines";
     } else if (at != "/scalars" && at != "/scalars/0/field" && !in_slice(at)) {
       ASSERT_TRUE(encoded.contains(pointer)) << at;
       EXPECT_TRUE(encoded.at(pointer).is_null()) << at << " has no static default";
@@ -83,7 +82,7 @@ TEST(Schema, StaticDefaultsAreThoseOfTheStructs) {
   EXPECT_GE(compared, 35);
 }
 
-TEST(Schema, TheDefaultViewIsValidAndSaysWhatNothingSays) {
+TEST(Schema, DefaultViewIsValidAndEqualsTheEmptyOne) {
   const auto said = ViewDocument::parse(encode_view(View{}));
   ASSERT_TRUE(said.has_value()) << said.error().message;
   EXPECT_EQ(encode_view(said->view()), encode_view(ViewDocument{}.view()));
@@ -102,9 +101,8 @@ TEST(Schema, EncodedViewsHoldExactlyTheSchemasKeys) {
   });
 }
 
-// The bound itself passes and the next number beyond it does not: the codec's range is the
-// schema's.
-TEST(Schema, RangesOfNumbersAreTheCodecs) {
+// The bound passes and the next number beyond it does not: codec and schema have the same range.
+TEST(Schema, RangesOfNumbersMatchTheCodec) {
   int bounds = 0;
   walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
     const bool integer = schema.value("type", Json()) == "integer";
@@ -113,7 +111,7 @@ TEST(Schema, RangesOfNumbersAreTheCodecs) {
       ++bounds;
       const auto bound = schema[keyword].get<double>();
       const double beyond = integer ? bound + outward : std::nextafter(bound, outward * 1e300);
-      // near < far leaves no partner for the greatest near and the least far.
+      // near < far leaves no partner for the largest near and the smallest far.
       const bool lonely =
           (at == "/depthCue/near" && outward > 0) || (at == "/depthCue/far" && outward < 0);
       EXPECT_EQ(first_pointer(view_with(at, schema[keyword])), lonely ? "/depthCue/near" : "")
@@ -124,7 +122,7 @@ TEST(Schema, RangesOfNumbersAreTheCodecs) {
   EXPECT_GE(bounds, 50);
 }
 
-TEST(Schema, RangesInsideArraysAreTheCodecs) {
+TEST(Schema, RangesInsideArraysMatchTheCodec) {
   int bounds = 0;
   walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
     if (!schema.contains("items") || !schema["items"].contains("minimum")) return;
@@ -152,7 +150,7 @@ TEST(Schema, RangesInsideArraysAreTheCodecs) {
   EXPECT_GE(bounds, 30);
 }
 
-TEST(Schema, LimitsOfTheViewAreThoseOfTheLimitsFile) {
+TEST(Schema, LimitsOfTheViewMatchTheLimitsFile) {
   const Json schema = read_protocol_json("view.schema.json");
   const auto at = [&](const char* pointer) {
     return schema.at(Json::json_pointer(pointer)).get<double>();
@@ -192,7 +190,7 @@ TEST(Schema, LimitsOfTheViewAreThoseOfTheLimitsFile) {
               HasSubstr(std::to_string(limits::image_pixels_max)));
 }
 
-TEST(Schema, ListsAreAsLongAsTheLimitsAllow) {
+TEST(Schema, ListLengthsMatchTheLimits) {
   const auto media = [](int count) {
     Json view{{"scalars", Json::array()}};
     for (int i = 0; i < count; ++i)
@@ -210,7 +208,7 @@ TEST(Schema, ListsAreAsLongAsTheLimitsAllow) {
   EXPECT_EQ(first_pointer(points(limits::extinction_points_max + 1)), "/scalars/0/extinction");
 }
 
-TEST(Schema, NamesAreMeasuredInCharactersNotBytes) {
+TEST(Schema, NamesAreMeasuredInCharacters) {
   std::string longest;
   for (std::size_t i = 0; i < limits::name_chars_max; ++i) longest += "\xc3\xbc";
   for (const char* at : {"/dataset", "/vector/field", "/vector/color/map", "/vector/color/field",
@@ -222,8 +220,8 @@ TEST(Schema, NamesAreMeasuredInCharactersNotBytes) {
   }
 }
 
-// The codec and the schema agree about every key and every kind of value that could stand there.
-TEST(Schema, EveryKeyTakesTheKindsOfValueThatTheSchemaSays) {
+// Codec and schema agree on every key and every type of value.
+TEST(Schema, EveryKeyAcceptsTheTypesOfTheSchema) {
   const std::vector<Json> samples{
       nullptr,       true,       3,         2.5,    "#123456", "auto",       "q\n",
       Json::array(), {{"x", 1}}, {0, 0, 1}, {0, 1}, {{0, 1}},  "perspective"};

@@ -1,5 +1,5 @@
-// What the protocol tests share: files of the protocol folder, vectors, and a validator for the
-// part of JSON Schema that the project's schemas use.
+// Shared by the protocol tests: files of the protocol folder, vectors, and a validator for the
+// subset of JSON Schema used by the project.
 #pragma once
 
 #include <cstdint>
@@ -28,12 +28,12 @@ struct Vector {
 };
 std::vector<Vector> read_vectors(const std::string& folder);  // "valid" or "invalid"
 
-// Complaints of the schema at `pointer` ("" or "#/$defs/...") of `file` about a document; empty
-// means valid. An unknown schema keyword is a complaint too, so that none is skipped unnoticed.
+// Errors of the schema at `pointer` ("" or "#/$defs/...") of `file` for a document; empty if valid.
+// An unknown schema keyword is an error, so that none is ignored.
 std::vector<std::string> schema_complaints(const std::string& file, const std::string& pointer,
                                            const Json& document);
 
-// The test fails unless `json` is of that shape of messages.schema.json.
+// Fails the test unless `json` has that shape of messages.schema.json.
 void expect_shape(const std::string& shape, const std::string& json);
 
 // pointer + "/" + key.

@@ -46,7 +46,7 @@ TEST(Vectors, EveryInvalidDocumentFailsItsSchemaAtItsPointer) {
   }
 }
 
-TEST(Vectors, TheCodecTakesEveryValidView) {
+TEST(Vectors, CodecAcceptsEveryValidView) {
   for (const Vector& vector : read_vectors("valid")) {
     if (vector.kind() != "view") continue;
     const auto document = ViewDocument::parse(vector.text());
@@ -60,7 +60,7 @@ TEST(Vectors, TheCodecTakesEveryValidView) {
   }
 }
 
-TEST(Vectors, TheCodecTakesEveryValidClientMessage) {
+TEST(Vectors, CodecAcceptsEveryValidClientMessage) {
   for (const Vector& vector : read_vectors("valid")) {
     if (vector.kind() != "clientMessage") continue;
     const auto message = parse_client_message(vector.text());
@@ -78,7 +78,7 @@ void expect_refusal(const Vector& vector, const Error& error) {
   EXPECT_THAT(error.message, HasSubstr(error.at.front().detail)) << vector.name();
 }
 
-TEST(Vectors, TheCodecRefusesEveryInvalidViewAtItsPointer) {
+TEST(Vectors, CodecRefusesEveryInvalidViewAtItsPointer) {
   for (const Vector& vector : read_vectors("invalid")) {
     if (vector.kind() != "view") continue;
     const auto document = ViewDocument::parse(vector.text());
@@ -87,7 +87,7 @@ TEST(Vectors, TheCodecRefusesEveryInvalidViewAtItsPointer) {
   }
 }
 
-TEST(Vectors, TheCodecRefusesEveryInvalidClientMessageAtItsPointer) {
+TEST(Vectors, CodecRefusesEveryInvalidClientMessageAtItsPointer) {
   for (const Vector& vector : read_vectors("invalid")) {
     if (vector.kind() != "clientMessage") continue;
     const auto message = parse_client_message(vector.text());
@@ -96,7 +96,7 @@ TEST(Vectors, TheCodecRefusesEveryInvalidClientMessageAtItsPointer) {
   }
 }
 
-TEST(Vectors, EveryKindIsOneThatATestReads) {
+TEST(Vectors, EveryKindIsReadByATest) {
   for (const char* folder : {"valid", "invalid"}) {
     for (const Vector& vector : read_vectors(folder)) {
       EXPECT_THAT(

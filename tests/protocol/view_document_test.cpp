@@ -28,7 +28,7 @@ std::string set(const std::string& json, const std::string& pointer, const std::
   return result ? result->canonical() : "refused " + result.error().message;
 }
 
-TEST(ViewDocument, GivesWhatWasSaidAndDefaultsForTheRest) {
+TEST(ViewDocument, KeepsGivenValuesAndFillsDefaults) {
   const View view = document_of(R"({"dataset": "gcm", "step": 12,
       "camera": {"projection": "orthographic", "eye": [0, -3, 2.5], "height": 2.2},
       "image": {"width": 640, "background": "#a0B1c2"},
@@ -89,7 +89,7 @@ TEST(ViewDocument, GivesWhatWasSaidAndDefaultsForTheRest) {
   EXPECT_TRUE(view.quality.lossless);
 }
 
-TEST(ViewDocument, TellsNoLinesFromTheDatasetsLines) {
+TEST(ViewDocument, DistinguishesNoLinesFromDefaultLines) {
   EXPECT_EQ(document_of("{}").view().vector.field.kind, FieldChoice::Kind::dataset_default);
   EXPECT_EQ(document_of(R"({"vector": {"field": null}})").view().vector.field.kind,
             FieldChoice::Kind::none);
@@ -97,7 +97,7 @@ TEST(ViewDocument, TellsNoLinesFromTheDatasetsLines) {
   EXPECT_TRUE(document_of(R"({"scalars": []})").view().scalars->empty());
 }
 
-TEST(ViewDocument, WhatIsEncodedIsReadBackAsItWas) {
+TEST(ViewDocument, EncodedViewIsReadBackUnchanged) {
   for (const Vector& vector : read_vectors("valid")) {
     if (vector.kind() != "view") continue;
     const std::string whole = encode_view(document_of(vector.text()).view());
@@ -107,7 +107,7 @@ TEST(ViewDocument, WhatIsEncodedIsReadBackAsItWas) {
   }
 }
 
-TEST(ViewDocument, NamesEveryFaultUpToTheLimit) {
+TEST(ViewDocument, ReportsEveryErrorUpToTheLimit) {
   const auto two = ViewDocument::parse(R"({"step": -1, "camera": {"fovY": 0}, "zoom": 1})");
   ASSERT_FALSE(two.has_value());
   ASSERT_EQ(two.error().at.size(), 3U);
@@ -120,7 +120,7 @@ TEST(ViewDocument, NamesEveryFaultUpToTheLimit) {
   EXPECT_THAT(refused.error().message, HasSubstr("and 999 more"));
 }
 
-TEST(ViewDocument, SaysTheLimitAndTheValueInWords) {
+TEST(ViewDocument, ReportsTheLimitAndTheValue) {
   const auto step = ViewDocument::parse(R"({"step": 3000000000})");
   EXPECT_EQ(step.error().at[0].detail,
             "must be a whole number from 0 to 2147483647, not 3000000000");
@@ -131,7 +131,7 @@ TEST(ViewDocument, SaysTheLimitAndTheValueInWords) {
             R"(must be one of "kernel", "slab", "reference", not "splat")");
 }
 
-TEST(ViewDocument, AnAnswerDoesNotRepeatAGiantOrHostileKey) {
+TEST(ViewDocument, ErrorsDoNotRepeatOversizeOrHostileKeys) {
   const std::string key = std::string(60000, 'k');
   const auto giant = ViewDocument::parse("{\"" + key + "\": 1}");
   ASSERT_FALSE(giant.has_value());
@@ -180,7 +180,7 @@ TEST(MergePatch, ReplacesArraysWhole) {
             R"({"scalars":[{"field":"a"}]})");
 }
 
-TEST(MergePatch, IsRefusedWholeAndLeavesTheViewAsItWas) {
+TEST(MergePatch, InvalidPatchLeavesTheViewUnchanged) {
   const std::string_view text = R"({"dataset":"gcm","vector":{"r2":2}})";
   const ViewDocument before = document_of(std::string(text));
   for (const char* patch :
@@ -189,18 +189,18 @@ TEST(MergePatch, IsRefusedWholeAndLeavesTheViewAsItWas) {
     EXPECT_FALSE(before.patched(patch).has_value()) << patch;
     EXPECT_EQ(before.canonical(), text) << patch;
   }
-  // r1 fits the r2 that was said before, though not the default.
+  // r1 fits the r2 set before, though not the default.
   EXPECT_TRUE(before.patched(R"({"vector":{"r1":1.9}})").has_value());
-  // Taking r2 away brings its default back, which r1 no longer fits.
+  // Removing r2 restores its default, which r1 no longer fits.
   const auto wide = before.patched(R"({"vector":{"r1":1.9}})");
   EXPECT_FALSE(wide->patched(R"({"vector":{"r2":null}})").has_value());
 }
 
-TEST(MergePatch, RemovingWhatIsNotThereIsNoFault) {
+TEST(MergePatch, RemovingAMissingKeyIsNoError) {
   EXPECT_EQ(patched(R"({"step":1})", R"({"camera":null,"zoom":null})"), R"({"step":1})");
 }
 
-TEST(SetAt, TakesJsonOrPlainText) {
+TEST(SetAt, AcceptsJsonOrPlainText) {
   EXPECT_EQ(set("{}", "/step", "3"), R"({"step":3})");
   EXPECT_EQ(set("{}", "/dataset", "tornado"), R"({"dataset":"tornado"})");
   EXPECT_EQ(set("{}", "/dataset", "\"2020\""), R"({"dataset":"2020"})");
@@ -224,7 +224,7 @@ TEST(SetAt, ReachesIntoArrays) {
             R"({"scalars":[{"field":"a"},{"field":"b"}]})");
 }
 
-TEST(SetAt, RefusesPointersThatLeadNowhere) {
+TEST(SetAt, RefusesInvalidPointers) {
   const ViewDocument document = document_of(R"({"step":1,"scalars":[{"field":"a"}]})");
   const auto fault = [&](const char* pointer, const char* value) {
     const auto result = set_at(document, pointer, value);
@@ -251,7 +251,7 @@ TEST(SetAt, RefusesPointersThatLeadNowhere) {
   EXPECT_EQ(escaped.error().at.front().pointer, "/a~1b~0c");
 }
 
-TEST(TextLimits, BytesAreCountedToTheLast) {
+TEST(TextLimits, BytesAreLimitedExactly) {
   const std::string view = R"({"step":1})";
   const std::string fits = view + std::string(limits::message_bytes_max - view.size(), ' ');
   EXPECT_TRUE(ViewDocument::parse(fits).has_value());
@@ -262,7 +262,7 @@ TEST(TextLimits, BytesAreCountedToTheLast) {
   EXPECT_EQ(parse_client_message(fits + " ").error().kind, ErrorKind::too_large);
 }
 
-TEST(TextLimits, DepthIsCountedToTheLast) {
+TEST(TextLimits, DepthIsLimitedExactly) {
   const auto nested = [](std::size_t depth) {
     std::string text;
     for (std::size_t i = 0; i < depth; ++i) text += i % 2 == 0 ? "{\"a\":" : "[";
@@ -272,7 +272,7 @@ TEST(TextLimits, DepthIsCountedToTheLast) {
   };
   const auto fits = ViewDocument::parse(nested(limits::json_depth_max));
   ASSERT_FALSE(fits.has_value());
-  EXPECT_EQ(fits.error().kind, ErrorKind::invalid) << "read, but an unknown key";
+  EXPECT_EQ(fits.error().kind, ErrorKind::invalid) << "syntactically valid, with an unknown key";
   const auto deep = ViewDocument::parse(nested(limits::json_depth_max + 1));
   ASSERT_FALSE(deep.has_value());
   EXPECT_EQ(deep.error().kind, ErrorKind::malformed);
@@ -285,7 +285,7 @@ TEST(TextLimits, DepthIsCountedToTheLast) {
   EXPECT_FALSE(ViewDocument{}.patched(nested(5000)).has_value());
 }
 
-TEST(TextLimits, NumbersAtTheEdgeOfDoublesAreNeverWrapped) {
+TEST(TextLimits, NumbersAtTheLimitsOfDoublesAreNeverWrapped) {
   const auto kind = [](const std::string& number) {
     const auto result = ViewDocument::parse(R"({"vector":{"jitter":{"seed":)" + number + "}}}");
     return result ? "taken" : problem_from(result.error()).errors.at(0).pointer;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Whether the built program has what cmake/hardening.cmake asks for: position-independent, stack
+"""Whether the built program has the hardening of cmake/hardening.cmake: position-independent, stack
 protected, relocations read-only and bound at start, no executable stack, fortified calls, no search
 path that others could fill. Shadow stacks (-fcf-protection) are not looked for: one object without
 the mark takes it from all, and Debian 12's start files have none.

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks what CONTRIBUTING.md says of size and wording: long lines, functions and files, notes of
-work put off, paths of somebody's machine, test folders without a test.
+"""Checks the style rules of CONTRIBUTING.md: long lines, functions and files, notes of postponed
+work, paths of one machine, names of C++ tests, test folders without a test.
 
 Usage: check_style.py [ROOT]"""
 import pathlib
@@ -20,6 +20,8 @@ GENERATED = re.compile(r"(.*/)?(package-lock\.json|.*\.generated\.\w+|generated/
 # Put together from pieces so that this file may be checked too.
 PUT_OFF = re.compile(r"\b(" + "|".join(["TO" + "DO", "FIX" + "ME", "X" * 3]) + r")\b")
 MACHINE = re.compile(r"(?<![\w./:$}*-])/(home|root|Users|work|workspace)/")
+
+TEST_NAME = re.compile(r"^(?:TYPED_)?TEST(?:_[FP])?\(\s*(\w+)\s*,\s*(\w+)\s*\)", re.M)
 
 OPENS_SCOPE = re.compile(r"(inline )?(namespace|class|struct|union|enum|extern)\b")
 
@@ -56,6 +58,14 @@ def long_functions(path, lines):
             statement = []
 
 
+def test_names(path, content):
+    for match in TEST_NAME.finditer(content):
+        suite, name = match.groups()
+        if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", suite + name) or not name[0].isupper():
+            number = content.count("\n", 0, match.start()) + 1
+            yield f"{path}:{number}: test name {suite}.{name} is not CamelCase"
+
+
 def complaints_about(path, content):
     lines = content.splitlines()
     for number, line in enumerate(lines, 1):
@@ -72,10 +82,11 @@ def complaints_about(path, content):
         yield f"{path}: {len(lines)} lines"
     if path.endswith((".cpp", ".hpp")):
         yield from long_functions(path, lines)
+        yield from test_names(path, content)
 
 
 def empty_test_folders(root, files):
-    """CMake passes over a folder of tests without a source; nobody would miss it."""
+    """CMake silently accepts a folder of tests without a source."""
     listing = root / "tests" / "CMakeLists.txt"
     if listing.exists():
         for name, named in re.findall(r"^windsplat_test\((\w+) (\S+)", listing.read_text(), re.M):

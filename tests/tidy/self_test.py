@@ -22,7 +22,7 @@ CLEAN = {
     "server/transport/listener.cpp": "#include <boost/asio.hpp>\n",
     "protocol/codec_view.cpp": "#include <nlohmann/json.hpp>\n",
     "tests/CMakeLists.txt": "windsplat_test(unit_base unit/base unit windsplat_base)\n",
-    "tests/unit/base/error_test.cpp": "TEST(Error, says_why) {\n}\n",
+    "tests/unit/base/error_test.cpp": "TEST(Error, NamesTheCause) {\n}\n",
     "web/src/base/text.ts": "export const text = 1;\n",
     "web/src/wire/api.ts": 'import type { View } from "../../generated/view";\n',
     "web/src/app/app.ts": 'import {\n  api,\n} from "../wire/api";\nimport "../base/text";\n',
@@ -56,24 +56,24 @@ class Planted(unittest.TestCase):
         self.expect(check_spelling)
         self.expect(check_web_imports)
 
-    def test_import_against_the_order_of_the_page_s_folders(self):
+    def test_import_against_the_order_of_web_folders(self):
         self.plant("web/src/base/dom.ts", '\nexport { api } from "../wire/api";\n')
         self.expect(check_web_imports, "base/dom.ts:2: base may not import web/src/wire/api")
 
-    def test_circle_of_imports(self):
+    def test_cyclic_imports(self):
         self.plant("web/src/view/a.ts", 'import type { B } from "./b";\n')
         self.plant("web/src/view/b.ts", 'import { c } from "./c";\n')
         self.plant("web/src/view/c.ts", 'const a = await import("./a");\n')
         self.expect(check_web_imports, "view/a -> web/src/view/b -> web/src/view/c -> web/src/view")
 
-    def test_place_of_the_page_s_files(self):
+    def test_web_file_outside_its_folder(self):
         self.plant("web/src/main.ts", "\n")
         self.plant("web/src/extra/a.ts", "\n")
         self.plant("web/src/save/a.ts", 'import { run } from "../../scripts/build";\n')
         self.expect(check_web_imports, "main.ts: belongs in a folder", "extra/a.ts: no rule",
                     "web/scripts/build is no file of the page")
 
-    def test_folder_of_the_page_with_many_files(self):
+    def test_web_folder_with_too_many_files(self):
         for n in range(check_web_imports.MAX_FILES):
             self.plant(f"web/src/base/f{n}.ts", "\n")
         self.expect(check_web_imports, "web/src/base: 31 files")
@@ -87,7 +87,7 @@ class Planted(unittest.TestCase):
         self.plant("server/base/pool.hpp", '#include "server/scene/scene.hpp"\n')
         self.expect(check_includes, "server/base may not include server/scene/scene.hpp")
 
-    def test_engine_sees_the_scene_types_alone(self):
+    def test_engine_includes_scene_types_only(self):
         self.plant("server/engine/tile.cpp", '\n#include "server/scene/camera.hpp"\n')
         self.expect(check_includes, "server/engine/tile.cpp:2: server/engine may not include")
 
@@ -95,7 +95,7 @@ class Planted(unittest.TestCase):
         self.plant("server/engine/kernels/k.cpp", '#include "server/transport/server.hpp"\n')
         self.expect(check_includes, "server/engine may not include server/transport/server.hpp")
 
-    def test_outside_header_out_of_its_folder(self):
+    def test_library_header_outside_its_folder(self):
         for path, header in [("protocol/view.cpp", "nlohmann/json.hpp"),
                              ("server/scene/s.cpp", "netcdf.h"),
                              ("server/data/d.cpp", "seccomp.h"),
@@ -109,7 +109,7 @@ class Planted(unittest.TestCase):
                 self.expect(check_includes, f"{path}:1: {header} may not be named here")
                 (self.root / path).unlink()
 
-    def test_outside_header_by_way_of_one_of_ours(self):
+    def test_library_header_through_a_project_header(self):
         self.plant("protocol/codec_json.hpp", "#include <nlohmann/json.hpp>\n")
         self.plant("protocol/codec_read.cpp", '#include "protocol/codec_json.hpp"\n')
         self.expect(check_includes)
@@ -117,7 +117,7 @@ class Planted(unittest.TestCase):
         self.plant("server/scene/s.cpp", '#include "protocol/codec_deep.hpp"\n')
         self.expect(check_includes, "s.cpp:1: protocol/codec_deep.hpp brings nlohmann/")
 
-    def test_tests_may_use_a_neighbour(self):
+    def test_tests_may_include_a_neighbour(self):
         self.plant("tests/protocol/support.hpp", "#pragma once\n")
         self.plant("tests/protocol/a_test.cpp", '#include "support.hpp"\n')
         self.expect(check_includes)
@@ -152,11 +152,6 @@ class Planted(unittest.TestCase):
         self.expect(check_style)
         self.expect(check_spelling)
 
-    def test_misspelled_word(self):
-        wrong = "rec" + "ieved"
-        self.plant("server/base/queue.hpp", f"// What was {wrong}.\n")
-        self.expect(check_spelling, f"server/base/queue.hpp:1: {wrong} ==> received")
-
     def test_wording(self):
         self.plant("server/base/a.cpp", "// TO" + "DO: later\n")
         self.plant("docs/b.md", "Look into /ho" + "me/me/notes.\n")
@@ -173,6 +168,12 @@ class Planted(unittest.TestCase):
         self.plant("server/base/a.cpp", "// see docs/d.md\n// ARCHITECTURE.md\n")
         self.expect(check_links, "docs/c.md:1: gone.md", "docs/c.md:3: b.md#z", "#no-heading",
                     "a.cpp:1: docs/d.md", "a.cpp:2: ARCHITECTURE.md")
+
+    def test_name_of_a_test_in_snake_case(self):
+        self.plant("tests/unit/base/a_test.cpp",
+                   "TEST_F(Pool, runs_once) {\n}\nTEST(Pool,\n     endsLate) {\n}\n")
+        self.expect(check_style, "a_test.cpp:1: test name Pool.runs_once",
+                    "a_test.cpp:3: test name Pool.endsLate")
 
     def test_folder_of_tests_without_a_test(self):
         self.plant("tests/unit/base/error_test.cpp", "// nothing yet\n")

@@ -46,7 +46,7 @@ int main() {
   const Camera camera = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}, 0};
   Samples samples = {};
   samples.count = 1;
-  // Called by its address: main itself is optimised as code that runs once.
+  // Called by address: main itself is optimised as code that runs once.
   float (*const volatile called)(const Camera&, const float*, Samples&) = first_x;
   return called(camera, positions, samples) == 7 ? 0 : 1;
 }

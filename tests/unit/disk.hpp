@@ -1,4 +1,4 @@
-// What tests of files need: a folder that is theirs alone, and a disk that is full.
+// A temporary folder and a simulated full disk for tests of files.
 #pragma once
 
 #include <sys/resource.h>
@@ -12,7 +12,7 @@
 
 namespace windsplat::test {
 
-// A folder for one test's files, removed with it.
+// A folder for the files of one test, removed with it.
 class Folder {
  public:
   Folder() {
@@ -36,7 +36,7 @@ class Folder {
   std::filesystem::path path_;
 };
 
-// No file may grow beyond this while it lives, as on a disk that is full.
+// Limits the size of files during its lifetime, like a full disk.
 class FullDisk {
  public:
   explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {

@@ -88,7 +88,7 @@ test("a link to a stored view stays until that view is loaded", async () => {
   assert.equal(visit.alert, "");
 });
 
-test("a stored view that does not come leaves the link until the view is edited", async () => {
+test("a stored view that fails to load keeps the link until an edit", async () => {
   for (const later of [false, true]) {
     const visit = new Visit(later ? "" : short);
     if (later) visit.goTo(short);
@@ -102,7 +102,7 @@ test("a stored view that does not come leaves the link until the view is edited"
   }
 });
 
-test("a server that does not answer is not waited for without end", async (t) => {
+test("an unresponsive server is not waited for indefinitely", async (t) => {
   const late = new AbortController();
   const given: number[] = [];
   t.mock.method(AbortSignal, "timeout", (ms: number) => (given.push(ms), late.signal));
@@ -117,7 +117,7 @@ test("a server that does not answer is not waited for without end", async (t) =>
   assert.equal(visit.rests({}), short);
 });
 
-test("who has gone to another address hears nothing more of the first", async () => {
+test("navigation cancels the previous request", async () => {
   const visit = new Visit(short);
   visit.goTo(hashOfView({ step: 2 }));
   visit.answer(Response.json({ title: "No" }, { status: 404 }));
@@ -127,7 +127,7 @@ test("who has gone to another address hears nothing more of the first", async ()
   assert.equal(visit.rests({ step: 4 }), hashOfView({ step: 4 }));
 });
 
-test("Share copies the view of now, also while steps run and the address waits", async () => {
+test("share copies the current view during playback and pending updates", async () => {
   const visit = new Visit("");
   const before = visit.rests({ step: 1 });
   visit.runs = true;

@@ -48,7 +48,7 @@ function project(view: Camera, point: Vec3): [number, number] {
   return [dot(p, frame.right) / span, dot(p, frame.up) / span];
 }
 
-test("azimuth 0 has the eye in the south, looking north, east on the right", () => {
+test("at azimuth 0 the eye is in the south and looks north with east on the right", () => {
   assert.deepEqual(anglesOf(camera), { azimuth: 0, elevation: 0 });
   const frame = cameraFrame(camera);
   nearAll(frame.forward, [0, 1, 0]);
@@ -56,14 +56,14 @@ test("azimuth 0 has the eye in the south, looking north, east on the right", () 
   nearAll(frame.up, [0, 0, 1]);
 });
 
-test("positive azimuth moves the eye eastward, elevation above the horizon", () => {
+test("positive azimuth moves the eye east, elevation above the horizon", () => {
   nearAll(lookFrom(camera, { azimuth: 90, elevation: 0 }).eye, [3, 0, 0]);
   nearAll(lookFrom(camera, { azimuth: 180, elevation: 0 }).eye, [0, 3, 0]);
   const half = Math.SQRT1_2 * 3;
   nearAll(lookFrom(camera, { azimuth: 0, elevation: 45 }).eye, [0, -half, half]);
 });
 
-test("from above north is up, and the azimuth is not lost", () => {
+test("from above north is up and the azimuth is kept", () => {
   for (const azimuth of [-120, -30, 0, 45, 170]) {
     for (const elevation of [90, -90]) {
       const view = lookFrom(camera, { azimuth, elevation });
@@ -76,7 +76,7 @@ test("from above north is up, and the azimuth is not lost", () => {
   assert.ok(y > 0);
 });
 
-test("angles come back from the eye that they were made into", () => {
+test("angles are recovered from the eye computed from them", () => {
   for (let azimuth = -175; azimuth <= 175; azimuth += 25) {
     for (let elevation = -85; elevation <= 85; elevation += 17) {
       const angles = anglesOf(lookFrom(camera, { azimuth, elevation }));
@@ -86,7 +86,7 @@ test("angles come back from the eye that they were made into", () => {
   }
 });
 
-test("orbiting keeps target and distance, adds up, and stops at the poles", () => {
+test("orbiting keeps target and distance, accumulates and stops at the poles", () => {
   const off: Camera = { ...camera, target: [0.3, -0.2, 0.1], eye: [1, -2, 1.5] };
   const turned = orbit(orbit(off, 20, 10), 15, -4);
   const once = orbit(off, 35, 6);
@@ -112,7 +112,7 @@ test("the orbit's frame is right-handed and orthonormal", () => {
   }
 });
 
-test("panning moves the target's picture by just the finger's way", () => {
+test("panning moves the target by the pointer distance", () => {
   for (const projection of ["perspective", "orthographic"] as const) {
     const view = orbit({ ...camera, projection }, 25, 30);
     const moved = pan(view, 0.2, -0.1);
@@ -133,7 +133,7 @@ test("zooming scales the picture about the target", () => {
   assert.ok(distanceOf(zoom(camera, 1e12)) > 0, "never onto the target");
 });
 
-test("the other projection shows the target's surroundings at the same size", () => {
+test("changing the projection keeps the size of the target", () => {
   const ortho = withProjection(camera, "orthographic");
   near(ortho.height, 2 * 3 * Math.tan(20 * degree));
   near(heightAtTarget(ortho), heightAtTarget(camera));
@@ -143,7 +143,7 @@ test("the other projection shows the target's surroundings at the same size", ()
   near(distanceOf(back), 1);
 });
 
-test("framing a box leaves 4 % round what reaches farthest", () => {
+test("framing a box leaves a margin of 4 %", () => {
   const box: Box = { min: [-1, -0.5, -0.15], max: [1, 0.5, 0.15] };
   const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((n): Vec3 => [
     (n & 1 ? box.max : box.min)[0],
@@ -173,7 +173,7 @@ test("stretching a box keeps its longest edge at 2", () => {
   nearAll(scaledBox(box, [1, 1, 20]).min, [-1 / 3, -0.5 / 3, -1]);
 });
 
-test("the gizmo's arms are the axes as the picture shows them, farthest first", () => {
+test("the gizmo shows the axes as in the picture, farthest first", () => {
   const view = lookFrom(camera, { azimuth: 0, elevation: 30 });
   const arms = gizmoArms(view);
   assert.deepEqual(

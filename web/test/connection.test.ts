@@ -135,7 +135,7 @@ function setUp() {
   return { clock, sockets, seen, connection, last, state };
 }
 
-test("names the subprotocol, is live after hello, passes on messages and frames", () => {
+test("sends the subprotocol, is live after hello and delivers messages and frames", () => {
   const { connection, last, seen, state } = setUp();
   connection.start();
   assert.equal(last().protocol, "windsplat.v1");
@@ -163,7 +163,7 @@ test("nothing is sent before hello or after the end", () => {
   assert.equal(connection.send({ type: "pause" }), false);
 });
 
-test("delays double from half a second to 15 s and are spread", () => {
+test("reconnection delays double from 0.5 s to 15 s with jitter", () => {
   for (const chance of [0, 0.5, 1]) {
     const delays = Array.from({ length: 12 }, (_, n) => reconnectDelayMs(n, chance));
     delays.forEach((delay, n) => {
@@ -177,7 +177,7 @@ test("delays double from half a second to 15 s and are spread", () => {
   assert.ok(reconnectDelayMs(3, 1) - reconnectDelayMs(3, 0) > 0.3 * reconnectDelayMs(3, 0.5));
 });
 
-test("comes back after a loss, each time later, and at once after a frame has come", () => {
+test("reconnects later after each failure and at once after a frame", () => {
   const { clock, connection, last, sockets, state } = setUp();
   connection.start();
   for (const delay of [625, 1250, 2500]) {
@@ -198,7 +198,7 @@ test("comes back after a loss, each time later, and at once after a frame has co
   assert.equal(waiting.name === "waiting" && waiting.delayMs, 625);
 });
 
-test("a server that greets and falls over is not asked ever faster", () => {
+test("a server that fails after hello is not contacted more often", () => {
   const { clock, connection, last, state } = setUp();
   connection.start();
   let before = 0;
@@ -212,7 +212,7 @@ test("a server that greets and falls over is not asked ever faster", () => {
   }
 });
 
-test("garbage closes the connection, is reported, and does not break the page", () => {
+test("malformed data close the connection and are reported", () => {
   const garbage: unknown[] = [
     "",
     "{",
@@ -248,7 +248,7 @@ test("garbage closes the connection, is reported, and does not break the page", 
   }
 });
 
-test("messages and frames before hello break the protocol", () => {
+test("messages and frames before hello are protocol errors", () => {
   for (const early of [stats, frameBytes()]) {
     const { connection, last } = setUp();
     connection.start();
@@ -269,7 +269,7 @@ test("a server that never sends hello is disconnected", () => {
   assert.ok(sockets.length >= 2);
 });
 
-test("a refused origin or token is asked again only seldom", () => {
+test("after a refused origin or token reconnection is rare", () => {
   const { connection, last, state } = setUp();
   connection.start();
   last().dies(1008);
@@ -278,7 +278,7 @@ test("a refused origin or token is asked again only seldom", () => {
   assert.match(waiting.name === "waiting" ? waiting.reason : "", /origin or token/);
 });
 
-test("after long idling it sleeps until someone is there", () => {
+test("after long inactivity reconnection waits for the user", () => {
   const { clock, connection, last, sockets, state } = setUp();
   connection.start();
   last().says(hello);
@@ -292,7 +292,7 @@ test("after long idling it sleeps until someone is there", () => {
   assert.equal(sockets.length, 2, "once");
 });
 
-test("when the network is back the delay is not sat out", () => {
+test("reconnects at once when the network returns", () => {
   const { connection, last, sockets, clock } = setUp();
   connection.start();
   last().dies();

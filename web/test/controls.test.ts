@@ -60,7 +60,7 @@ const dataset = {
   ],
 } as unknown as Dataset;
 
-test("the shapes offered are those that the dataset lists, whatever its axes and default", () => {
+test("the offered shapes are those listed by the dataset", () => {
   const labels = (mappings: Dataset["mappings"]) =>
     mappingOptions({ ...dataset, mappings, defaultView: { geometry: { mapping: "flat" } } });
   assert.deepEqual(Object.values(labels(["flat"])), ["flat"]);
@@ -70,11 +70,11 @@ test("the shapes offered are those that the dataset lists, whatever its axes and
   assert.equal(Object.keys(curved).length, 3);
 });
 
-test("heights come from the axis or a scalar, those in metres first", () => {
+test("heights are offered from the axis or a scalar, metres first", () => {
   assert.deepEqual(Object.values(heightOptions(dataset)), ["", "zg", "cloud"]);
 });
 
-test("a slice begins in the middle of an axis that has layers, and shows where it lies", () => {
+test("a slice starts in the middle of an axis with layers and shows its position", () => {
   assert.deepEqual(Object.values(sliceOptions(dataset)), ["all", "x", "z"]);
   assert.equal(sliceIndexMax(dataset, "x"), 3);
   assert.deepEqual(slicePatch(dataset, "z"), { geometry: { slice: { axis: "z", index: 2 } } });
@@ -84,7 +84,7 @@ test("a slice begins in the middle of an axis that has layers, and shows where i
   assert.equal(sliceText(dataset, {}), "");
 });
 
-test("colour by another quantity forgets the range, and a scalar is named", () => {
+test("colouring by another quantity resets the range, and scalars are named", () => {
   assert.deepEqual(colorByPatch(dataset, {}, "direction"), {
     vector: { color: { by: "direction", range: null, map: "compass" } },
   });
@@ -115,7 +115,7 @@ test("the ends of the depth cue stay in order", () => {
   }
 });
 
-test("what a choice makes meaningless does not count", () => {
+test("settings without effect are ignored", () => {
   const whole: View = {
     vector: { field: "wind", color: { by: "rise" }, jitter: { center: 0, stride: 0.3 } },
     depthCue: { strength: 0.3 },
@@ -144,7 +144,7 @@ test("what a choice makes meaningless does not count", () => {
   assert.equal(off({ depthCue: { strength: 0 } }).depthCue, false);
 });
 
-test("every method and compositing offered is explained; the reference is not offered", () => {
+test("every offered method and compositing is explained, and the reference is not offered", () => {
   assert.deepEqual(Object.values(methodOptions), ["kernel", "slab"]);
   for (const method of Object.values(methodOptions)) assert.ok(methodHints[method]);
   const offered = Object.values(compositingOptions);
@@ -154,7 +154,7 @@ test("every method and compositing offered is explained; the reference is not of
   assert.match(compositingHints["cd-naive"]!, /seams/);
 });
 
-test("bearings are labelled by the compass, wherever the range begins", () => {
+test("bearings have compass labels for any start of the range", () => {
   const labels = (low: number, high: number) =>
     compassTicks([low, high]).map(({ at, text }) => `${text}${at.toFixed(2)}`);
   assert.deepEqual(labels(0, 360), ["N0.00", "E0.25", "S0.50", "W0.75", "N1.00"]);
@@ -183,7 +183,7 @@ test("the legend labels direction by the compass and a scalar by its name and un
   assert.deepEqual(scalar!.range, [0, 16000]);
 });
 
-test("levels stand where the axis says only while nothing bends the grid", () => {
+test("levels are at their axis positions unless the grid is curved", () => {
   assert.notEqual(sampleHeights(dataset, {}), null);
   assert.equal(sampleHeights(dataset, { geometry: { mapping: "sphere" } }), null);
   assert.equal(sampleHeights(dataset, { geometry: { heightField: "zg" } }), null);

@@ -10,7 +10,7 @@ import { described, Page, problem, summaryOf } from "./page";
 const tooBig =
   "the field needs 27.5 MiB; the memory limit is 20.0 MiB, of which 0.4 MiB are in use";
 
-test("where titles repeat the ids are shown, and failures are marked", () => {
+test("repeated titles show ids, and failures are marked", () => {
   const titled = (id: string, title: string, more = {}) =>
     summaryOf(described(id, { title, ...more }));
   const notes = ["levels were turned", "'b.nc' is damaged"];
@@ -30,7 +30,7 @@ test("where titles repeat the ids are shown, and failures are marked", () => {
   assert.match(entries[4]!.hint, /cannot be read/);
 });
 
-test("the dataset to begin with is one that can be read", () => {
+test("the initial dataset is one that can be read", () => {
   const list = ["b", "climate", "c"].map((id) => summaryOf(described(id)));
   assert.equal(bestDataset(list), "climate");
   const without = withState(list, { id: "climate", state: "failed", notes: ["gone"] });
@@ -42,7 +42,7 @@ test("the dataset to begin with is one that can be read", () => {
   );
 });
 
-test("why a chosen dataset cannot be shown stays to be read", () => {
+test("the reason why a dataset cannot be shown stays visible", () => {
   const storm = described("storm");
   // The server refuses the request, then the patch, in either order; the page goes back meanwhile.
   for (const patchFirst of [false, true]) {
@@ -72,7 +72,7 @@ test("why a chosen dataset cannot be shown stays to be read", () => {
   }
 });
 
-test("when nothing can be read all are tried once, and the last error stays", () => {
+test("when nothing can be read each dataset is tried once and the last error stays", () => {
   const page = new Page([described("a"), described("b")]);
   page.says({ type: "error", id: page.openId, problem: problem("a is damaged") });
   assert.equal(page.sent("open").at(-1)!.dataset, "b");
@@ -87,7 +87,7 @@ const camera = { eye: [1, 2, 3], target: [0, 0, 0], up: [0, 0, 1], fovY: 20, hei
 const explicitView = (page: Page): View =>
   page.sent("patch").reduce<View>((view, { patch }) => mergeView(view, patch), {});
 
-test("a dataset that cannot be opened leaves the shown one as it was", () => {
+test("a dataset that cannot be opened keeps the shown one", () => {
   const storm = described("storm");
   for (const twice of [false, true]) {
     const page = new Page([storm, described("big"), described("other")]);
@@ -107,7 +107,7 @@ test("a dataset that cannot be opened leaves the shown one as it was", () => {
   }
 });
 
-test("who chooses what is shown while another is being opened stays with it", () => {
+test("choosing the shown dataset while another opens keeps it", () => {
   const [storm, big] = [described("storm"), described("big")];
   for (const back of ["picker", "link"]) {
     const page = new Page([storm, big]);

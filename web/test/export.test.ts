@@ -82,13 +82,13 @@ function python(program: string, content: Uint8Array, name: string): unknown {
   }
 }
 
-test("CRCs are those of the specifications", () => {
+test("checksums match the specifications", () => {
   assert.equal(crc32(utf8("IEND")), 0xae426082); // every PNG's last four bytes
   assert.equal(crc32(utf8("123456789")), 0xcbf43926); // the usual check value
   assert.equal(crc32(utf8("")), 0);
 });
 
-test("texts go into a PNG, another reader finds them, and they come back", () => {
+test("text chunks of a PNG survive a round trip and are read by another program", () => {
   const text = '{"dataset":"climate","title":"Wolken über 東京 🌪"}';
   const png = withTexts(tinyPng(), { Software: "windsplat", "windsplat-view": text });
   assert.deepEqual(python(pythonReader, png, "a.png"), {
@@ -101,19 +101,19 @@ test("texts go into a PNG, another reader finds them, and they come back", () =>
   assert.equal(textOf(tinyPng(), "windsplat-view"), null);
 });
 
-test("a text with a language, as other programs write it, is read; a compressed one is not", () => {
+test("an international text chunk is read, a compressed one is not", () => {
   const other = tinyPng(["iTXt", "a\0\0\0de\0Ding\0wert"], ["iTXt", "b\0\x01\0\0\0xyz"]);
   assert.equal(textOf(other, "a"), "wert");
   assert.equal(textOf(other, "b"), null);
 });
 
-test("a long text without an end of its keyword is passed over", () => {
+test("a text chunk without a keyword end is skipped", () => {
   const png = tinyPng(["iTXt", "x".repeat(1e6)], ["iTXt", `${"k".repeat(200)}\0\0\0\0\0no`]);
   assert.equal(textOf(withTexts(png, { a: "value" }), "a"), "value");
   assert.equal(textOf(png, "a"), null);
 });
 
-test("what is no PNG or is damaged is an error, and a truncated one ends", () => {
+test("an invalid or truncated PNG is an error", () => {
   assert.throws(() => textOf(utf8("GIF89a and more than that"), "a"), /not a PNG/);
   assert.throws(() => textOf(new Uint8Array(0), "a"), /not a PNG/);
   assert.throws(() => withTexts(utf8("\x89PNG\r\n\x1a\n"), {}), /not a PNG/);
@@ -126,7 +126,7 @@ test("what is no PNG or is damaged is an error, and a truncated one ends", () =>
   assert.throws(() => textOf(png, "a"), /damaged/);
 });
 
-test("a view in a picture has to be an object", () => {
+test("a view in a picture must be an object", () => {
   assert.deepEqual(parseView('{"step":3}'), { step: 3 });
   for (const text of ["", "[]", "null", "3", "{"]) assert.throws(() => parseView(text), /view/);
 });
@@ -141,7 +141,7 @@ json.dump([[i.filename, z.read(i).decode("utf-8"), i.compress_type, list(i.date_
            for i in z.infolist()], sys.stdout)
 `;
 
-test("python opens the ZIP file and finds every file as it was", async () => {
+test("every file of the ZIP archive is read unchanged by Python", async () => {
   const zip = new Zip(new Date(2026, 10, 22, 13, 4, 26));
   const files: [string, string][] = [
     ["a.txt", ""],
@@ -156,7 +156,7 @@ test("python opens the ZIP file and finds every file as it was", async () => {
   );
 });
 
-test("a ZIP file of too many files is refused, not corrupt", () => {
+test("too many files for a ZIP archive are refused", () => {
   const zip = new Zip(new Date());
   const empty = utf8("");
   assert.throws(() => {
@@ -166,7 +166,7 @@ test("a ZIP file of too many files is refused, not corrupt", () => {
 
 // --- sizes and views --------------------------------------------------------------------------
 
-test("a picture is n times its size on the page, within the server's limits", () => {
+test("a picture is n times its displayed size within the limits", () => {
   assert.deepEqual(exportSize(1136, 818, 2, 35_389_440), { width: 2272, height: 1636, scale: 2 });
   for (const [w, h, most] of [
     [1136, 818, 35_389_440],
@@ -188,7 +188,7 @@ test("a picture is n times its size on the page, within the server's limits", ()
   }
 });
 
-test("a picture's view is the page's, in its size and without a budget", () => {
+test("the view of a picture is that of the page with its size and no budget", () => {
   const said: View = {
     dataset: "gcm",
     image: { width: 10, height: 20, background: "#102030" },
@@ -221,7 +221,7 @@ test("an animation over steps takes every n-th, either way", () => {
   assert.deepEqual(steps({ ...animation, from: 4, to: 4 }), [4]);
 });
 
-test("a turn goes once round at one height, and its end meets its beginning", () => {
+test("an orbit is one closed turn at constant elevation", () => {
   const turn: Animation = { ...animation, over: "turn" };
   assert.equal(frameCount(turn), 12);
   const start = anglesOf(camera);
@@ -236,7 +236,7 @@ test("a turn goes once round at one height, and its end meets its beginning", ()
   }
 });
 
-test("the motion of the lines runs one step of time a second", () => {
+test("line motion advances one step per second", () => {
   const view: View = { vector: { field: "wind", motion: { mode: "phase", time: 2 } } };
   const flow: Animation = { ...animation, over: "flow", fps: 8 };
   for (const n of [0, 1, 8, 11]) {
@@ -257,7 +257,7 @@ test("progress estimates the time left from the frames that are done", () => {
 
 const never = new AbortController().signal;
 
-test("a frame is asked for as a PNG of the view, below the base path", async () => {
+test("a frame is requested as PNG below the base path", async () => {
   const { asked, fetch } = server(() => new Response("picture"));
   const blob = await drawFrame(fetch, "http://host/a/b/", { dataset: "x" }, never);
   assert.equal(await blob.text(), "picture");
@@ -268,7 +268,7 @@ test("a frame is asked for as a PNG of the view, below the base path", async () 
   assert.deepEqual(JSON.parse(body as string), { dataset: "x" });
 });
 
-test("a busy server is asked again after as long as it says; others are believed", async () => {
+test("a busy server is retried after its Retry-After time, other errors are final", async () => {
   const waits: number[] = [];
   const wait = (ms: number) => Promise.resolve(void waits.push(ms));
   const busy = server(
@@ -291,7 +291,7 @@ test("a busy server is asked again after as long as it says; others are believed
   await assert.rejects(drawFrame(gone, "http://host/", {}, never, wait), /cannot be reached/);
 });
 
-test("waiting ends at once when it is cancelled", async () => {
+test("cancelling ends a wait at once", async () => {
   const job = new AbortController();
   const waiting = waitFor(3_600_000, job.signal);
   job.abort();
@@ -302,7 +302,7 @@ test("waiting ends at once when it is cancelled", async () => {
   assert.equal(getEventListeners(other.signal, "abort").length, 0, "nothing is left behind");
 });
 
-test("at most two frames are under way, and they are taken in order", async () => {
+test("at most two frames are pending, and they are handled in order", async () => {
   let under = 0;
   let most = 0;
   const taken: number[] = [];
@@ -323,7 +323,7 @@ test("at most two frames are under way, and they are taken in order", async () =
   assert.deepEqual(taken, [0, 1, 2, 3, 4, 5, 6, 7, 8]);
 });
 
-test("after a frame that fails no other is begun", async () => {
+test("no further frame is requested after a failure", async () => {
   const begun: number[] = [];
   const draw = (n: number): Promise<number> => {
     begun.push(n);
@@ -351,7 +351,7 @@ const entry = (notes: number, range: [number, number] | null = [0, 1]): LegendEn
   leftOut: notes > 1 ? "more" : "",
 });
 
-test("legend cards never overlap or leave the picture, however small it is", () => {
+test("legend cards never overlap or leave the picture", () => {
   for (const [width, height] of [
     [1136, 818],
     [390, 420],

@@ -16,7 +16,7 @@ function shown(): Page {
   return page;
 }
 
-test("a view keeps what new files can still show", () => {
+test("a view keeps what changed files still contain", () => {
   const view: View = {
     dataset: "storm",
     step: 4,
@@ -57,7 +57,7 @@ test("a view keeps what new files can still show", () => {
   assert.equal(shapeOf(same), shapeOf({ ...same, residentBytes: 9, notes: ["read again"] }));
 });
 
-test("files with fewer steps: the last one is shown, all else as it was", () => {
+test("fewer steps select the last one and keep the rest", () => {
   const page = shown();
   page.app.change({ step: 4, vector: { length: 0.2 } });
   page.app.change({ scalars: [{ field: "temperature", stride: 2 }] });
@@ -84,7 +84,7 @@ test("files with fewer steps: the last one is shown, all else as it was", () => 
   assert.equal(page.sent("open").length, 1, "nothing is opened again");
 });
 
-test("files with more steps or of one step: the time bar follows, the step stays", () => {
+test("the time bar follows the number of steps, and the step is kept", () => {
   const page = shown();
   page.app.change({ step: 3 });
   page.draws();
@@ -99,7 +99,7 @@ test("files with more steps or of one step: the time bar follows, the step stays
   assert.equal(page.element("time").inert, true);
 });
 
-test("steps that run go on within the new ones, and stop where there is but one", () => {
+test("playback continues within the new steps and stops at a single one", () => {
   const page = shown();
   page.app.playback.play(1);
   page.opened(described("storm", { steps: 9 }));
@@ -115,7 +115,7 @@ test("steps that run go on within the new ones, and stop where there is but one"
   assert.equal(page.sent("pause").length, 1);
 });
 
-test("a field that is gone is asked for no more, and the defaults are the new ones", () => {
+test("a removed field is not requested, and defaults are updated", () => {
   const page = shown();
   page.app.change({ scalars: [{ field: "temperature" }], camera: { fovY: 50 } });
   page.draws();
@@ -137,7 +137,7 @@ test("the answer to a cancelled request changes nothing", () => {
   assert.equal(page.app.dataset().id, "calm");
 });
 
-test("new files that cannot be read: an error until they can, and the old picture stays", () => {
+test("unreadable changed files show an error and keep the old picture", () => {
   const page = shown();
   const patches = page.sent("patch").length;
   page.says({ type: "error", id: page.openId, problem: problem(damaged) });
@@ -155,7 +155,7 @@ test("new files that cannot be read: an error until they can, and the old pictur
   assert.deepEqual(page.entries, ["The storm", "The calm"]);
 });
 
-test("files that could not be read before the page came are reported by the server's note", () => {
+test("files unreadable before the page loads are reported by the server note", () => {
   const failed = described("storm", { state: "failed", notes: ["levels were turned", damaged] });
   const page = new Page([failed, described("calm")]);
   assert.equal(page.sent("open").at(-1)!.dataset, "calm", "one that can be read goes first");
@@ -169,7 +169,7 @@ test("files that could not be read before the page came are reported by the serv
   assert.equal(page.alert, null);
 });
 
-test("a failed dataset after another failed request is reported for the one that is shown", () => {
+test("a failed dataset is reported even after another failed request", () => {
   const page = shown();
   page.choose("calm");
   page.says({ type: "error", id: page.openId, problem: problem("no") });

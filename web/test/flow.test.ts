@@ -58,7 +58,7 @@ class Page {
   }
 }
 
-test("lines flow one step of time a second, whatever the frame rate", () => {
+test("lines move one step per second at any frame rate", () => {
   for (const frameMs of [5, 60, 150]) {
     const page = new Page();
     page.flow.start();
@@ -67,7 +67,7 @@ test("lines flow one step of time a second, whatever the frame rate", () => {
   }
 });
 
-test("quick frames are asked for 15 times a second and no more", () => {
+test("fast frames are requested at most 15 times a second", () => {
   const page = new Page();
   page.flow.start();
   page.run(2000, 5);
@@ -75,7 +75,7 @@ test("quick frames are asked for 15 times a second and no more", () => {
   assert.ok(page.sent.length >= 2 * flowFps - 4, `${page.sent.length}`);
 });
 
-test("slow frames are waited for: never two moves under way", () => {
+test("slow frames are awaited with at most one pending request", () => {
   const page = new Page();
   page.flow.start();
   page.run(3000, 400);
@@ -94,7 +94,7 @@ test("slow frames are waited for: never two moves under way", () => {
   assert.equal(silent.sent.length, 1, "nor because someone looks or an older frame comes");
 });
 
-test("a hidden page asks for nothing and goes on without a jump", () => {
+test("a hidden page requests nothing and continues without a jump", () => {
   const page = new Page();
   page.flow.start();
   page.run(1000, 5);
@@ -109,7 +109,7 @@ test("a hidden page asks for nothing and goes on without a jump", () => {
   assert.ok(page.at > at + 0.5 && page.at < at + 1.5, `${at} -> ${page.at}`);
 });
 
-test("a stop, a refusal and lines that stand still end the flow", () => {
+test("stop, an error or static lines end the motion", () => {
   const stops: ((page: Page) => void)[] = [
     (page) => page.flow.stop(),
     (page) => page.flow.refused(page.rev),
@@ -134,7 +134,7 @@ test("a stop, a refusal and lines that stand still end the flow", () => {
   assert.equal(page.flow.running, true, "another's refusal is not the flow's");
 });
 
-test("the page hears of an end that it did not ask for, once, when the flow has stopped", () => {
+test("the page is notified once of an end that it did not request", () => {
   const ends = (end: (page: Page) => void): boolean[] => {
     const page = new Page();
     page.flow.start();
@@ -159,7 +159,7 @@ test("the page hears of an end that it did not ask for, once, when the flow has 
   );
 });
 
-test("a flow that was stopped while a frame was due begins anew at once", () => {
+test("motion stopped while a frame is due restarts at once", () => {
   const page = new Page();
   page.flow.start();
   page.run(500, null);
@@ -169,7 +169,7 @@ test("a flow that was stopped while a frame was due begins anew at once", () => 
   assert.ok(page.sent.length > 4, `${page.sent.length}`);
 });
 
-test("a stall does not make the time jump, and it stays within the wire's limit", () => {
+test("a stall does not advance the phase, which stays within the protocol limit", () => {
   assert.equal(laterTime(2, 100), 2.1);
   assert.equal(laterTime(2, 60_000), 2.25);
   assert.equal(laterTime(2, -50), 2);

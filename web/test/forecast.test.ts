@@ -12,7 +12,7 @@ import {
 } from "../src/panels/forecast";
 import type { ForecastPoint } from "../src/wire/api";
 
-test("an axis holds what it shall, leaves out what has no logarithm, and is wide enough", () => {
+test("an axis contains its values, omits those without logarithm, and has a minimum width", () => {
   const axis = axisOver([0, Number.NaN, 5, 200], 30);
   assert.ok(axis.low < 5 && axis.high > 200 && axis.low > 1);
   const narrow = axisOver([10, 10], 30);
@@ -21,7 +21,7 @@ test("an axis holds what it shall, leaves out what has no logarithm, and is wide
   assert.ok(axisOver([], 30).low > 0);
 });
 
-test("places go by ratios and come back", () => {
+test("positions are logarithmic and invertible", () => {
   const axis = { low: 1, high: 10_000 };
   assert.equal(positionOn(axis, 100), 0.5);
   assert.equal(positionOn(axis, 0), 0);
@@ -30,7 +30,7 @@ test("places go by ratios and come back", () => {
   assert.equal(valueOn(axis, 7), 10_000);
 });
 
-test("ticks are round, and no more than there is room for", () => {
+test("ticks are round and limited by the space", () => {
   assert.deepEqual(logTicks({ low: 4, high: 600 }, 7), [5, 10, 20, 50, 100, 200, 500]);
   assert.deepEqual(logTicks({ low: 4, high: 600 }, 5), [10, 100]);
   assert.deepEqual(logTicks({ low: 2e-6, high: 0.5 }, 5), [1e-5, 1e-4, 1e-3, 1e-2, 1e-1]);
@@ -51,7 +51,7 @@ const point: ForecastPoint = {
   pareto: true,
 };
 
-test("a setting as text, by either measure of error", () => {
+test("a setting is formatted with either error metric", () => {
   assert.equal(
     pointText(point, "rmse"),
     "slab of 2 cells, 568×409, data 1/2: 31.4 ms, error 0.011 (0.006 to 0.02), estimated",
@@ -60,7 +60,7 @@ test("a setting as text, by either measure of error", () => {
   assert.match(pointText(kernel, "psnr"), /^kernel, 568×409: 31.4 ms, PSNR 39.0 dB/);
 });
 
-test("arrow keys move the greatest error from wherever it is, finer by about a hundredth", () => {
+test("arrow keys change the error limit by about a hundredth of its value", () => {
   for (let error = 1e-3; error < 1e-2; error = Number((error + 1e-5).toPrecision(3))) {
     for (const way of [1, -1] as const) {
       const by = (limitAfter(error, way, true) / error) ** way;
@@ -71,7 +71,7 @@ test("arrow keys move the greatest error from wherever it is, finer by about a h
   }
 });
 
-test("arrow keys move the budget by a twentieth, at least a millisecond, within the wire's", () => {
+test("arrow keys change the budget by a twentieth within the protocol limits", () => {
   assert.equal(budgetAfter(100, 1, false), 105);
   assert.equal(budgetAfter(100, -1, true), 99);
   assert.equal(budgetAfter(3, 1, false), 4);

@@ -68,7 +68,7 @@ test("an error above what the view allows says so", () => {
   }
 });
 
-test("an error is shown in dB as well: 20 for each power of ten, and a limit is then below", () => {
+test("an error is also shown in dB, with the limit below it", () => {
   const text = (change: Change, limit: number | null = null) =>
     errorLabel(header({ flags: 4, ...change }), limit, "psnr").text;
   assert.equal(text({ error: 0.1 }), "PSNR 20.0 dB est.");
@@ -80,7 +80,7 @@ test("an error is shown in dB as well: 20 for each power of ten, and a limit is 
   assert.equal(encodingLabel(header({ jpegError: 0.01 }), "psnr").text, "JPEG 40.0 dB");
 });
 
-test("the error metric is page-wide, and notifies its watchers", () => {
+test("the error metric applies to the page and notifies subscribers", () => {
   const metrics: string[] = [];
   errorMetric.watch((metric) => metrics.push(metric));
   toggleErrorMetric();
@@ -89,7 +89,7 @@ test("the error metric is page-wide, and notifies its watchers", () => {
   assert.deepEqual(metrics, ["psnr", "rmse"]);
 });
 
-test("an error that is no number, or of no kind, is unknown", () => {
+test("an error without number or kind is unknown", () => {
   for (const change of [
     { flags: 4, error: NaN },
     { flags: 2, error: NaN },
@@ -101,7 +101,7 @@ test("an error that is no number, or of no kind, is unknown", () => {
   }
 });
 
-test("the encoding's error stands apart, and a PNG has none", () => {
+test("the encoding error is separate, and a PNG has none", () => {
   assert.equal(encodingLabel(header({ jpegError: 4.1e-3 })).text, "JPEG 0.0041");
   assert.equal(
     encodingLabel(header({ jpegError: NaN })).text,
@@ -111,7 +111,7 @@ test("the encoding's error stands apart, and a PNG has none", () => {
   assert.equal(encodingLabel(header({ codec: 2, jpegError: NaN })).text, "PNG lossless");
 });
 
-test("a frame is as large as the whole picture, a half of it, or so many percent", () => {
+test("frame size is shown as full, half or a percentage", () => {
   assert.equal(scaleText(1280, 1280), "");
   assert.equal(scaleText(2000, 1280), "");
   assert.equal(scaleText(640, 1280), "1/2");
@@ -120,7 +120,7 @@ test("a frame is as large as the whole picture, a half of it, or so many percent
   assert.equal(scaleText(1, 1280), "1 %", "never nothing");
 });
 
-test("a frame refines if it shows a view that was shown already, and is not final", () => {
+test("a frame refines when it shows a displayed view and is not final", () => {
   const moving = header({ flags: 0, rev: 5, step: 3 });
   assert.equal(frameState(moving, null), "moving");
   assert.equal(frameState(moving, header({ flags: 0, rev: 4, step: 3 })), "moving");
@@ -133,7 +133,7 @@ test("a frame refines if it shows a view that was shown already, and is not fina
   assert.equal(frameState(moving, header({ flags: 1, rev: 5, step: 3 })), "moving");
 });
 
-test("pictures of any size fill a canvas of their shape, others keep theirs", () => {
+test("pictures fill a canvas of their aspect ratio, others are letterboxed", () => {
   const canvas = { width: 1280, height: 720 };
   const all = [0, 0, 1280, 720];
   for (const share of [1, 0.9, 0.77, 0.5, 0.31, 0.125, 0.03]) {
@@ -146,7 +146,7 @@ test("pictures of any size fill a canvas of their shape, others keep theirs", ()
   assert.deepEqual(pictureRect(canvas, { width: 1280, height: 360 }), [0, 180, 1280, 360]);
 });
 
-test("network time is what the server's own times do not explain, measured once a patch", () => {
+test("network time excludes server times and is measured once per patch", () => {
   const sent = { t: 1000, queueUs: 1000, renderUs: 20_000, encodeUs: 4000 } as FrameHeader;
   assert.equal(networkMs(sent, 1040, 0), 15);
   assert.equal(networkMs(sent, 1040, 1000), null);

@@ -40,7 +40,7 @@ class Desk {
 
 const eye = (x: number) => ({ camera: { eye: [x, -3, 0] } });
 
-test("whatever a pointer does while it is down is one entry, of any length", () => {
+test("everything during one pointer press is one entry", () => {
   const desk = new Desk();
   desk.history.begin(true);
   for (let n = 1; n <= 500; n++) desk.change(eye(n), n === 250 ? 5000 : 10);
@@ -54,7 +54,7 @@ test("whatever a pointer does while it is down is one entry, of any length", () 
   assert.equal(desk.undo(), null);
 });
 
-test("what a drag sent last joins it, also after the button is up", () => {
+test("the last patch of a drag joins its entry after release", () => {
   const desk = new Desk();
   desk.history.begin(true);
   desk.change(eye(1));
@@ -64,7 +64,7 @@ test("what a drag sent last joins it, also after the button is up", () => {
   assert.deepEqual(desk.view, { dataset: "storm" });
 });
 
-test("a burst of the same is one entry, what rests between or is of another key is not", () => {
+test("a burst of equal keys is one entry, a pause or another key starts a new one", () => {
   const desk = new Desk();
   for (let n = 1; n <= 30; n++) desk.change(eye(n), 590);
   desk.change(eye(100), 601);
@@ -74,7 +74,7 @@ test("a burst of the same is one entry, what rests between or is of another key 
   assert.deepEqual(desk.view, { dataset: "storm", ...eye(100) });
 });
 
-test("what moves only a part of the camera joins what moved all of it", () => {
+test("a partial camera change joins a full one", () => {
   const desk = new Desk();
   desk.change({ camera: { eye: [1, -3, 0], target: [0, 0, 0], height: 2 } });
   desk.change({ camera: { eye: [1, -2, 0], target: [0, 0, 0], height: 1 } });
@@ -82,7 +82,7 @@ test("what moves only a part of the camera joins what moved all of it", () => {
   assert.deepEqual(desk.view, { dataset: "storm" });
 });
 
-test("another press is another entry, however soon", () => {
+test("another pointer press starts a new entry", () => {
   const desk = new Desk();
   desk.history.begin(false);
   desk.change(eye(1));
@@ -92,7 +92,7 @@ test("another press is another entry, however soon", () => {
   assert.deepEqual(desk.view.camera!.eye, [1, -3, 0]);
 });
 
-test("there and back in one gesture leaves nothing to undo", () => {
+test("a gesture that returns to its start leaves no entry", () => {
   const desk = new Desk({ vector: { length: 1 } });
   desk.history.begin(true);
   desk.change({ vector: { length: 2 } });
@@ -100,7 +100,7 @@ test("there and back in one gesture leaves nothing to undo", () => {
   assert.equal(desk.history.canUndo, false);
 });
 
-test("redo leads where undo came from, and a new change ends it", () => {
+test("redo reverts undo, and a new change clears it", () => {
   const desk = new Desk();
   const seen = [desk.view];
   for (const patch of [eye(1), { scalars: [{ field: "t" }] }, { vector: { field: null } }]) {
@@ -119,7 +119,7 @@ test("redo leads where undo came from, and a new change ends it", () => {
   assert.deepEqual([desk.history.canRedo, desk.undo()], [false, "time step"]);
 });
 
-test("what runs by itself and the window's size stay as they are", () => {
+test("playback and the window size are not undone", () => {
   const desk = new Desk({ step: 0, image: { width: 800, height: 600 } });
   desk.change(eye(1));
   desk.runs({ step: 7, vector: { motion: { time: 3 } } });
@@ -129,7 +129,7 @@ test("what runs by itself and the window's size stay as they are", () => {
   assert.deepEqual(desk.view, { step: 7, image, vector: { motion: { time: 3 } } });
 });
 
-test("a gesture round steps that were played takes none of them back", () => {
+test("undo of a gesture during playback keeps the played steps", () => {
   const desk = new Desk({ step: 0 });
   desk.history.begin(true);
   desk.change(eye(1));
@@ -139,7 +139,7 @@ test("a gesture round steps that were played takes none of them back", () => {
   assert.deepEqual(desk.view, { step: 3 });
 });
 
-test("another dataset is an entry that brings the former one back as it was", () => {
+test("opening a dataset is an entry that restores the previous view", () => {
   const before: View = { dataset: "storm", step: 4, vector: { field: "wind" } };
   const desk = new Desk(before);
   desk.now = 1;
@@ -149,7 +149,7 @@ test("another dataset is an entry that brings the former one back as it was", ()
   assert.deepEqual(desk.view, before);
 });
 
-test("what makes no difference any more is passed over", () => {
+test("entries without effect are skipped", () => {
   const desk = new Desk();
   desk.change(eye(1), 1000);
   const stands = desk.view;
@@ -166,7 +166,7 @@ test("the history holds two hundred entries", () => {
   assert.deepEqual([undone, desk.view.step], [200, 50]);
 });
 
-test("differences go leaf by leaf, arrays whole", () => {
+test("differences are per leaf, arrays are replaced whole", () => {
   const a = { a: { b: 1, c: [1, 2] }, d: 1 };
   const b = { a: { b: 1, c: [1, 3] }, e: null };
   assert.deepEqual(differences(a, b), [

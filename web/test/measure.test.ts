@@ -31,7 +31,7 @@ const histogram = (counts: number[], change: Partial<Histogram> = {}): Histogram
 
 // --- histograms ---------------------------------------------------------------------------
 
-test("quantiles of even counts lie in proportion", () => {
+test("quantiles of uniform counts are proportional", () => {
   const even = histogram(Array.from({ length: 100 }, () => 7));
   for (const share of [0.01, 0.25, 0.5, 0.99]) {
     assert.ok(Math.abs(quantile(even, share) - 100 * share) < 1e-9);
@@ -47,14 +47,14 @@ test("samples beyond the range count, masked ones do not", () => {
   assert.equal(quantile(cut, 0.95), 2);
 });
 
-test("a clip leaves out lone outliers, and says none where all is one value", () => {
+test("clipping omits outliers, and reports none for a constant field", () => {
   const outlier = histogram([0, 0, 500, 499, 0, 0, 0, 0, 0, 1]);
   const [low, high] = clipRange(outlier, 0.01)!;
   assert.ok(low > 2 && low < 2.1 && high > 3.9 && high <= 4);
   assert.equal(clipRange(histogram([0, 0], { below: 5 }), 0.01), null);
 });
 
-test("bars are as high as their counts, or as their logarithms", () => {
+test("bar heights follow counts or their logarithms", () => {
   const heights = (path: string) => [...path.matchAll(/V([\d.]+)h1/g)].map((m) => 1 - Number(m[1]));
   assert.deepEqual(heights(barPath([0, 5, 10], false)), [0, 0.5, 1]);
   const [none, some, most] = heights(barPath([0, 9, 99], true));
@@ -63,7 +63,7 @@ test("bars are as high as their counts, or as their logarithms", () => {
   assert.equal(barPath([0, 0], false), "");
 });
 
-test("values are as fine as their range asks for", () => {
+test("values have the precision of their range", () => {
   assert.equal(neat(0.123456789, [0, 1]), 0.123);
   assert.equal(neat(98765.4321, [0, 100000]), 98765);
   assert.equal(neat(1.23456789e-6, [0, 1e-5]), 1.23e-6);
@@ -71,7 +71,7 @@ test("values are as fine as their range asks for", () => {
   assert.equal(valueAt(7, [250, 350]), 350);
 });
 
-test("a drag holds an end that is near, draws a range elsewhere", () => {
+test("a drag moves a nearby end, or draws a range elsewhere", () => {
   const end = new RangeDrag(0.21, [0.2, 0.8], 0.05);
   assert.deepEqual(end.to(0.4), [0.4, 0.8]);
   assert.deepEqual(end.to(0.9), [0.8, 0.9], "beyond the other end they change places");
@@ -118,7 +118,7 @@ const series = {
   units: "K",
 };
 
-test("a series as the schema has it is understood, and its ends are shown as times", async () => {
+test("a series of the schema is parsed, and its ends are shown as times", async () => {
   const schemas = ["view", "messages"].map((name): object =>
     JSON.parse(readFileSync(`../protocol/${name}.schema.json`, "utf8")),
   );
@@ -131,7 +131,7 @@ test("a series as the schema has it is understood, and its ends are shown as tim
   await assert.rejects(strings.api.series("d", "t", [1, 2, 3]), /not be understood/);
 });
 
-test("each question has its address, beneath where the page is mounted", async () => {
+test("each request has its URL below the base path", async () => {
   const counted = histogram([1, 2]);
   const h = server(counted);
   assert.deepEqual(await h.api.histogram("a b", "|v|/x", 7, 64), counted);
@@ -149,7 +149,7 @@ test("each question has its address, beneath where the page is mounted", async (
   assert.deepEqual(s.asked, ["http://host/base/v1/datasets/d/fields/t/series?x=1&y=2&z=3"]);
 });
 
-test("failures are reported in the server's text, or in the page's", async () => {
+test("errors show the text of the server or of the page", async () => {
   const refused = server(
     { title: "Not Found", status: 404, detail: "there is no such field" },
     404,
@@ -175,7 +175,7 @@ const dataset = {
   world: { min: [-1, -0.5, -0.15], max: [1, 0.5, 0.15] },
 } as unknown as Dataset;
 
-test("a sample's coordinates, and the sample nearest to one, whichever way the axis runs", () => {
+test("sample coordinates and nearest samples are found on axes of either direction", () => {
   assert.deepEqual(middleSample(dataset), [1, 0, 1]);
   assert.deepEqual(coordinatesOf(dataset, [3, 1, 0]), [270, 45, 1000]);
   assert.equal(nearestIndex([1000, 500, 200], 340), 2);
@@ -183,7 +183,7 @@ test("a sample's coordinates, and the sample nearest to one, whichever way the a
   assert.equal(nearestIndex([0, 90, 180], 46), 1);
 });
 
-test("places follow the scale of the geometry and are unknown on a bent grid", () => {
+test("positions follow the scale of the geometry and are unknown on a curved grid", () => {
   const plain: View = {};
   assert.deepEqual(worldOf(dataset, plain, [3, 1, 0]), [0.75, 0.25, -0.1]);
   // Twice as high: x keeps the longest edge.
@@ -207,7 +207,7 @@ const camera = (projection: Camera["projection"]): Camera => ({
   height: 2.5,
 });
 
-test("a point of a plane is found where it is shown", () => {
+test("a point of a plane is found at its screen position", () => {
   for (const projection of ["perspective", "orthographic"] as const) {
     for (const [axis, point] of [
       [2, [0.4, -0.3, 0.1]],
@@ -221,7 +221,7 @@ test("a point of a plane is found where it is shown", () => {
   }
 });
 
-test("the target shows in the middle, what is behind the eye nowhere", () => {
+test("the target projects to the centre, points behind the eye do not project", () => {
   const c = camera("perspective");
   const [x, y] = project(c, c.target, 1.6)!;
   assert.ok(Math.abs(x - 0.5) < 1e-12 && Math.abs(y - 0.5) < 1e-12);
@@ -233,7 +233,7 @@ test("the target shows in the middle, what is behind the eye nowhere", () => {
   assert.ok(Math.abs(project(level, [0, 0, top], 1.6)![1]) < 1e-12);
 });
 
-test("values as text", () => {
+test("values are formatted as text", () => {
   assert.equal(valueText(0.4, "1"), "0.4");
   assert.equal(valueText(280.25, "K"), "280.3 K");
   assert.equal(valueText([3, 4, 0], "m s-1"), "(3, 4, 0), |v| 5 m s⁻¹");
@@ -242,7 +242,7 @@ test("values as text", () => {
   assert.equal(magnitude([2, 3, 6]), 7);
 });
 
-test("a course over time breaks where there is no value", () => {
+test("a series plot has gaps where there is no value", () => {
   const course = seriesCurve([1, 3, null, 2, null, 5, 5])!;
   assert.deepEqual([course.low, course.high], [1, 5]);
   assert.equal(course.path, "M0 1.0000L1 0.5000M3 0.7500h0.25M5 0.0000L6 0.0000");

@@ -98,7 +98,7 @@ const vector = (color: object): View => ({
   scalars: [],
 });
 
-test("ticks are 1, 2 or 5 times a power of ten apart and lie within", () => {
+test("ticks are 1, 2 or 5 times a power of ten apart and within the range", () => {
   assert.deepEqual(niceTicks(0, 1, 5), [0, 0.2, 0.4, 0.6, 0.8, 1]);
   assert.deepEqual(niceTicks(0, 60, 5), [0, 20, 40, 60]);
   assert.deepEqual(niceTicks(-0.3, 0.3, 3), [-0.2, 0, 0.2]);
@@ -122,7 +122,7 @@ test("ticks are 1, 2 or 5 times a power of ten apart and lie within", () => {
   }
 });
 
-test("a reversed range has its ticks from the other side", () => {
+test("a reversed range has reversed ticks", () => {
   assert.deepEqual(
     linearTicks([0, 10], 2).map((tick) => [tick.at, tick.text]),
     [
@@ -141,7 +141,7 @@ test("a reversed range has its ticks from the other side", () => {
   );
 });
 
-test("numbers and bytes are short", () => {
+test("numbers and byte counts are short", () => {
   const rows: [number, string][] = [
     [0, "0"],
     [0.30000000000000004, "0.3"],
@@ -161,7 +161,7 @@ test("numbers and bytes are short", () => {
   ]);
 });
 
-test("height is labelled by the vertical axis's own levels, where the samples stand", () => {
+test("height labels are levels of the vertical axis at their positions", () => {
   const [entry] = legendEntries(dataset, vector({ by: "worldZ", range: [-0.24, 0.15] }));
   assert.equal(entry!.units, "hPa");
   assert.match(entry!.title, /pressure/);
@@ -171,7 +171,7 @@ test("height is labelled by the vertical axis's own levels, where the samples st
   assert.ok(at["1000"]! < at["500"]!, "low pressure is high");
 });
 
-test("round levels win where there is no room for all", () => {
+test("round levels are preferred where space is short", () => {
   const ticks = axisTicks([0, 1], [0.5, 0.52, 0.54], [510, 500, 490], 0.2);
   assert.deepEqual(
     ticks.map((tick) => tick.text),
@@ -194,7 +194,7 @@ test("stretching the volume moves the levels along", () => {
   assert.equal(entry!.units, "world units");
 });
 
-test("each way of colouring has its unit; one colour has no range", () => {
+test("each colouring has its unit, a constant colour has no range", () => {
   const units = (color: object) => legendEntries(dataset, vector(color))[0]!.units;
   assert.equal(units({ by: "magnitude", range: [0, 60] }), "m s⁻¹");
   assert.equal(units({ by: "screenZ", range: [1, 3] }), "world units");
@@ -205,7 +205,7 @@ test("each way of colouring has its unit; one colour has no range", () => {
   assert.match(constant!.note, /60 m s⁻¹/);
 });
 
-test("the legend says what is too slow to be drawn, in the field's unit", () => {
+test("the legend states the slow limit in the unit of the field", () => {
   const calls = (minMagnitude: number | undefined, units = "m s-1") => {
     const fields = dataset.fields.map((field) => ({ ...field, units }));
     const view: View = { vector: { field: "wind", minMagnitude }, scalars: [{ field: "cloud" }] };
@@ -218,7 +218,7 @@ test("the legend says what is too slow to be drawn, in the field's unit", () => 
   for (const all of [0, undefined]) assert.deepEqual(calls(all), ["", ""]);
 });
 
-test("powers in units are raised, anything else stays", () => {
+test("powers in units are superscript", () => {
   const rows: [string | undefined, string][] = [
     ["m s-1", "m s⁻¹"],
     ["kg m-2 s-1", "kg m⁻² s⁻¹"],
@@ -235,7 +235,7 @@ test("powers in units are raised, anything else stays", () => {
   for (const [units, text] of rows) assert.equal(unitText(units), text);
 });
 
-test("the legend shows what is drawn and nothing else", () => {
+test("the legend shows what is rendered only", () => {
   assert.deepEqual(
     legendEntries(dataset, { dataset: "gcm", vector: { field: null }, scalars: [] }),
     [],
@@ -266,7 +266,7 @@ test("the legend shows what is drawn and nothing else", () => {
   ]);
 });
 
-test("a link gives the same view back, without the window's size", () => {
+test("a link restores the view without the window size", () => {
   const view: View = {
     dataset: "a b/ü#%\"'",
     step: 3,
@@ -286,13 +286,13 @@ test("a link gives the same view back, without the window's size", () => {
   });
 });
 
-test("what is no link is no view", () => {
+test("an invalid link gives no view", () => {
   for (const hash of ["", "#", "#x", "#!", "#!{", "#![]", "#!null", "#!7", "#!%", "#!%E0%A4%A"]) {
     assert.equal(viewOfHash(hash), null, hash);
   }
 });
 
-test("density scales the opacity curve, threshold moves its foot", () => {
+test("density scales the opacity curve, threshold moves its start", () => {
   const curve: Curve = [
     [0, 0],
     [0.2, 0],
@@ -335,7 +335,7 @@ test("density scales the opacity curve, threshold moves its foot", () => {
   assert.equal(densityOf(withDensity(gone, [0, 1], 5)), 5);
 });
 
-test("a medium that is switched off keeps its place and settings", () => {
+test("a disabled medium keeps its position and settings", () => {
   const a = { field: "a" };
   const b = { field: "b", stride: 3 };
   let layers: Layer[] = followMedia([], [a, b]);
@@ -364,13 +364,13 @@ test("a medium that is switched off keeps its place and settings", () => {
   );
 });
 
-test("pointers read a value and make the patch that sets it", () => {
+test("pointers read values and create patches", () => {
   assert.equal(valueAt({ a: { b: 3 } }, "/a/b"), 3);
   assert.equal(valueAt({ a: null }, "/a/b"), undefined);
   assert.deepEqual(patchAt("/a/b/c", [1]), { a: { b: { c: [1] } } });
 });
 
-test("two fingers have a centre and a spread", () => {
+test("two pointers have a centre and a distance", () => {
   assert.deepEqual(gesture([{ x: 3, y: 4 }]), { x: 3, y: 4, spread: 0 });
   assert.deepEqual(
     gesture([
@@ -419,7 +419,7 @@ class Desk {
   }
 }
 
-test("the first move goes out at once, and what comes until the next display frame as one", () => {
+test("the first move is sent at once, later ones once per display frame", () => {
   const desk = new Desk();
   desk.grow(50);
   assert.deepEqual([desk.calls, desk.camera.height], [1, 2], "the first does not wait");
@@ -436,7 +436,7 @@ test("the first move goes out at once, and what comes until the next display fra
   assert.equal(desk.calls, 4, "and the next one is a first one again");
 });
 
-test("while the link holds patches up, moves are gathered and the newest wins", () => {
+test("while patches are held back moves are merged", () => {
   const desk = new Desk();
   desk.isReady = false;
   desk.grow(3);
@@ -450,7 +450,7 @@ test("while the link holds patches up, moves are gathered and the newest wins", 
   assert.deepEqual([desk.calls, desk.camera.height], [1, 14]);
 });
 
-test("the picture is as sharp as the screen up to what is worth it", () => {
+test("the picture uses the pixel density up to a limit", () => {
   const most = 35_389_440; // of the server
   assert.deepEqual(pictureSize(800, 600, 1, most), [800, 600]);
   assert.deepEqual(pictureSize(800, 600, 2, most), [1600, 1200]);
@@ -469,13 +469,13 @@ test("the picture is as sharp as the screen up to what is worth it", () => {
   }
 });
 
-test("times are readable and unknown ones stay as they are", () => {
+test("times are readable, and unknown ones unchanged", () => {
   assert.equal(readableTime("2001-01-01T03:00:00Z"), "2001-01-01 03:00Z");
   assert.equal(readableTime("2001-01-01T03:00:07Z"), "2001-01-01 03:00:07Z");
   assert.equal(readableTime("step 3"), "step 3");
 });
 
-test("a problem is described by its values at fault", () => {
+test("a problem is described by its invalid values", () => {
   const problem = { type: "about:blank", title: "Bad", status: 422, detail: "d" };
   assert.equal(problemText(problem), "d");
   assert.equal(problemText({ ...problem, detail: "" }), "Bad");
@@ -485,7 +485,7 @@ test("a problem is described by its values at fault", () => {
   );
 });
 
-test("the page keeps a strict policy for content and any base path", () => {
+test("the page has a strict content security policy at any base path", () => {
   const page = readFileSync("index.html", "utf8");
   assert.doesNotMatch(page, /<style|\sstyle=|\son\w+=|javascript:/i);
   for (const [, script] of page.matchAll(/<script([^>]*)>/g))

@@ -37,7 +37,7 @@ class Page {
   }
 }
 
-test("play says the whole run, backward from its end", () => {
+test("play sends the whole range, backward from its end", () => {
   const page = new Page();
   page.settings = { steps: 10, fps: 12, loop: false, drop: false };
   page.playback.play(1);
@@ -49,7 +49,7 @@ test("play says the whole run, backward from its end", () => {
   assert.equal(page.playback.direction, -1);
 });
 
-test("one step has nothing to play, and a lost connection plays nothing", () => {
+test("a single step or a lost connection plays nothing", () => {
   const page = new Page();
   page.settings.steps = 1;
   page.playback.play(1);
@@ -61,7 +61,7 @@ test("one step has nothing to play, and a lost connection plays nothing", () => 
   assert.deepEqual(page.sent, []);
 });
 
-test("a new speed is said while steps run, and only then", () => {
+test("a new speed is sent only during playback", () => {
   const page = new Page();
   page.playback.again();
   page.playback.play(-1);
@@ -73,7 +73,7 @@ test("a new speed is said while steps run, and only then", () => {
   assert.deepEqual(page.said(), ["9>0@24", "9>0@60", "pause"]);
 });
 
-test("the slider holds time and lets it run on the same way", () => {
+test("dragging the slider pauses playback and continues in the same direction", () => {
   const page = new Page();
   page.playback.play(-1);
   for (const step of [5, 6, 7]) page.playback.scrub(step);
@@ -87,7 +87,7 @@ test("the slider holds time and lets it run on the same way", () => {
   assert.equal(page.playback.running, false, "at rest it stays at rest");
 });
 
-test("without loop it ends at the end of its way", () => {
+test("without loop playback ends at its last step", () => {
   for (const [direction, end] of [
     [1, 9],
     [-1, 0],
@@ -103,7 +103,7 @@ test("without loop it ends at the end of its way", () => {
   }
 });
 
-test("a frame of the last step from before does not end what begins anew", () => {
+test("an earlier frame of the last step does not end a restarted playback", () => {
   const page = new Page();
   page.settings.loop = false;
   page.step = 9;
@@ -127,7 +127,7 @@ const stats = (change: Partial<StatsMessage>): StatsMessage => ({
   ...change,
 });
 
-test("the pace as text", () => {
+test("the pace is formatted as text", () => {
   assert.equal(paceText(23.96), "24 steps/s");
   assert.equal(paceText(0.5), "0.5 steps/s");
   assert.equal(stepsText(stats({})), "");
@@ -137,7 +137,7 @@ test("the pace as text", () => {
   );
 });
 
-test("a medium that was said in part is completed by the drawn one of its field", () => {
+test("a partial medium is completed by the rendered one of its field", () => {
   const drawn = { scalars: [{ field: "a", stride: 2, color: { map: "ice" } }, { field: "b" }] };
   const said = { step: 4, scalars: [{ field: "a", color: { range: [0, 1] } }, { field: "c" }] };
   assert.deepEqual(completeView(drawn as never, said as never), {

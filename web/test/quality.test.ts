@@ -14,7 +14,7 @@ function shown(): Page {
   return page;
 }
 
-test("the method that a moving frame was drawn with is not the view's", () => {
+test("the method of a moving frame does not change the view", () => {
   const page = shown();
   page.app.change({ camera: { fovY: 40 } });
   page.draws({ final: false, view: { method: { name: "kernel", slabThickness: 4 } } });
@@ -26,7 +26,7 @@ test("the method that a moving frame was drawn with is not the view's", () => {
   assert.deepEqual(page.app.view().method, { name: "slab", slabThickness: 2 }, "and the default");
 });
 
-test("quality is what was said of it, whatever older frames were drawn for", () => {
+test("quality shows the requested values regardless of older frames", () => {
   const page = shown();
   page.app.change({ quality: { maxError: 0.01, lossless: true } });
   page.draws({ view: { quality: { budgetMs: null, maxError: 0.01, lossless: true } } });
@@ -37,7 +37,7 @@ test("quality is what was said of it, whatever older frames were drawn for", () 
   assert.deepEqual(patch!.patch, { quality: { maxError: null } });
 });
 
-test("the link keeps the quality, and the limit's control is there only with a limit", () => {
+test("the link keeps the quality, and the limit control appears only with a limit", () => {
   const view: View = { quality: { budgetMs: 66, maxError: 0.002, lossless: true } };
   assert.deepEqual(viewOfHash(hashOfView(view)), view);
   assert.equal(controlStates(view).errorLimit, true);
@@ -46,7 +46,7 @@ test("the link keeps the quality, and the limit's control is there only with a l
   assert.notEqual(qualityHint(view), qualityHint({}));
 });
 
-test("a frame gives its credit back when it is decoded, before and whether it is shown", () => {
+test("a frame is acknowledged when decoded, before and without display", () => {
   const page = shown();
   page.app.acknowledge(7, 2.5);
   assert.deepEqual(page.sent("ack").at(-1), { type: "ack", seq: 7, decodeMs: 2.5 });
@@ -55,7 +55,7 @@ test("a frame gives its credit back when it is decoded, before and whether it is
   assert.equal(page.sent("ack").length, before, "not once more when it is shown");
 });
 
-test("the server is notified when the page is hidden, and when it is shown again", () => {
+test("the server is notified when the page is hidden or shown", () => {
   const page = shown();
   page.hide(true);
   assert.deepEqual(page.sent("visibility").at(-1), { type: "visibility", hidden: true });
@@ -77,7 +77,7 @@ test("a new session is sent the whole view in one patch, and the page's visibili
   assert.deepEqual(page.sent("visibility"), [{ type: "visibility", hidden: false }]);
 });
 
-test("a camera waits while earlier patches are held up on their way out", () => {
+test("a camera patch waits for earlier unsent patches", () => {
   const page = shown();
   assert.equal(page.app.cameras.ready(), true);
   page.holdUp(100_000);

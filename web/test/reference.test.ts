@@ -57,13 +57,13 @@ test("a reference is as large as the picture, up to a million pixels", () => {
   assert.ok(Math.abs(width! / height! - 16 / 9) < 0.005);
 });
 
-test("progress as text", () => {
+test("progress is formatted as text", () => {
   assert.equal(progressText(job({ state: "queued" })), ": waiting");
   assert.equal(progressText(job({ progress: 0.004 })), ": 0 %");
   assert.equal(progressText(job({ progress: 0.346, etaMs: 7100 })), ": 34 %, 8 s left");
 });
 
-test("asked for by the first hold, shown by the next, at once where it is still held", async () => {
+test("the first hold requests the reference, the next or a lasting one shows it", async () => {
   for (const keeps of [false, true]) {
     const { reference, calls, said, state, wake } = page([
       job({ state: "queued" }),
@@ -101,7 +101,7 @@ test("asked for by the first hold, shown by the next, at once where it is still 
   }
 });
 
-test("another view drops it and its job; the same view in another form does not", async () => {
+test("a different view discards the reference, an equivalent one does not", async () => {
   const { reference, calls, said, state, wake } = page([job({}), job({ id: "8" }), done, done]);
   reference.hold();
   await settled();
@@ -125,7 +125,7 @@ test("another view drops it and its job; the same view in another form does not"
   assert.equal(calls.at(-1), "load v1/references/ab.png", "nothing is left to cancel");
 });
 
-test("a view that changes before the job is known leaves no job behind", async () => {
+test("a view that changes before the job id is known cancels the job", async () => {
   let answer: (job: Job) => void = () => {};
   const posted = new Promise((resolve: (job: Job) => void) => (answer = resolve));
   const { reference, calls } = page([posted]);
@@ -142,7 +142,7 @@ test("a view that changes before the job is known leaves no job behind", async (
   assert.deepEqual(calls.slice(1), ["DELETE v1/jobs/7"]);
 });
 
-test("the same view asked for again after a drop is another asking", async () => {
+test("after a discard the same view is requested again", async () => {
   const { reference, calls, said, wake } = page([job({}), done]);
   reference.prepare();
   await settled();

@@ -41,7 +41,7 @@ test("views are saved, renamed and deleted, the newest first", () => {
 
 const namesOf = (saved: SavedViews): string[] => saved.list().map(({ name }) => name);
 
-test("another tab's changes of the list are heeded, by entries of earlier releases too", () => {
+test("changes by other tabs are applied, including entries of earlier releases", () => {
   const store = new Store();
   store.text = JSON.stringify([
     { name: "b", view: {}, date: 2 },
@@ -59,7 +59,7 @@ test("another tab's changes of the list are heeded, by entries of earlier releas
   assert.deepEqual(namesOf(there), ["c", "AA"]);
 });
 
-test("whatever the storage holds, the list is a list of views", () => {
+test("any stored content is read as a list of views", () => {
   const store = new Store();
   const saved = new SavedViews(() => store, "key");
   const good = { name: "a", view: {}, date: 1 };
@@ -111,7 +111,7 @@ test("a short link names a view that the server stores", async () => {
   assert.ok(shortLinkHash("k7").length < linkMax);
 });
 
-test("what has not the shape of a view is refused wherever it comes from", async () => {
+test("invalid views are refused from any source", async () => {
   const whole = {
     ...{ dataset: "gcm", step: 3, image: { background: "#000000" }, later: [null, { x: 1 }] },
     camera: { projection: "perspective", eye: [0, -3, 1], target: null, fovY: 35 },

@@ -6,7 +6,7 @@ import { described, Page, problem } from "./page";
 const a = described("a");
 const b = described("b");
 
-test("lesser news does not overwrite why the connection is lost", async () => {
+test("minor messages do not replace the reason of a lost connection", async () => {
   const page = new Page([a]);
   page.lose(1013);
   await new Promise((done) => setImmediate(done)); // the colour maps could not be loaded either
@@ -20,7 +20,7 @@ test("lesser news does not overwrite why the connection is lost", async () => {
   assert.equal(page.element("offline").hidden, true);
 });
 
-test("a cancelled dataset: the view before is asked for again, late answers are not heard", () => {
+test("cancelling a dataset requests the previous view and ignores late answers", () => {
   const page = new Page([a, b]);
   page.opened(a);
   page.app.change({ vector: { opacity: 0.25 } });
@@ -34,7 +34,7 @@ test("a cancelled dataset: the view before is asked for again, late answers are 
   assert.deepEqual([page.alert, page.app.dataset().id], [null, "a"]);
 });
 
-test("a step that takes its time is cancelled by the one that was drawn", () => {
+test("cancelling a slow step returns to the rendered one", () => {
   const page = new Page([a]);
   page.opened(a);
   page.draws();
@@ -44,7 +44,7 @@ test("a step that takes its time is cancelled by the one that was drawn", () => 
   assert.equal(page.sent("patch").at(-1)!.patch.step ?? 0, 0);
 });
 
-test("without a dataset, or when the first is cancelled, the cards come up", () => {
+test("without a dataset, or when the first is cancelled, the cards are shown", () => {
   assert.equal(new Page([]).cardsShown, 1);
   const page = new Page([a]);
   assert.equal(page.cardsShown, 0);

@@ -28,7 +28,7 @@ const ramp: Curve = [
   [1, 8],
 ];
 
-test("a point stays between its neighbours and never below nothing", () => {
+test("a point stays between its neighbours and is not negative", () => {
   assert.deepEqual(movePoint(ramp, 1, 0.5, 3)[1], [0.5, 3]);
   assert.deepEqual(movePoint(ramp, 1, 7, 3)[1], [1, 3], "on its neighbour: a step edge");
   assert.deepEqual(movePoint(ramp, 1, -7, -3)[1], [0, 0]);
@@ -38,7 +38,7 @@ test("a point stays between its neighbours and never below nothing", () => {
   assert.deepEqual(ramp[1], [0.2, 0], "the old curve is as it was");
 });
 
-test("points are added in order, up to as many as the wire takes, and the last one stays", () => {
+test("points are added in order up to the protocol limit, and the last one is kept", () => {
   const added = addPoint(ramp, 0.6, 2)!;
   assert.deepEqual([added.index, added.curve[2], added.curve.length], [2, [0.6, 2], 4]);
   assert.equal(addPoint(ramp, -5, 1)!.index, 0);
@@ -50,12 +50,12 @@ test("points are added in order, up to as many as the wire takes, and the last o
   assert.deepEqual(removePoint([[3, 1]], 0), [[3, 1]]);
 });
 
-test("a new point of the table stands in the middle of the widest gap, on the curve", () => {
+test("a new table point bisects the widest gap on the curve", () => {
   assert.deepEqual(freePosition(ramp), [0.6, 4]);
   assert.deepEqual(freePosition([[3, 1]]), [3, 1]);
 });
 
-test("both scales give back what they show", () => {
+test("both scales are invertible", () => {
   for (const log of [false, true]) {
     const scale = { top: 40, log };
     assert.equal(shareOf(40, scale), 1);
@@ -72,12 +72,12 @@ test("both scales give back what they show", () => {
   assert.ok(extinctionAt(1, { top: 1e30, log: false }) <= 1e30);
 });
 
-test("a drag above the plot makes it a few times as much, not a billion", () => {
+test("dragging above the plot multiplies the value by a small factor", () => {
   const most = (log: boolean) => extinctionAt(dragShareMax({ top: 40, log }), { top: 40, log });
   assert.deepEqual([most(false), most(true)], [160, 400]);
 });
 
-test("the scale has room above the curve, whatever its size", () => {
+test("the scale extends above any curve", () => {
   assert.equal(roomyTop(ramp, 1), 10);
   assert.equal(roomyTop([[0, 1e-9]], 1), 1.3e-9);
   assert.equal(roomyTop([[0, 1e30]], 1), 1e30);
@@ -87,7 +87,7 @@ test("the scale has room above the curve, whatever its size", () => {
 const pairs = (path: string): [number, number][] =>
   [...path.matchAll(/[ML](-?[\d.]+) (-?[\d.]+)/g)].map((m) => [Number(m[1]), Number(m[2])]);
 
-test("the curve is straight between points, bent on a logarithmic scale, level beyond", () => {
+test("the curve is linear between points and constant beyond them", () => {
   const path = curvePath(ramp, [0, 2], { top: 8, log: false });
   assert.deepEqual(pairs(path).slice(-3), [
     [0, 1],
@@ -109,20 +109,20 @@ test("the curve is straight between points, bent on a logarithmic scale, level b
   ]);
 });
 
-test("only a foot and a ramp are the form that has a foot to move", () => {
+test("only a ramp has a threshold to move", () => {
   assert.ok(isRamp(ramp));
   assert.ok(isRamp(ramp.slice(1)));
   assert.ok(!isRamp([...ramp, [2, 8]]));
   assert.ok(!isRamp(movePoint(ramp, 1, 0.2, 1)));
 });
 
-test("the table rounds values by the domain's width, not by their distance from zero", () => {
+test("the table rounds values relative to the domain width", () => {
   assert.deepEqual(shownPoint([101305.2, 0.1 + 0.2], [101300, 101310]), [101305.2, 0.3]);
   assert.deepEqual(shownPoint([Math.fround(0.3), 1e-9], [0, 1]), [0.3, 1e-9]);
   assert.deepEqual(shownPoint([123456.7, 5], [-1e9, 1e9]), [123457, 5]);
 });
 
-test("a point as text", () => {
+test("a point is formatted as text", () => {
   assert.equal(pointText([0.2, 4], ""), "0.2 → 4 per world unit");
   assert.equal(pointText([5e-8, 1e30], "J m⁻³"), "5e-8 J m⁻³ → 1e30 per world unit");
 });
@@ -158,7 +158,7 @@ function source(change: Partial<RangeSource> = {}) {
 
 const soon = (): Promise<void> => new Promise((done) => setImmediate(done));
 
-test("the range of the step is read again at each step that rests, and of all once", async () => {
+test("the range of a step is read at each step at rest, that of all steps once", async () => {
   const { state, follower } = source();
   follower.set("step");
   await soon();
@@ -182,7 +182,7 @@ test("the range of the step is read again at each step that rests, and of all on
   assert.deepEqual([state.range, follower.mode], [[0, 1], "default"]);
 });
 
-test("a range from elsewhere is the user's own", async () => {
+test("a range from another source is custom", async () => {
   const { state, all, follower } = source();
   assert.equal(follower.mode, "default");
   state.range = [2, 3];
@@ -199,7 +199,7 @@ test("a range from elsewhere is the user's own", async () => {
   assert.equal(new RangeFollower(all, () => {}).mode, "custom", "kept for the next panel");
 });
 
-test("a late answer does not undo what was chosen since; ends stay turned", async () => {
+test("a late answer does not override a later choice, and ends stay reversed", async () => {
   const answers: ((range: Range) => void)[] = [];
   const { state, follower } = source({ read: () => new Promise((done) => answers.push(done)) });
   follower.set("all");
@@ -260,7 +260,7 @@ async function undoable() {
   };
 }
 
-test("a range that follows the step is no entry of undo, the choice of it is one", async () => {
+test("a range that follows the step is not undone, its selection is", async () => {
   const { undoControl, follower, said, rest, seek } = await undoable();
   follower.set("step");
   assert.deepEqual(await rest(), [0, 0, 10, "step"]);
@@ -281,7 +281,7 @@ test("a range that follows the step is no entry of undo, the choice of it is one
   assert.equal(said.at(-1), "nothing to undo");
 });
 
-test("undo that brings an earlier range back leaves the mode, and it is read again", async () => {
+test("undo and redo of a range restore its mode and read it again", async () => {
   const { undoControl, follower, rest, setMedium, medium, seek } = await undoable();
   follower.set("step");
   await rest();
@@ -300,7 +300,7 @@ test("undo that brings an earlier range back leaves the mode, and it is read aga
   assert.equal(medium().stride, 4);
 });
 
-test("an answer of what is no longer shown, or after a drag, changes nothing", async () => {
+test("outdated answers change nothing", async () => {
   const answers: ((range: Range) => void)[] = [];
   const { state, follower } = source({ read: () => new Promise((done) => answers.push(done)) });
   for (const of of ["calm u", "storm v", null]) {
@@ -322,7 +322,7 @@ test("an answer of what is no longer shown, or after a drag, changes nothing", a
   assert.deepEqual([state.range, follower.mode], [[2, 3], "custom"]);
 });
 
-test("the default comes later from the server where the dataset has none", () => {
+test("the default is loaded later if the dataset has none", () => {
   const { state, follower } = source({ defaultRange: () => null });
   state.range = [7, 9]; // what a first frame was drawn with
   follower.follow();

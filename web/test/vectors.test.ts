@@ -78,7 +78,7 @@ for (const kind of ["view", "clientMessage", "serverMessage"]) {
     }
   });
 
-  test(`invalid ${kind} vectors do not, at the pointer that they name`, () => {
+  test(`invalid ${kind} vectors fail at their pointer`, () => {
     let asked = 0;
     for (const one of cases("invalid", kind)) {
       if (one.schema === false || one.bytes !== undefined) continue;
@@ -126,7 +126,7 @@ test("the page refuses server messages of unknown or no type", () => {
   }
 });
 
-test("the page's client messages are those of the vectors", () => {
+test("client messages of the page match the vectors", () => {
   for (const one of cases("valid", "clientMessage")) {
     const document = documentOf(one) as ClientMessage;
     const again: unknown = JSON.parse(encodeClientMessage(document));
@@ -135,7 +135,7 @@ test("the page's client messages are those of the vectors", () => {
   }
 });
 
-test("valid frame headers are read as their fields say", () => {
+test("valid frame headers have their field values", () => {
   for (const one of cases("valid", "frameHeader")) {
     const header = parseFrameHeader(bytesOf(one.hex!));
     const fields = one.fields!;
@@ -184,7 +184,7 @@ test("invalid frame headers are refused", () => {
   }
 });
 
-test("a frame whose picture is shorter or longer than its header says is refused", () => {
+test("a frame with a picture of another length than its header is refused", () => {
   const header = bytesOf(cases("valid", "frameHeader")[0]!.hex!);
   const size = new DataView(header.buffer).getUint32(52, true);
   for (const extra of [-1, 0, 1]) {

@@ -43,7 +43,7 @@ test("merging changes neither argument and no prototype", () => {
   assert.equal(({} as { polluted?: boolean }).polluted, undefined);
 });
 
-test("what was said stands over defaults; arrays are taken whole", () => {
+test("given values override defaults, and arrays are replaced whole", () => {
   const defaults = { camera: { fovY: 35, eye: [0, 0, 1] }, scalars: [{ field: "cloud" }], step: 0 };
   const said = { camera: { eye: [1, 2, 3] }, scalars: [] };
   assert.deepEqual(withDefaults(defaults, said), {
@@ -56,7 +56,7 @@ test("what was said stands over defaults; arrays are taken whole", () => {
   });
 });
 
-test("a refused patch is taken back and the ones around it stand", () => {
+test("a refused patch is reverted and the others stay", () => {
   const state = new ViewState();
   state.change({ dataset: "climate" });
   state.settle(1);
@@ -102,7 +102,7 @@ test("a new session is sent the whole view in one patch", () => {
   assert.deepEqual(state.document, { dataset: "climate", camera: { fovY: 20 }, step: 7 });
 });
 
-test("time that runs by itself moves the step without a patch", () => {
+test("playback moves the step without a patch", () => {
   const state = new ViewState();
   state.change({ dataset: "climate", step: 2 });
   state.settle(1);
@@ -112,7 +112,7 @@ test("time that runs by itself moves the step without a patch", () => {
   assert.equal(state.rev, rev);
 });
 
-test("without news the pending patches stay bounded and the view right", () => {
+test("without answers pending patches stay bounded and the view correct", () => {
   const state = new ViewState();
   for (let step = 0; step < 1000; step++) state.change({ step });
   assert.equal(state.document.step, 999);
@@ -136,7 +136,7 @@ function randomView(random: () => number): View {
   return view;
 }
 
-test("replacing leads from any view to any other, whatever the server has", () => {
+test("replacement transforms any view into any other", () => {
   let seed = 7;
   const random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
   for (let n = 0; n < 500; n++) {

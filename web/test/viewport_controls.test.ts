@@ -40,7 +40,7 @@ const south: Camera = {
 
 // --- roll ------------------------------------------------------------------------------------
 
-test("a roll turns the picture clockwise: what was up is then to the right", () => {
+test("a roll rotates the picture clockwise", () => {
   const rolled = roll(south, 90);
   nearAll(rolled.up, [-1, 0, 0]);
   const [x, y] = project(rolled, [0, 0, 0.5], 1)!;
@@ -51,7 +51,7 @@ test("a roll turns the picture clockwise: what was up is then to the right", () 
   nearAll(roll(roll(south, 25), -25).up, south.up);
 });
 
-test("orbiting keeps the roll and goes about the vertical axis as without it", () => {
+test("orbiting keeps the roll and rotates about the vertical axis", () => {
   const from = lookFrom(south, { azimuth: 30, elevation: 20 });
   const plain = orbit(from, 40, -35);
   const rolled = orbit(roll(from, 33), 40, -35);
@@ -71,7 +71,7 @@ test("the other projection keeps the roll", () => {
   near(rollOf(withProjection(flat, "perspective")), 20);
 });
 
-test("what is dragged follows the hand, however the picture is rolled", () => {
+test("dragging follows the pointer at any roll", () => {
   const front: Vec3 = [0, -0.2, 0]; // before the target, so that turning moves it
   for (const angle of [0, 90, -90, 180, 37]) {
     const from = roll(south, angle);
@@ -87,7 +87,7 @@ test("what is dragged follows the hand, however the picture is rolled", () => {
 
 // --- turns -----------------------------------------------------------------------------------
 
-test("a way between cameras begins and ends at them and goes the shorter way round", () => {
+test("camera interpolation joins its ends by the shorter rotation", () => {
   const from = roll(lookFrom(south, { azimuth: 170, elevation: 10 }, 2), 30);
   const to = lookFrom(south, { azimuth: -170, elevation: 50 }, 8);
   nearAll(between(from, to, 0).eye, from.eye);
@@ -132,7 +132,7 @@ class Stage {
 
 const east = lookFrom(south, { azimuth: 90, elevation: 0 });
 
-test("a preset is reached by a short turn, one camera a display frame", () => {
+test("a preset is reached by a short animation, one camera per display frame", () => {
   const stage = new Stage();
   stage.turn().to(east);
   stage.play(600);
@@ -145,14 +145,14 @@ test("a preset is reached by a short turn, one camera a display frame", () => {
   for (let n = 1; n < ways.length; n++) assert.ok(ways[n]! >= ways[n - 1]! - 1e-9);
 });
 
-test("who wants no movement is there at once", () => {
+test("with reduced motion a preset is applied at once", () => {
   const stage = new Stage();
   stage.turn(true).to(east);
   stage.play(600);
   assert.deepEqual(stage.cameras, [east]);
 });
 
-test("a hand on the picture, an undo or another preset ends a turn", () => {
+test("pointer input, undo or another preset ends an animation", () => {
   const stage = new Stage();
   stage.turn().to(east);
   stage.play(100);
@@ -170,7 +170,7 @@ test("a hand on the picture, an undo or another preset ends a turn", () => {
 
 // --- fingers and wheel -----------------------------------------------------------------------
 
-test("fingers twist by the angle of their turn, whatever they move and pinch meanwhile", () => {
+test("twisting rolls by the angle while panning and pinching", () => {
   const fingers = (angle: number, size: number, x: number, n = 2) =>
     Array.from({ length: n }, (_, k) => {
       const at = ((angle + (360 / n) * k) * Math.PI) / 180;
@@ -182,7 +182,7 @@ test("fingers twist by the angle of their turn, whatever they move and pinch mea
   assert.equal(twist([{ x: 1, y: 2 }], [{ x: 7, y: 9 }]), 0);
 });
 
-test("a wheel zooms by what it turned, whatever unit it counts in, and never jumps", () => {
+test("wheel zoom is proportional to the scroll in any unit and bounded", () => {
   const wheel = (deltaY: number, deltaMode = 0, ctrlKey = false) =>
     wheelZoom({ deltaY, deltaMode, ctrlKey } as WheelEvent);
   near(wheel(100) * wheel(-100), 1);
@@ -240,7 +240,7 @@ class Glass {
   }
 }
 
-test("one question at a time, of the newest place, and no more than eight a second", async () => {
+test("one hover request at a time for the newest position, at most eight a second", async () => {
   const glass = new Glass();
   for (const x of [0.1, 0.2, 0.3, 0.4]) glass.hover.move([x, 0]);
   assert.deepEqual(glass.asked, [1], "the rest wait for the answer");
@@ -258,7 +258,7 @@ test("one question at a time, of the newest place, and no more than eight a seco
   assert.deepEqual(glass.asked, [1, 4], "the same sample is not asked for again");
 });
 
-test("the cursor that leaves takes its question along", async () => {
+test("leaving the picture cancels the hover request", async () => {
   const glass = new Glass();
   glass.hover.move([0.1, 0]);
   glass.hover.leave();
@@ -274,7 +274,7 @@ test("the cursor that leaves takes its question along", async () => {
   assert.deepEqual([glass.shown, glass.asked], [[], [1, 2]]);
 });
 
-test("while the view moves nothing is shown or requested; then what is there now", async () => {
+test("no hover values during motion, current ones afterwards", async () => {
   const glass = new Glass();
   glass.hover.move([0.1, 0]);
   await glass.answer();
@@ -323,7 +323,7 @@ const probe: Probe = {
   },
 };
 
-test("the text beside the cursor: what is drawn, where, and in which level", () => {
+test("the hover text names field, position and level", () => {
   const view = { vector: { field: "wind" }, scalars: [{ field: "cloud" }] } as View;
   assert.deepEqual(hoverLines(grid, view, probe, 2), [
     "wind 5 m s⁻¹ · cloud masked",

@@ -1,4 +1,5 @@
-// fork, with the counters of coverage handed back; the sanitizer's report tells whose fault it was.
+// fork, with coverage counters returned to the parent; the sanitizer report decides whose fault a
+// crash was.
 #include "tests/fuzz/support/apart.hpp"
 
 #include <sys/mman.h>
@@ -18,12 +19,12 @@
 
 #include "tests/fuzz/support/check.hpp"
 
-// The sections in which the compiler keeps the counters of this program.
+// The sections that contain the compiler's coverage counters.
 extern "C" std::uint8_t __start___sancov_cntrs[];
 extern "C" std::uint8_t __stop___sancov_cntrs[];
 extern "C" void __sanitizer_set_death_callback(void (*callback)());
 
-// An assertion of a library is a crash of it like any other: with a stack.
+// An assertion of a library is a crash like any other: with a stack.
 extern "C" const char* __asan_default_options() {
   return "handle_abort=2:allocator_may_return_null=1:max_allocation_size_mb=2048";
 }
@@ -56,7 +57,7 @@ void tell_counts() {
                static_cast<unsigned long long>(counts().late));
 }
 
-// The first frame of the report that is neither the sanitizer's, the C library's nor `abort`.
+// The first frame of the report outside the sanitizer, the C library and `abort`.
 bool is_library_fault(std::string_view report) {
   std::size_t at = report.find("    #0 ");
   while (at != std::string_view::npos) {
@@ -101,7 +102,7 @@ void apart(const std::function<void()>& work, unsigned seconds) {
   const pid_t child = ::fork();
   expect(child >= 0, "a process");
   if (child == 0) {
-    __sanitizer_set_death_callback(nullptr);  // the input is the parent's to keep
+    __sanitizer_set_death_callback(nullptr);  // the parent keeps the input
     ::dup2(report[1], 2);
     ::signal(SIGALRM, SIG_DFL);
     ::alarm(seconds);

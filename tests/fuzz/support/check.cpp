@@ -1,4 +1,4 @@
-// A property that does not hold ends the process.
+// A violated property ends the process.
 #include "tests/fuzz/support/check.hpp"
 
 #include <cstdio>

@@ -1,4 +1,4 @@
-// What a target holds besides "no crash".
+// Properties of a target besides "no crash".
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace fuzz {
 
-// Ends the process with the words, so that libFuzzer keeps the input, unless `holds`.
+// Ends the process with the message unless `holds`, so that libFuzzer keeps the input.
 void expect(bool holds, std::string_view what, std::string_view seen = {});
 
 inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {

@@ -1,4 +1,4 @@
-// One Server on a thread, plain sockets, and the grammar of answers.
+// One Server on a thread, plain sockets, and the grammar of responses.
 #include "tests/fuzz/support/daemon.hpp"
 
 #include <arpa/inet.h>
@@ -32,7 +32,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds end_of_life{20'000};
 
-// Never destroyed: it serves to the end of the process.
+// Never destroyed: it serves until the process ends.
 net::Server& server() {
   static net::Server* const the_one = [] {
     log::configure(log::Format::text, log::Level::off);
@@ -53,7 +53,7 @@ net::Server& server() {
   return *the_one;
 }
 
-// A source address of its own for each, 127.0.0.2 and on: no tuple of addresses comes back soon.
+// A separate source address for each, from 127.0.0.2: no address tuple is reused soon.
 sockaddr_in next_source() {
   static std::uint32_t count = 0;
   sockaddr_in source{};
@@ -62,8 +62,8 @@ sockaddr_in next_source() {
   return source;
 }
 
-// 0, or errno. A signal that interrupts connect(2), as the fuzzer's alarm every 13 s does, leaves
-// it going on: SO_ERROR says whether it succeeded once the socket can be written to (POSIX).
+// 0, or errno. A signal that interrupts connect(2), like the fuzzer's alarm every 13 s, does not
+// stop it: SO_ERROR is valid once the socket is writable (POSIX).
 int connect_to(int socket, const sockaddr_in& to) {
   if (::connect(socket, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0) return 0;
   if (errno != EINTR) return errno;
@@ -129,7 +129,7 @@ void expect_problem(const Head& head, std::string_view body, std::string_view al
   expect(head.status != 500, "nothing that is asked is a fault of the server's", all);
   if (head.status < 400 || head.type == "text/plain") return;
   expect(head.type == "application/problem+json", "a refusal says why", all);
-  if (body.empty()) return;  // of HEAD
+  if (body.empty()) return;  // response to HEAD
   expect(body.front() == '{' && body.back() == '}' &&
              body.find("\"status\":" + std::to_string(head.status)) != std::string_view::npos,
          "a refusal is an object that repeats its status", all);
@@ -171,7 +171,7 @@ void Peer::talk(std::string_view bytes, milliseconds patience,
     if (!bytes.empty() && (about.revents & POLLOUT) != 0) {
       const ssize_t sent = ::send(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
       if (sent > 0) bytes.remove_prefix(static_cast<std::size_t>(sent));
-      // What it said before it closed is still to be heard.
+      // Data sent before the close are still read.
       if (sent < 0 && errno != EAGAIN && errno != EINTR) bytes = {};
     }
     if ((about.revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
@@ -195,7 +195,7 @@ std::size_t expect_answers(std::string_view heard, bool whole) {
     std::string_view body = heard.substr(end + 4);
     const bool has_body = head.status >= 200 && head.status != 204 && head.status != 304;
     expect(!has_body || head.has_length, "an answer with a body tells its length", heard);
-    // Of HEAD there is none.
+    // Responses to HEAD have none.
     const bool left_out = body.empty() || body.starts_with("HTTP/1.1 ");
     const std::size_t length = has_body && !left_out ? head.length : 0;
     if (length > body.size()) {

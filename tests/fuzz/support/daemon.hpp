@@ -1,4 +1,4 @@
-// The daemon's network side in this process, with one small dataset, and a peer over loopback.
+// The network side of the daemon in this process, with one small dataset, and a loopback client.
 #pragma once
 
 #include <chrono>
@@ -9,19 +9,19 @@
 
 namespace fuzz {
 
-// A connection to the one server of this process, which is started by the first of them.
+// A connection to the single server of this process, which the first connection starts.
 class Peer {
  public:
   Peer();
-  ~Peer();  // resets what is still open, so that no port is held
+  ~Peer();  // resets an open connection, so that no port is held
   Peer(const Peer&) = delete;
   Peer& operator=(const Peer&) = delete;
 
-  // Sends what it can of `bytes` and hears meanwhile, until the server ends the connection, `done`
-  // says that all was heard, or nothing moved for `patience`.
+  // Sends `bytes` as far as possible while reading, until the server closes, `done` returns true,
+  // or nothing moved for `patience`.
   void talk(std::string_view bytes, std::chrono::milliseconds patience,
             const std::function<bool(const std::string& heard)>& done);
-  // Tells that nothing more comes.
+  // Shuts down the sending side.
   void half_close();
   void forget() { heard_.clear(); }
   [[nodiscard]] const std::string& heard() const { return heard_; }
@@ -33,11 +33,11 @@ class Peer {
   bool ended_ = false;
 };
 
-// What a server says to any bytes: answers one after the other, each well-formed and none of them
-// a fault of its own (500). `whole`: the last one is not cut off. Returns their number.
+// Checks the responses to any bytes: each is well-formed and none is a server error (500). `whole`:
+// the last one is complete. Returns their number.
 std::size_t expect_answers(std::string_view heard, bool whole);
 
-// Says how long the server takes to tell that it lives; it must.
+// Time until the server answers a health check; it must.
 void expect_alive();
 
 }  // namespace fuzz

@@ -1,5 +1,4 @@
-// Files in memory that take no place anywhere, and the properties of what readers give and of
-// pictures of it.
+// In-memory files, and properties of reader results and of pictures made from them.
 #include "tests/fuzz/support/files.hpp"
 
 #include <fcntl.h>
@@ -29,13 +28,13 @@ using namespace windsplat;
 using namespace windsplat::data;
 
 constexpr std::size_t files_max = 64;
-// Larger volumes are not read: they are honest, and slow.
+// Larger volumes are not read: valid, but slow.
 constexpr std::size_t floats_max = std::size_t{1} << 20;
-// Larger grids are not drawn.
+// Larger grids are not rendered.
 constexpr std::size_t drawn_samples_max = std::size_t{1} << 15;
 
-// The one name of a process that does its work apart: of the parent, so that what a child that
-// crashed left behind is written over by the next.
+// The file name of a process with separate work: named by the parent, so that the next child
+// overwrites the remains of a crashed one.
 std::string name_on_disk() {
   return (std::filesystem::temp_directory_path() / "windsplat-fuzz-").string() +
          std::to_string(::getppid());
@@ -94,7 +93,7 @@ class MemoryFiles : public Files {
   bool on_disk_;
 };
 
-// Where the next mark begins: at the begin of a line.
+// Start of the next mark: at the start of a line.
 std::size_t find_mark(std::string_view input, std::size_t from) {
   for (;;) {
     const std::size_t at = input.find(file_mark, from);
@@ -127,7 +126,7 @@ void expect_premultiplied(const engine::Image& image) {
   }
 }
 
-// The default view but for its size and its threshold, by both methods that viewers are served.
+// The default view except for size and threshold, by both methods of streams.
 void draw(std::unique_ptr<FileSource> source) {
   if (source->info().grid.samples() > drawn_samples_max) return;
   const int last_step = static_cast<int>(source->info().steps.size()) - 1;
@@ -184,7 +183,7 @@ std::shared_ptr<Files> files_of(std::string_view input, std::string main, Kept k
     const std::string name(input.substr(at + file_mark.size(), line - at - file_mark.size()));
     const std::size_t next = find_mark(input, std::min(line + 1, input.size()));
     const std::size_t begin = std::min(line + 1, input.size());
-    // The line's end before a mark is the mark's.
+    // The line end before a mark belongs to the mark.
     const std::size_t end = next == std::string_view::npos ? input.size() : next - 1;
     if (!name.empty()) files.emplace(name, input.substr(begin, std::max(begin, end) - begin));
     at = next;

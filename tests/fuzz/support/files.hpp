@@ -1,5 +1,5 @@
-// One input -> the files of a dataset, in memory. A line "#!file NAME" begins a file; what comes
-// before the first such line is the one that is opened.
+// One input -> the files of a dataset, in memory. A line "#!file NAME" starts a file; the part
+// before the first such line is the file to open.
 #pragma once
 
 #include <cstddef>
@@ -20,16 +20,16 @@ enum class Kept {
   on_disk,  // under a name, one at a time: HDF5 resolves the links of what it opens
 };
 
-// `main`: what the first file is called.
+// `main`: the name of the first file.
 std::shared_ptr<windsplat::data::Files> files_of(std::string_view input, std::string main,
                                                  Kept kept = Kept::in_memory);
 
 // The first bytes of the first file.
 std::string_view first_file(std::string_view input);
 
-// Opens the dataset and reads its first and last field at its first and last step. What a reader
-// gives must be what the daemon would believe of a loader, and every volume must be whole. Small
-// datasets are drawn too, and each pixel must be a premultiplied color.
+// Opens the dataset and reads its first and last field at its first and last step. Results of a
+// reader must pass the checks for loader messages, and every volume must be complete. Small
+// datasets are also rendered, and each pixel must be a premultiplied color.
 void read_dataset(const std::shared_ptr<windsplat::data::Files>& files);
 
 }  // namespace fuzz

@@ -1,4 +1,4 @@
-// A configuration file -> its entries, written again from them and read again.
+// A configuration file -> its entries, written and read again.
 #include <algorithm>
 #include <cstdint>
 #include <string>

@@ -1,5 +1,5 @@
-// Whatever bytes a connection may bring -> the HTTP edge of a server in this process. Answers must
-// be HTTP, and the server must live on.
+// Bytes of a connection -> the HTTP edge of a server in this process. Responses must be valid HTTP,
+// and the server must survive.
 #include <algorithm>
 #include <charconv>
 #include <chrono>
@@ -17,8 +17,8 @@ using std::chrono::milliseconds;
 
 constexpr std::string_view last_name = "the-last-one";
 
-// How many bytes the body of the first request lacks: they are filled up, so that what comes next
-// is a request. An estimate: where it is wrong the input takes longer.
+// Number of bytes missing in the body of the first request: they are added, so that a request
+// follows. An estimate: errors only cost time.
 std::size_t lacking(std::string_view input) {
   const std::size_t end = input.find("\r\n\r\n");
   const std::size_t at = input.find("Content-Length: ");
@@ -44,7 +44,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   fuzz::Peer peer;
   if (has_end) {
-    // A request that is drawn for longer than this is left: the server has to bear that too.
+    // A request that renders longer than this is abandoned, which the server must handle.
     peer.talk(bytes, milliseconds(200), [](const std::string&) { return false; });
   } else {
     peer.talk(bytes, milliseconds(20), [](const std::string&) { return true; });

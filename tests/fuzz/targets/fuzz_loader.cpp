@@ -1,5 +1,4 @@
-// What a loader that a file has taken over could send: bytes on its socket, and the payloads of
-// each kind of message.
+// Messages of a compromised loader: bytes on its socket, and the payloads of each kind of message.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -34,7 +33,7 @@ void expect_info(const DatasetInfo& info) {
     expect(!field.name.empty() && field.components.size() <= 3 && !field.components.empty(),
            "a field has a name and one to three components");
   }
-  // Texts are printable from the second time on.
+  // Texts are printable after the first round.
   const std::string once = loader::encode_info(info);
   const auto again = loader::decode_info(once);
   expect(again.has_value(), "what was believed is believed again");
@@ -59,7 +58,7 @@ void decode(std::string_view payload) {
 
 }  // namespace
 
-// Even first byte: a payload. Odd: what comes over the socket until it is closed.
+// Even first byte: a payload. Odd: bytes on the socket until it is closed.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const std::string_view bytes = fuzz::text_of(data + 1, size - 1);
@@ -71,7 +70,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   expect(::socketpair(AF_UNIX, SOCK_STREAM, 0, pair.data()) == 0, "a pair of sockets");
   const Descriptor ours(pair[0]);
   Descriptor theirs(pair[1]);
-  // All of it fits the socket's buffer: inputs are bounded by it.
+  // Inputs are smaller than the socket buffer.
   const std::string_view sent = bytes.substr(0, std::size_t{64} * 1024);
   expect(::send(theirs.number(), sent.data(), sent.size(), MSG_NOSIGNAL) ==
              static_cast<ssize_t>(sent.size()),

@@ -1,7 +1,7 @@
-// Whole calls to a loader that a file has taken over. The input is its turns, "#!turn" on a line of
-// its own between them: each is what it says when it has heard something. A turn begins with the
-// kind of message, the rest is the payload; from 0x80 on the rest goes over the socket as it is.
-// Memory that it is to fill gets the turn's bytes over and over.
+// Complete calls to a compromised loader. The input is its turns, separated by lines "#!turn": each
+// is the reply to one received message. A turn starts with the kind of message, followed by the
+// payload; from 0x80 on the rest is sent unframed. Memory to fill receives the bytes of the turn
+// repeatedly.
 #include <unistd.h>
 
 #include <chrono>
@@ -24,7 +24,7 @@ using namespace windsplat::data;
 
 constexpr std::size_t floats_max = std::size_t{1} << 18;
 
-// A folder with the program, what it says, and the file that it is asked to open.
+// A folder with the program, its replies, and the file to open.
 struct Stage {
   std::filesystem::path folder;
   std::string file;

@@ -1,4 +1,4 @@
-// A client's message -> the codec, a session that acts on it, and the answers as they are sent.
+// A client message -> the codec, a session that acts on it, and the encoded replies.
 #include <algorithm>
 #include <cstdint>
 #include <memory>
@@ -21,7 +21,7 @@ namespace limits = protocol::limits;
 
 constexpr int steps = 5;
 
-// Whatever may be asked for is answered: a frame of one byte, or no dataset.
+// Every request of the session is answered: a frame of one byte, or no dataset.
 class Viewer {
  public:
   Viewer()
@@ -95,7 +95,7 @@ class Viewer {
   template <class Other>
   void act(const Other& /*effect*/) {}
 
-  // One thing at a time, since each gives effects again.
+  // One effect at a time, since each causes further ones.
   void answer() {
     if (closed_ || answering_) return;
     answering_ = true;
@@ -141,7 +141,7 @@ class Viewer {
 
 }  // namespace
 
-// One message a line.
+// One message per line.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::string_view rest = fuzz::text_of(data, size);
   Viewer viewer;

@@ -1,5 +1,5 @@
-// A request's target: the parser, the readers of parameters and of what a client accepts, and the
-// routes of a server in this process that take a query. Behind a zero byte: the value of a header.
+// A request target: the parser, the readers of parameters and of Accept headers, and the routes
+// with a query of a server in this process. After a zero byte: a header value.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -76,7 +76,7 @@ void read_header(std::string_view value) {
   (void)net::normal_base_path(value);
 }
 
-// Ends of lines would begin another field.
+// Line ends would start another field.
 std::string one_line(std::string_view text) {
   std::string out(text);
   std::replace(out.begin(), out.end(), '\r', ' ');

@@ -1,4 +1,4 @@
-// GRIB files: our index of the messages, then ecCodes, in a process of its own.
+// GRIB files: the project's index of messages, then ecCodes, in a separate process.
 #include <cstdint>
 #include <fstream>
 #include <iterator>
@@ -11,8 +11,8 @@
 
 namespace {
 
-// Honest files, read in this process: ecCodes keeps its tables, which take it a second, and the
-// children have them too.
+// Valid files, read in this process: ecCodes caches its tables, which take a second to load, for
+// all children.
 bool keep_tables() {
   for (const char* name : {"regular_ll_pl_grib1", "regular_ll_pl_grib2"}) {
     std::ifstream file("/usr/share/eccodes/samples/" + std::string(name) + ".tmpl",

@@ -1,4 +1,4 @@
-// HDF5 and netCDF-4 files by way of the C libraries, in a process of their own.
+// HDF5 and netCDF-4 files through the C libraries, in a separate process.
 #include <cstdint>
 #include <string_view>
 

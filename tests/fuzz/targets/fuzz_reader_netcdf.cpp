@@ -1,4 +1,4 @@
-// netCDF classic files: our look at the header, then the C library, in a process of its own.
+// netCDF classic files: the project's header check, then the C library, in a separate process.
 #include <cstdint>
 #include <string_view>
 

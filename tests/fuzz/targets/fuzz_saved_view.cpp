@@ -1,4 +1,4 @@
-// A kept view's file, as it may be found on disk -> the view, written and read again.
+// The file of a saved view -> the view, written and read again.
 #include <cstdint>
 #include <string>
 

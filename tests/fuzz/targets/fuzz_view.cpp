@@ -1,5 +1,5 @@
-// A view, or a view and a patch of it behind a zero byte -> codec, merge patch, what the catalogue
-// says of it, and a picture of a few pixels drawn from it.
+// A view, or after a zero byte a view and a patch -> codec, merge patch, completion, and a picture
+// of a few pixels.
 #include <algorithm>
 #include <cstdint>
 #include <memory>
@@ -21,7 +21,7 @@ using fuzz::expect;
 using windsplat::protocol::ViewDocument;
 namespace limits = windsplat::protocol::limits;
 
-// One small dataset of lines and medium, whatever the view calls it.
+// One small dataset of lines and medium under any name.
 struct Surroundings {
   std::shared_ptr<windsplat::data::Store> store =
       std::make_shared<windsplat::data::Store>(std::uint64_t{256} << 20);
@@ -59,7 +59,7 @@ void expect_within_limits(const windsplat::protocol::View& view) {
          "a kernel is within the limits");
 }
 
-// Everything but the number of pixels is as the view says.
+// Everything but the number of pixels is that of the view.
 void draw(windsplat::protocol::View view) {
   Surroundings& all = surroundings();
   constexpr int edge_max = 24;
@@ -71,7 +71,7 @@ void draw(windsplat::protocol::View view) {
   view.method.name = view.method.name == windsplat::protocol::MethodName::reference
                          ? windsplat::protocol::MethodName::kernel
                          : view.method.name;
-  // Thin slabs are many: no fault, but slow.
+  // Many thin slabs are valid, but slow.
   view.method.slab_thickness = std::max(view.method.slab_thickness, 0.5);
   const auto frame = windsplat::frame::produce(view, *all.dataset, {}, all.pool,
                                                windsplat::CancelToken(), all.space);

@@ -1,5 +1,5 @@
-// What may follow an upgrade -> the WebSocket edge and the session behind it. Even first byte:
-// bytes as they are on the wire. Odd: messages, one a line, framed here.
+// Data after an upgrade -> the WebSocket edge and its session. Even first byte: raw bytes. Odd:
+// messages, one per line, framed here.
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -18,7 +18,7 @@ constexpr std::string_view upgrade =
     "GET /v1/stream HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
     "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
 
-// Masked by zeros, so that it reads as it is.
+// A zero mask keeps the text readable.
 std::string frame_of(unsigned char first, std::string_view payload) {
   std::string out(1, static_cast<char>(first));
   const std::size_t size = payload.size();
@@ -50,13 +50,13 @@ void expect_close(std::string_view payload) {
   expect(payload.size() >= 2, "a close has a code");
   const int code =
       (static_cast<unsigned char>(payload[0]) << 8) | static_cast<unsigned char>(payload[1]);
-  // Of those from 5000 on RFC 6455 says nothing; a client that sends one hears it again.
+  // RFC 6455 does not define codes from 5000 on; the server returns them.
   const bool sendable =
       (code >= 1000 && code <= 1003) || (code >= 1007 && code <= 1013) || code >= 3000;
   expect(sendable, "a close has a code that may be sent", std::to_string(code));
 }
 
-// RFC 6455, 5.2: frames of a server. Whether one of them is its close.
+// Checks frames of a server (RFC 6455, 5.2). Returns whether one is a close.
 bool expect_frames(std::string_view heard) {
   bool closed = false;
   while (heard.size() >= 2) {
@@ -100,7 +100,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return head != std::string::npos;
   });
   if (!peer.heard().starts_with("HTTP/1.1 101 ")) {
-    // Full for a moment, where it still takes leave of those before.
+    // Full for a moment while earlier sessions are released.
     expect(peer.heard().starts_with("HTTP/1.1 429 ") || peer.heard().starts_with("HTTP/1.1 503 "),
            "a stream is opened, or there are too many", peer.heard());
     fuzz::expect_answers(peer.heard(), peer.ended());
@@ -108,7 +108,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   peer.talk(wire + frame_of(0x88, {}), milliseconds(20), [](const std::string&) { return true; });
   peer.half_close();
-  // A server that has said its close may wait for ours for two seconds: not here.
+  // A server may wait two seconds for the client's close: not here.
   bool closed = false;
   peer.talk({}, milliseconds(10'000), [&closed, head](const std::string& heard) {
     closed = expect_frames(std::string_view(heard).substr(head + 4));

@@ -1,5 +1,5 @@
-// A loader that says what an input tells it to say: started by the daemon's side in place of
-// `windsplat load`. The input lies beside the program; see fuzz_loader_call.cpp for its form.
+// A loader that sends the messages of an input, started instead of `windsplat load`. The input is
+// next to the program; fuzz_loader_call.cpp describes its form.
 #include <sys/auxv.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -35,7 +35,8 @@ bool send_all(const void* data, std::size_t size) {
   return true;
 }
 
-// Hears a message to its end; the descriptor that came with it, or -1. False: the daemon has gone.
+// Reads a message to its end; returns the descriptor received with it, or -1. False: the daemon has
+// disconnected.
 bool hear(int& descriptor) {
   Frame frame;
   iovec part{&frame, sizeof frame};
@@ -60,7 +61,7 @@ bool hear(int& descriptor) {
   return true;
 }
 
-// The turn's first bytes over and over, in the memory that was given to be filled.
+// Repeats the first bytes of the turn in the memory to fill.
 void fill(int memory, std::string_view turn) {
   struct stat status {};
   std::array<char, 64> pattern{};
@@ -76,7 +77,7 @@ void fill(int memory, std::string_view turn) {
 }  // namespace
 
 int main() {
-  // The name it was started by: the input belongs to that.
+  // The name of the program, which identifies the input.
   const auto* name = reinterpret_cast<const char*>(::getauxval(AT_EXECFN));
   std::ifstream file(std::string(name) + ".in", std::ios::binary);
   const std::string input((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());

@@ -25,7 +25,7 @@ class CliAccess : public testing::Test {
  protected:
   void SetUp() override { dataset = synth(folder, "tornado", "8x8x8"); }
 
-  // A secret of its owner's alone.
+  // A secret readable by its owner only.
   std::string secret(const std::string& name, const std::string& text) const {
     const std::string path = folder.file(name);
     write_file(path, text);
@@ -77,7 +77,7 @@ void stop(Process& daemon) {
   EXPECT_EQ(daemon.wait(), 0) << daemon.messages();
 }
 
-TEST_F(CliAccess, ATokenFileIsAskedForAndNeverTold) {
+TEST_F(CliAccess, TokenFileIsRequiredAndItsTokenNeverPrinted) {
   const std::string file = secret("token", first_token + "\n");
   Process daemon(serve({"--token-file", file}));
   const auto port = port_of(daemon);
@@ -90,7 +90,7 @@ TEST_F(CliAccess, ATokenFileIsAskedForAndNeverTold) {
   EXPECT_THAT(daemon.messages(), Not(HasSubstr("is readable by other users")));
 }
 
-TEST_F(CliAccess, ATokenFileThatIsNoGoodStopsTheStart) {
+TEST_F(CliAccess, InvalidTokenFilePreventsStartup) {
   for (const auto& [text, reason] :
        std::vector<std::pair<std::string, std::string>>{{"", "empty"},
                                                         {"short", "16 to 512"},
@@ -110,7 +110,7 @@ TEST_F(CliAccess, ATokenFileThatIsNoGoodStopsTheStart) {
   EXPECT_EQ(refused({}, {"WINDSPLAT_TOKEN_FILE=" + folder.file("absent")}).code, 1);
 }
 
-TEST_F(CliAccess, ASecretThatOthersCanReadIsWarnedOf) {
+TEST_F(CliAccess, WarnsOfASecretReadableByOthers) {
   const std::string file = secret("token", first_token);
   chmod(file.c_str(), 0644);
   Process daemon(serve({"--token-file", file}));
@@ -118,7 +118,7 @@ TEST_F(CliAccess, ASecretThatOthersCanReadIsWarnedOf) {
   EXPECT_TRUE(says(daemon, "is readable by other users"));
 }
 
-TEST_F(CliAccess, BeyondLoopbackATokenIsNeededOrTheFlag) {
+TEST_F(CliAccess, NonLoopbackAddressRequiresATokenOrTheFlag) {
   const Words remote{"serve", "--listen", "0.0.0.0:0", "--allow-root", dataset};
   const auto with = [&](const Words& more) {
     Words words = remote;
@@ -146,7 +146,7 @@ TEST_F(CliAccess, BeyondLoopbackATokenIsNeededOrTheFlag) {
   EXPECT_THAT(daemon.messages(), Not(HasSubstr("sent unencrypted")));
 }
 
-TEST_F(CliAccess, HealthIsCheckedOverTlsByWhomItTrusts) {
+TEST_F(CliAccess, HealthcheckOverTlsUsesTheTrustedCertificates) {
   give_certificate("mine");
   Process daemon(serve(tls_words()));
   const std::string line = daemon.read_until('\n');
@@ -164,7 +164,7 @@ TEST_F(CliAccess, HealthIsCheckedOverTlsByWhomItTrusts) {
   write_file(folder.file("none.pem"), "no certificate");
   EXPECT_EQ(run({"healthcheck", url, "--ca", folder.file("none.pem")}).code, 2);
   EXPECT_EQ(run({"healthcheck", url, "--ca", folder.file("absent.pem")}).code, 1);
-  // The same place by a name that the certificate does not have.
+  // The same address by a name that is not in the certificate.
   const std::string other_name =
       "https://127.1" + url.substr(std::string("https://127.0.0.1").size());
   const Outcome elsewhere = run({"healthcheck", other_name, "--ca", folder.file("cert.pem")});
@@ -172,7 +172,7 @@ TEST_F(CliAccess, HealthIsCheckedOverTlsByWhomItTrusts) {
   EXPECT_THAT(elsewhere.err, HasSubstr("hostname mismatch"));
 }
 
-TEST_F(CliAccess, ACertificateThatIsNoGoodStopsTheStart) {
+TEST_F(CliAccess, InvalidCertificatePreventsStartup) {
   give_certificate("mine");
   const std::string cert = folder.file("cert.pem");
   EXPECT_EQ(refused({"--tls-cert", cert}).code, 2);
@@ -190,7 +190,7 @@ TEST_F(CliAccess, ACertificateThatIsNoGoodStopsTheStart) {
 
 // --- the configuration ---------------------------------------------------------------------------
 
-TEST_F(CliAccess, TheConfigurationGivesOptionsAndTheEnvironmentAndTheCommandLineWin) {
+TEST_F(CliAccess, CommandLineOverridesEnvironmentOverridesConfiguration) {
   const std::string config = folder.file("windsplat.json");
   write_file(config, R"({"datasets": [")" + dataset + R"("], "listen": "127.0.0.1:0", "threads": 2,
       "base-path": "/from-config/", "max-sessions": 7, "allow-remote": false})");
@@ -213,12 +213,12 @@ TEST_F(CliAccess, TheConfigurationGivesOptionsAndTheEnvironmentAndTheCommandLine
     return net_test::StreamClient(port, {{"Origin", origin}}).handshake().status;
   };
   EXPECT_EQ(from("https://b.example"), 101);
-  EXPECT_EQ(from("https://a.example"), 403) << "a list takes another's place, too";
+  EXPECT_EQ(from("https://a.example"), 403) << "a list replaces the earlier one";
   Process by_environment({"serve"}, {"WINDSPLAT_CONFIG=" + config});
   EXPECT_THAT(by_environment.read_until('\n'), HasSubstr("/from-config/"));
 }
 
-TEST_F(CliAccess, TheConfigurationIsRefusedWithAPointer) {
+TEST_F(CliAccess, InvalidConfigurationIsReportedWithAPointer) {
   const std::string config = folder.file("windsplat.json");
   for (const auto& [text, pointer] : std::vector<std::pair<std::string, std::string>>{
            {R"({"max-session": 5})", "/max-session"},
@@ -253,7 +253,7 @@ TEST_F(CliAccess, TheConfigurationIsRefusedWithAPointer) {
 
 // --- SIGHUP --------------------------------------------------------------------------------------
 
-TEST_F(CliAccess, SighupReadsTheTokenAgain) {
+TEST_F(CliAccess, SighupReloadsTheToken) {
   const std::string file = secret("token", first_token);
   Process daemon(serve({"--token-file", file}));
   const auto port = port_of(daemon);
@@ -272,7 +272,7 @@ TEST_F(CliAccess, SighupReadsTheTokenAgain) {
   stop(daemon);
 }
 
-TEST_F(CliAccess, SighupReadsTheCertificateAgainAndABadOneChangesNothing) {
+TEST_F(CliAccess, SighupReloadsTheCertificateAndAnInvalidOneChangesNothing) {
   give_certificate("first");
   Process daemon(serve(tls_words()));
   const Place place(port_of(daemon), true);
@@ -289,7 +289,7 @@ TEST_F(CliAccess, SighupReadsTheCertificateAgainAndABadOneChangesNothing) {
   stop(daemon);
 }
 
-TEST_F(CliAccess, SighupTakesAllOfTheConfigurationOrNothing) {
+TEST_F(CliAccess, SighupAppliesTheConfigurationWholeOrNotAtAll) {
   const std::string config = folder.file("windsplat.json");
   const std::string file = secret("token", first_token);
   const auto write = [&](const std::string& more) {
@@ -310,7 +310,7 @@ TEST_F(CliAccess, SighupTakesAllOfTheConfigurationOrNothing) {
   EXPECT_TRUE(eventually([&] { return from_friend() == 101; }));
   EXPECT_TRUE(says(daemon, "requires a restart"));
   EXPECT_THAT(daemon.messages(), HasSubstr("option=max-sessions"));
-  // One value at fault, and the others are not taken either.
+  // One value is invalid, so none is applied.
   secret("token", second_token);
   write(R"(, "max-sessions": "many")");
   daemon.send(SIGHUP);
@@ -321,7 +321,7 @@ TEST_F(CliAccess, SighupTakesAllOfTheConfigurationOrNothing) {
   stop(daemon);
 }
 
-TEST_F(CliAccess, BeyondLoopbackRootNeedsItsFlag) {
+TEST_F(CliAccess, RootOnANonLoopbackAddressRequiresItsFlag) {
   if (::geteuid() != 0) GTEST_SKIP() << "not root";
   Words words{"serve", "--listen", "0.0.0.0:0", "--allow-remote", dataset};
   const Outcome refused = run(words);
@@ -333,7 +333,7 @@ TEST_F(CliAccess, BeyondLoopbackRootNeedsItsFlag) {
   EXPECT_EQ(net_test::get(port_of(local), "/v1").status, 200) << "loopback needs no flag";
 }
 
-TEST_F(CliAccess, SighupCannotTakeTheTokenFromWhatOthersReach) {
+TEST_F(CliAccess, SighupCannotRemoveTheTokenOfANonLoopbackServer) {
   const std::string config = folder.file("windsplat.json");
   const std::string file = secret("token", first_token);
   write_file(config,
@@ -354,7 +354,7 @@ TEST_F(CliAccess, SighupCannotTakeTheTokenFromWhatOthersReach) {
 }
 
 // Opening a pipe would block until a writer opens it.
-TEST_F(CliAccess, APipeInATokensPlaceIsRefusedAndKeepsNobodyWaiting) {
+TEST_F(CliAccess, PipeAsTokenFileIsRefusedWithoutBlocking) {
   const std::string file = secret("token", first_token);
   Process daemon(serve({"--token-file", file}));
   const auto port = port_of(daemon);
@@ -368,7 +368,7 @@ TEST_F(CliAccess, APipeInATokensPlaceIsRefusedAndKeepsNobodyWaiting) {
   stop(daemon);
 }
 
-TEST_F(CliAccess, SecretsAreInNoCoreDump) {
+TEST_F(CliAccess, CoreDumpsHoldNoSecrets) {
   const auto limit = [](const Process& daemon) {
     const std::string limits = read_file("/proc/" + std::to_string(daemon.id()) + "/limits");
     const std::size_t at = limits.find("Max core file size");
@@ -385,7 +385,7 @@ TEST_F(CliAccess, SecretsAreInNoCoreDump) {
 
 // DNS rebinding: a page's name can resolve to this machine, and the browser treats it as
 // same-origin.
-TEST_F(CliAccess, BeyondLoopbackWithoutATokenOnlyKnownNamesAreAnswered) {
+TEST_F(CliAccess, NonLoopbackWithoutTokenAnswersOnlyKnownHostNames) {
   const auto status_for = [](std::uint16_t port, const std::string& host) {
     return net_test::raw(port, "GET /v1 HTTP/1.1\r\nHost: " + host + "\r\n\r\n").status;
   };
@@ -410,7 +410,7 @@ TEST_F(CliAccess, BeyondLoopbackWithoutATokenOnlyKnownNamesAreAnswered) {
   EXPECT_EQ(status_for(second, "evil.example"), 421);
   const std::string file = secret("token", first_token);
   Process guarded(with({"--token-file", file}));
-  EXPECT_EQ(status_for(port_of(guarded), "any.example"), 401) << "the token is asked for instead";
+  EXPECT_EQ(status_for(port_of(guarded), "any.example"), 401) << "the token is required instead";
   Process both(with({"--token-file", file, "--allow-host", "winds.example"}));
   const auto fourth = port_of(both);
   EXPECT_EQ(status_for(fourth, "any.example"), 421);
@@ -420,12 +420,12 @@ TEST_F(CliAccess, BeyondLoopbackWithoutATokenOnlyKnownNamesAreAnswered) {
   }
 }
 
-TEST_F(CliAccess, SighupBeforeTheServerRunsIsKept) {
+TEST_F(CliAccess, SighupBeforeStartupIsHandled) {
   const std::string file = secret("token", first_token);
   const std::string large = folder.file("large.nc");
   ASSERT_EQ(run({"synth", "tornado", "--dims", "96x96x96", "--steps", "3", "-o", large}).code, 0);
   Process daemon(serve({"--token-file", file, large, "climate", "efield"}));
-  // "opened" of the first dataset: the others are still to be opened.
+  // "opened" of the first dataset: the others are still pending.
   ASSERT_TRUE(says(daemon, "opened"));
   for (int n = 0; n < 20; ++n) daemon.send(SIGHUP);
   const auto port = port_of(daemon);

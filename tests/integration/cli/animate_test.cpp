@@ -29,13 +29,13 @@ std::size_t files_like(const Folder& folder, const std::string& ending) {
   return count;
 }
 
-TEST(CliAnimate, EveryFrameIsWhatRenderDrawsOfItsStep) {
+TEST(CliAnimate, EveryFrameEqualsRenderOfItsStep) {
   const Folder folder;
   const std::string path = folder.file("four.nc");
   ASSERT_EQ(run({"synth", "climate", "--dims", "24x12x6", "--steps", "4", "-o", path}).code, 0);
   const Outcome made = run_with({"animate", path, "-o", folder.file("f_%03d.png")}, {});
   EXPECT_EQ(made.code, 0);
-  EXPECT_EQ(made.out + made.err, "") << "no bar where stderr is no terminal";
+  EXPECT_EQ(made.out + made.err, "") << "no progress bar where stderr is no terminal";
   EXPECT_EQ(files_like(folder, ".png"), 4U);
   std::set<std::string> pictures;
   for (const char* step : {"0", "1", "2", "3"}) {
@@ -48,7 +48,7 @@ TEST(CliAnimate, EveryFrameIsWhatRenderDrawsOfItsStep) {
   EXPECT_EQ(pictures.size(), 4U) << "the steps differ";
 }
 
-TEST(CliAnimate, StepsMayBeginLaterAndLeaveSomeOut) {
+TEST(CliAnimate, StepsMayStartLaterAndSkip) {
   const Folder folder;
   const std::string path = folder.file("four.nc");
   ASSERT_EQ(run({"synth", "climate", "--dims", "24x12x6", "--steps", "4", "-o", path}).code, 0);
@@ -61,7 +61,7 @@ TEST(CliAnimate, StepsMayBeginLaterAndLeaveSomeOut) {
   EXPECT_EQ(read_file(folder.file("100% 1.jpg")), read_file(last));
 }
 
-// k of N frames a step stands at the time k / N.
+// Frame k of N frames per step is at time k / N.
 TEST(CliAnimate, FramesBetweenStepsHaveTheirTimes) {
   const Folder folder;
   const std::string path = synth(folder, "tornado", "12x12x12");
@@ -78,8 +78,8 @@ TEST(CliAnimate, FramesBetweenStepsHaveTheirTimes) {
   EXPECT_EQ(read_file(folder.file("f_7.png")), read_file(one));
 }
 
-// From one drawn step to the next the time grows evenly, by the stride, from the view's own time.
-TEST(CliAnimate, TimesRunOnOverAStrideFromTheViewsOwn) {
+// Between rendered steps time increases evenly, by the stride, from the time of the view.
+TEST(CliAnimate, TimesContinueFromTheViewsTimeAcrossAStride) {
   const Folder folder;
   const std::string path = folder.file("four.nc");
   ASSERT_EQ(run({"synth", "tornado", "--dims", "12x12x12", "--steps", "4", "-o", path}).code, 0);
@@ -107,7 +107,7 @@ TEST(CliAnimate, TimesRunOnOverAStrideFromTheViewsOwn) {
 }
 
 // The signal may arrive during any frame: every existing file must be complete.
-TEST(CliAnimate, ASignalStopsItBetweenWholeFiles) {
+TEST(CliAnimate, SignalStopsBetweenWholeFiles) {
   for (const int signal : {SIGINT, SIGTERM}) {
     const Folder folder;
     const std::string path = synth(folder, "tornado", "12x12x12");
@@ -144,7 +144,7 @@ TEST(CliAnimate, StopsAtTheFirstErrorAndNamesIt) {
   EXPECT_THAT(nowhere.err, HasSubstr("f_0.png"));
 }
 
-TEST(CliAnimate, NothingIsDrawnTwiceForNothing) {
+TEST(CliAnimate, SkipsUnnecessaryRendering) {
   const Folder folder;
   const std::string path = synth(folder, "tornado", "8x8x8");
   const Outcome refused =

@@ -78,7 +78,7 @@ TEST(CliFiles, InspectTextNamesAxesFieldsStepsAndSize) {
   EXPECT_EQ(told.out.find('\x1b'), std::string::npos);
 }
 
-TEST(CliFiles, InspectTellsWhatNeedsNoMemoryWhereRangesNeedTooMuch) {
+TEST(CliFiles, InspectReportsWithoutMemoryWhenRangesExceedTheLimit) {
   const Outcome told = run({"inspect", "tornado:400", "--memory-limit", "192M"});
   EXPECT_EQ(told.code, 0) << told.err;
   EXPECT_THAT(told.out, HasSubstr("400 x 400 x 400 samples"));
@@ -96,14 +96,14 @@ TEST(CliFiles, InspectTellsWhatNeedsNoMemoryWhereRangesNeedTooMuch) {
   EXPECT_THAT(asked.err, HasSubstr("--memory-limit 901M would do"));
 }
 
-TEST(CliFiles, ABuiltInSampleIsNamedWithoutAFile) {
+TEST(CliFiles, BuiltInSampleNeedsNoFile) {
   const Folder folder;
   const Outcome told = run({"inspect", "--json", "tornado"});
   ASSERT_EQ(told.code, 0) << told.err;
   EXPECT_EQ(json::parse(told.out)["id"], "tornado");
 }
 
-TEST(CliFiles, TheNameDecidesTheFormatAndDashIsStdout) {
+TEST(CliFiles, NameDecidesTheFormatAndDashIsStdout) {
   const Folder folder;
   const std::string path = synth(folder, "tornado", "8x8x8");
   const auto draw = [&](const std::string& output) {
@@ -125,7 +125,7 @@ TEST(CliFiles, TheNameDecidesTheFormatAndDashIsStdout) {
   EXPECT_EQ(png, read_file(folder.file("a.png")));
 }
 
-TEST(CliFiles, AReportTellsWhatAPictureTookAndLeftOut) {
+TEST(CliFiles, ReportContainsTimesAndOmittedWork) {
   const Folder folder;
   const std::string path = synth(folder, "climate", "16x8x5");
   const auto report_of = [&](const Words& more) {
@@ -159,7 +159,7 @@ TEST(CliFiles, AReportTellsWhatAPictureTookAndLeftOut) {
   EXPECT_EQ(run({"render", path, "-o", "-", "--report", "-"}).code, 2);
 }
 
-TEST(CliFiles, AnyNumberOfThreadsGivesTheSameBytes) {
+TEST(CliFiles, AnyThreadCountGivesTheSameBytes) {
   const Folder folder;
   const std::string path = synth(folder, "climate", "32x16x6");
   const auto draw = [&](const char* threads) {
@@ -174,8 +174,8 @@ TEST(CliFiles, AnyNumberOfThreadsGivesTheSameBytes) {
   EXPECT_EQ(one, draw("5"));
 }
 
-// No file may grow past a limit: to the libraries, what a full disk is.
-TEST(CliFiles, SynthThatCannotWriteSaysSoLeavesNothingAndDoesNotCrash) {
+// A file size limit, which libraries report like a full disk.
+TEST(CliFiles, SynthReportsAFailedWriteAndLeavesNoFile) {
   const Folder folder;
   rlimit before{};
   ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
@@ -199,7 +199,7 @@ TEST(CliFiles, SynthThatCannotWriteSaysSoLeavesNothingAndDoesNotCrash) {
   EXPECT_THAT(nowhere.err, HasSubstr("missing folder"));
 }
 
-TEST(CliFiles, LaterWordsChangeTheViewOfTheFile) {
+TEST(CliFiles, OptionsOverrideTheViewFile) {
   const Folder folder;
   const std::string path = synth(folder, "tornado", "8x8x8");
   const std::string view = folder.file("view.json");
@@ -219,7 +219,7 @@ TEST(CliFiles, LaterWordsChangeTheViewOfTheFile) {
   EXPECT_NE(draw({"--set", "/image/background=#00ff00"}), draw({}));
 }
 
-TEST(CliFiles, StepChoosesAnotherPicture) {
+TEST(CliFiles, StepSelectsAnotherPicture) {
   const Folder folder;
   const std::string path = synth(folder, "climate", "32x16x6");
   const Words words{"render", path, "--size", "80x60", "-o", "-", "--step"};
@@ -230,7 +230,7 @@ TEST(CliFiles, StepChoosesAnotherPicture) {
   EXPECT_NE(run(first).out, run(second).out);
 }
 
-TEST(CliFiles, BadViewsExitWith2AndNameThePlace) {
+TEST(CliFiles, InvalidViewsExitWith2AndNameTheirLocation) {
   const Folder folder;
   const std::string path = synth(folder, "tornado", "8x8x8");
   const std::vector<std::pair<Words, std::string>> bad{
@@ -260,7 +260,7 @@ TEST(CliFiles, BadViewsExitWith2AndNameThePlace) {
   }
 }
 
-TEST(CliFiles, BadDataExitsWith3AndSaysWhichFile) {
+TEST(CliFiles, InvalidDataExitsWith3AndNamesTheFile) {
   const Folder folder;
   const std::string text = folder.file("letter.nc");
   write_file(text, "Dear reader, this is not a data file.\n");
@@ -282,7 +282,7 @@ TEST(CliFiles, BadDataExitsWith3AndSaysWhichFile) {
   EXPECT_FALSE(std::filesystem::exists(folder.file("never.png")));
 }
 
-TEST(CliFiles, WhatIsNotThereExitsWith1) {
+TEST(CliFiles, MissingFilesExitWith1) {
   const Folder folder;
   for (const Words& words :
        {Words{"render", "hurricane", "-o", folder.file("a.png")},
@@ -301,7 +301,7 @@ TEST(CliFiles, WhatIsNotThereExitsWith1) {
   EXPECT_THAT(unwritable.err, HasSubstr("folder.png"));
 }
 
-TEST(CliFiles, AFullDiskIsToldAndNothingHalfIsLeft) {
+TEST(CliFiles, FullDiskIsReportedAndNoPartialFileLeft) {
   const Folder folder;
   const std::string path = synth(folder, "tornado", "4x4x4");
   const std::string full = folder.file("full.png");  // every write to /dev/full fails
@@ -309,10 +309,10 @@ TEST(CliFiles, AFullDiskIsToldAndNothingHalfIsLeft) {
   const Outcome outcome = run({"render", path, "--size", "8x8", "-o", full});
   EXPECT_EQ(outcome.code, 1);
   EXPECT_THAT(outcome.err, HasSubstr("full.png"));
-  EXPECT_TRUE(std::filesystem::is_symlink(full)) << "what is no regular file stays";
+  EXPECT_TRUE(std::filesystem::is_symlink(full)) << "a file that is not regular is kept";
 }
 
-TEST(CliFiles, NamesFromOutsideCannotCommandTheTerminal) {
+TEST(CliFiles, ControlCharactersInNamesAreEscaped) {
   const Outcome outcome = run({"inspect", "evil\x1b[31m\nname.nc"});
   EXPECT_EQ(outcome.code, 1);
   EXPECT_EQ(outcome.err.find('\x1b'), std::string::npos);

@@ -1,5 +1,4 @@
-// docs/gallery: its view files drawn small by the program; its script, pictures and text against
-// each other.
+// docs/gallery: its view files rendered small, and consistency of its script, pictures and text.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -53,8 +52,8 @@ std::vector<Entry> script_entries() {
   return entries;
 }
 
-// Share of the pixels that the volume covers by a tenth at least, from a picture as .npy: little-
-// endian float32, [height, width, 4], after a header that ends in a line feed.
+// Share of pixels with a coverage of at least 0.1, from a picture as .npy: little-endian float32,
+// [height, width, 4], after a header that ends in a line feed.
 double covered(const std::string& npy, int width, int height) {
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   const std::size_t bytes = pixels * 4 * sizeof(float);
@@ -67,7 +66,7 @@ double covered(const std::string& npy, int width, int height) {
 }
 
 // A gallery's picture fills its frame: at least a quarter of it is not background.
-TEST(Gallery, EveryViewIsAcceptedAndFillsItsPicture) {
+TEST(Gallery, EveryViewIsValidAndFillsItsPicture) {
   const Folder folder;
   for (const std::string& name : names(".json")) {
     SCOPED_TRACE(name);
@@ -86,7 +85,7 @@ TEST(Gallery, EveryViewIsAcceptedAndFillsItsPicture) {
   }
 }
 
-TEST(Gallery, TheScriptDrawsEveryViewAndNoOther) {
+TEST(Gallery, ScriptRendersEveryViewAndNoOther) {
   std::set<std::string> drawn;
   for (const Entry& entry : script_entries()) {
     SCOPED_TRACE(entry.name);
@@ -99,7 +98,7 @@ TEST(Gallery, TheScriptDrawsEveryViewAndNoOther) {
   EXPECT_EQ(drawn, names(".jpg"));
 }
 
-TEST(Gallery, PicturesAreSmallAndTheTextNamesFilesThatAreThere) {
+TEST(Gallery, PicturesAreSmallAndReferencedFilesExist) {
   const std::string text = read_file((gallery() / "README.md").string());
   for (const std::string& name : names(".jpg")) {
     EXPECT_LE(fs::file_size(gallery() / (name + ".jpg")), picture_bytes_max) << name;
@@ -113,7 +112,7 @@ TEST(Gallery, PicturesAreSmallAndTheTextNamesFilesThatAreThere) {
 }
 
 // The commands of the text are those of the script.
-TEST(Gallery, TheTextTellsTheScriptsCommands) {
+TEST(Gallery, TextQuotesTheCommandsOfTheScript) {
   const std::string text = read_file((gallery() / "README.md").string());
   for (const Entry& entry : script_entries()) {
     std::ostringstream command;
@@ -123,7 +122,7 @@ TEST(Gallery, TheTextTellsTheScriptsCommands) {
   }
 }
 
-TEST(Gallery, QualityChoosesTheBytesOfAJpeg) {
+TEST(Gallery, QualitySetsTheBytesOfAJpeg) {
   const Folder folder;
   const std::string path = synth(folder, "tornado", "16x16x16");
   const auto bytes = [&](const Words& more) {

@@ -20,7 +20,7 @@ using testing::MatchesRegex;
 using testing::Not;
 using testing::StartsWith;
 
-// A socket of ours on a free port of 127.0.0.1.
+// A listening socket on a free port of 127.0.0.1.
 class Port {
  public:
   Port() : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -79,7 +79,7 @@ std::uint16_t port_of(const std::string& url) {
                                                                : std::stoi(url.substr(colon + 1)));
 }
 
-TEST_F(CliServe, AStateFolderKeepsViewsOverAKillAndIsOneDaemonsAlone) {
+TEST_F(CliServe, StateFolderKeepsViewsAfterAKillAndIsLockedByOneDaemon) {
   const Words words{"serve", "--listen", "127.0.0.1:0", "--threads", "2", dataset};
   const std::string state = folder.file("state");
   const net_test::Headers json{{"Content-Type", "application/json"}};
@@ -125,12 +125,12 @@ pid_t child_of(pid_t parent) {
   return -1;
 }
 
-TEST_F(CliServe, SigtermDoesNotWaitForALoaderThatHangs) {
+TEST_F(CliServe, SigtermDoesNotWaitForAHangingLoader) {
   Process daemon({"serve", "--listen", "127.0.0.1:0", "--threads", "2", dataset});
   const std::string url = url_of(daemon);
   const auto port = port_of(url);
   const pid_t loader = child_of(daemon.id());
-  ASSERT_GT(loader, 1) << "files are read by a process of their own";
+  ASSERT_GT(loader, 1) << "files are read by a separate process";
   ASSERT_EQ(kill(loader, SIGSTOP), 0);
   net_test::Socket asking(port);
   asking.send(
@@ -154,7 +154,7 @@ std::string limit_told(const std::string& message) {
   return message.substr(begin, message.find(' ', begin) - begin);
 }
 
-TEST_F(CliServe, ADatasetOfWhichNoStepFitsIsRefusedWithTheLimitThatWouldDo) {
+TEST_F(CliServe, DatasetWithoutAFittingStepIsRefusedWithTheRequiredLimit) {
   const std::string large = "tornado:200x200x200";  // 91.6 MiB of wind, 30.5 MiB of cloud
   const Outcome refused =
       run({"serve", "--listen", "127.0.0.1:0", "--memory-limit", "192M", large});
@@ -180,7 +180,7 @@ TEST_F(CliServe, ADatasetOfWhichNoStepFitsIsRefusedWithTheLimitThatWouldDo) {
 }
 
 // The reported memory includes a loader and the buffers for reading.
-TEST_F(CliServe, TheLimitThatIsToldDoesForFilesToo) {
+TEST_F(CliServe, ReportedRequiredLimitSufficesForFiles) {
   const std::string file = folder.file("large.nc");
   ASSERT_EQ(run({"synth", "tornado", "--dims", "180x180x180", "--steps", "1", "-o", file}).code, 0);
   const Outcome refused = run(
@@ -193,27 +193,27 @@ TEST_F(CliServe, TheLimitThatIsToldDoesForFilesToo) {
   EXPECT_EQ(drawn.code, 0) << limit << ": " << drawn.err;
 }
 
-TEST_F(CliServe, WhatDoesNotFitIntoTheMemoryLimitIsNamedAndSoIsTheOption) {
+TEST_F(CliServe, DatasetAboveTheMemoryLimitIsReportedWithTheOption) {
   const std::string large = "tornado:170x170x170";  // 56.2 MiB of wind, 18.7 MiB of cloud
   Process daemon({"serve", "--listen", "127.0.0.1:0", "--memory-limit", "192M", large});
   const std::string url = url_of(daemon);
   const auto port = port_of(url);
   const std::string of = "/v1/datasets/" + large + '/';
-  // Small pictures are drawn of averages, which take turns in memory.
+  // Small pictures use averages, which need memory in turn.
   const auto picture = net_test::get(port, of + "frame.png?width=512&height=512");
   ASSERT_EQ(picture.status, 507);
   EXPECT_THAT(picture.body, HasSubstr("dataset '" + large + "'"));
   EXPECT_THAT(picture.body, HasSubstr("--memory-limit 192M leaves 68.0 MiB for data"));
   EXPECT_THAT(picture.body, HasSubstr("'wind' and 'cloud' need 75.0 MiB together"));
   EXPECT_EQ(limit_told(picture.body), "200M");
-  EXPECT_EQ(net_test::get(port, of + "fields/wind/range").status, 200) << "a field by itself fits";
+  EXPECT_EQ(net_test::get(port, of + "fields/wind/range").status, 200) << "a single field fits";
   daemon.send(SIGTERM);
   EXPECT_EQ(daemon.wait(), 0);
   EXPECT_THAT(daemon.messages(), HasSubstr("may be too small for a dataset's first view"));
 }
 #endif
 
-TEST_F(CliServe, SigintDrainsToo) {
+TEST_F(CliServe, SigintDrains) {
   Process daemon({"serve", "--listen", ":0", dataset});
   url_of(daemon);
   daemon.send(SIGINT);
@@ -228,7 +228,7 @@ TEST_F(CliServe, BasePathIsPartOfTheUrlAndOfHealthcheck) {
   EXPECT_EQ(run({"healthcheck", url.substr(0, url.size() - 1)}).code, 0);
 }
 
-TEST_F(CliServe, LogGoesToStderrAsJsonLinesWhenAskedFor) {
+TEST_F(CliServe, LogIsWrittenToStderrAsJsonLines) {
   Process daemon({"serve", "--listen", ":0", dataset}, {"WINDSPLAT_LOG_FORMAT=json"});
   url_of(daemon);
   daemon.send(SIGTERM);
@@ -237,7 +237,7 @@ TEST_F(CliServe, LogGoesToStderrAsJsonLinesWhenAskedFor) {
   EXPECT_THAT(daemon.messages(), HasSubstr("\"dataset\":\"tornado-small\""));
 }
 
-TEST_F(CliServe, AnAddressThatOthersReachNeedsItsFlag) {
+TEST_F(CliServe, NonLoopbackAddressRequiresItsFlag) {
   const Outcome refused = run({"serve", "--listen", "0.0.0.0:0", dataset});
   EXPECT_EQ(refused.code, 2);
   EXPECT_THAT(refused.err, HasSubstr("--allow-remote"));
@@ -247,7 +247,7 @@ TEST_F(CliServe, AnAddressThatOthersReachNeedsItsFlag) {
   EXPECT_EQ(daemon.wait(), 0);
 }
 
-TEST_F(CliServe, ATakenPortIsAnErrorThatNamesIt) {
+TEST_F(CliServe, PortInUseIsReported) {
   const Port port;
   port.take();
   const Outcome outcome = run({"serve", "--listen", "127.0.0.1:" + port.text(), dataset});
@@ -257,7 +257,7 @@ TEST_F(CliServe, ATakenPortIsAnErrorThatNamesIt) {
   EXPECT_THAT(outcome.err, HasSubstr("use port 0 for any free port"));
 }
 
-TEST_F(CliServe, ADatasetThatCannotBeOpenedIsListedAsFailedAmongTheOthers) {
+TEST_F(CliServe, DatasetThatFailsToOpenIsListedAsFailed) {
   const std::string bad = folder.file("bad.nc");
   write_file(bad, "nothing of use");
   Process daemon({"serve", "--listen", "127.0.0.1:0", bad, folder.file("absent.nc"), dataset});
@@ -276,7 +276,7 @@ TEST_F(CliServe, ADatasetThatCannotBeOpenedIsListedAsFailedAmongTheOthers) {
   EXPECT_EQ(daemon.wait(), 0);
 }
 
-TEST_F(CliServe, WhatIsListedAsFailedRecoversWithItsFileOrIsForgotten) {
+TEST_F(CliServe, FailedDatasetRecoversWithItsFileOrIsRemoved) {
   const std::string mended = folder.file("mended.nc");
   const std::string bad = folder.file("bad.nc");
   write_file(bad, "nothing of use");
@@ -301,7 +301,7 @@ TEST_F(CliServe, WhatIsListedAsFailedRecoversWithItsFileOrIsForgotten) {
   EXPECT_EQ(daemon.wait(), 0);
 }
 
-TEST_F(CliServe, WithoutADatasetThatCanBeOpenedItDoesNotStart) {
+TEST_F(CliServe, WithoutAnyUsableDatasetStartupFails) {
   const std::string bad = folder.file("bad.nc");
   write_file(bad, "nothing of use");
   const Outcome outcome = run({"serve", "--listen", ":0", folder.file("absent.nc"), bad});

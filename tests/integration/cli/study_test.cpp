@@ -1,4 +1,4 @@
-// windsplat study as a person runs it: a report, a second run that measures nothing, an interrupt.
+// windsplat study on the command line: a report, a second run without measurements, an interrupt.
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -12,7 +12,7 @@ namespace {
 using testing::HasSubstr;
 using Json = nlohmann::json;
 
-TEST(CliStudy, QuickStudyOfOneSceneWritesItsReportAndIsNotDoneTwice) {
+TEST(CliStudy, QuickStudyWritesItsReportAndSkipsFinishedPoints) {
   const Folder folder;
   const std::string out = folder.file("report");
   const Words words{"study", "--quick", "--scene", "vectors", "--threads", "1", "-o", out};
@@ -34,7 +34,7 @@ TEST(CliStudy, QuickStudyOfOneSceneWritesItsReportAndIsNotDoneTwice) {
   EXPECT_EQ(after.at("scenes").at(0).at("points"), before.at("scenes").at(0).at("points"));
 }
 
-TEST(CliStudy, AFileWithAViewIsStudiedAsTheViewSays) {
+TEST(CliStudy, FileWithAViewIsStudiedByThatView) {
   const Folder folder;
   const std::string data = synth(folder, "tornado", "12x12x12");
   write_file(folder.file("view.json"), R"({"scalars": [], "vector": {"span": 3}})");
@@ -52,7 +52,7 @@ TEST(CliStudy, AFileWithAViewIsStudiedAsTheViewSays) {
   EXPECT_THAT(done.out, HasSubstr("within a factor of 2"));
 }
 
-TEST(CliStudy, IsNotCalibratedWhereThatIsNotWanted) {
+TEST(CliStudy, CalibrationCanBeDisabled) {
   const Folder folder;
   const std::string data = synth(folder, "tornado", "12x12x12");
   const std::string out = folder.file("report");
@@ -63,7 +63,7 @@ TEST(CliStudy, IsNotCalibratedWhereThatIsNotWanted) {
       Json::parse(read_file(out + "/study.json")).at("scenes").at(0).contains("calibration"));
 }
 
-TEST(CliStudy, AnInterruptLeavesAFolderToGoOnFrom) {
+TEST(CliStudy, InterruptedStudyCanBeResumed) {
   const Folder folder;
   const std::string out = folder.file("report");
   Process process({"study", "--scene", "climate", "-o", out});

@@ -30,7 +30,7 @@ std::string shell(const std::string& command) {
   return text;
 }
 
-TEST(CliSystem, AnEmptyValueIsNoDefault) {
+TEST(CliSystem, EmptyValueIsNotTheDefault) {
   const Folder folder;
   const std::string picture = folder.file("x.png");
   const std::vector<Words> empty{{"render", "climate", "-o", picture, "--size", ""},
@@ -57,7 +57,7 @@ TEST(CliSystem, AnEmptyValueIsNoDefault) {
               HasSubstr("--size has an empty value"));
 }
 
-TEST(CliSystem, WhatCannotBePrintedIsAFailure) {
+TEST(CliSystem, FailedPrintIsAnError) {
   for (const char* words :
        {"--help", "--version", "render --help", "inspect tornado:8", "inspect tornado:8 --json"}) {
     const std::string full = shell(std::string("$W ") + words + " >/dev/full");
@@ -67,7 +67,7 @@ TEST(CliSystem, WhatCannotBePrintedIsAFailure) {
   }
 }
 
-TEST(CliSystem, APictureGoesThroughALinkToAStreamAndToStdout) {
+TEST(CliSystem, PictureIsWrittenThroughLinksStreamsAndStdout) {
   const Folder folder;
   const std::string draw = "$W render tornado:8 --size 16x16 -o ";
   fs::create_symlink("target.png", folder.file("link.png"));
@@ -95,7 +95,7 @@ bool begins_to_write(const Process& process, const std::string& path) {
   return fs::exists(part);
 }
 
-TEST(CliSystem, AnInterruptedSynthLeavesNothing) {
+TEST(CliSystem, InterruptedSynthLeavesNoFile) {
   for (const int signal : {SIGINT, SIGTERM}) {
     const Folder folder;
     const std::string path = folder.file("large.nc");
@@ -108,20 +108,20 @@ TEST(CliSystem, AnInterruptedSynthLeavesNothing) {
   }
 }
 
-TEST(CliSystem, ASynthThatIsInterruptedTwiceLeavesNothing) {
+TEST(CliSystem, SynthInterruptedTwiceLeavesNoFile) {
   for (int n = 0; n < 5; ++n) {
     const Folder folder;
     const std::string path = folder.file("large.nc");
     Process process({"synth", "tornado", "--dims", "96x96x96", "--steps", "100000", "-o", path});
     ASSERT_TRUE(begins_to_write(process, path)) << process.messages();
     process.send(SIGINT);
-    process.send(SIGTERM);  // one SIGINT that is not yet seen would swallow the next
+    process.send(SIGTERM);  // a second SIGINT would be merged with a pending one
     EXPECT_EQ(process.wait(), 130);
     EXPECT_TRUE(fs::is_empty(fs::path(path).parent_path()));
   }
 }
 
-TEST(CliSystem, ASynthThatIsInterruptedTwiceLeavesAnotherOnesFileAlone) {
+TEST(CliSystem, SynthInterruptedTwiceLeavesFilesOfOthers) {
   const Folder folder;
   const std::string path = folder.file("large.nc");
   const std::vector<std::string> words{"synth",   "tornado", "--dims", "96x96x96",
@@ -138,7 +138,7 @@ TEST(CliSystem, ASynthThatIsInterruptedTwiceLeavesAnotherOnesFileAlone) {
   EXPECT_EQ(other.wait(), 130);
 }
 
-TEST(CliSystem, SynthDoesNotTakeThePlaceOfAPipe) {
+TEST(CliSystem, SynthDoesNotReplaceAPipe) {
   const Folder folder;
   const std::string pipe = folder.file("pipe.nc");
   shell("mkfifo " + pipe);
@@ -150,7 +150,7 @@ TEST(CliSystem, SynthDoesNotTakeThePlaceOfAPipe) {
 
 #ifndef WINDSPLAT_SANITIZED  // whose shadow memory needs terabytes of address space
 // 512 threads need more than is left, whatever the libraries take.
-TEST(CliSystem, TooLittleAddressSpaceIsNamed) {
+TEST(CliSystem, InsufficientAddressSpaceIsReported) {
   const std::string text =
       shell("ulimit -v 300000; timeout 30 $W serve --threads 512 --listen 127.0.0.1:0 tornado:8");
   EXPECT_THAT(text, HasSubstr("exit 1\n"));

@@ -32,7 +32,7 @@ TEST(CliUsage, VersionIsOneLineOnStdout) {
   EXPECT_EQ(version.out, "windsplat " WINDSPLAT_VERSION "\n");
 }
 
-TEST(CliUsage, ALimitThatIsNoNumberIsNamedWithItsRange) {
+TEST(CliUsage, NonNumericLimitIsReportedWithItsRange) {
   for (const char* wrong : {"abc", "-1", "1e19"}) {
     const Outcome outcome = run({"serve", "--max-handshakes", wrong});
     EXPECT_EQ(outcome.code, 2) << wrong;
@@ -44,7 +44,7 @@ TEST(CliUsage, ALimitThatIsNoNumberIsNamedWithItsRange) {
   }
 }
 
-TEST(CliUsage, WrongArgumentsExitWith2AndSayWhyOnStderrAlone) {
+TEST(CliUsage, InvalidArgumentsExitWith2AndReportOnStderrOnly) {
   const std::vector<Words> wrong{{},
                                  {"paint"},
                                  {"animate", "climate"},
@@ -106,7 +106,7 @@ TEST(CliUsage, WrongArgumentsExitWith2AndSayWhyOnStderrAlone) {
   }
 }
 
-TEST(CliUsage, AMemoryLimitThatCannotHoldIsRefusedWithWhatIsNeeded) {
+TEST(CliUsage, InsufficientMemoryLimitIsRefusedWithTheRequiredAmount) {
   const Outcome outcome = run({"serve", "--memory-limit", "40M", "tornado"});
   EXPECT_EQ(outcome.code, 2);
   EXPECT_THAT(outcome.err,
@@ -114,7 +114,7 @@ TEST(CliUsage, AMemoryLimitThatCannotHoldIsRefusedWithWhatIsNeeded) {
                          "112M for the program and a picture"));
 }
 
-TEST(CliUsage, AMemoryLimitMayHaveALowerCaseUnitAndDecimals) {
+TEST(CliUsage, MemoryLimitAcceptsLowerCaseUnitsAndDecimals) {
   for (const char* limit : {"192m", "1.5G", "0.25g", "201326592", "128T"}) {
     const Outcome outcome = run({"inspect", "tornado:8", "--memory-limit", limit});
     EXPECT_EQ(outcome.code, 0) << limit << ": " << outcome.err;
@@ -124,13 +124,13 @@ TEST(CliUsage, AMemoryLimitMayHaveALowerCaseUnitAndDecimals) {
   EXPECT_THAT(absurd.err, HasSubstr("'8388608T' is above 128T"));
 }
 
-TEST(CliUsage, HelpTellsTheLeastMemoryLimit) {
+TEST(CliUsage, HelpStatesTheMinimumMemoryLimit) {
   for (const char* command : {"serve", "render", "animate", "inspect", "study"}) {
     EXPECT_THAT(run({command, "--help"}).out, HasSubstr("at least 192M")) << command;
   }
 }
 
-TEST(CliUsage, AWordThatIsNotKnownIsNamedWithWhatMayBeMeant) {
+TEST(CliUsage, UnknownWordIsReportedWithASuggestion) {
   EXPECT_THAT(
       run({"render", "tornado", "-o", "x.png", "--siez", "3x3"}).err,
       StartsWith("windsplat: '--siez' is not an option of 'render'; did you mean --size?\n"));
@@ -141,8 +141,8 @@ TEST(CliUsage, AWordThatIsNotKnownIsNamedWithWhatMayBeMeant) {
               HasSubstr("'extra' is an unexpected argument"));
 }
 
-// What a user's words bring into a message cannot pose as lines or colours of the program's own.
-TEST(CliUsage, MessagesHoldNoControlCharactersOfTheArguments) {
+// Text from arguments must not imitate lines or colours of the program's messages.
+TEST(CliUsage, MessagesEscapeControlCharactersOfArguments) {
   for (const Words& words : std::vector<Words>{
            {"x\ny\x1b[0m"}, {"serve", "--log-format", "x\nwindsplat: all well\x1b]0;t\a"}}) {
     const Outcome outcome = run(words);
@@ -153,14 +153,14 @@ TEST(CliUsage, MessagesHoldNoControlCharactersOfTheArguments) {
   EXPECT_THAT(run({"paint"}).err, HasSubstr("unknown command 'paint'"));
 }
 
-// A flag that would do nothing must not be taken.
-TEST(CliUsage, ADataRootThatIsNotThereIsRefused) {
+// A flag without effect must be refused.
+TEST(CliUsage, MissingDataRootIsRefused) {
   const Outcome outcome = run({"serve", "--data-root", "x"});
   EXPECT_EQ(outcome.code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("--data-root 'x'"));
 }
 
-TEST(CliUsage, AStateFolderThatCannotBeIsRefused) {
+TEST(CliUsage, UnusableStateFolderIsRefused) {
   for (const Words& environment : {Words{}, Words{"WINDSPLAT_STATE_DIR=/dev/null/state"}}) {
     Words words{"serve", "--listen", "127.0.0.1:0", "tornado"};
     if (environment.empty()) words.insert(words.end(), {"--state-dir", "/dev/null/state"});
@@ -172,7 +172,7 @@ TEST(CliUsage, AStateFolderThatCannotBeIsRefused) {
   EXPECT_THAT(run({"serve", "--help"}).out, HasSubstr("WINDSPLAT_STATE_DIR"));
 }
 
-TEST(CliUsage, TheEnvironmentGivesOptionsAndTheCommandLineWins) {
+TEST(CliUsage, CommandLineOverridesTheEnvironment) {
   const Words environment{"WINDSPLAT_LISTEN=nonsense"};
   const Outcome from_environment = run({"serve"}, environment);
   EXPECT_EQ(from_environment.code, 2);

@@ -54,12 +54,12 @@ Headers operator+(Headers a, const Headers& b) {
   return a;
 }
 
-TEST_F(Guarded, health_is_told_to_everyone) {
+TEST_F(Guarded, HealthNeedsNoToken) {
   EXPECT_EQ(get(port(), "/livez").status, 200);
   EXPECT_EQ(get(port(), "/readyz").status, 200);
 }
 
-TEST_F(Guarded, nothing_else_is) {
+TEST_F(Guarded, EverythingElseNeedsAToken) {
   for (const char* target : {"/", "/v1", "/v1/datasets", "/metrics", "/view.schema.json", "/none",
                              "/v1/datasets/small/frame.jpg?width=20&height=20", "/login"}) {
     for (const Headers& wrong : {Headers{}, Headers{{"Authorization", "Bearer " + secret + "x"}},
@@ -75,7 +75,7 @@ TEST_F(Guarded, nothing_else_is) {
   EXPECT_EQ(request(port(), "OPTIONS", "/v1").status, 401);
 }
 
-TEST_F(Guarded, the_token_opens_everything) {
+TEST_F(Guarded, TokenGrantsAccessToEverything) {
   for (const char* target : {"/", "/v1", "/metrics"}) {
     EXPECT_EQ(get(port(), target, bearer).status, 200) << target;
   }
@@ -88,7 +88,7 @@ TEST_F(Guarded, the_token_opens_everything) {
 }
 
 // The body of an unauthenticated request is not read, so the connection is closed.
-TEST_F(Guarded, a_stranger_is_refused_before_the_body) {
+TEST_F(Guarded, UnauthorizedRequestIsRefusedBeforeItsBody) {
   Socket socket(port());
   socket.send("POST /v1/frames HTTP/1.1\r\nHost: x\r\nContent-Length: 60000\r\n\r\n");
   const Answer answer = read_answer(socket);
@@ -96,7 +96,7 @@ TEST_F(Guarded, a_stranger_is_refused_before_the_body) {
   EXPECT_EQ(answer.header("connection"), "close");
 }
 
-TEST_F(Guarded, a_websocket_shows_the_token_before_it_is_opened) {
+TEST_F(Guarded, WebSocketIsAuthenticatedBeforeTheUpgrade) {
   const auto status = [&](const Headers& headers) {
     return StreamClient(port(), headers).handshake().status;
   };
@@ -116,7 +116,7 @@ TEST_F(Guarded, a_websocket_shows_the_token_before_it_is_opened) {
   EXPECT_TRUE(viewer.next_text("hello"));
 }
 
-TEST_F(Guarded, a_person_logs_in_and_the_cookie_is_enough) {
+TEST_F(Guarded, LoginCookieGrantsAccess) {
   const Answer form = get(port(), "/", browser);
   EXPECT_EQ(form.status, 401);
   EXPECT_THAT(form.header("content-type"), HasSubstr("text/html"));
@@ -140,14 +140,14 @@ TEST_F(Guarded, a_person_logs_in_and_the_cookie_is_enough) {
   EXPECT_EQ(keep({}), 403);
 }
 
-TEST_F(Guarded, a_login_comes_from_the_page) {
+TEST_F(Guarded, LoginIsAcceptedFromTheOwnPageOnly) {
   EXPECT_EQ(log_in(secret, {{"Origin", "https://evil.example"}}).status, 403);
   EXPECT_EQ(log_in(secret, {{"X", "no origin"}}).status, 403);
   EXPECT_EQ(request(port(), "POST", "/login", {{"Origin", origin()}}, "token=" + secret).status,
             415);
 }
 
-TEST_F(Guarded, a_token_in_an_address_is_no_proof) {
+TEST_F(Guarded, TokenInAUrlIsRefused) {
   for (const std::string key : {"token", "access_token"}) {
     EXPECT_EQ(get(port(), "/?" + key + "=" + secret).status, 400);
     EXPECT_EQ(get(port(), "/v1?" + key + "=" + secret, bearer).status, 400);
@@ -156,7 +156,7 @@ TEST_F(Guarded, a_token_in_an_address_is_no_proof) {
 }
 
 // Correct tokens are refused too: otherwise the limit would not slow down guessing.
-TEST(GuardedGuesses, are_answered_no_more_beyond_the_limit_and_cookies_are) {
+TEST(GuardedAttempts, AreRefusedBeyondTheLimitWhileCookiesAreAccepted) {
   ServerOptions options = guarded();
   options.limits.failed_logins_per_address = 4;
   TestServer server(options);
@@ -186,7 +186,7 @@ TEST(GuardedGuesses, are_answered_no_more_beyond_the_limit_and_cookies_are) {
   EXPECT_EQ(get(port, "/v1").status, 401);
 }
 
-TEST_F(Guarded, another_token_ends_cookies_and_streams) {
+TEST_F(Guarded, NewTokenRevokesCookiesAndStreams) {
   const Headers cookie = with_cookie();
   StreamClient viewer(port(), bearer);
   ASSERT_TRUE(viewer.next_text("hello"));
@@ -202,7 +202,7 @@ TEST_F(Guarded, another_token_ends_cookies_and_streams) {
   EXPECT_EQ(get(port(), "/v1", {{"Authorization", "Bearer another-token-of-ours"}}).status, 200);
 }
 
-TEST(GuardedLog, does_not_tell_the_token_nor_what_was_tried) {
+TEST(GuardedLog, ContainsNeitherTheTokenNorAttempts) {
   log::configure(log::Format::json, log::Level::debug);
   testing::internal::CaptureStderr();
   {

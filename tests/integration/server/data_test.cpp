@@ -57,7 +57,7 @@ bool is_running(std::uint16_t port, const std::string& id) {
   return false;
 }
 
-TEST(OpenedDatasets, WhatTheServerBeganWithIsNotForgottenBecauseSomebodyPostedItToo) {
+TEST(OpenedDatasets, DatasetsOfTheCommandLineAreKeptWhenPostedAgain) {
   TestServer server(with_root(folder_of_small()));
   const Json job = finished_job(server.port(), post_file(server.port(), "small.nc"));
   EXPECT_EQ(job["state"], "done");
@@ -67,7 +67,7 @@ TEST(OpenedDatasets, WhatTheServerBeganWithIsNotForgottenBecauseSomebodyPostedIt
   EXPECT_EQ(get(server.port(), "/v1/datasets/small").status, 200);
 }
 
-// Files are opened once the gate is.
+// Files are opened when the gate is open.
 class SharedDataset : public testing::Test {
  protected:
   void SetUp() override {
@@ -108,7 +108,7 @@ class SharedDataset : public testing::Test {
   std::string second_;
 };
 
-TEST_F(SharedDataset, IsThereForTheFirstWhenTheSecondCancels) {
+TEST_F(SharedDataset, RemainsForTheFirstClientWhenTheSecondCancels) {
   cancel(second_);
   gate_->open();
   EXPECT_EQ(finished_job(port(), second_)["state"], "cancelled");
@@ -116,18 +116,18 @@ TEST_F(SharedDataset, IsThereForTheFirstWhenTheSecondCancels) {
   EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 200);
 }
 
-TEST_F(SharedDataset, IsThereForTheSecondWhenTheFirstCancels) {
+TEST_F(SharedDataset, RemainsForTheSecondClientWhenTheFirstCancels) {
   cancel(first_);
   gate_->open();
   EXPECT_EQ(finished_job(port(), first_)["state"], "cancelled");
   EXPECT_EQ(finished_job(port(), second_)["state"], "done");
   EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 200);
   EXPECT_EQ(request(port(), "DELETE", "/v1/datasets/posted?forget=true").status, 204)
-      << "it was opened by POST all the same";
+      << "it was opened by POST nevertheless";
   EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 404);
 }
 
-TEST_F(SharedDataset, GoesWithTheLastThatCancels) {
+TEST_F(SharedDataset, IsReleasedWhenTheLastClientCancels) {
   cancel(first_);
   cancel(second_);
   gate_->open();
@@ -136,7 +136,7 @@ TEST_F(SharedDataset, GoesWithTheLastThatCancels) {
   EXPECT_EQ(get(port(), "/v1/datasets/posted").status, 404);
 }
 
-// A disk that does not answer until the read is cancelled.
+// A disk that does not respond until the read is cancelled.
 class StuckSource : public data::Source {
  public:
   StuckSource(std::unique_ptr<data::Source> source, std::shared_ptr<Gate> gate)
@@ -154,8 +154,8 @@ class StuckSource : public data::Source {
   std::shared_ptr<Gate> gate_;
 };
 
-// Its client is there and waits, so 499 would not be true.
-TEST(ForgottenDatasets, APictureThatWaitsForOneIsToldWhatBecameOfIt) {
+// The client is still connected, so status 499 would be wrong.
+TEST(ForgottenDatasets, WaitingPictureReportsTheRemoval) {
   std::string name = (fs::temp_directory_path() / "windsplat-forgot-XXXXXX").string();
   ASSERT_NE(mkdtemp(name.data()), nullptr);
   fs::copy_file(small_file(), name + "/posted.nc");
@@ -186,7 +186,7 @@ TEST(ForgottenDatasets, APictureThatWaitsForOneIsToldWhatBecameOfIt) {
 }
 
 // Files that differ only in their folder: name, size and time are equal.
-TEST(KnownRanges, AreNotThoseOfAnotherFileThatLooksTheSameFromOutside) {
+TEST(KnownRanges, AreNotReusedForAnotherFileOfEqualSizeAndTime) {
   std::string name = (fs::temp_directory_path() / "windsplat-twins-XXXXXX").string();
   ASSERT_NE(mkdtemp(name.data()), nullptr);
   const fs::path root = name;
@@ -219,7 +219,7 @@ TEST(KnownRanges, AreNotThoseOfAnotherFileThatLooksTheSameFromOutside) {
   fs::remove_all(root);
 }
 
-TEST(Loads, ADatasetThatHangsLeavesTheOthersATurn) {
+TEST(Loads, HangingDatasetDoesNotBlockOthers) {
   const auto gate = std::make_shared<Gate>();
   std::string name = (fs::temp_directory_path() / "windsplat-hangs-XXXXXX").string();
   ASSERT_NE(mkdtemp(name.data()), nullptr);
@@ -237,13 +237,13 @@ TEST(Loads, ADatasetThatHangsLeavesTheOthersATurn) {
   ASSERT_EQ(finished_job(server.port(), post_file(server.port(), "hangs.nc"))["state"], "done");
   const std::string probe = "/v1/datasets/hangs/probe?x=0&y=0&z=500&step=";
   std::vector<std::unique_ptr<Socket>> waiting;
-  for (int i = 0; i < 8; ++i) {  // as many as one address may have
+  for (int i = 0; i < 8; ++i) {  // the maximum for one address
     waiting.push_back(std::make_unique<Socket>(server.port()));
     waiting.back()->send("GET " + probe + std::to_string(i % small_steps) +
                          " HTTP/1.1\r\nHost: x\r\n\r\n");
   }
   ASSERT_TRUE(gate->wait_for(1));
-  // More of them than there are threads stand in line before any of these.
+  // More of them than threads are queued before any of these.
   EXPECT_EQ(get(server.port(), "/v1/datasets/small/probe?x=0&y=0&z=500&step=0").status, 200);
   EXPECT_EQ(get(server.port(), "/v1/datasets/small/frame.png?width=32&height=32").status, 200);
   EXPECT_EQ(get(server.port(), "/v1/datasets/small").status, 200);
@@ -253,7 +253,7 @@ TEST(Loads, ADatasetThatHangsLeavesTheOthersATurn) {
   fs::remove_all(root);
 }
 
-TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesWaitForNobody) {
+TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesDoNotWait) {
   Gate gate;
   const auto one = std::make_shared<int>(1);
   std::mutex mutex;
@@ -278,13 +278,13 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesWaitForNobody) {
   other_ran.get_future().wait();
   note(0);
   gate.open();
-  last_ran.get_future().wait();  // end() cancels what waits, and cancelled ones keep no order
+  last_ran.get_future().wait();  // end() cancels waiting jobs, and cancelled ones keep no order
   loads.end();
   EXPECT_THAT(order, testing::ElementsAre(0, 1, 2, 3));
 }
 
-// The line of one dataset is full: others still get in.
-TEST(Loads, EveryDatasetHasALineOfItsOwn) {
+// The queue of one dataset is full: others are still admitted.
+TEST(Loads, EveryDatasetHasItsOwnQueue) {
   Gate gate;
   net::LoadService loads(2, 2, "loads");
   const auto one = std::make_shared<int>(1);
@@ -300,9 +300,9 @@ TEST(Loads, EveryDatasetHasALineOfItsOwn) {
   gate.open();
 }
 
-// Views that say nothing of their fields' ranges, so that working out what they will need reads
-// the field they show; all but one in vain.
-TEST(Viewer, OfManyWishesThatWaitOnlyTheNewestIsWorkedOut) {
+// Views without ranges of their fields, so that their completion reads the shown field; all but one
+// are superseded.
+TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add("climate:32x16x6").value();
   const std::string scalar = dataset->info().first(data::FieldKind::scalar)->name;
@@ -313,7 +313,7 @@ TEST(Viewer, OfManyWishesThatWaitOnlyTheNewestIsWorkedOut) {
   for (int i = 0; i < 2; ++i) {
     ASSERT_TRUE(services.backend.loads.submit({{}, [&] { gate.pass(); }}));
   }
-  ASSERT_TRUE(gate.wait_for(2)) << "both threads are taken";
+  ASSERT_TRUE(gate.wait_for(2)) << "both threads are busy";
   protocol::View of_scalar;
   of_scalar.dataset = dataset->info().id;
   protocol::View of_vector = of_scalar;
@@ -333,7 +333,7 @@ TEST(Viewer, OfManyWishesThatWaitOnlyTheNewestIsWorkedOut) {
   EXPECT_TRUE(dataset->seen(vector, 0));
 }
 
-TEST(Drawings, ARequestThatWasLetInIsNotRefusedOnceItsDataIsThere) {
+TEST(Drawings, AdmittedRequestIsNotRefusedAfterLoading) {
   Gate gate;  // before the services, whose threads use it until they end
   std::promise<std::string> told;
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);

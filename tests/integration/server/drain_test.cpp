@@ -11,8 +11,8 @@
 namespace net_test {
 namespace {
 
-// Takes frames and gives their credit back until the view is at rest, so that what is asked for
-// next is begun.
+// Receives and acknowledges frames until the view is at rest, so that the next request starts at
+// once.
 bool until_final(StreamClient& client) {
   while (const auto bytes = client.next_frame()) {
     const auto header = windsplat::protocol::parse_frame_header(
@@ -24,21 +24,21 @@ bool until_final(StreamClient& client) {
   return false;
 }
 
-TEST(Drain, an_idle_server_ends) {
+TEST(Drain, IdleServerStops) {
   TestServer server;
   EXPECT_EQ(get(server.port(), "/livez").status, 200);
   server.stop();
   EXPECT_EQ(get(server.port(), "/livez").status, 0) << "the listening socket is closed";
 }
 
-TEST(Drain, twice_or_before_it_runs_is_no_harm) {
+TEST(Drain, RepeatedOrEarlyDrainIsHarmless) {
   TestServer server;
   server.server().drain();
   server.server().drain();
   server.stop();
 }
 
-TEST(Drain, streams_are_closed_with_1001) {
+TEST(Drain, StreamsAreClosedWith1001) {
   TestServer server;
   StreamClient idle(server.port());
   ASSERT_TRUE(idle.next_text("hello"));
@@ -52,7 +52,7 @@ TEST(Drain, streams_are_closed_with_1001) {
   server.stop();
 }
 
-TEST(Drain, is_not_put_off_by_clients_that_ask_again_and_again) {
+TEST(Drain, IsNotDelayedByRepeatedRequests) {
   TestServer server;
   std::vector<std::thread> clients;
   clients.reserve(6);
@@ -71,7 +71,7 @@ TEST(Drain, is_not_put_off_by_clients_that_ask_again_and_again) {
 }
 
 // Operations still in progress at the deadline must not access destroyed objects.
-TEST(Drain, connections_that_outlast_it_are_ended) {
+TEST(Drain, RemainingConnectionsAreClosedAtTheDeadline) {
   windsplat::net::ServerOptions options;
   options.drain_cancel_after = std::chrono::milliseconds(0);
   options.drain_abort_after = std::chrono::milliseconds(0);
@@ -94,7 +94,7 @@ TEST(Drain, connections_that_outlast_it_are_ended) {
   EXPECT_TRUE(drawing.closed_by_peer());
 }
 
-TEST(Drain, a_picture_that_is_being_drawn_is_answered_and_readiness_is_gone_meanwhile) {
+TEST(Drain, RunningPictureIsAnsweredWhileReadinessFails) {
   TestServer server;
   Socket drawing(server.port());
   drawing.send(
@@ -107,7 +107,7 @@ TEST(Drain, a_picture_that_is_being_drawn_is_answered_and_readiness_is_gone_mean
   const auto closing = stream.next();
   ASSERT_TRUE(closing);
   const Answer ready = get(server.port(), "/readyz");
-  if (ready.status != 0) {  // else it had ended already
+  if (ready.status != 0) {  // otherwise it had already ended
     EXPECT_EQ(ready.status, 503);
     EXPECT_EQ(get(server.port(), "/v1").status, 503);
   }
@@ -117,9 +117,9 @@ TEST(Drain, a_picture_that_is_being_drawn_is_answered_and_readiness_is_gone_mean
   server.stop();
 }
 
-TEST(Drain, a_peer_that_never_reads_does_not_hold_it_up) {
+TEST(Drain, PeerThatNeverReadsDoesNotDelayIt) {
   TestServer server;
-  // A picture of noise that no kernel buffer takes: its write is stuck when the drain begins.
+  // A picture of noise too large for kernel buffers: its write is blocked when the drain starts.
   StreamClient deaf(server.port(), {}, "/v1/stream", 4096);
   deaf.say(R"({"type":"patch","rev":1,"patch":{"dataset":"small",
               "image":{"width":32,"height":32}}})");
@@ -134,7 +134,7 @@ TEST(Drain, a_peer_that_never_reads_does_not_hold_it_up) {
   EXPECT_TRUE(deaf.socket.closed_by_peer());
 }
 
-TEST(Drain, idle_connections_do_not_hold_it_up) {
+TEST(Drain, IdleConnectionsDoNotDelayIt) {
   TestServer server;
   Socket silent(server.port());
   Socket between(server.port());

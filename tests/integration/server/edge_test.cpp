@@ -27,7 +27,7 @@ class Edge : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(Edge, requests_that_can_be_read_in_two_ways_are_refused) {
+TEST_F(Edge, AmbiguousRequestsAreRefused) {
   const std::string get = "GET /livez HTTP/1.1\r\n";
   const std::string post = "POST /v1/frames HTTP/1.1\r\nHost: x\r\n";
   struct Case {
@@ -62,7 +62,7 @@ TEST_F(Edge, requests_that_can_be_read_in_two_ways_are_refused) {
 }
 
 // DNS rebinding: the page of a foreign name that resolves to this machine.
-TEST(LocalHosts, alone_are_answered_where_only_they_are_expected) {
+TEST(LocalHosts, AreTheOnlyHostNamesAnsweredOnLoopback) {
   windsplat::net::ServerOptions options;
   options.local_hosts_only = true;
   options.allow_origins = {"https://winds.example"};
@@ -82,7 +82,7 @@ TEST(LocalHosts, alone_are_answered_where_only_they_are_expected) {
   }
 }
 
-TEST_F(Edge, a_body_too_large_is_refused_before_it_is_read) {
+TEST_F(Edge, OversizeBodyIsRefusedBeforeItIsRead) {
   const std::string post = "POST /v1/frames HTTP/1.1\r\nHost: x\r\n";
   // No body was sent: the response depends on the header only.
   for (const char* length : {"65537", "104857600", "9223372036854775808", "18446744073709551615"}) {
@@ -92,17 +92,17 @@ TEST_F(Edge, a_body_too_large_is_refused_before_it_is_read) {
   }
 }
 
-TEST_F(Edge, a_body_of_100_mb_that_is_sent_all_the_same_gets_413) {
+TEST_F(Edge, BodyOf100MbSentWithoutWaitingGets413) {
   Socket socket(port());
   socket.send("POST /v1/frames HTTP/1.1\r\nHost: x\r\nContent-Length: 104857600\r\n\r\n");
   const std::string megabyte(1 << 20, 'x');
   for (int n = 0; n < 100; ++n) {
-    if (!socket.send(megabyte)) break;  // the server has had enough
+    if (!socket.send(megabyte)) break;  // the server has refused the rest
   }
   EXPECT_EQ(read_answer(socket).status, 413);
 }
 
-TEST_F(Edge, headers_of_every_size_about_the_limit) {
+TEST_F(Edge, HeadersOfEverySizeAroundTheLimit) {
   const std::string start = "GET /livez HTTP/1.1\r\nHost: x\r\nX: ";
   const std::string end = "\r\n\r\n";
   for (const std::size_t size : {8191U, 8192U, 8193U, 9000U, 16383U, 16384U, 16385U, 70000U}) {
@@ -116,14 +116,14 @@ TEST_F(Edge, headers_of_every_size_about_the_limit) {
       expect_refused(bytes, 431);
     }
   }
-  // One that never ends.
+  // An endless header.
   Socket socket(port());
   socket.send(start);
   socket.send(std::string(100000, 'a'));
   EXPECT_EQ(read_answer(socket).status, 431);
 }
 
-TEST_F(Edge, bodies_at_the_limit_are_read) {
+TEST_F(Edge, BodiesAtTheLimitAreRead) {
   for (const std::size_t size : {65535U, 65536U}) {
     const std::string body = R"({"dataset":"small","image":{"width":16,"height":16}})";
     const Answer answer = post_view(port(), body + std::string(size - body.size(), ' '));
@@ -131,7 +131,7 @@ TEST_F(Edge, bodies_at_the_limit_are_read) {
   }
 }
 
-TEST_F(Edge, a_connection_carries_many_requests_even_sent_at_once) {
+TEST_F(Edge, ConnectionCarriesManyRequestsEvenPipelined) {
   Socket socket(port());
   const std::string one = "GET /livez HTTP/1.1\r\nHost: x\r\n\r\n";
   const std::string picture =
@@ -155,7 +155,7 @@ TEST_F(Edge, a_connection_carries_many_requests_even_sent_at_once) {
   EXPECT_EQ(read_answer(socket).status, 200);
 }
 
-TEST_F(Edge, a_refusal_after_a_head_has_its_body) {
+TEST_F(Edge, RefusalAfterAHeadRequestHasItsBody) {
   Socket socket(port());
   socket.send("HEAD /livez HTTP/1.1\r\nHost: x\r\n\r\n");
   EXPECT_EQ(read_answer(socket, true).status, 200);
@@ -166,18 +166,18 @@ TEST_F(Edge, a_refusal_after_a_head_has_its_body) {
   EXPECT_FALSE(answer.body.empty());
 }
 
-TEST_F(Edge, http_1_0_is_answered_and_closed) {
+TEST_F(Edge, Http10IsAnsweredAndClosed) {
   Socket socket(port());
   socket.send("GET /livez HTTP/1.0\r\nHost: x\r\n\r\n");
   EXPECT_EQ(read_answer(socket).status, 200);
   EXPECT_TRUE(socket.closed_by_peer());
 }
 
-TEST_F(Edge, absolute_form_is_the_same_path) {
+TEST_F(Edge, AbsoluteFormIsTheSamePath) {
   EXPECT_EQ(raw(port(), "GET http://x/livez HTTP/1.1\r\nHost: x\r\n\r\n").status, 200);
 }
 
-TEST_F(Edge, an_expected_100_is_said_before_the_body_comes) {
+TEST_F(Edge, ExpectedContinueIsSentBeforeTheBody) {
   const std::string body = R"({"dataset":"small","image":{"width":16,"height":16}})";
   Socket socket(port());
   socket.send(
@@ -189,7 +189,7 @@ TEST_F(Edge, an_expected_100_is_said_before_the_body_comes) {
   EXPECT_EQ(read_answer(socket).status, 200);
 }
 
-TEST_F(Edge, a_slow_header_is_cut_off_while_others_are_served) {
+TEST_F(Edge, SlowHeaderTimesOutWhileOthersAreServed) {
   Socket slow(port());
   slow.send("GET /livez HT");
   Socket silent_body(port());
@@ -199,14 +199,14 @@ TEST_F(Edge, a_slow_header_is_cut_off_while_others_are_served) {
   EXPECT_TRUE(silent_body.closed_by_peer());
 }
 
-TEST_F(Edge, a_client_that_leaves_frees_the_renderer) {
+TEST_F(Edge, DisconnectCancelsTheRendering) {
   for (int n = 0; n < 12; ++n) {
     Socket socket(port());
     socket.send(
         "GET /v1/datasets/small/frame.png?width=4096&height=4096 HTTP/1.1\r\n"
         "Host: x\r\n\r\n");
   }
-  // Were they all drawn, this would come after a minute of work.
+  // If all were rendered, this would take a minute.
   const Answer answer = get(port(), "/v1/datasets/small/frame.jpg?width=32&height=32");
   EXPECT_EQ(answer.status, 200);
 }

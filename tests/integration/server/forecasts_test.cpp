@@ -21,7 +21,7 @@ class Forecasts : public testing::Test {
   Answer post(const Json& view, const Headers& headers = json_type) {
     return request(port(), "POST", "/v1/forecasts", headers, view.dump());
   }
-  // Draws the view once, so that its data is there.
+  // Renders the view once, so that its data are resident.
   void draw(const Json& view) { EXPECT_EQ(post_view(port(), view.dump()).status, 200); }
 
   static Json view_of(int width, int height) {
@@ -66,7 +66,7 @@ TEST_F(Forecasts, AreACurveOfErrorAgainstTime) {
 }
 
 // The forecast setting is the one with which POST /v1/frames draws the view.
-TEST_F(Forecasts, TheChosenPointIsHowThePictureIsDrawn) {
+TEST_F(Forecasts, ChosenPointIsTheRenderedSetting) {
   Json view = view_of(320, 240);
   draw(view);
   EXPECT_TRUE(json_of(post(view))["chosen"].is_null());
@@ -83,7 +83,7 @@ TEST_F(Forecasts, TheChosenPointIsHowThePictureIsDrawn) {
   }
 }
 
-TEST_F(Forecasts, ALargerBudgetNeverChoosesWhatErrsMore) {
+TEST_F(Forecasts, LargerBudgetNeverChoosesALargerError) {
   Json view = view_of(640, 480);
   draw(view);
   double last = 2;
@@ -96,10 +96,10 @@ TEST_F(Forecasts, ALargerBudgetNeverChoosesWhatErrsMore) {
     different += error < last ? 1U : 0U;
     last = error;
   }
-  EXPECT_GT(different, 1U) << "or this test shows nothing";
+  EXPECT_GT(different, 1U) << "otherwise this test shows nothing";
 }
 
-TEST_F(Forecasts, BeforeTheDataIsThereTheyAreNotMadeAndNothingIsLoaded) {
+TEST_F(Forecasts, AreEmptyBeforeLoadingAndLoadNothing) {
   const Json view = view_of(320, 240);
   const Answer early = post(view);
   expect_refused(early, 409, "POST /v1/frames");
@@ -112,9 +112,9 @@ TEST_F(Forecasts, BeforeTheDataIsThereTheyAreNotMadeAndNothingIsLoaded) {
   EXPECT_EQ(server_.loads(), loads);
 }
 
-// A viewer that rests has its view surveyed: from then on the same view's errors are measured ones,
-// and times are told in milliseconds of this machine.
-TEST_F(Forecasts, AreMeasuredOnceAViewerHasLooked) {
+// A session at rest starts a calibration run of its view: afterwards errors are measured ones, and
+// times are milliseconds of this machine.
+TEST_F(Forecasts, AreMeasuredAfterASession) {
   const Json view = view_of(320, 240);
   draw(view);
   const auto share_measured = [&](const char* key, const Json& yes) {
@@ -136,11 +136,11 @@ TEST_F(Forecasts, AreMeasuredOnceAViewerHasLooked) {
     const auto frame = viewer.next_frame(500);
     if (share_measured("kind", "measured") == 1) break;
     if (frame) viewer.say(Json{{"type", "ack"}, {"seq", seq}, {"decodeMs", 1}}.dump());
-    ASSERT_LT(seq, 200U) << "nothing was surveyed";
+    ASSERT_LT(seq, 200U) << "no calibration run";
     if (!frame) --seq;
   }
   EXPECT_EQ(share_measured("timed", true), 1);
-  // Seen from elsewhere it is the same style at another sight.
+  // From another viewpoint the scene is the same.
   Json elsewhere = view;
   elsewhere["camera"] = {{"eye", {0, 0.1, 4}}, {"target", {0, 0, 0}}, {"up", {0, 1, 0}}};
   const Json told = json_of(post(elsewhere));
@@ -150,7 +150,7 @@ TEST_F(Forecasts, AreMeasuredOnceAViewerHasLooked) {
   }
 }
 
-TEST_F(Forecasts, WhatHasNoneIsRefused) {
+TEST_F(Forecasts, ViewWithoutForecastIsRefused) {
   Json reference = view_of(320, 240);
   reference["method"]["name"] = "reference";
   const Answer refused = post(reference);

@@ -1,6 +1,5 @@
-// Who gives way to whose handshake, and what is left of one that ended: connections as the listener
-// hands them over, in an io loop that goes on when a test says so, so that no deadline comes
-// between.
+// Eviction of pending handshakes, and release of ended ones: connections as the listener passes
+// them on, in an io loop that the test advances, so that no deadline interferes.
 #include <gmock/gmock.h>
 #include <openssl/ssl.h>
 #include <poll.h>
@@ -39,7 +38,7 @@ using Tcp = boost::asio::ip::tcp;
 
 class HandshakePlaces : public testing::Test {
  protected:
-  // The server's order (server.cpp).
+  // The server's order of destruction (server.cpp).
   ~HandshakePlaces() override {
     connections.each([](windsplat::net::Connection& one) { one.abort(); });
     gate_.set_value();
@@ -54,7 +53,7 @@ class HandshakePlaces : public testing::Test {
     return options;
   }
 
-  // The client's end of a connection from there.
+  // The client's end of a connection from that address.
   Tcp::socket& come(const std::string& address, bool known = false) {
     Tcp::socket& client = clients.emplace_back(io);
     client.connect(acceptor.local_endpoint());
@@ -64,17 +63,17 @@ class HandshakePlaces : public testing::Test {
   }
 
   void go_on() {
-    io.restart();  // it stops where nothing is left to do
+    io.restart();  // stops when no work is left
     io.poll();
   }
 
-  // Until the thread has had the steps of that address that wait.
+  // Until the thread has received the waiting steps of that address.
   void wait_for_steps(const std::string& address) {
     std::promise<void> done;
     thread.submit(address, [&done] { done.set_value(); });
     done.get_future().wait();
   }
-  // It stays busy until the test ends.
+  // Busy until the test ends.
   void hold_thread() {
     std::promise<void> begun;
     thread.submit("0", [&begun, end = gate_.get_future()]() mutable {
@@ -105,7 +104,7 @@ class HandshakePlaces : public testing::Test {
   }
   static bool is_open(Tcp::socket& client) { return !is_closed(client, 0); }
 
-  // The bytes by which a client begins.
+  // The first bytes of a client.
   static std::string client_hello() {
     const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> context(
         SSL_CTX_new(TLS_client_method()), SSL_CTX_free);
@@ -132,7 +131,7 @@ class HandshakePlaces : public testing::Test {
   std::promise<void> gate_;
 };
 
-TEST_F(HandshakePlaces, that_were_given_back_hold_no_descriptor) {
+TEST_F(HandshakePlaces, ReleasedSlotsHoldNoDescriptor) {
   const std::string address = "192.0.2.1";
   const std::size_t before = open_descriptors();
   for (int n = 0; n < 32; ++n) come(address);
@@ -145,7 +144,7 @@ TEST_F(HandshakePlaces, that_were_given_back_hold_no_descriptor) {
   })) << open_descriptors() - before - clients.size();
 }
 
-TEST_F(HandshakePlaces, of_an_address_go_to_its_newer_ones) {
+TEST_F(HandshakePlaces, OfAnAddressGoToItsNewestConnections) {
   Tcp::socket& other = come("192.0.2.2");
   for (int n = 0; n < 64; ++n) come("192.0.2.1");
   EXPECT_TRUE(is_open(clients[1]));
@@ -155,7 +154,7 @@ TEST_F(HandshakePlaces, of_an_address_go_to_its_newer_ones) {
   EXPECT_TRUE(is_open(other));
 }
 
-TEST_F(HandshakePlaces, of_many_addresses_are_taken_from_who_has_most) {
+TEST_F(HandshakePlaces, OfManyAddressesAreTakenFromTheLargestHolder) {
   Tcp::socket& lonely = come("198.51.100.1");
   Tcp::socket& known = come("198.51.100.2", true);
   Tcp::socket& crowd = come("192.0.2.0");
@@ -165,7 +164,7 @@ TEST_F(HandshakePlaces, of_many_addresses_are_taken_from_who_has_most) {
   EXPECT_TRUE(is_open(known));
 }
 
-TEST_F(HandshakePlaces, of_those_that_showed_the_token_are_not_taken_by_strangers) {
+TEST_F(HandshakePlaces, OfAuthenticatedAddressesAreNotTakenByOthers) {
   for (int n = 0; n < 256; ++n) come("192.0.2." + std::to_string(n % 4), true);
   EXPECT_TRUE(is_closed(come("198.51.100.1")));
   for (std::size_t n = 0; n < 256; ++n) EXPECT_TRUE(is_open(clients[n])) << n;
@@ -173,13 +172,13 @@ TEST_F(HandshakePlaces, of_those_that_showed_the_token_are_not_taken_by_stranger
   EXPECT_TRUE(is_closed(clients[0]));
 }
 
-TEST_F(HandshakePlaces, are_charged_for_what_was_computed_before_they_ended) {
+TEST_F(HandshakePlaces, AreChargedForComputationBeforeTheClose) {
   const std::string hello = client_hello();
   ASSERT_FALSE(hello.empty());
   const auto took = [&] { return services.metrics.text({}); };
   const std::string nothing = "windsplat_tls_handshake_seconds_total 0\n";
   EXPECT_THAT(took(), HasSubstr(nothing));
-  // The thread's clock may be coarse, so that some seem to take nothing.
+  // The clock of the thread may be coarse, so that some seem to take no time.
   for (int n = 0; n < 1000 && took().find(nothing) != std::string::npos; ++n) {
     Tcp::socket& client = come("192.0.2.1");
     boost::asio::write(client, boost::asio::buffer(hello));

@@ -1,4 +1,4 @@
-// TLS versions and groups offered, and limits on the computation for unauthenticated clients.
+// Offered TLS versions and groups, and limits on computation for unauthenticated clients.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <netinet/in.h>
@@ -36,7 +36,7 @@ ServerOptions over_tls(const Limits& limits = {}) {
   return options;
 }
 
-// A blocking client from an address of loopback, whose offers a test chooses.
+// A blocking client from a loopback address with configurable offers.
 class Client {
  public:
   using Setup = std::function<void(SSL_CTX*)>;
@@ -72,7 +72,7 @@ class Client {
   [[nodiscard]] bool shaken() const { return shaken_; }
   [[nodiscard]] SSL* ssl() const { return ssl_.get(); }
 
-  // The answer to a GET, and by TLS 1.3 the tickets that come before it.
+  // The response to a GET, and with TLS 1.3 the tickets before it.
   std::string get(const std::string& target, const std::string& fields = "") {
     const std::string ask =
         "GET " + target + " HTTP/1.1\r\nHost: x\r\nConnection: close\r\n" + fields + "\r\n";
@@ -99,12 +99,12 @@ Client::Setup offering(const char* groups, int version = TLS1_3_VERSION) {
   };
 }
 
-TEST(TlsGroups, that_are_expensive_are_refused) {
+TEST(TlsGroups, ThatAreExpensiveAreRefused) {
   TestServer server(over_tls());
   for (const char* groups : {"X25519", "P-256", "ffdhe2048:P-256", "P-384:X25519"}) {
     EXPECT_TRUE(Client(server.port(), offering(groups)).shaken()) << groups;
   }
-  // There the certificate's own group, P-256, must be among them.
+  // The certificate's own group, P-256, must be among them.
   for (const char* groups : {"X25519:P-256", "P-256", "P-384:P-256"}) {
     EXPECT_TRUE(Client(server.port(), offering(groups, TLS1_2_VERSION)).shaken()) << groups;
   }
@@ -116,7 +116,7 @@ TEST(TlsGroups, that_are_expensive_are_refused) {
   }
 }
 
-TEST(TlsSessions, are_resumed_without_early_data) {
+TEST(TlsSessions, AreResumedWithoutEarlyData) {
   TestServer server(over_tls());
   static SSL_SESSION* ticket = nullptr;
   const auto keep = [](SSL_CTX* context) {
@@ -127,7 +127,7 @@ TEST(TlsSessions, are_resumed_without_early_data) {
       return 1;
     });
   };
-  Client first(server.port(), keep);  // whose end would spoil the ticket
+  Client first(server.port(), keep);  // closing it would invalidate the ticket
   ASSERT_THAT(first.get("/livez"), HasSubstr(" 200 "));
   ASSERT_NE(ticket, nullptr);
   EXPECT_EQ(SSL_SESSION_get_max_early_data(ticket), 0U);
@@ -138,7 +138,7 @@ TEST(TlsSessions, are_resumed_without_early_data) {
   SSL_SESSION_free(std::exchange(ticket, nullptr));
 }
 
-TEST(TlsSessions, ask_for_no_certificate_of_the_client) {
+TEST(TlsSessions, AskForNoCertificateOfTheClient) {
   TestServer server(over_tls());
   static int asked = 0;
   Client client(server.port(), [](SSL_CTX* context) {
@@ -151,16 +151,16 @@ TEST(TlsSessions, ask_for_no_certificate_of_the_client) {
   EXPECT_EQ(asked, 0);
 }
 
-TEST(TlsHandshakes, beyond_an_addresses_time_are_not_begun) {
+TEST(TlsHandshakes, BeyondTheTimeOfAnAddressAreNotStarted) {
   Limits limits;
   limits.handshake_ms_per_address = 2;
   TestServer server(over_tls(limits));
   Client file_watch(server.port(), nullptr, nullptr, "127.0.0.2");
   ASSERT_TRUE(file_watch.shaken());
   int shaken = 0;
-  // The thread's clock may be coarse, so that some handshakes seem to take nothing.
+  // The clock of the thread may be coarse, so that some handshakes seem to take no time.
   while (shaken < 5000 && Client(server.port()).shaken()) ++shaken;
-  EXPECT_GT(shaken, 0) << "ten seconds' worth at once";
+  EXPECT_GT(shaken, 0) << "the burst of ten seconds";
   EXPECT_LT(shaken, 5000);
   const std::string metrics = file_watch.get("/metrics");
   EXPECT_THAT(metrics, HasSubstr("windsplat_refused_total{limit=\"handshakes\"} 1\n"));
@@ -168,9 +168,9 @@ TEST(TlsHandshakes, beyond_an_addresses_time_are_not_begun) {
   EXPECT_TRUE(Client(server.port(), nullptr, nullptr, "127.0.0.2").shaken());
 }
 
-TEST(TlsHandshakes, of_strangers_leave_time_for_health_asked_by_the_machine_itself) {
+TEST(TlsHandshakes, OfOtherAddressesLeaveTimeForLocalHealthChecks) {
   Limits limits;
-  limits.handshake_ms = 0.01;  // a further handshake is paid within a minute
+  limits.handshake_ms = 0.01;  // a further handshake is repaid within a minute
   limits.handshake_ms_per_address = 1000;
   testing::internal::CaptureStderr();
   TestServer server(over_tls(limits));
@@ -186,15 +186,15 @@ TEST(TlsHandshakes, of_strangers_leave_time_for_health_asked_by_the_machine_itse
   const std::string log = testing::internal::GetCapturedStderr();
   EXPECT_LT(shaken, 5000);
   EXPECT_EQ(healthy, 5);
-  EXPECT_LT(others, 5) << "they wait for what the first stranger owes";
+  EXPECT_LT(others, 5) << "they wait for the debt of the first address";
   EXPECT_THAT(log, HasSubstr("exceeded their processor time"));
   EXPECT_THAT(log, HasSubstr("connections=1 seconds=0 address=127.0.0.2"));
 }
 
-// HTTP reports to the quota which address has shown the token: it has separate handshakes.
-TEST(TlsHandshakes, of_an_address_that_showed_the_token_do_not_compete_with_strangers) {
+// HTTP reports authenticated addresses to the quota: their handshakes are counted separately.
+TEST(TlsHandshakes, OfAuthenticatedAddressesDoNotCompeteWithOthers) {
   Limits limits;
-  limits.handshake_ms = 0.001;  // a further handshake is paid within ten minutes
+  limits.handshake_ms = 0.001;  // a further handshake is repaid within ten minutes
   limits.handshake_ms_per_address = 1000;
   ServerOptions options = over_tls(limits);
   options.token = std::make_shared<const Token>(Token::parse("a-token-of-this-test").value());
@@ -210,10 +210,10 @@ TEST(TlsHandshakes, of_an_address_that_showed_the_token_do_not_compete_with_stra
   EXPECT_TRUE(from("127.0.0.2")->shaken());
   int others = 0;
   for (int n = 0; n < 5; ++n) others += from("127.0.0.4")->shaken() ? 1 : 0;
-  EXPECT_LT(others, 5) << "they wait for what the first stranger owes";
+  EXPECT_LT(others, 5) << "they wait for the debt of the first address";
 }
 
-TEST(PlainHttp, at_the_port_of_tls_is_charged_to_its_address) {
+TEST(PlainHttp, AtTheTlsPortIsChargedToItsAddress) {
   Limits limits;
   limits.bytes_per_address = 1;  // ten at once
   TestServer server(over_tls(limits));
@@ -225,7 +225,7 @@ TEST(PlainHttp, at_the_port_of_tls_is_charged_to_its_address) {
 }
 
 // OpenSSL accepts a ClientHello of 131 kB and waits for all of it.
-TEST(TlsHandshakes, that_send_much_are_ended_before_those_that_send_nothing) {
+TEST(TlsHandshakes, WithMuchInputAreClosedBeforeIdleOnes) {
   TestServer server(over_tls());
   Socket silent(server.port());
   Socket large(server.port());
@@ -241,8 +241,8 @@ TEST(TlsHandshakes, that_send_much_are_ended_before_those_that_send_nothing) {
   EXPECT_LT(waited, (std::chrono::steady_clock::now() - begin) / 2);
 }
 
-// What ends one: its client, its deadline, the server itself.
-TEST(TlsHandshakes, may_end_at_any_time) {
+// A handshake is ended by its client, its deadline or the server.
+TEST(TlsHandshakes, MayBeAbortedAtAnyTime) {
   for (int n = 0; n < 24; ++n) {
     TestServer server(over_tls());
     std::deque<Socket> half;

@@ -17,7 +17,7 @@ namespace {
 
 using testing::ElementsAre;
 
-// Holds jobs until it is opened.
+// Blocks jobs until it is opened.
 class Gate {
  public:
   void open() {
@@ -65,7 +65,7 @@ protocol::JobDescription finished(const Jobs& jobs, const std::string& id) {
   }
 }
 
-TEST(Jobs, AResultAnErrorAndAFaultEachEndTheirJobAlone) {
+TEST(Jobs, ResultErrorAndExceptionEachEndTheirJobOnly) {
   Jobs jobs(8, 2);
   const auto good = submitted(jobs, [](const Jobs::Handle&) { return Result<std::string>("gcm"); });
   const auto bad = submitted(jobs, [](const Jobs::Handle&) -> Result<std::string> {
@@ -95,7 +95,7 @@ TEST(Jobs, AResultAnErrorAndAFaultEachEndTheirJobAlone) {
   EXPECT_FALSE(jobs.cancel("99"));
 }
 
-TEST(Jobs, NoMoreRunThanMayAndTheOthersWait) {
+TEST(Jobs, ConcurrencyIsLimitedAndOthersWait) {
   Gate gate;
   Jobs jobs(8, 2);
   std::vector<std::string> ids;
@@ -119,7 +119,7 @@ TEST(Jobs, NoMoreRunThanMayAndTheOthersWait) {
   for (const auto& id : ids) EXPECT_EQ(finished(jobs, id).state, "done");
 }
 
-TEST(Jobs, SlowOnesLeaveAThreadToTheOthers) {
+TEST(Jobs, SlowJobsLeaveAThreadToOthers) {
   Gate gate;
   Jobs jobs(8, 2);
   const auto pass = [&](const Jobs::Handle&) {
@@ -140,7 +140,7 @@ TEST(Jobs, SlowOnesLeaveAThreadToTheOthers) {
   for (const auto& id : ids) EXPECT_EQ(finished(jobs, id).state, "done");
 }
 
-TEST(Jobs, CancellingOneThatWaitsOrRuns) {
+TEST(Jobs, WaitingAndRunningJobsCanBeCancelled) {
   Gate gate;
   Jobs jobs(8, 1);
   std::atomic<bool> second_ran{false};
@@ -157,18 +157,18 @@ TEST(Jobs, CancellingOneThatWaitsOrRuns) {
   EXPECT_TRUE(jobs.cancel(waiting));
   EXPECT_EQ(jobs.find(waiting)->state, "cancelled");
   EXPECT_TRUE(jobs.cancel(running));
-  EXPECT_EQ(jobs.find(running)->state, "running") << "until it notices";
+  EXPECT_EQ(jobs.find(running)->state, "running") << "until it checks for cancellation";
   gate.open();
   EXPECT_EQ(finished(jobs, running).state, "cancelled");
   EXPECT_FALSE(finished(jobs, running).problem);
   const auto last = submitted(jobs, [](const Jobs::Handle&) { return Result<std::string>("x"); });
   EXPECT_EQ(finished(jobs, last).state, "done");
   EXPECT_TRUE(jobs.cancel(last));
-  EXPECT_EQ(jobs.find(last)->state, "done") << "what is finished stays so";
+  EXPECT_EQ(jobs.find(last)->state, "done") << "a finished job stays finished";
   EXPECT_FALSE(second_ran);
 }
 
-TEST(Jobs, TheOldestFinishedIsForgottenAndUnfinishedOnesNever) {
+TEST(Jobs, OldestFinishedJobIsForgottenUnfinishedOnesAreKept) {
   Gate gate;
   Jobs jobs(3, 1);
   const auto pass = [&](const Jobs::Handle&) {
@@ -189,7 +189,7 @@ TEST(Jobs, TheOldestFinishedIsForgottenAndUnfinishedOnesNever) {
   EXPECT_EQ(finished(jobs, fourth).state, "done");
 }
 
-TEST(Jobs, EndingCancelsWhatRunsAndWaits) {
+TEST(Jobs, ShutdownCancelsRunningAndWaitingJobs) {
   std::atomic<int> ran{0};
   {
     Jobs jobs(8, 1);

@@ -18,7 +18,7 @@ namespace {
 using testing::HasSubstr;
 using windsplat::net::ServerOptions;
 
-// Refused, saying so.
+// Refused with the reason.
 void expect_limit(const Answer& answer, int status, const std::string& words) {
   EXPECT_EQ(answer.status, status) << answer.body;
   EXPECT_EQ(answer.header("content-type"), "application/problem+json");
@@ -26,7 +26,7 @@ void expect_limit(const Answer& answer, int status, const std::string& words) {
   EXPECT_GE(std::atoi(answer.header("retry-after").c_str()), 1);
 }
 
-// Of an upgrade the client reads the head alone.
+// The client reads the head only of an upgrade.
 void expect_no_upgrade(const StreamClient& viewer, int status) {
   EXPECT_EQ(viewer.handshake().status, status);
   EXPECT_GE(std::atoi(viewer.handshake().header("retry-after").c_str()), 1);
@@ -45,7 +45,7 @@ bool comes_true(const std::function<bool()>& holds) {
   return false;
 }
 
-// Connections that are known to have been accepted; `busy`: with the beginning of a request.
+// Connections that have been accepted; `busy`: with the start of a request.
 std::vector<std::unique_ptr<Socket>> hold(std::uint16_t port, int count, bool busy = true) {
   std::vector<std::unique_ptr<Socket>> held;
   for (int n = 0; n < count; ++n) {
@@ -54,11 +54,11 @@ std::vector<std::unique_ptr<Socket>> hold(std::uint16_t port, int count, bool bu
     EXPECT_EQ(read_answer(*held.back()).status, 200);
     if (busy) held.back()->send("GET ");
   }
-  if (busy) std::this_thread::sleep_for(std::chrono::milliseconds(200));  // for it to arrive
+  if (busy) std::this_thread::sleep_for(std::chrono::milliseconds(200));  // time for it to arrive
   return held;
 }
 
-TEST(Limits, beyond_all_connections_health_alone_is_answered) {
+TEST(Limits, AtTheConnectionLimitOnlyHealthIsAnswered) {
   ServerOptions options;
   options.limits.connections = 3;
   TestServer server(options);
@@ -76,7 +76,7 @@ TEST(Limits, beyond_all_connections_health_alone_is_answered) {
   EXPECT_TRUE(comes_true([&] { return get(server.port(), "/v1").status == 200; }));
 }
 
-TEST(Limits, whoever_is_idle_for_longest_makes_room) {
+TEST(Limits, LongestIdleConnectionIsClosedForANewOne) {
   ServerOptions options;
   options.limits.connections = 2;
   TestServer server(options);
@@ -87,30 +87,31 @@ TEST(Limits, whoever_is_idle_for_longest_makes_room) {
   EXPECT_EQ(read_answer(*held[1]).status, 200);
 }
 
-TEST(Limits, a_connection_that_says_nothing_is_soon_closed) {
+TEST(Limits, SilentConnectionIsClosedSoon) {
   TestServer server;
   Socket silent(server.port());
   const auto kept = hold(server.port(), 1, false);
-  // 5 s; a machine that runs many tests at once gets six times that, half of an idle one's.
+  // 5 s; six times that on a machine that runs many tests at once, half the timeout of an idle
+  // connection.
   EXPECT_TRUE(silent.closed_by_peer(30'000));
   kept[0]->send("GET /livez HTTP/1.1\r\nHost: x\r\n\r\n");
-  EXPECT_EQ(read_answer(*kept[0]).status, 200) << "between requests there is more time";
+  EXPECT_EQ(read_answer(*kept[0]).status, 200) << "the timeout between requests is longer";
 }
 
-TEST(Limits, connections_beyond_their_rate_are_closed) {
+TEST(Limits, ConnectionsAboveTheirRateAreClosed) {
   ServerOptions options;
   options.limits.arrivals_per_address = 0.5;  // 5 at once
   TestServer server(options);
   const auto answered = [&] { return get(server.port(), "/livez").status == 200; };
   int taken = 0;
   while (answered() && taken < 50) ++taken;
-  EXPECT_GE(taken, 4);  // one may have looked whether the server is there
-  EXPECT_LT(taken, 20) << "the test itself takes a while";
+  EXPECT_GE(taken, 4);  // one may have been used to wait for the server
+  EXPECT_LT(taken, 20) << "the test itself takes time";
   EXPECT_TRUE(comes_true(answered));
 }
 
-// Nothing of it is understood, and yet it counts.
-TEST(Limits, nonsense_is_charged_as_requests_are) {
+// Malformed requests count, too.
+TEST(Limits, MalformedInputIsChargedLikeRequests) {
   ServerOptions options;
   options.limits.requests_per_address = 1;  // 10 at once
   TestServer server(options);
@@ -118,7 +119,7 @@ TEST(Limits, nonsense_is_charged_as_requests_are) {
   expect_limit(get(server.port(), "/v1"), 429, "1 requests a second");
 }
 
-TEST(Limits, a_stream_that_says_too_much_is_read_more_slowly) {
+TEST(Limits, StreamWithTooManyMessagesIsThrottled) {
   ServerOptions options;
   options.limits.messages_per_address = 20;  // 40 at once
   TestServer server(options);
@@ -129,7 +130,7 @@ TEST(Limits, a_stream_that_says_too_much_is_read_more_slowly) {
   EXPECT_GT(std::chrono::steady_clock::now() - since, std::chrono::milliseconds(1500));
 }
 
-TEST(Limits, one_address_has_no_more_connections_than_it_may) {
+TEST(Limits, ConnectionsOfOneAddressAreLimited) {
   ServerOptions options;
   options.limits.connections_per_address = 2;
   TestServer server(options);
@@ -138,8 +139,8 @@ TEST(Limits, one_address_has_no_more_connections_than_it_may) {
   EXPECT_EQ(get(server.port(), "/readyz").status, 200);
 }
 
-// Silent connections hold their places for two seconds; others are closed meanwhile.
-TEST(Limits, the_reserve_is_bounded_and_clears_itself) {
+// Silent connections hold their slots for two seconds; others are closed meanwhile.
+TEST(Limits, ReservedConnectionsAreBoundedAndReleased) {
   ServerOptions options;
   options.limits.connections = 1;
   TestServer server(options);
@@ -155,7 +156,7 @@ TEST(Limits, the_reserve_is_bounded_and_clears_itself) {
   EXPECT_GE(read.value("windsplat_connections_refused_total"), 84);
 }
 
-TEST(Limits, one_address_has_no_more_sessions_than_it_may) {
+TEST(Limits, SessionsOfOneAddressAreLimited) {
   ServerOptions options;
   options.limits.sessions_per_address = 2;
   TestServer server(options);
@@ -170,7 +171,7 @@ TEST(Limits, one_address_has_no_more_sessions_than_it_may) {
   EXPECT_TRUE(comes_true([&] { return StreamClient(server.port()).handshake().status == 101; }));
 }
 
-TEST(Limits, requests_beyond_their_rate_are_refused_and_health_is_not) {
+TEST(Limits, RequestsAboveTheirRateAreRefusedExceptHealth) {
   ServerOptions options;
   options.limits.requests_per_address = 2;  // 20 at once
   TestServer server(options);
@@ -178,7 +179,7 @@ TEST(Limits, requests_beyond_their_rate_are_refused_and_health_is_not) {
   Answer last;
   while ((last = get(server.port(), "/v1")).status == 200 && answered < 100) ++answered;
   EXPECT_GE(answered, 20);
-  EXPECT_LT(answered, 60) << "the test itself takes a while";
+  EXPECT_LT(answered, 60) << "the test itself takes time";
   expect_limit(last, 429, "2 requests a second");
   EXPECT_EQ(get(server.port(), "/livez").status, 200);
   EXPECT_GE(refused(server.port(), "requests"), 1);
@@ -186,7 +187,7 @@ TEST(Limits, requests_beyond_their_rate_are_refused_and_health_is_not) {
   EXPECT_EQ(get(server.port(), "/v1").status, 200);
 }
 
-TEST(Limits, drawing_is_charged_and_its_debt_is_waited_for) {
+TEST(Limits, RenderingIsChargedAndItsDebtDelaysRequests) {
   ServerOptions options;
   options.limits.render_s_per_address = 0.0001;
   TestServer server(options);
@@ -201,11 +202,12 @@ TEST(Limits, drawing_is_charged_and_its_debt_is_waited_for) {
                        {{"Content-Type", "application/json"}}, R"({"dataset":"small"})"),
                429, "seconds of rendering");
   expect_no_upgrade(StreamClient(server.port()), 429);
-  EXPECT_EQ(get(server.port(), "/v1/datasets").status, 200) << "what draws nothing is answered";
+  EXPECT_EQ(get(server.port(), "/v1/datasets").status, 200)
+      << "requests without rendering are answered";
   EXPECT_EQ(refused(server.port(), "render"), 4);
 }
 
-TEST(Limits, a_stream_that_owes_too_much_is_closed) {
+TEST(Limits, StreamAboveItsQuotaIsClosed) {
   ServerOptions options;
   options.limits.render_s_per_address = 0.0001;
   TestServer server(options);
@@ -218,7 +220,7 @@ TEST(Limits, a_stream_that_owes_too_much_is_closed) {
   EXPECT_EQ(viewer.close_code(), 1013);
 }
 
-TEST(Limits, bytes_sent_are_charged) {
+TEST(Limits, BytesSentAreCharged) {
   ServerOptions options;
   options.limits.bytes_per_address = 1;  // 10 at once
   TestServer server(options);
@@ -229,7 +231,7 @@ TEST(Limits, bytes_sent_are_charged) {
   }));
 }
 
-TEST(Limits, clients_behind_a_trusted_proxy_are_told_apart) {
+TEST(Limits, ClientsBehindATrustedProxyAreDistinguished) {
   ServerOptions options;
   options.limits.requests_per_address = 0.1;  // one, and no more for ten seconds
   options.limits.trusted_proxies = {"127.0.0.1"};
@@ -246,7 +248,7 @@ TEST(Limits, clients_behind_a_trusted_proxy_are_told_apart) {
   EXPECT_EQ(get(wary.port(), "/v1", {{"X-Forwarded-For", "198.51.100.2"}}).status, 429);
 }
 
-TEST(Limits, pictures_too_large_or_too_dear_are_refused_before_anything_is_read) {
+TEST(Limits, OversizeOrExpensivePicturesAreRefusedBeforeLoading) {
   ServerOptions options;
   options.limits.pixels = 100 * 100;
   options.limits.kernels = 1e6;
@@ -283,7 +285,7 @@ TEST(Limits, pictures_too_large_or_too_dear_are_refused_before_anything_is_read)
   ASSERT_TRUE(viewer.next_frame());
   viewer.texts.clear();
   viewer.say(R"({"type":"still","id":5,"width":200,"height":200,"format":"png","scale":1})");
-  // Frames that refine may come first, and take the credit until they are acknowledged.
+  // Refining frames may come first and use the credit until they are acknowledged.
   std::optional<std::string> still;
   for (int seq = 1; !still;) {
     viewer.say(R"({"type":"ack","decodeMs":1,"seq":)" + std::to_string(seq) + "}");
@@ -299,7 +301,7 @@ TEST(Limits, pictures_too_large_or_too_dear_are_refused_before_anything_is_read)
   EXPECT_GE(refused(server.port(), "kernels"), 4);
 }
 
-TEST(Limits, every_answer_is_safe_by_its_headers) {
+TEST(Limits, EveryResponseHasSecurityHeaders) {
   TestServer server;
   const auto answers = {get(server.port(), "/v1"),
                         get(server.port(), "/nothing"),
@@ -319,8 +321,8 @@ TEST(Limits, every_answer_is_safe_by_its_headers) {
   }
 }
 
-// Whatever is sent, there are as many series as ever.
-TEST(Limits, no_path_method_or_refusal_makes_a_series) {
+// The number of series is constant for any request.
+TEST(Limits, PathsMethodsAndRefusalsCreateNoMetricSeries) {
   ServerOptions options;
   options.limits.sessions_per_address = 1;
   options.limits.pixels = 10'000;
@@ -342,8 +344,8 @@ TEST(Limits, no_path_method_or_refusal_makes_a_series) {
   EXPECT_EQ(series(), before);
 }
 
-// Pictures whose data is not there leave the renderer's queue for the loads': that has an end, too.
-TEST(Limits, pictures_that_wait_for_a_slow_disk_are_bounded) {
+// Pictures whose data are not resident wait in the load queue, which is bounded, too.
+TEST(Limits, PicturesWaitingForASlowDiskAreBounded) {
   namespace data = windsplat::data;
   const auto gate = std::make_shared<Gate>();
   TestServer server(
@@ -370,14 +372,14 @@ TEST(Limits, pictures_that_wait_for_a_slow_disk_are_bounded) {
     if (answer.status != 200) expect_limit(answer, 429, "try again");
     served += answer.status == 200 ? 1 : 0;
   }
-  EXPECT_GE(served, 8);  // half of the places: they are all of one address
+  EXPECT_GE(served, 8);  // half of the slots: all are from one address
   EXPECT_LE(served, 12);
 }
 
-// The renderer is free again soon after whoever wanted a picture of seconds has gone: with a byte
-// of a next request before the end, too, and from a stream. The requirement is 100 ms; machines
-// that run many tests at once get thirty times that.
-TEST(Cancel, whoever_leaves_frees_the_renderer) {
+// The renderer is free soon after the client of an expensive picture disconnects, also with a byte
+// of another request before the close, and for a stream. The requirement is 100 ms; machines that
+// run many tests at once get thirty times that.
+TEST(Cancel, DisconnectCancelsTheRendering) {
   TestServer server;
   const std::string view = R"({"dataset":"small","image":{"width":4096,"height":4096},)"
                            R"("vector":{"r1":60,"r2":64,"length":3,"span":64},)"

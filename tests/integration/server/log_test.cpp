@@ -17,7 +17,7 @@ using testing::HasSubstr;
 using testing::MatchesRegex;
 using testing::Not;
 
-// The log of a server, whole: it has ended when its lines are asked for.
+// The complete log of a server, which has stopped before its lines are read.
 class Logged : public testing::Test {
  protected:
   void SetUp() override {
@@ -55,7 +55,7 @@ class Logged : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(Logged, a_requests_own_id_comes_back_and_is_logged) {
+TEST_F(Logged, RequestIdIsReturnedAndLogged) {
   const std::string id = "Az09._-" + std::string(57, 'x');
   const Answer answer = get(port(), "/v1/datasets/small/frame.jpg?width=40&height=30&preset=wind",
                             {{"X-Request-Id", id}});
@@ -71,7 +71,7 @@ TEST_F(Logged, a_requests_own_id_comes_back_and_is_logged) {
   EXPECT_GE(told[0]["ms"].get<double>(), 0);
 }
 
-TEST_F(Logged, an_id_that_is_not_fit_is_replaced) {
+TEST_F(Logged, InvalidRequestIdIsReplaced) {
   std::set<std::string> ids;
   const std::string too_long(65, 'x');
   for (const char* given : {"two words", "a,b", "", "\"quoted\"", "\xc3\xa4", too_long.c_str()}) {
@@ -85,12 +85,12 @@ TEST_F(Logged, an_id_that_is_not_fit_is_replaced) {
   EXPECT_EQ(ids.size(), 7U) << "each has its own";
 }
 
-TEST_F(Logged, problems_name_their_request) {
+TEST_F(Logged, ProblemsContainTheirRequestId) {
   const Answer own = get(port(), "/v1/datasets/none", {{"X-Request-Id", "mine-1"}});
   EXPECT_EQ(own.status, 404);
   EXPECT_EQ(json_of(own)["requestId"], "mine-1");
   EXPECT_EQ(json_of(own)["status"], 404);
-  // Also where nothing of the request was understood.
+  // Also for malformed requests.
   const Answer refused = raw(port(), "GET / HTTP/1.1\nHost: x\r\n\r\n");
   EXPECT_EQ(refused.status, 400);
   const std::string id = refused.header("x-request-id");
@@ -102,7 +102,7 @@ TEST_F(Logged, problems_name_their_request) {
   EXPECT_EQ(told[0]["status"], 400);
 }
 
-TEST_F(Logged, requests_of_one_connection_have_ids_of_their_own) {
+TEST_F(Logged, RequestsOfOneConnectionHaveDistinctIds) {
   Socket socket(port());
   const std::string request = "GET /v1 HTTP/1.1\r\nHost: x\r\n";
   socket.send(request + "X-Request-Id: first\r\n\r\n");
@@ -111,7 +111,7 @@ TEST_F(Logged, requests_of_one_connection_have_ids_of_their_own) {
   EXPECT_THAT(read_answer(socket).header("x-request-id"), MatchesRegex("[0-9a-f]{16}"));
 }
 
-TEST_F(Logged, a_viewer_is_known_by_its_upgrade) {
+TEST_F(Logged, SessionHasTheRequestIdOfItsUpgrade) {
   {
     StreamClient viewer(port(), {{"X-Request-Id", "viewer-7"}});
     EXPECT_EQ(viewer.handshake().status, 101);
@@ -127,7 +127,7 @@ TEST_F(Logged, a_viewer_is_known_by_its_upgrade) {
   EXPECT_THAT(messages, testing::ElementsAre("session opened", "session disconnected"));
 }
 
-TEST_F(Logged, says_neither_paths_nor_queries_nor_headers) {
+TEST_F(Logged, ContainsNoPathsQueriesOrHeaders) {
   get(port(), "/v1/datasets/small/frame.jpg?width=40&height=30&token=hunter2",
       {{"Authorization", "Bearer hunter2"}, {"Cookie", "session=hunter2"}});
   get(port(), "/hunter2?hunter2", {{"Referer", "https://hunter2.example/"}});

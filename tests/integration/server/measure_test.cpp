@@ -45,7 +45,7 @@ class Measures : public testing::Test {
   std::shared_ptr<const windsplat::data::Volume> volume(const std::string& name, int step) {
     return dataset_->volume(name, static_cast<std::size_t>(step)).value();
   }
-  // A place a little off the sample's own, as a query.
+  // A query for a position slightly off that of the sample.
   std::string near(int i, int j, int k) {
     std::string query = "?";
     const std::array<int, 3> index{i, j, k};
@@ -66,7 +66,7 @@ class Measures : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(Measures, ProbeTellsEveryFieldAtTheNearestSample) {
+TEST_F(Measures, ProbeReturnsEveryFieldAtTheNearestSample) {
   const Json probe = ask("probe" + near(5, 3, 2) + "&step=1");
   EXPECT_EQ(probe["step"], 1);
   EXPECT_EQ(probe["position"]["index"], Json({{"x", 5}, {"y", 3}, {"z", 2}}));
@@ -83,7 +83,7 @@ TEST_F(Measures, ProbeTellsEveryFieldAtTheNearestSample) {
   }
 }
 
-TEST_F(Measures, ProbesOutsideOrUnclearAreRefused) {
+TEST_F(Measures, InvalidOrOutsideProbesAreRefused) {
   expect_problem_saying(refused("probe?x=0&y=95&z=500"), 422, "box");
   expect_problem_saying(refused("probe?x=0&y=0"), 422, "z is required");
   expect_problem_saying(refused("probe?x=here&y=0&z=500"), 400);
@@ -93,7 +93,7 @@ TEST_F(Measures, ProbesOutsideOrUnclearAreRefused) {
   expect_problem_saying(get(port(), "/v1/datasets/none/probe?x=0&y=0&z=0"), 404);
 }
 
-TEST_F(Measures, AHistogramCountsEverySampleOnce) {
+TEST_F(Measures, HistogramCountsEverySampleOnce) {
   for (const auto kind : {windsplat::data::FieldKind::scalar, windsplat::data::FieldKind::vector}) {
     const std::string name = field(kind).name;
     const auto there = volume(name, 2);
@@ -114,8 +114,8 @@ TEST_F(Measures, AHistogramCountsEverySampleOnce) {
   }
 }
 
-// A share of 0.1 leaves out as many whole values at either end as there are in a tenth of all.
-TEST_F(Measures, AHistogramsClipLeavesOutTheEnds) {
+// A share of 0.1 omits as many whole values at either end as a tenth of all contains.
+TEST_F(Measures, HistogramClipOmitsBothEnds) {
   const std::string name = field(windsplat::data::FieldKind::scalar).name;
   const auto there = volume(name, 2);
   std::vector<float> values(there->values.data(), there->values.data() + there->values.size());
@@ -125,10 +125,10 @@ TEST_F(Measures, AHistogramsClipLeavesOutTheEnds) {
   const Json h = ask("fields/" + name + "/histogram?step=2&clip=0.1");
   EXPECT_EQ(h["range"][0].get<float>(), values[dropped]);
   EXPECT_EQ(h["range"][1].get<float>(), values[values.size() - 1 - dropped]);
-  EXPECT_LT(values.front(), values[dropped]) << "or this test shows nothing";
+  EXPECT_LT(values.front(), values[dropped]) << "otherwise this test shows nothing";
 }
 
-TEST_F(Measures, HistogramsThatCannotBeAreRefused) {
+TEST_F(Measures, InvalidHistogramsAreRefused) {
   const std::string base =
       "fields/" + field(windsplat::data::FieldKind::scalar).name + "/histogram";
   expect_problem_saying(refused(base + "?bins=0"), 422);
@@ -147,7 +147,7 @@ TEST_F(Measures, HistogramsThatCannotBeAreRefused) {
   expect_problem_saying(refused("fields/nope/mean"), 404);
 }
 
-TEST_F(Measures, ASeriesIsThePointAtEveryStep) {
+TEST_F(Measures, SeriesIsTheProbeAtEveryStep) {
   for (const auto kind : {windsplat::data::FieldKind::scalar, windsplat::data::FieldKind::vector}) {
     const auto& info = field(kind);
     const Json series = ask("fields/" + info.name + "/series" + near(9, 8, 1));
@@ -169,7 +169,7 @@ TEST_F(Measures, ASeriesIsThePointAtEveryStep) {
   expect_problem_saying(refused("fields/nope/series?x=0&y=0&z=500"), 404);
 }
 
-TEST_F(Measures, ARangeOfAllStepsIsReadOnce) {
+TEST_F(Measures, RangeOfAllStepsIsReadOnce) {
   const std::string name = field(windsplat::data::FieldKind::scalar).name;
   float low = std::numeric_limits<float>::infinity();
   float high = -low;
@@ -188,12 +188,12 @@ TEST_F(Measures, ARangeOfAllStepsIsReadOnce) {
   EXPECT_EQ(server_.loads(), 3U);
   EXPECT_EQ(request(port(), "DELETE", "/v1/datasets/small").status, 204);
   EXPECT_EQ(ask("fields/" + name + "/range?of=all"), all);
-  EXPECT_EQ(server_.loads(), 3U) << "remembered though evicted";
+  EXPECT_EQ(server_.loads(), 3U) << "cached though evicted";
   expect_problem_saying(refused("fields/" + name + "/range?of=most"), 422);
   expect_problem_saying(refused("fields/" + name + "/range?of=all&step=1"), 422);
 }
 
-TEST_F(Measures, ARangeOfAllStepsIsThatOfEveryOneOfThem) {
+TEST_F(Measures, RangeOfAllStepsIsTheUnionOfTheSteps) {
   int wider_than_the_first = 0;
   for (const auto& info : dataset_->info().fields) {
     std::array<float, 2> range = volume(info.name, 0)->range;
@@ -207,10 +207,10 @@ TEST_F(Measures, ARangeOfAllStepsIsThatOfEveryOneOfThem) {
     EXPECT_EQ(all["range"][1].get<float>(), range[1]) << info.name;
     wider_than_the_first += range != first ? 1 : 0;
   }
-  EXPECT_GT(wider_than_the_first, 0) << "or this test shows nothing";
+  EXPECT_GT(wider_than_the_first, 0) << "otherwise this test shows nothing";
 }
 
-TEST_F(Measures, EvictingKeepsTheDatasetAndForgettingIsForWhatWasPosted) {
+TEST_F(Measures, EvictionKeepsDatasetsAndOnlyPostedOnesCanBeRemoved) {
   ask("probe" + near(1, 1, 1));
   const auto resident = [&] {
     return json_of(get(port(), "/v1/datasets"))["datasets"][0]["residentBytes"].get<int>();
@@ -240,7 +240,7 @@ class DataRoot : public testing::Test {
     fs::create_directories(root_ / "runs");
     fs::copy_file(small_file(), root_ / "runs/gcm.nc");
     fs::copy_file(small_file(), root_.parent_path() / "secret.nc");
-    std::ofstream(root_ / "broken.nc") << "this is no data";
+    std::ofstream(root_ / "broken.nc") << "not a data file";
     fs::create_symlink("../secret.nc", root_ / "out.nc");
     EXPECT_EQ(mkfifo((root_ / "pipe.nc").c_str(), 0600), 0);
     windsplat::net::ServerOptions options;
@@ -266,7 +266,7 @@ class DataRoot : public testing::Test {
   std::unique_ptr<TestServer> server_;
 };
 
-TEST_F(DataRoot, APostedPathBecomesADatasetByWayOfAJob) {
+TEST_F(DataRoot, PostedPathBecomesADatasetThroughAJob) {
   const Answer accepted = post_path(port(), "runs/gcm.nc");
   ASSERT_EQ(accepted.status, 202) << accepted.body;
   const std::string location = accepted.header("location");
@@ -289,7 +289,7 @@ TEST_F(DataRoot, APostedPathBecomesADatasetByWayOfAJob) {
   EXPECT_EQ(json_of(get(port(), "/v1/datasets"))["datasets"].size(), 1U);
 }
 
-TEST_F(DataRoot, LinksThatAPatternLeavesOutAreToldByTheDataset) {
+TEST_F(DataRoot, LinksOmittedFromAPatternAreListed) {
   fs::create_symlink("../../secret.nc", root_ / "runs/gcm2.nc");
   const Json job = finished(post_path(port(), "runs/gcm*.nc").header("location"));
   ASSERT_EQ(job["state"], "done") << job;
@@ -298,7 +298,7 @@ TEST_F(DataRoot, LinksThatAPatternLeavesOutAreToldByTheDataset) {
   EXPECT_THAT(told["notes"].dump(), HasSubstr("1 of 2 names that the pattern matches is a link"));
 }
 
-TEST_F(DataRoot, WhatCannotBeReadIsAFailedJobAndNothingElse) {
+TEST_F(DataRoot, UnreadableFileIsAFailedJob) {
   for (const char* path : {"broken.nc", "runs"}) {
     const Answer accepted = post_path(port(), path);
     ASSERT_EQ(accepted.status, 202) << accepted.body;
@@ -312,7 +312,7 @@ TEST_F(DataRoot, WhatCannotBeReadIsAFailedJobAndNothingElse) {
   EXPECT_EQ(get(port(), "/v1/datasets/small/frame.jpg?width=32&height=32").status, 200);
 }
 
-TEST_F(DataRoot, PathsThatLeadOutAreRefusedAtOnce) {
+TEST_F(DataRoot, PathsOutsideTheRootAreRefused) {
   for (const std::string path :
        {"../secret.nc", "runs/../../secret.nc", "/etc/passwd", "out.nc", "http://127.0.0.1/a.nc",
         "file:///etc/passwd", "pipe.nc", ".", "..", "../*.nc", "o*.nc"}) {
@@ -329,7 +329,7 @@ TEST_F(DataRoot, PathsThatLeadOutAreRefusedAtOnce) {
   EXPECT_TRUE(json_of(get(port(), "/v1/jobs"))["jobs"].empty());
 }
 
-TEST_F(DataRoot, BodiesThatAreNoRequestAreRefused) {
+TEST_F(DataRoot, InvalidBodiesAreRefused) {
   const auto post = [&](const std::string& type, const std::string& body) {
     return request(port(), "POST", "/v1/datasets", {{"Content-Type", type}}, body);
   };
@@ -346,7 +346,7 @@ TEST_F(DataRoot, BodiesThatAreNoRequestAreRefused) {
   expect_problem_saying(request(port(), "DELETE", "/v1/jobs"), 405);
 }
 
-TEST(NoDataRoot, FilesAreNotOpenedAndThatIsSaid) {
+TEST(NoDataRoot, PostedFilesAreRefusedWithTheReason) {
   TestServer server;
   expect_problem_saying(post_path(server.port(), "a.nc"), 403, "--data-root");
 }

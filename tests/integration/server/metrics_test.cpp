@@ -36,7 +36,7 @@ class MetricsTest : public testing::Test {
  protected:
   [[nodiscard]] std::uint16_t port() const { return server_.port(); }
 
-  // What is counted once a peer has all of it may be counted a moment later.
+  // Counters updated after the last byte may change a moment later.
   Exposition scrape_until(const std::function<bool(const Exposition&)>& holds) const {
     Exposition read = scrape(port());
     for (int turns = 0; turns < 4000 && !holds(read); ++turns) {
@@ -50,7 +50,7 @@ class MetricsTest : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(MetricsTest, a_picture_moves_what_it_has_to_do_with_by_one) {
+TEST_F(MetricsTest, PictureIncrementsItsCountersByOne) {
   const Exposition before = scrape(port());
   const Answer picture = get(port(), "/v1/datasets/small/frame.jpg?width=64&height=48");
   ASSERT_EQ(picture.status, 200);
@@ -72,10 +72,10 @@ TEST_F(MetricsTest, a_picture_moves_what_it_has_to_do_with_by_one) {
   EXPECT_NEAR(moved(R"(windsplat_stage_seconds_sum{stage="render"})"), std::stod(render[1]) / 1000,
               1e-6);
   EXPECT_GE(moved(R"(windsplat_sent_bytes_total{over="http"})"), picture.body.size());
-  EXPECT_EQ(moved(frames("final")), 0) << "that is for viewers' frames";
+  EXPECT_EQ(moved(frames("final")), 0) << "only frames of sessions count";
 }
 
-TEST_F(MetricsTest, data_is_counted_where_it_is_read_and_found) {
+TEST_F(MetricsTest, LoadsAndHitsAreCountedSeparately) {
   const Exposition before = scrape(port());
   EXPECT_EQ(before.value("windsplat_resident_bytes"), 0);
   EXPECT_EQ(before.value("windsplat_memory_limit_bytes"), 1U << 30);
@@ -92,7 +92,7 @@ TEST_F(MetricsTest, data_is_counted_where_it_is_read_and_found) {
             once.value(R"(windsplat_data_lookups_total{result="hit"})"));
 }
 
-TEST_F(MetricsTest, a_viewers_frames_are_counted_by_what_they_are_for) {
+TEST_F(MetricsTest, FramesOfASessionAreCountedByPurpose) {
   {
     StreamClient viewer(port());
     EXPECT_EQ(scrape_until([](const Exposition& now) {
@@ -130,16 +130,16 @@ TEST_F(MetricsTest, a_viewers_frames_are_counted_by_what_they_are_for) {
   EXPECT_EQ(gone.value("windsplat_sessions_opened_total"), 1);
 }
 
-// Whatever they ask for, one frame waits for them, and a second one when they have taken it; the
-// kernel's buffers of a few hundred kilobytes are the rest.
-TEST_F(MetricsTest, peers_that_never_read_hold_a_frame_each_at_most) {
+// One frame waits for such peers at any time, and a second one after they read; the rest are kernel
+// buffers of a few hundred kilobytes.
+TEST_F(MetricsTest, PeersThatNeverReadHoldOneFrameEach) {
   constexpr int peers = 5;  // a frame each before the first is given up as too slow
   const std::string image = R"("image":{"width":2000,"height":1500})";
   const Answer picture = request(port(), "POST", "/v1/frames",
                                  {{"Content-Type", "application/json"}, {"Accept", "image/png"}},
                                  R"({"dataset":"small",)" + image + "}");
   ASSERT_EQ(picture.status, 200);
-  ASSERT_GT(picture.body.size(), 3U << 18) << "more than a socket takes";
+  ASSERT_GT(picture.body.size(), 3U << 18) << "more than a socket buffer holds";
   std::vector<std::unique_ptr<StreamClient>> deaf;
   for (int i = 0; i < peers; ++i) {
     deaf.push_back(std::make_unique<StreamClient>(port(), Headers{}, "/v1/stream", 131072));
@@ -153,14 +153,14 @@ TEST_F(MetricsTest, peers_that_never_read_hold_a_frame_each_at_most) {
   scrape_until([&](const Exposition& now) {
     return now.value("windsplat_unsent_bytes") > peers * 0.5 * frame;
   });
-  // All that was asked for was drawn meanwhile, had it been allowed to.
+  // Unless refused, all requests were rendered meanwhile.
   ASSERT_EQ(get(port(), "/v1/datasets/small/frame.jpg?width=64&height=48").status, 200);
   EXPECT_LE(scrape(port()).value("windsplat_unsent_bytes"), peers * (1.2 * frame + 65536));
   deaf.clear();
   scrape_until([](const Exposition& now) { return now.value("windsplat_unsent_bytes") == 0; });
 }
 
-TEST_F(MetricsTest, no_client_can_make_series) {
+TEST_F(MetricsTest, ClientsCannotCreateSeries) {
   const Exposition before = scrape(port());
   for (int i = 0; i < 50; ++i) {
     const std::string name = "nothing-" + std::to_string(i);
@@ -186,24 +186,24 @@ TEST_F(MetricsTest, no_client_can_make_series) {
   EXPECT_EQ(after.value(requests("/v1", "4xx")), 1);
 }
 
-TEST_F(MetricsTest, are_told_while_the_renderer_is_busy) {
+TEST_F(MetricsTest, AreServedWhileTheRendererIsBusy) {
   Socket waiting(port());
   waiting.send(
       "GET /v1/datasets/small/frame.png?width=4096&height=4096 HTTP/1.1\r\nHost: x\r\n\r\n");
-  // The first frame of all was begun once the data is there.
+  // The first frame starts when the data are resident.
   scrape_until([](const Exposition& now) { return now.value("windsplat_resident_bytes") > 0; });
   for (int i = 0; i < 5; ++i) scrape(port());
-  EXPECT_EQ(waiting.receive(1), "") << "the picture is not there yet";
+  EXPECT_EQ(waiting.receive(1), "") << "the picture is not ready";
 }
 
-TEST_F(MetricsTest, of_the_process_are_the_systems) {
+TEST_F(MetricsTest, OfTheProcessMatchTheSystem) {
   const Exposition now = scrape(port());
   EXPECT_GT(now.value("process_resident_memory_bytes"), 1 << 20);
   EXPECT_GT(now.value("process_cpu_seconds_total"), 0);
   const double open = now.value("process_open_fds");
   Socket one(port());
   Socket two(port());
-  // Both ends of each are this process's.
+  // Both ends of each connection are in this process.
   const Exposition later = scrape_until(
       [&](const Exposition& read) { return read.value("process_open_fds") >= open + 4; });
   EXPECT_LE(later.value("process_open_fds"), open + 6);
@@ -211,7 +211,7 @@ TEST_F(MetricsTest, of_the_process_are_the_systems) {
             1);
 }
 
-TEST(MetricsAt, the_root_and_below_the_base_path) {
+TEST(MetricsAt, RootAndBasePath) {
   windsplat::net::ServerOptions options;
   options.base_path = "/winds";
   TestServer server(options);
@@ -221,7 +221,7 @@ TEST(MetricsAt, the_root_and_below_the_base_path) {
   EXPECT_EQ(request(server.port(), "POST", "/metrics", {}, "{}").status, 405);
 }
 
-TEST_F(MetricsTest, are_all_in_the_manual_and_the_manual_has_no_others) {
+TEST_F(MetricsTest, AreExactlyThoseOfTheManual) {
   std::ifstream manual(WINDSPLAT_SOURCE_DIR "/docs/user/metrics.md");
   std::map<std::string, std::string> types;
   const std::regex row(R"(^\| `([a-z_]+)` \| (counter|gauge|histogram) \|.*)");

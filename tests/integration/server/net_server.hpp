@@ -26,7 +26,7 @@ inline Json json_of(const Answer& answer) { return Json::parse(answer.body, null
 
 inline constexpr int small_steps = 3;
 
-// A file that lives as long as the tests.
+// A file for the lifetime of the tests.
 inline const std::string& small_file() {
   struct Made {
     std::filesystem::path folder;

@@ -1,4 +1,4 @@
-// One line after the other, then what histograms have to fulfil.
+// Line by line, then the invariants of histograms.
 #include "tests/integration/server/prometheus_text.hpp"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace {
 
 const char* const name_pattern = "[a-zA-Z_:][a-zA-Z0-9_:]*";
 
-// The family that a sample's name belongs to, if one was announced.
+// The family of a sample name, if declared.
 std::optional<std::string> family_of(const Exposition& read, const std::string& name) {
   if (read.types.count(name) > 0 && read.types.at(name) != "histogram") return name;
   for (const std::string suffix : {"_bucket", "_sum", "_count"}) {

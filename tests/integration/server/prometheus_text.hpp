@@ -14,7 +14,7 @@ struct Exposition {
   std::map<std::string, double> samples;     // "name{a="b"}" as it is written -> value
   std::vector<std::string> faults;           // what is wrong, with its line
 
-  // 0 with a fault noted in the test where there is none.
+  // 0 with a test failure if there is none.
   [[nodiscard]] double value(const std::string& sample) const;
   // Of a histogram, by its labels: "" or {a="b"}.
   [[nodiscard]] double count(const std::string& family, const std::string& labels) const {

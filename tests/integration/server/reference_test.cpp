@@ -35,7 +35,7 @@ std::string begun(std::uint16_t port, const std::string& view) {
 
 bool is_over(const Json& job) { return job["state"] != "queued" && job["state"] != "running"; }
 
-// The job's first state of which `enough` is true, the last if it ends before.
+// The first state of the job that satisfies `enough`, or its last.
 template <class Enough>
 Json job_when(std::uint16_t port, const std::string& path, const Enough& enough) {
   Json job;
@@ -44,7 +44,7 @@ Json job_when(std::uint16_t port, const std::string& path, const Enough& enough)
     if (is_over(job) || enough(job)) return job;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  ADD_FAILURE() << "it does not get there: " << job;
+  ADD_FAILURE() << "the state is not reached: " << job;
   return job;
 }
 
@@ -52,7 +52,7 @@ Json finished(std::uint16_t port, const std::string& path) {
   return job_when(port, path, [](const Json&) { return false; });
 }
 
-// The 4 values a pixel of a picture as .npy.
+// The four values per pixel of a picture as .npy.
 std::vector<float> values_of(const std::string& npy, std::size_t pixels) {
   std::vector<float> values(4 * pixels);
   const std::size_t bytes = values.size() * sizeof(float);
@@ -70,7 +70,7 @@ std::string rendered(const std::string& format) {
   return cli_test::read_file(file);
 }
 
-TEST(References, APostedViewBecomesThePictureThatRenderDraws) {
+TEST(References, PostedViewBecomesThePictureOfRender) {
   TestServer server;
   const std::string job_path = begun(server.port(), reference_view);
   double progress = 0;
@@ -111,17 +111,17 @@ TEST(References, APostedViewBecomesThePictureThatRenderDraws) {
   EXPECT_NEAR(result["error"]["max"].get<double>(), most, 1e-5 * most);
   EXPECT_NEAR(result["error"]["psnr"].get<double>(), -20 * std::log10(rmse), 1e-3);
 
-  // What is kept is not drawn again; another view is another picture.
+  // A cached reference is not rendered again; another view is another picture.
   EXPECT_EQ(finished(server.port(), begun(server.port(), reference_view))["result"], result);
   const std::string hurried =
       R"({"dataset":"small","image":{"width":96,"height":64},"quality":{"budgetMs":40}})";
   EXPECT_EQ(finished(server.port(), begun(server.port(), hurried))["result"], result)
-      << "how fast frames are to be drawn is nothing to it";
+      << "the frame budget does not matter";
   const std::string other = R"({"dataset":"small","step":1,"image":{"width":96,"height":64}})";
   EXPECT_NE(finished(server.port(), begun(server.port(), other))["result"]["id"], result["id"]);
 }
 
-TEST(References, OthersAreAnsweredMeanwhileAndNothingDrawnIsLost) {
+TEST(References, OtherRequestsAreServedMeanwhileAndNoWorkIsLost) {
   TestServer server;
   const std::string job_path = begun(server.port(), large_view);
   double progress = 0;
@@ -130,7 +130,7 @@ TEST(References, OthersAreAnsweredMeanwhileAndNothingDrawnIsLost) {
       EXPECT_GE(now["progress"].get<double>(), progress);
       return now["progress"].get<double>() > progress;
     });
-    ASSERT_EQ(job["state"], "running") << "it was to take longer: " << job;
+    ASSERT_EQ(job["state"], "running") << "expected to take longer: " << job;
     progress = job["progress"];
     const std::string frame =
         R"({"dataset":"small","step":)" + std::to_string(i % small_steps) + "}";
@@ -140,12 +140,12 @@ TEST(References, OthersAreAnsweredMeanwhileAndNothingDrawnIsLost) {
   EXPECT_GT(json_of(get(server.port(), job_path))["etaMs"].get<double>(), 0);
 }  // and the server ends, whatever is still drawn
 
-TEST(References, ADeletedJobEndsAndMakesRoomAtOnce) {
+TEST(References, DeletedJobStopsAndFreesItsSlot) {
   TestServer server;
   const std::string first = begun(server.port(), large_view);
   job_when(server.port(), first, [](const Json& now) { return now["state"] == "running"; });
   const Answer refused = post_reference(server.port(), reference_view);
-  EXPECT_EQ(refused.status, 429) << "one at a time for an address";
+  EXPECT_EQ(refused.status, 429) << "one at a time per address";
   EXPECT_EQ(refused.header("retry-after"), "5");
   EXPECT_EQ(request(server.port(), "DELETE", first).status, 204);
   const std::string second = begun(server.port(), reference_view);
@@ -155,8 +155,8 @@ TEST(References, ADeletedJobEndsAndMakesRoomAtOnce) {
   EXPECT_EQ(cancelled["result"], nullptr);
 }
 
-// Of 1920 x 1080 the values alone are 32 MiB.
-TEST(References, WhatNeedsMoreMemoryThanThereIsSaysSo) {
+// At 1920 x 1080 the values alone are 32 MiB.
+TEST(References, InsufficientMemoryIsReported) {
   TestServer server({}, {}, std::uint64_t{24} << 20);
   const std::string view = R"({"dataset":"small","image":{"width":1920,"height":1080}})";
   const Json job = finished(server.port(), begun(server.port(), view));
@@ -169,7 +169,7 @@ TEST(References, WhatNeedsMoreMemoryThanThereIsSaysSo) {
   EXPECT_EQ(finished(server.port(), begun(server.port(), reference_view))["state"], "done");
 }
 
-TEST(References, WhatCannotBeDrawnIsRefusedByItsPlace) {
+TEST(References, InvalidViewIsRefusedWithItsPointer) {
   TestServer server;
   const auto refused = [&](const std::string& view) {
     const Answer answer = post_reference(server.port(), view);
@@ -194,7 +194,7 @@ TEST(References, WhatCannotBeDrawnIsRefusedByItsPlace) {
   EXPECT_EQ(json_of(get(server.port(), "/v1"))["links"]["references"], "/v1/references");
 }
 
-TEST(ReferenceTickets, OneAnAddressAndFourInAll) {
+TEST(ReferenceTickets, OnePerAddressAndFourInTotal) {
   References references;
   const CancelToken unwanted;
   const auto first = references.admit("a", unwanted);
@@ -210,10 +210,10 @@ TEST(ReferenceTickets, OneAnAddressAndFourInAll) {
   EXPECT_TRUE(e) << "one has ended";
   EXPECT_FALSE(references.admit("f", {}));
   unwanted.cancel();
-  EXPECT_TRUE(references.admit("a", {})) << "the first is not wanted any more";
+  EXPECT_TRUE(references.admit("a", {})) << "the first is cancelled";
 }
 
-TEST(ReferencePictures, TheLeastRecentlyAskedForAreForgotten) {
+TEST(ReferencePictures, LeastRecentlyRequestedAreEvicted) {
   References references;
   const auto keep = [&](const std::string& id, std::size_t bytes) {
     windsplat::protocol::ReferenceDescription description;

@@ -19,12 +19,12 @@ using testing::StartsWith;
 
 class Rest : public testing::Test {
  protected:
-  // Nobody else suffers from what a test did.
+  // Releases what a test loaded or saved.
   void TearDown() override {
     Answer good;
     for (int turns = 0; turns < 600; ++turns) {
       good = get(port(), "/v1/datasets/small/frame.jpg?width=32&height=32");
-      if (good.status != 429) break;  // busy is an answer too, for a moment
+      if (good.status != 429) break;  // busy is a valid answer for a moment
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
     EXPECT_EQ(good.status, 200) << good.body;
@@ -47,7 +47,7 @@ void expect_problem(const Answer& answer, int status, const std::string& pointer
 
 // --- documents ----------------------------------------------------------------------------------
 
-TEST_F(Rest, service_tells_version_links_and_limits_and_every_link_leads_somewhere) {
+TEST_F(Rest, ServiceReportsVersionLimitsAndValidLinks) {
   const Answer answer = get(port(), "/v1");
   ASSERT_EQ(answer.status, 200);
   const Json service = json_of(answer);
@@ -63,7 +63,7 @@ TEST_F(Rest, service_tells_version_links_and_limits_and_every_link_leads_somewhe
   }
 }
 
-TEST_F(Rest, datasets_are_listed_without_being_read_and_described_after_reading) {
+TEST_F(Rest, DatasetsAreListedBeforeAndDescribedAfterReading) {
   const Json list = json_of(get(port(), "/v1/datasets"));
   ASSERT_EQ(list["datasets"].size(), 1U);
   EXPECT_EQ(list["datasets"][0]["id"], "small");
@@ -77,7 +77,7 @@ TEST_F(Rest, datasets_are_listed_without_being_read_and_described_after_reading)
   EXPECT_EQ(dataset["dims"], Json({{"x", 32}, {"y", 16}, {"z", 6}}));
   EXPECT_EQ(dataset["steps"]["count"], small_steps);
   EXPECT_EQ(dataset["defaultView"]["dataset"], "small");
-  // The default view shows two of the fields: others are neither loaded nor are their ranges known.
+  // The default view shows two fields: others are not loaded and have no known range.
   for (const Json& field : dataset["fields"]) {
     const bool shown = field["name"] == "wind" || field["name"] == "cloud";
     EXPECT_EQ(field["range"].is_array(), shown) << field;
@@ -89,14 +89,14 @@ TEST_F(Rest, datasets_are_listed_without_being_read_and_described_after_reading)
   expect_problem(get(port(), "/v1/datasets/nowhere"), 404);
 }
 
-TEST_F(Rest, the_default_view_is_a_view_that_can_be_posted) {
+TEST_F(Rest, DefaultViewCanBePosted) {
   const Json dataset = json_of(get(port(), "/v1/datasets/small"));
   Json view = dataset["defaultView"];
   view["image"] = {{"width", 64}, {"height", 48}};
   EXPECT_EQ(post_view(port(), view.dump()).status, 200);
 }
 
-TEST_F(Rest, color_maps_and_presets_and_schema) {
+TEST_F(Rest, ColorMapsAndPresetsAndSchema) {
   const Json maps = json_of(get(port(), "/v1/colormaps"));
   ASSERT_FALSE(maps["colormaps"].empty());
   EXPECT_GE(maps["colormaps"][0]["colors"].size(), 16U);
@@ -111,7 +111,7 @@ TEST_F(Rest, color_maps_and_presets_and_schema) {
   EXPECT_TRUE(again.body.empty());
 }
 
-TEST_F(Rest, health_answers) {
+TEST_F(Rest, HealthAnswers) {
   EXPECT_EQ(get(port(), "/livez").status, 200);
   EXPECT_EQ(get(port(), "/readyz").status, 200);
   const std::string base = "http://127.0.0.1:" + std::to_string(port());
@@ -123,7 +123,7 @@ TEST_F(Rest, health_answers) {
 
 // --- pictures -----------------------------------------------------------------------------------
 
-TEST_F(Rest, a_picture_has_the_size_asked_for_and_shows_something) {
+TEST_F(Rest, PictureHasTheRequestedSizeAndContent) {
   const Answer answer = get(port(), "/v1/datasets/small/frame.jpg?width=200&height=120&step=1");
   ASSERT_EQ(answer.status, 200) << answer.body;
   EXPECT_EQ(answer.header("content-type"), "image/jpeg");
@@ -139,7 +139,7 @@ TEST_F(Rest, a_picture_has_the_size_asked_for_and_shows_something) {
   EXPECT_GT(info["work"]["samples"], 0);
 }
 
-TEST_F(Rest, formats_by_suffix_and_by_accept) {
+TEST_F(Rest, FormatsBySuffixAndByAccept) {
   const std::string size = "?width=40&height=30";
   const Answer png = get(port(), "/v1/datasets/small/frame.png" + size);
   EXPECT_EQ(png.header("content-type"), "image/png");
@@ -164,7 +164,7 @@ TEST_F(Rest, formats_by_suffix_and_by_accept) {
                  415);
 }
 
-TEST_F(Rest, orbit_and_preset_change_the_picture) {
+TEST_F(Rest, OrbitAndPresetChangeThePicture) {
   const std::string base = "/v1/datasets/small/frame.npy?width=60&height=40";
   const std::string plain = get(port(), base).body;
   for (const char* change : {"&azimuth=90", "&elevation=80", "&zoom=3", "&preset=top",
@@ -179,7 +179,7 @@ TEST_F(Rest, orbit_and_preset_change_the_picture) {
   }
 }
 
-TEST_F(Rest, quality_of_a_jpeg) {
+TEST_F(Rest, QualityOfAJpeg) {
   const std::string base = "/v1/datasets/small/frame.jpg?width=200&height=120&quality=";
   EXPECT_LT(get(port(), base + "20").body.size(), get(port(), base + "95").body.size());
   expect_problem(get(port(), base + "0"), 422);
@@ -187,7 +187,7 @@ TEST_F(Rest, quality_of_a_jpeg) {
   expect_problem(get(port(), "/v1/datasets/small/frame.png?quality=50"), 400);
 }
 
-TEST_F(Rest, the_same_view_has_the_same_tag_and_bytes_and_is_not_sent_twice) {
+TEST_F(Rest, SameViewHasTheSameTagAndBytesAndGets304) {
   const std::string view = R"({"dataset":"small","image":{"width":40,"height":30}})";
   const Answer first = post_view(port(), view);
   ASSERT_EQ(first.status, 200);
@@ -195,20 +195,20 @@ TEST_F(Rest, the_same_view_has_the_same_tag_and_bytes_and_is_not_sent_twice) {
   EXPECT_THAT(etag, StartsWith("\""));
   const Answer second = post_view(port(), R"({"image":{"height":30,"width":40},"dataset":"small",
                                               "step":0})");
-  EXPECT_EQ(second.header("etag"), etag) << "spelled otherwise, the same view";
+  EXPECT_EQ(second.header("etag"), etag) << "the same view in another spelling";
   EXPECT_EQ(second.body, first.body);
   const Answer third = post_view(port(), view, {{"If-None-Match", "\"other\", " + etag}});
   EXPECT_EQ(third.status, 304);
   EXPECT_TRUE(third.body.empty());
   EXPECT_EQ(third.header("etag"), etag);
-  // What changes the bytes changes the tag.
+  // Any change of the bytes changes the tag.
   EXPECT_NE(post_view(port(), view, {{"Accept", "image/png"}}).header("etag"), etag);
   EXPECT_NE(post_view(port(), R"({"dataset":"small","step":1,"image":{"width":40,"height":30}})")
                 .header("etag"),
             etag);
 }
 
-TEST_F(Rest, a_budgeted_picture_is_not_to_be_kept) {
+TEST_F(Rest, BudgetedPictureIsNotCacheable) {
   const Answer answer = post_view(
       port(), R"({"dataset":"small","image":{"width":40,"height":30},"quality":{"budgetMs":20}})");
   EXPECT_EQ(answer.status, 200);
@@ -216,9 +216,8 @@ TEST_F(Rest, a_budgeted_picture_is_not_to_be_kept) {
   EXPECT_EQ(answer.header("etag"), "");
 }
 
-// Every picture says what it is thought to err, and one that is asked for by its error or its time
-// is drawn by what does.
-TEST_F(Rest, a_picture_says_its_error_and_keeps_what_is_asked_of_it) {
+// Every picture reports its estimated error, and a requested error or time decides its setting.
+TEST_F(Rest, PictureReportsItsErrorAndMeetsErrorAndBudget) {
   const auto frame_of = [&](const std::string& quality) {
     const Answer answer =
         post_view(port(), R"({"dataset":"small","image":{"width":320,"height":240},"quality":)" +
@@ -241,7 +240,7 @@ TEST_F(Rest, a_picture_says_its_error_and_keeps_what_is_asked_of_it) {
 
 // --- bad input ----------------------------------------------------------------------------------
 
-TEST_F(Rest, bad_views_are_refused_with_the_pointer) {
+TEST_F(Rest, InvalidViewsAreRefusedWithThePointer) {
   struct Case {
     const char* view;
     int status;
@@ -281,13 +280,13 @@ TEST_F(Rest, bad_views_are_refused_with_the_pointer) {
   expect_problem(post_view(port(), deep), 400);
 }
 
-TEST_F(Rest, a_picture_with_more_pixels_than_allowed_is_413_or_422) {
+TEST_F(Rest, PictureAboveThePixelLimitGets413Or422) {
   const Answer answer =
       post_view(port(), R"({"dataset":"small","image":{"width":8192,"height":8192}})");
   EXPECT_THAT(answer.status, testing::AnyOf(413, 422));
 }
 
-TEST_F(Rest, bad_queries_are_refused) {
+TEST_F(Rest, InvalidQueriesAreRefused) {
   const std::string base = "/v1/datasets/small/frame.jpg?";
   for (const char* query :
        {"colour=1", "width=ten", "width=1&width=2", "azimuth=NaN", "azimuth=inf", "azimuth=1e999",
@@ -305,7 +304,7 @@ TEST_F(Rest, bad_queries_are_refused) {
   expect_problem(get(port(), "/v1/datasets/..%2f..%2fetc%2fpasswd"), 404);
 }
 
-TEST_F(Rest, methods_that_do_nothing_are_told_which_do) {
+TEST_F(Rest, UnsupportedMethodsGetTheAllowedOnes) {
   const Answer deleted = request(port(), "DELETE", "/v1/datasets");
   expect_problem(deleted, 405);
   EXPECT_EQ(deleted.header("allow"), "GET, HEAD, POST, OPTIONS");
@@ -320,7 +319,7 @@ TEST_F(Rest, methods_that_do_nothing_are_told_which_do) {
   expect_problem(request(port(), "BREW", "/v1"), 501);
 }
 
-TEST_F(Rest, head_is_get_without_the_body) {
+TEST_F(Rest, HeadIsGetWithoutTheBody) {
   for (const char* target :
        {"/v1", "/v1/datasets/small/frame.png?width=40&height=30", "/view.schema.json", "/"}) {
     const Answer whole = get(port(), target);
@@ -332,10 +331,10 @@ TEST_F(Rest, head_is_get_without_the_body) {
   }
 }
 
-TEST_F(Rest, beyond_what_can_wait_comes_429_at_once) {
-  // Resident, so that nothing is let in only to find that it has to be loaded first.
+TEST_F(Rest, FullQueueGets429AtOnce) {
+  // Resident, so that no admitted request has to load first.
   ASSERT_EQ(get(port(), "/v1/datasets/small/frame.jpg?width=16&height=16").status, 200);
-  // More pictures than may wait, requested before the first is done.
+  // More pictures than the queue holds, requested before the first is done.
   const std::string slow =
       "GET /v1/datasets/small/frame.png?width=4096&height=4096 HTTP/1.1\r\nHost: x\r\n\r\n";
   std::vector<std::unique_ptr<Socket>> sockets;
@@ -343,7 +342,7 @@ TEST_F(Rest, beyond_what_can_wait_comes_429_at_once) {
     sockets.push_back(std::make_unique<Socket>(port()));
     sockets.back()->send(slow);
   }
-  // The last were refused while the first is still being drawn.
+  // The last were refused while the first was still rendering.
   const Answer refused = read_answer(*sockets.back());
   expect_problem(refused, 429);
   EXPECT_FALSE(refused.header("retry-after").empty());
@@ -362,7 +361,7 @@ TEST_F(Rest, beyond_what_can_wait_comes_429_at_once) {
 
 // --- the page -----------------------------------------------------------------------------------
 
-TEST_F(Rest, the_page_is_served_safely_and_cached) {
+TEST_F(Rest, PageIsServedWithSecurityAndCacheHeaders) {
   const Answer page = get(port(), "/");
   ASSERT_EQ(page.status, 200);
   EXPECT_THAT(page.header("content-type"), StartsWith("text/html"));
@@ -381,10 +380,10 @@ TEST_F(Rest, the_page_is_served_safely_and_cached) {
   const Answer known =
       get(port(), "/", {{"Accept-Encoding", "gzip"}, {"If-None-Match", zipped.header("etag")}});
   EXPECT_EQ(known.status, 304);
-  // A browser lets a 304's headers replace those it kept: another policy would break the page.
+  // Headers of a 304 replace the cached ones in browsers: another policy would break the page.
   EXPECT_EQ(known.header("content-security-policy"), policy);
 
-  // What the page loads is there, and may be kept for good.
+  // Files of the page exist and are cacheable forever.
   const std::size_t at = page.body.find(".js\"");
   ASSERT_NE(at, std::string::npos);
   const std::size_t from = page.body.rfind('"', at) + 1;
@@ -405,7 +404,7 @@ TEST(RestFrames, APostedViewIsCompletedOnceThoughItsDataHadToBeLoaded) {
   EXPECT_EQ(windsplat::scene::completions() - before, 2U) << "one each";
 }
 
-TEST(RestBase, everything_lies_below_the_base_path_and_health_at_the_root_too) {
+TEST(RestBase, BasePathPrefixesEverythingAndHealthIsAlsoAtTheRoot) {
   windsplat::net::ServerOptions options;
   options.base_path = "/a/b";
   TestServer server(options);
@@ -423,7 +422,7 @@ TEST(RestBase, everything_lies_below_the_base_path_and_health_at_the_root_too) {
   EXPECT_EQ(Json::parse(get(port, "/a/b/v1").body)["links"]["datasets"], "/a/b/v1/datasets");
 }
 
-TEST(RestListen, an_address_that_cannot_be_had_is_named) {
+TEST(RestListen, UnavailableAddressIsReported) {
   const auto store = std::make_shared<windsplat::data::Store>(1 << 20);
   const auto pool = std::make_shared<windsplat::ThreadPool>(1);
   windsplat::net::ServerOptions options;

@@ -25,7 +25,7 @@ class Gate {
     changed_.notify_all();
     changed_.wait(lock, [this] { return open_; });
   }
-  // Until so many have come since the beginning; false if they do not come.
+  // Waits until that many callers arrived; false on a timeout.
   bool wait_for(int count) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, std::chrono::minutes(1), [&] { return arrived_ >= count; });
@@ -48,7 +48,7 @@ class Gate {
   int arrived_ = 0;
 };
 
-// Another source behind a gate; ignores cancel(), as a disk does that hangs.
+// Another source behind a gate; ignores cancel(), like a hanging disk.
 class SlowSource : public windsplat::data::Source {
  public:
   SlowSource(std::unique_ptr<windsplat::data::Source> source, std::shared_ptr<Gate> gate)

@@ -28,7 +28,7 @@ std::optional<Frame> parse_frame(const std::optional<std::string>& bytes) {
   return Frame{*header, bytes->substr(protocol::frame_header_bytes)};
 }
 
-// A viewer that acknowledges what it is sent.
+// A session that acknowledges every frame.
 class Viewer : public StreamClient {
  public:
   using StreamClient::StreamClient;
@@ -66,7 +66,7 @@ class Stream : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(Stream, says_hello_first_and_agrees_on_the_protocol) {
+TEST_F(Stream, SendsHelloFirstAndNegotiatesTheProtocol) {
   StreamClient offers(port(), {{"Sec-WebSocket-Protocol", "chat, windsplat.v1"}});
   EXPECT_EQ(offers.handshake().status, 101);
   EXPECT_EQ(offers.handshake().header("sec-websocket-protocol"), "windsplat.v1");
@@ -82,7 +82,7 @@ TEST_F(Stream, says_hello_first_and_agrees_on_the_protocol) {
   EXPECT_TRUE(plain.next_text("hello"));
 }
 
-TEST_F(Stream, open_then_patch_then_a_moving_and_a_final_frame) {
+TEST_F(Stream, OpenAndPatchGiveAMovingAndAFinalFrame) {
   Viewer viewer(port());
   viewer.say(R"({"type":"open","id":3,"dataset":"small"})");
   const auto opened = viewer.next_text("opened");
@@ -102,7 +102,7 @@ TEST_F(Stream, open_then_patch_then_a_moving_and_a_final_frame) {
   EXPECT_GT(picture.distinct(), 160U * 120U / 50);
 }
 
-TEST_F(Stream, a_patch_and_acks_are_enough) {
+TEST_F(Stream, PatchAndAcksSuffice) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   const auto moving = viewer.frame();
@@ -117,7 +117,7 @@ TEST_F(Stream, a_patch_and_acks_are_enough) {
   const auto final = viewer.final_frame(1);
   ASSERT_TRUE(final);
   EXPECT_EQ(final->header.seq, 2U);
-  // Each was announced by what was chosen for it.
+  // Each was announced by a `chosen` message.
   std::vector<int> announced;
   for (const std::string& text : viewer.texts) {
     const Json json = Json::parse(text);
@@ -126,7 +126,7 @@ TEST_F(Stream, a_patch_and_acks_are_enough) {
   EXPECT_THAT(announced, testing::ElementsAre(1, 2));
 }
 
-TEST_F(Stream, chosen_tells_a_view_that_draws_the_same_picture) {
+TEST_F(Stream, ChosenReportsAViewThatRendersTheSamePicture) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -141,7 +141,7 @@ TEST_F(Stream, chosen_tells_a_view_that_draws_the_same_picture) {
             post_view(port(), small_view, {{"Accept", "image/png"}}).body);
 }
 
-TEST_F(Stream, no_third_frame_before_an_ack) {
+TEST_F(Stream, NoThirdFrameBeforeAnAck) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.next_frame());
@@ -161,7 +161,7 @@ TEST_F(Stream, no_third_frame_before_an_ack) {
   EXPECT_EQ(third->header.rev, 29U) << "the newest view";
 }
 
-TEST_F(Stream, a_drag_shows_motion_and_ends_sharp) {
+TEST_F(Stream, DragShowsMovingFramesAndEndsWithTheFinalFrame) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -177,11 +177,11 @@ TEST_F(Stream, a_drag_shows_motion_and_ends_sharp) {
       ++moved;
     }
   }
-  EXPECT_GE(moved, 5U) << "the picture follows the hand";
+  EXPECT_GE(moved, 5U) << "the picture follows the input";
   EXPECT_TRUE(viewer.final_frame(rev));
 }
 
-TEST_F(Stream, a_still_comes_at_its_size_after_its_announcement) {
+TEST_F(Stream, StillFollowsItsAnnouncementAtItsSize) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -201,7 +201,7 @@ TEST_F(Stream, a_still_comes_at_its_size_after_its_announcement) {
   EXPECT_EQ(progress["done"], 1);
 }
 
-TEST_F(Stream, a_lossless_view_ends_as_the_png_that_a_request_gets) {
+TEST_F(Stream, LosslessViewEndsWithThePngOfARequest) {
   Viewer viewer(port());
   const char* const view =
       R"({"dataset":"small","image":{"width":160,"height":120},"quality":{"lossless":true}})";
@@ -216,7 +216,7 @@ TEST_F(Stream, a_lossless_view_ends_as_the_png_that_a_request_gets) {
   EXPECT_EQ(final->payload, post_view(port(), view, {{"Accept", "image/png"}}).body);
 }
 
-TEST_F(Stream, play_runs_through_the_steps) {
+TEST_F(Stream, PlayShowsTheSteps) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -234,7 +234,7 @@ TEST_F(Stream, play_runs_through_the_steps) {
   }
 }
 
-TEST_F(Stream, two_viewers_share_what_was_read_and_see_their_own_view) {
+TEST_F(Stream, TwoSessionsShareLoadedDataAndKeepTheirViews) {
   Viewer one(port());
   Viewer two(port());
   one.patch(1, R"({"dataset":"small","image":{"width":64,"height":48}})");
@@ -245,7 +245,7 @@ TEST_F(Stream, two_viewers_share_what_was_read_and_see_their_own_view) {
   ASSERT_TRUE(second);
   EXPECT_EQ(first->header.width, 64);
   EXPECT_EQ(second->header.width, 96);
-  // The next step is read ahead, some time after the frames.
+  // The next step is prefetched some time after the frames.
   std::uint64_t loads = server_.loads();
   for (int quiet = 0; quiet < 20; ++quiet) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -260,7 +260,7 @@ TEST_F(Stream, two_viewers_share_what_was_read_and_see_their_own_view) {
 
 // --- bad input ----------------------------------------------------------------------------------
 
-TEST_F(Stream, messages_that_cannot_be_followed_are_answered_and_the_connection_lives) {
+TEST_F(Stream, InvalidMessagesAreAnsweredAndTheConnectionStays) {
   Viewer viewer(port());
   viewer.patch(1, small_view);
   ASSERT_TRUE(viewer.final_frame(1));
@@ -295,7 +295,7 @@ TEST_F(Stream, messages_that_cannot_be_followed_are_answered_and_the_connection_
   EXPECT_EQ(frame->header.step, 1U);
 }
 
-TEST_F(Stream, what_breaks_the_protocol_closes_with_its_code) {
+TEST_F(Stream, ProtocolViolationsCloseWithTheirCode) {
   {
     StreamClient client(port());
     client.send_frame(Opcode::binary, "frames come from the server");
@@ -312,7 +312,7 @@ TEST_F(Stream, what_breaks_the_protocol_closes_with_its_code) {
     EXPECT_EQ(client.close_code(), 1009);
   }
   {
-    // In fragments of no length: none of them is too big, and there is no end to them.
+    // Empty fragments: none is too large, and they never end.
     StreamClient client(port());
     client.send_frame(Opcode::text, "", false);
     for (int n = 0; n < 60000; ++n) {
@@ -327,13 +327,13 @@ TEST_F(Stream, what_breaks_the_protocol_closes_with_its_code) {
   }
 }
 
-// A ping between fragments is no sign of a message's end.
-TEST_F(Stream, a_message_that_never_ends_is_cut_off_though_pings_come_between) {
+// A ping between fragments does not end the message.
+TEST_F(Stream, EndlessMessageTimesOutDespitePings) {
   StreamClient client(port());
   ASSERT_TRUE(client.next_text("hello"));
   client.send_frame(Opcode::text, "", false);
   bool cut = false;
-  // A message may take 10 s; this would go on for three times as long.
+  // A message may take 10 s; this would take three times as long.
   for (int n = 0; n < 60 && !cut; ++n) {
     client.send_frame(Opcode::ping, "x");
     client.send_frame(Opcode::more, "", false);
@@ -342,7 +342,7 @@ TEST_F(Stream, a_message_that_never_ends_is_cut_off_though_pings_come_between) {
   EXPECT_TRUE(cut);
 }
 
-TEST_F(Stream, pings_alone_are_no_message) {
+TEST_F(Stream, PingsDoNotCountAsMessages) {
   StreamClient client(port());
   for (int n = 0; n < 24; ++n) {
     client.send_frame(Opcode::ping, "x");
@@ -350,27 +350,27 @@ TEST_F(Stream, pings_alone_are_no_message) {
   }
 }
 
-TEST_F(Stream, a_peer_that_has_said_goodbye_is_not_waited_for) {
+TEST_F(Stream, PeerThatClosedIsNotWaitedFor) {
   StreamClient client(port());
   ASSERT_TRUE(client.next_text("hello"));
   const auto begin = std::chrono::steady_clock::now();
-  // At once: the server finds the close when it has begun to say its own.
+  // At once: the server finds the close when it has begun its own.
   const std::string mask(4, '\0');
   client.socket.send("\x82\x81" + mask + "x" + "\x88\x82" + mask + "\x03\xe8");
   EXPECT_EQ(client.close_code(), 4400);
   EXPECT_TRUE(client.socket.closed_by_peer());
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(1500))
-      << "one that says nothing is waited for 2 s";
+      << "a silent client is waited for 2 s";
 }
 
-TEST_F(Stream, a_message_at_the_limit_is_read) {
+TEST_F(Stream, MessageAtTheLimitIsRead) {
   Viewer viewer(port());
   const std::string patch = R"({"type":"patch","rev":1,"patch":)" + std::string(small_view) + "}";
   viewer.say(patch + std::string(65536 - patch.size(), ' '));
   EXPECT_TRUE(viewer.final_frame(1));
 }
 
-TEST_F(Stream, pages_of_other_origins_may_not_connect) {
+TEST_F(Stream, PagesOfOtherOriginsCannotConnect) {
   const std::string own = "http://127.0.0.1:" + std::to_string(port());
   const auto status = [&](const std::string& origin) {
     return StreamClient(port(), {{"Origin", origin}}).handshake().status;
@@ -388,7 +388,7 @@ TEST_F(Stream, pages_of_other_origins_may_not_connect) {
   EXPECT_EQ(StreamClient(other.port(), {{"Origin", "http://lab.example"}}).handshake().status, 403);
 }
 
-TEST_F(Stream, viewers_beyond_the_limit_are_told_so) {
+TEST_F(Stream, SessionsAboveTheLimitAreRefusedWithTheReason) {
   windsplat::net::ServerOptions options;
   options.sessions_max = 2;
   TestServer server(options);
@@ -400,15 +400,15 @@ TEST_F(Stream, viewers_beyond_the_limit_are_told_so) {
     StreamClient three(server.port());
     EXPECT_EQ(three.close_code(), 1013);
   }
-  // Their places are free after they disconnect.
+  // Their slots are free after they disconnect.
   for (int turns = 0; turns < 100; ++turns) {
     StreamClient next(server.port());
     if (next.next_text("hello")) return;
   }
-  FAIL() << "no place came free";
+  FAIL() << "no slot was released";
 }
 
-TEST_F(Stream, silence_ends_the_session) {
+TEST_F(Stream, SilenceClosesTheSession) {
   windsplat::net::ServerOptions options;
   options.idle_timeout_s = 1;
   const TestServer server(options);
@@ -416,7 +416,7 @@ TEST_F(Stream, silence_ends_the_session) {
   EXPECT_EQ(client.close_code(), 4410);
 }
 
-TEST_F(Stream, a_peer_that_never_reads_is_sent_two_frames_at_most) {
+TEST_F(Stream, PeerThatNeverReadsIsSentAtMostTwoFrames) {
   StreamClient deaf(port(), {}, "/v1/stream", 4096);
   deaf.say(R"({"type":"patch","rev":1,"patch":{"dataset":"small",
               "image":{"width":1600,"height":1200}}})");

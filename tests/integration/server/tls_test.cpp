@@ -1,4 +1,4 @@
-// The same server in TLS: requests, streams, deadlines, and certificates that change while it runs.
+// The server with TLS: requests, streams, deadlines, and certificates replaced while it runs.
 #include "server/transport/tls.hpp"
 
 #include <gmock/gmock.h>
@@ -38,11 +38,11 @@ class Tls : public testing::Test {
   TestServer server_{in_tls()};
 };
 
-TEST_F(Tls, requests_are_answered_and_told_to_stay_in_it) {
+TEST_F(Tls, RequestsAreAnsweredWithStrictTransportSecurity) {
   EXPECT_THAT(server_.server().url(), testing::StartsWith("https://127.0.0.1:"));
   const Answer live = get(place(), "/livez");
   EXPECT_EQ(live.status, 200);
-  EXPECT_EQ(live.header("strict-transport-security"), "") << "loopback is others', too";
+  EXPECT_EQ(live.header("strict-transport-security"), "") << "loopback is shared with other users";
   Socket by_name(place());
   by_name.send("GET /livez HTTP/1.1\r\nHost: winds.example\r\n\r\n");
   EXPECT_EQ(read_answer(by_name).header("strict-transport-security"), "max-age=15552000");
@@ -57,7 +57,7 @@ TEST_F(Tls, requests_are_answered_and_told_to_stay_in_it) {
   EXPECT_EQ(read_answer(plain_by_name).header("strict-transport-security"), "");
 }
 
-TEST_F(Tls, speaks_1_3_and_http_1_1) {
+TEST_F(Tls, SupportsTls13AndHttp11) {
   Socket socket(place());
   ASSERT_TRUE(socket.shaken());
   EXPECT_EQ(socket.version(), "TLSv1.3");
@@ -65,7 +65,7 @@ TEST_F(Tls, speaks_1_3_and_http_1_1) {
   EXPECT_EQ(socket.peer_name(), "first");
 }
 
-TEST_F(Tls, one_connection_carries_many_requests_even_sent_at_once) {
+TEST_F(Tls, ConnectionCarriesManyRequestsEvenPipelined) {
   Socket socket(place());
   const std::string ask =
       "GET /v1/datasets/small/frame.png?width=20&height=20 HTTP/1.1\r\nHost: x\r\n\r\n";
@@ -88,8 +88,8 @@ TEST_F(Tls, one_connection_carries_many_requests_even_sent_at_once) {
   EXPECT_TRUE(socket.closed_by_peer());
 }
 
-// Frames of every size come whole: small ones share a record, large ones take many.
-TEST_F(Tls, a_stream_brings_frames) {
+// Frames of every size arrive complete: small ones share a record, large ones take many.
+TEST_F(Tls, StreamSendsFrames) {
   StreamClient viewer(place(), {{"Sec-WebSocket-Protocol", "windsplat.v1"}});
   ASSERT_EQ(viewer.handshake().status, 101);
   ASSERT_TRUE(viewer.next_text("hello"));
@@ -119,23 +119,23 @@ TEST_F(Tls, a_stream_brings_frames) {
   EXPECT_TRUE(viewer.socket.closed_by_peer());
 }
 
-TEST_F(Tls, a_peer_that_speaks_plain_http_is_told) {
+TEST_F(Tls, PlainHttpClientGetsAnExplanation) {
   const Answer answer = raw(plain(), "GET /livez HTTP/1.1\r\nHost: x\r\n\r\n");
   EXPECT_EQ(answer.status, 400);
   EXPECT_THAT(answer.body, HasSubstr("https://"));
   EXPECT_EQ(answer.header("connection"), "close");
 }
 
-TEST_F(Tls, noise_is_cut_off) {
+TEST_F(Tls, NoiseIsDisconnected) {
   for (const std::string& noise : {std::string(100, '\0'), std::string(70000, '\xff'),
                                    std::string("\x16\x03\x01\x40\x00", 5)}) {
     Socket socket(plain());
     socket.send(noise);
-    EXPECT_TRUE(socket.closed_by_peer(20'000)) << "at the handshake's deadline at the latest";
+    EXPECT_TRUE(socket.closed_by_peer(20'000)) << "no later than the handshake deadline";
   }
 }
 
-TEST_F(Tls, a_handshake_has_a_deadline_while_others_are_served) {
+TEST_F(Tls, HandshakeHasADeadlineWhileOthersAreServed) {
   Socket silent(plain());
   Socket slow(plain());
   slow.send(std::string("\x16\x03\x01\x02", 4));
@@ -143,17 +143,17 @@ TEST_F(Tls, a_handshake_has_a_deadline_while_others_are_served) {
   EXPECT_EQ(get(place(), "/livez").status, 200);
   EXPECT_TRUE(silent.closed_by_peer(20'000));
   EXPECT_TRUE(slow.closed_by_peer(20'000));
-  EXPECT_GT(Clock::now() - begin, std::chrono::seconds(3)) << "it is no refusal at once";
+  EXPECT_GT(Clock::now() - begin, std::chrono::seconds(3)) << "not refused at once";
 }
 
-TEST_F(Tls, a_slow_header_is_cut_off) {
+TEST_F(Tls, SlowHeaderTimesOut) {
   Socket slow(place());
   slow.send("GET /livez HT");
   EXPECT_TRUE(slow.closed_by_peer(20'000));
 }
 
-// With a close_notify and without; were they all drawn, the last would come after a minute of work.
-TEST_F(Tls, a_client_that_leaves_frees_the_renderer) {
+// With and without close_notify; if all were rendered, the last would take a minute.
+TEST_F(Tls, DisconnectCancelsTheRendering) {
   for (int n = 0; n < 12; ++n) {
     Socket socket(place());
     socket.send(
@@ -166,11 +166,11 @@ TEST_F(Tls, a_client_that_leaves_frees_the_renderer) {
       "windsplat_http_requests_total{route=\"/v1/datasets/{id}/frame\",status=\"4xx\"} ";
   const std::size_t at = metrics.find(left);
   ASSERT_NE(at, std::string::npos);
-  EXPECT_GE(std::stoi(metrics.substr(at + left.size())), 6) << "those that said goodbye";
+  EXPECT_GE(std::stoi(metrics.substr(at + left.size())), 6) << "those with close_notify";
 }
 
-// What comes in TLS is not always a request, or a client that goes.
-TEST_F(Tls, a_change_of_keys_while_a_picture_is_drawn_is_no_leaving) {
+// TLS records are not always a request or a close.
+TEST_F(Tls, KeyUpdateDuringAPictureIsNoDisconnect) {
   Socket socket(place());
   socket.send(
       "GET /v1/datasets/small/frame.png?width=1500&height=1500 HTTP/1.1\r\nHost: x\r\n\r\n");
@@ -180,7 +180,7 @@ TEST_F(Tls, a_change_of_keys_while_a_picture_is_drawn_is_no_leaving) {
   EXPECT_EQ(read_answer(socket).status, 200);
 }
 
-TEST_F(Tls, a_viewer_that_changes_its_keys_stays) {
+TEST_F(Tls, KeyUpdateDuringAStreamIsNoDisconnect) {
   StreamClient viewer(place());
   ASSERT_TRUE(viewer.next_text("hello"));
   EXPECT_TRUE(viewer.socket.change_key());
@@ -190,8 +190,8 @@ TEST_F(Tls, a_viewer_that_changes_its_keys_stays) {
   EXPECT_TRUE(viewer.next_text("opened"));
 }
 
-// A body that is not wanted, and sent all the same, does not cost the client its answer.
-TEST_F(Tls, a_body_too_large_gets_413) {
+// A client that sends a refused body still gets its response.
+TEST_F(Tls, OversizeBodyGets413) {
   Socket socket(place());
   socket.send("POST /v1/frames HTTP/1.1\r\nHost: x\r\nContent-Length: 104857600\r\n\r\n");
   const std::string megabyte(1 << 20, 'x');
@@ -201,8 +201,8 @@ TEST_F(Tls, a_body_too_large_gets_413) {
   EXPECT_EQ(read_answer(socket).status, 413);
 }
 
-// The write deadline is 15 s and some more for the size.
-TEST_F(Tls, a_viewer_that_never_reads_is_sent_away) {
+// The write deadline is 15 s plus a time for the size.
+TEST_F(Tls, SessionThatNeverReadsIsClosed) {
   StreamClient viewer(place(), {}, "/v1/stream", 4096);
   ASSERT_TRUE(viewer.next_text("hello"));
   viewer.say(R"({"type":"open","id":1,"dataset":"small"})");
@@ -220,7 +220,7 @@ TEST_F(Tls, a_viewer_that_never_reads_is_sent_away) {
   FAIL() << "it still holds its session";
 }
 
-TEST_F(Tls, another_certificate_is_for_connections_that_come) {
+TEST_F(Tls, NewCertificateIsUsedForNewConnections) {
   Socket old(place());
   StreamClient viewer(place());
   ASSERT_TRUE(viewer.next_text("hello"));
@@ -236,7 +236,7 @@ TEST_F(Tls, another_certificate_is_for_connections_that_come) {
   EXPECT_TRUE(viewer.next_text("opened"));
 }
 
-TEST(TlsDrain, says_goodbye) {
+TEST(TlsDrain, SendsCloseNotify) {
   TestServer server(in_tls());
   StreamClient viewer(Place(server.port(), true));
   ASSERT_TRUE(viewer.next_text("hello"));
@@ -245,7 +245,7 @@ TEST(TlsDrain, says_goodbye) {
   EXPECT_TRUE(viewer.socket.closed_by_peer());
 }
 
-TEST(TlsFiles, are_refused_with_a_reason) {
+TEST(TlsFiles, InvalidFilesAreRefusedWithAReason) {
   const Certificate mine = make_certificate("mine");
   const Certificate other = make_certificate("other");
   const auto refused = [](const std::string& chain, const std::string& key) {

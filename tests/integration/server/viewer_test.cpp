@@ -34,7 +34,7 @@ bool prepared(net::Viewer& viewer, std::uint64_t ticket, const protocol::View& v
   return loaded;
 }
 
-TEST(Viewer, AFrameThatWaitedForAveragesSaysSoAsOneThatWaitedForFields) {
+TEST(Viewer, WaitForAveragesIsReportedLikeAWaitForFields) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add(small_file()).value();
   net::Services services({}, store, std::make_shared<ThreadPool>(2));
@@ -81,7 +81,7 @@ TEST(Viewer, CompletesAViewOnceForAllThatIsDrawnOfIt) {
 }
 
 // Data of one step and a half fit: every frame has to wait until those before it are drawn.
-TEST(Viewer, ViewersOfDifferentStepsAllGetTheirFramesWhereOneStepFits) {
+TEST(Viewer, SessionsAtDifferentStepsGetFramesWhenOneStepFits) {
   constexpr std::uint64_t sample_bytes = 4 * sizeof(float);  // a wind and a cloud
   constexpr std::uint64_t step_bytes = std::uint64_t{32} * 16 * 6 * sample_bytes;
   const auto store = std::make_shared<data::Store>(step_bytes * 3 / 2);
@@ -119,7 +119,7 @@ TEST(Viewer, ViewersOfDifferentStepsAllGetTheirFramesWhereOneStepFits) {
   }
 }
 
-// One picture of more pixels than are always kept room for, and the data of one step and a half.
+// One picture with more pixels than are reserved, and the data of one and a half steps.
 class LargePictures : public testing::Test {
  protected:
   static constexpr std::uint64_t step_bytes = std::uint64_t{32} * 16 * 6 * 4 * sizeof(float);
@@ -134,7 +134,7 @@ class LargePictures : public testing::Test {
     services_ = std::make_unique<net::Services>(net::ServerOptions{}, store_,
                                                 std::make_shared<ThreadPool>(2));
   }
-  // Why there is no frame; empty: there is one.
+  // Why there is no frame; empty if there is one.
   std::future<std::string> fault_of(net::Viewer& viewer, const protocol::View& view) {
     const auto told = std::make_shared<std::promise<std::string>>();
     viewer.start(session::StartRender{++tickets_, view, {}, {}},
@@ -150,7 +150,7 @@ class LargePictures : public testing::Test {
   std::uint64_t tickets_ = 0;
 };
 
-TEST_F(LargePictures, WaitForTheRoomThatOthersHold) {
+TEST_F(LargePictures, WaitForMemoryHeldByOthers) {
   net::Viewer viewer(services_->backend, 1, "192.0.2.1");
   ASSERT_EQ(fault_of(viewer, view_).get(), "") << "its data are resident from now on";
   auto others = store_->reserve(step_bytes);
@@ -164,7 +164,7 @@ TEST_F(LargePictures, WaitForTheRoomThatOthersHold) {
   EXPECT_EQ(fault.get(), "");
 }
 
-TEST_F(LargePictures, OfTwoViewersAreDrawnOneAfterTheOtherWhereOneFits) {
+TEST_F(LargePictures, OfTwoSessionsAreRenderedInTurnWhenOneFits) {
   net::Viewer one(services_->backend, 1, "192.0.2.1");
   net::Viewer other(services_->backend, 2, "192.0.2.2");
   for (int round = 0; round < 4; ++round) {
@@ -178,7 +178,7 @@ TEST_F(LargePictures, OfTwoViewersAreDrawnOneAfterTheOtherWhereOneFits) {
   }
 }
 
-TEST_F(LargePictures, ThatFitNotEvenAloneAreRefusedAtOnce) {
+TEST_F(LargePictures, ThatNeverFitAreRefusedAtOnce) {
   net::Viewer viewer(services_->backend, 1, "192.0.2.1");
   view_.image.height = 2048;
   const std::string fault = fault_of(viewer, view_).get();

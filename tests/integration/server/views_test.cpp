@@ -59,8 +59,8 @@ class Views : public testing::Test {
   TestServer server_;
 };
 
-TEST_F(Views, APostedViewIsKeptInCanonicalFormUnderItsLocation) {
-  // The dataset is none that the server has.
+TEST_F(Views, PostedViewIsStoredInCanonicalFormAtItsLocation) {
+  // The dataset does not exist on the server.
   const Answer made = post(R"({ "step": 3.0, "dataset": "elsewhere", "vector": {"field": null},
                                 "camera": {}, "quality": {"maxError": null} })");
   ASSERT_EQ(made.status, 201) << made.body;
@@ -78,7 +78,7 @@ TEST_F(Views, APostedViewIsKeptInCanonicalFormUnderItsLocation) {
   EXPECT_NE(saved("{}"), saved("{}"));
 }
 
-TEST_F(Views, BelowABasePathTheLocationIsBelowItToo) {
+TEST_F(Views, LocationContainsTheBasePath) {
   windsplat::net::ServerOptions options;
   options.base_path = "/a/b/";
   const TestServer below(options);
@@ -88,7 +88,7 @@ TEST_F(Views, BelowABasePathTheLocationIsBelowItToo) {
   EXPECT_EQ(get(below.port(), made.header("location")).status, 200);
 }
 
-TEST_F(Views, AnETagIsOfWhatTheViewIsNow) {
+TEST_F(Views, EtagIdentifiesTheCurrentView) {
   const std::string id = saved(R"({"step":1})");
   const std::string first = read(id).header("etag");
   ASSERT_FALSE(first.empty());
@@ -122,7 +122,7 @@ TEST_F(Views, PutReplacesAndPatchMerges) {
   EXPECT_EQ(json_of(put)["id"], id);
 }
 
-TEST_F(Views, ADeletedViewIsGone) {
+TEST_F(Views, DeletedViewReturns404) {
   const std::string id = saved("{}");
   const std::string other = saved("{}");
   const Answer gone = ask("DELETE", id, "", {});
@@ -135,7 +135,7 @@ TEST_F(Views, ADeletedViewIsGone) {
   EXPECT_EQ(read(other).status, 200);
 }
 
-TEST_F(Views, IfNoneMatchOfWhatIsThereChangesNothing) {
+TEST_F(Views, IfNoneMatchOnAnExistingViewChangesNothing) {
   const std::string id = saved(R"({"step":1})");
   for (const std::string& tag : {std::string("*"), read(id).header("etag")}) {
     expect_views_problem(ask("PUT", id, R"({"step":2})", with(json_type, "If-None-Match", tag)),
@@ -146,7 +146,7 @@ TEST_F(Views, IfNoneMatchOfWhatIsThereChangesNothing) {
   EXPECT_EQ(ask("PUT", id, R"({"step":2})", with(json_type, "If-None-Match", "\"x\"")).status, 200);
 }
 
-TEST_F(Views, IfMatchLetsOnlyTheViewThatWasSeenBeChanged) {
+TEST_F(Views, IfMatchRefusesChangesToAnotherVersion) {
   const std::string id = saved(R"({"step":1})");
   const std::string seen = read(id).header("etag");
   const auto if_match = [](const std::string& tag) { return with(json_type, "If-Match", tag); };
@@ -167,7 +167,7 @@ TEST_F(Views, IfMatchLetsOnlyTheViewThatWasSeenBeChanged) {
 }
 
 // Each client modifies what it read and retries on a conflict: no change is lost.
-TEST_F(Views, WritersThatHeedIfMatchLoseNoneOfTheirChanges) {
+TEST_F(Views, ConcurrentWritersWithIfMatchLoseNoChange) {
   const std::string id = saved(R"({"step":0})");
   constexpr int writers = 4;
   constexpr int changes = 10;
@@ -191,7 +191,7 @@ TEST_F(Views, WritersThatHeedIfMatchLoseNoneOfTheirChanges) {
   EXPECT_EQ(json_of(read(id))["view"]["step"], writers * changes);
 }
 
-TEST_F(Views, FaultsNameTheirPlaceAndChangeNothing) {
+TEST_F(Views, ErrorsNameTheirPointerAndChangeNothing) {
   const std::string id = saved(R"({"step":1})");
   const Headers patch_type{{"Content-Type", "application/merge-patch+json"}};
   expect_views_problem(post(R"({"image":{"width":0}})"), 422, "/image/width");
@@ -216,13 +216,13 @@ TEST_F(Views, FaultsNameTheirPlaceAndChangeNothing) {
   EXPECT_EQ(json_of(read(id))["view"], Json({{"step", 1}}));
 }
 
-TEST_F(Views, ABodyNeedsItsLength) {
+TEST_F(Views, BodyNeedsItsLength) {
   for (const std::string method : {"POST", "PUT", "PATCH"}) {
     EXPECT_EQ(raw(port(), method + " /v1/views HTTP/1.1\r\nHost: localhost\r\n\r\n").status, 411);
   }
 }
 
-TEST_F(Views, MethodsThatDoNothingAreToldWhatDoes) {
+TEST_F(Views, UnsupportedMethodsGetTheAllowedOnes) {
   const std::string id = saved("{}");
   const Answer list = get(port(), "/v1/views");
   expect_views_problem(list, 405);
@@ -244,7 +244,7 @@ TEST_F(Views, MethodsThatDoNothingAreToldWhatDoes) {
   EXPECT_EQ(head.header("content-length"), std::to_string(read(id).body.size()));
 }
 
-TEST_F(Views, NothingBesideAnIdNamesAView) {
+TEST_F(Views, OnlyAnIdNamesAView) {
   saved("{}");
   for (const char* path : {"x", "0123456789", "..%2f..%2fetc%2fpasswd", "%2e%2e", "a%00b", "a/b"}) {
     const int status = get(port(), std::string("/v1/views/") + path).status;
@@ -275,7 +275,7 @@ windsplat::net::ServerOptions keeping(const windsplat::views::Options& options) 
   return out;
 }
 
-TEST(ViewsOfAServer, AFullOneSaysSoAndKeepsWhatItHas) {
+TEST(ViewsOfAServer, FullStoreRefusesAndKeepsItsViews) {
   const TestServer server(keeping({{}, 2}));
   const auto post = [&] { return request(server.port(), "POST", "/v1/views", json_type, "{}"); };
   const std::string first = post().header("location");
@@ -289,7 +289,7 @@ TEST(ViewsOfAServer, AFullOneSaysSoAndKeepsWhatItHas) {
   EXPECT_EQ(post().status, 201);
 }
 
-TEST(ViewsOfAServer, WithAFolderTheyOutlastIt) {
+TEST(ViewsOfAServer, WithAStateFolderTheySurviveARestart) {
   const Folder folder;
   std::string location;
   std::string body;
@@ -309,8 +309,8 @@ TEST(ViewsOfAServer, WithAFolderTheyOutlastIt) {
   EXPECT_TRUE(fs::is_empty(folder.path / "views"));
 }
 
-// A view is what POST /v1/frames takes: what was kept draws the picture that was saved.
-TEST(ViewsOfAServer, AKeptViewDrawsTheSamePicture) {
+// A saved view is valid for POST /v1/frames and gives the same picture.
+TEST(ViewsOfAServer, SavedViewRendersTheSamePicture) {
   const TestServer server;
   const std::string view = R"({"step":1,"dataset":"small","image":{"height":48,"width":64}})";
   const Answer made = request(server.port(), "POST", "/v1/views", json_type, view);
@@ -321,14 +321,14 @@ TEST(ViewsOfAServer, AKeptViewDrawsTheSamePicture) {
   EXPECT_EQ(direct.body, kept.body);
 }
 
-// A page that saves a few views at once is no load.
-TEST(ViewChanges, TwentyAtOnceWaitForASlowDisk) {
+// A page that saves a few views at once is within the limit.
+TEST(ViewChanges, AtMostTwentyWaitForASlowDisk) {
   windsplat::net::ServerOptions options;
   const auto views = SavedViews::open({}).value();
   options.views = views;
   TestServer server(std::move(options));
   const std::string id = views->add(windsplat::protocol::ViewDocument::parse("{}").value(), "")->id;
-  // Whoever changes views waits for this change.
+  // Other changes of views wait for this one.
   std::promise<void> begun;
   std::promise<void> let_go;
   std::thread slow([&] {
@@ -346,7 +346,8 @@ TEST(ViewChanges, TwentyAtOnceWaitForASlowDisk) {
       return request(server.port(), "POST", "/v1/views", json_type, "{}");
     }));
   }
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // those refused would be by now
+  std::this_thread::sleep_for(
+      std::chrono::milliseconds(300));  // refusals would have arrived by now
   let_go.set_value();
   slow.join();
   for (auto& answer : answers) EXPECT_EQ(answer.get().status, 201);

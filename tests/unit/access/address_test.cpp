@@ -6,7 +6,7 @@
 namespace windsplat::net {
 namespace {
 
-TEST(Address, counts_ipv4_as_it_is_and_of_ipv6_the_first_64_bits) {
+TEST(Address, CountsIpv4WholeAndIpv6ByTheFirst64Bits) {
   EXPECT_EQ(counted_address("192.0.2.1"), "192.0.2.1");
   EXPECT_EQ(counted_address("::ffff:192.0.2.1"), "192.0.2.1");
   EXPECT_EQ(counted_address("2001:db8:1:2:3:4:5:6"), "2001:db8:1:2::/64");
@@ -18,7 +18,7 @@ TEST(Address, counts_ipv4_as_it_is_and_of_ipv6_the_first_64_bits) {
   EXPECT_LE(counted_address(std::string(100'000, 'x')).size(), 64U);
 }
 
-TEST(Network, holds_what_begins_like_it) {
+TEST(Network, ContainsAddressesWithItsPrefix) {
   const auto holds = [](const char* network, const char* address) {
     const auto parsed = Network::parse(network);
     EXPECT_TRUE(parsed) << network;
@@ -41,24 +41,24 @@ TEST(Network, holds_what_begins_like_it) {
   }
 }
 
-TEST(ClientAddress, is_the_last_hop_that_is_no_trusted_proxy) {
+TEST(ClientAddress, IsTheLastHopThatIsNoTrustedProxy) {
   const std::vector<Network> trusted{*Network::parse("10.0.0.0/8"), *Network::parse("192.0.2.7")};
   const auto client = [&](const char* peer, const char* hops) {
     return client_address(peer, hops, trusted);
   };
   EXPECT_EQ(client("10.0.0.1", "198.51.100.1"), "198.51.100.1");
-  // What the client itself claims stands before what the proxy saw.
+  // Entries claimed by the client precede those added by the proxy.
   EXPECT_EQ(client("10.0.0.1", "1.1.1.1, 198.51.100.1"), "198.51.100.1");
   EXPECT_EQ(client("10.0.0.1", "1.1.1.1,198.51.100.1 ,\t192.0.2.7, 10.9.9.9"), "198.51.100.1");
   EXPECT_EQ(client("10.0.0.1", "198.51.100.1:4711"), "198.51.100.1");
   EXPECT_EQ(client("10.0.0.1", "[2001:db8::1]:443"), "2001:db8::1");
   EXPECT_EQ(client("10.0.0.1", "2001:db8::1"), "2001:db8::1");
-  // Nobody said, or nothing that can be understood: the proxy itself.
+  // Without a valid header the address is that of the proxy.
   for (const char* hops : {"", ",", "unknown", "198.51.100.1, _hidden", "[", "[]", "1.2.3", ":"}) {
     EXPECT_EQ(client("10.0.0.1", hops), "10.0.0.1") << hops;
   }
   EXPECT_EQ(client("10.0.0.1", "10.2.2.2, 10.1.1.1"), "10.2.2.2");
-  // From anybody else it is not believed.
+  // The header is ignored from untrusted peers.
   EXPECT_EQ(client("203.0.113.9", "198.51.100.1"), "203.0.113.9");
   EXPECT_EQ(client("", "198.51.100.1"), "");
 }

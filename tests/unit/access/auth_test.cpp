@@ -36,7 +36,7 @@ Verdict verdict(const Request& request, bool upgrade = false) {
 
 std::string cookie_header(const std::string& value) { return "a=b; windsplat=" + value + "; c=d"; }
 
-TEST(TokenFile, is_one_line_of_a_bearer_tokens_characters) {
+TEST(TokenFile, IsOneLineOfBearerTokenCharacters) {
   EXPECT_TRUE(token("0123456789abcdef\n").is("0123456789abcdef"));
   EXPECT_TRUE(token("0123456789abcdef\r\n").is("0123456789abcdef"));
   EXPECT_TRUE(token(std::string(512, 'x')).is(std::string(512, 'x')));
@@ -54,7 +54,7 @@ TEST(TokenFile, is_one_line_of_a_bearer_tokens_characters) {
   }
 }
 
-TEST(TokenFile, is_that_token_and_no_other) {
+TEST(TokenFile, MatchesOnlyItsToken) {
   const Token mine = token();
   EXPECT_TRUE(mine.is(secret));
   for (const char* other : {"", "0", "0123456789abcdef-._~+/=", "0123456789abcdef-._~+/===",
@@ -63,15 +63,15 @@ TEST(TokenFile, is_that_token_and_no_other) {
   }
 }
 
-TEST(Cookie, is_an_hmac_of_its_end_by_the_token) {
-  // By Python's hmac: key = HMAC-SHA256(token, "windsplat cookie, version 1"), HMAC-SHA256(key,
-  // end).
+TEST(Cookie, IsAnHmacOfItsExpiryByTheToken) {
+  // Computed by Python's hmac: key = HMAC-SHA256(token, "windsplat cookie, version 1"),
+  // HMAC-SHA256(key, end).
   const std::string end = "2000000000";
   const std::string mac = "0ecadcfbdcb915cc2f78f27377d8b4326d90cdb1f9c7c3bf9baf6e16c217df2d";
   EXPECT_EQ(token().cookie(2'000'000'000), end + "." + mac);
 }
 
-TEST(Cookie, ends_and_is_good_for_its_token_alone) {
+TEST(Cookie, ExpiresAndIsValidForItsTokenOnly) {
   const Token mine = token();
   const std::string cookie = mine.cookie(now_s + 1);
   EXPECT_TRUE(mine.admits(cookie, now_s));
@@ -88,7 +88,7 @@ TEST(Cookie, ends_and_is_good_for_its_token_alone) {
   }
 }
 
-TEST(Cookie, has_the_port_in_its_name) {
+TEST(Cookie, ContainsThePortInItsName) {
   const auto name = [](const char* host) {
     Request out;
     out.headers = {{"Host", host}};
@@ -102,23 +102,23 @@ TEST(Cookie, has_the_port_in_its_name) {
   const Token mine = token();
   Request asked = request("GET", {"v1"}, {{"Cookie", cookie_header(mine.cookie(now_s + 9))}});
   asked.headers.back().second = "winds.example:8080";  // the Host
-  EXPECT_EQ(judge(asked, false, &mine, {}, now_s), Verdict::no_token) << "another daemon's";
+  EXPECT_EQ(judge(asked, false, &mine, {}, now_s), Verdict::no_token) << "cookie of another daemon";
   asked.headers.front().second = "windsplat-8080=" + mine.cookie(now_s + 9);
   EXPECT_EQ(judge(asked, false, &mine, {}, now_s), Verdict::allowed);
 }
 
-TEST(TokenFile, another_one_has_to_be_shown_anew) {
+TEST(TokenFile, NewTokenInvalidatesEarlierProofs) {
   const Token first = token();
   const Token same = token();
   const Token other = token("another-token-of-24-char");
   EXPECT_FALSE(is_other_token(&first, &same));
   EXPECT_TRUE(is_other_token(&first, &other));
   EXPECT_TRUE(is_other_token(nullptr, &first));
-  EXPECT_FALSE(is_other_token(&first, nullptr)) << "no token is required any more";
+  EXPECT_FALSE(is_other_token(&first, nullptr)) << "the token is no longer required";
   EXPECT_FALSE(is_other_token(nullptr, nullptr));
 }
 
-TEST(TokenFile, a_secret_is_overwritten_before_it_goes) {
+TEST(TokenFile, SecretIsOverwrittenBeforeRelease) {
   std::string text(64, 's');
   const char* const bytes = text.data();
   wipe(text);
@@ -126,7 +126,7 @@ TEST(TokenFile, a_secret_is_overwritten_before_it_goes) {
   EXPECT_EQ(std::count(bytes, bytes + 64, 's'), 0);
 }
 
-TEST(Judge, health_is_open_and_nothing_else) {
+TEST(Authentication, OnlyHealthIsPublic) {
   EXPECT_EQ(verdict(request("GET", {"livez"})), Verdict::allowed);
   EXPECT_EQ(verdict(request("HEAD", {"readyz"})), Verdict::allowed);
   for (const std::vector<std::string>& path : {std::vector<std::string>{},
@@ -144,7 +144,7 @@ TEST(Judge, health_is_open_and_nothing_else) {
   }
 }
 
-TEST(Judge, a_bearer_token_lets_in) {
+TEST(Authentication, BearerTokenGrantsAccess) {
   const std::string right = std::string("Bearer ") + secret;
   const std::vector<std::string> path{"v1"};
   EXPECT_EQ(verdict(request("GET", path, {{"Authorization", right}})), Verdict::allowed);
@@ -158,15 +158,15 @@ TEST(Judge, a_bearer_token_lets_in) {
   }
   EXPECT_EQ(verdict(request("GET", path, {{"Authorization", right}, {"Authorization", right}})),
             Verdict::wrong_token)
-      << "which of two counts is not guessed";
+      << "two cookies are ambiguous";
   EXPECT_EQ(verdict(request("GET", path,
                             {{"Authorization", "Bearer wrong"},
                              {"Cookie", cookie_header(token().cookie(now_s + 9))}})),
             Verdict::wrong_token);
 }
 
-// A proxy that asks for a password has the browser send it with every request.
-TEST(Judge, another_scheme_is_no_proof_and_no_wrong_one) {
+// Browsers repeat the credentials of a proxy with every request.
+TEST(Authentication, AnotherSchemeIsNeitherProofNorAWrongToken) {
   const std::string basic = "Basic dXNlcjpwYXNzd29yZA==";
   for (const std::string& other : {basic, std::string(secret), std::string("Bearers ") + secret}) {
     const Headers alone{{"Authorization", other}};
@@ -185,8 +185,8 @@ TEST(Judge, another_scheme_is_no_proof_and_no_wrong_one) {
             Verdict::allowed);
 }
 
-// What may be a guess, right or wrong, and is counted before it is compared.
-TEST(Judge, a_guess_is_what_shows_a_token_where_one_is_asked_for) {
+// Credentials that could be attempts are counted before they are compared.
+TEST(Authentication, WrongTokensCountOnlyWhereOneIsRequired) {
   const Headers bearer{{"Authorization", "Bearer x"}};
   const Headers offer{{"Sec-WebSocket-Protocol", "bearer.eA"}};
   EXPECT_TRUE(shows_token(request("GET", {"v1"}, bearer), false));
@@ -196,7 +196,7 @@ TEST(Judge, a_guess_is_what_shows_a_token_where_one_is_asked_for) {
   EXPECT_FALSE(shows_token(request("GET", {"v1"}, {{"Cookie", "windsplat=1.2"}}), false));
 }
 
-TEST(Judge, a_page_in_plain_http_is_not_one_of_a_server_in_tls) {
+TEST(Authentication, PlainHttpOriginDiffersFromTheTlsServer) {
   const Token mine = token();
   const auto posted = [&](const char* origin, bool tls) {
     return judge(request("POST", {"v1", "views"},
@@ -205,18 +205,19 @@ TEST(Judge, a_page_in_plain_http_is_not_one_of_a_server_in_tls) {
   };
   EXPECT_EQ(posted("http://winds.example", true), Verdict::wrong_origin);
   EXPECT_EQ(posted("https://winds.example", true), Verdict::allowed);
-  EXPECT_EQ(posted("http://friend.example", true), Verdict::allowed) << "it was named";
+  EXPECT_EQ(posted("http://friend.example", true), Verdict::allowed) << "the host was named";
   EXPECT_EQ(posted("http://winds.example", false), Verdict::allowed);
-  EXPECT_EQ(posted("https://winds.example", false), Verdict::allowed) << "a proxy may speak TLS";
+  EXPECT_EQ(posted("https://winds.example", false), Verdict::allowed)
+      << "a proxy may terminate TLS";
 }
 
-TEST(Judge, a_subprotocol_lets_a_websocket_in) {
+TEST(Authentication, SubprotocolAuthenticatesAWebSocket) {
   const std::string right = std::string("windsplat.v1, bearer.") + secret_in_base64url;
   const auto with = [](const std::string& offers) {
     return request("GET", {"v1", "stream"}, {{"Sec-WebSocket-Protocol", offers}});
   };
   EXPECT_EQ(verdict(with(right), true), Verdict::allowed);
-  EXPECT_EQ(verdict(with(right), false), Verdict::no_token) << "of an upgrade alone";
+  EXPECT_EQ(verdict(with(right), false), Verdict::no_token) << "upgrades only";
   EXPECT_EQ(verdict(with("windsplat.v1"), true), Verdict::no_token);
   for (const std::string& wrong : {right + "=", right + "A", right.substr(0, right.size() - 1),
                                    std::string("bearer."), std::string("bearer.") + secret}) {
@@ -224,7 +225,7 @@ TEST(Judge, a_subprotocol_lets_a_websocket_in) {
   }
 }
 
-TEST(Judge, a_cookie_lets_in_and_changes_something_for_pages_of_ours_alone) {
+TEST(Authentication, CookieAuthenticatesAndAllowsChangesFromOwnPagesOnly) {
   const std::string cookie = cookie_header(token().cookie(now_s + 100));
   const auto with = [&](const char* method, Headers more) {
     more.emplace_back("Cookie", cookie);
@@ -250,20 +251,20 @@ TEST(Judge, a_cookie_lets_in_and_changes_something_for_pages_of_ours_alone) {
             Verdict::no_token);
 }
 
-TEST(Judge, a_foreign_page_is_refused_even_with_the_token) {
+TEST(Authentication, ForeignOriginIsRefusedEvenWithTheToken) {
   const Headers headers{{"Authorization", std::string("Bearer ") + secret},
                         {"Origin", "https://evil.example"}};
   EXPECT_EQ(verdict(request("GET", {"v1", "stream"}, headers), true), Verdict::wrong_origin);
   EXPECT_EQ(verdict(request("POST", {"v1", "views"}, headers)), Verdict::wrong_origin);
   EXPECT_EQ(verdict(request("GET", {"v1"}, headers)), Verdict::allowed)
-      << "what is read the browser itself keeps from the page";
+      << "the browser prevents the page from reading the response";
   EXPECT_EQ(judge(request("PUT", {"v1"}, {{"Origin", "https://evil.example"}}), false, nullptr, {},
                   now_s),
             Verdict::wrong_origin)
-      << "without a token, too";
+      << "also without a token";
 }
 
-TEST(Judge, a_token_in_an_address_is_refused_before_all_else) {
+TEST(Authentication, TokenInAUrlIsRefusedFirst) {
   for (const char* key : {"token", "access_token", "TOKEN"}) {
     Request asked = request("GET", {"livez"}, {{"Authorization", std::string("Bearer ") + secret}});
     asked.query = {{"width", "3"}, {key, secret}};
@@ -287,7 +288,7 @@ std::string text_of(const Response& response) {
   return {response.body.bytes.begin(), response.body.bytes.end()};
 }
 
-TEST(TurnedAway, programs_get_a_problem_and_people_a_form) {
+TEST(AccessRefusal, ProgramsGetAProblemAndBrowsersAForm) {
   const Request program = request("GET", {"v1"}, {{"Accept", "*/*"}});
   const Response problem = turned_away(Verdict::no_token, program, "/");
   EXPECT_EQ(problem.status, 401);
@@ -316,7 +317,7 @@ Request login(const std::string& body, Headers headers = {{"Origin", "http://win
   return out;
 }
 
-TEST(Login, comes_from_a_page_of_ours) {
+TEST(Login, RequiresAnOwnPage) {
   EXPECT_EQ(verdict(login("")), Verdict::allowed);
   EXPECT_EQ(verdict(login("", {{"Sec-Fetch-Site", "same-origin"}})), Verdict::allowed);
   EXPECT_EQ(verdict(login("", {})), Verdict::wrong_origin);
@@ -324,7 +325,7 @@ TEST(Login, comes_from_a_page_of_ours) {
   EXPECT_EQ(verdict(login("", {{"Origin", "null"}})), Verdict::wrong_origin);
 }
 
-TEST(Login, changes_the_token_for_a_cookie) {
+TEST(Login, ExchangesTheTokenForACookie) {
   const Token mine = token();
   for (const char* body :
        {"token=0123456789abcdef-._~%2B%2F%3D%3D", "token=+0123456789abcdef-._~%2b/==+",
@@ -342,7 +343,7 @@ TEST(Login, changes_the_token_for_a_cookie) {
   }
 }
 
-TEST(Login, a_cookie_is_for_tls_alone_where_the_page_is) {
+TEST(Login, CookieIsSecureUnderTls) {
   const std::string body = "token=0123456789abcdef-._~%2B/==";
   const auto cookie = [&](bool tls, const char* origin) {
     return header_of(log_in(login(body, {{"Origin", origin}}), token(), "/", tls, now_s),
@@ -353,7 +354,7 @@ TEST(Login, a_cookie_is_for_tls_alone_where_the_page_is) {
   EXPECT_THAT(cookie(false, "http://winds.example"), Not(HasSubstr("Secure")));
 }
 
-TEST(Login, with_another_token_shows_the_form_again) {
+TEST(Login, WrongTokenShowsTheFormAgain) {
   for (const char* body : {"", "token", "token=", "token=wrong", "nekot=0123456789abcdef-._~%2B/==",
                            "token=%", "token=%2", "token=%zz"}) {
     const Response out = log_in(login(body), token(), "/", false, now_s);

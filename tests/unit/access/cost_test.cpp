@@ -47,7 +47,7 @@ class CostTest : public testing::Test {
 
 constexpr double samples = 100 * 80 * 60;
 
-TEST_F(CostTest, counts_every_stop_and_every_sample) {
+TEST_F(CostTest, CountsEveryKernelPositionAndSample) {
   EXPECT_GE(cost(view_).kernels, samples);
   EXPECT_LT(cost(view_).kernels, 20 * samples);
   EXPECT_EQ(cost(view_).pixels, 1280 * 720);
@@ -56,22 +56,22 @@ TEST_F(CostTest, counts_every_stop_and_every_sample) {
   EXPECT_GE(cost(with_medium).kernels, cost(view_).kernels + samples);
   protocol::View nothing = view_;
   nothing.vector.field = {protocol::FieldChoice::Kind::none, ""};
-  EXPECT_LT(cost(nothing).kernels, samples) << "the picture alone";
+  EXPECT_LT(cost(nothing).kernels, samples) << "the picture only";
   nothing.scalars = {medium()};
   (*nothing.scalars)[0].extinction = {{0, 0}};
-  EXPECT_LT(cost(nothing).kernels, samples) << "it absorbs nothing";
+  EXPECT_LT(cost(nothing).kernels, samples) << "a transparent medium absorbs nothing";
   protocol::View unseen = view_;
   unseen.vector.opacity = 0;
   EXPECT_LT(cost(unseen).kernels, samples);
 }
 
-TEST_F(CostTest, a_stride_leaves_samples_out_and_a_slice_all_but_a_layer) {
+TEST_F(CostTest, StrideReducesSamplesAndASliceLeavesOneLayer) {
   protocol::View strided = view_;
   strided.vector.stride = 4;
   strided.vector.length = 0.001;
   protocol::View plain = view_;
   plain.vector.length = 0.001;
-  // 16 pixels at least count for each: the rest is the picture's.
+  // At least 16 pixels are counted for each kernel; the rest is the cost of the picture.
   const double picture = 1280.0 * 720 / frame::Cost::pixels_a_kernel;
   EXPECT_NEAR((cost(plain).kernels - picture) / (cost(strided).kernels - picture), 64, 1);
   protocol::View sliced = plain;
@@ -79,7 +79,7 @@ TEST_F(CostTest, a_stride_leaves_samples_out_and_a_slice_all_but_a_layer) {
   EXPECT_NEAR((cost(plain).kernels - picture) / (cost(sliced).kernels - picture), 60, 1);
 }
 
-TEST_F(CostTest, giant_kernels_cost_what_they_cover) {
+TEST_F(CostTest, GiantKernelsCostWhatTheyCover) {
   protocol::View wide = view_;
   wide.vector.r2 = 64;
   EXPECT_GT(cost(wide).kernels, 100 * cost(view_).kernels);
@@ -98,14 +98,14 @@ TEST_F(CostTest, giant_kernels_cost_what_they_cover) {
   EXPECT_EQ(cost(thin).dominant, "/method/slabThickness");
 }
 
-TEST_F(CostTest, what_is_averaged_or_out_of_sight_costs_less) {
+TEST_F(CostTest, AveragedOrCulledSamplesCostLess) {
   protocol::View far = view_;
   far.camera.eye = protocol::Vec3{0, -1000, 0};
   far.camera.target = protocol::Vec3{0, 0, 0};
   const double all = cost(far).kernels;
   far.method.detail = protocol::Detail::automatic;
   EXPECT_LT(cost(far).kernels, 0.2 * all);
-  // From within, most of the large kernels lie behind the eye or beside the picture.
+  // From inside, most of the large kernels are behind the eye or outside the picture.
   protocol::View within = view_;
   within.vector.r2 = 20;
   const double from_outside = cost(within).kernels;
@@ -115,7 +115,7 @@ TEST_F(CostTest, what_is_averaged_or_out_of_sight_costs_less) {
   EXPECT_LT(cost(within).kernels, 0.5 * from_outside);
 }
 
-TEST_F(CostTest, is_finite_and_refused_at_every_extreme_of_a_view) {
+TEST_F(CostTest, IsFiniteAndRefusedAtEveryExtremeOfAView) {
   for (const double r2 : {0.0, 64.0}) {
     for (const double length : {0.0, 10.0}) {
       for (const double eye : {1e-6, 1.0, 1e6}) {
@@ -139,7 +139,7 @@ TEST_F(CostTest, is_finite_and_refused_at_every_extreme_of_a_view) {
   }
 }
 
-TEST(CheckCost, names_what_would_make_it_less_and_the_limit) {
+TEST(CheckCost, NamesTheLimitAndHowToReduceTheCost) {
   Limits limits;
   limits.pixels = 1000;
   limits.kernels = 5000;

@@ -25,7 +25,7 @@ Limits none() {
   return limits;
 }
 
-TEST(Quota, an_address_may_not_have_the_connections_of_all) {
+TEST(Quota, OneAddressCannotUseAllConnections) {
   Limits limits = none();
   limits.connections = 3;
   limits.connections_per_address = 2;
@@ -45,7 +45,7 @@ TEST(Quota, an_address_may_not_have_the_connections_of_all) {
   EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
 }
 
-TEST(Quota, the_reserve_has_an_end_and_no_address_has_all_of_it) {
+TEST(Quota, ReserveIsLimitedInTotalAndPerAddress) {
   Limits limits = none();
   limits.connections = 1;
   Quota quota(limits);
@@ -64,7 +64,7 @@ TEST(Quota, the_reserve_has_an_end_and_no_address_has_all_of_it) {
   EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Slot::reserve);
 }
 
-TEST(Quota, a_proxy_counts_in_total_alone) {
+TEST(Quota, ProxyIsLimitedInTotalOnly) {
   Limits limits = none();
   limits.connections = 8;
   limits.connections_per_address = 1;
@@ -75,7 +75,7 @@ TEST(Quota, a_proxy_counts_in_total_alone) {
   EXPECT_EQ(quota.connect(here, true, 0).place, Quota::Slot::reserve);
 }
 
-TEST(Quota, sessions_are_counted_by_address) {
+TEST(Quota, SessionsAreCountedByAddress) {
   Limits limits = none();
   limits.sessions_per_address = 2;
   Quota quota(limits);
@@ -89,13 +89,13 @@ TEST(Quota, sessions_are_counted_by_address) {
   EXPECT_FALSE(quota.open_session(here, 0));
 }
 
-TEST(Quota, requests_come_back_at_their_rate_and_health_has_its_own) {
+TEST(Quota, RequestsRefillAtTheirRateAndHealthHasItsOwn) {
   Limits limits = none();
   limits.requests_per_address = 2;
   Quota quota(limits);
   int at_once = 0;
   while (!quota.request(here, false, 0)) ++at_once;
-  EXPECT_EQ(at_once, 20) << "ten seconds' worth";
+  EXPECT_EQ(at_once, 20) << "the burst of ten seconds";
   const auto refused = quota.request(here, false, 0);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->kind, LimitKind::requests);
@@ -108,30 +108,30 @@ TEST(Quota, requests_come_back_at_their_rate_and_health_has_its_own) {
   EXPECT_TRUE(quota.request(here, false, second / 2));
 }
 
-TEST(Quota, one_picture_may_go_into_debt_and_the_next_waits_until_it_is_paid) {
+TEST(Quota, OnePictureMayOverdrawAndTheNextWaitsUntilRepaid) {
   Limits limits = none();
   limits.render_s_per_address = 6;
   Quota quota(limits);
   EXPECT_FALSE(quota.picture(here, 0));
   quota.rendered(here, 6 * second, 0);
-  EXPECT_FALSE(quota.picture(here, 0)) << "all of a minute's may be had at once";
+  EXPECT_FALSE(quota.picture(here, 0)) << "the burst of a minute";
   quota.rendered(here, 3 * second, 0);
   const auto refused = quota.picture(here, 0);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->kind, LimitKind::render);
-  EXPECT_EQ(refused->retry_after_s, 30) << "3 s at 6 s a minute";
+  EXPECT_EQ(refused->retry_after_s, 30) << "3 s of rendering at 6 s per minute";
   EXPECT_EQ(quota.throttle_delay(here, 0), 30 * second);
   EXPECT_FALSE(quota.picture(there, 0));
   EXPECT_TRUE(quota.picture(here, 30 * second - 1));
   EXPECT_FALSE(quota.picture(here, 30 * second));
 }
 
-TEST(Quota, bytes_are_charged_as_they_leave) {
+TEST(Quota, BytesAreChargedWhenSent) {
   Limits limits = none();
   limits.bytes_per_address = 1000;
   Quota quota(limits);
   quota.sent(here, 10'000, 0);
-  EXPECT_FALSE(quota.picture(here, 0)) << "ten seconds' worth";
+  EXPECT_FALSE(quota.picture(here, 0)) << "the burst of ten seconds";
   quota.sent(here, 5000, 0);
   const auto refused = quota.picture(here, 0);
   ASSERT_TRUE(refused);
@@ -140,7 +140,7 @@ TEST(Quota, bytes_are_charged_as_they_leave) {
   EXPECT_FALSE(quota.picture(here, 5 * second));
 }
 
-TEST(Quota, wrong_tokens_are_let_off_so_often_a_minute) {
+TEST(Quota, WrongTokensAreLimitedPerMinute) {
   Limits limits = none();
   limits.failed_logins_per_address = 3;
   Quota quota(limits);
@@ -153,12 +153,11 @@ TEST(Quota, wrong_tokens_are_let_off_so_often_a_minute) {
   EXPECT_FALSE(quota.failed_login(here, 20 * second));
 }
 
-TEST(Quota, a_token_is_looked_at_while_there_were_not_too_many_wrong_ones) {
+TEST(Quota, TokensAreCheckedUntilTooManyWereWrong) {
   Limits limits = none();
   limits.failed_logins_per_address = 2;
   Quota quota(limits);
-  for (int n = 0; n < 100; ++n)
-    ASSERT_FALSE(quota.may_try_login(here, 0)) << "asking costs nothing";
+  for (int n = 0; n < 100; ++n) ASSERT_FALSE(quota.may_try_login(here, 0)) << "checks are free";
   quota.failed_login(here, 0);
   EXPECT_FALSE(quota.may_try_login(here, 0));
   quota.failed_login(here, 0);
@@ -170,7 +169,7 @@ TEST(Quota, a_token_is_looked_at_while_there_were_not_too_many_wrong_ones) {
   EXPECT_FALSE(quota.may_try_login(here, 30 * second));
 }
 
-TEST(Quota, new_connections_come_back_at_their_rate_and_tls_takes_more) {
+TEST(Quota, NewConnectionsRefillAtTheirRateAndTlsCostsMore) {
   Limits limits = none();
   limits.arrivals_per_address = 2;
   Quota quota(limits);
@@ -185,7 +184,7 @@ TEST(Quota, new_connections_come_back_at_their_rate_and_tls_takes_more) {
   EXPECT_FALSE(quota.arrive(here, false, true, 3 * second));
 }
 
-TEST(Quota, too_many_new_connections_in_all_are_refused_to_those_that_brought_them) {
+TEST(Quota, TotalConnectionRateIsEnforcedOnItsLargestUsers) {
   Limits limits = none();
   limits.arrivals = 5;
   limits.arrivals_per_address = 3;
@@ -198,28 +197,28 @@ TEST(Quota, too_many_new_connections_in_all_are_refused_to_those_that_brought_th
   EXPECT_FALSE(quota.arrive(here, false, false, second));
 }
 
-TEST(Quota, an_address_that_used_up_its_handshake_time_waits_for_it) {
+TEST(Quota, AddressOverItsHandshakeTimeIsThrottled) {
   Limits limits = none();
   limits.handshake_ms_per_address = 100;
   Quota quota(limits);
   ASSERT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
   ASSERT_EQ(quota.connect(there, false, 0).place, Quota::Slot::ordinary);
   quota.handshake_took(here, false, second, 0);
-  EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "ten seconds' worth at once";
+  EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "the burst of ten seconds";
   quota.handshake_took(here, false, second / 10, 0);
   const auto refused = quota.arrive(here, false, true, 0);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->kind, LimitKind::handshakes);
   EXPECT_EQ(refused->limit, 100);
   EXPECT_EQ(refused->retry_after_s, 1);
-  EXPECT_FALSE(quota.arrive(here, false, false, 0)) << "plain TCP takes no handshake";
+  EXPECT_FALSE(quota.arrive(here, false, false, 0)) << "plain TCP has no handshake";
   EXPECT_FALSE(quota.arrive(there, false, true, 0));
   EXPECT_FALSE(quota.arrive(here, false, true, second));
   quota.handshake_took(there, true, 60 * second, second);
-  EXPECT_FALSE(quota.arrive(there, true, true, second)) << "a proxy brings many";
+  EXPECT_FALSE(quota.arrive(there, true, true, second)) << "a proxy carries many clients";
 }
 
-TEST(Quota, strangers_together_use_up_handshake_time_of_strangers_alone) {
+TEST(Quota, UnauthenticatedClientsExhaustTheirOwnHandshakeTimeOnly) {
   Limits limits = none();
   limits.handshake_ms = 100;
   Quota quota(limits);
@@ -232,14 +231,14 @@ TEST(Quota, strangers_together_use_up_handshake_time_of_strangers_alone) {
   const auto refused = quota.arrive(there, false, true, 0);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->kind, LimitKind::handshakes);
-  EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "it has shown the token";
+  EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "authenticated";
   EXPECT_FALSE(quota.arrive(there, true, true, 0)) << "a proxy's";
   quota.handshake_took(here, false, 2 * second, 0);
-  EXPECT_TRUE(quota.arrive(here, false, true, 0)) << "those have a limit, too";
+  EXPECT_TRUE(quota.arrive(here, false, true, 0)) << "authenticated addresses have a limit, too";
   EXPECT_FALSE(quota.arrive(there, false, true, second));
 }
 
-TEST(Quota, strangers_use_up_no_handshake_time_of_the_machine_itself) {
+TEST(Quota, RemoteClientsDoNotExhaustLocalHandshakeTime) {
   Limits limits = none();
   limits.handshake_ms = 100;
   limits.handshake_ms_per_address = 50;
@@ -250,25 +249,27 @@ TEST(Quota, strangers_use_up_no_handshake_time_of_the_machine_itself) {
     quota.handshake_took(address, false, 2 * second, 0);
     ASSERT_TRUE(quota.arrive(address, false, true, 0)) << address;
   }
-  EXPECT_TRUE(quota.arrive("127.0.0.2", false, true, 0)) << "a stranger like others";
+  EXPECT_TRUE(quota.arrive("127.0.0.2", false, true, 0))
+      << "an unauthenticated address like others";
   for (const std::string own : {"127.0.0.1", "::/64"}) {
     ASSERT_EQ(quota.connect(own, false, 0).place, Quota::Slot::ordinary);
     EXPECT_FALSE(quota.arrive(own, false, true, 0)) << own;
     quota.handshake_took(own, false, second, 0);
     const auto refused = quota.arrive(own, false, true, 0);
-    ASSERT_TRUE(refused) << "it has its own allowance alone";
+    ASSERT_TRUE(refused) << "it has its own allowance only";
     EXPECT_EQ(refused->limit, 50);
   }
-  EXPECT_FALSE(quota.arrive("127.0.0.2", false, true, 11 * second)) << "others do not pay for it";
+  EXPECT_FALSE(quota.arrive("127.0.0.2", false, true, 11 * second))
+      << "others are not charged for it";
 
   limits.handshake_ms_per_address = 0;
   Quota without(limits);
   ASSERT_EQ(without.connect("127.0.0.1", false, 0).place, Quota::Slot::ordinary);
   without.handshake_took("127.0.0.1", false, 2 * second, 0);
-  EXPECT_TRUE(without.arrive("127.0.0.1", false, true, 0)) << "it is bounded all the same";
+  EXPECT_TRUE(without.arrive("127.0.0.1", false, true, 0)) << "it is bounded nevertheless";
 }
 
-TEST(Quota, messages_are_paid_before_more_is_read) {
+TEST(Quota, MessagesAreChargedBeforeMoreIsRead) {
   Limits limits = none();
   limits.messages_per_address = 10;
   limits.received_per_address = 1000;
@@ -280,7 +281,7 @@ TEST(Quota, messages_are_paid_before_more_is_read) {
   EXPECT_EQ(quota.message_received(there, 0, 2 * second), 0);
 }
 
-TEST(Quota, nought_is_no_limit) {
+TEST(Quota, ZeroMeansNoLimit) {
   Quota quota(none());
   for (int n = 0; n < 10'000; ++n) {
     ASSERT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
@@ -297,7 +298,7 @@ TEST(Quota, nought_is_no_limit) {
   EXPECT_FALSE(quota.picture(here, 0));
 }
 
-TEST(Quota, idle_addresses_are_forgotten_and_those_in_debt_are_not) {
+TEST(Quota, IdleAddressesAreForgottenExceptThoseInDebt) {
   Limits limits = none();
   limits.render_s_per_address = 1;
   Quota quota(limits);
@@ -311,7 +312,7 @@ TEST(Quota, idle_addresses_are_forgotten_and_those_in_debt_are_not) {
   EXPECT_TRUE(quota.picture(here, later));
 }
 
-TEST(Quota, no_number_of_addresses_makes_it_larger_than_it_may_be) {
+TEST(Quota, NumberOfAddressesIsBounded) {
   Limits limits = none();
   limits.connections_per_address = 1;
   Quota quota(limits);
@@ -320,10 +321,10 @@ TEST(Quota, no_number_of_addresses_makes_it_larger_than_it_may_be) {
     quota.request("2001:db8:0:" + std::to_string(n) + "::/64", false, 1);
   }
   EXPECT_EQ(quota.known(), Quota::addresses_max);
-  EXPECT_EQ(quota.connect(here, false, 2).place, Quota::Slot::reserve) << "its one is known";
+  EXPECT_EQ(quota.connect(here, false, 2).place, Quota::Slot::reserve) << "a known address";
 }
 
-TEST(Quota, strangers_make_no_room_of_those_that_showed_the_token) {
+TEST(Quota, UnauthenticatedClientsDoNotEvictAuthenticatedAddresses) {
   Quota quota(none());
   quota.authenticated(here, 0);
   for (std::size_t n = 0; n < 3 * Quota::addresses_max; ++n) {
@@ -336,10 +337,10 @@ TEST(Quota, strangers_make_no_room_of_those_that_showed_the_token) {
   for (std::size_t n = 0; n < 2 * Quota::addresses_max; ++n) {
     quota.authenticated("2001:db8:1:" + std::to_string(n) + "::/64", 3);
   }
-  EXPECT_EQ(quota.known(), Quota::addresses_max) << "of those too there is an end";
+  EXPECT_EQ(quota.known(), Quota::addresses_max) << "authenticated addresses are bounded, too";
 }
 
-TEST(Admission, logs_within_a_minute_how_many_handshakes_it_refused) {
+TEST(Admission, LogsRefusedHandshakesOncePerMinute) {
   Limits limits = none();
   limits.handshake_ms_per_address = 0.1;  // one at once
   Metrics metrics;
@@ -362,7 +363,7 @@ TEST(Admission, logs_within_a_minute_how_many_handshakes_it_refused) {
   EXPECT_EQ(rest.find("connections="), rest.rfind("connections=")) << "once: " << rest;
 }
 
-TEST(Admission, gives_places_back_when_their_tickets_go) {
+TEST(Admission, ReleasesSlotsWithTheirTickets) {
   Limits limits = none();
   limits.connections = 1;
   Metrics metrics;
@@ -377,7 +378,7 @@ TEST(Admission, gives_places_back_when_their_tickets_go) {
   EXPECT_FALSE(admission.connect(here)->reserve);
 }
 
-TEST(Admission, answers_with_the_limit_and_when_to_try_again) {
+TEST(Admission, RefusesWithTheLimitAndARetryTime) {
   Limits limits = none();
   limits.requests_per_address = 0.1;
   limits.connections = 1;
@@ -397,25 +398,25 @@ TEST(Admission, answers_with_the_limit_and_when_to_try_again) {
   const std::string text(refused->body.bytes.begin(), refused->body.bytes.end());
   EXPECT_NE(text.find("0.1 requests a second (--max-requests-per-address)"), std::string::npos)
       << text;
-  // In the reserve health alone is answered, and as the server's fault.
+  // In the reserve only health is answered, and refusals are server errors.
   const auto late = admission.connect(there);
   EXPECT_EQ(admission.request(*late, request, false)->status, 503);
   EXPECT_FALSE(admission.request(*late, request, true));
 }
 
-TEST(Admission, charges_what_was_refused_unread) {
+TEST(Admission, ChargesRefusedUnreadBodies) {
   Limits limits = none();
   limits.requests_per_address = 0.1;
   Metrics metrics;
   Admission admission(limits, metrics, [] { return 0; });
   const auto visitor = admission.connect(here);
   EXPECT_TRUE(admission.count_malformed(*visitor, {}));
-  EXPECT_FALSE(admission.count_malformed(*visitor, {})) << "not worth a line";
+  EXPECT_FALSE(admission.count_malformed(*visitor, {})) << "not logged yet";
   Request request;
   EXPECT_TRUE(admission.request(*visitor, request, false)) << "the same allowance";
 }
 
-TEST(Admission, refuses_what_takes_too_long) {
+TEST(Admission, RefusesExpensiveRequests) {
   Limits limits = none();
   limits.render_s = 2;
   Metrics metrics;
@@ -431,7 +432,7 @@ TEST(Admission, refuses_what_takes_too_long) {
   EXPECT_TRUE(Admission(limits, metrics).check_estimate(cost, 1e12));
 }
 
-TEST(Admission, charges_the_client_behind_a_trusted_proxy) {
+TEST(Admission, ChargesTheClientBehindATrustedProxy) {
   Limits limits = none();
   limits.requests_per_address = 0.1;
   limits.trusted_proxies = {"10.0.0.0/8"};
@@ -446,13 +447,13 @@ TEST(Admission, charges_the_client_behind_a_trusted_proxy) {
   EXPECT_FALSE(ask(*proxy, here));
   EXPECT_TRUE(ask(*proxy, here));
   EXPECT_FALSE(ask(*proxy, there));
-  // Anybody else may say what they like.
+  // Other addresses may send any header.
   const auto liar = admission.connect("203.0.113.9");
   EXPECT_FALSE(ask(*liar, "198.51.100.1"));
   EXPECT_TRUE(ask(*liar, "198.51.100.2"));
 }
 
-TEST(Metrics, names_every_limit_once) {
+TEST(Metrics, HaveEveryLimitOnce) {
   EXPECT_EQ(std::set(limit_names.begin(), limit_names.end()).size(), limit_names.size());
   EXPECT_EQ(static_cast<std::size_t>(LimitKind::handshakes) + 1, limit_names.size());
 }

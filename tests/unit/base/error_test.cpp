@@ -1,4 +1,4 @@
-// Errors as values, text made fit to print, and the cancel flag.
+// Errors as values, escaping of text, and cancel tokens.
 #include "server/base/error.hpp"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ TEST(Result, HoldsAValueOrAnError) {
   EXPECT_EQ(failed.error().at[0].detail, "must be even");
 }
 
-TEST(Result, AskingAFailedOneForItsValueIsABugThatTellsTheError) {
+TEST(Result, ValueOfAFailedResultAbortsWithTheError) {
   try {
     (void)half(7).value();
     FAIL() << "nothing was thrown";
@@ -45,7 +45,7 @@ TEST(Result, TheDocumentItselfHasAnEmptyPointer) {
   EXPECT_EQ(error.at.at(0).pointer, "");
 }
 
-TEST(Result, APointerFromOutsideCannotForgeTheMessage) {
+TEST(Result, ForeignPointerCannotForgeTheMessage) {
   const Error error = make_error_at(ErrorKind::invalid, "/a\r\nb\x1b[31m", "unknown key");
   EXPECT_EQ(error.message, "/a\\x0d\\x0ab\\x1b[31m: unknown key");
 }
@@ -59,7 +59,7 @@ TEST(Printable, KeepsTextAndEscapesControls) {
   EXPECT_EQ(printable(""), "");
 }
 
-TEST(Printable, EscapesWhatTerminalsObeyBeyondAscii) {
+TEST(Printable, EscapesNonAsciiTerminalControls) {
   EXPECT_EQ(printable("\xc2\x9b[31m"), "\\xc2\\x9b[31m");         // C1: CSI
   EXPECT_EQ(printable("a\xe2\x80\xae b"), "a\\xe2\\x80\\xae b");  // right-to-left override
   EXPECT_EQ(printable("a\xe2\x80\xa8"
@@ -78,7 +78,7 @@ TEST(Printable, EscapesBytesThatAreNotUtf8) {
   EXPECT_EQ(printable("ab\xe2\x82"), "ab\\xe2\\x82");                // ends inside a sequence
 }
 
-TEST(Printable, CutsAtWholeCharactersAndSaysSo) {
+TEST(Printable, TruncatesAtWholeCharactersWithAMark) {
   EXPECT_EQ(printable("0123456789", 10), "0123456789");
   EXPECT_EQ(printable("0123456789a", 10), "0123456...");
   EXPECT_EQ(printable("aaaaaa\xe2\x82\xac\xe2\x82\xac", 10), "aaaaaa...");
@@ -87,8 +87,8 @@ TEST(Printable, CutsAtWholeCharactersAndSaysSo) {
   EXPECT_EQ(printable("abcdef", 0), "");
 }
 
-// Whatever comes in: within the cap, no control byte, and printing it again changes nothing.
-TEST(Printable, HoldsItsPromisesForRandomBytes) {
+// For any input: within the limit, no control bytes, and idempotent.
+TEST(Printable, InvariantsHoldForRandomBytes) {
   std::mt19937 random(7);
   for (int round = 0; round < 20000; ++round) {
     std::string text(random() % 40, '\0');
@@ -103,7 +103,7 @@ TEST(Printable, HoldsItsPromisesForRandomBytes) {
   }
 }
 
-TEST(Check, FailureNamesExpressionAndPlace) {
+TEST(Check, FailureNamesExpressionAndLocation) {
   EXPECT_NO_THROW(WINDSPLAT_CHECK(1 + 1 == 2));
   try {
     WINDSPLAT_CHECK(1 + 1 == 3);
@@ -127,7 +127,7 @@ TEST(CancelToken, CopiesShareTheFlagAndOthersDoNot) {
   EXPECT_FALSE(other.cancelled());
 }
 
-TEST(CancelToken, AMovedFromTokenCanStillBeAsked) {
+TEST(CancelToken, MovedFromTokenRemainsUsable) {
   CancelToken token;
   const CancelToken taken = std::move(token);  // NOLINT(performance-move-const-arg)
   taken.cancel();

@@ -1,4 +1,4 @@
-// Log lines: one event is one line whatever it holds, in text and in JSON.
+// Log lines: one event is one line whatever it contains, in text and in JSON.
 #include "server/base/log.hpp"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 namespace windsplat::log {
 namespace {
 
-TEST(Log, TextLineReadsAsWordsAndPairs) {
+TEST(Log, TextLineHasAMessageAndPairs) {
   EXPECT_EQ(text_line("listening", {}), "listening");
   EXPECT_EQ(text_line("frame", {{"ms", 12.5}, {"session", "a1"}, {"final", true}, {"seq", 3}}),
             "frame ms=12.5 session=a1 final=true seq=3");
@@ -33,12 +33,12 @@ TEST(Log, JsonLineIsOneObject) {
             R"("who":"a\"b\\c\\x0a","n":18446744073709551615,"final":false})");
 }
 
-TEST(Log, NumbersThatJsonLacksAreText) {
+TEST(Log, NonFiniteNumbersAreText) {
   EXPECT_EQ(json_line("t", Level::info, "m", {{"x", std::numeric_limits<double>::infinity()}}),
             R"({"time":"t","level":"info","message":"m","x":"inf"})");
 }
 
-TEST(Log, LongValuesAreCut) {
+TEST(Log, LongValuesAreTruncated) {
   const std::string line = text_line("m", {{"value", std::string(10000, 'x')}});
   EXPECT_LT(line.size(), 500U);
   EXPECT_EQ(line.substr(line.size() - 3), "...");
@@ -50,7 +50,7 @@ TEST(Log, LevelsHaveNames) {
   EXPECT_FALSE(parse_level("loud").has_value());
 }
 
-TEST(Log, WritesToStderrFromItsLevelOn) {
+TEST(Log, WritesToStderrFromItsLevelUp) {
   testing::internal::CaptureStderr();
   configure(Format::json, Level::warn);
   info("not this", {});

@@ -1,4 +1,4 @@
-// The pool runs every index once, keeps its workers apart, and survives what its loops throw.
+// The pool runs every index once, separates its workers, and survives exceptions.
 #include "server/base/thread_pool.hpp"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ TEST_P(EveryPoolSize, RunsEachIndexOnce) {
   }
 }
 
-// A worker's number may index scratch memory: no two threads may hold the same one at a time.
+// A worker number may index scratch memory: no two threads may have the same one at a time.
 TEST_P(EveryPoolSize, WorkerNumbersAreSmallAndExclusive) {
   std::vector<std::atomic<int>> holders(GetParam());
   std::atomic<bool> shared = false;
@@ -45,9 +45,9 @@ TEST_P(EveryPoolSize, WorkerNumbersAreSmallAndExclusive) {
   EXPECT_FALSE(out_of_range);
 }
 
-// What the body writes is seen by the caller without further synchronisation, in loops too short
-// for every worker to take part, one right after another.
-TEST_P(EveryPoolSize, ManyShortLoopsLeaveTheirResults) {
+// Writes of the body are visible to the caller without further synchronisation, even in consecutive
+// loops too short for every worker.
+TEST_P(EveryPoolSize, ManyShortLoopsKeepTheirResults) {
   std::vector<std::size_t> plain(5);
   std::size_t sum = 0;
   constexpr std::size_t loops = 20000;
@@ -60,7 +60,7 @@ TEST_P(EveryPoolSize, ManyShortLoopsLeaveTheirResults) {
   EXPECT_EQ(sum, 3 * loops);
 }
 
-TEST_P(EveryPoolSize, AnExceptionReachesTheCallerAndThePoolLivesOn) {
+TEST_P(EveryPoolSize, ExceptionReachesTheCallerAndThePoolStaysUsable) {
   for (int round = 0; round < 200; ++round) {
     try {
       pool.run(64, [&](std::size_t i, unsigned) {
@@ -76,7 +76,7 @@ TEST_P(EveryPoolSize, AnExceptionReachesTheCallerAndThePoolLivesOn) {
   }
 }
 
-TEST_P(EveryPoolSize, NoIndexIsHandedOutLongAfterAThrow) {
+TEST_P(EveryPoolSize, IndicesStopSoonAfterAnException) {
   std::atomic<std::size_t> visits = 0;
   constexpr std::size_t count = 1U << 20;
   EXPECT_THROW(pool.run(count,
@@ -85,10 +85,10 @@ TEST_P(EveryPoolSize, NoIndexIsHandedOutLongAfterAThrow) {
                           throw std::runtime_error("first");
                         }),
                std::runtime_error);
-  EXPECT_LE(visits, GetParam());  // each thread can have drawn one at most
+  EXPECT_LE(visits, GetParam());  // each thread can have taken one at most
 }
 
-TEST_P(EveryPoolSize, ALoopInsideALoopIsRefusedInsteadOfHanging) {
+TEST_P(EveryPoolSize, NestedLoopIsRefusedInsteadOfDeadlocking) {
   EXPECT_THROW(
       pool.run(4, [&](std::size_t, unsigned) { pool.run(2, [](std::size_t, unsigned) {}); }),
       std::logic_error);
@@ -97,7 +97,7 @@ TEST_P(EveryPoolSize, ALoopInsideALoopIsRefusedInsteadOfHanging) {
   EXPECT_EQ(visits, 4);
 }
 
-TEST_P(EveryPoolSize, ALoopInAnotherPoolIsAllowed) {
+TEST_P(EveryPoolSize, LoopInAnotherPoolIsAllowed) {
   ThreadPool inner(2);
   std::atomic<int> visits = 0;
   pool.run(3,
@@ -105,7 +105,7 @@ TEST_P(EveryPoolSize, ALoopInAnotherPoolIsAllowed) {
   EXPECT_EQ(visits, 15);
 }
 
-TEST_P(EveryPoolSize, LoopsOfSeveralCallersDoNotMix) {
+TEST_P(EveryPoolSize, LoopsOfSeveralCallersDoNotInterfere) {
   constexpr int callers = 4;
   std::vector<std::vector<int>> visits(callers, std::vector<int>(97));
   std::vector<std::atomic<int>> inside(callers);
@@ -149,12 +149,12 @@ TEST(ThreadPool, OneThreadRunsInTheCallerInAscendingOrder) {
   EXPECT_EQ(order, ascending);
 }
 
-TEST(ThreadPool, ZeroMeansOneThreadAHardwareThread) {
+TEST(ThreadPool, ZeroMeansOneThreadPerHardwareThread) {
   EXPECT_EQ(ThreadPool(0).size(), std::max(1U, std::thread::hardware_concurrency()));
 }
 
-// Two indices that wait for each other end only if two threads work at the same time.
-TEST(ThreadPool, WorkersRunAtTheSameTime) {
+// Two indices that wait for each other end only if two threads run concurrently.
+TEST(ThreadPool, WorkersRunConcurrently) {
   ThreadPool pool(2);
   std::atomic<int> arrived = 0;
   pool.run(2, [&](std::size_t, unsigned) {
@@ -164,7 +164,7 @@ TEST(ThreadPool, WorkersRunAtTheSameTime) {
   EXPECT_EQ(arrived, 2);
 }
 
-TEST(ThreadPool, EndsWithoutEverHavingRun) {
+TEST(ThreadPool, UnusedPoolIsDestroyed) {
   for (int i = 0; i < 100; ++i) EXPECT_EQ(ThreadPool(4).size(), 4U);
 }
 

@@ -1,4 +1,4 @@
-// Files are written whole or not at all, and what is no regular file is left where it is.
+// Files are written whole or not at all, and files that are not regular are kept.
 #include "server/base/whole_file.hpp"
 
 #include <fcntl.h>
@@ -30,7 +30,7 @@ class WholeFile : public testing::Test {
   test::Folder folder_;
 };
 
-TEST_F(WholeFile, IsMadeAndReplacedAndLeavesNothingBesideIt) {
+TEST_F(WholeFile, IsCreatedAndReplacedWithoutTemporaryFiles) {
   const fs::path path = folder_ / "a.png";
   ASSERT_TRUE(write_whole_file(path, "first"));
   EXPECT_EQ(read(path), "first");
@@ -41,7 +41,7 @@ TEST_F(WholeFile, IsMadeAndReplacedAndLeavesNothingBesideIt) {
   EXPECT_EQ(entries(), 1);
 }
 
-TEST_F(WholeFile, WhatIsSyncedIsWrittenTheSameWay) {
+TEST_F(WholeFile, SyncedWriteHasTheSameResult) {
   const fs::path path = folder_ / "a.json";
   ASSERT_TRUE(write_whole_file(path, "first", Sync::now));
   ASSERT_TRUE(write_whole_file(path, "second", Sync::now));
@@ -51,7 +51,7 @@ TEST_F(WholeFile, WhatIsSyncedIsWrittenTheSameWay) {
   EXPECT_FALSE(sync_folder(path)) << "is no folder";
 }
 
-TEST_F(WholeFile, AReaderOfTheOldOneKeepsIt) {
+TEST_F(WholeFile, ReaderOfTheOldFileKeepsIt) {
   const fs::path path = folder_ / "a.png";
   ASSERT_TRUE(write_whole_file(path, "the old one"));
   std::ifstream reader(path, std::ios::binary);
@@ -59,7 +59,7 @@ TEST_F(WholeFile, AReaderOfTheOldOneKeepsIt) {
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(reader), {}), "the old one");
 }
 
-TEST_F(WholeFile, AFailureLeavesTheOldOneAndNoPart) {
+TEST_F(WholeFile, FailureKeepsTheOldFileAndLeavesNoPart) {
   const fs::path path = folder_ / "a.png";
   ASSERT_TRUE(write_whole_file(path, "good"));
   Result<void> written;
@@ -74,7 +74,7 @@ TEST_F(WholeFile, AFailureLeavesTheOldOneAndNoPart) {
   EXPECT_EQ(entries(), 1);
 }
 
-TEST_F(WholeFile, OfALinkTheFileBehindItIsWritten) {
+TEST_F(WholeFile, LinkTargetIsWritten) {
   const fs::path path = folder_ / "a.png";
   const fs::path link = folder_ / "link.png";
   ASSERT_TRUE(write_whole_file(path, "old"));
@@ -84,7 +84,7 @@ TEST_F(WholeFile, OfALinkTheFileBehindItIsWritten) {
   EXPECT_EQ(read(path), "new");
 }
 
-TEST_F(WholeFile, OfALinkWhoseFileIsNotThereYetTheFileIsMade) {
+TEST_F(WholeFile, MissingLinkTargetIsCreated) {
   fs::create_directory(folder_ / "sub");
   const fs::path link = folder_ / "link.png";
   fs::create_symlink("sub/second.png", link);
@@ -99,8 +99,8 @@ TEST_F(WholeFile, OfALinkWhoseFileIsNotThereYetTheFileIsMade) {
   EXPECT_TRUE(fs::is_symlink(folder_ / "round.png"));
 }
 
-// As /dev/stdout is where stdout goes to a file, others write there before and after.
-TEST_F(WholeFile, ADescriptorsNameIsWrittenToWhereItStands) {
+// Like /dev/stdout redirected to a file: others write there before and after.
+TEST_F(WholeFile, DescriptorPathIsWrittenAtItsPosition) {
   const fs::path path = folder_ / "log";
   const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
   ASSERT_GE(file, 0);
@@ -119,7 +119,7 @@ TEST_F(WholeFile, ADescriptorsNameIsWrittenToWhereItStands) {
   EXPECT_FALSE(is_stream(folder_.path()));
 }
 
-TEST_F(WholeFile, WhatIsNoRegularFileIsWrittenToAndStays) {
+TEST_F(WholeFile, NonRegularFileIsWrittenAndKept) {
   const fs::path pipe = folder_ / "pipe.png";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);

@@ -1,4 +1,4 @@
-// Which ranges `inspect` reads by default, how it reports omissions, and the override.
+// Default ranges of `inspect`, reports of omissions, and the override.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -32,7 +32,7 @@ bool has_note(const json& dataset, const std::string& part) {
   return false;
 }
 
-// Eight steps of 64 x 64, in chunks of so many steps that are mostly empty.
+// Eight steps of 64 x 64, in mostly empty chunks of the given number of steps.
 void write_steps(const std::string& path, std::size_t steps_of_a_chunk) {
   NetcdfMaker file(path);
   const int t = file.dimension("time", NC_UNLIMITED);
@@ -43,7 +43,7 @@ void write_steps(const std::string& path, std::size_t steps_of_a_chunk) {
   file.chunk(u, {steps_of_a_chunk, 64, 64});
 }
 
-// Together 34 MiB as floats: within the limit, which twice as much is not.
+// Together 34 MiB as floats: within the limit, which twice as much exceeds.
 TEST(Inspect, CountsWhatIsDecodedOnce) {
   const Folder folder;
   const std::string path = folder.file("a.nc");
@@ -63,7 +63,7 @@ TEST(Inspect, CountsWhatIsDecodedOnce) {
   }
 }
 
-TEST(Inspect, SaysWhyRangesAreOverTheFirstStep) {
+TEST(Inspect, ExplainsWhyRangesCoverTheFirstStepOnly) {
   const Folder folder;
   const std::string path = folder.file("a.nc");
   write_steps(path, 1024);  // chunks of 16 MiB
@@ -79,7 +79,7 @@ TEST(Inspect, SaysWhyRangesAreOverTheFirstStep) {
   EXPECT_FALSE(has_note(all, "ranges are"));
 }
 
-TEST(Inspect, ReadsRangesBeyondTheLimitWhereItIsAsked) {
+TEST(Inspect, ReadsRangesAboveTheLimitOnRequest) {
   const Folder folder;
   const std::string path = folder.file("a.nc");
   write_steps(path, 8192);  // chunks of 128 MiB

@@ -33,7 +33,7 @@ class SettingsFile : public testing::Test {
   std::filesystem::path folder_;
 };
 
-TEST_F(SettingsFile, is_read_whole_and_no_further_than_it_may_be) {
+TEST_F(SettingsFile, IsReadWholeUpToItsLimit) {
   std::ofstream(file("text")) << "0123456789";
   EXPECT_EQ(read_settings_file(file("text"), 10).value(), "0123456789");
   const auto large = read_settings_file(file("text"), 9);
@@ -45,7 +45,7 @@ TEST_F(SettingsFile, is_read_whole_and_no_further_than_it_may_be) {
 }
 
 // Opening a pipe without a writer would block.
-TEST_F(SettingsFile, that_is_none_is_not_waited_for) {
+TEST_F(SettingsFile, NonRegularFileDoesNotBlock) {
   ASSERT_EQ(mkfifo(file("pipe").c_str(), 0600), 0);
   for (const std::string& path : {file("pipe"), folder_.string(), std::string("/dev/zero")}) {
     const auto text = read_settings_file(path, 10);
@@ -81,7 +81,7 @@ class Gate {
   bool open_ = false;
 };
 
-TEST(Errand, is_not_waited_for_by_whoever_wants_it_or_ends_it) {
+TEST(Errand, DoesNotBlockRequestersOrShutdown) {
   Gate gate;
   std::atomic<int> calls = 0;
   Errand errand([&] {
@@ -91,13 +91,13 @@ TEST(Errand, is_not_waited_for_by_whoever_wants_it_or_ends_it) {
   errand.want();
   ASSERT_TRUE(gate.is_reached());
   errand.want();
-  EXPECT_FALSE(errand.end(milliseconds(1))) << "it is still under way";
+  EXPECT_FALSE(errand.end(milliseconds(1))) << "it is still running";
   gate.open();
   EXPECT_TRUE(errand.end(patience));
-  EXPECT_EQ(calls, 1) << "none is begun after the end";
+  EXPECT_EQ(calls, 1) << "none starts after the end";
 }
 
-TEST(Errand, is_done_once_more_for_what_came_meanwhile_and_lives_through_faults) {
+TEST(Errand, RunsOnceMoreForMissedRequestsAndSurvivesExceptions) {
   Gate gate;
   std::atomic<int> calls = 0;
   Gate second;

@@ -1,4 +1,4 @@
-// Short ways to look into a dataset in tests.
+// Shortcuts for inspecting a dataset in tests.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// Files for the tests of loaders: a small honest one, and two crafted to make HDF5 read another.
+// Files for the tests of loaders: a small valid one, and two crafted to make HDF5 read another
+// file.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -69,7 +70,7 @@ inline void write_floats(const std::string& path, std::size_t count, float value
              static_cast<std::streamsize>(count * sizeof(float)));
 }
 
-// An HDF5 file whose dataset "secret" (4 x 4 x 4 floats) has its numbers in another file.
+// An HDF5 file whose dataset "secret" (4 x 4 x 4 floats) has its values in another file.
 inline void write_external_storage(const std::string& path, const std::string& other) {
   const std::array<hsize_t, 3> dims{4, 4, 4};
   const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);

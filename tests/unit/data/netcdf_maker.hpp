@@ -1,5 +1,5 @@
-// Writes small netCDF files for the tests straight through the C library, so that the reader is
-// never judged by the project's own writer.
+// Writes small netCDF files through the C library, so that the reader is tested independently of
+// the project's writer.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -148,7 +148,7 @@ inline std::string bytes_of(const std::string& path) {
 }
 
 inline void write_bytes(const std::string& path, const std::string& bytes) {
-  // A new file: some file systems wait for the disk when an old one is written over.
+  // A new file: some file systems flush to disk when an old one is overwritten.
   std::filesystem::remove(path);
   std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
 }

@@ -1,4 +1,4 @@
-// Where the real files are that scripts/fetch-test-data fetches.
+// Path of the real files fetched by scripts/fetch-test-data.
 #pragma once
 
 #include <cstdlib>

@@ -21,7 +21,7 @@ Request request_with(Headers headers) {
   return request;
 }
 
-TEST(HeaderBytes, a_request_line_is_three_words_and_the_last_a_version) {
+TEST(HeaderBytes, RequestLineHasThreePartsWithAVersionLast) {
   for (const char* line :
        {"GET / HTTP/1.1", "GET / HTTP/9.0", "X * HTTP/1.0", "GET http://a/b?c HTTP/1.1"}) {
     EXPECT_EQ(status_of_line(line), 0) << line;
@@ -35,7 +35,7 @@ TEST(HeaderBytes, a_request_line_is_three_words_and_the_last_a_version) {
   }
 }
 
-TEST(HeaderBytes, line_ends_are_pairs_and_nothing_is_folded) {
+TEST(HeaderBytes, LineEndsAreCrlfWithoutFolding) {
   const std::string line = "GET / HTTP/1.1\r\n";
   EXPECT_EQ(status_of(check_header_bytes(line + "A: 1\r\nB: 2\r\n\r\n")), 0);
   for (const char* rest : {"A: 1\nB: 2\r\n\r\n", "A: 1\rB: 2\r\n\r\n", "A: 1\r\r\n\r\n",
@@ -44,7 +44,7 @@ TEST(HeaderBytes, line_ends_are_pairs_and_nothing_is_folded) {
   }
 }
 
-TEST(RequestCheck, a_host_is_a_name_or_an_address_with_or_without_a_port) {
+TEST(RequestCheck, HostIsANameOrAddressWithOptionalPort) {
   for (const char* host : {"a", "a.example", "a-b_c~d.example:80", "127.0.0.1", "127.0.0.1:65535",
                            "[::1]", "[2001:db8::1]:8080", "[::ffff:1.2.3.4]", "a:", "%41"}) {
     EXPECT_EQ(status_of(check_request(request_with({{"Host", host}}), 11)), 0) << host;
@@ -67,7 +67,7 @@ Headers upgrade_headers() {
           {"Sec-WebSocket-Key", "dGhlIHNhbXBsZSBub25jZQ=="}};
 }
 
-TEST(Upgrade, is_asked_for_by_lists_in_any_number_of_lines) {
+TEST(Upgrade, IsRequestedByListsInAnyNumberOfLines) {
   Request request = request_with(upgrade_headers());
   EXPECT_TRUE(asks_for_websocket(request, 11));
   EXPECT_FALSE(asks_for_websocket(request, 10));
@@ -83,7 +83,7 @@ TEST(Upgrade, is_asked_for_by_lists_in_any_number_of_lines) {
   EXPECT_FALSE(asks_for_websocket(request, 11));
 }
 
-TEST(Upgrade, needs_a_key_of_16_bytes_once) {
+TEST(Upgrade, NeedsAKeyOf16BytesOnce) {
   Request request = request_with(upgrade_headers());
   EXPECT_EQ(status_of(check_upgrade(request)), 0);
   std::string& key = request.headers[4].second;
@@ -101,7 +101,7 @@ TEST(Upgrade, needs_a_key_of_16_bytes_once) {
   EXPECT_EQ(status_of(check_upgrade(request)), 400);
 }
 
-TEST(Upgrade, of_another_version_is_told_which_one_would_do) {
+TEST(Upgrade, OtherVersionGetsTheSupportedOne) {
   for (const char* version : {"", "8", "12", "14", "013", "13, 8", "+13"}) {
     Request request = request_with(upgrade_headers());
     request.headers[3].second = version;
@@ -114,7 +114,7 @@ TEST(Upgrade, of_another_version_is_told_which_one_would_do) {
   }
 }
 
-// What the path and query of a target are, joined; empty where it is refused.
+// Path and query of a target, joined; empty if it is refused.
 std::string told(std::string_view target, const char* host) {
   Request request = request_with({{"Host", host}});
   if (!parse_target(target, "/", request)) return "";
@@ -124,7 +124,7 @@ std::string told(std::string_view target, const char* host) {
   return out;
 }
 
-TEST(Target, in_absolute_form_names_the_host_that_was_asked_for) {
+TEST(Target, AbsoluteFormNamesTheRequestedHost) {
   EXPECT_EQ(told("/a/b?c=/d", "h:1"), "/a/b?c=/d");
   EXPECT_EQ(told("http://h:1/a/b?c=/d", "h:1"), "/a/b?c=/d");
   EXPECT_EQ(told("HTTPS://H/a", "h"), "/a");
@@ -135,7 +135,7 @@ TEST(Target, in_absolute_form_names_the_host_that_was_asked_for) {
   }
 }
 
-TEST(Target, without_a_word_behind_the_question_mark_has_no_query) {
+TEST(Target, WithoutQueryTextHasNoQuery) {
   EXPECT_EQ(told("/a?", "h"), "/a");
   EXPECT_EQ(told("/a?&&", "h"), "/a");
   EXPECT_EQ(told("/a?&b=1&", "h"), "/a?b=1");

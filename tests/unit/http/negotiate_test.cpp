@@ -6,7 +6,7 @@
 namespace windsplat::net {
 namespace {
 
-TEST(HostNames, of_loopback_are_three) {
+TEST(HostNames, LoopbackHasThree) {
   for (const char* host : {"localhost", "LOCALHOST:8080", "127.0.0.1", "127.9.9.9:1", "[::1]:80"}) {
     EXPECT_TRUE(names_loopback(host)) << host;
   }
@@ -15,8 +15,8 @@ TEST(HostNames, of_loopback_are_three) {
   }
 }
 
-// A page can have its own name resolve to this machine, but no address.
-TEST(HostNames, are_no_addresses) {
+// A page can make its own name resolve to this machine, but not an address.
+TEST(HostNames, AddressesAreNotHostNames) {
   for (const char* host : {"10.0.0.1", "10.0.0.1:8080", "[2001:db8::1]", "[::ffff:1.2.3.4]:80"}) {
     EXPECT_TRUE(is_address(host)) << host;
   }
@@ -26,7 +26,7 @@ TEST(HostNames, are_no_addresses) {
   }
 }
 
-TEST(HostNames, may_be_given) {
+TEST(HostNames, CanBeConfigured) {
   const std::vector<std::string> origins{"https://a.example"};
   const std::vector<std::string> names{"winds.example"};
   for (const char* host : {"localhost:1", "a.example", "winds.example", "WINDS.example:8080"}) {

@@ -8,7 +8,7 @@
 namespace windsplat::net {
 namespace {
 
-TEST(Problems, say_in_their_header_when_to_try_again) {
+TEST(Problems, ContainARetryTimeInTheirHeader) {
   const auto retry_after = [](int seconds) {
     Error error = make_error(ErrorKind::busy, "later");
     error.retry_after_s = seconds;

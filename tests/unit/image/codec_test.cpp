@@ -21,7 +21,7 @@ struct Picture {
   std::vector<std::uint8_t> rgb;
 };
 
-// Smooth, with every channel on its own course: what JPEG is made for.
+// Smooth, with different channels: the typical content of JPEG.
 Picture smooth_picture(int width, int height) {
   Picture picture{width, height, -1, {}};
   for (int y = 0; y < height; ++y) {
@@ -34,7 +34,7 @@ Picture smooth_picture(int width, int height) {
   return picture;
 }
 
-// No two neighbours alike: any pixel out of its place shows.
+// No two neighbours are equal: any misplaced pixel is visible.
 Picture busy_picture(int width, int height) {
   Picture picture{width, height, -1, {}};
   std::uint32_t state = 12345;
@@ -71,7 +71,7 @@ double root_mean_square(const Picture& a, const Picture& b) {
 
 const std::vector<std::pair<int, int>> few_sizes{{1, 1}, {1, 67}, {67, 1}, {17, 9}, {256, 64}};
 
-TEST(Jpeg, KeepsSizeSubsamplingAndColours) {
+TEST(Jpeg, KeepsSizeSubsamplingAndColors) {
   for (const auto& [width, height] : few_sizes) {
     for (const Subsampling subsampling : {Subsampling::s444, Subsampling::s420}) {
       const Picture picture = smooth_picture(width, height);
@@ -96,7 +96,7 @@ TEST(Jpeg, HigherQualityIsNearerAndLarger) {
   EXPECT_GT(fine->size(), coarse->size());
 }
 
-TEST(Jpeg, RefusesWhatTheFormatCannotHold) {
+TEST(Jpeg, RefusesSizesTheFormatCannotHold) {
   const std::vector<std::uint8_t> pixel{1, 2, 3};
   EXPECT_EQ(encode_jpeg(pixel, 1, 1, 0, Subsampling::s444).error().kind, ErrorKind::invalid);
   EXPECT_EQ(encode_jpeg(pixel, 1, 1, 101, Subsampling::s444).error().kind, ErrorKind::invalid);
@@ -117,8 +117,8 @@ TEST(Png, IsLossless) {
   }
 }
 
-// Whoever shows the picture is told that it is sRGB, to be mapped by relative colorimetry.
-TEST(Png, HasTheChunksThatAreMeant) {
+// The picture declares sRGB with relative colorimetric intent.
+TEST(Png, HasTheExpectedChunks) {
   const auto bytes = encode_png(busy_picture(200, 200).rgb, 200, 200);
   ASSERT_TRUE(bytes) << bytes.error().message;
   std::vector<std::string> names;
@@ -136,7 +136,7 @@ TEST(Png, HasTheChunksThatAreMeant) {
   EXPECT_EQ(names, (std::vector<std::string>{"IHDR", "sRGB", "IDAT", "IEND"}));
 }
 
-TEST(Png, CompressesAnEvenPicture) {
+TEST(Png, CompressesAUniformPicture) {
   const std::vector<std::uint8_t> rgb(std::size_t{3} * 256 * 256, 40);
   const auto bytes = encode_png(rgb, 256, 256);
   ASSERT_TRUE(bytes);
@@ -147,7 +147,7 @@ TEST(Png, RefusesAnEmptyPicture) {
   EXPECT_EQ(encode_png({}, 0, 4).error().kind, ErrorKind::invalid);
 }
 
-TEST(Png, WhatTheLibraryRefusesIsAnError) {
+TEST(Png, LibraryFailureIsAnError) {
   constexpr int over_its_limit = 1000001;
   const std::vector<std::uint8_t> row(std::size_t{3} * over_its_limit);
   const auto refused = encode_png(row, over_its_limit, 1);
@@ -167,7 +167,7 @@ TEST(Png, StopsWhenCancelled) {
 
 // NPY 1.0: "\x93NUMPY", 1, 0, u16 header length, a Python dict ending with a line feed, values from
 // a multiple of 64 on.
-TEST(Npy, HeaderAndValuesAreWhereTheFormatPutsThem) {
+TEST(Npy, HeaderAndValuesFollowTheFormat) {
   for (const auto& [width, height] : {std::pair{1, 1}, {1, 67}, {67, 1}, {1280, 720}}) {
     std::vector<float> rgba(4 * static_cast<std::size_t>(width * height));
     for (std::size_t i = 0; i < rgba.size(); ++i) rgba[i] = 0.25F * static_cast<float>(i) - 3.0F;

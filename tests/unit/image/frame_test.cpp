@@ -1,4 +1,4 @@
-// frame::produce on a built-in sample: sizes, levels, formats, report; and what is told of a frame.
+// frame::produce on a built-in sample: sizes, levels, formats, reports, and frame infos.
 #include "server/frame/frame.hpp"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ class Produce : public testing::Test {
   CancelToken cancel;
 };
 
-TEST_F(Produce, EachFormatIsWhatItsFirstBytesSay) {
+TEST_F(Produce, EveryFormatHasItsSignature) {
   const auto jpeg = produce_as(Format::jpeg);
   const auto png = produce_as(Format::png);
   const auto npy = produce_as(Format::npy);
@@ -65,12 +65,12 @@ TEST_F(Produce, LevelHalvesBothSidesAndKeepsAtLeastOnePixel) {
     ASSERT_TRUE(frame) << frame.error().message;
     EXPECT_EQ(frame->width, width) << level;
     EXPECT_EQ(frame->height, height) << level;
-    EXPECT_EQ(frame->view.image.width, 96) << "the view told is the one asked for";
+    EXPECT_EQ(frame->view.image.width, 96) << "the reported view is the requested one";
   }
 }
 
-// Coverage is a mean over the picture: resolution must not change how much of it is lit.
-TEST_F(Produce, ALowerLevelShowsTheSamePicture) {
+// Mean coverage must not depend on the resolution.
+TEST_F(Produce, LowerLevelShowsTheSamePicture) {
   view.image.width = 256;
   view.image.height = 192;
   const auto mean_opacity = [](const Frame& frame) {
@@ -88,7 +88,7 @@ TEST_F(Produce, ALowerLevelShowsTheSamePicture) {
   EXPECT_NEAR(mean_opacity(*half) / mean_opacity(*whole), 1, 0.1);
 }
 
-TEST_F(Produce, ReportNamesTheFieldsShownAndTheirBytes) {
+TEST_F(Produce, ReportListsShownFieldsAndTheirBytes) {
   const auto both = produce_as(Format::jpeg);
   ASSERT_TRUE(both) << both.error().message;
   const auto& info = dataset->info();
@@ -123,7 +123,7 @@ TEST_F(Produce, ReportNamesTheFieldsShownAndTheirBytes) {
   EXPECT_EQ(nothing->work.bytes, 0);
 }
 
-TEST_F(Produce, BackgroundIsOfThePictureButNotOfTheArray) {
+TEST_F(Produce, BackgroundIsPartOfThePictureButNotOfTheArray) {
   view.vector.field.kind = protocol::FieldChoice::Kind::none;
   view.scalars.emplace();
   view.image.background = "#204060";
@@ -141,7 +141,7 @@ TEST_F(Produce, BackgroundIsOfThePictureButNotOfTheArray) {
   for (std::size_t i = values_at; i < npy->bytes.size(); ++i) ASSERT_EQ(npy->bytes[i], 0);
 }
 
-TEST_F(Produce, AnyNumberOfThreadsGivesTheSameBytes) {
+TEST_F(Produce, AnyThreadCountGivesTheSameBytes) {
   ThreadPool one(1);
   const auto alone = produce(view, *dataset, {Format::png}, one, cancel);
   const auto shared = produce_as(Format::png);
@@ -149,7 +149,7 @@ TEST_F(Produce, AnyNumberOfThreadsGivesTheSameBytes) {
   EXPECT_EQ(alone->bytes, shared->bytes);
 }
 
-// The two ways from the engine to bytes: a JPEG's tile by tile, the PNG's by way of an image.
+// The two paths from the engine to bytes: JPEG tile by tile, PNG from an image.
 TEST_F(Produce, JpegShowsWhatPngShows) {
   view.image.background = "#305070";
   for (const auto& [width, height] : {std::pair{96, 64}, {131, 67}, {1, 1}, {3, 70}}) {
@@ -173,8 +173,8 @@ TEST_F(Produce, JpegShowsWhatPngShows) {
   }
 }
 
-// A workspace that other frames were drawn into gives what a new one gives, and a step apart too.
-TEST_F(Produce, AWorkspaceCarriesNothingOver) {
+// A workspace used for other frames gives the same as a new one, as does a frame rendered in steps.
+TEST_F(Produce, WorkspaceKeepsNoStateBetweenPictures) {
   Workspace used;
   ThreadPool one(1);
   const Encoding moving{Format::jpeg, 80, image::Subsampling::s420};
@@ -198,7 +198,7 @@ TEST_F(Produce, AWorkspaceCarriesNothingOver) {
             produce(view, *dataset, moving, pool, cancel)->bytes);
 }
 
-TEST_F(Produce, WrongViewsAndCancelledFramesAreErrors) {
+TEST_F(Produce, InvalidViewsAndCancelledFramesAreErrors) {
   view.step = 2;
   const auto late = produce_as(Format::jpeg);
   ASSERT_FALSE(late);
@@ -213,8 +213,8 @@ TEST_F(Produce, WrongViewsAndCancelledFramesAreErrors) {
   EXPECT_EQ(cancelled.error().kind, ErrorKind::cancelled);
 }
 
-// Who waits for the renderer with others is refused what takes minutes.
-TEST_F(Produce, TheReferenceIsDrawnOnlyWhereItIsAllowed) {
+// A request that shares the renderer is refused if it takes minutes.
+TEST_F(Produce, ReferenceIsRenderedOnlyWhereAllowed) {
   view.method.name = protocol::MethodName::reference;
   const auto refused = produce_as(Format::png);
   ASSERT_FALSE(refused);
@@ -224,8 +224,8 @@ TEST_F(Produce, TheReferenceIsDrawnOnlyWhereItIsAllowed) {
   EXPECT_EQ(dataset->loads(), 0U);
 }
 
-// Fields of colour and of heights are among those touched, each once however often it is used.
-TEST(ProduceFields, OfColourAndHeightAreToldOnce) {
+// Fields of colour and of heights are listed, each once.
+TEST(ProduceFields, OfColorAndHeightAreListedOnce) {
   auto source = std::make_unique<scene::FakeSource>(
       scene::atmosphere_grid(),
       std::vector<data::FieldInfo>{scene::wind_info(), scene::scalar_info("z", "m"),
@@ -254,8 +254,8 @@ TEST(ProduceFields, OfColourAndHeightAreToldOnce) {
   EXPECT_EQ(fields(), (Names{"wind", "z"}));
 }
 
-// The source is asked for what is shown and for nothing else, whatever draws it.
-TEST(ProduceFields, WhatIsNotShownIsNeverRead) {
+// The source is asked for the shown fields only, for every method.
+TEST(ProduceFields, UnusedFieldsAreNeverRead) {
   using Reads = scene::FakeSource::Reads;
   for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
     const auto reads_of = [&](const auto& change) {
@@ -310,7 +310,7 @@ TEST(ProduceFields, WhatIsNotShownIsNeverRead) {
                 view.vector.color.field = "q";
               }),
               Reads{})
-        << "the colour of lines that are not drawn";
+        << "the colour field of hidden lines";
   }
 }
 
@@ -328,7 +328,7 @@ TEST_F(Produce, FrameInfoNamesMethodsAndSlabs) {
   EXPECT_EQ(info.slab_thickness, 0.5);
 }
 
-TEST_F(Produce, ReportTellsTheLevelAndWhatIsReallyDrawn) {
+TEST_F(Produce, ReportContainsTheLevelAndActualSettings) {
   view.image.width = 10;
   view.image.height = 8;
   const auto coarse = produce_as(Format::png);
@@ -350,7 +350,7 @@ TEST_F(Produce, ReportTellsTheLevelAndWhatIsReallyDrawn) {
   EXPECT_EQ(coarse->work.fields, full->work.fields);
 }
 
-TEST_F(Produce, FrameInfoTellsTheReport) {
+TEST_F(Produce, FrameInfoContainsTheReport) {
   const auto frame = produce_as(Format::jpeg, 1);
   ASSERT_TRUE(frame) << frame.error().message;
   view.vector.stride = 3;

@@ -1,4 +1,5 @@
-// JPEGs of strips: against a JPEG of the same planes in one piece, and read by ITU-T T.81.
+// JPEGs from strips: compared with a JPEG of the same planes in one piece, and parsed by ITU-T
+// T.81.
 #include <gtest/gtest.h>
 #include <turbojpeg.h>
 
@@ -75,7 +76,7 @@ Bytes decode(const Bytes& jpeg, int width, int height, int subsampling) {
   return rgb;
 }
 
-// What a reader finds: the interval of DRI (0 without), and the restart markers in order.
+// What a reader finds: the DRI interval (0 without), and the restart markers in order.
 struct Restarts {
   int interval = 0;
   std::vector<int> markers;
@@ -109,7 +110,7 @@ const std::vector<std::pair<int, int>> many_sizes{
     {1, 1},     {1, 67},     {67, 1},    {17, 9},     {18, 22},     {334, 398}, {640, 480},
     {641, 479}, {1280, 720}, {9, 20000}, {20000, 17}, {1921, 1081}, {47, 3001}};
 
-TEST(JpegStrips, DecodeToWhatOnePieceDecodesTo) {
+TEST(JpegStrips, DecodeLikeOnePiece) {
   ThreadPool pool(2);
   JpegEncoder encoder;
   Bytes bytes;
@@ -127,9 +128,9 @@ TEST(JpegStrips, DecodeToWhatOnePieceDecodesTo) {
   }
 }
 
-// Every interval but the last is whole, markers count modulo 8, and large pictures have enough
+// Every interval but the last is complete, markers count modulo 8, and large pictures have enough
 // strips for many threads.
-TEST(JpegStrips, RestartMarkersSayWhereStripsEnd) {
+TEST(JpegStrips, RestartMarkersMarkTheEndsOfStrips) {
   ThreadPool pool(1);
   JpegEncoder encoder;
   Bytes bytes;
@@ -153,10 +154,10 @@ TEST(JpegStrips, RestartMarkersSayWhereStripsEnd) {
       for (int m = 0; m < strips - 1; ++m) EXPECT_EQ(found.markers[m], m % 8);
     }
   }
-  EXPECT_GT(most, 8U) << "no picture here has come round to marker 0 again";
+  EXPECT_GT(most, 8U) << "no picture here wraps around to marker 0";
 }
 
-TEST(JpegStrips, AnyNumberOfThreadsGivesTheSameBytes) {
+TEST(JpegStrips, AnyThreadCountGivesTheSameBytes) {
   ThreadPool one(1);
   ThreadPool two(2);
   ThreadPool five(5);
@@ -175,8 +176,8 @@ TEST(JpegStrips, AnyNumberOfThreadsGivesTheSameBytes) {
   }
 }
 
-// The frame loop keeps its memory: neither the bytes' storage nor the planes' moves.
-TEST(JpegStrips, StorageIsKept) {
+// The frame loop keeps its memory: neither the output nor the planes are reallocated.
+TEST(JpegStrips, StorageIsReused) {
   ThreadPool pool(2);
   JpegEncoder encoder;
   YccPicture picture = waves(640, 480, Subsampling::s420);
@@ -187,12 +188,12 @@ TEST(JpegStrips, StorageIsKept) {
   const std::size_t size = bytes.size();
   picture.reset(640, 480, Subsampling::s420, {0.5F, 0.5F, 0.5F});
   ASSERT_TRUE(encoder.encode(picture, 80, pool, bytes));
-  EXPECT_LT(bytes.size(), size / 4) << "an even picture is small";
+  EXPECT_LT(bytes.size(), size / 4) << "a uniform picture is small";
   EXPECT_EQ(bytes.data(), storage);
   EXPECT_EQ(picture.planes()[0].samples, luma);
 }
 
-TEST(JpegStrips, RefuseWhatTheFormatCannotHold) {
+TEST(JpegStrips, RefuseSizesTheFormatCannotHold) {
   ThreadPool pool(1);
   JpegEncoder encoder;
   Bytes bytes;
@@ -204,8 +205,8 @@ TEST(JpegStrips, RefuseWhatTheFormatCannotHold) {
   EXPECT_EQ(encoder.encode(picture, 80, pool, bytes).error().kind, ErrorKind::too_large);
 }
 
-// Its MCUs reach beyond what the library takes.
-TEST(JpegStrips, HoldTheLongestEdgeOfTheFormat) {
+// Its MCUs extend beyond the limit of the library.
+TEST(JpegStrips, SupportTheLongestEdgeOfTheFormat) {
   ThreadPool pool(1);
   JpegEncoder encoder;
   Bytes bytes;
@@ -223,8 +224,8 @@ TEST(JpegStrips, HoldTheLongestEdgeOfTheFormat) {
   }
 }
 
-// A decoder reads all of them by the first one's tables.
-TEST(JpegStitch, RefusesStripsOfOtherTables) {
+// A decoder reads all strips with the tables of the first.
+TEST(JpegStitch, RefusesStripsWithOtherTables) {
   ThreadPool pool(1);
   JpegEncoder encoder;
   Bytes first;
@@ -237,12 +238,12 @@ TEST(JpegStitch, RefusesStripsOfOtherTables) {
       stitch(std::vector<std::span<const std::uint8_t>>{first, other}, {64, 32, 4}, out);
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().kind, ErrorKind::internal);
-  // A last strip of another height is as it should be.
+  // A last strip of another height is valid.
   ASSERT_TRUE(encoder.encode(waves(64, 9, Subsampling::s420), 80, pool, other));
   EXPECT_TRUE(stitch(std::vector<std::span<const std::uint8_t>>{first, other}, {64, 25, 4}, out));
 }
 
-TEST(JpegStitch, RefusesStripsOfAnotherForm) {
+TEST(JpegStitch, RefusesStripsOfAnotherShape) {
   ThreadPool pool(1);
   JpegEncoder encoder;
   Bytes strip;

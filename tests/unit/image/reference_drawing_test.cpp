@@ -1,5 +1,5 @@
-// frame::ReferenceDrawing: what is drawn in bits, with others in between, is the picture drawn at
-// once; and how far the view's own one is from it.
+// frame::ReferenceDrawing: rendering in interrupted pieces equals one pass; and the error of the
+// view's own picture.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -66,7 +66,7 @@ class Drawing : public testing::Test {
   std::uint64_t reserved = 0;
 };
 
-TEST_F(Drawing, InStripsThatAreCutShortIsThePictureDrawnAtOnce) {
+TEST_F(Drawing, InterruptedStripsGiveThePictureRenderedAtOnce) {
   const auto drawing = begin();
   ASSERT_TRUE(drawing) << drawing.error().message;
   int strips = 0;
@@ -74,7 +74,7 @@ TEST_F(Drawing, InStripsThatAreCutShortIsThePictureDrawnAtOnce) {
   while ((*drawing)->done() < 1 && strips < 10000) {
     const CancelToken stop;
     std::atomic<int> asked{0};
-    // Every other strip is ended by other work instead.
+    // Every other strip is interrupted.
     const auto enough = [&] {
       if (++asked < 4) return false;
       if (strips % 2 == 1) stop.cancel();
@@ -93,7 +93,7 @@ TEST_F(Drawing, InStripsThatAreCutShortIsThePictureDrawnAtOnce) {
   EXPECT_GT(reserved, 16U * 75 * 40);
 }
 
-TEST_F(Drawing, ItsErrorIsWhatTheTwoPicturesDifferBy) {
+TEST_F(Drawing, ItsErrorIsTheDifferenceOfTheTwoPictures) {
   view.method.name = protocol::MethodName::kernel;
   const auto drawing = begin();
   ASSERT_TRUE(drawing) << drawing.error().message;
@@ -117,7 +117,7 @@ TEST_F(Drawing, ItsErrorIsWhatTheTwoPicturesDifferBy) {
 }
 
 // Lines 128 pixels wide cover 256 tiles at least, where they are not at the picture's edge.
-TEST_F(Drawing, WhatItsListsNeedIsCountedAndRefusedByTheSizeOfThePicture) {
+TEST_F(Drawing, MemoryOfListsIsCountedAndRefusedByPictureSize) {
   view.image.width = 640;
   view.image.height = 480;
   view.vector.r1 = 0.5;
@@ -127,9 +127,9 @@ TEST_F(Drawing, WhatItsListsNeedIsCountedAndRefusedByTheSizeOfThePicture) {
   view.vector.r2 = 64;
   ASSERT_TRUE(begin());
   const std::uint64_t wide = reserved;
-  EXPECT_GT(wide, narrow + 4 * 100 * 200) << "100 lines in the middle at least";
+  EXPECT_GT(wide, narrow + 4 * 100 * 200) << "at least 100 lines in the middle";
   limit = wide;
-  EXPECT_TRUE(begin()) << "so much is enough";
+  EXPECT_TRUE(begin()) << "that much suffices";
   limit = wide - 1;
   const auto refused = begin();
   ASSERT_FALSE(refused);
@@ -144,7 +144,7 @@ TEST_F(Drawing, WhatItsListsNeedIsCountedAndRefusedByTheSizeOfThePicture) {
   EXPECT_FALSE(begin());
 }
 
-TEST_F(Drawing, WhatIsUnwantedIsNotBegun) {
+TEST_F(Drawing, CancelledDrawingIsNotStarted) {
   ASSERT_TRUE(scene::complete(view, *dataset));
   const std::uint64_t loads = dataset->loads();
   const CancelToken raised;

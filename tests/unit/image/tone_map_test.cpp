@@ -35,13 +35,13 @@ TEST(ToneMap, KnownValuesOfTheStandard) {
   EXPECT_EQ(code_of(1.0F / 3294.6F), 1);  // 12.92 * 255 codes a unit on the straight part
 }
 
-TEST(ToneMap, EveryCodeComesBackFromItsLinearValue) {
+TEST(ToneMap, EveryCodeSurvivesARoundTrip) {
   for (int code = 0; code < 256; ++code) {
     EXPECT_EQ(code_of(static_cast<float>(inverse(code / 255.0))), code);
   }
 }
 
-// Half a code is the error of perfect rounding.
+// Half a code is the error of exact rounding.
 TEST(ToneMap, RoundsToTheNearestCodeEverywhere) {
   constexpr int count = 1 << 20;
   std::vector<float> linear(count + 1);
@@ -55,14 +55,14 @@ TEST(ToneMap, RoundsToTheNearestCodeEverywhere) {
   EXPECT_LE(worst, 0.5 + 1e-9);
 }
 
-TEST(ToneMap, BordersBetweenCodesAreWhereTheFormulaPutsThem) {
+TEST(ToneMap, CodeThresholdsMatchTheFormula) {
   for (int code = 0; code < 255; ++code) {
     EXPECT_EQ(code_of(static_cast<float>(inverse((code + 0.4999) / 255))), code);
     EXPECT_EQ(code_of(static_cast<float>(inverse((code + 0.5001) / 255))), code + 1);
   }
 }
 
-TEST(ToneMap, ExactFormIsTheFormula) {
+TEST(ToneMap, ExactFormMatchesTheFormula) {
   for (int i = 0; i <= 1000; ++i) {
     EXPECT_NEAR(srgb_from_linear(i / 1000.0), formula(i / 1000.0), 1e-12);
   }
@@ -80,7 +80,7 @@ TEST(ToneMap, ValuesOutsideTheRangeAreClamped) {
   EXPECT_EQ(code_of(std::numeric_limits<float>::denorm_min()), 0);
 }
 
-TEST(ToneMap, PremultipliedPixelsStandOverTheBackground) {
+TEST(ToneMap, PremultipliedPixelsAreCompositedOverTheBackground) {
   const std::array<float, 3> background{0.2F, 0.0F, 1.0F};
   const std::vector<float> rgba{0.0F, 0.0F, 0.0F, 0.0F,   // nothing: the background
                                 0.3F, 0.4F, 0.5F, 1.0F,   // opaque: itself
@@ -93,8 +93,8 @@ TEST(ToneMap, PremultipliedPixelsStandOverTheBackground) {
   }
 }
 
-// Pixels are worked on in blocks: every size must see each pixel once and in its place.
-TEST(ToneMap, EverySizeKeepsEveryPixelInItsPlace) {
+// Pixels are processed in blocks: every size must process each pixel once, in its position.
+TEST(ToneMap, EverySizeKeepsEveryPixelPosition) {
   for (const auto& [width, height] :
        {std::pair{1, 1}, {1, 67}, {67, 1}, {255, 1}, {256, 1}, {257, 1}, {33, 31}, {0, 5}}) {
     const int pixels = width * height;

@@ -25,21 +25,21 @@ struct Pixels {
   std::vector<float> rgba;
 };
 
-// Every pixel on its own, opaque and clear ones among them.
+// Every pixel different, including opaque and transparent ones.
 Pixels busy(int width, int height, unsigned seed) {
   Pixels pixels{width, height, std::vector<float>(std::size_t{4} * width * height)};
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> unit(0.0F, 1.0F);
   for (std::size_t i = 0; i < pixels.rgba.size(); i += 4) {
     const float alpha = std::clamp(1.5F * unit(random) - 0.25F, 0.0F, 1.0F);
-    // Dark values as often as light ones: there a code is narrowest.
+    // Dark values as often as light ones: codes are narrowest there.
     for (int c = 0; c < 3; ++c) pixels.rgba[i + c] = alpha * std::pow(unit(random), 4.0F);
     pixels.rgba[i + 3] = alpha;
   }
   return pixels;
 }
 
-// As the engine does: tiles of 64 x 64, from a buffer of their own.
+// As the engine does: tiles of 64 x 64 from separate buffers.
 void put_tiles(const Pixels& pixels, YccPicture& picture) {
   constexpr int side = 64;
   std::vector<float> tile(std::size_t{4} * side * side);
@@ -72,7 +72,7 @@ std::array<double, 3> formula(const float* rgba, const Colour& background) {
   return {luma, 128 + (rgb[2] - luma) / 1.772, 128 + (rgb[0] - luma) / 1.402};
 }
 
-// What the planes' sample stands for, past the edges too.
+// The value of a plane sample, beyond the edges, too.
 double expected(const Pixels& pixels, const Colour& background, Subsampling subsampling, int plane,
                 int x, int y) {
   const int side = plane > 0 && subsampling == Subsampling::s420 ? 2 : 1;
@@ -103,10 +103,10 @@ double worst_sample(const Pixels& pixels, const Colour& background, const YccPic
   return worst;
 }
 
-// Half a code is the error of perfect rounding; the polynomial adds 1/12 of one to each channel.
+// Half a code is the error of exact rounding; the polynomial adds 1/12 per channel.
 constexpr double tolerance = 0.5 + 0.15;
 
-TEST(Ycc, IsTheFormulaAtEverySizeAndPastTheEdges) {
+TEST(Ycc, MatchesTheFormulaAtEverySizeAndBeyondTheEdges) {
   const Colour background{0.02F, 0.3F, 0.9F};
   YccPicture picture;
   for (const Subsampling subsampling : {Subsampling::s420, Subsampling::s444}) {
@@ -121,15 +121,15 @@ TEST(Ycc, IsTheFormulaAtEverySizeAndPastTheEdges) {
     picture.reset(131, 133, subsampling, background);
     put_tiles(pixels, picture);
     EXPECT_LE(worst_sample(pixels, background, picture), tolerance);
-    // In one part that is wider than what is worked on together.
+    // In one part, wider than a block.
     picture.reset(131, 133, subsampling, background);
     picture.put({0, 0, 131, 133, pixels.rgba.data(), std::size_t{4} * 131});
     EXPECT_LE(worst_sample(pixels, background, picture), tolerance);
   }
 }
 
-// Wherever a chroma sample ends: the last part may begin within the last MCU, or long before it.
-TEST(Ycc, PartsMayBeCutWithinAnMcu) {
+// At any multiple of chroma samples: the last part may start within the last MCU or long before.
+TEST(Ycc, PartsMayBeSplitWithinAnMcu) {
   const Colour background{0.02F, 0.3F, 0.9F};
   YccPicture picture;
   for (const int width : {66, 67, 81, 130}) {
@@ -146,7 +146,7 @@ TEST(Ycc, PartsMayBeCutWithinAnMcu) {
   }
 }
 
-TEST(Ycc, PlanesReachToWholeMcus) {
+TEST(Ycc, PlanesExtendToWholeMcus) {
   YccPicture picture;
   picture.reset(17, 33, Subsampling::s420, {});
   EXPECT_EQ(picture.planes()[0].width, 32);
@@ -158,8 +158,8 @@ TEST(Ycc, PlanesReachToWholeMcus) {
   EXPECT_EQ(picture.planes()[1].height, 40);
 }
 
-// No seam where a tile with nothing in it was delivered beside one that was not.
-TEST(Ycc, WhatIsNeverDeliveredIsWhatClearPixelsAre) {
+// No seam between delivered and omitted blank tiles.
+TEST(Ycc, MissingTilesAreTransparentPixels) {
   for (const Subsampling subsampling : {Subsampling::s420, Subsampling::s444}) {
     for (int shade = 0; shade <= 100; ++shade) {
       const Colour background{0.01F * shade, 1.0F - 0.01F * shade, 1e-4F * shade * shade};
@@ -181,7 +181,7 @@ TEST(Ycc, WhatIsNeverDeliveredIsWhatClearPixelsAre) {
   }
 }
 
-TEST(Ycc, GreysHaveNoChromaAndPrimariesTheExtremes) {
+TEST(Ycc, GraysHaveNoChromaAndPrimariesTheExtremes) {
   YccPicture picture;
   const auto codes = [&](Colour colour) {
     picture.reset(1, 1, Subsampling::s444, colour);
@@ -200,8 +200,8 @@ TEST(Ycc, GreysHaveNoChromaAndPrimariesTheExtremes) {
   EXPECT_EQ(codes({-infinity, -7, nan}), codes({0, 0, 0}));
 }
 
-// A row of vectors that have nothing in all of one channel, or in all but one.
-TEST(Ycc, OnlyPixelsWithNothingAtAllAreSkipped) {
+// A row of vectors with zeros in one channel, or in all but one.
+TEST(Ycc, OnlyFullyTransparentPixelsAreSkipped) {
   const Colour background{0.9F, 0.5F, 0.2F};
   YccPicture picture;
   for (int channel = 0; channel < 4; ++channel) {
@@ -246,8 +246,8 @@ TEST(Ycc, InstructionSetsAgree) {
   for (const Bytes& samples : fused) EXPECT_EQ(samples, fused.front());
 }
 
-// A second picture of another size and background finds nothing of the first.
-TEST(Ycc, StorageThatIsUsedAgainStartsAsBackground) {
+// A second picture with another size and background contains nothing of the first.
+TEST(Ycc, ReusedStorageStartsAsBackground) {
   YccPicture picture;
   picture.reset(64, 64, Subsampling::s420, {1, 1, 1});
   put_tiles(busy(64, 64, 3), picture);
@@ -255,7 +255,7 @@ TEST(Ycc, StorageThatIsUsedAgainStartsAsBackground) {
   EXPECT_LE(worst_sample({40, 24, std::vector<float>(std::size_t{4} * 40 * 24)}, {}, picture), 0.5);
 }
 
-TEST(Ycc, PartsThatCutAChromaSampleAreABug) {
+TEST(Ycc, PartsThatSplitAChromaSampleAreABug) {
   YccPicture picture;
   picture.reset(8, 8, Subsampling::s420, {});
   const std::vector<float> rgba(std::size_t{4} * 64);
@@ -266,14 +266,14 @@ TEST(Ycc, PartsThatCutAChromaSampleAreABug) {
   EXPECT_NO_THROW(picture.put({1, 0, 3, 3, rgba.data(), 32}));
 }
 
-// The same picture by way of rounded RGB codes and the library's own colour conversion.
-TEST(Ycc, DecodedPictureIsThatOfTheRgbPath) {
+// The same picture through rounded RGB codes and the library's colour conversion.
+TEST(Ycc, DecodedPictureEqualsTheRgbPath) {
   ThreadPool pool(1);
   JpegEncoder encoder;
   YccPicture picture;
   for (int width = 1; width <= 67; width += 3) {
     const int height = 68 - width;
-    // Smooth: an encoder keeps at quality 100 what neighbours share, whichever way it came.
+    // Smooth: at quality 100 an encoder keeps what neighbours share, on either path.
     Pixels pixels{width, height, {}};
     for (int i = 0; i < width * height; ++i) {
       const float x = 0.05F * static_cast<float>(i % width);
@@ -294,8 +294,8 @@ TEST(Ycc, DecodedPictureIsThatOfTheRgbPath) {
       ASSERT_TRUE(a && b);
       double sum = 0;
       for (std::size_t i = 0; i < a->size(); ++i) {
-        // Rounded in other places, and once more by the transforms: two codes of luma and chroma
-        // at most, and blue shows chroma 1.77 times.
+        // Rounding in different places and in the transforms: at most two codes of luma and chroma,
+        // and blue has chroma weighted by 1.77.
         ASSERT_NEAR((*a)[i], (*b)[i], 5) << width;
         sum += std::abs((*a)[i] - (*b)[i]);
       }

@@ -1,6 +1,5 @@
-// A frame loop in its steady state allocates nothing; from a view to a JPEG only what is small: the
-// view's copies, its scene and the bytes that are sent. Every allocation of this program is
-// counted.
+// A frame loop allocates nothing in its steady state; from a view to a JPEG only small blocks:
+// copies of the view, its scene and the output. Every allocation of this program is counted.
 #include <gtest/gtest.h>
 #include <malloc.h>
 
@@ -61,7 +60,7 @@ void* counted(std::size_t size, std::align_val_t alignment) {
 
 }  // namespace
 
-// Arrays and the form that does not throw would go through these, but not under every sanitizer.
+// Array and nothrow forms would use these, but not under every sanitizer.
 void* operator new[](std::size_t size) { return counted(size); }
 void operator delete[](void* at) noexcept { give_up(at); }
 void operator delete[](void* at, std::size_t /*size*/) noexcept { give_up(at); }
@@ -139,7 +138,7 @@ class SteadyState : public testing::TestWithParam<Look> {
   engine::RenderSpace space_;
 };
 
-// The second time round, and the third, whatever the picture's size and the data's.
+// The second and third round, for any picture size and dataset.
 TEST_P(SteadyState, FramesAllocateNothing) {
   struct Size {
     std::array<int, 3> dims;
@@ -148,7 +147,7 @@ TEST_P(SteadyState, FramesAllocateNothing) {
   for (const Size& size : {Size{{40, 24, 8}, 160, 120}, Size{{64, 40, 12}, 240, 180}}) {
     const auto scenes = orbit(GetParam(), size.dims, size.width, size.height);
     const Spent first = spent_by([&] { draw(scenes); });
-    EXPECT_GT(first.blocks, 0) << "what is kept was made once";
+    EXPECT_GT(first.blocks, 0) << "kept memory was allocated once";
     for (int round = 2; round < 4; ++round) {
       const Spent spent = spent_by([&] { draw(scenes); });
       EXPECT_EQ(spent.blocks, 0) << "round " << round << ", " << spent.bytes << " bytes";
@@ -156,9 +155,9 @@ TEST_P(SteadyState, FramesAllocateNothing) {
   }
 }
 
-// A camera that goes where it never was finds almost everything there: what still grows is far less
-// than a picture a frame.
-TEST_P(SteadyState, AWayNeverTakenBeforeCostsHardlyMore) {
+// A camera at new positions reuses almost all memory: the remaining growth is far less than a
+// picture per frame.
+TEST_P(SteadyState, NewPathCostsFewAllocations) {
   const std::array<int, 3> dims{64, 40, 12};
   const auto warm = orbit(GetParam(), dims, 240, 180);
   const auto scenes = orbit(GetParam(), dims, 240, 180, 7);
@@ -174,8 +173,8 @@ INSTANTIATE_TEST_SUITE_P(Looks, SteadyState,
                          testing::Values(Look::kernel, Look::slab, Look::globe, Look::winds,
                                          Look::clouds));
 
-// From a view to a JPEG: no picture, no planes, no strips, but the bytes that are sent.
-TEST(SteadyStateItself, AJpegCostsItsOwnBytes) {
+// From a view to a JPEG: no picture, planes or strips, only the output.
+TEST(SteadyStateItself, JpegAllocatesItsOwnBytesOnly) {
   data::Dataset dataset(data::open_sample("climate", {64, 40, 12}, 1).value(), "climate",
                         std::uint64_t{1} << 30U);
   protocol::View view = scene::complete({}, dataset).value().view();
@@ -203,8 +202,8 @@ TEST(SteadyStateItself, AJpegCostsItsOwnBytes) {
     };
     draw();
     const Spent spent = spent_by(draw);
-    // The view, two colour tables of 3 kB, some numbers a stop of each axis, and what the report
-    // names; the planes alone would be 115 kB.
+    // The view, two colour tables of 3 kB, some numbers per kernel position of each axis, and names
+    // of the report; the planes alone would be 115 kB.
     EXPECT_LE(spent.bytes, turns * 16384 + sent);
     EXPECT_GE(spent.bytes, sent);
     EXPECT_LE(spent.blocks, turns * 60);
@@ -216,7 +215,7 @@ constexpr int huge_width = 2048;
 constexpr int huge_height = 1536;
 constexpr std::int64_t huge_pixels = std::int64_t{huge_width} * huge_height;
 
-TEST(HugePicture, FloatsAreGivenBackByTheNextSmallerOne) {
+TEST(HugePicture, FloatsAreReleasedByTheNextSmallerPicture) {
   const auto huge = orbit(Look::kernel, {8, 8, 4}, huge_width, huge_height);
   const auto small = orbit(Look::kernel, {8, 8, 4}, 160, 120);
   ThreadPool pool(2);
@@ -227,7 +226,7 @@ TEST(HugePicture, FloatsAreGivenBackByTheNextSmallerOne) {
   EXPECT_LT(space.image().rgba.capacity(), std::size_t{4} * 1920 * 1080);
 }
 
-TEST(HugePicture, FloatsOfAPngAreGivenBackWhenItIsEncoded) {
+TEST(HugePicture, FloatsOfAPngAreReleasedAfterEncoding) {
   data::Dataset dataset(data::open_sample("climate", {8, 8, 4}, 1).value(), "climate",
                         std::uint64_t{1} << 30U);
   protocol::View view = scene::complete({}, dataset).value().view();
@@ -243,8 +242,8 @@ TEST(HugePicture, FloatsOfAPngAreGivenBackWhenItIsEncoded) {
   }
 }
 
-// What a workspace of planes and strips holds after one huge picture and a small one.
-TEST(HugePicture, PlanesAndStripsAreGivenBackByTheNextSmallerOne) {
+// The planes and strips that a workspace keeps after one huge and one small picture.
+TEST(HugePicture, PlanesAndStripsAreReleasedByTheNextSmallerPicture) {
   ThreadPool pool(2);
   for (const auto subsampling : {image::Subsampling::s420, image::Subsampling::s444}) {
     image::YccPicture planes;
@@ -258,15 +257,15 @@ TEST(HugePicture, PlanesAndStripsAreGivenBackByTheNextSmallerOne) {
     const std::int64_t small = held;
     encode(4 * huge_width, huge_height);
     const std::int64_t huge = held;
-    EXPECT_GT(huge - small, 4 * huge_pixels) << "what is given back is worth the trouble";
+    EXPECT_GT(huge - small, 4 * huge_pixels) << "a substantial amount is released";
     planes.reset(160, 120, subsampling, {});
     const std::int64_t without_planes = held;
-    EXPECT_LE(without_planes, huge - 4 * huge_pixels) << "one sample a pixel at least";
+    EXPECT_LE(without_planes, huge - 4 * huge_pixels) << "at least one sample per pixel";
     encode(160, 120);
     EXPECT_LE(held, without_planes - 4 * huge_pixels) << "strips";
     jpeg = image::Bytes();
     EXPECT_LE(held, small + 65536);
-    // A picture of a common size stays, whatever is drawn between.
+    // Memory for common picture sizes is kept whatever is rendered in between.
     encode(1920, 1080);
     const std::int64_t common = held;
     encode(960, 540);
@@ -274,12 +273,12 @@ TEST(HugePicture, PlanesAndStripsAreGivenBackByTheNextSmallerOne) {
   }
 }
 
-// What a daemon that has no memory left does as it ends, and destructors of its sessions do.
-TEST(WithoutMemory, WishesAreTakenBackAndAStoreEnds) {
+// Shutdown of a daemon without memory, and the destructors of its sessions.
+TEST(WithoutMemory, PrefetchRequestsAreWithdrawnAndAStoreIsDestroyed) {
   data::Store store(std::uint64_t{1} << 30U);
   const auto dataset = store.add("climate:16x16x8").value();
   const std::string field = dataset->info().fields.front().name;
-  ASSERT_TRUE(dataset->volume(field, 0)) << "so that no thread has anything to do for a wish";
+  ASSERT_TRUE(dataset->volume(field, 0)) << "so that no thread works on a prefetch request";
   store.request_prefetch(1, {{*dataset, field, 0, {}}});
   const Spent spent = spent_by([&] {
     store.request_prefetch(2, {});
@@ -289,8 +288,8 @@ TEST(WithoutMemory, WishesAreTakenBackAndAStoreEnds) {
   EXPECT_EQ(spent.blocks, 0);
 }
 
-// Whichever allocation fails, of libpng, of zlib or of the bytes: an error, and nothing is leaked.
-TEST(WithoutMemory, APngIsAnError) {
+// A failure of any allocation, by libpng, zlib or for the output, is an error without leaks.
+TEST(WithoutMemory, PngIsAnError) {
   constexpr int edge = 200;
   std::vector<std::uint8_t> noise(std::size_t{3} * edge * edge);
   std::uint32_t state = 1;
@@ -317,8 +316,8 @@ TEST(WithoutMemory, APngIsAnError) {
   EXPECT_GE(failures, 8) << "two structures, five blocks of zlib's, some of the bytes";
 }
 
-// The counter counts: a vector as large as a picture would be seen.
-TEST(SteadyStateItself, SeesAVector) {
+// Checks the counter: an allocation of picture size is counted.
+TEST(SteadyStateItself, CountsTheAllocationOfAVector) {
   const Spent spent = spent_by([] {
     std::vector<float> picture(4UL * 320 * 240);
     ASSERT_EQ(picture.back(), 0.0F);

@@ -1,4 +1,4 @@
-// Forecasts made up -> the curve that is told of them.
+// Synthetic forecasts -> the reported curve.
 #include "server/quality/curve.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ class Curve : public testing::Test {
     view.image.height = 1080;
     view.quality.max_error = 0.5;  // so that slabs are allowed
     for (std::size_t i = 0; i < forecasts.size(); ++i) {
-      // In no order of either, and no two alike.
+      // In no order, all different.
       forecasts[i].ms = 1 + std::fmod(20 + 37.0 * static_cast<double>(i), 53.0);
       forecasts[i].error = 1e-3 * (1 + std::fmod(29.0 * static_cast<double>(i), 61.0));
       forecasts[i].spread = 0.1 + 0.01 * static_cast<double>(i);
@@ -33,7 +33,7 @@ class Curve : public testing::Test {
   Forecasts forecasts;
 };
 
-TEST_F(Curve, IsSortedByTimeAndHoldsEverySettingThatIsAllowed) {
+TEST_F(Curve, IsSortedByTimeAndContainsEveryAllowedSetting) {
   const ForecastDescription out = curve(view, forecasts);
   EXPECT_EQ(out.width, 1920);
   EXPECT_EQ(out.height, 1080);
@@ -55,8 +55,8 @@ TEST_F(Curve, IsSortedByTimeAndHoldsEverySettingThatIsAllowed) {
   EXPECT_LT(curve(view, forecasts).points.size(), settings_count);
 }
 
-// The definition, point by point against every other.
-TEST_F(Curve, TheFrontIsWhatNoOtherPointBeatsInBoth) {
+// The definition, applied to every pair of points.
+TEST_F(Curve, FrontContainsTheUndominatedPoints) {
   forecasts[3] = forecasts[7] = {0.05, 0.1, 0.5, true};  // of two alike one is enough
   const ForecastDescription out = curve(view, forecasts);
   int on_front = 0;
@@ -76,7 +76,7 @@ TEST_F(Curve, TheFrontIsWhatNoOtherPointBeatsInBoth) {
   EXPECT_LT(on_front, static_cast<int>(settings_count) - 1);
 }
 
-TEST_F(Curve, APointTellsHowItWouldBeDrawn) {
+TEST_F(Curve, PointContainsItsSetting) {
   view.method.slab_thickness = 3;
   const Setting setting{MethodName::slab, 2, 1};
   const Setting thin{MethodName::slab, 0, 0, 4};
@@ -98,8 +98,8 @@ TEST_F(Curve, APointTellsHowItWouldBeDrawn) {
   EXPECT_TRUE(points[1].timed);
 }
 
-// ln(error) is normal: 1.645 standard deviations leave 5 of 100 out at either end.
-TEST_F(Curve, BoundsAreThoseOfALogNormalErrorAndStayWithinWhatErrorsCanBe) {
+// ln(error) is normally distributed: 1.645 standard deviations leave 5 % at either end.
+TEST_F(Curve, BoundsAreThoseOfALogNormalErrorWithinPossibleErrors) {
   for (Forecast& forecast : forecasts) forecast = {0.01, 0.4, 1, true};
   for (const ForecastPoint& point : curve(view, forecasts).points) {
     EXPECT_NEAR(std::log(point.error_high / point.error), 1.645 * 0.4, 0.01);
@@ -113,7 +113,7 @@ TEST_F(Curve, BoundsAreThoseOfALogNormalErrorAndStayWithinWhatErrorsCanBe) {
   }
 }
 
-TEST_F(Curve, TheChosenPointIsThePickedSetting) {
+TEST_F(Curve, ChosenPointIsThePickedSetting) {
   view.quality = {};
   EXPECT_FALSE(curve(view, forecasts).chosen);
   for (const double budget : {3.0, 9.0, 20.0, 60.0}) {
@@ -129,8 +129,8 @@ TEST_F(Curve, TheChosenPointIsThePickedSetting) {
   }
 }
 
-// Of one style: near the sight that was measured, and as far from it as sights get.
-TEST(Measured, IsSaidOfErrorsFromNearByAlone) {
+// One scene: near the measured viewpoint and as far from it as possible.
+TEST(Measured, IsReportedForErrorsOfNearbyViewpointsOnly) {
   Table table{Kind{}};
   const Viewpoint viewpoint{1, {0, 1, 0}, 640, 480};
   Viewpoint beside = viewpoint;

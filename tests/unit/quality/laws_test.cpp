@@ -1,4 +1,4 @@
-// What is told of a style before anything was measured of it.
+// Forecasts of a scene before any measurement.
 #include "server/quality/laws.hpp"
 
 #include <gtest/gtest.h>
@@ -20,11 +20,11 @@ double error_of(const Kind& kind, const Setting& setting,
   return expected_error(kind, setting, viewpoint).value;
 }
 
-// Method slab is of order 2 in the thickness of its slabs.
-TEST(Laws, SlabsErrByTheSquareOfTheirThickness) {
+// The slab method is of order 2 in the slab thickness.
+TEST(Laws, SlabErrorGrowsWithTheSquareOfThickness) {
   for (const Kind& kind : {both, media}) {
     Kind dense = kind;
-    dense.thickness = 4;  // far above the least error that is told
+    dense.thickness = 4;  // far above the smallest reported error
     const double own = error_of(dense, {MethodName::slab, 0, 0});
     EXPECT_NEAR(error_of(dense, {MethodName::slab, 0, 0, 2}) / own, 1.0 / 4, 1e-12);
     EXPECT_NEAR(error_of(dense, {MethodName::slab, 0, 0, 4}) / own, 1.0 / 16, 1e-12);
@@ -34,7 +34,7 @@ TEST(Laws, SlabsErrByTheSquareOfTheirThickness) {
   }
 }
 
-TEST(Laws, FewerPixelsAndCoarserDataErrMoreThanTheViewsOwn) {
+TEST(Laws, FewerPixelsAndCoarserDataIncreaseTheError) {
   for (const Kind& kind : {both, media}) {
     double last = error_of(kind, {MethodName::slab, 0, 0});
     for (const Setting& worse : {Setting{MethodName::kernel, 0, 0},
@@ -52,12 +52,12 @@ TEST(Laws, FewerPixelsAndCoarserDataErrMoreThanTheViewsOwn) {
   }
 }
 
-TEST(Laws, LinesAloneAreExactUnderSlabs) {
+TEST(Laws, LinesAloneAreExactWithSlabs) {
   const Kind lines{true, false, 0.16, 1.4, 1, 1};
   EXPECT_EQ(error_of(lines, {MethodName::slab, 0, 0}), error_least);
 }
 
-TEST(Laws, OfAViewThatIsNotCompletedTooEveryErrorIsPositiveAndFinite) {
+TEST(Laws, IncompleteViewsHavePositiveFiniteErrors) {
   for (const Kind& kind : {Kind{}, both, media, Kind{true, true, 1e-9, 50, 1e35, 32}}) {
     for (const Viewpoint& viewpoint :
          {Viewpoint{}, Viewpoint{1e12, {0, 0, 1}, 8192, 8192}, Viewpoint{1e-12}}) {
@@ -82,7 +82,7 @@ TEST(Laws, FewerPixelsTakeLessTime) {
   EXPECT_GT(ms({MethodName::slab, 0, 0, 2}), ms({MethodName::slab, 0, 0}));
 }
 
-TEST(Prior, IsTheLawsAndAsUncertainAsStylesAndSightsTogether) {
+TEST(Prior, EqualsTheLawsWithTheCombinedUncertainty) {
   const Viewpoint viewpoint{2, {}, 640, 480};
   for (const Setting& setting : settings) {
     const Forecast told = prior(both, setting, viewpoint);

@@ -1,4 +1,4 @@
-// frame::survey and frame::measured_error on a small sample, against the integral itself.
+// frame::survey and frame::measured_error on a small sample, against the integral.
 #include "server/frame/measure.hpp"
 
 #include <gtest/gtest.h>
@@ -59,7 +59,7 @@ class Measure : public testing::Test {
     return frame ? std::move(*frame) : Frame();
   }
 
-  // Of a frame's pixels, which end its bytes, against the integral.
+  // Error of the decoded pixels of a frame against the integral.
   double true_error(const Frame& npy) {
     if (integral.empty()) {
       const auto scene = scene::build_scene(view, *dataset);
@@ -84,7 +84,7 @@ class Measure : public testing::Test {
   CancelToken cancel;
 };
 
-TEST_F(Measure, AFramesMeasuredErrorIsItsErrorAgainstTheIntegral) {
+TEST_F(Measure, MeasuredFrameErrorIsItsErrorAgainstTheIntegral) {
   for (const auto method : {protocol::MethodName::slab, protocol::MethodName::kernel}) {
     const Frame frame = drawn(method, Format::npy);
     ASSERT_TRUE(frame.error);
@@ -94,8 +94,8 @@ TEST_F(Measure, AFramesMeasuredErrorIsItsErrorAgainstTheIntegral) {
   }
 }
 
-// What thinner slabs mend less, or not at all: the rule of compositing and an early stop.
-TEST_F(Measure, OtherRulesAndEarlyStopsAreMeasuredAgainstTheIntegralToo) {
+// Errors that thinner slabs reduce less or not at all: compositing rule and early termination.
+TEST_F(Measure, OtherRulesAndEarlyTerminationAreMeasuredAgainstTheIntegral) {
   const protocol::MethodView usual = view.method;
   true_error(drawn(protocol::MethodName::slab, Format::npy));  // keeps the integral
   for (const auto& [compositing, stop] : {std::pair{protocol::Compositing::simple, 1.5e-4},
@@ -118,13 +118,13 @@ TEST_F(Measure, OtherRulesAndEarlyStopsAreMeasuredAgainstTheIntegralToo) {
         quality::prior(quality::signature_of(view).kind,
                        quality::settings[quality::own_setting(view)], quality::viewpoint_of(view))
             .error;
-    EXPECT_GT(promised, 0.2 * truth) << "before anything was measured";
+    EXPECT_GT(promised, 0.2 * truth) << "before any measurement";
     view.method.slab_thickness /= 4;
     EXPECT_NEAR(error_of(4) / drawn(protocol::MethodName::slab, Format::npy).error.value(), 1, 0.3);
   }
 }
 
-TEST_F(Measure, WhatIsMeasuredIsThePictureThatIsSent) {
+TEST_F(Measure, MeasuredPictureIsTheSentOne) {
   Encoding encoding;
   for (const Format format : {Format::png, Format::npy, Format::jpeg}) {
     const Frame measured = drawn(protocol::MethodName::slab, format);
@@ -137,14 +137,14 @@ TEST_F(Measure, WhatIsMeasuredIsThePictureThatIsSent) {
   }
 }
 
-TEST_F(Measure, EveryFormatOfAPictureIsToldTheSameError) {
+TEST_F(Measure, EveryFormatOfAPictureReportsTheSameError) {
   const double png = drawn(protocol::MethodName::slab, Format::png).error.value();
   const Frame jpeg = drawn(protocol::MethodName::slab, Format::jpeg);
   EXPECT_NEAR(jpeg.error.value() / png, 1, 1e-4);
   EXPECT_GT(jpeg.jpeg_error.value(), 0);
 }
 
-TEST_F(Measure, OnlyPicturesOfFullSizeAreMeasured) {
+TEST_F(Measure, OnlyFullSizePicturesAreMeasured) {
   Encoding encoding;
   encoding.measure = true;
   const auto prepared = prepare(completed(), {view.method.name, 1}, *dataset, encoding);
@@ -154,7 +154,7 @@ TEST_F(Measure, OnlyPicturesOfFullSizeAreMeasured) {
   EXPECT_FALSE(small->error);
 }
 
-TEST_F(Measure, ASurveyTellsOfEveryAllowedSettingOnce) {
+TEST_F(Measure, CalibrationRunReportsEveryAllowedSettingOnce) {
   const auto found = surveyed();
   for (std::size_t i = 0; i < quality::settings_count; ++i) {
     EXPECT_EQ(found.count(i), quality::is_allowed(quality::settings[i], view) ? 1U : 0U) << i;
@@ -165,8 +165,8 @@ TEST_F(Measure, ASurveyTellsOfEveryAllowedSettingOnce) {
   }
 }
 
-// Two ways to the same number: a survey's truth is another than a frame's finer run.
-TEST_F(Measure, ASurveyAgreesWithWhatFramesMeasure) {
+// Two estimates of the same error: a calibration run uses another reference than a frame.
+TEST_F(Measure, CalibrationRunAgreesWithMeasuredFrames) {
   auto found = surveyed();
   const auto error_of = [&](const quality::Setting& setting) {
     return found.at(quality::index_of(setting).value()).error.value();
@@ -181,7 +181,7 @@ TEST_F(Measure, ASurveyAgreesWithWhatFramesMeasure) {
 }
 
 // Seen from far away the view averages its data: slabs of any thickness err alike then.
-TEST_F(Measure, ASurveyOfAveragesDrawsThemAsFramesDo) {
+TEST_F(Measure, CalibrationRunRendersAveragesAsFramesDo) {
   scene::orbit(view, completed().lattice(), 20, 30, 0.05);
   EXPECT_LT(viewpoint_of(completed()).detail, 1);
   auto found = surveyed();
@@ -193,7 +193,7 @@ TEST_F(Measure, ASurveyOfAveragesDrawsThemAsFramesDo) {
 }
 
 // What is told of the detail is what scenes are built by.
-TEST_F(Measure, AViewAveragesWhereItsDetailIsBelowOne) {
+TEST_F(Measure, ViewUsesAveragesWhereItsDetailIsBelowOne) {
   const scene::CompletedView first = completed();
   int averaged = 0;
   for (const bool lines : {true, false}) {
@@ -213,7 +213,7 @@ TEST_F(Measure, AViewAveragesWhereItsDetailIsBelowOne) {
   EXPECT_EQ(scene::detail_shown(completed()), 0);
 }
 
-TEST_F(Measure, ACancelledSurveyEnds) {
+TEST_F(Measure, CancelledCalibrationRunStops) {
   int told = 0;
   const CancelToken stop;
   const auto done =

@@ -1,4 +1,4 @@
-// Forecasts made up, a budget, an error -> the setting that is picked.
+// Synthetic forecasts, a budget, an error -> the chosen setting.
 #include "server/quality/pick.hpp"
 
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ TEST_F(Pick, LeastErrorWithinTheBudget) {
   EXPECT_EQ(picked({{}, {}}), finest);
 }
 
-TEST_F(Pick, NeverWorseForALargerBudget) {
+TEST_F(Pick, NeverWorseWithALargerBudget) {
   double last = std::numeric_limits<double>::infinity();
   for (double budget = 2.2; budget < 2000; budget *= 1.3) {
     const Choice choice = pick(view, forecasts, {budget, {}});
@@ -63,28 +63,28 @@ TEST_F(Pick, FastestWithinTheError) {
   EXPECT_EQ(picked({{}, 0.001}), finest);
 }
 
-TEST_F(Pick, LeastErrorWhereNoneKeepsIt) { EXPECT_EQ(picked({{}, 1e-5}), finest); }
+TEST_F(Pick, LeastErrorWhenNoneMeetsTheLimit) { EXPECT_EQ(picked({{}, 1e-5}), finest); }
 
-TEST_F(Pick, WithBothTheFastestThatKeepsTheErrorElseWhatTheBudgetAllows) {
+TEST_F(Pick, WithBothTheFastestWithinTheErrorElseTheBest) {
   EXPECT_EQ(picked({500, 0.01}), fine);
   EXPECT_EQ(picked({20, 0.01}), middle);
 }
 
-TEST_F(Pick, WhatScattersMustKeepTheErrorWithItsScatter) {
+TEST_F(Pick, UncertainErrorsMustMeetTheLimitWithTheirSpread) {
   set(middle, 0.02, 8, 0.5);
   EXPECT_EQ(picked({{}, 0.03}), fine);
   EXPECT_EQ(picked({{}, 0.05}), fast);
-  // One in twenty of a normal distribution lies beyond 1.645 standard deviations.
+  // 5 % of a normal distribution are beyond 1.645 standard deviations.
   EXPECT_NEAR(std::log(error_bound({0.02, 0.5, 8, true}) / 0.02) / 0.5, 1.645, 0.01);
 }
 
-TEST_F(Pick, NothingFitsSoTheFastestAndItSaysSo) {
+TEST_F(Pick, FastestWithAFlagWhenNothingFits) {
   const Choice choice = pick(view, forecasts, {1, {}});
   EXPECT_FALSE(choice.fits);
   EXPECT_EQ(settings[choice.setting], fast);
 }
 
-TEST_F(Pick, PicturesOfFewPixelsWhereALimitIsSet) {
+TEST_F(Pick, ReducedPicturesWhereALimitIsSet) {
   std::array<double, settings_count> ms{};
   for (std::size_t i = 0; i < ms.size(); ++i) ms[i] = forecasts[i].ms;
   const auto picked_of = [&](double pixels_most) {
@@ -93,18 +93,18 @@ TEST_F(Pick, PicturesOfFewPixelsWhereALimitIsSet) {
   EXPECT_EQ(picked_of(1e9), finest);
   EXPECT_EQ(picked_of(1280 * 720 - 1), middle);
   EXPECT_EQ(picked_of(320 * 180), fast);
-  // None is as small: then the limit is none.
+  // No setting meets the limit, so it is ignored.
   EXPECT_EQ(picked_of(100), finest);
 }
 
-TEST_F(Pick, OnlyWhatIsAllowed) {
+TEST_F(Pick, OnlyAllowedSettings) {
   view.method.name = MethodName::kernel;
   EXPECT_EQ(picked({500, {}}), fine);
   view.quality.max_error = 0.001;
   EXPECT_EQ(picked({500, 0.001}), finest);
 }
 
-TEST_F(Pick, TimesMayBeOthersThanTheForecasts) {
+TEST_F(Pick, TimesMayDifferFromTheForecast) {
   std::array<double, settings_count> ms{};
   ms.fill(1000);
   ms[index_of(fine).value()] = 5;

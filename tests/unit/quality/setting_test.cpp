@@ -1,4 +1,4 @@
-// Settings: how large their pictures are, what they make of a view, and where they are allowed.
+// Settings: picture sizes, their effect on a view, and where they are allowed.
 #include "server/quality/setting.hpp"
 
 #include <gtest/gtest.h>
@@ -38,20 +38,20 @@ TEST(Edge, WholeLevelsHalveAndHalfLevelsHalveThePixels) {
   EXPECT_EQ(edge_at(1, 31), 1);
 }
 
-TEST(Edge, TheWiresLevelIsTheFinerWholeOne) {
+TEST(Edge, WireLevelIsTheFinerWholeOne) {
   EXPECT_EQ(wire_level(0), 0);
   EXPECT_EQ(wire_level(1), 0);
   EXPECT_EQ(wire_level(2), 1);
   EXPECT_EQ(wire_level(5), 2);
 }
 
-TEST(Setting, EachIsThereOnceAndFoundAgain) {
+TEST(Setting, EachExistsOnceAndIsFound) {
   for (std::size_t i = 0; i < settings.size(); ++i) EXPECT_EQ(index_of(settings[i]), i);
   EXPECT_FALSE(index_of({MethodName::kernel, 7, 0}));
   EXPECT_FALSE(index_of({MethodName::slab, 0, 0, 3}));
 }
 
-TEST(Setting, TheViewsOwnDrawsItAsItStands) {
+TEST(Setting, OwnSettingRendersTheViewUnchanged) {
   for (const MethodName method : {MethodName::kernel, MethodName::slab}) {
     const protocol::View view = view_of(640, 480, method);
     const Setting& own = settings[own_setting(view)];
@@ -62,7 +62,7 @@ TEST(Setting, TheViewsOwnDrawsItAsItStands) {
   }
 }
 
-TEST(Setting, TakesMethodAndThicknessAndLeavesThePicture) {
+TEST(Setting, AppliesMethodAndThicknessAndKeepsTheSize) {
   protocol::View view = view_of(640, 480);
   view.method.slab_thickness = 2;
   const protocol::View thin = at_setting(view, {MethodName::slab, 0, 0, 4});
@@ -74,7 +74,7 @@ TEST(Setting, TakesMethodAndThicknessAndLeavesThePicture) {
   EXPECT_EQ(at_setting(view, {MethodName::kernel, 4, 1}).method.name, MethodName::reference);
 }
 
-TEST(Allowed, AKernelViewIsDrawnBySlabsOnlyIfItAsksForAnError) {
+TEST(Allowed, KernelViewUsesSlabsOnlyForARequestedError) {
   protocol::View view = view_of(640, 480, MethodName::kernel);
   EXPECT_FALSE(is_allowed({MethodName::slab, 0, 0}, view));
   EXPECT_TRUE(is_allowed({MethodName::kernel, 0, 0}, view));
@@ -82,7 +82,7 @@ TEST(Allowed, AKernelViewIsDrawnBySlabsOnlyIfItAsksForAnError) {
   EXPECT_TRUE(is_allowed({MethodName::slab, 0, 0}, view));
 }
 
-TEST(Allowed, NothingElseForTheReferenceAndNoAveragesWhereEverySampleIsAskedFor) {
+TEST(Allowed, ReferenceHasNoAlternativesAndFullDetailNoAverages) {
   for (const Setting& setting : settings) {
     EXPECT_FALSE(is_allowed(setting, view_of(640, 480, MethodName::reference)));
     protocol::View full = view_of(640, 480);
@@ -92,7 +92,7 @@ TEST(Allowed, NothingElseForTheReferenceAndNoAveragesWhereEverySampleIsAskedFor)
   }
 }
 
-TEST(Allowed, NoPictureBelow64PixelsButTheViewsOwn) {
+TEST(Allowed, NoPictureBelow64PixelsExceptTheRequestedOne) {
   EXPECT_TRUE(is_allowed({MethodName::kernel, 6, 0}, view_of(1024, 512)));
   EXPECT_FALSE(is_allowed({MethodName::kernel, 8, 0}, view_of(1024, 512)));
   EXPECT_FALSE(is_allowed({MethodName::kernel, 6, 0}, view_of(1024, 511)));
@@ -101,7 +101,7 @@ TEST(Allowed, NoPictureBelow64PixelsButTheViewsOwn) {
   EXPECT_FALSE(is_allowed({MethodName::kernel, 1, 0}, tiny));
 }
 
-TEST(Allowed, NoSlabsThinnerThanTheWiresLimit) {
+TEST(Allowed, NoSlabsThinnerThanTheWireLimit) {
   protocol::View view = view_of(640, 480);
   view.method.slab_thickness = 2 * protocol::limits::slab_thickness_min;
   EXPECT_TRUE(is_allowed(settings[index({MethodName::slab, 0, 0, 2})], view));

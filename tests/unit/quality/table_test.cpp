@@ -1,4 +1,4 @@
-// Measurements of one style -> forecasts, against closed forms.
+// Measurements of one scene -> forecasts, against closed forms.
 #include "server/quality/table.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ constexpr std::size_t kernel = 0;
 constexpr std::size_t half = 2;  // half the width
 const Kind kind{true, true, 0.16, 1.4, 1, 1};
 
-// A sight at that distance of every other with another number: heights apart alone.
+// A viewpoint at that distance from all others: only heights differ.
 Viewpoint sight_at(double steps) {
   Viewpoint viewpoint{std::exp(0.5 * steps), {0, 1, 0}, 640, 480};
   return viewpoint;
@@ -27,7 +27,7 @@ double prior_of(std::size_t setting, const Viewpoint& viewpoint) {
   return prior(kind, settings[setting], viewpoint).error;
 }
 
-TEST(Table, NothingMeasuredIsThePrior) {
+TEST(Table, WithoutMeasurementsEqualsThePrior) {
   const Table table(kind);
   const Forecasts told = table.forecasts(sight_at(0));
   for (std::size_t i = 0; i < told.size(); ++i) {
@@ -39,7 +39,7 @@ TEST(Table, NothingMeasuredIsThePrior) {
   }
 }
 
-TEST(Table, AtAMeasuredSightWhatWasMeasured) {
+TEST(Table, AtAMeasuredViewpointEqualsTheMeasurement) {
   Table table(kind);
   const double error = 5 * prior_of(half, sight_at(0));
   const double ms = 7 * prior(kind, settings[half], sight_at(0)).ms;
@@ -49,11 +49,11 @@ TEST(Table, AtAMeasuredSightWhatWasMeasured) {
   EXPECT_NEAR(told.ms / ms, 1, 0.03);
   EXPECT_TRUE(told.timed);
   EXPECT_LT(told.spread, 0.1);
-  // Of another setting it says nothing.
+  // Other settings are unaffected.
   EXPECT_EQ(table.forecast(kernel, sight_at(0)).error, prior_of(kernel, sight_at(0)));
 }
 
-TEST(Table, WhatOnlyTellsAnErrorNeverPushesOutATime) {
+TEST(Table, ErrorMeasurementsNeverReplaceTimes) {
   Table table(kind);
   table.add(half, sight_at(0), {0.02, 50.0});
   for (std::size_t n = 0; n < 2 * Table::measurements_max; ++n) {
@@ -63,7 +63,7 @@ TEST(Table, WhatOnlyTellsAnErrorNeverPushesOutATime) {
   EXPECT_TRUE(table.forecast(half, sight_at(0)).timed);
 }
 
-TEST(Table, WhatIsNoNumberIsNotKept) {
+TEST(Table, NonFiniteMeasurementsAreIgnored) {
   Table table(kind);
   for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
     table.add(half, sight_at(0), {bad, {}});
@@ -75,7 +75,7 @@ TEST(Table, WhatIsNoNumberIsNotKept) {
 
 // One measurement: E = c / (c(0) + noise^2) of its logarithm over the prior's, where c is the
 // correlated variance at that distance.
-TEST(Table, OneMeasurementCountsByItsShareOfTheVariance) {
+TEST(Table, MeasurementsAreWeightedByTheirShareOfTheVariance) {
   const Scatter scatter = expected_error(kind, settings[half], sight_at(0)).scatter;
   const double signature = scatter.signature * scatter.signature;
   const double near = scatter.viewpoint * scatter.viewpoint;
@@ -92,7 +92,7 @@ TEST(Table, OneMeasurementCountsByItsShareOfTheVariance) {
   }
 }
 
-TEST(Table, SpreadGrowsWithTheDistanceAndShrinksWithMeasurements) {
+TEST(Table, UncertaintyGrowsWithDistanceAndShrinksWithMeasurements) {
   Table table(kind);
   table.add(kernel, sight_at(0), {0.01, {}});
   double last = 0;
@@ -107,8 +107,8 @@ TEST(Table, SpreadGrowsWithTheDistanceAndShrinksWithMeasurements) {
   EXPECT_LT(table.forecast(kernel, sight_at(4)).spread, last);
 }
 
-// Far from what was measured a style is still the same style.
-TEST(Table, FarAwayItStaysOnTheSideOfThePriorWhereTheStyleIs) {
+// Far from the measurements the scene still has its own bias.
+TEST(Table, FarAwayEstimatesKeepTheBiasOfTheScene) {
   Table table(kind);
   const double factor = 4;
   table.add(half, sight_at(0), {factor * prior_of(half, sight_at(0)), {}});
@@ -117,7 +117,7 @@ TEST(Table, FarAwayItStaysOnTheSideOfThePriorWhereTheStyleIs) {
   EXPECT_LT(far, factor);
 }
 
-TEST(Table, TwoAtOneSightAreTheirGeometricMean) {
+TEST(Table, TwoMeasurementsAtOneViewpointGiveTheirGeometricMean) {
   Table table(kind);
   const double base = prior_of(half, sight_at(0));
   table.add(half, sight_at(0), {base * 2, {}});
@@ -125,7 +125,7 @@ TEST(Table, TwoAtOneSightAreTheirGeometricMean) {
   EXPECT_NEAR(table.forecast(half, sight_at(0)).error / (4 * base), 1, 0.03);
 }
 
-TEST(Table, TheNearerOfTwoCountsMore) {
+TEST(Table, NearerMeasurementHasMoreWeight) {
   Table table(kind);
   const auto ratio = [&](double steps) {
     return table.forecast(half, sight_at(steps)).error / prior_of(half, sight_at(steps));
@@ -146,7 +146,7 @@ TEST(Table, KeepsTheNewestMeasurementsOfASetting) {
   EXPECT_NEAR(table.forecast(half, sight_at(0)).error / (0.1 * base), 1, 0.03);
 }
 
-TEST(Table, ManyMeasurementsOfOnePlaceAreNoTrouble) {
+TEST(Table, ManyMeasurementsAtOneViewpointStayStable) {
   Table table(kind);
   for (int i = 0; i < 100; ++i) table.add(kernel, sight_at(0), {0.01, 5.0});
   const Forecast told = table.forecast(kernel, sight_at(0.7));
@@ -155,8 +155,8 @@ TEST(Table, ManyMeasurementsOfOnePlaceAreNoTrouble) {
   EXPECT_GT(error_bound(told), told.error);
 }
 
-// An error of nothing is an error of rounding: logarithms stay finite.
-TEST(Table, AnErrorOfNothingIsTheLeastThereIs) {
+// A zero error is a rounding error: logarithms stay finite.
+TEST(Table, ZeroErrorIsTheSmallestStoredError) {
   Table table(kind);
   table.add(kernel, sight_at(0), {0.0, 0.0});
   const Forecast told = table.forecast(kernel, sight_at(0));
@@ -165,8 +165,8 @@ TEST(Table, AnErrorOfNothingIsTheLeastThereIs) {
   EXPECT_GT(told.ms, 0);
 }
 
-// Times that were not measured follow those that were.
-TEST(Table, AMachineOfAnotherSpeedIsOfThatSpeedInEverySetting) {
+// Unmeasured times follow the measured ones.
+TEST(Table, SpeedOfTheMachineAppliesToEverySetting) {
   Table table(kind);
   for (const std::size_t i : {kernel, half}) {
     table.add(i, sight_at(0), {{}, 10 * prior(kind, settings[i], sight_at(0)).ms});
@@ -177,9 +177,9 @@ TEST(Table, AMachineOfAnotherSpeedIsOfThatSpeedInEverySetting) {
   EXPECT_NEAR(told[other].ms / prior(kind, settings[other], sight_at(0)).ms, 10, 0.5);
 }
 
-// Where cells are smaller than what the picture resolves it averages: that errs by another law, and
-// what was measured on one side says nothing of the other.
-TEST(Table, AveragesAreKnownApartFromWhatIsDrawnOfEverySample) {
+// Where cells are smaller than the resolution, data are averaged, with another error law:
+// measurements on one side do not apply to the other.
+TEST(Table, AveragesAreLearnedSeparatelyFromFullDetail) {
   Table table(kind);
   Viewpoint near = sight_at(0);
   near.detail = 1.1;
@@ -190,11 +190,11 @@ TEST(Table, AveragesAreKnownApartFromWhatIsDrawnOfEverySample) {
   EXPECT_NEAR(table.forecast(slab, near).error / prior_of(slab, near), 3, 0.2);
   EXPECT_EQ(table.forecast(slab, far).error, prior_of(slab, far));
   EXPECT_GT(prior_of(slab, far), 10 * prior_of(slab, near));
-  // Fewer pixels err more than the averages do.
+  // Reducing pixels adds more error than averaging.
   EXPECT_EQ(prior_of(half, far), prior_of(half, near));
 }
 
-TEST(Study, IsBegunOnceAndWantedWhereNothingIsKnown) {
+TEST(Study, StartsOnceAndIsNeededWhereNothingIsKnown) {
   Table table(kind);
   EXPECT_TRUE(table.wants_study(sight_at(0)));
   table.begin_study(sight_at(0));
@@ -206,14 +206,14 @@ TEST(Study, IsBegunOnceAndWantedWhereNothingIsKnown) {
   EXPECT_TRUE(table.wants_study(sight_at(2)));
 }
 
-TEST(Study, OneThatWasCutOffIsWantedAgain) {
+TEST(Study, InterruptedRunIsNeededAgain) {
   Table table(kind);
   table.begin_study(sight_at(0));
   table.end_study(false);
   EXPECT_TRUE(table.wants_study(sight_at(0)));
 }
 
-TEST(Study, TheOldestAreForgotten) {
+TEST(Study, OldestRunsAreForgotten) {
   Table table(kind);
   for (std::size_t i = 0; i <= Table::studies_max; ++i) {
     table.begin_study(sight_at(2.0 * static_cast<double>(i)));
@@ -223,7 +223,7 @@ TEST(Study, TheOldestAreForgotten) {
   EXPECT_FALSE(table.wants_study(sight_at(2)));
 }
 
-TEST(Encoding, ErrsLessAtAHigherQualityAndMoreWithHalfTheChroma) {
+TEST(Encoding, ErrorFallsWithQualityAndGrowsWithHalfChroma) {
   const Table table(kind);
   for (int quality = 11; quality <= 100; ++quality) {
     EXPECT_LT(table.encoding_error(quality, true, sight_at(0)),
@@ -233,7 +233,7 @@ TEST(Encoding, ErrsLessAtAHigherQualityAndMoreWithHalfTheChroma) {
             table.encoding_error(80, true, sight_at(0)));
 }
 
-TEST(Encoding, FollowsWhatWasMeasured) {
+TEST(Encoding, FollowsMeasurements) {
   Table table(kind);
   const double before = table.encoding_error(60, true, sight_at(0));
   const double measured = 3 * table.encoding_error(90, true, sight_at(0));
@@ -242,18 +242,18 @@ TEST(Encoding, FollowsWhatWasMeasured) {
   EXPECT_NEAR(table.encoding_error(60, true, sight_at(0)) / before, 3, 1e-9);
   for (int i = 0; i < 20; ++i) table.add_encoding(90, sight_at(0), 2 * measured);
   EXPECT_NEAR(table.encoding_error(90, true, sight_at(0)) / measured, 2, 1e-4)
-      << "the newest count most";
+      << "the newest have the largest weight";
 }
 
-TEST(Encoding, NearerThereIsMoreToEncode) {
+TEST(Encoding, CloserViewpointsNeedMoreBytes) {
   Table table(kind);
   table.add_encoding(90, sight_at(0), 0.01);
   EXPECT_GT(table.encoding_error(90, true, sight_at(-1)), 0.01);
   EXPECT_LT(table.encoding_error(90, true, sight_at(1)), 0.01);
 }
 
-// Halving the chroma loses the same whatever the quality: squares add up.
-TEST(Encoding, HalfTheChromaAddsTheSameAtEveryQuality) {
+// Halving chroma adds the same squared error at any quality.
+TEST(Encoding, HalfChromaAddsTheSameAtEveryQuality) {
   Table table(kind);
   table.add_encoding(90, sight_at(0), 0.02);
   const auto added = [&](int quality) {
@@ -264,7 +264,7 @@ TEST(Encoding, HalfTheChromaAddsTheSameAtEveryQuality) {
   for (const int quality : {1, 40, 70, 95}) EXPECT_NEAR(added(quality), added(90), 1e-12);
 }
 
-TEST(Encoding, WhatIsNoErrorTeachesNothing) {
+TEST(Encoding, InvalidErrorsAreIgnored) {
   Table table(kind);
   const double before = table.encoding_error(90, true, sight_at(0));
   for (const double wrong : {0.0, -1.0, std::nan(""), double{INFINITY}}) {

@@ -1,4 +1,4 @@
-// Tables of styles shared by many: what is kept, for how many, and from several threads at once.
+// Calibration tables shared by sessions: retention, capacity and concurrent access.
 #include "server/quality/tables.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ const Viewpoint viewpoint{1, {0, 1, 0}, 640, 480};
 
 double prior_of(std::size_t setting) { return prior(Kind{}, settings[setting], viewpoint).error; }
 
-TEST(Tables, StylesAreApart) {
+TEST(Tables, ScenesAreIndependent) {
   Tables tables;
   tables.add(signature("a"), 0, viewpoint, {0.5 * prior_of(0), 3.0});
   EXPECT_LT(tables.forecast(signature("a"), 0, viewpoint).error, 0.6 * prior_of(0));
@@ -27,7 +27,7 @@ TEST(Tables, StylesAreApart) {
   EXPECT_FALSE(tables.forecasts(signature("b"), viewpoint)[0].timed);
 }
 
-TEST(Tables, AStyleWithoutAKeyHasThePriorAndKeepsNothing) {
+TEST(Tables, SceneWithoutAKeyHasThePriorAndKeepsNothing) {
   Tables tables;
   tables.add(signature(""), 0, viewpoint, {0.5 * prior_of(0), 3.0});
   EXPECT_EQ(tables.forecast(signature(""), 0, viewpoint).error, prior_of(0));
@@ -37,7 +37,7 @@ TEST(Tables, AStyleWithoutAKeyHasThePriorAndKeepsNothing) {
   EXPECT_EQ(tables.encoding_error(signature(""), 90, true, viewpoint), before);
 }
 
-TEST(Tables, TheStyleUsedLeastRecentlyIsForgotten) {
+TEST(Tables, LeastRecentlyUsedSceneIsForgotten) {
   Tables tables;
   const auto is_known = [&](int n) {
     return tables.forecast(signature(std::to_string(n)), 0, viewpoint).error < 0.9 * prior_of(0);
@@ -53,7 +53,7 @@ TEST(Tables, TheStyleUsedLeastRecentlyIsForgotten) {
   EXPECT_FALSE(is_known(1));
 }
 
-TEST(Tables, LookingAtManyStylesForgetsNone) {
+TEST(Tables, LookupOfManyScenesForgetsNone) {
   Tables tables;
   tables.add(signature("own"), 0, viewpoint, {0.2 * prior_of(0), 3.0});
   for (std::size_t n = 0; n < 2 * Tables::styles_max; ++n) {
@@ -65,7 +65,7 @@ TEST(Tables, LookingAtManyStylesForgetsNone) {
   EXPECT_TRUE(tables.forecasts(signature("own"), viewpoint)[0].timed);
 }
 
-TEST(Tables, AnotherDatasetsStylesOutlastOneThatChanged) {
+TEST(Tables, ChangedDatasetKeepsTheScenesOfOthers) {
   Tables tables;
   const SceneSignature sea{"waves", "sea", Kind{}};
   tables.add(signature("a"), 0, viewpoint, {0.2 * prior_of(0), 3.0});
@@ -75,7 +75,7 @@ TEST(Tables, AnotherDatasetsStylesOutlastOneThatChanged) {
   EXPECT_TRUE(tables.forecast(sea, 0, viewpoint).timed);
 }
 
-TEST(Tables, AStudyIsBegunByOneOfManyWhoAsk) {
+TEST(Tables, OneOfManyCallersStartsTheCalibrationRun) {
   Tables tables;
   std::atomic<int> begun{0};
   {
@@ -91,8 +91,8 @@ TEST(Tables, AStudyIsBegunByOneOfManyWhoAsk) {
   EXPECT_FALSE(tables.begin_study(signature("a"), viewpoint));
 }
 
-// The sanitizer of threads looks on.
-TEST(Tables, ManyThreadsAtOnce) {
+// Run under ThreadSanitizer.
+TEST(Tables, ManyThreadsConcurrently) {
   Tables tables;
   std::atomic<int> wrong{0};
   {

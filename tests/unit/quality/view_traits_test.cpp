@@ -1,4 +1,4 @@
-// What of a view is its style, and how far two sights are apart.
+// Scene signature of a view, and the distance of two viewpoints.
 #include "server/quality/view_traits.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ protocol::View completed() {
   return view;
 }
 
-TEST(Viewpoint, IsTheHeightAtTheMiddleAndTheWay) {
+TEST(Viewpoint, IsTheHeightAtTheCenterAndTheDirection) {
   protocol::View view = completed();
   const Viewpoint viewpoint = viewpoint_of(view);
   EXPECT_NEAR(viewpoint.height, 4 * std::tan(view.camera.fov_y * std::acos(-1) / 360), 1e-12);
@@ -33,7 +33,7 @@ TEST(Viewpoint, IsTheHeightAtTheMiddleAndTheWay) {
   EXPECT_EQ(viewpoint_of(view).height, 3);
 }
 
-TEST(Viewpoint, WithoutACameraItIsTheOtherOnesButForThePixels) {
+TEST(Viewpoint, WithoutACameraUsesTheOtherExceptForPixels) {
   protocol::View view = completed();
   view.camera.eye = {};
   view.image.height = 111;
@@ -43,8 +43,8 @@ TEST(Viewpoint, WithoutACameraItIsTheOtherOnesButForThePixels) {
   EXPECT_EQ(viewpoint.pixels_high, 111);
 }
 
-// As large as the volume is in the picture, so large are its cells.
-TEST(Viewpoint, DetailIsScaledFromTheOtherOnes) {
+// Cells scale with the size of the volume in the picture.
+TEST(Viewpoint, DetailIsScaledFromTheOther) {
   protocol::View view = completed();
   view.image.height = 480;
   Viewpoint known = viewpoint_of(view);
@@ -56,7 +56,7 @@ TEST(Viewpoint, DetailIsScaledFromTheOtherOnes) {
   EXPECT_EQ(viewpoint_of(view).detail, 0) << "not known";
 }
 
-TEST(SceneSignature, DoesNotDependOnWhereAndWhenOneLooks) {
+TEST(SceneSignature, DoesNotDependOnCameraAndStep) {
   const std::string key = signature_of(completed()).key;
   protocol::View view = completed();
   view.step = 3;
@@ -68,7 +68,7 @@ TEST(SceneSignature, DoesNotDependOnWhereAndWhenOneLooks) {
   EXPECT_EQ(signature_of(view).key, key);
 }
 
-TEST(SceneSignature, DependsOnWhatIsShown) {
+TEST(SceneSignature, DependsOnTheContent) {
   const std::string key = signature_of(completed()).key;
   const auto other = [&](auto change) {
     protocol::View view = completed();
@@ -81,7 +81,7 @@ TEST(SceneSignature, DependsOnWhatIsShown) {
   EXPECT_TRUE(other([](auto& view) { view.method.slab_thickness = 2; }));
 }
 
-TEST(SceneSignature, KnowsItsLinesAndItsMedium) {
+TEST(SceneSignature, DistinguishesLinesAndMedium) {
   const Kind kind = signature_of(completed()).kind;
   EXPECT_TRUE(kind.lines && kind.medium);
   EXPECT_EQ(kind.length, 0.5);
@@ -94,15 +94,15 @@ TEST(SceneSignature, KnowsItsLinesAndItsMedium) {
   EXPECT_FALSE(signature_of(view).kind.lines);
 }
 
-// A view that nobody completed yet may show anything.
-TEST(SceneSignature, OfAViewThatIsNotCompletedIsOfLinesInAMedium) {
+// An incomplete view may show anything.
+TEST(SceneSignature, IncompleteViewHasLinesInAMedium) {
   const Kind kind = signature_of(protocol::View()).kind;
   EXPECT_TRUE(kind.lines && kind.medium);
   EXPECT_EQ(kind.length, 0);
   EXPECT_GT(kind.depth, 0);
 }
 
-TEST(Distance, IsNoneToItselfAndAlikeBothWays) {
+TEST(Distance, IsZeroToItselfAndSymmetric) {
   const Viewpoint a{1, {0, 1, 0}, 640, 480};
   const Viewpoint b{2, {0.6, 0.8, 0}, 1280, 960};
   EXPECT_EQ(distance(a, a), 0);
@@ -110,7 +110,7 @@ TEST(Distance, IsNoneToItselfAndAlikeBothWays) {
   EXPECT_GT(distance(a, b), 0);
 }
 
-TEST(Distance, GrowsWithZoomTurnAndPixels) {
+TEST(Distance, GrowsWithZoomRotationAndPixels) {
   const Viewpoint from{1, {0, 1, 0}, 640, 480};
   double last = 0;
   for (const double zoom : {1.1, 1.5, 2.0, 4.0}) {

@@ -1,4 +1,4 @@
-// Where samples stand on a globe, on a curvilinear map and along terrain: closed forms.
+// Sample positions on a globe, on a curvilinear map and along terrain, against closed forms.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,7 +20,7 @@ using protocol::GeometryMapping;
 using protocol::GeometryView;
 using protocol::View;
 
-constexpr double tolerance = 1e-6;  // places are floats
+constexpr double tolerance = 1e-6;  // positions are floats
 constexpr double degree = std::numbers::pi / 180;
 
 std::vector<double> steps(double first, double step, int count) {
@@ -60,7 +60,7 @@ double radius(int level, double scale = 1) {
   return inner + (level + 0.5) / 3 * (1 - inner);
 }
 
-TEST(Sphere, PolesAndEquatorStandWhereTheyShould) {
+TEST(Sphere, PolesAndEquatorAreInPlace) {
   const auto lattice = place_lattice(globe(), mapped(GeometryMapping::sphere));
   ASSERT_TRUE(lattice) << lattice.error().message;
   ASSERT_TRUE(lattice->places);
@@ -81,7 +81,7 @@ TEST(Sphere, PolesAndEquatorStandWhereTheyShould) {
   }
 }
 
-TEST(Sphere, TheUnbentLatticeHasTheBentOnesMeanCells) {
+TEST(Sphere, RectilinearLatticeHasTheMeanCellsOfTheCurvedOne) {
   const auto lattice = place_lattice(globe(), mapped(GeometryMapping::sphere));
   ASSERT_TRUE(lattice);
   const double inner = 1 / 1.15;
@@ -91,7 +91,7 @@ TEST(Sphere, TheUnbentLatticeHasTheBentOnesMeanCells) {
     EXPECT_NEAR(lattice->spacing[2][at], (1 - inner) / 3, 1e-12);
     EXPECT_NEAR(lattice->positions[2][at], radius(k) - middle, 1e-12);
   }
-  // Half the chord over two steps within, a whole chord over one at the poles.
+  // Half the chord over two steps inside, a whole chord over one step at the poles.
   EXPECT_NEAR(lattice->spacing[1][3], middle * std::sin(30 * degree), tolerance);
   EXPECT_NEAR(lattice->spacing[1][0], middle * 2 * std::sin(15 * degree), tolerance);
   EXPECT_NEAR(lattice->positions[1][3], 0, tolerance);
@@ -99,7 +99,7 @@ TEST(Sphere, TheUnbentLatticeHasTheBentOnesMeanCells) {
               0.5 * (lattice->spacing[1][3] + lattice->spacing[1][4]), 1e-12);
 }
 
-TEST(Sphere, HeightScalesTheShellAlone) {
+TEST(Sphere, HeightScalesTheShellOnly) {
   GeometryView geometry = mapped(GeometryMapping::sphere);
   geometry.scale = {5, 7, 2};
   const auto lattice = place_lattice(globe(), geometry);
@@ -110,7 +110,7 @@ TEST(Sphere, HeightScalesTheShellAlone) {
   EXPECT_NEAR(lattice->box_max.z, 1, tolerance);
 }
 
-TEST(Sphere, OneLevelIsAsThickAsItsColumnsAreApart) {
+TEST(Sphere, SingleLevelIsAsThickAsItsColumnSpacing) {
   data::Grid grid = globe();
   grid.axes[0].coordinates = steps(0, 3, 120);
   grid.axes[2] = axis(AxisKind::pressure, "hPa", {500});
@@ -158,8 +158,8 @@ TEST(Sphere, IsFramedFromEveryDirection) {
   }
 }
 
-// A view begins opposite the part of the globe that the data cover.
-TEST(Sphere, APartIsSeenFromAboveItself) {
+// A view starts above the part of the globe covered by the data.
+TEST(Sphere, PartIsViewedFromAboveItself) {
   data::Grid grid = globe();
   grid.axes[0].coordinates = steps(120, 5, 7);
   grid.axes[1].coordinates = steps(-10, 5, 5);
@@ -209,7 +209,7 @@ TEST(Curvilinear, EveryColumnHasItsLongitudeAndLatitude) {
   EXPECT_NEAR(lattice->spacing[1][1], std::hypot(5, 2) * scale, tolerance);
 }
 
-TEST(Curvilinear, ColumnsStandOnTheGlobeToo) {
+TEST(Curvilinear, ColumnsArePlacedOnTheGlobe) {
   const auto lattice = place_lattice(sheared(), mapped(GeometryMapping::sphere));
   ASSERT_TRUE(lattice);
   const glm::dvec3 p = place(*lattice, 3, 1, 1);  // 382 = 22 E, 5 N
@@ -273,7 +273,7 @@ TEST(HeightField, TerrainKeepsItsSlope) {
   EXPECT_NEAR(lattice.box_min.z, -lattice.box_max.z, tolerance);
 }
 
-TEST(HeightField, AMaskedHeightIsItsLevelsMean) {
+TEST(HeightField, MaskedHeightIsTheMeanOfItsLevel) {
   auto dataset = terrain(metres(), "m", [](std::size_t n) {
     if (n == 9) return std::nan("");
     return 10.0 * static_cast<double>(n / 8) + (n % 8 == 0 ? 7.0 : 0.0);
@@ -281,13 +281,13 @@ TEST(HeightField, AMaskedHeightIsItsLevelsMean) {
   const auto placed = place_dataset(with_heights(), *dataset);
   ASSERT_TRUE(placed);
   const Lattice& lattice = (*placed)->lattice;
-  // One of the seven heights that are there is 17, the others are 10.
+  // One of the seven present heights is 17, the others are 10.
   const double one = place(lattice, 0, 0, 1).z - place(lattice, 2, 0, 1).z;
   EXPECT_NEAR(place(lattice, 1, 0, 1).z - place(lattice, 2, 0, 1).z, one / 7, tolerance);
   EXPECT_NEAR(place(lattice, 1, 0, 1).z, lattice.positions[2][1], tolerance);
 }
 
-TEST(HeightField, StandsOnTheGlobe) {
+TEST(HeightField, IsPlacedOnTheGlobe) {
   auto dataset = terrain(globe(), "m", [](std::size_t n) {
     return 1000.0 * static_cast<double>(n / 84) + (n % 84 == 40 ? 500.0 : 0.0);
   });
@@ -302,7 +302,7 @@ TEST(HeightField, StandsOnTheGlobe) {
   EXPECT_NEAR(glm::length(place(lattice, 5, 3, 2)), at(2000), tolerance);
 }
 
-TEST(HeightField, OfOneLevelIsASurface) {
+TEST(HeightField, SingleLevelIsASurface) {
   data::Grid grid = metres();
   grid.axes[2].coordinates = {0};
   auto dataset = terrain(grid, "m", [](std::size_t n) { return 5.0 * static_cast<double>(n % 4); });
@@ -312,7 +312,7 @@ TEST(HeightField, OfOneLevelIsASurface) {
   EXPECT_NEAR(east.z, 0.5 * east.x, tolerance);
 }
 
-TEST(HeightField, IsRefusedWhereItIsNoHeight) {
+TEST(HeightField, OtherQuantitiesAreRefused) {
   const auto refusal = [](data::Dataset& dataset, const char* field) {
     View view;
     view.geometry.height_field = field;
@@ -356,8 +356,8 @@ TEST(HeightField, IsLoadedOnceAndOnlyIfNamed) {
   EXPECT_NE(taller->lattice.places, scene->lattice.places);
 }
 
-// A metre is as long anywhere on a globe: the shell's middle radius over the Earth's.
-TEST(WorldRates, OnTheGlobeAreLengthsPerMetre) {
+// A metre has the same length anywhere on a globe: the middle radius of the shell over the Earth's.
+TEST(WorldRates, OnTheGlobeAreLengthsPerMeter) {
   auto dataset = dataset_of(
       std::make_unique<FakeSource>(globe(), std::vector<data::FieldInfo>{wind_info()}, 1));
   View view;
@@ -375,7 +375,7 @@ TEST(WorldRates, OnTheGlobeAreLengthsPerMetre) {
   for (const double z : scene->vector->rate_z) EXPECT_NEAR(z, up, 1e-9 * up);
 }
 
-// 10 degrees of longitude at the equator and 5 of latitude are as long as the map says.
+// 10 degrees of longitude at the equator and 5 of latitude have the lengths of the map.
 TEST(WorldRates, OnACurvilinearMapAreThoseOfDegrees) {
   auto dataset = dataset_of(
       std::make_unique<FakeSource>(sheared(), std::vector<data::FieldInfo>{wind_info()}, 1));

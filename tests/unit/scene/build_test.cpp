@@ -1,5 +1,5 @@
-// From a completed view to the engine's input: only what is shown is loaded, radii, tables, rates,
-// presets, and the description of a dataset.
+// From a completed view to the input of the engine: only shown fields are loaded; radii, tables,
+// rates, presets, and the description of a dataset.
 #include "server/scene/build.hpp"
 
 #include <gmock/gmock.h>
@@ -39,7 +39,7 @@ TEST(BuildScene, LoadsOnlyWhatIsShown) {
   Scene scene = built(view, *dataset);
   EXPECT_TRUE(scene.vector);
   EXPECT_EQ(scene.scalars.size(), 1U);
-  // Ranges come from step 0, the picture from step 2; nobody asked for the temperature.
+  // Ranges are those of step 0, the picture of step 2; the temperature is not used.
   EXPECT_EQ(*reads, (Reads{{"wind@0", 1}, {"wind@2", 1}, {"cloud@0", 1}, {"cloud@2", 1}}));
 
   reads = std::make_shared<Reads>();
@@ -74,7 +74,7 @@ TEST(BuildScene, AnEmptyOpacityFunctionIsNoMedium) {
   EXPECT_TRUE(reads->empty());
 }
 
-TEST(BuildScene, ShowsTheStepThatWasAskedFor) {
+TEST(BuildScene, ShowsTheRequestedStep) {
   auto dataset = weather();
   View view;
   view.step = 1;
@@ -83,7 +83,7 @@ TEST(BuildScene, ShowsTheStepThatWasAskedFor) {
   EXPECT_EQ(scene.scalars[0].field->component(0)[5], 1005.0F);
 }
 
-TEST(BuildScene, RadiiFollowThePicturesHeight) {
+TEST(BuildScene, RadiiScaleWithThePictureHeight) {
   auto dataset = weather();
   View view;
   view.image.height = 1440;
@@ -108,7 +108,7 @@ TEST(BuildScene, RadiiFollowThePicturesHeight) {
   EXPECT_NEAR(scene.vector->opacity, 0.8, 1e-12);
 }
 
-TEST(BuildScene, ReversedColourRangesTurnTheMapAbout) {
+TEST(BuildScene, ReversedColorRangesReverseTheMap) {
   auto dataset = weather();
   View view;
   protocol::ScalarView scalar;
@@ -123,7 +123,7 @@ TEST(BuildScene, ReversedColourRangesTurnTheMapAbout) {
   EXPECT_EQ(table.entries.front(), color_map_linear("viridis", 256).back());
 }
 
-TEST(BuildScene, ConstantColourAndBackgroundAreLinear) {
+TEST(BuildScene, ConstantColorAndBackgroundAreLinear) {
   auto dataset = weather();
   View view;
   view.vector.color.by = protocol::ColorBy::constant;
@@ -178,7 +178,7 @@ TEST(WorldRates, OmegaRisesWherePressureFalls) {
   }
 }
 
-// Low pressure is high in the picture, whatever a line's direction is made of.
+// Low pressure is at the top of the picture for any source of the line direction.
 TEST(BuildScene, ComponentsPointUpWhereAirRises) {
   View view;
   view.vector.scale = {1, 2, 3};
@@ -191,7 +191,7 @@ TEST(BuildScene, ComponentsPointUpWhereAirRises) {
   }
 }
 
-// Level 1 may be the highest or the lowest: then omega is drawn as it stands.
+// Level 1 may be the highest or the lowest: then omega is used unchanged.
 TEST(BuildScene, OmegaOnNumberedLevelsIsNotTurned) {
   data::Grid grid = atmosphere_grid();
   grid.axes[2] = axis(data::AxisKind::level, "", {1, 2, 3});
@@ -202,7 +202,7 @@ TEST(BuildScene, OmegaOnNumberedLevelsIsNotTurned) {
   EXPECT_EQ(built(View{}, *dataset).vector->scale, glm::dvec3(1, 1, 1));
 }
 
-TEST(WorldRates, HeightAxesTakeMetresPerSecondAsTheyStand) {
+TEST(WorldRates, HeightAxesUseMetersPerSecondUnchanged) {
   data::Grid grid = atmosphere_grid();
   grid.axes[0] = axis(data::AxisKind::cartesian, "km", {0, 1, 2, 3});
   grid.axes[1] = axis(data::AxisKind::cartesian, "km", {0, 1, 2});
@@ -217,7 +217,7 @@ TEST(WorldRates, HeightAxesTakeMetresPerSecondAsTheyStand) {
   EXPECT_NEAR(scene.vector->rate_z[1], 0.3 / 3000.0, 1e-12);
 }
 
-TEST(WorldRates, AreAbsentForComponentsAndRefusedWhereUnknown) {
+TEST(WorldRates, AreAbsentForComponentsAndRefusedForUnknownUnits) {
   auto dataset = weather();
   EXPECT_TRUE(built(View{}, *dataset).vector->rate_x.empty());
   data::Grid grid = atmosphere_grid();
@@ -232,7 +232,7 @@ TEST(WorldRates, AreAbsentForComponentsAndRefusedWhereUnknown) {
   EXPECT_EQ(refused.error().at.at(0).pointer, "/vector/space");
 }
 
-TEST(Presets, ChangeWhatTheirNamesSay) {
+TEST(Presets, ChangeTheNamedProperties) {
   auto dataset = weather();
   const Lattice lattice = *place_lattice(dataset->info().grid, {});
   const View start = complete({}, *dataset)->view();
@@ -260,7 +260,7 @@ TEST(Presets, ChangeWhatTheirNamesSay) {
   EXPECT_EQ(refused.error().at.at(0).pointer, "/preset");
 }
 
-TEST(Describe, LoadsNothingUnlessRangesAreWanted) {
+TEST(Describe, LoadsNothingUnlessRangesAreRequested) {
   auto dataset = weather();
   const auto brief = *describe(*dataset, RangesOf::none);
   EXPECT_EQ(dataset->loads(), 0U);
@@ -278,7 +278,7 @@ TEST(Describe, LoadsNothingUnlessRangesAreWanted) {
   EXPECT_EQ(brief.bytes_when_resident, 5U * 36U * 4U * 3U);
 }
 
-TEST(Describe, RangesAreOfTheFirstStepOrOfAll) {
+TEST(Describe, RangesCoverTheFirstStepOrAll) {
   auto dataset = weather();
   const auto first = *describe(*dataset, RangesOf::first_step);
   EXPECT_EQ(first.fields[1].range, (protocol::Range{0, 35}));
@@ -291,7 +291,7 @@ TEST(Describe, RangesAreOfTheFirstStepOrOfAll) {
   EXPECT_EQ(all.fields[1].range_of, "all");
 }
 
-TEST(Describe, AWhollyMaskedFieldHasNoRange) {
+TEST(Describe, FullyMaskedFieldHasNoRange) {
   auto source = std::make_unique<FakeSource>(
       atmosphere_grid(), std::vector<data::FieldInfo>{scalar_info("cloud", "1")}, 2);
   source->constant = std::make_unique<double>(std::nan(""));

@@ -1,4 +1,4 @@
-// The camera: which way is east and up in the picture, orbits, framing, refusals.
+// The camera: orientation of the picture, orbits, framing, invalid cameras.
 #include "server/scene/camera.hpp"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ struct Pixel {
   double x, y, depth;
 };
 
-// Pixel coordinates of a world point, row 0 on top: written from the Camera's own description.
+// Pixel coordinates of a world point, top row first, by the documented definition of the camera.
 Pixel project(const Camera& camera, const glm::dvec3& point) {
   const glm::dvec3 p = point - camera.eye;
   const double depth = glm::dot(p, camera.forward);
@@ -95,7 +95,7 @@ TEST(Orbit, AzimuthZeroLooksNorthAndPositiveMovesEast) {
   EXPECT_NEAR(std::atan2(eye[2], -eye[1]), 30 * std::numbers::pi / 180, 1e-12);
 }
 
-TEST(Orbit, StraightDownHasNorthUpAndLeavesAValidCamera) {
+TEST(Orbit, StraightDownHasNorthUpAndAValidCamera) {
   auto dataset = atmosphere();
   const Lattice lattice = *place_lattice(dataset->info().grid, {});
   protocol::View view;
@@ -141,7 +141,7 @@ TEST(Orbit, ZoomOneFramesTheWholeBoxTightlyInEitherProjection) {
   }
 }
 
-TEST(Orbit, ZoomTwoDrawsTheCentreTwiceAsLarge) {
+TEST(Orbit, ZoomTwoRendersTheCenterTwiceAsLarge) {
   auto dataset = atmosphere();
   const Lattice lattice = *place_lattice(dataset->info().grid, {});
   for (const auto projection :
@@ -164,7 +164,7 @@ std::string pointer_of(const Result<CompletedView>& result) {
   return result.error().at[0].pointer;
 }
 
-TEST(Camera, ImpossibleCamerasAreRefusedByName) {
+TEST(Camera, InvalidCamerasAreRefusedByName) {
   auto dataset = atmosphere();
   protocol::View view;
   view.camera.eye = protocol::Vec3{0, 0, 4};
@@ -179,7 +179,7 @@ TEST(Camera, ImpossibleCamerasAreRefusedByName) {
   EXPECT_EQ(pointer_of(complete(view, *dataset)), "/camera/eye");
 }
 
-TEST(DepthCue, ItsEndsAreTheBoxsNearestAndFarthestCorners) {
+TEST(DepthCue, EndsAtTheNearestAndFarthestCornersOfTheBox) {
   auto dataset = atmosphere();
   protocol::View view;
   view.camera.eye = protocol::Vec3{0, -5, 0};

@@ -1,4 +1,4 @@
-// Colour maps: their ends, their lightness, and colours told as text.
+// Colour maps: their end colours, their lightness, and colours as text.
 #include "server/scene/colormap.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ double luminance(const std::array<float, 3>& c) {
          0.0722 * static_cast<double>(c[2]);
 }
 
-TEST(ColorMap, EndsAreThePublishedOnes) {
+TEST(ColorMap, EndColorsMatchThePublication) {
   const auto viridis = color_map_srgb("viridis", 256);
   EXPECT_EQ(viridis.front(), (std::array<unsigned char, 3>{0x44, 0x01, 0x54}));
   EXPECT_EQ(viridis.back(), (std::array<unsigned char, 3>{0xfd, 0xe7, 0x25}));
@@ -27,12 +27,12 @@ TEST(ColorMap, EndsAreThePublishedOnes) {
   EXPECT_EQ(inferno[1], (std::array<unsigned char, 3>{0xfc, 0xff, 0xa4}));
 }
 
-TEST(ColorMap, PassesThroughItsStops) {
-  // The eleven stops of viridis fall on every tenth of 1001 entries' way.
+TEST(ColorMap, PassesThroughItsControlPoints) {
+  // The eleven control points of viridis are at every tenth of 1001 entries.
   EXPECT_EQ(color_map_srgb("viridis", 11)[5], (std::array<unsigned char, 3>{0x21, 0x91, 0x8c}));
 }
 
-TEST(ColorMap, SequentialMapsGrowLighterAndDivergingOnesPeakInTheMiddle) {
+TEST(ColorMap, SequentialMapsGrowLighterAndDivergingOnesPeakAtTheCenter) {
   ASSERT_GE(color_maps().size(), 10U);
   for (const ColorMap& map : color_maps()) {
     const auto entries = color_map_linear(map.name, 64);
@@ -68,9 +68,9 @@ std::array<double, 3> oklab(const std::array<float, 3>& c) {
           0.0259040371 * l + 0.7827717662 * m - 0.8086757660 * s};
 }
 
-TEST(ColorMap, EqualDifferencesOfValuesAreEqualDifferencesOfColour) {
+TEST(ColorMap, EqualValueDifferencesAreEqualColorDifferences) {
   for (const ColorMap& map : color_maps()) {
-    if (map.kind == "cyclic") continue;  // its quarters are the bearings'
+    if (map.kind == "cyclic") continue;  // its quarters are the compass quarters
     const auto entries = color_map_linear(map.name, 257);
     std::vector<double> steps;
     for (std::size_t n = 8; n < entries.size(); n += 8) {
@@ -79,7 +79,7 @@ TEST(ColorMap, EqualDifferencesOfValuesAreEqualDifferencesOfColour) {
       steps.push_back(std::hypot(after[0] - before[0], after[1] - before[1], after[2] - before[2]));
     }
     const auto [least, most] = std::minmax_element(steps.begin(), steps.end());
-    // Those that are published were made even by another measure (CAM02-UCS).
+    // Published maps were made uniform in another measure (CAM02-UCS).
     const bool published =
         std::set<std::string>{"viridis", "magma", "inferno", "plasma", "cividis"}.count(map.name) !=
         0;
@@ -87,7 +87,7 @@ TEST(ColorMap, EqualDifferencesOfValuesAreEqualDifferencesOfColour) {
   }
 }
 
-TEST(ColorMap, TheCompassTellsItsFourQuartersApartAndHasNoSeam) {
+TEST(ColorMap, CompassDistinguishesFourQuartersWithoutASeam) {
   const auto compass = color_map_srgb("compass", 361);
   EXPECT_EQ(compass[0], compass[360]);
   const auto distance = [&](std::size_t a, std::size_t b) {
@@ -111,7 +111,7 @@ TEST(ColorMap, GraysAreEvenInPerceivedLightness) {
   }
 }
 
-TEST(ColorMap, OneEntryIsTheLowEndAndUnknownNamesAreUnknown) {
+TEST(ColorMap, OneEntryIsTheLowEndAndUnknownNamesAreRefused) {
   EXPECT_EQ(color_map_srgb("plasma", 1)[0], (std::array<unsigned char, 3>{0x0d, 0x08, 0x87}));
   EXPECT_TRUE(has_color_map("coolwarm"));
   EXPECT_FALSE(has_color_map("jet"));
@@ -130,7 +130,7 @@ TEST(Color, ParsesSixHexDigitsOnly) {
   }
 }
 
-TEST(Color, TransferCurveGoesBothWays) {
+TEST(Color, TransferCurveIsInvertible) {
   EXPECT_NEAR(static_cast<double>(srgb_from_linear(0.5F)), 0.735357, 1e-5);
   for (int n = 0; n <= 100; ++n) {
     const float v = static_cast<float>(n) / 100.0F;

@@ -1,4 +1,4 @@
-// Defaults and refusals: what a view becomes for a dataset, and what is refused by name.
+// Defaults and errors: completion of a view for a dataset, and named errors.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ View completed(const View& view, data::Dataset& dataset) {
   return full->view();
 }
 
-// Every optional of a view as text, to compare two of them.
+// Every optional of a view as text, for comparison.
 std::string told(const View& view) {
   const auto vec = [](const protocol::Vec3& v) {
     return std::to_string(v[0]) + " " + std::to_string(v[1]) + " " + std::to_string(v[2]) + ";";
@@ -68,7 +68,7 @@ TEST(CompleteView, FillsEverythingAndIsIdempotent) {
   }
 }
 
-TEST(CompleteView, DefaultsAreFitForTheSchema) {
+TEST(CompleteView, DefaultsFitTheSchema) {
   for (const std::string& name : data::sample_names()) {
     auto dataset = sample_dataset(name, {24, 16, 12});
     const View full = complete({}, *dataset)->view();
@@ -88,7 +88,7 @@ TEST(CompleteView, DefaultsAreFitForTheSchema) {
   }
 }
 
-TEST(CompleteView, KeepsWhatTheUserSaid) {
+TEST(CompleteView, KeepsGivenValues) {
   auto dataset = cloudy_weather();
   View view;
   view.vector.length = 0.7;
@@ -111,7 +111,7 @@ TEST(CompleteView, KeepsWhatTheUserSaid) {
   ASSERT_EQ(full.scalars->size(), 1U);
   EXPECT_EQ((*full.scalars)[0].color.range, (protocol::Range{300, 200}));
   EXPECT_EQ((*full.scalars)[0].color.map, "ice");
-  EXPECT_EQ(dataset->loads(), 0U);  // every range was told
+  EXPECT_EQ(dataset->loads(), 0U);  // every range was given
 }
 
 TEST(CompleteView, RangesComeFromTheFirstStep) {
@@ -121,7 +121,7 @@ TEST(CompleteView, RangesComeFromTheFirstStep) {
   EXPECT_EQ(told(completed(later, *dataset)), told(completed(View{}, *dataset)));
 }
 
-TEST(CompleteView, TheFieldsThatAViewMayLoadAreKnownWithoutLoading) {
+TEST(CompleteView, FieldsThatAViewMayLoadAreKnownWithoutLoading) {
   const auto dataset = sample_dataset("tornado", {8, 8, 8});
   const data::DatasetInfo& info = dataset->info();
   protocol::View view;
@@ -137,7 +137,7 @@ TEST(CompleteView, TheFieldsThatAViewMayLoadAreKnownWithoutLoading) {
   EXPECT_THAT(fields_of(view, info), testing::ElementsAre("vorticity", "cloud"));
 }
 
-TEST(CompleteView, ShowsCloudsButNoTemperatureBesideAWind) {
+TEST(CompleteView, ShowsCloudsButNoTemperatureWithWind) {
   auto dataset = cloudy_weather();
   const View full = completed(View{}, *dataset);
   ASSERT_EQ(full.scalars->size(), 1U);
@@ -155,7 +155,7 @@ TEST(CompleteView, WithoutAVectorTheFirstScalarIsShown) {
   EXPECT_EQ((*full.scalars)[0].field, "temperature");
 }
 
-TEST(CompleteView, AFieldThatIsTheSameEverywhereStillHasRanges) {
+TEST(CompleteView, ConstantFieldHasRanges) {
   for (const double value : {0.0, -3.0, 1e-35, 1e30}) {
     auto source = std::make_unique<FakeSource>(
         atmosphere_grid(), std::vector<data::FieldInfo>{wind_info(), scalar_info("cloud", "kg")},
@@ -170,7 +170,7 @@ TEST(CompleteView, AFieldThatIsTheSameEverywhereStillHasRanges) {
   }
 }
 
-TEST(CompleteView, AWhollyMaskedFieldStillHasRanges) {
+TEST(CompleteView, FullyMaskedFieldHasRanges) {
   auto source = std::make_unique<FakeSource>(
       atmosphere_grid(), std::vector<data::FieldInfo>{wind_info(), scalar_info("cloud", "1")}, 1);
   source->constant = std::make_unique<double>(std::nan(""));
@@ -186,7 +186,7 @@ TEST(CompleteView, LinesAreAboutFiveGridSpacingsLong) {
   EXPECT_NEAR(*completed(view, *dataset).vector.length, 5 * 2.0 / 32, 0.02);
 }
 
-TEST(CompleteView, AChangedKeyOfTheLinesLeavesTheOthersDefaultsAlone) {
+TEST(CompleteView, ChangedLineKeyKeepsTheOtherDefaults) {
   auto dataset = sample_dataset("tornado", {32, 32, 32});
   const protocol::VectorView plain = completed(View{}, *dataset).vector;
   View view;
@@ -199,7 +199,7 @@ TEST(CompleteView, AChangedKeyOfTheLinesLeavesTheOthersDefaultsAlone) {
   EXPECT_EQ(changed.color.range, plain.color.range);
 }
 
-TEST(CompleteView, AtmospheresAreColouredByHeightOthersByMagnitude) {
+TEST(CompleteView, AtmospheresAreColoredByHeightOthersByMagnitude) {
   auto climate = sample_dataset("climate", {24, 16, 12});
   auto tornado = sample_dataset("tornado", {24, 16, 12});
   EXPECT_EQ(completed(View{}, *climate).vector.color.by, ColorBy::world_z);
@@ -289,7 +289,7 @@ TEST(Defaults, NiceNumbersRoundUp) {
   EXPECT_NEAR(nice_above(3.3e-8), 4e-8, 1e-20);
 }
 
-TEST(Defaults, QuantilesAreOfTheUnmaskedMagnitudes) {
+TEST(Defaults, QuantilesAreThoseOfUnmaskedMagnitudes) {
   data::Volume volume;
   volume.dims = {5, 1, 1};
   volume.components = 2;

@@ -32,7 +32,7 @@ std::string pointer_of_refusal(const View& view, data::Dataset& dataset) {
   return refused.error().at[0].pointer;
 }
 
-TEST(Slice, IsTheLayerThatTheViewNames) {
+TEST(Slice, IsTheLayerNamedByTheView) {
   auto dataset = known_weather();
   EXPECT_FALSE(built(View{}, *dataset).slice);
   View view;
@@ -58,7 +58,7 @@ TEST(Slice, BeyondTheGridIsRefusedWithItsLimit) {
   }
 }
 
-// A full volume hides itself unless weak lines are left out; a slice does not.
+// A full volume occludes itself unless weak lines are omitted; a slice does not.
 TEST(Slice, KeepsItsLinesByDefault) {
   auto dataset = sample_dataset("climate", {96, 48, 19});
   const View whole = complete({}, *dataset)->view();
@@ -74,8 +74,9 @@ TEST(Slice, KeepsItsLinesByDefault) {
   }
 }
 
-// Of many lines in one layer only the strongest of that layer are shown, wherever the others are.
-TEST(Slice, CountsItsOwnLinesAlone) {
+// Of many lines in one layer only the strongest of that layer are shown, independent of other
+// layers.
+TEST(Slice, CountsItsOwnLinesOnly) {
   data::Grid grid;
   std::vector<double> many(900);
   for (std::size_t n = 0; n < many.size(); ++n) many[n] = static_cast<double>(n);
@@ -84,7 +85,7 @@ TEST(Slice, CountsItsOwnLinesAlone) {
                axis(data::AxisKind::cartesian, "m", {0, 1})};
   auto source =
       std::make_unique<FakeSource>(std::move(grid), std::vector<data::FieldInfo>{wind_info()}, 1);
-  // Magnitudes of the lower layer spread evenly up to 1, of the upper up to 100.
+  // Magnitudes of the lower layer are uniform up to 1, of the upper up to 100.
   source->values = [](const std::string&, std::size_t n) {
     const bool upper = n >= std::size_t{900} * 900;
     const double share = std::fmod(static_cast<double>(n) * 0.7548776662466927, 1.0);
@@ -97,8 +98,8 @@ TEST(Slice, CountsItsOwnLinesAlone) {
   const auto full = complete(view, *dataset);
   ASSERT_TRUE(full);
   // The layer is 2 by 2; seen from 35 degrees above, 720 pixels are 2.08 (sin 35 + 0.01) high, so
-  // 900 x 900 lines of three quarters of five spacings by 2 pixels are there to cover three times
-  // that area.
+  // that 900 x 900 lines of three quarters of five spacings by 2 pixels cover three times that
+  // area.
   const double pixel = 2.08 * (std::sin(35 * std::numbers::pi / 180) + 0.005) / 720;
   const double wanted = 1 - 3 * 4 / (0.75 * 0.011 * 2 * pixel * 810000);
   EXPECT_NEAR(*full->view().vector.min_magnitude, wanted, 0.06);
@@ -106,13 +107,13 @@ TEST(Slice, CountsItsOwnLinesAlone) {
   EXPECT_DOUBLE_EQ(*complete(view, *dataset)->view().vector.min_magnitude, 0.9);  // all but the top
 }
 
-TEST(Slice, LinesAndMediumAreMeasuredByTheLayer) {
+TEST(Slice, LinesAndMediumAreScaledToTheLayer) {
   auto dataset = known_weather();
   View view;
   const Scene whole = built(view, *dataset);
   view.geometry.slice = SliceView{GridAxis::z, 1};
   const Scene slice = built(view, *dataset);
-  // One of three even layers: dense parts are as opaque through it as through all three.
+  // One of three equal layers: dense parts are as opaque through it as through all three.
   const auto top = [](const Scene& scene) { return scene.scalars.at(0).extinction.back()[1]; };
   EXPECT_NEAR(top(slice) / top(whole), 3, 0.6);  // both are rounded up to nice numbers
   // Across x, lines are as long as y is coarse: 5 cells of 10 degrees on a scale of 40 to 2.
@@ -130,7 +131,7 @@ TEST(ColorByDirection, SpansTheCompass) {
   EXPECT_FALSE(scene.vector->color_field);
 }
 
-TEST(ColorByScalar, TakesTheFieldAtTheStepAndItsRangeFromTheFirst) {
+TEST(ColorByScalar, UsesTheFieldAtTheStepAndTheRangeOfTheFirst) {
   auto reads = std::make_shared<FakeSource::Reads>();
   auto dataset = known_weather(reads);
   View view;
@@ -148,7 +149,7 @@ TEST(ColorByScalar, TakesTheFieldAtTheStepAndItsRangeFromTheFirst) {
   EXPECT_EQ((*reads)["temperature@2"], 1);
 }
 
-TEST(ColorByScalar, LoadsNothingThatIsNotDrawn) {
+TEST(ColorByScalar, LoadsNothingThatIsNotRendered) {
   for (const bool lines : {true, false}) {
     auto reads = std::make_shared<FakeSource::Reads>();
     auto dataset = known_weather(reads);
@@ -188,7 +189,7 @@ TEST(Motion, CyclesAreRateTimesStepAndTime) {
   EXPECT_DOUBLE_EQ(scene.vector->motion_cycles, 1.5 * 2.25);
 }
 
-TEST(Methods, AreTheViews) {
+TEST(Methods, MatchThoseOfTheView) {
   auto dataset = known_weather();
   View view;
   EXPECT_EQ(built(view, *dataset).method, Method::slab);

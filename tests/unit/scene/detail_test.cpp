@@ -1,4 +1,4 @@
-// Levels of detail: which a camera gets, in closed form, and what becomes of lattice and lines.
+// Levels of detail: the level for a camera, in closed form, and its effect on lattice and lines.
 #include "server/scene/detail.hpp"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ Lattice cube(int side) {
   return box({even, even, even});
 }
 
-// Looks north from so far before the nearest face of a box of edge 2: 100 pixels a unit there.
+// Looks north at the nearest face of a box of edge 2 from that distance: 100 pixels per unit there.
 Camera before(double distance) {
   Camera camera;
   camera.eye = {0, -1 - distance, 0};
@@ -49,7 +49,7 @@ Camera before(double distance) {
   return camera;
 }
 
-TEST(ChooseLevel, HalvesWhileACellIsBelowAPixel) {
+TEST(ChooseLevel, HalvesWhileACellIsSmallerThanAPixel) {
   const Camera camera = before(8);  // at the face a cell of the cube covers 200 / side pixels
   EXPECT_NEAR(pixels_per_unit(camera, cube(64)), 100, 1e-9);
   EXPECT_EQ(choose_level(camera, cube(199), {}), (Level{0, 0, 0}));
@@ -58,7 +58,7 @@ TEST(ChooseLevel, HalvesWhileACellIsBelowAPixel) {
   EXPECT_EQ(choose_level(camera, cube(404), {}), (Level{2, 2, 2}));
 }
 
-TEST(ChooseLevel, RisesByOneWithTwiceTheDistance) {
+TEST(ChooseLevel, RisesByOneWhenTheDistanceDoubles) {
   const Lattice lattice = cube(160);  // 1.25 pixels a cell at distance 8
   for (int doubled = 0; doubled < 6; ++doubled) {
     Camera camera = before(8);
@@ -70,7 +70,7 @@ TEST(ChooseLevel, RisesByOneWithTwiceTheDistance) {
   }
 }
 
-TEST(ChooseLevel, OrthographicCountsThePicturesHeightAlone) {
+TEST(ChooseLevel, OrthographicDependsOnThePictureHeightOnly) {
   Camera camera = before(8);
   camera.perspective = false;
   camera.half_height = 2;  // 400 pixels for 4 units
@@ -81,7 +81,7 @@ TEST(ChooseLevel, OrthographicCountsThePicturesHeightAlone) {
   }
 }
 
-TEST(ChooseLevel, DoesNotChangeAsAnOrthographicViewTurns) {
+TEST(ChooseLevel, DoesNotChangeWhenAnOrthographicViewRotates) {
   Camera camera = before(8);
   camera.perspective = false;
   camera.half_height = 2;
@@ -94,7 +94,7 @@ TEST(ChooseLevel, DoesNotChangeAsAnOrthographicViewTurns) {
   }
 }
 
-TEST(ChooseLevel, JudgesEveryAxisByItsWidestCell) {
+TEST(ChooseLevel, UsesTheWidestCellOfEveryAxis) {
   // 400 columns of half a pixel, 19 layers of 1.5 to 1.6, 100 rows of which one is 1.2 wide.
   std::vector<double> rows(100, 0.004);
   rows[40] = 0.012;
@@ -106,7 +106,7 @@ TEST(ChooseLevel, JudgesEveryAxisByItsWidestCell) {
   EXPECT_EQ(choose_level(camera, lattice, {}), (Level{1, 0, 0}));
 }
 
-TEST(ChooseLevel, KeepsSlicedAndBentAndSmallAxes) {
+TEST(ChooseLevel, KeepsSlicedCurvedAndSmallAxes) {
   Camera camera = before(8);
   EXPECT_EQ(choose_level(camera, cube(202), Slice{1, 7}), (Level{1, 0, 1}));
   camera.eye.y = -1e6;
@@ -118,13 +118,13 @@ TEST(ChooseLevel, KeepsSlicedAndBentAndSmallAxes) {
   EXPECT_EQ(choose_level(camera, bent, {}), (Level{0, 0, 0}));
 }
 
-TEST(ChooseLevel, AnEyeInsideTheBoxSeesFullDetail) {
+TEST(ChooseLevel, EyeInsideTheBoxUsesFullDetail) {
   Camera camera = before(8);
   camera.eye = {0, 0, 0};
   EXPECT_EQ(choose_level(camera, cube(202), {}), (Level{0, 0, 0}));
 }
 
-TEST(CoarsenLattice, KeepsTheBoxAndStandsInTheMiddleOfMergedCells) {
+TEST(CoarsenLattice, KeepsTheBoxAndCentersMergedCells) {
   const Lattice fine = box({std::vector<double>{1, 2, 3, 4, 5}, {1, 1}, {0.5, 0.25, 0.125}});
   const Lattice coarse = coarsen_lattice(fine, {1, 0, 2});
   EXPECT_EQ(coarse.dims, (std::array{3, 2, 1}));
@@ -156,7 +156,7 @@ TEST(MergeLines, AddUpTheirOpacityAndThenTheirWidth) {
   EXPECT_EQ(merged.r1, layer.r1);
   EXPECT_EQ(merged.r2, layer.r2);
 
-  // Eight times 0.15 are 1.2 lines of one: a fifth wider than r1 + r2 = 2.
+  // Eight times 0.15 are 1.2 lines: a fifth wider than r1 + r2 = 2.
   merged = layer;
   merged.opacity = 0.15;
   merge_lines(lattice, {1, 1, 1}, 50, merged);
@@ -164,7 +164,7 @@ TEST(MergeLines, AddUpTheirOpacityAndThenTheirWidth) {
   EXPECT_NEAR(merged.r1 + merged.r2, 2.4, 1e-12);
   EXPECT_NEAR(merged.r2 - merged.r1, 1, 1e-12);
 
-  // Samples half a pixel apart cannot cover more than half a pixel beside the line.
+  // Samples half a pixel apart cover at most half a pixel beside the line.
   merged = layer;
   merged.opacity = 1;
   merge_lines(lattice, {1, 1, 1}, 50, merged);
@@ -194,7 +194,7 @@ class LevelOfAScene : public testing::Test {
   protocol::View view;
 };
 
-TEST_F(LevelOfAScene, FollowsTheSizeOfThePicture) {
+TEST_F(LevelOfAScene, DependsOnThePictureSize) {
   const Scene small = built();
   const int level = small.level[0];
   EXPECT_GE(level, 1);
@@ -209,7 +209,7 @@ TEST_F(LevelOfAScene, FollowsTheSizeOfThePicture) {
   EXPECT_EQ(built().level[0], level - 1);
 }
 
-TEST_F(LevelOfAScene, IsFullWhereTheViewOrItsMethodOrAStrideSaysSo) {
+TEST_F(LevelOfAScene, IsFullWhereViewMethodOrStrideRequireIt) {
   const Scene reduced = built();
   const std::uint64_t resident = dataset->resident_bytes();
   const auto expect_full = [&](const char* why) {
@@ -217,7 +217,7 @@ TEST_F(LevelOfAScene, IsFullWhereTheViewOrItsMethodOrAStrideSaysSo) {
     EXPECT_EQ(scene.level, (Level{0, 0, 0})) << why;
     EXPECT_EQ(scene.lattice.dims, (std::array{64, 64, 64})) << why;
     EXPECT_EQ(scene.vector->field->dims, scene.lattice.dims) << why;
-    EXPECT_EQ(dataset->resident_bytes(), resident) << why << ": no level is made";
+    EXPECT_EQ(dataset->resident_bytes(), resident) << why << ": no level is computed";
   };
   view.method.detail = protocol::Detail::full;
   expect_full("full");
@@ -230,7 +230,7 @@ TEST_F(LevelOfAScene, IsFullWhereTheViewOrItsMethodOrAStrideSaysSo) {
   EXPECT_NE(reduced.level, (Level{0, 0, 0}));
 }
 
-TEST_F(LevelOfAScene, KeepsTheCameraAndItsCue) {
+TEST_F(LevelOfAScene, KeepsTheCameraAndItsDepthCue) {
   const Scene coarse = built();
   view.method.detail = protocol::Detail::full;
   const Scene full = built();
@@ -241,7 +241,7 @@ TEST_F(LevelOfAScene, KeepsTheCameraAndItsCue) {
   EXPECT_EQ(coarse.vector->min_magnitude, full.vector->min_magnitude);
 }
 
-TEST_F(LevelOfAScene, MakesNoLevelOfWhatIsNotShown) {
+TEST_F(LevelOfAScene, AveragesNoHiddenFields) {
   view.vector.field.kind = protocol::FieldChoice::Kind::none;
   const Scene scene = built();
   ASSERT_EQ(scene.level[0], scene.level[2]);
@@ -250,7 +250,7 @@ TEST_F(LevelOfAScene, MakesNoLevelOfWhatIsNotShown) {
   EXPECT_EQ(dataset->resident_bytes(), fine + (fine >> (3 * scene.level[0])));
 }
 
-// The cloud alone, of 64^3 samples, in a store of so many bytes.
+// The cloud only, of 64^3 samples, in a store of that many bytes.
 class LevelWithin : public LevelOfAScene {
  protected:
   static constexpr std::uint64_t fine = 4ULL * 64 * 64 * 64;
@@ -261,7 +261,7 @@ class LevelWithin : public LevelOfAScene {
   }
 };
 
-TEST_F(LevelWithin, EverySampleIsDrawnWhereALevelHasNoRoomBesideThem) {
+TEST_F(LevelWithin, FullDetailIsRenderedWhenALevelDoesNotFit) {
   open_within(fine);
   for (int again = 0; again < 2; ++again) {
     const Scene scene = built();
@@ -273,19 +273,19 @@ TEST_F(LevelWithin, EverySampleIsDrawnWhereALevelHasNoRoomBesideThem) {
   EXPECT_EQ(dataset->loads(), 1U) << "the next frame finds the volume";
 }
 
-TEST_F(LevelWithin, ALevelIsDrawnWhereThereIsRoom) {
+TEST_F(LevelWithin, LevelIsRenderedWhenItFits) {
   open_within(fine + fine / 8);
   EXPECT_GE(built().level[0], 1);
 }
 
-TEST_F(LevelWithin, WhatFullDetailRefusesIsRefused) {
+TEST_F(LevelWithin, ErrorsOfFullDetailAreReturned) {
   open_within(fine);
   const auto completed = complete(view, *dataset).value();
   open_within(fine - 1);
   EXPECT_EQ(build_scene(completed, *dataset).error().kind, ErrorKind::out_of_memory);
 }
 
-TEST_F(LevelOfAScene, IsTheSameWhereOnlyTheScaleOfHeightChanges) {
+TEST_F(LevelOfAScene, IsUnaffectedByTheScaleOfHeightAlone) {
   const Scene first = built();
   const std::uint64_t resident = dataset->resident_bytes();
   for (const double z : {0.97, 0.9, 0.83, 0.7}) {
@@ -299,7 +299,7 @@ TEST_F(LevelOfAScene, IsTheSameWhereOnlyTheScaleOfHeightChanges) {
   }
 }
 
-TEST(LevelOfRates, AreMeansOfTheRowsAndLayersMerged) {
+TEST(LevelOfRates, AreMeansOfMergedRowsAndLayers) {
   std::vector<double> latitudes;
   for (int j = 0; j < 64; ++j) latitudes.push_back(-63 + 2 * j);
   std::vector<double> longitudes;

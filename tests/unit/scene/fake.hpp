@@ -1,4 +1,4 @@
-// A small dataset whose fields are known, and which counts what is read from it.
+// A small dataset with known values that counts reads.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -60,7 +60,7 @@ inline data::FieldInfo wind_info(const std::string& vertical_unit = "m s-1") {
   return info;
 }
 
-// Every sample n of component c at step s holds n + 100 c + 1000 s, unless `constant` is set.
+// Every sample n of component c at step s is n + 100 c + 1000 s, unless `constant` is set.
 class FakeSource final : public data::Source {
  public:
   using Reads = std::map<std::string, int>;
@@ -121,7 +121,7 @@ inline std::unique_ptr<data::Dataset> sample_dataset(const std::string& name,
   return std::make_unique<data::Dataset>(std::move(*source), name, std::uint64_t{1} << 32U);
 }
 
-// A view completed and built; the test fails where that does.
+// A completed view and its scene; the test fails if either fails.
 inline Scene built(const protocol::View& view, data::Dataset& dataset) {
   auto full = complete(view, dataset);
   EXPECT_TRUE(full) << full.error().message;

@@ -1,4 +1,4 @@
-// Where samples stand: closed forms of placement, proportion and scale.
+// Sample positions: closed forms of placement, proportion and scale.
 #include "server/scene/lattice.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ data::Grid metres(std::vector<double> x, std::vector<double> y, std::vector<doub
   return grid;
 }
 
-TEST(Lattice, EvenAxesReachHalfACellBeyondTheirSamples) {
+TEST(Lattice, EvenAxesExtendHalfACellBeyondTheirSamples) {
   const auto lattice = place_lattice(metres({0, 1, 2, 3}, {0, 1}, {0, 1}), GeometryView{});
   ASSERT_TRUE(lattice);
   // Four cells make the longest edge 2, so a cell is 0.5.
@@ -37,7 +37,7 @@ TEST(Lattice, EvenAxesReachHalfACellBeyondTheirSamples) {
   EXPECT_NEAR(lattice->box_max.z, 0.5, 1e-14);
 }
 
-TEST(Lattice, UnevenAxesKeepTheirPlacesAndMeetMidway) {
+TEST(Lattice, UnevenAxesKeepTheirPositionsAndMeetMidway) {
   const auto lattice = place_lattice(metres({0, 1, 3, 7}, {0, 1}, {0, 1}), GeometryView{});
   ASSERT_TRUE(lattice);
   // Edges -0.5, 0.5, 2, 5, 9: 9.5 long, centred on 4.25.
@@ -50,14 +50,14 @@ TEST(Lattice, UnevenAxesKeepTheirPlacesAndMeetMidway) {
   }
 }
 
-TEST(Lattice, ASingleLayerIsPlacedHoweverLargeItsCoordinate) {
+TEST(Lattice, SingleLayerIsPlacedAtAnyCoordinate) {
   const auto lattice = place_lattice(metres({0, 1, 2}, {0, 1, 2}, {1e17}), GeometryView{});
   ASSERT_TRUE(lattice) << lattice.error().message;
   EXPECT_EQ(lattice->positions[2], std::vector<double>{0});
   EXPECT_NEAR(lattice->spacing[2][0], lattice->spacing[0][0], 1e-14);
 }
 
-TEST(Lattice, PressuresThatTheLogarithmBringsTogetherAreRefused) {
+TEST(Lattice, PressuresWithEqualLogarithmsAreRefused) {
   data::Grid grid = metres({0, 1, 2}, {0, 1, 2}, {});
   // 16 units in the last place apart, of which the logarithm leaves one or none.
   grid.axes[2] = axis(AxisKind::pressure, "Pa", {1e5 + 4.4e-10, 1e5 + 2.2e-10, 1e5});
@@ -66,7 +66,7 @@ TEST(Lattice, PressuresThatTheLogarithmBringsTogetherAreRefused) {
   EXPECT_EQ(lattice.error().kind, ErrorKind::bad_data);
 }
 
-TEST(Lattice, PressureStandsByItsLogarithmLowPressureHigh) {
+TEST(Lattice, PressureIsPlacedByLogarithmWithLowPressureHigh) {
   const auto lattice = place_lattice(atmosphere_grid(), GeometryView{});
   ASSERT_TRUE(lattice);
   // ln 2 apart each: three even cells, in a box of 0.15 of the longest horizontal edge.
@@ -76,7 +76,7 @@ TEST(Lattice, PressureStandsByItsLogarithmLowPressureHigh) {
   EXPECT_NEAR(lattice->positions[2][2], 0.1, 1e-14);
 }
 
-TEST(Lattice, VerticalPlacementCanBeChosen) {
+TEST(Lattice, VerticalPlacementIsConfigurable) {
   GeometryView geometry;
   geometry.vertical = VerticalPlacement::linear;
   auto lattice = place_lattice(atmosphere_grid(), geometry);
@@ -124,7 +124,7 @@ TEST(Lattice, LongitudeAndLatitudeShareTheirUnit) {
   EXPECT_NEAR(lattice->box_max.y, 0.75, 1e-14);  // 30 degrees
 }
 
-TEST(Lattice, ADimensionOfOneIsOneCellThick) {
+TEST(Lattice, DimensionOfOneIsOneCellThick) {
   auto lattice = place_lattice(metres({0, 1, 3, 7}, {0, 2}, {5}), GeometryView{});
   ASSERT_TRUE(lattice);
   // The smallest cell of the others is 1 m of 9.5 m.
@@ -162,7 +162,7 @@ TEST(Lattice, SpacingsAMillionfoldApartStayFinite) {
   EXPECT_NEAR(lattice->box_max.z - lattice->box_min.z, 2.0, 1e-12);
 }
 
-TEST(Lattice, CoordinatesThatTurnBackAreBadData) {
+TEST(Lattice, NonMonotonicCoordinatesAreRefused) {
   const auto refused = place_lattice(metres({0, 2, 1}, {0, 1}, {0, 1}), GeometryView{});
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::bad_data);

@@ -1,4 +1,4 @@
-// What a dataset says its grid can be bent to, of files as they come.
+// The geometries that a dataset offers, for real layouts of files.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ std::shared_ptr<data::Dataset> opened(const std::string& path) {
   return dataset ? *dataset : nullptr;
 }
 
-// 2-D longitudes and latitudes of three rows and four columns, turned against the compass.
+// 2-D longitudes and latitudes of three rows and four columns, rotated against the compass.
 void write_curvilinear(const std::string& path, double gap_or_one) {
   NetcdfMaker file(path);
   const int y = file.dimension("eta", 3);
@@ -57,7 +57,7 @@ void write_axes(const std::string& path, const std::array<const char*, 2>& names
   file.variable("f", NC_FLOAT, {y, x}, counting(12));
 }
 
-// The list, once it is known that placing the grid agrees with every word of it.
+// The list, checked against the placement of the grid for every entry.
 Words mappings(data::Dataset& dataset) {
   Words out = describe(dataset, RangesOf::none)->mappings;
   for (const auto& [mapping, name] :

@@ -19,7 +19,7 @@ constexpr double no_limit = std::numeric_limits<double>::infinity();
 constexpr Micros frame_us = 33'000;
 const quality::Viewpoint viewpoint{1, {0, 1, 0}, 1280, 720};
 
-// Pixels decide the time, the prior the error.
+// Pixels decide the time, the prior decides the error.
 Forecasts surveyed(double full_ms) {
   Forecasts out = quality::Table(quality::Kind{}).forecasts(viewpoint);
   for (std::size_t i = 0; i < out.size(); ++i) {
@@ -37,7 +37,7 @@ struct Drag {
   protocol::View view;
   Micros now = 0;
 
-  // `count` frames; the settings drawn. A setting takes `slower` times what is forecast.
+  // Settings of `count` frames. A setting takes `slower` times its forecast.
   std::vector<std::size_t> run(const Forecasts& known, const quality::Aim& aim, int count,
                                const std::function<double(int frame)>& slower) {
     std::vector<std::size_t> drawn;
@@ -53,7 +53,7 @@ struct Drag {
 
 double always(int /*frame*/) { return 1; }
 
-TEST(Chooser, CorrectsForecastsByWhatFramesTook) {
+TEST(Chooser, CorrectsForecastsByMeasuredFrames) {
   Drag drag;
   const Forecasts known = surveyed(100);
   const auto drawn = drag.run(known, {50.0, std::nullopt}, 30, [](int) { return 3.0; });
@@ -63,7 +63,7 @@ TEST(Chooser, CorrectsForecastsByWhatFramesTook) {
   EXPECT_NEAR(expected, 3 * known[drawn.back()].ms, 0.05 * expected);
 }
 
-TEST(Chooser, GoesDownAtOnceAndUpWithPatience) {
+TEST(Chooser, CoarsensAtOnceAndRefinesWithHysteresis) {
   Drag drag;
   const Forecasts known = surveyed(100);
   const quality::Aim aim{30.0, std::nullopt};
@@ -76,7 +76,7 @@ TEST(Chooser, GoesDownAtOnceAndUpWithPatience) {
   EXPECT_EQ(after.back(), calm.back());
 }
 
-TEST(Chooser, DoesNotFlickerWhereCostsScatter) {
+TEST(Chooser, DoesNotOscillateWhenCostsVary) {
   Drag drag;
   const Forecasts known = surveyed(100);
   const auto drawn = drag.run(known, {40.0, std::nullopt}, 400, [](int n) {
@@ -87,7 +87,7 @@ TEST(Chooser, DoesNotFlickerWhereCostsScatter) {
   EXPECT_LE(changes, 4);
 }
 
-TEST(Chooser, AnErrorIsKeptByTheFastestSettingThatDoes) {
+TEST(Chooser, FastestSettingWithinTheErrorIsChosen) {
   const Forecasts known = surveyed(100);
   for (const double most : {0.2, 0.08, 0.03, 0.005}) {
     Drag drag;
@@ -101,12 +101,12 @@ TEST(Chooser, AnErrorIsKeptByTheFastestSettingThatDoes) {
   }
 }
 
-// Nothing is surveyed: what finer pictures take is only guessed, and each is tried in its turn.
-TEST(Chooser, WithoutASurveyFinerPicturesAreTriedOneAfterTheOther) {
+// Without a calibration run times of finer pictures are only estimates, tried one by one.
+TEST(Chooser, WithoutACalibrationRunFinerPicturesAreTriedOneByOne) {
   Drag drag;
   const Forecasts guessed = quality::Table(quality::Kind{}).forecasts(viewpoint);
   const quality::Aim aim{30.0, std::nullopt};
-  // Ten times as slow as guessed, and then a tenth of that.
+  // Ten times as slow as estimated, then a tenth of it.
   const auto slow = drag.run(guessed, aim, 20, [](int) { return 10.0; });
   std::vector<std::size_t> fast;
   for (int n = 0; n < 20; ++n) {
@@ -119,7 +119,7 @@ TEST(Chooser, WithoutASurveyFinerPicturesAreTriedOneAfterTheOther) {
   EXPECT_LE(0.5 * guessed[fast.back()].ms, 30);
 }
 
-TEST(Chooser, LeavesOutPicturesThatTheLinkCannotCarry) {
+TEST(Chooser, ExcludesPicturesTheLinkCannotCarry) {
   Chooser chooser;
   const Forecasts known = surveyed(10);
   const protocol::View view;

@@ -64,7 +64,7 @@ class Driver {
     take(session_.on_described(id, std::move(description), now_));
   }
 
-  // Time passes; the session is woken whenever it asked to be.
+  // Advances time; the session is woken at every time it requested.
   void wait(Micros duration) {
     const Micros end = now_ + duration;
     for (int turns = 0;; ++turns) {
@@ -77,9 +77,9 @@ class Driver {
     now_ = end;
   }
 
-  // The render that was asked for ends after `cost`; its frame is handed over at once.
+  // The requested render ends after `cost`; its frame is delivered at once.
   void finish_render(Micros cost = 10 * ms, bool loaded = false) {
-    ASSERT_TRUE(render) << "nothing is being drawn";
+    ASSERT_TRUE(render) << "no render is running";
     wait(cost);
     const StartRender done = *render;
     render.reset();
@@ -102,7 +102,7 @@ class Driver {
     unwritten_ = false;
   }
 
-  // Draws and acknowledges until nothing is left to do.
+  // Renders and acknowledges until the session is idle.
   void settle(Micros cost = 10 * ms) {
     for (int turns = 0; turns < 50; ++turns) {
       if (render) finish_render(cost);
@@ -110,7 +110,7 @@ class Driver {
       if (!render) wait(200 * ms);
       if (!render) return;
     }
-    FAIL() << "there is no end to it";
+    FAIL() << "the session does not become idle";
   }
 
   // --- what came out ----------------------------------------------------------------------------
@@ -197,7 +197,7 @@ class Driver {
       if (auto* text = std::get_if<SendText>(&effect)) {
         texts.push_back(text->message);
         if (const auto* chosen = std::get_if<protocol::ChosenMessage>(&text->message)) {
-          ASSERT_EQ(chosen->seq, pinged_) << "the ping precedes its frame";
+          ASSERT_EQ(chosen->seq, pinged_) << "the ping must precede its frame";
         }
       }
       if (auto* describe = std::get_if<Describe>(&effect)) describes.push_back(*describe);
@@ -213,7 +213,7 @@ class Driver {
         cancelled = true;
       }
       if (auto* frame = std::get_if<SendFrame>(&effect)) {
-        ASSERT_FALSE(unwritten_) << "two frames under way";
+        ASSERT_FALSE(unwritten_) << "two frames are unacknowledged";
         frames.push_back(*frame);
         unwritten_ = true;
       }

@@ -1,4 +1,8 @@
-// Pacing on simulated links: how old frames are when they arrive, how many come, and what waits.
+// Pacing on simulated links: age of frames on arrival, frame rate, queueing. The age of a frame is
+// its arrival less t of the newest patch it shows, on the client's clock. Link time is the
+// transmission of that patch and of the frame: 2 delay, plus the bytes of the frame and its texts
+// over the rate. A render interval is the median time between starts of renders of moving frames.
+// Then p99(age - link time) <= 2 render intervals.
 //
 // Of a frame, `age` is its arrival less t of the newest patch it shows, on the viewer's clock. The
 // link's time is the way of that patch there and of the frame back, 2 delay, with the bytes of the
@@ -55,7 +59,7 @@ Told tell(const Viewer& viewer, const LinkOptions& link) {
 
 constexpr double whole = 1280 * 720;  // pixels
 
-// Median of what frames cost.
+// Median cost of frames.
 Micros drawing_time(const Told& told, Micros full) {
   std::vector<Micros> costs;
   for (const Shown& frame : told.moving) {
@@ -90,7 +94,7 @@ std::string name(const Case& c) {
          std::to_string(c.full / milli) + " ms";
 }
 
-TEST(Simulated, frames_are_young_and_as_many_as_the_link_allows) {
+TEST(Simulated, FramesAreRecentAndAsManyAsTheLinkAllows) {
   for (const Case& c : cases()) {
     SCOPED_TRACE(name(c));
     Clock clock;
@@ -123,7 +127,7 @@ TEST(Simulated, frames_are_young_and_as_many_as_the_link_allows) {
   }
 }
 
-TEST(Simulated, a_moving_frame_is_on_the_link_for_a_moment_and_good_where_the_link_is_fast) {
+TEST(Simulated, MovingFramesLeaveTheLinkSoonAndAreGoodOnAFastLink) {
   for (const Case& c : cases()) {
     SCOPED_TRACE(name(c));
     Clock clock;
@@ -132,7 +136,7 @@ TEST(Simulated, a_moving_frame_is_on_the_link_for_a_moment_and_good_where_the_li
     const Micros begin = clock.now();
     viewer.drag(begin + 10 * second);
     clock.run_until(begin + 10 * second);
-    // The first frames went before anything was known of the link.
+    // The first frames were sent before the link was known.
     std::vector<Micros> on_link;
     for (std::size_t n = 3; n < viewer.frames.size(); ++n) {
       on_link.push_back(
@@ -142,7 +146,7 @@ TEST(Simulated, a_moving_frame_is_on_the_link_for_a_moment_and_good_where_the_li
     }
     ASSERT_FALSE(on_link.empty());
     EXPECT_LE(quantile(on_link, 1), 300 * milli);
-    // 1280x720 at quality 85 are some 80 kB: 6 ms at 100 Mbit/s, less than a quarter of 33 ms.
+    // 1280x720 at quality 85 are about 80 kB: 6 ms at 100 Mbit/s, less than a quarter of 33 ms.
     const Shown& last = viewer.frames.back();
     if (c.link.bytes_per_s >= 100 * mbit) {
       EXPECT_EQ(last.quality, 85);
@@ -153,12 +157,12 @@ TEST(Simulated, a_moving_frame_is_on_the_link_for_a_moment_and_good_where_the_li
     if (c.link.bytes_per_s <= mbit) {
       EXPECT_EQ(last.quality, 40);
       EXPECT_LE(last.pixels, whole / 16);
-      EXPECT_GE(last.pixels, whole / 40) << "not coarser than it must be";
+      EXPECT_GE(last.pixels, whole / 40) << "not coarser than necessary";
     }
   }
 }
 
-TEST(Simulated, a_link_that_slows_down_and_recovers_is_followed) {
+TEST(Simulated, SlowingAndRecoveringLinkIsFollowed) {
   Clock clock;
   Renderer renderer(clock, 10 * milli);
   LinkOptions fast{50 * mbit, 10 * milli, 3 * milli};
@@ -178,12 +182,12 @@ TEST(Simulated, a_link_that_slows_down_and_recovers_is_followed) {
     const bool good = frame.pixels == whole && frame.quality >= 75;
     if (frame.arrived > begin + 40 * second && good && recovered == 0) recovered = frame.arrived;
   }
-  EXPECT_GE(slow_frames, 18 * 7) << "a second seven or more";
+  EXPECT_GE(slow_frames, 18 * 7) << "at least seven per second";
   ASSERT_GT(recovered, 0);
   EXPECT_LE(recovered, begin + 43 * second);
 }
 
-TEST(Simulated, a_short_rest_does_not_fill_a_slow_link_with_a_final_frame) {
+TEST(Simulated, ShortRestDoesNotFillASlowLinkWithAFinalFrame) {
   for (const double rate : {0.5, 100.0}) {
     SCOPED_TRACE(rate);
     Clock clock;
@@ -194,7 +198,7 @@ TEST(Simulated, a_short_rest_does_not_fill_a_slow_link_with_a_final_frame) {
     clock.run_until(begin + 10 * second);
     ASSERT_TRUE(viewer.frames.back().final);
     const std::size_t before = viewer.frames.size();
-    for (int n = 0; n < 8; ++n) {  // the hand moves for 1 s and rests for half of one
+    for (int n = 0; n < 8; ++n) {  // input for 1 s, then 0.5 s of rest
       viewer.drag(clock.now() + 1 * second);
       clock.run_until(clock.now() + 1500 * milli);
     }
@@ -209,7 +213,7 @@ TEST(Simulated, a_short_rest_does_not_fill_a_slow_link_with_a_final_frame) {
   }
 }
 
-TEST(Simulated, a_hidden_viewer_has_nothing_drawn) {
+TEST(Simulated, HiddenSessionRendersNothing) {
   Clock clock;
   Renderer renderer(clock, 10 * milli);
   Viewer viewer(clock, renderer, {10 * mbit, 20 * milli, 3 * milli});
@@ -227,7 +231,7 @@ TEST(Simulated, a_hidden_viewer_has_nothing_drawn) {
   EXPECT_EQ(viewer.frames.back().rev, viewer.rev());
 }
 
-TEST(Simulated, a_slow_viewer_does_not_slow_another) {
+TEST(Simulated, SlowSessionDoesNotSlowAnother) {
   const LinkOptions fast{1000 * mbit, 1 * milli, 2 * milli};
   const LinkOptions slow{0.5 * mbit, 200 * milli, 300 * milli};
   std::vector<double> count;
@@ -245,12 +249,12 @@ TEST(Simulated, a_slow_viewer_does_not_slow_another) {
     count.push_back(static_cast<double>(told.back().moving.size()));
     EXPECT_EQ(other.frames.empty(), alone);
   }
-  // The other's few renders are all that is missing.
+  // Only the few renders of the other session are missing.
   EXPECT_GE(count[1], 0.9 * count[0]);
   EXPECT_LE(quantile(told[1].beyond, 0.99), 2 * told[1].interval + 20 * milli);
 }
 
-TEST(Simulated, what_is_said_waits_for_one_frame_at_most) {
+TEST(Simulated, MessagesWaitForOneFrameAtMost) {
   for (const double rate : {0.5, 2.0, 10.0}) {
     SCOPED_TRACE(rate);
     Clock clock;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr Micros milli = 1000;
 
-// A link of `rate` bytes/s and `trip` there and back, on which one frame is at a time.
+// A link with `rate` bytes/s and round trip `trip` that carries one frame at a time.
 struct Known {
   double rate = 1e6;
   Micros trip = 40 * milli;
@@ -29,17 +29,17 @@ struct Known {
   }
 };
 
-TEST(Link, knows_nothing_before_a_frame_was_acknowledged) {
+TEST(Link, HasNoEstimateBeforeAnAcknowledgement) {
   Link link;
   EXPECT_FALSE(link.known());
   EXPECT_EQ(link.may_start_at(), 0);
   link.sent({1, 1000, 0, true}, 10);
   EXPECT_FALSE(link.known());
-  EXPECT_EQ(link.may_start_at(), 0) << "the credit alone holds it back";
+  EXPECT_EQ(link.may_start_at(), 0) << "only credit delays it";
   EXPECT_EQ(link.bytes_in_flight(), 1000U);
 }
 
-TEST(Link, finds_rate_and_round_trip_however_far_the_viewer_is) {
+TEST(Link, EstimatesRateAndRoundTripAtAnyDistance) {
   for (const double rate : {6e4, 2.5e5, 1.25e6, 1.25e7}) {
     for (const Micros trip : {2 * milli, 40 * milli, 400 * milli}) {
       for (const Micros decode : {0 * milli, 15 * milli}) {
@@ -56,7 +56,7 @@ TEST(Link, finds_rate_and_round_trip_however_far_the_viewer_is) {
   }
 }
 
-TEST(Link, a_frame_that_was_held_up_lowers_nothing) {
+TEST(Link, OneDelayedFrameLowersNothing) {
   Known known;
   Link link;
   for (int n = 0; n < 5; ++n) known.send(link, 50'000);
@@ -64,18 +64,18 @@ TEST(Link, a_frame_that_was_held_up_lowers_nothing) {
   EXPECT_NEAR(link.bytes_per_s(), known.rate, 0.001 * known.rate);
 }
 
-TEST(Link, two_frames_that_took_long_tell_that_it_has_become_slow) {
+TEST(Link, TwoSlowFramesLowerTheRate) {
   Known known;
   Link link;
   for (int n = 0; n < 20; ++n) known.send(link, 50'000);
   known.rate = 1e5;
   known.send(link, 50'000);
-  EXPECT_NEAR(link.bytes_per_s(), 1e6, 1e3) << "one may have been held up";
+  EXPECT_NEAR(link.bytes_per_s(), 1e6, 1e3) << "one frame may have been delayed";
   known.send(link, 50'000);
   EXPECT_NEAR(link.bytes_per_s(), 1e5, 1e2);
 }
 
-TEST(Link, frames_too_small_to_fill_it_lower_nothing_and_larger_ones_do) {
+TEST(Link, SmallFramesLowerNothingAndLargerOnesDo) {
   Known known;
   known.rate = 2e6;
   Link link;
@@ -84,10 +84,10 @@ TEST(Link, frames_too_small_to_fill_it_lower_nothing_and_larger_ones_do) {
   EXPECT_NEAR(link.bytes_per_s(), 2e6, 2e3);
   known.rate = 1e5;
   for (int n = 0; n < 8; ++n) known.send(link, 100'000);
-  EXPECT_NEAR(link.bytes_per_s(), 1e5, 1e2) << "it has become slow";
+  EXPECT_NEAR(link.bytes_per_s(), 1e5, 1e2) << "the link has become slow";
 }
 
-TEST(Link, without_pongs_the_smallest_frame_tells_the_round_trip) {
+TEST(Link, WithoutPongsTheSmallestFrameGivesTheRoundTrip) {
   Known known;
   Link link;
   known.send(link, 1'000, false);
@@ -97,7 +97,7 @@ TEST(Link, without_pongs_the_smallest_frame_tells_the_round_trip) {
   EXPECT_NEAR(link.bytes_per_s(), known.rate, 0.02 * known.rate);
 }
 
-TEST(Link, a_longer_way_is_believed_after_a_while) {
+TEST(Link, LongerRoundTripIsAcceptedAfterAWhile) {
   Known known;
   Link link;
   known.send(link, 50'000);
@@ -107,7 +107,7 @@ TEST(Link, a_longer_way_is_believed_after_a_while) {
   EXPECT_NEAR(link.bytes_per_s(), known.rate, 0.001 * known.rate);
 }
 
-TEST(Link, two_frames_in_a_row_tell_the_rate_that_the_second_alone_hides) {
+TEST(Link, ConsecutiveFramesRevealTheRateHiddenByTheSecond) {
   const Micros trip = 20 * milli;
   const double rate = 1e6;
   Link link;
@@ -119,8 +119,8 @@ TEST(Link, two_frames_in_a_row_tell_the_rate_that_the_second_alone_hides) {
   EXPECT_NEAR(link.bytes_per_s(), rate, 0.001 * rate);
 }
 
-TEST(Link, the_next_frame_is_begun_so_that_it_finds_the_link_free) {
-  Known known;  // 1 MB/s; frames are drawn in 10 ms
+TEST(Link, NextFrameStartsSoThatTheLinkIsFree) {
+  Known known;  // 1 MB/s; frames take 10 ms to render
   known.trip = 4 * milli;
   Link link;
   for (int n = 0; n < 4; ++n) known.send(link, 60'000);
@@ -133,7 +133,7 @@ TEST(Link, the_next_frame_is_begun_so_that_it_finds_the_link_free) {
   EXPECT_EQ(link.may_start_at(), 0) << "nothing is in flight";
 }
 
-TEST(Link, the_next_frame_is_begun_so_that_it_finds_the_viewer_free) {
+TEST(Link, NextFrameStartsSoThatTheClientIsFree) {
   Known known;
   known.trip = 4 * milli;
   known.decode = 200 * milli;
@@ -141,12 +141,13 @@ TEST(Link, the_next_frame_is_begun_so_that_it_finds_the_viewer_free) {
   for (int n = 0; n < 12; ++n) known.send(link, 20'000);
   const Micros sent = known.now;
   link.sent({++known.seq, 20'000, sent - 10 * milli, true}, sent);
-  // It arrives 20 ms later, is decoded for 200 ms; the next takes 10 ms to draw, 20 to arrive.
+  // It arrives 20 ms later and takes 200 ms to decode; the next takes 10 ms to render, 20 to
+  // arrive.
   EXPECT_NEAR(static_cast<double>(link.may_start_at()),
               static_cast<double>(sent + (20 + 200 - 20 - 10) * milli), 1.0 * milli);
 }
 
-TEST(Link, far_viewers_get_their_two_frames_evenly) {
+TEST(Link, DistantClientsGetTheirTwoFramesEvenlySpaced) {
   Known known;
   known.rate = 1e8;
   known.trip = 400 * milli;
@@ -160,7 +161,7 @@ TEST(Link, far_viewers_get_their_two_frames_evenly) {
 
 // --- JPEG ---------------------------------------------------------------------------------------
 
-// A link of that rate on which nothing is in flight.
+// An idle link of that rate.
 Link link_of(double rate) {
   Known known;
   known.rate = rate;
@@ -172,7 +173,7 @@ Link link_of(double rate) {
 constexpr Micros budget = 33 * milli;
 constexpr double full = 1280 * 720;
 
-// Frames of a picture whose bytes obey the model with c = 0.7, at what is chosen for them.
+// Frames whose bytes follow the model with c = 0.7 at the chosen quality.
 int settled(JpegRate& jpeg, const Link& link, double pixels) {
   int quality = 0;
   for (int n = 0; n < 20; ++n) {
@@ -185,7 +186,7 @@ int settled(JpegRate& jpeg, const Link& link, double pixels) {
   return quality;
 }
 
-TEST(JpegRate, quality_falls_with_the_link_and_rises_where_there_is_plenty) {
+TEST(JpegRate, QualityFollowsTheLinkRate) {
   int before = 0;
   for (const double rate : {1e5, 1.6e6, 2.2e6, 4e6, 1.2e7, 1e8}) {
     JpegRate jpeg;
@@ -209,14 +210,14 @@ TEST(JpegRate, quality_falls_with_the_link_and_rises_where_there_is_plenty) {
   }
 }
 
-TEST(JpegRate, is_usual_while_nothing_is_known_of_the_link) {
+TEST(JpegRate, IsDefaultWhileTheLinkIsUnknown) {
   JpegRate jpeg;
   const Link link;
   EXPECT_EQ(jpeg.choose(full, link, budget), 75);
   EXPECT_EQ(jpeg.least_level(1280, 720, link, budget), 0);
 }
 
-TEST(JpegRate, level_gives_way_where_the_lowest_quality_is_too_much) {
+TEST(JpegRate, LevelChangesWhenTheLowestQualityIsTooLarge) {
   int before = 4;
   for (const double rate : {1e4, 6.25e4, 2.5e5, 4e5, 1e6}) {
     JpegRate jpeg;
@@ -227,7 +228,7 @@ TEST(JpegRate, level_gives_way_where_the_lowest_quality_is_too_much) {
     for (int n = 0; n < 5; ++n) level = jpeg.least_level(1280, 720, link, budget);
     EXPECT_LE(level, before);
     before = level;
-    // Just as many pixels as take moving_most_us, where any do.
+    // The most pixels that fit within moving_most_us, if any do.
     const double bytes = jpeg.predicted_bytes(most, JpegRate::quality_least) + 1700;
     if (rate > 5e4) {
       EXPECT_NEAR(bytes / rate, 0.125, 0.002) << rate;
@@ -237,14 +238,14 @@ TEST(JpegRate, level_gives_way_where_the_lowest_quality_is_too_much) {
       EXPECT_LE(drawn, 1.25 * most);
     }
     if (level > 0) {
-      EXPECT_GT(4 * drawn, most) << "no coarser than it must be";
+      EXPECT_GT(4 * drawn, most) << "not coarser than necessary";
     }
   }
   EXPECT_EQ(before, 0);
 }
 
-TEST(JpegRate, pictures_that_vary_a_little_do_not_change_the_level) {
-  // However near to a change of level the link happens to be.
+TEST(JpegRate, SmallVariationsOfPicturesKeepTheLevel) {
+  // However near the rate is to a change of level.
   for (double rate = 1e5; rate < 3e5; rate *= 1.03) {
     JpegRate jpeg;
     const Link link = link_of(rate);
@@ -259,7 +260,7 @@ TEST(JpegRate, pictures_that_vary_a_little_do_not_change_the_level) {
   }
 }
 
-TEST(JpegRate, a_link_that_recovers_is_used_after_a_few_frames) {
+TEST(JpegRate, RecoveredLinkIsUsedAfterAFewFrames) {
   JpegRate jpeg;
   const Link slow = link_of(1e5);
   settled(jpeg, slow, 57'600);

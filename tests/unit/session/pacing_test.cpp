@@ -8,7 +8,7 @@ namespace {
 
 using testing::ElementsAre;
 
-TEST(Pacing, a_patch_alone_brings_a_moving_frame_and_then_the_final_one) {
+TEST(Pacing, SinglePatchGivesAMovingAndThenTheFinalFrame) {
   Driver driver;
   driver.patch(7, R"({"dataset":"wind"})", 123.5);
   driver.finish_render();
@@ -22,7 +22,7 @@ TEST(Pacing, a_patch_alone_brings_a_moving_frame_and_then_the_final_one) {
 
   driver.ack(1);
   driver.wait(100 * ms);
-  EXPECT_FALSE(driver.render) << "too early: the viewer may go on moving";
+  EXPECT_FALSE(driver.render) << "too early: motion may continue";
   driver.wait(60 * ms);
   ASSERT_TRUE(driver.render);
   EXPECT_EQ(driver.render->setting.half_level, 0);
@@ -35,10 +35,10 @@ TEST(Pacing, a_patch_alone_brings_a_moving_frame_and_then_the_final_one) {
 
   driver.ack(2);
   driver.wait(5000 * ms);
-  EXPECT_FALSE(driver.render) << "nothing is left to draw";
+  EXPECT_FALSE(driver.render) << "nothing is left to render";
 }
 
-TEST(Pacing, moving_frames_are_drawn_by_kernel_and_final_ones_as_asked) {
+TEST(Pacing, MovingFramesUseKernelsAndFinalOnesTheRequestedMethod) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   ASSERT_TRUE(driver.render);
@@ -50,7 +50,7 @@ TEST(Pacing, moving_frames_are_drawn_by_kernel_and_final_ones_as_asked) {
   EXPECT_EQ(driver.render->setting.method, protocol::MethodName::slab);
 }
 
-TEST(Pacing, slow_final_frames_by_slab_do_not_coarsen_moving_ones) {
+TEST(Pacing, SlowFinalSlabFramesDoNotCoarsenMovingOnes) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   ASSERT_TRUE(driver.render);
@@ -67,7 +67,7 @@ TEST(Pacing, slow_final_frames_by_slab_do_not_coarsen_moving_ones) {
   EXPECT_LE(driver.render->setting.coarser, before.coarser);
 }
 
-TEST(Pacing, every_frame_is_announced_by_what_was_chosen_for_it) {
+TEST(Pacing, EveryFrameIsAnnouncedWithItsSetting) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -79,7 +79,7 @@ TEST(Pacing, every_frame_is_announced_by_what_was_chosen_for_it) {
   }
 }
 
-TEST(Pacing, a_lossless_view_rests_as_png_and_moves_as_jpeg) {
+TEST(Pacing, LosslessViewRestsAsPngAndMovesAsJpeg) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","quality":{"lossless":true}})");
   driver.settle();
@@ -90,7 +90,7 @@ TEST(Pacing, a_lossless_view_rests_as_png_and_moves_as_jpeg) {
   EXPECT_TRUE(Driver::is_final(driver.frames[1]));
 }
 
-TEST(Pacing, a_final_frame_is_of_high_quality_however_slow_the_link) {
+TEST(Pacing, FinalFrameHasHighQualityOnAnyLink) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -98,7 +98,7 @@ TEST(Pacing, a_final_frame_is_of_high_quality_however_slow_the_link) {
   for (std::uint32_t rev = 2; rev < 12; ++rev) {
     driver.patch(rev, azimuth(static_cast<int>(rev)));
     driver.finish_render();
-    driver.wait(100 * ms);  // for not even 1 kB
+    driver.wait(100 * ms);  // insufficient even for 1 kB
     driver.ack(rev);
   }
   EXPECT_EQ(driver.frames.back().header.quality, 40);
@@ -109,7 +109,7 @@ TEST(Pacing, a_final_frame_is_of_high_quality_however_slow_the_link) {
   EXPECT_EQ(driver.frames.back().header.level, 0);
 }
 
-TEST(Pacing, no_third_frame_before_an_acknowledgement) {
+TEST(Pacing, NoThirdFrameBeforeAnAcknowledgement) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -120,7 +120,7 @@ TEST(Pacing, no_third_frame_before_an_acknowledgement) {
     driver.wait(50 * ms);
   }
   EXPECT_EQ(driver.frames.size(), 2U);
-  EXPECT_FALSE(driver.render) << "a frame that cannot be sent would be old when it can";
+  EXPECT_FALSE(driver.render) << "a frame without credit would be outdated when sent";
 
   driver.ack(2);  // stands for frame 1 too
   driver.finish_render();
@@ -128,7 +128,7 @@ TEST(Pacing, no_third_frame_before_an_acknowledgement) {
   EXPECT_EQ(driver.frames[2].header.rev, 19U) << "the newest view, not the next one";
 }
 
-TEST(Pacing, nothing_is_drawn_while_a_frame_is_being_written) {
+TEST(Pacing, NothingIsRenderedWhileAFrameIsWritten) {
   Driver driver;
   driver.write_at_once = false;
   driver.patch(1, R"({"dataset":"wind"})");
@@ -143,7 +143,7 @@ TEST(Pacing, nothing_is_drawn_while_a_frame_is_being_written) {
   EXPECT_EQ(driver.frames.back().header.rev, 3U);
 }
 
-TEST(Pacing, a_steady_flow_of_patches_starves_nobody) {
+TEST(Pacing, SteadyPatchesStarveNoSession) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -156,7 +156,7 @@ TEST(Pacing, a_steady_flow_of_patches_starves_nobody) {
     if (driver.render) {
       busy += 10 * ms;
       EXPECT_FALSE(driver.cancelled && !driver.render->encoding.full_chroma)
-          << "moving frames are let finish";
+          << "moving frames are completed";
     }
     driver.wait(10 * ms);
     if (busy >= 30 * ms) {
@@ -166,15 +166,15 @@ TEST(Pacing, a_steady_flow_of_patches_starves_nobody) {
     }
   }
   const std::size_t moved = driver.frames.size() - before;
-  EXPECT_GE(moved, 40U) << "about one a render time";
+  EXPECT_GE(moved, 40U) << "about one per render time";
   for (std::size_t n = before + 1; n < driver.frames.size(); ++n) {
     EXPECT_GT(driver.frames[n].header.rev, driver.frames[n - 1].header.rev);
     EXPECT_FALSE(Driver::is_final(driver.frames[n]));
   }
-  EXPECT_GE(driver.frames.back().header.rev + 10, rev) << "and never far behind";
+  EXPECT_GE(driver.frames.back().header.rev + 10, rev) << "never far behind";
 }
 
-TEST(Pacing, after_stopping_only_the_newest_view_is_shown) {
+TEST(Pacing, AfterStoppingOnlyTheNewestViewIsShown) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -186,12 +186,12 @@ TEST(Pacing, after_stopping_only_the_newest_view_is_shown) {
   for (std::size_t n = before; n < driver.frames.size(); ++n) {
     revs.push_back(driver.frames[n].header.rev);
   }
-  // The frame under way when the flow began, the newest while moving, the newest for good.
+  // The frame that was running at the start, the newest in motion, and the final one.
   EXPECT_THAT(revs, ElementsAre(2U, 30U, 30U));
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(Pacing, a_change_gives_up_the_final_frame_and_a_moving_one_comes_instead) {
+TEST(Pacing, ChangeCancelsTheFinalFrameForAMovingOne) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -201,14 +201,14 @@ TEST(Pacing, a_change_gives_up_the_final_frame_and_a_moving_one_comes_instead) {
   driver.patch(2, azimuth(1));
   EXPECT_TRUE(driver.cancelled);
   driver.finish_render(1 * ms);
-  EXPECT_EQ(driver.frames.size(), 1U) << "what was given up is not sent";
+  EXPECT_EQ(driver.frames.size(), 1U) << "a cancelled frame is not sent";
   ASSERT_TRUE(driver.render);
   EXPECT_FALSE(driver.render->encoding.full_chroma);
   driver.finish_render();
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
 }
 
-TEST(Pacing, a_final_frame_that_was_done_just_before_the_change_is_dropped) {
+TEST(Pacing, FinalFrameFinishedJustBeforeAChangeIsDropped) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -223,7 +223,7 @@ TEST(Pacing, a_final_frame_that_was_done_just_before_the_change_is_dropped) {
   EXPECT_EQ(driver.texts_of<protocol::StatsMessage>().back().dropped, 1U);
 }
 
-TEST(Pacing, a_hidden_client_is_sent_nothing_until_it_is_seen_again) {
+TEST(Pacing, HiddenClientGetsNothingUntilVisible) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.say(protocol::VisibilityMessage{true});
@@ -251,7 +251,7 @@ Revs unchanged_revs(const Driver& driver) {
   return revs;
 }
 
-TEST(Unchanged, a_patch_that_says_the_same_is_answered_without_a_frame) {
+TEST(Unchanged, EquivalentPatchIsAnsweredWithoutAFrame) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[1,2,3]}})");
   driver.settle();
@@ -269,11 +269,11 @@ TEST(Unchanged, a_patch_that_says_the_same_is_answered_without_a_frame) {
 
   driver.patch(5, azimuth(2));
   driver.settle();
-  EXPECT_EQ(driver.frames.back().header.rev, 5U) << "the next change shows";
+  EXPECT_EQ(driver.frames.back().header.rev, 5U) << "the next change is visible";
   EXPECT_EQ(unchanged_revs(driver), (Revs{2, 3, 4}));
 }
 
-TEST(Unchanged, a_view_that_differs_in_anything_is_drawn) {
+TEST(Unchanged, AnyDifferenceIsRendered) {
   for (const char* other :
        {R"({"step":1})", R"({"camera":{"eye":[1,2,4]}})", R"({"image":{"background":"#010101"}})",
         R"({"image":{"width":99}})", R"({"vector":{"field":null}})", R"({"dataset":"sea"})"}) {
@@ -286,7 +286,7 @@ TEST(Unchanged, a_view_that_differs_in_anything_is_drawn) {
   }
 }
 
-TEST(Unchanged, a_moving_frame_does_not_stand_for_its_view) {
+TEST(Unchanged, MovingFrameDoesNotStandForItsView) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -298,20 +298,20 @@ TEST(Unchanged, a_moving_frame_does_not_stand_for_its_view) {
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
 }
 
-TEST(Unchanged, back_to_what_was_shown_while_another_view_is_drawn_is_drawn_again) {
+TEST(Unchanged, ReturnToTheShownViewDuringARenderIsRenderedAgain) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
   driver.patch(2, azimuth(1));
   ASSERT_TRUE(driver.render);
   driver.patch(3, R"({"camera":{"eye":null}})");
-  EXPECT_TRUE(unchanged_revs(driver).empty()) << "the frame of rev 2 is still to come";
+  EXPECT_TRUE(unchanged_revs(driver).empty()) << "the frame of rev 2 is still pending";
   driver.settle();
   EXPECT_EQ(driver.frames.back().header.rev, 3U);
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(Unchanged, there_and_back_while_the_credit_is_out_needs_no_frame) {
+TEST(Unchanged, ThereAndBackWithoutCreditNeedsNoFrame) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -328,7 +328,7 @@ TEST(Unchanged, there_and_back_while_the_credit_is_out_needs_no_frame) {
   EXPECT_EQ(driver.frames.size(), 2U);
 }
 
-TEST(Unchanged, a_camera_that_moves_where_nothing_shows_sends_nothing) {
+TEST(Unchanged, CameraMotionWithoutVisibleContentSendsNothing) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
   driver.settle();
@@ -341,11 +341,11 @@ TEST(Unchanged, a_camera_that_moves_where_nothing_shows_sends_nothing) {
   EXPECT_EQ(unchanged_revs(driver), (Revs{2, 3, 4, 5}));
   driver.patch(6, azimuth(3));
   driver.settle();
-  EXPECT_EQ(driver.frames.back().header.rev, 6U) << "now something shows";
+  EXPECT_EQ(driver.frames.back().header.rev, 6U) << "content is visible again";
   EXPECT_GT(driver.frames.size(), frames);
 }
 
-TEST(Unchanged, a_moving_frame_with_nothing_in_it_does_not_stand_for_the_final_one) {
+TEST(Unchanged, EmptyMovingFrameDoesNotStandForTheFinalOne) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
   driver.settle(200 * ms);
@@ -355,7 +355,7 @@ TEST(Unchanged, a_moving_frame_with_nothing_in_it_does_not_stand_for_the_final_o
   EXPECT_FALSE(driver.render->encoding.full_chroma) << "a moving frame is sent first";
   driver.finish_render(10 * ms);
   EXPECT_EQ(driver.frames.size(), frames);
-  EXPECT_TRUE(unchanged_revs(driver).empty()) << "that is not known yet";
+  EXPECT_TRUE(unchanged_revs(driver).empty()) << "not known yet";
   driver.settle(200 * ms);
   ASSERT_EQ(driver.frames.size(), frames + 1);
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
@@ -363,7 +363,7 @@ TEST(Unchanged, a_moving_frame_with_nothing_in_it_does_not_stand_for_the_final_o
   EXPECT_TRUE(unchanged_revs(driver).empty());
 }
 
-TEST(Unchanged, a_rev_that_is_said_again_is_answered_again) {
+TEST(Unchanged, RepeatedRevIsAnsweredAgain) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -379,7 +379,7 @@ TEST(Unchanged, a_rev_that_is_said_again_is_answered_again) {
   EXPECT_EQ(unchanged_revs(driver), (Revs{1, 1})) << "no patch, no answer";
 }
 
-TEST(Unchanged, going_back_after_a_refusal_answers_what_was_not_answered_and_no_more) {
+TEST(Unchanged, ReturnAfterARefusalAnswersOpenPatchesOnly) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -388,10 +388,10 @@ TEST(Unchanged, going_back_after_a_refusal_answers_what_was_not_answered_and_no_
   driver.settle();
   ASSERT_EQ(driver.errors().size(), 1U);
   EXPECT_EQ(driver.errors()[0].rev, 2U);
-  EXPECT_TRUE(unchanged_revs(driver).empty()) << "rev 1 was answered long ago";
+  EXPECT_TRUE(unchanged_revs(driver).empty()) << "rev 1 was already answered";
 }
 
-TEST(Unchanged, what_shows_nothing_but_differs_by_more_than_the_camera_is_sent) {
+TEST(Unchanged, EmptyViewDifferingInMoreThanTheCameraIsSent) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","camera":{"eye":[2000,0,0]}})");
   driver.settle();
@@ -402,7 +402,7 @@ TEST(Unchanged, what_shows_nothing_but_differs_by_more_than_the_camera_is_sent) 
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
 }
 
-TEST(Unchanged, from_something_to_nothing_is_sent) {
+TEST(Unchanged, ChangeToAnEmptyPictureIsSent) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();

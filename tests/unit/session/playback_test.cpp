@@ -11,7 +11,7 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-// A dataset of `steps` steps at rest at `step`, with nothing recorded of how it came there.
+// A dataset of `steps` steps at rest at `step`, with the recorded history cleared.
 void rest_at(Driver& driver, int step) {
   driver.patch(1, R"({"dataset":"wind","step":)" + std::to_string(step) + "}");
   driver.settle();
@@ -20,7 +20,7 @@ void rest_at(Driver& driver, int step) {
   driver.requests.clear();
 }
 
-// Draws each frame in `cost` and acknowledges it, for `duration`.
+// Renders each frame in `cost` and acknowledges it, for `duration`.
 void run_and_acknowledge(Driver& driver, Micros duration, Micros cost, bool loaded = false) {
   const Micros end = driver.now() + duration;
   while (driver.now() < end) {
@@ -43,7 +43,7 @@ std::vector<std::uint32_t> moving_steps(const Driver& driver) {
 
 // --- order --------------------------------------------------------------------------------------
 
-TEST(Reverse, runs_down_and_begins_again_at_the_top) {
+TEST(Reverse, RunsDownAndRestartsAtTheTop) {
   Driver driver;
   rest_at(driver, 2);
   driver.say(play(4, 0, 10, true, true));
@@ -51,7 +51,7 @@ TEST(Reverse, runs_down_and_begins_again_at_the_top) {
   EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 0U, 4U, 3U, 2U, 1U));
 }
 
-TEST(Reverse, without_loop_ends_at_the_bottom_and_makes_it_final) {
+TEST(Reverse, WithoutLoopEndsAtTheFirstStepAndMakesItFinal) {
   Driver driver;
   rest_at(driver, 2);
   driver.say(play(9, 0, 10, false, true));
@@ -64,17 +64,17 @@ TEST(Reverse, without_loop_ends_at_the_bottom_and_makes_it_final) {
   EXPECT_THAT(driver.steps_shown(), ElementsAre(9U, 8U));
 }
 
-TEST(Reverse, with_drop_skips_downward_and_over_the_end) {
+TEST(Reverse, WithDropSkipsDownwardAndAcrossTheEnd) {
   Driver driver;
   rest_at(driver, 3);
   driver.say(play(9, 0, 10, true, true));
   driver.wait(105 * ms);
   ASSERT_EQ(driver.render->view.step, 2);
-  driver.finish_render(500 * ms);  // the steps 1 to 0 and 9 to 7 go by
+  driver.finish_render(500 * ms);  // steps 1 to 0 and 9 to 7 are skipped
   EXPECT_EQ(driver.render->view.step, 7);
 }
 
-TEST(Reverse, from_beyond_the_last_step_is_an_error) {
+TEST(Reverse, FromBeyondTheLastStepIsAnError) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(steps, 0, 10, true, true));
@@ -82,20 +82,20 @@ TEST(Reverse, from_beyond_the_last_step_is_an_error) {
   EXPECT_EQ(driver.errors()[0].problem.errors.at(0).pointer, "/from");
 }
 
-// --- changes on the way -------------------------------------------------------------------------
+// --- changes during playback --------------------------------------------------------------------
 
-TEST(Seamless, a_faster_pace_goes_on_from_the_present_step) {
+TEST(Seamless, FasterPaceContinuesFromThePresentStep) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 1, true, true));
-  run_and_acknowledge(driver, 1010 * ms, 5 * ms);  // step 1 came just now
+  run_and_acknowledge(driver, 1010 * ms, 5 * ms);  // step 1 was just shown
   driver.frames.clear();
   driver.say(play(0, 9, 10, true, true));
   run_and_acknowledge(driver, 350 * ms, 5 * ms);
   EXPECT_THAT(moving_steps(driver), ElementsAre(2U, 3U, 4U));
 }
 
-TEST(Seamless, saying_the_same_again_and_again_holds_nothing_up) {
+TEST(Seamless, RepeatedEqualMessagesDelayNothing) {
   Driver driver;
   rest_at(driver, 0);
   for (int n = 0; n < 20; ++n) {
@@ -105,7 +105,7 @@ TEST(Seamless, saying_the_same_again_and_again_holds_nothing_up) {
   EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 2U, 3U, 4U));
 }
 
-TEST(Seamless, turning_round_goes_back_over_the_steps_just_seen) {
+TEST(Seamless, ReversalReturnsOverTheStepsJustShown) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 10, true, true));
@@ -115,19 +115,19 @@ TEST(Seamless, turning_round_goes_back_over_the_steps_just_seen) {
   EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 2U, 3U, 2U, 1U, 0U));
 }
 
-TEST(Seamless, dropping_from_now_on_does_not_leap_over_what_was_late) {
+TEST(Seamless, DroppingFromNowOnDoesNotSkipLateSteps) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 10, true, false));
   driver.wait(105 * ms);
   ASSERT_EQ(driver.render->view.step, 1);
-  driver.wait(600 * ms);  // still being drawn
+  driver.wait(600 * ms);  // still rendering
   driver.say(play(0, 9, 10, true, true));
   driver.finish_render(1 * ms);
   EXPECT_EQ(driver.render->view.step, 2);
 }
 
-TEST(Seamless, no_loop_from_now_on_ends_at_the_last_step) {
+TEST(Seamless, LoopTurnedOffEndsAtTheLastStep) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 3, 10, true, true));
@@ -138,7 +138,7 @@ TEST(Seamless, no_loop_from_now_on_ends_at_the_last_step) {
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(Seamless, one_step_alone_is_shown_and_nothing_runs) {
+TEST(Seamless, SingleStepIsShownWithoutPlayback) {
   Driver driver;
   rest_at(driver, 5);
   driver.say(play(7, 7, 60, true, true));
@@ -147,7 +147,7 @@ TEST(Seamless, one_step_alone_is_shown_and_nothing_runs) {
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(EveryStep, is_shown_while_the_view_is_turned_all_the_time) {
+TEST(EveryStep, IsShownDuringContinuousRotation) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 20, false, false));
@@ -160,7 +160,7 @@ TEST(EveryStep, is_shown_while_the_view_is_turned_all_the_time) {
   for (std::uint32_t step = 1; step < 10; ++step) EXPECT_THAT(shown, testing::Contains(step));
 }
 
-TEST(Scrub, at_rest_shows_the_newest_of_many_steps) {
+TEST(Scrub, AtRestShowsTheNewestOfManySteps) {
   Driver driver;
   rest_at(driver, 0);
   std::uint32_t rev = 1;
@@ -177,13 +177,13 @@ TEST(Scrub, at_rest_shows_the_newest_of_many_steps) {
   EXPECT_THAT(driver.steps_shown(), ElementsAre(1U, 8U, 8U));
 }
 
-TEST(Hidden, steps_wait_until_someone_looks_again) {
+TEST(Hidden, StepsWaitUntilVisible) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 10, true, true));
   run_and_acknowledge(driver, 210 * ms, 5 * ms);
   driver.say(protocol::VisibilityMessage{true});
-  driver.wait(3370 * ms);  // no whole number of rounds
+  driver.wait(3370 * ms);  // no whole number of loops
   driver.say(protocol::VisibilityMessage{false});
   driver.frames.clear();
   run_and_acknowledge(driver, 250 * ms, 5 * ms);
@@ -192,19 +192,19 @@ TEST(Hidden, steps_wait_until_someone_looks_again) {
 
 // --- counts -------------------------------------------------------------------------------------
 
-TEST(PlayStats, tell_the_pace_and_that_nothing_was_left_out) {
+TEST(PlayStats, ReportThePaceAndThatNothingWasDropped) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 25, true, true));
   run_and_acknowledge(driver, 3200 * ms, 10 * ms);
   const auto stats = driver.texts_of<protocol::StatsMessage>();
-  ASSERT_EQ(stats.size(), 3U) << "one a second";
+  ASSERT_EQ(stats.size(), 3U) << "one per second";
   for (const auto& told : stats) EXPECT_NEAR(told.play_fps.value_or(0), 25, 0.5);
   EXPECT_EQ(stats.back().steps_dropped, 0U);
   EXPECT_EQ(stats.back().steps_not_ready, 0U);
 }
 
-TEST(PlayStats, without_drop_tell_the_pace_that_drawing_allows) {
+TEST(PlayStats, WithoutDropReportTheRenderingPace) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 60, true, false));
@@ -215,13 +215,13 @@ TEST(PlayStats, without_drop_tell_the_pace_that_drawing_allows) {
   EXPECT_EQ(stats.back().steps_dropped, 0U);
 }
 
-TEST(PlayStats, steps_shown_and_dropped_are_all_that_went_by) {
+TEST(PlayStats, ShownAndDroppedStepsAddUp) {
   for (const Micros cost : {30 * ms, 70 * ms, 130 * ms, 310 * ms}) {
     Driver driver;
     rest_at(driver, 0);
     driver.say(play(0, 9, 20, true, true));
     run_and_acknowledge(driver, 4020 * ms, cost);
-    const int showing = driver.render ? 1 : 0;  // begun, so it will be shown
+    const int showing = driver.render ? 1 : 0;  // started, so it will be shown
     const auto shown = static_cast<std::int64_t>(moving_steps(driver).size()) + showing;
     driver.say(protocol::PauseMessage{});
     driver.settle();
@@ -240,13 +240,13 @@ TEST(PlayStats, steps_shown_and_dropped_are_all_that_went_by) {
   }
 }
 
-TEST(PlayStats, count_the_steps_that_had_to_be_read_first) {
+TEST(PlayStats, CountStepsThatWaitedForLoading) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 10, true, true));
   run_and_acknowledge(driver, 305 * ms, 5 * ms, true);
   EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 2U, 3U));
-  driver.patch(2, R"({"camera":{"fovY":20}})");  // its frame is not the step's first
+  driver.patch(2, R"({"camera":{"fovY":20}})");  // its frame is not the first of the step
   run_and_acknowledge(driver, 20 * ms, 5 * ms, true);
   driver.say(protocol::PauseMessage{});
   driver.settle();
@@ -261,7 +261,7 @@ std::vector<int> iota(int first, int count) {
   return out;
 }
 
-TEST(PrefetchRequest, at_rest_is_for_the_neighbours) {
+TEST(PrefetchRequest, AtRestCoversTheNeighbors) {
   for (const auto& [step, wanted] : std::vector<std::pair<int, std::vector<int>>>{
            {0, {1}}, {4, {5, 3}}, {steps - 1, {steps - 2}}}) {
     Driver driver;
@@ -276,7 +276,7 @@ TEST(PrefetchRequest, at_rest_is_for_the_neighbours) {
   }
 }
 
-TEST(PrefetchRequest, outlives_a_turn_of_the_camera_but_not_another_step) {
+TEST(PrefetchRequest, SurvivesCameraMotionButNotAnotherStep) {
   Driver driver;
   rest_at(driver, 4);
   driver.patch(2, R"({"camera":{"fovY":20}})");
@@ -290,7 +290,7 @@ TEST(PrefetchRequest, outlives_a_turn_of_the_camera_but_not_another_step) {
   EXPECT_THAT(driver.requests[1].steps, ElementsAre(8, 6));
 }
 
-TEST(PrefetchRequest, is_said_anew_for_other_fields) {
+TEST(PrefetchRequest, IsRenewedForOtherFields) {
   Driver driver;
   rest_at(driver, 4);
   driver.patch(2, R"({"scalars":[{"field":"salt"}]})");
@@ -302,7 +302,7 @@ TEST(PrefetchRequest, is_said_anew_for_other_fields) {
   EXPECT_EQ(driver.requests[1].view.scalars->at(0).field, "salt");
 }
 
-TEST(PrefetchRequest, while_steps_run_is_for_those_ahead_in_their_order) {
+TEST(PrefetchRequest, DuringPlaybackCoversFollowingStepsInOrder) {
   Driver driver;
   rest_at(driver, 6);
   driver.say(play(0, 9, 10, true, true));
@@ -317,7 +317,7 @@ TEST(PrefetchRequest, while_steps_run_is_for_those_ahead_in_their_order) {
   EXPECT_THAT(driver.requests[2].steps, ElementsAre(6, 5, 4, 3, 2, 1, 0)) << "no loop: no further";
 }
 
-TEST(PrefetchRequest, ends_with_the_run_and_comes_back_at_rest) {
+TEST(PrefetchRequest, EndsWithPlaybackAndReturnsAtRest) {
   Driver driver;
   rest_at(driver, 0);
   driver.say(play(0, 9, 10, true, true));
@@ -328,7 +328,7 @@ TEST(PrefetchRequest, ends_with_the_run_and_comes_back_at_rest) {
   EXPECT_THAT(driver.requests.back().steps, ElementsAre(4, 2));
 }
 
-TEST(PrefetchRequest, is_for_nothing_while_nobody_looks_and_after_the_end) {
+TEST(PrefetchRequest, IsEmptyWhileHiddenAndAfterTheEnd) {
   Driver driver;
   rest_at(driver, 4);
   driver.say(protocol::VisibilityMessage{true});
@@ -343,7 +343,7 @@ TEST(PrefetchRequest, is_for_nothing_while_nobody_looks_and_after_the_end) {
   EXPECT_TRUE(driver.closed);
 }
 
-TEST(PrefetchRequest, goes_with_the_dataset) {
+TEST(PrefetchRequest, IsWithdrawnWithTheDataset) {
   Driver driver;
   rest_at(driver, 4);
   driver.say(protocol::OpenMessage{3, "sea"});
@@ -356,7 +356,7 @@ TEST(PrefetchRequest, goes_with_the_dataset) {
 }
 
 // Sixteen at most: asked of the player itself, with more steps than the driver's datasets have.
-TEST(PrefetchRequest, reaches_sixteen_steps_ahead) {
+TEST(PrefetchRequest, CoversSixteenStepsAhead) {
   Player player;
   player.start(play(0, 239, 24, true, true), 230, 0);
   auto wanted = iota(231, 9);

@@ -15,7 +15,7 @@ Player playing(bool drop) {
   return player;
 }
 
-TEST(Player, what_is_late_is_dropped_in_one_go) {
+TEST(Player, LateStepsAreDroppedTogether) {
   Player player = playing(true);
   EXPECT_EQ(player.advance(99 * ms, true).passed, 0);
   const auto late = player.advance(450 * ms, false);  // steps 1 to 4 are due
@@ -24,7 +24,7 @@ TEST(Player, what_is_late_is_dropped_in_one_go) {
   EXPECT_EQ(player.next_at(false), 500 * ms);
 }
 
-TEST(Player, without_drop_a_stall_is_not_caught_up_with) {
+TEST(Player, WithoutDropAStallIsNotCompensated) {
   Player player = playing(false);
   int step = player.advance(1000 * ms, true).step;
   EXPECT_EQ(step, 1);

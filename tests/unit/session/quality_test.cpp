@@ -10,7 +10,7 @@ namespace {
 
 // --- settings -----------------------------------------------------------------------------------
 
-// As a survey would find them where a full picture by kernels takes `full_ms`: time goes with
+// Results of a calibration run where a full kernel picture takes `full_ms`: time is proportional to
 // pixels and samples, slabs take four times as long.
 quality::Forecasts surveyed(double full_ms) {
   quality::Forecasts out = quality::Table(quality::Kind{}).forecasts({1, {0, 1, 0}, 1280, 720});
@@ -24,7 +24,7 @@ quality::Forecasts surveyed(double full_ms) {
   return out;
 }
 
-// Drags for `count` frames whose cost follows the setting; the settings drawn.
+// Settings of `count` dragged frames whose cost depends on the setting.
 std::vector<quality::Setting> drag(Driver& driver, int count, std::uint32_t& rev,
                                    const std::function<Micros(const quality::Setting&)>& cost) {
   std::vector<quality::Setting> drawn;
@@ -39,7 +39,7 @@ std::vector<quality::Setting> drag(Driver& driver, int count, std::uint32_t& rev
   return drawn;
 }
 
-// What a setting takes on a machine that is `slower` than the one surveyed.
+// Time of a setting on a machine `slower` than the calibrated one.
 std::function<Micros(const quality::Setting&)> costs(const quality::Forecasts& known,
                                                      double slower = 1) {
   return [known, slower](const quality::Setting& setting) {
@@ -47,7 +47,7 @@ std::function<Micros(const quality::Setting&)> costs(const quality::Forecasts& k
   };
 }
 
-TEST(Setting, says_so_in_the_header_and_the_final_frame_is_full) {
+TEST(Setting, IsReportedInTheHeaderAndTheFinalFrameIsFull) {
   Driver driver;
   driver.surveyed = surveyed(400);
   driver.patch(1, R"({"dataset":"wind","image":{"width":800,"height":600}})");
@@ -71,7 +71,7 @@ TEST(Setting, says_so_in_the_header_and_the_final_frame_is_full) {
   EXPECT_FLOAT_EQ(final.error, 3e-4F);
 }
 
-TEST(Setting, keeps_the_budget_on_a_machine_that_is_slower_than_it_was) {
+TEST(Setting, KeepsTheBudgetOnASlowedMachine) {
   for (const double budget : {16.0, 33.0, 66.0, 100.0}) {
     Driver driver;
     driver.surveyed = surveyed(120);
@@ -85,7 +85,7 @@ TEST(Setting, keeps_the_budget_on_a_machine_that_is_slower_than_it_was) {
     for (std::size_t n = 10; n < drawn.size(); ++n) {
       EXPECT_LE(cost(drawn[n]), 1000 * budget) << "frame " << n << " at " << budget << " ms";
     }
-    // Of what the budget allows with room to spare, nothing errs less.
+    // Of the settings well within the budget none has a smaller error.
     const auto error = [&](const quality::Setting& setting) {
       return (*driver.surveyed)[quality::index_of(setting).value()].error;
     };
@@ -97,7 +97,7 @@ TEST(Setting, keeps_the_budget_on_a_machine_that_is_slower_than_it_was) {
   }
 }
 
-TEST(Setting, one_slow_load_does_not_coarsen_what_follows) {
+TEST(Setting, OneSlowLoadDoesNotCoarsenLaterFrames) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   std::uint32_t rev = 1;
@@ -111,7 +111,7 @@ TEST(Setting, one_slow_load_does_not_coarsen_what_follows) {
   EXPECT_LE(driver.render->setting.coarser, before.coarser);
 }
 
-TEST(Setting, never_makes_a_picture_too_small_to_tell_anything) {
+TEST(Setting, KeepsAMinimumPictureSize) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","image":{"width":300,"height":200}})");
   std::uint32_t rev = 1;
@@ -121,7 +121,7 @@ TEST(Setting, never_makes_a_picture_too_small_to_tell_anything) {
   }
 }
 
-TEST(Setting, comes_back_when_the_scene_has_become_cheap) {
+TEST(Setting, RecoversWhenTheSceneBecomesCheap) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   std::uint32_t rev = 1;
@@ -135,7 +135,7 @@ TEST(Setting, comes_back_when_the_scene_has_become_cheap) {
   EXPECT_EQ(fine.back().coarser, 0);
 }
 
-TEST(Setting, an_error_that_is_asked_for_decides_instead_of_a_budget) {
+TEST(Setting, RequestedErrorReplacesTheBudget) {
   Driver driver;
   driver.surveyed = surveyed(120);
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.005}})");
@@ -143,14 +143,14 @@ TEST(Setting, an_error_that_is_asked_for_decides_instead_of_a_budget) {
   driver.finish_render(costs(*driver.surveyed)(driver.render->setting));
   driver.ack(1);
   const auto drawn = drag(driver, 20, rev, costs(*driver.surveyed));
-  EXPECT_EQ(drawn.back().method, protocol::MethodName::slab) << "whatever it takes";
+  EXPECT_EQ(drawn.back().method, protocol::MethodName::slab) << "at any cost";
   driver.patch(++rev, R"({"quality":{"budgetMs":16}})");
   const auto late = drag(driver, 20, rev, costs(*driver.surveyed));
-  EXPECT_EQ(late.back().method, protocol::MethodName::kernel) << "a budget comes first";
+  EXPECT_EQ(late.back().method, protocol::MethodName::kernel) << "a budget has precedence";
 }
 
-// Sixteen viewers of one kind: each waits for fifteen frames of the others, and all of them shrink.
-TEST(Setting, frames_become_shorter_where_many_wait_for_the_renderer) {
+// Sixteen equal sessions: each waits for fifteen frames of the others, and all shrink their frames.
+TEST(Setting, FramesBecomeCheaperWhenManyWaitForTheRenderer) {
   Driver driver;
   driver.surveyed = surveyed(33);
   driver.patch(1, R"({"dataset":"wind"})");
@@ -168,9 +168,9 @@ TEST(Setting, frames_become_shorter_where_many_wait_for_the_renderer) {
   EXPECT_GE(own, 4 * ms);
 }
 
-// --- the way to the final frame -----------------------------------------------------------------
+// --- refinement to the final frame ---------------------------------------------------------------
 
-TEST(Refining, a_final_frame_that_is_long_in_coming_has_a_better_one_before_it) {
+TEST(Refining, LongFinalFrameIsPrecededByABetterOne) {
   Driver driver;
   driver.surveyed = surveyed(200);
   driver.measured_error = 5e-4;
@@ -192,14 +192,14 @@ TEST(Refining, a_final_frame_that_is_long_in_coming_has_a_better_one_before_it) 
   ASSERT_GE(drawn.size(), 2U);
   float before = driver.frames[moved - 1].header.error;
   for (std::size_t n = moved; n < driver.frames.size(); ++n) {
-    EXPECT_LE(driver.frames[n].header.error, 0.5F * before) << "each is worth its time";
+    EXPECT_LE(driver.frames[n].header.error, 0.5F * before) << "each refinement is worth its time";
     before = driver.frames[n].header.error;
     EXPECT_EQ(Driver::is_final(driver.frames[n]), n + 1 == driver.frames.size());
   }
   EXPECT_EQ(drawn.back(), quality::settings[quality::own_setting(View{})]);
 }
 
-TEST(Refining, is_given_up_by_the_next_change) {
+TEST(Refining, IsCancelledByTheNextChange) {
   Driver driver;
   driver.surveyed = surveyed(200);
   driver.patch(1, R"({"dataset":"wind"})");
@@ -215,9 +215,9 @@ TEST(Refining, is_given_up_by_the_next_change) {
   EXPECT_TRUE(driver.cancelled);
 }
 
-TEST(Refining, slabs_become_thinner_until_the_measured_error_is_what_was_asked_for) {
+TEST(Refining, SlabsBecomeThinnerUntilTheRequestedErrorIsMet) {
   Driver driver;
-  driver.measured_error = 1e-3;  // a quarter of it with every halving
+  driver.measured_error = 1e-3;  // a quarter with every halving
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.0001}})");
   driver.settle();
   ASSERT_GE(driver.frames.size(), 3U);
@@ -228,7 +228,7 @@ TEST(Refining, slabs_become_thinner_until_the_measured_error_is_what_was_asked_f
   }
 }
 
-TEST(Refining, ends_where_thinner_slabs_do_not_mend_it) {
+TEST(Refining, EndsWhereThinnerSlabsDoNotHelp) {
   Driver driver;
   driver.averaged = true;
   driver.measured_error = 1e-2;
@@ -236,10 +236,10 @@ TEST(Refining, ends_where_thinner_slabs_do_not_mend_it) {
   driver.settle();
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
   EXPECT_EQ(driver.frames.back().header.error, 1e-2F);
-  EXPECT_LE(driver.frames.size(), 3U) << "one moving, one halving tried";
+  EXPECT_LE(driver.frames.size(), 3U) << "one moving frame, one halving tried";
 }
 
-TEST(Setting, a_late_frame_of_another_dataset_teaches_nothing) {
+TEST(Setting, LateFrameOfAnotherDatasetIsIgnored) {
   const auto first_of_sea = [](Micros late) {
     Driver driver;
     driver.surveyed = surveyed(10);
@@ -254,16 +254,16 @@ TEST(Setting, a_late_frame_of_another_dataset_teaches_nothing) {
   EXPECT_EQ(first_of_sea(2000 * ms), first_of_sea(10 * ms));
 }
 
-TEST(Refining, ends_where_no_slab_is_thin_enough) {
+TEST(Refining, EndsWhereNoSlabIsThinEnough) {
   Driver driver;
   driver.measured_error = 1;
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.000001}})");
   driver.settle();
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
-  EXPECT_GT(driver.frames.back().header.error, 1e-6F) << "and says that it is not";
+  EXPECT_GT(driver.frames.back().header.error, 1e-6F) << "reports that the error is not met";
 }
 
-TEST(Refining, a_lossless_final_frame_is_a_png) {
+TEST(Refining, LosslessFinalFrameIsAPng) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","quality":{"lossless":true}})");
   driver.settle();
@@ -272,7 +272,7 @@ TEST(Refining, a_lossless_final_frame_is_a_png) {
   EXPECT_EQ(driver.frames.back().header.codec, protocol::Codec::png);
 }
 
-TEST(Refining, a_view_that_rests_is_surveyed_once) {
+TEST(Refining, ViewAtRestIsCalibratedOnce) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   EXPECT_TRUE(driver.calibrations.empty());
@@ -285,7 +285,7 @@ TEST(Refining, a_view_that_rests_is_surveyed_once) {
     driver.ack(driver.frames.back().header.seq);
     driver.wait(10 * ms);
   }
-  EXPECT_EQ(driver.calibrations.size(), 1U) << "not while steps run";
+  EXPECT_EQ(driver.calibrations.size(), 1U) << "not during playback";
 }
 
 }  // namespace

@@ -17,12 +17,12 @@ protocol::DatasetDescription description(const std::string& id) {
 
 // --- opening ------------------------------------------------------------------------------------
 
-TEST(Open, describes_the_dataset_and_then_draws_it) {
+TEST(Open, DescribesTheDatasetAndRendersIt) {
   Driver driver;
   driver.say(protocol::OpenMessage{5, "wind"});
   ASSERT_EQ(driver.describes.size(), 1U);
   EXPECT_EQ(driver.describes[0].dataset, "wind");
-  EXPECT_FALSE(driver.render) << "the client's own view may still come";
+  EXPECT_FALSE(driver.render) << "the client may still send its own view";
   driver.patch(1, R"({"image":{"width":640,"height":480}})");
   driver.described(5, description("wind"));
   const auto opened = driver.texts_of<protocol::OpenedMessage>();
@@ -34,8 +34,8 @@ TEST(Open, describes_the_dataset_and_then_draws_it) {
   EXPECT_EQ(driver.render->view.image.width, 640);
 }
 
-// Of several refusals a viewer may see the last alone.
-TEST(Open, that_failed_is_why_there_is_nothing_to_play) {
+// After several errors the client may show only the last one.
+TEST(Open, FailureExplainsWhyThereIsNothingToPlay) {
   const auto why = make_error(ErrorKind::out_of_memory, "the field needs 9 MiB");
   const auto play = [](Driver& driver) {
     driver.texts.clear();
@@ -43,7 +43,7 @@ TEST(Open, that_failed_is_why_there_is_nothing_to_play) {
     return driver.texts_of<protocol::ErrorMessage>().at(0).problem;
   };
   Driver described;
-  EXPECT_EQ(play(described).status, 404) << "nothing was asked for";
+  EXPECT_EQ(play(described).status, 404) << "no dataset was requested";
   described.say(protocol::OpenMessage{5, "wind"});
   described.described(5, why);
   EXPECT_EQ(play(described).status, 507);
@@ -53,7 +53,7 @@ TEST(Open, that_failed_is_why_there_is_nothing_to_play) {
   drawn.fail_render(why);
   EXPECT_EQ(play(drawn).status, 507);
 
-  // Once another one was there, what failed before it is no reason any more.
+  // After a dataset was opened, earlier failures are irrelevant.
   described.say(protocol::OpenMessage{6, "sea"});
   described.described(6, description("sea"));
   described.patch(1, R"({"dataset":null})");
@@ -65,7 +65,7 @@ TEST(Open, that_failed_is_why_there_is_nothing_to_play) {
 }
 
 // Progress is not reported for fast loads, nor for reads of other sessions while this one renders.
-TEST(Open, how_far_reading_has_come_is_told_while_a_frame_waits_for_it) {
+TEST(Open, LoadingProgressIsReportedWhileAFrameWaits) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.reading = Reading{"u", 0.25};
@@ -96,7 +96,7 @@ TEST(Open, how_far_reading_has_come_is_told_while_a_frame_waits_for_it) {
 
 // --- files that change --------------------------------------------------------------------------
 
-TEST(Changed, the_dataset_is_described_and_drawn_anew) {
+TEST(Changed, DatasetIsDescribedAndRenderedAgain) {
   Driver driver;
   driver.say(protocol::OpenMessage{5, "wind"});
   driver.described(5, description("wind"));
@@ -105,19 +105,19 @@ TEST(Changed, the_dataset_is_described_and_drawn_anew) {
   driver.describes.clear();
   driver.texts.clear();
   driver.changed("sea");
-  EXPECT_TRUE(driver.describes.empty()) << "is not shown";
+  EXPECT_TRUE(driver.describes.empty()) << "a hidden dataset";
   driver.changed("wind");
   ASSERT_EQ(driver.describes.size(), 1U);
   EXPECT_EQ(driver.describes[0].id, 5U);
   driver.changed("wind");
-  EXPECT_EQ(driver.describes.size(), 1U) << "is on its way";
+  EXPECT_EQ(driver.describes.size(), 1U) << "loading";
   driver.described(5, description("wind"));
   EXPECT_EQ(driver.texts_of<protocol::OpenedMessage>().size(), 1U);
   driver.settle();
   EXPECT_GT(driver.renders, before);
 }
 
-TEST(Changed, a_step_that_is_gone_becomes_the_last_and_neighbours_are_wished_for_anew) {
+TEST(Changed, MissingStepBecomesTheLastAndNeighborsArePrefetched) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":8})");
   driver.settle();
@@ -134,7 +134,7 @@ TEST(Changed, a_step_that_is_gone_becomes_the_last_and_neighbours_are_wished_for
   EXPECT_THAT(driver.requests.back().steps, ElementsAre(2));
 }
 
-TEST(Open, an_unknown_dataset_is_an_error_and_the_view_stays) {
+TEST(Open, UnknownDatasetIsAnErrorAndTheViewStays) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -149,7 +149,7 @@ TEST(Open, an_unknown_dataset_is_an_error_and_the_view_stays) {
   EXPECT_EQ(driver.render->view.dataset, "wind");
 }
 
-TEST(Open, another_dataset_starts_afresh_but_keeps_the_pictures_size) {
+TEST(Open, AnotherDatasetResetsTheViewExceptThePictureSize) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":4,"image":{"width":640,"height":480},
                       "vector":{"field":"u"}})");
@@ -164,7 +164,7 @@ TEST(Open, another_dataset_starts_afresh_but_keeps_the_pictures_size) {
   EXPECT_EQ(view.vector.field.kind, protocol::FieldChoice::Kind::dataset_default);
 }
 
-TEST(Open, data_that_cannot_be_read_leaves_the_old_view) {
+TEST(Open, UnreadableDataKeepTheOldView) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":2})");
   driver.settle();
@@ -178,7 +178,7 @@ TEST(Open, data_that_cannot_be_read_leaves_the_old_view) {
 
 // --- patches ------------------------------------------------------------------------------------
 
-TEST(Patch, that_is_invalid_names_its_rev_and_pointer_and_the_old_view_stays) {
+TEST(Patch, InvalidPatchNamesRevAndPointerAndKeepsTheView) {
   for (const char* bad :
        {R"({"image":{"width":0}})", R"({"unknown":1})", R"({"step":-1})", R"({"step":99})",
         R"({"camera":{"fovY":1e999}})", R"({"dataset":"nowhere"})", R"([1])"}) {
@@ -201,7 +201,7 @@ TEST(Patch, that_is_invalid_names_its_rev_and_pointer_and_the_old_view_stays) {
   }
 }
 
-TEST(Patch, before_a_dataset_is_named_is_remembered) {
+TEST(Patch, BeforeADatasetIsOpenIsRemembered) {
   Driver driver;
   driver.patch(1, R"({"image":{"width":320,"height":200}})");
   EXPECT_FALSE(driver.render);
@@ -211,7 +211,7 @@ TEST(Patch, before_a_dataset_is_named_is_remembered) {
   EXPECT_EQ(driver.render->view.image.width, 320);
 }
 
-TEST(Patch, whose_data_cannot_be_read_leaves_no_trace_and_the_others_stand) {
+TEST(Patch, UnreadableDataDiscardThatPatchOnly) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":2})");
   driver.settle();
@@ -226,8 +226,8 @@ TEST(Patch, whose_data_cannot_be_read_leaves_no_trace_and_the_others_stand) {
   EXPECT_EQ(driver.frames.back().header.rev, 3U);
 }
 
-// The step that cannot be read is hidden under a later patch before any frame is drawn of it.
-TEST(Patch, a_fault_beneath_later_patches_is_found_and_the_stream_goes_on) {
+// The unreadable step is hidden by a later patch before any frame of it is rendered.
+TEST(Patch, FailedPatchBelowLaterOnesIsFoundAndTheStreamContinues) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":2})");
   driver.settle();
@@ -242,11 +242,11 @@ TEST(Patch, a_fault_beneath_later_patches_is_found_and_the_stream_goes_on) {
   };
   fail_step_3();
   driver.settle();
-  EXPECT_EQ(driver.frames.back().header.step, 2U) << "what was drawn before";
+  EXPECT_EQ(driver.frames.back().header.step, 2U) << "the rendered view";
   driver.patch(5, R"({"camera":{"fovY":25}})");
   fail_step_3();
   driver.settle();
-  EXPECT_EQ(driver.frames.back().header.rev, 5U) << "an innocent patch is followed";
+  EXPECT_EQ(driver.frames.back().header.rev, 5U) << "the valid patch is applied";
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
   bool named = false;
   for (const auto& error : driver.errors()) {
@@ -256,14 +256,14 @@ TEST(Patch, a_fault_beneath_later_patches_is_found_and_the_stream_goes_on) {
   EXPECT_TRUE(named) << "the rejected patch is named";
 }
 
-TEST(Patch, that_fails_for_good_is_not_tried_again_and_again) {
+TEST(Patch, PermanentFailureIsNotRetried) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
   driver.ack(1);
   driver.patch(2, R"({"step":5})");
   driver.fail_render(make_error(ErrorKind::out_of_memory, "no room"));
-  ASSERT_TRUE(driver.render) << "the old view again, of which no final frame was sent";
+  ASSERT_TRUE(driver.render) << "the old view again, without a final frame so far";
   driver.fail_render(make_error(ErrorKind::out_of_memory, "no room"));
   const int renders = driver.renders;
   driver.wait(3000 * ms);
@@ -271,7 +271,7 @@ TEST(Patch, that_fails_for_good_is_not_tried_again_and_again) {
   EXPECT_EQ(driver.errors().size(), 2U);
 }
 
-TEST(Patch, that_fails_leaves_the_final_frame_that_stands) {
+TEST(Patch, FailureKeepsTheFinalFrame) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -279,7 +279,7 @@ TEST(Patch, that_fails_leaves_the_final_frame_that_stands) {
   driver.patch(2, R"({"step":5})");
   driver.fail_render(make_error(ErrorKind::out_of_memory, "no room"));
   driver.wait(3000 * ms);
-  EXPECT_EQ(driver.renders, renders + 1) << "what the viewer sees is the old view, sharp";
+  EXPECT_EQ(driver.renders, renders + 1) << "the client sees the old view in full quality";
   ASSERT_EQ(driver.errors().size(), 1U);
   EXPECT_EQ(driver.errors()[0].rev, 2U);
   EXPECT_TRUE(driver.texts_of<protocol::UnchangedMessage>().empty()) << "no patch is answered";
@@ -287,7 +287,7 @@ TEST(Patch, that_fails_leaves_the_final_frame_that_stands) {
 
 // --- acknowledgements ---------------------------------------------------------------------------
 
-TEST(Ack, of_a_frame_never_sent_is_an_error_and_counts_for_nothing) {
+TEST(Ack, OfAnUnsentFrameIsAnErrorAndGivesNoCredit) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.ack(1);
@@ -305,7 +305,7 @@ TEST(Ack, of_a_frame_never_sent_is_an_error_and_counts_for_nothing) {
   EXPECT_TRUE(driver.render);
 }
 
-TEST(Ack, may_be_repeated_or_come_late) {
+TEST(Ack, MayBeRepeatedOrLate) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -320,12 +320,12 @@ TEST(Ack, may_be_repeated_or_come_late) {
   driver.patch(4, R"({"step":3})");
   driver.finish_render();
   driver.patch(5, R"({"step":4})");
-  EXPECT_FALSE(driver.render) << "two are out, however often old ones were acknowledged";
+  EXPECT_FALSE(driver.render) << "two unacknowledged, however often old ones are acknowledged";
 }
 
 // --- stills -------------------------------------------------------------------------------------
 
-TEST(Still, is_drawn_at_its_size_and_announced_by_its_id) {
+TEST(Still, IsRenderedAtItsSizeAndAnnouncedWithItsId) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":3})");
   driver.settle();
@@ -352,7 +352,7 @@ TEST(Still, is_drawn_at_its_size_and_announced_by_its_id) {
   EXPECT_EQ(driver.texts_of<protocol::ChosenMessage>().back().seq, header.seq);
 }
 
-TEST(Still, waits_for_credit_and_gets_its_turn_while_the_view_moves) {
+TEST(Still, WaitsForCreditAndIsServedWhileTheViewMoves) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.finish_render();
@@ -372,7 +372,7 @@ TEST(Still, waits_for_credit_and_gets_its_turn_while_the_view_moves) {
   EXPECT_EQ(stills, 1);
 }
 
-TEST(Still, whose_data_are_released_while_they_are_read_is_answered) {
+TEST(Still, ReleasedDataDuringLoadingAreReported) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -382,10 +382,10 @@ TEST(Still, whose_data_are_released_while_they_are_read_is_answered) {
   driver.fail_render(make_error(ErrorKind::not_resident, "its memory was released; try again"));
   ASSERT_EQ(driver.errors().size(), 1U);
   EXPECT_EQ(driver.errors()[0].id, 77U);
-  EXPECT_FALSE(driver.render) << "whoever still wants it asks again";
+  EXPECT_FALSE(driver.render) << "the client may ask again";
 }
 
-TEST(Still, too_large_too_many_or_of_nothing_is_an_error) {
+TEST(Still, OversizeExcessOrEmptyStillIsAnError) {
   Driver driver;
   protocol::StillMessage still;
   still.id = 1;
@@ -407,9 +407,9 @@ TEST(Still, too_large_too_many_or_of_nothing_is_an_error) {
                                    std::pair(6U, 429), std::pair(7U, 429), std::pair(8U, 429)));
 }
 
-// --- steps that run -----------------------------------------------------------------------------
+// --- playback -----------------------------------------------------------------------------------
 
-// Draws each frame in `cost` and acknowledges it, for `duration`.
+// Renders each frame in `cost` and acknowledges it, for `duration`.
 void run_for(Driver& driver, Micros duration, Micros cost) {
   const Micros end = driver.now() + duration;
   while (driver.now() < end) {
@@ -422,7 +422,7 @@ void run_for(Driver& driver, Micros duration, Micros cost) {
   }
 }
 
-TEST(Play, shows_every_step_in_time_when_there_is_time) {
+TEST(Play, ShowsEveryStepInTimeWhenPossible) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -432,7 +432,7 @@ TEST(Play, shows_every_step_in_time_when_there_is_time) {
   EXPECT_THAT(driver.steps_shown(), ElementsAre(1U, 2U, 3U, 0U, 1U, 2U, 3U, 0U));
 }
 
-TEST(Play, with_drop_skips_what_is_late) {
+TEST(Play, WithDropSkipsLateSteps) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -445,11 +445,11 @@ TEST(Play, with_drop_skips_what_is_late) {
   }
   ASSERT_GE(shown.size(), 3U);
   for (std::size_t n = 1; n < shown.size(); ++n) EXPECT_GT(shown[n], shown[n - 1]);
-  EXPECT_LT(shown.size(), 7U) << "some must be left out";
-  EXPECT_EQ(shown.back(), 9U) << "the last is where it ends, and on time";
+  EXPECT_LT(shown.size(), 7U) << "some must be skipped";
+  EXPECT_EQ(shown.back(), 9U) << "the last step is on time";
 }
 
-TEST(Play, without_drop_leaves_none_out_however_long_it_takes) {
+TEST(Play, WithoutDropShowsEveryStep) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -465,7 +465,7 @@ TEST(Play, without_drop_leaves_none_out_however_long_it_takes) {
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-TEST(Play, pause_stops_at_the_step_reached_and_makes_it_final) {
+TEST(Play, PauseStopsAtTheShownStepAndMakesItFinal) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -481,7 +481,7 @@ TEST(Play, pause_stops_at_the_step_reached_and_makes_it_final) {
   EXPECT_EQ(driver.render->view.step, 3) << "the view keeps the step that time has reached";
 }
 
-TEST(Play, goes_on_from_the_step_that_the_user_picks) {
+TEST(Play, ContinuesFromASelectedStep) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -492,7 +492,7 @@ TEST(Play, goes_on_from_the_step_that_the_user_picks) {
   EXPECT_THAT(driver.steps_shown(), ElementsAre(7U, 8U, 9U));
 }
 
-TEST(Play, beyond_the_last_step_or_of_nothing_is_an_error) {
+TEST(Play, InvalidStepOrMissingDatasetIsAnError) {
   Driver driver;
   driver.say(play(0, 3, 10, true, true));
   driver.patch(1, R"({"dataset":"wind"})");
@@ -501,7 +501,7 @@ TEST(Play, beyond_the_last_step_or_of_nothing_is_an_error) {
   EXPECT_EQ(driver.errors()[1].problem.errors.at(0).pointer, "/to");
 }
 
-TEST(Play, a_step_that_cannot_be_read_stops_it) {
+TEST(Play, UnreadableStepStopsIt) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
@@ -514,16 +514,16 @@ TEST(Play, a_step_that_cannot_be_read_stops_it) {
   EXPECT_EQ(driver.frames.back().header.step, 0U);
 }
 
-// --- ends ---------------------------------------------------------------------------------------
+// --- closing ------------------------------------------------------------------------------------
 
-TEST(End, a_binary_message_closes_with_4400) {
+TEST(End, BinaryMessageClosesWith4400) {
   Driver driver;
   driver.binary();
   ASSERT_TRUE(driver.closed);
   EXPECT_EQ(driver.closed->code, 4400);
 }
 
-TEST(End, a_drain_closes_with_1001_and_gives_up_the_render) {
+TEST(End, DrainClosesWith1001AndCancelsTheRender) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   driver.drain();
@@ -535,7 +535,7 @@ TEST(End, a_drain_closes_with_1001_and_gives_up_the_render) {
   EXPECT_TRUE(driver.frames.empty());
 }
 
-TEST(End, silence_closes_with_4410_and_any_message_keeps_it_open) {
+TEST(End, SilenceClosesWith4410AndAnyMessageKeepsItOpen) {
   Options options;
   options.idle_timeout_us = 60'000 * ms;
   Driver driver(options);
@@ -552,7 +552,7 @@ TEST(End, silence_closes_with_4410_and_any_message_keeps_it_open) {
   EXPECT_EQ(driver.closed->code, 4410);
 }
 
-TEST(End, text_that_is_no_message_is_answered_and_nothing_else_happens) {
+TEST(End, InvalidMessageIsAnsweredWithoutOtherEffects) {
   Driver driver;
   driver.refused(make_error(ErrorKind::malformed, "no JSON"));
   ASSERT_EQ(driver.errors().size(), 1U);

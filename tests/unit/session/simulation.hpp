@@ -41,10 +41,10 @@ class Clock {
 
  private:
   Micros now_ = second;
-  std::multimap<Micros, std::function<void()>> events_;  // of one time in order of their making
+  std::multimap<Micros, std::function<void()>> events_;  // order of creation at equal times
 };
 
-// One renderer for all sessions, in order of asking. A picture costs by its pixels.
+// One renderer for all sessions, first come, first served. Cost depends on pixels.
 class Renderer {
  public:
   Renderer(Clock& clock, Micros full_us) : clock_(clock), full_us_(full_us) {}
@@ -67,7 +67,7 @@ class Renderer {
   int renders = 0;
 
  private:
-  // Not the session's model of it: another power law, and pictures differ.
+  // Deliberately not the session's model: another power law, and pictures vary.
   std::size_t bytes(double pixels, const StartRender& wanted) {
     const int quality = wanted.encoding.quality;
     const double scale = quality < 50 ? 50.0 / quality : 2 - quality / 50.0;
@@ -84,7 +84,7 @@ class Renderer {
 
 struct LinkOptions {
   double bytes_per_s = 1e6;
-  Micros delay = 1000;   // one way
+  Micros delay = 1000;   // decoding of frames in the client, one at a time
   Micros decode = 2000;  // of a frame in the viewer, one after the other
 };
 
@@ -93,14 +93,14 @@ struct Shown {
   bool final = false;
   int quality = 0;
   double pixels = 0;
-  double wire_bytes = 0;  // with its texts
+  double wire_bytes = 0;  // with its texts of the newest patch at its start
   Micros t = 0;           // of the newest patch when it was begun
   Micros arrived = 0;
   Micros shown = 0;  // decoded
 };
 
-// A viewer, its link, and the server's edge: texts before frames, one message at a time, of which
-// the kernel holds `unsent` bytes at most.
+// A client, its link, and the server's edge: texts before frames, one message at a time, of which
+// the kernel buffers at most `unsent` bytes.
 class Viewer {
  public:
   Viewer(Clock& clock, Renderer& renderer, LinkOptions options)
@@ -122,7 +122,7 @@ class Viewer {
     clock_.at(clock_.now() + options_.delay,
               [this, message] { take(session_.on_message(message, clock_.now())); });
   }
-  // Answered by an error right away; when that arrives.
+  // Answered by an error at once; the time of its arrival.
   void ask(std::function<void(Micros)> answered) {
     clock_.at(clock_.now() + options_.delay, [this, answered = std::move(answered)] {
       answers_.push_back(answered);
@@ -191,7 +191,7 @@ class Viewer {
     });
   }
 
-  // Writes the next message: its last byte leaves when all before it have.
+  // Writes the next message: its last byte leaves after all earlier ones.
   void pump() {
     if (writing_) return;
     Out next;
@@ -251,7 +251,7 @@ class Viewer {
   bool writing_ = false;
   bool rendering_ = false;
   std::size_t unacked_ = 0;
-  Micros free_at_ = 0;  // of the link's narrowest place
+  Micros free_at_ = 0;  // of the bottleneck link
   Micros decoder_free_ = 0;
   std::uint64_t wakes_ = 0;
   std::deque<std::function<void(Micros)>> answers_;

@@ -18,7 +18,7 @@ using test::Folder;
 using test::NetcdfMaker;
 using test::write_small;
 
-TEST(Store, AFileThatChangesIsOpenedAnewUnderItsName) {
+TEST(Store, ChangedFileIsReopenedUnderItsName) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   Store store(1 << 20);
@@ -28,14 +28,14 @@ TEST(Store, AFileThatChangesIsOpenedAnewUnderItsName) {
 
   write_small(folder / "new.nc", 50);
   std::filesystem::rename(folder / "new.nc", folder / "rain.nc");
-  EXPECT_TRUE(store.look_for_changes(3600).empty()) << "it may still be being written";
+  EXPECT_TRUE(store.look_for_changes(3600).empty()) << "it may still be incomplete";
   EXPECT_EQ(store.look_for_changes(0), std::vector<std::string>{"rain"});
   const auto after = store.find("rain").value();
   EXPECT_NE(after, before);
   EXPECT_EQ(after->volume("f", 0).value()->values[3], 53.0F);
-  EXPECT_EQ(held->values[3], 3.0F) << "what was held stays what it was";
+  EXPECT_EQ(held->values[3], 3.0F) << "held volumes are unchanged";
 
-  std::ofstream(folder / "rain.nc", std::ios::trunc) << "no longer a file of numbers";
+  std::ofstream(folder / "rain.nc", std::ios::trunc) << "no longer a netCDF file";
   EXPECT_TRUE(store.look_for_changes(0).empty());
   EXPECT_EQ(store.find("rain").value(), after) << "the old data stay";
   EXPECT_NE(store.problem("rain").find("changed"), std::string::npos);
@@ -51,7 +51,7 @@ void write_hour(const std::string& path, double hour, double first) {
   file.variable("f", NC_FLOAT, {t, y, x}, test::counting(4, first));
 }
 
-TEST(Store, ASeriesGrowsAndShrinksWithItsFolder) {
+TEST(Store, SeriesGrowsAndShrinksWithItsFolder) {
   const Folder folder;
   write_hour(folder / "f1.nc", 1, 10);
   write_hour(folder / "f2.nc", 2, 20);
@@ -73,7 +73,7 @@ TEST(Store, ASeriesGrowsAndShrinksWithItsFolder) {
   EXPECT_EQ(store.find(id).value()->volume("f", 0).value()->values[3], 23.0F);
 }
 
-TEST(Store, WhatIsLeftOutOfASeriesIsNoted) {
+TEST(Store, OmittedFilesOfASeriesAreNoted) {
   const Folder folder;
   write_hour(folder / "f1.nc", 1, 10);
   std::filesystem::create_symlink("nowhere.nc", folder / "f2.nc");
@@ -89,8 +89,8 @@ TEST(Store, WhatIsLeftOutOfASeriesIsNoted) {
   EXPECT_EQ(store.note(id), "");
 }
 
-// Like a running model's output: the same file of the same size.
-TEST(Store, AFileThatIsWrittenOverInPlaceIsOpenedAnew) {
+// Like the output of a running model: the same file of the same size.
+TEST(Store, FileOverwrittenInPlaceIsReopened) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   write_small(folder / "new.nc", 50);
@@ -105,7 +105,7 @@ TEST(Store, AFileThatIsWrittenOverInPlaceIsOpenedAnew) {
   EXPECT_EQ(store.find("rain").value()->volume("f", 0).value()->values[3], 53.0F);
 }
 
-TEST(Store, WhatCannotBeOpenedAnewIsTriedOnceAChange) {
+TEST(Store, FailedReopenIsRetriedAfterAChange) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   std::atomic<int> opened{0};
@@ -128,8 +128,8 @@ TEST(Store, WhatCannotBeOpenedAnewIsTriedOnceAChange) {
   EXPECT_EQ(store.problem("rain"), "");
 }
 
-// A first view that fits no more would make every frame an error.
-TEST(Store, WhatDoesNotPassTheCheckIsNotPutInPlaceOfWhatDid) {
+// A first view that no longer fits would make every frame an error.
+TEST(Store, DatasetThatFailsTheCheckDoesNotReplaceAValidOne) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   std::atomic<int> opened{0};
@@ -162,7 +162,7 @@ TEST(Store, WhatDoesNotPassTheCheckIsNotPutInPlaceOfWhatDid) {
   EXPECT_EQ(store.problem("rain"), "");
 }
 
-TEST(Store, WhatIsListedAsFailedIsOpenedOnceItsFileIsReplaced) {
+TEST(Store, FailedDatasetIsOpenedWhenItsFileIsReplaced) {
   const Folder folder;
   const std::string rain = folder / "rain.nc";
   const std::string snow = folder / "snow.nc";
@@ -179,7 +179,7 @@ TEST(Store, WhatIsListedAsFailedIsOpenedOnceItsFileIsReplaced) {
     store.list_failed(name, store.add(name).error());
   }
   EXPECT_TRUE(store.look_for_changes(0).empty());
-  EXPECT_EQ(opened, 2) << "it may have changed while it was opened";
+  EXPECT_EQ(opened, 2) << "it may have changed while opening";
   EXPECT_TRUE(store.look_for_changes(0).empty());
   EXPECT_EQ(opened, 2);
   store.try_failed_again();
@@ -189,13 +189,13 @@ TEST(Store, WhatIsListedAsFailedIsOpenedOnceItsFileIsReplaced) {
 
   write_small(rain, 50);
   write_small(snow, 50);
-  EXPECT_TRUE(store.look_for_changes(3600).empty()) << "they may still be being written";
+  EXPECT_TRUE(store.look_for_changes(3600).empty()) << "they may still be incomplete";
   EXPECT_EQ(store.look_for_changes(0), (std::vector<std::string>{"rain", "snow"}));
   EXPECT_TRUE(store.failed().empty());
   EXPECT_EQ(store.find("rain").value()->volume("f", 0).value()->values[3], 53.0F);
 }
 
-TEST(Store, WhatIsOpenedByItsNewNameIsNoLongerListedAsFailed) {
+TEST(Store, DatasetOpenedByItsNewNameIsNoLongerFailed) {
   const Folder folder;
   const std::string late = folder / "late.nc";
   Store store(1 << 20);
@@ -203,12 +203,12 @@ TEST(Store, WhatIsOpenedByItsNewNameIsNoLongerListedAsFailed) {
   write_small(late, 50);
   const auto added = store.add(late);
   ASSERT_TRUE(added);
-  EXPECT_TRUE(store.look_for_changes(0).empty()) << "it was open already";
+  EXPECT_TRUE(store.look_for_changes(0).empty()) << "it was already open";
   EXPECT_TRUE(store.failed().empty());
   EXPECT_EQ(store.all().size(), 1U);
 }
 
-TEST(Store, WhatIsTakenOffTheListWhileItIsOpenedStaysAway) {
+TEST(Store, DatasetRemovedWhileOpeningStaysRemoved) {
   const Folder folder;
   const std::string rain = folder / "rain.nc";
   std::ofstream(rain) << "no numbers";

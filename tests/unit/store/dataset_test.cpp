@@ -19,7 +19,7 @@ std::unique_ptr<Dataset> make_dataset(std::uint64_t volumes_max) {
                                    volumes_max * kVolumeBytes);
 }
 
-TEST(Dataset, LoadsOnFirstNeedAndOnlyOnce) {
+TEST(Dataset, LoadsOnFirstUseAndOnlyOnce) {
   const auto dataset = make_dataset(10);
   EXPECT_EQ(dataset->info().id, "fake");
   EXPECT_EQ(dataset->loads(), 0U);
@@ -36,7 +36,7 @@ TEST(Dataset, LoadsOnFirstNeedAndOnlyOnce) {
   EXPECT_EQ(dataset->resident_bytes(), 4 * kVolumeBytes);
 }
 
-TEST(Dataset, SaysWhatItDoesNotHave) {
+TEST(Dataset, ReportsUnknownFieldsAndSteps) {
   const auto dataset = make_dataset(10);
   const auto field = dataset->volume("nothing", 0);
   ASSERT_FALSE(field);
@@ -49,7 +49,7 @@ TEST(Dataset, SaysWhatItDoesNotHave) {
   EXPECT_EQ(dataset->loads(), 0U);
 }
 
-TEST(Dataset, ThreadsThatAskTogetherShareOneLoad) {
+TEST(Dataset, ConcurrentThreadsShareOneLoad) {
   auto source = std::make_unique<FakeSource>();
   auto gate = std::make_shared<FakeSource::Gate>();
   source->gate = gate;
@@ -77,7 +77,7 @@ TEST(Dataset, ThreadsThatAskTogetherShareOneLoad) {
   }
 }
 
-TEST(Dataset, TheLeastRecentlyUsedGoesFirst) {
+TEST(Dataset, LeastRecentlyUsedIsEvictedFirst) {
   const auto dataset = make_dataset(3);
   for (const std::size_t step : {0, 1, 2}) {
     ASSERT_TRUE(dataset->volume("a", step));
@@ -93,7 +93,7 @@ TEST(Dataset, TheLeastRecentlyUsedGoesFirst) {
   EXPECT_EQ(dataset->loads(), 5U);
 }
 
-TEST(Dataset, WhatSomebodyHoldsIsNotEvictedAndStaysValid) {
+TEST(Dataset, HeldVolumeIsNotEvictedAndStaysValid) {
   const auto dataset = make_dataset(3);
   auto held = dataset->volume("a", 0);
   ASSERT_TRUE(held);
@@ -106,7 +106,7 @@ TEST(Dataset, WhatSomebodyHoldsIsNotEvictedAndStaysValid) {
   EXPECT_EQ(dataset->loads(), 20U);
 }
 
-TEST(Dataset, BeyondTheLimitIsRefusedWithFiguresAndNothingIsLost) {
+TEST(Dataset, LoadAboveTheLimitIsRefusedWithFigures) {
   const auto dataset = make_dataset(3);
   auto a = dataset->volume("a", 0);
   auto b = dataset->volume("b", 0);
@@ -124,13 +124,13 @@ TEST(Dataset, BeyondTheLimitIsRefusedWithFiguresAndNothingIsLost) {
   EXPECT_EQ(dataset->resident_bytes(), 3 * kVolumeBytes);
 }
 
-TEST(Dataset, AVolumeLargerThanTheLimitIsRefused) {
+TEST(Dataset, VolumeLargerThanTheLimitIsRefused) {
   const auto dataset = make_dataset(2);
   EXPECT_EQ(dataset->volume("v", 0).error().kind, ErrorKind::out_of_memory);
   EXPECT_TRUE(dataset->volume("a", 0));
 }
 
-TEST(Dataset, AFailureIsToldToAllWhoWaitAndTriedAgainLater) {
+TEST(Dataset, FailureReachesAllWaitersAndIsRetriedLater) {
   auto source = std::make_unique<FakeSource>();
   source->failures = 1;
   Dataset dataset(std::move(source), "fake", kVolumeBytes);
@@ -153,7 +153,7 @@ TEST(Dataset, ExceptionsOfASourceBecomeErrors) {
             ErrorKind::out_of_memory);
 }
 
-TEST(Dataset, ManyThreadsUnderASmallBudget) {
+TEST(Dataset, ManyThreadsWithASmallBudget) {
   const auto dataset = make_dataset(6);
   std::atomic<int> wrong{0};
   std::atomic<int> refused{0};

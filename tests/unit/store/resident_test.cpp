@@ -1,4 +1,4 @@
-// What is loaded when: handles that never load, loading ahead of need, packed storage.
+// Loading of volumes: handles that never load, prefetch, packed storage.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -24,8 +24,8 @@ constexpr std::size_t edge = 10;
 constexpr std::uint64_t volume_bytes = edge * edge * edge * sizeof(float);
 constexpr std::size_t last_step = 99;
 
-// A field of 10 x 10 x 10 samples, 100 steps; sample n of step s is s + n / 1000, of the last one
-// s + n / 125. Notes what is read, and when.
+// A field of 10 x 10 x 10 samples, 100 steps; sample n of step s is s + n / 1000, of the last step
+// s + n / 125. Records what is read and when.
 class Series : public Source {
  public:
   struct Log {
@@ -115,7 +115,7 @@ struct Fixture {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
-  // Until so many volumes were read, or for ten seconds.
+  // Waits until that many volumes were read, or for ten seconds.
   void wait_for_reads(std::size_t count) const {
     for (int i = 0; i < 10000 && log->read().size() < count; ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -126,7 +126,7 @@ struct Fixture {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
-  // Time in which a thread that had something to load would have begun.
+  // Time in which a thread with pending loads would have started.
   static void settle() { std::this_thread::sleep_for(std::chrono::milliseconds(50)); }
 
   std::shared_ptr<Series::Log> log = std::make_shared<Series::Log>();
@@ -134,7 +134,7 @@ struct Fixture {
   std::shared_ptr<Dataset> dataset;
 };
 
-TEST(Resident, AHandleForWhatIsThereNeverLoads) {
+TEST(Resident, ResidentVolumeIsNeverLoadedAgain) {
   Fixture f(10);
   Dataset resident = f.dataset->resident_only();
   const auto absent = resident.volume("f", 3);
@@ -152,7 +152,7 @@ TEST(Resident, AHandleForWhatIsThereNeverLoads) {
   EXPECT_EQ(resident.level("f", 3, half).value(), level.value());
 }
 
-TEST(Resident, WhatIsWishedForIsLoadedSoonestFirst) {
+TEST(Resident, PrefetchRequestsAreLoadedSoonestFirst) {
   Fixture f(10);
   f.request_prefetch({7, 8, 9, 10});
   f.wait_until_resident(10);
@@ -162,10 +162,10 @@ TEST(Resident, WhatIsWishedForIsLoadedSoonestFirst) {
   f.request_prefetch({8, 9, 10, 11});
   f.wait_for_reads(5);
   f.settle();
-  EXPECT_EQ(f.log->read().size(), 5U) << "what is there is not read again";
+  EXPECT_EQ(f.log->read().size(), 5U) << "a resident volume is not read again";
 }
 
-TEST(Resident, ANewWishReplacesWhatWasNotYetLoaded) {
+TEST(Resident, NewPrefetchRequestReplacesPendingOnes) {
   Fixture f(10);
   f.log->hold = true;
   f.request_prefetch({1, 2, 3, 4});
@@ -177,7 +177,7 @@ TEST(Resident, ANewWishReplacesWhatWasNotYetLoaded) {
   EXPECT_EQ(f.log->read(), (std::vector<std::size_t>{1, 50}));
 }
 
-TEST(Resident, LoadingAheadStaysWithinTheLimitAndKeepsWhatIsWishedFor) {
+TEST(Resident, PrefetchStaysWithinTheLimitAndKeepsRequestedVolumes) {
   Fixture f(4);
   const auto held = f.dataset->volume("f", 0);
   f.request_prefetch({1, 2, 3, 4, 5, 6});
@@ -187,7 +187,7 @@ TEST(Resident, LoadingAheadStaysWithinTheLimitAndKeepsWhatIsWishedFor) {
   EXPECT_EQ(f.store.counts().refusals, 1U) << "the fifth and sixth were not tried";
   EXPECT_LE(f.store.counts().bytes, 4 * volume_bytes);
   for (const std::size_t step : {1, 2, 3}) EXPECT_TRUE(f.is_resident(step)) << step;
-  // A demand takes the place of what is not wished for, or else of the least recently used.
+  // A demand evicts volumes without a prefetch request first, then the least recently used.
   f.request_prefetch({2, 3});
   ASSERT_TRUE(f.dataset->volume("f", 20));
   EXPECT_FALSE(f.is_resident(1));
@@ -195,8 +195,8 @@ TEST(Resident, LoadingAheadStaysWithinTheLimitAndKeepsWhatIsWishedFor) {
   EXPECT_TRUE(f.is_resident(3));
 }
 
-// Least-recently-used alone would take the oldest.
-TEST(Resident, WhatNobodyWishesForGoesBeforeOlderWishes) {
+// Least-recently-used alone would evict the oldest.
+TEST(Resident, UnrequestedVolumesAreEvictedBeforeOlderRequests) {
   Fixture f(3);
   for (const std::size_t step : {1, 2, 3}) ASSERT_TRUE(f.dataset->volume("f", step));
   f.request_prefetch({1, 2});
@@ -206,7 +206,7 @@ TEST(Resident, WhatNobodyWishesForGoesBeforeOlderWishes) {
   EXPECT_FALSE(f.is_resident(3));
 }
 
-TEST(Resident, AnAverageThatIsWishedForStaysThoughItCouldBeMadeAgain) {
+TEST(Resident, RequestedAverageStaysThoughItCouldBeRecomputed) {
   Fixture f(4);
   Coarsening half;
   half.halvings = {1, 1, 1};
@@ -216,10 +216,10 @@ TEST(Resident, AnAverageThatIsWishedForStaysThoughItCouldBeMadeAgain) {
   f.store.request_prefetch(1, {{*f.dataset, "f", 0, half}});
   ASSERT_TRUE(f.dataset->volume("f", 3));
   EXPECT_TRUE(f.dataset->resident_only().level("f", 0, half));
-  EXPECT_FALSE(f.is_resident(0)) << "the oldest that nobody wishes for";
+  EXPECT_FALSE(f.is_resident(0)) << "the oldest without a request";
 }
 
-TEST(Resident, OwnersOfWishesTakeTurns) {
+TEST(Resident, OwnersOfPrefetchRequestsTakeTurns) {
   Fixture f(10);
   f.log->hold = true;
   f.request_prefetch({1, 2, 3}, 1);
@@ -230,7 +230,7 @@ TEST(Resident, OwnersOfWishesTakeTurns) {
   EXPECT_EQ(f.log->read(), (std::vector<std::size_t>{1, 11, 2, 12, 3, 13}));
 }
 
-TEST(Resident, WhatWasRemovedIsNotLoadedAnyMore) {
+TEST(Resident, RemovedDatasetIsNoLongerLoaded) {
   Fixture f(10);
   f.log->hold = true;
   f.request_prefetch({1, 2, 3});
@@ -242,9 +242,9 @@ TEST(Resident, WhatWasRemovedIsNotLoadedAnyMore) {
   EXPECT_EQ(f.log->read(), std::vector<std::size_t>{1});
 }
 
-// A series larger than memory, played in a loop with the next steps wished for: every step is there
-// when it is shown, though least-recently-used alone would have evicted each before its return.
-TEST(Resident, ASeriesLargerThanMemoryPlaysWithEveryStepThere) {
+// A series larger than memory, played in a loop with prefetch: every step is resident when shown,
+// though least-recently-used alone would evict each before its next use.
+TEST(Resident, SeriesLargerThanMemoryPlaysEveryStep) {
   Fixture f(8);
   constexpr std::size_t steps = 20;
   std::size_t waited_for = 0;
@@ -260,10 +260,10 @@ TEST(Resident, ASeriesLargerThanMemoryPlaysWithEveryStepThere) {
     EXPECT_EQ((*f.dataset->volume("f", step))->values[0], static_cast<float>(step));
     EXPECT_LE(f.store.counts().bytes, 8 * volume_bytes);
   }
-  EXPECT_LE(waited_for, 1U) << "but for the first";
+  EXPECT_LE(waited_for, 1U) << "except the first";
 }
 
-TEST(Resident, WhoWaitsComesBeforeWhatIsAhead) {
+TEST(Resident, DemandedLoadPrecedesPrefetch) {
   Fixture f(50);
   f.log->hold = true;
   f.request_prefetch({1, 2, 3, 4, 5, 6, 7, 8});
@@ -274,23 +274,23 @@ TEST(Resident, WhoWaitsComesBeforeWhatIsAhead) {
   waiting.join();
   const auto read = f.log->read();
   ASSERT_GE(read.size(), 2U);
-  EXPECT_EQ(read[1], 60U) << "right after the one in work";
+  EXPECT_EQ(read[1], 60U) << "right after the running one";
 }
 
-TEST(Resident, EvictionFreesWhatNobodyHolds) {
+TEST(Resident, EvictionFreesUnreferencedVolumes) {
   Fixture f(10);
   const auto held = f.dataset->volume("f", 0);
   ASSERT_TRUE(f.dataset->volume("f", 1));
   f.dataset->evict();
-  EXPECT_EQ(f.log->cancelled, 1) << "whatever is being read is given up";
+  EXPECT_EQ(f.log->cancelled, 1) << "the running read is cancelled";
   EXPECT_EQ(f.dataset->resident_bytes(), volume_bytes);
   EXPECT_TRUE(f.is_resident(0));
   EXPECT_FALSE(f.is_resident(1));
-  EXPECT_EQ(f.dataset->seen("f", 1)->range[0], 1.0F) << "its range is remembered";
+  EXPECT_EQ(f.dataset->seen("f", 1)->range[0], 1.0F) << "its range is cached";
 }
 
 // The caller still waits, so the error states why the data were removed.
-TEST(Resident, ALoadThatSomebodyElseEndsSaysWhy) {
+TEST(Resident, LoadCancelledByAnotherCallerReportsTheReason) {
   const std::vector<std::pair<std::function<void(Fixture&)>, ErrorKind>> ends{
       {[](Fixture& f) { f.dataset->evict(); }, ErrorKind::not_resident},
       {[](Fixture& f) { EXPECT_TRUE(f.store.remove("series")); }, ErrorKind::not_found},
@@ -309,7 +309,7 @@ TEST(Resident, ALoadThatSomebodyElseEndsSaysWhy) {
   }
 }
 
-TEST(Resident, WhatIsHeldOfADatasetThatIsGoneCountsUntilItIsLetGoOf) {
+TEST(Resident, HeldVolumesOfARemovedDatasetCountUntilReleased) {
   Fixture f(10);
   auto held = f.dataset->volume("f", 3);
   ASSERT_TRUE(f.dataset->volume("f", 4));
@@ -322,7 +322,7 @@ TEST(Resident, WhatIsHeldOfADatasetThatIsGoneCountsUntilItIsLetGoOf) {
   EXPECT_EQ(f.store.counts().bytes, 0U);
 }
 
-TEST(Resident, WhatIsBeingReadIsToldUntilItIsThere) {
+TEST(Resident, LoadingProgressIsReportedUntilDone) {
   Fixture f(10);
   f.log->hold = true;
   std::thread reader([&] { ASSERT_TRUE(f.dataset->volume("f", 7)); });
@@ -340,7 +340,7 @@ TEST(Resident, WhatIsBeingReadIsToldUntilItIsThere) {
   EXPECT_FALSE(f.dataset->loading());
 }
 
-TEST(Resident, ASourceIsReleasedWhenNothingWasReadForAWhile) {
+TEST(Resident, SourceIsReleasedAfterIdleTime) {
   Fixture f(10);
   ASSERT_TRUE(f.dataset->volume("f", 0));
   f.store.release_idle(3600);
@@ -350,7 +350,7 @@ TEST(Resident, ASourceIsReleasedWhenNothingWasReadForAWhile) {
   EXPECT_EQ(f.log->released, 1);
 }
 
-TEST(Resident, NumbersAreRememberedByTheirKeyAndFailuresAreNot) {
+TEST(Resident, ValuesAreCachedByKeyAndFailuresAreNot) {
   Fixture f(1);
   int made = 0;
   const auto ask = [&](const std::string& key, bool fails) {
@@ -367,8 +367,8 @@ TEST(Resident, NumbersAreRememberedByTheirKeyAndFailuresAreNot) {
   EXPECT_EQ(made, 3);
 }
 
-// A moment of coarser frames must not cost the series what it has read.
-TEST(Resident, AveragesGoBeforeTheVolumesTheyAreMadeOf) {
+// A short phase of coarser frames must not evict the series.
+TEST(Resident, AveragesAreEvictedBeforeTheirSourceVolumes) {
   Fixture f(6);
   Coarsening half;
   half.halvings = {1, 1, 1};
@@ -378,7 +378,7 @@ TEST(Resident, AveragesGoBeforeTheVolumesTheyAreMadeOf) {
   ASSERT_TRUE(f.dataset->volume("f", 5));
   for (std::size_t step = 0; step < 6; ++step) EXPECT_TRUE(f.is_resident(step)) << step;
   EXPECT_EQ(f.dataset->counts().averages, 5U);
-  ASSERT_TRUE(f.dataset->level("f", 5, half)) << "in place of a volume now";
+  ASSERT_TRUE(f.dataset->level("f", 5, half)) << "instead of a volume";
   EXPECT_FALSE(f.is_resident(0));
 }
 
@@ -407,16 +407,16 @@ TEST(Resident, PackedStorageHoldsMoreStepsWithinItsError) {
   EXPECT_GE(packed.dataset->counts().unpacked, 5U);
 }
 
-TEST(Resident, TheErrorOfPackedStorageIsTheLargestOfAllSteps) {
+TEST(Resident, ErrorOfPackedStorageIsTheMaximumOfAllSteps) {
   Fixture f(10, Storage::packed16);
   ASSERT_TRUE(f.dataset->volume("f", last_step));
   ASSERT_TRUE(f.dataset->volume("f", 1));
-  // Half of one of 65534 steps between the least and the greatest value.
+  // Half of one of 65534 steps between minimum and maximum.
   EXPECT_NEAR(f.dataset->storage_error("f"), 0.5 * (999.0 / 125) / 65534, 1e-9);
 }
 
-// Limit: three volumes. Two that are wished for, with their packed forms, fill it.
-TEST(Resident, APackedFormTakesNoWishsPlace) {
+// Limit: three volumes. Two requested ones with their packed forms fill it.
+TEST(Resident, PackedFormDoesNotReplaceAPrefetchRequest) {
   Fixture f(3, Storage::packed16);
   f.request_prefetch({1, 2});
   for (int i = 0; i < 10000 && !f.is_resident(2); ++i) {
@@ -451,7 +451,7 @@ TEST(Packed, MaskedConstantAndExtremeValues) {
   volume.components = 1;
   volume.values = std::vector<float>{-most, most, 0, 1};
   finish_volume(volume);
-  EXPECT_FALSE(pack(volume)) << "steps would leave the range of a float";
+  EXPECT_FALSE(pack(volume)) << "quantisation steps would exceed the range of float";
   volume.values = std::vector<float>(4, nan);
   finish_volume(volume);
   const auto empty = pack(volume);
@@ -459,7 +459,7 @@ TEST(Packed, MaskedConstantAndExtremeValues) {
   EXPECT_EQ(unpack(*empty).masked, 4);
 }
 
-TEST(Packed, RandomValuesErrByHalfAStepAtMost) {
+TEST(Packed, RandomValuesDeviateByAtMostHalfAStep) {
   std::mt19937 random(5);
   for (const float scale : {1e-30F, 1.0F, 1e30F}) {
     std::normal_distribution<float> normal(0.3F, 1.0F);

@@ -1,4 +1,4 @@
-// A netCDF file that is written in a moment.
+// A netCDF file that is written quickly.
 #pragma once
 
 #include <string>

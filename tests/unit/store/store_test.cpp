@@ -1,4 +1,6 @@
-// The store's promises: a dataset for each set of files, one budget for all.
+// Guarantees of the store: one load per field and step, one budget for all, held volumes stay
+// valid.
+
 #include "server/data/resident/store.hpp"
 
 #include <gtest/gtest.h>
@@ -26,7 +28,7 @@ std::string numbered(int i) {
   return name;
 }
 
-TEST(Store, IdsAreFileNamesMadeUnique) {
+TEST(Store, IdsAreUniqueFileNames) {
   const Folder folder;
   std::filesystem::create_directory(folder / "sub");
   write_small(folder / "rain.nc", 0);
@@ -48,7 +50,7 @@ TEST(Store, IdsAreFileNamesMadeUnique) {
   EXPECT_EQ((*store.find("tornado-2"))->info().format, "sample");
 }
 
-TEST(Store, WhatIsNotThereIsNamed) {
+TEST(Store, MissingDatasetIsNamed) {
   Store store(1 << 20);
   const auto found = store.find("nothing");
   ASSERT_FALSE(found);
@@ -78,7 +80,7 @@ TEST(Store, DatasetsShareOneBudget) {
   EXPECT_EQ((*b)->resident_bytes(), 16U);
 }
 
-TEST(Store, AFileReadByManyThreadsGivesEachItsNumbers) {
+TEST(Store, FileReadByManyThreadsGivesCorrectValues) {
   const Folder folder;
   Store store(1 << 24);
   for (int i = 0; i < 4; ++i) {
@@ -105,7 +107,7 @@ TEST(Store, AFileReadByManyThreadsGivesEachItsNumbers) {
   EXPECT_EQ(wrong, 0);
 }
 
-TEST(Store, TheSameFilesAreOneDatasetHoweverOftenTheyAreAdded) {
+TEST(Store, SameFilesAreOneDatasetWhenAddedAgain) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   std::filesystem::create_symlink(folder / "rain.nc", folder / "link.nc");
@@ -133,10 +135,10 @@ TEST(Store, TheSameFilesAreOneDatasetHoweverOftenTheyAreAdded) {
   ASSERT_TRUE(store.remove(got[0]->info().id));
   EXPECT_FALSE(store.find(got[0]->info().id));
   ASSERT_TRUE(store.add(folder / "rain.nc"));
-  EXPECT_EQ(opened, 2) << "what was removed is opened anew";
+  EXPECT_EQ(opened, 2) << "a removed dataset is reopened";
 }
 
-TEST(Store, WhatIsRefusedStaysListedAsFailedUntilItPasses) {
+TEST(Store, RefusedDatasetStaysFailedUntilItPasses) {
   const Folder folder;
   const std::string file = folder / "rain.nc";
   write_small(file, 0);
@@ -157,12 +159,12 @@ TEST(Store, WhatIsRefusedStaysListedAsFailedUntilItPasses) {
   refuses = false;
   const auto added = store.add(file);
   ASSERT_TRUE(added) << added.error().message;
-  EXPECT_EQ((*added)->info().id, "rain") << "under the id by which it was listed";
+  EXPECT_EQ((*added)->info().id, "rain") << "under its listed id";
   EXPECT_TRUE(store.failed().empty());
 }
 
 // Other waiters for the same volume must not wait forever.
-TEST(Budget, WhatThrowsIsAnErrorAndCanBeAskedForAgain) {
+TEST(Budget, ExceptionIsAnErrorAndTheLoadCanBeRetried) {
   Budget budget(1000);
   const ResidentKey key{budget.next_owner(), 0, 0, ""};
   const auto fails =
@@ -175,7 +177,7 @@ TEST(Budget, WhatThrowsIsAnErrorAndCanBeAskedForAgain) {
   EXPECT_TRUE(works);
 }
 
-TEST(Store, WhatThrowsWhileItIsOpenedIsAnErrorAndCanBeAddedAgain) {
+TEST(Store, ExceptionWhileOpeningIsAnErrorAndCanBeRetried) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   int asked = 0;
@@ -189,8 +191,8 @@ TEST(Store, WhatThrowsWhileItIsOpenedIsAnErrorAndCanBeAddedAgain) {
   EXPECT_TRUE(store.add(folder / "rain.nc"));
 }
 
-// Steps and places can be more than what is shown of them.
-TEST(Store, WhatIsKnownOfADatasetCountsInTheLimit) {
+// Steps and positions can take more memory than the shown data.
+TEST(Store, MetadataOfADatasetCountsInTheLimit) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   Store store({4 << 20, Storage::float32, [](const Location&) -> Result<std::unique_ptr<Source>> {
@@ -206,7 +208,7 @@ TEST(Store, WhatIsKnownOfADatasetCountsInTheLimit) {
 }
 
 // A model writes its newest file.
-TEST(Store, OfALongSeriesAChangeOfTheLastFileIsSeen) {
+TEST(Store, ChangeOfTheLastFileOfALongSeriesIsDetected) {
   const Folder folder;
   for (int i = 100; i < 200; ++i) std::ofstream(folder / numbered(i)) << "a step";
   StoreOptions options;
@@ -221,7 +223,7 @@ TEST(Store, OfALongSeriesAChangeOfTheLastFileIsSeen) {
   EXPECT_EQ(store.look_for_changes(0).size(), 1U);
 }
 
-TEST(Store, WhatIsRemovedWhileItIsOpenedAnewStaysAway) {
+TEST(Store, DatasetRemovedWhileReopeningStaysRemoved) {
   const Folder folder;
   std::ofstream(folder / "rain") << "a";
   Store* whole = nullptr;

@@ -51,12 +51,12 @@ class Turn : public testing::Test {
   static std::shared_ptr<Dataset> series(const std::shared_ptr<Budget>& budget) {
     return std::make_shared<Dataset>(std::make_unique<PlainSource>(), "series", budget);
   }
-  // Room for one volume and a half.
+  // Memory for one and a half volumes.
   std::shared_ptr<Budget> budget_ = std::make_shared<Budget>(plain_bytes * 3 / 2);
   std::shared_ptr<Dataset> dataset_ = series(budget_);
 };
 
-TEST_F(Turn, AStepThatIsHeldGivesWayToTheNextOnceItIsLetGoOf) {
+TEST_F(Turn, HeldStepIsEvictedForTheNextOnceReleased) {
   auto shown = dataset_->volume("a", 0);
   ASSERT_TRUE(shown);
   EXPECT_FALSE(dataset_->volume("a", 1)) << "without in_turn the error is immediate";
@@ -65,7 +65,7 @@ TEST_F(Turn, AStepThatIsHeldGivesWayToTheNextOnceItIsLetGoOf) {
     return patient.volume("a", 1);
   });
   EXPECT_EQ(next.wait_for(std::chrono::milliseconds(100)), std::future_status::timeout);
-  EXPECT_EQ((*shown)->values[0], 0.0F) << "what is held stays valid";
+  EXPECT_EQ((*shown)->values[0], 0.0F) << "held volumes stay valid";
   EXPECT_LE(budget_->counts().bytes, budget_->bytes_max());
   shown->reset();
   const auto loaded = next.get();
@@ -74,7 +74,7 @@ TEST_F(Turn, AStepThatIsHeldGivesWayToTheNextOnceItIsLetGoOf) {
   EXPECT_LE(budget_->counts().bytes, budget_->bytes_max());
 }
 
-TEST_F(Turn, NobodyHoldsAnewWhatIsWaitedFor) {
+TEST_F(Turn, VolumeAwaitedByATurnIsFoundByHoldersOnly) {
   auto shown = dataset_->volume("a", 0);
   ASSERT_TRUE(shown);
   auto next = std::async(std::launch::async, [&] {
@@ -86,16 +86,16 @@ TEST_F(Turn, NobodyHoldsAnewWhatIsWaitedFor) {
   {
     Dataset holder = dataset_->held();
     const auto found = holder.volume("a", 0);
-    ASSERT_TRUE(found) << "a frame whose fields were loaded is drawn";
+    ASSERT_TRUE(found) << "a frame with loaded fields is rendered";
     EXPECT_EQ(found->get(), shown->get());
-    EXPECT_FALSE(dataset_->volume("a", 2)) << "others get no room before it";
+    EXPECT_FALSE(dataset_->volume("a", 2)) << "others get no memory before it";
     shown->reset();
     EXPECT_EQ(next.wait_for(std::chrono::milliseconds(50)), std::future_status::timeout);
   }
   EXPECT_TRUE(next.get());
 }
 
-TEST_F(Turn, WhatTheCallerHoldsItselfIsNotWaitedFor) {
+TEST_F(Turn, VolumesHeldByTheCallerAreNotWaitedFor) {
   const auto begin = TurnClock::now();
   Dataset patient = dataset_->in_turn();
   const auto first = patient.volume("a", 0);
@@ -106,7 +106,7 @@ TEST_F(Turn, WhatTheCallerHoldsItselfIsNotWaitedFor) {
   EXPECT_LT(TurnClock::now() - begin, Budget::patience / 2);
 }
 
-TEST_F(Turn, WhatIsLargerThanTheLimitIsRefusedAtOnce) {
+TEST_F(Turn, VolumeLargerThanTheLimitIsRefusedAtOnce) {
   const auto small = std::make_shared<Budget>(plain_bytes - 1);
   const auto dataset = series(small);
   const auto begin = TurnClock::now();
@@ -120,7 +120,7 @@ TEST_F(Turn, WhatIsLargerThanTheLimitIsRefusedAtOnce) {
   EXPECT_LT(TurnClock::now() - begin, Budget::patience / 2);
 }
 
-TEST_F(Turn, ACancelledWaitEndsAndWhatWasInItsWayStaysResident) {
+TEST_F(Turn, CancelledWaitEndsAndKeepsBlockingVolumesResident) {
   const auto shown = dataset_->volume("a", 0);
   ASSERT_TRUE(shown);
   const CancelToken cancel;
@@ -137,13 +137,13 @@ TEST_F(Turn, ACancelledWaitEndsAndWhatWasInItsWayStaysResident) {
   EXPECT_EQ(loaded.error().kind, ErrorKind::cancelled);
   EXPECT_LT(TurnClock::now() - begin, Budget::patience / 2);
   const auto again = resident.volume("a", 0);
-  ASSERT_TRUE(again) << "it need not be read once more";
+  ASSERT_TRUE(again) << "it need not be read again";
   EXPECT_EQ(again->get(), shown->get());
   EXPECT_EQ(budget_->counts().bytes, plain_bytes);
   EXPECT_EQ(budget_->counts().evictions, 0U);
 }
 
-TEST_F(Turn, ATurnThatIsTakenIsNotWaitedForByWhoIsCancelled) {
+TEST_F(Turn, CancelledCallerDoesNotWaitForAnOccupiedTurn) {
   Store store(plain_bytes);
   const auto taken = store.take_turn(*dataset_);
   ASSERT_TRUE(taken);
@@ -155,7 +155,7 @@ TEST_F(Turn, ATurnThatIsTakenIsNotWaitedForByWhoIsCancelled) {
   EXPECT_FALSE(next.get());
 }
 
-TEST_F(Turn, ATurnThatEndsIsTheNextOnes) {
+TEST_F(Turn, EndedTurnPassesToTheNext) {
   Store store(plain_bytes);
   auto taken = store.take_turn(*dataset_);
   auto next = std::async(std::launch::async, [&] { return store.take_turn(*dataset_) != nullptr; });
@@ -164,7 +164,7 @@ TEST_F(Turn, ATurnThatEndsIsTheNextOnes) {
   EXPECT_TRUE(next.get());
 }
 
-TEST_F(Turn, WorkOfOthersIsWaitedForButNotWhatLasts) {
+TEST_F(Turn, TemporaryWorkIsWaitedForButNotPermanentData) {
   const auto load = [&] {
     Dataset patient = dataset_->in_turn();
     return patient.volume("a", 0);
@@ -185,7 +185,7 @@ TEST_F(Turn, WorkOfOthersIsWaitedForButNotWhatLasts) {
   EXPECT_LT(TurnClock::now() - begin, Budget::reservation_patience / 2);
 }
 
-TEST(Budget, WhatFitsBesideALoadInTurnDoesNotWaitForIt) {
+TEST(Budget, LoadThatFitsBesideALoadInTurnDoesNotWait) {
   Budget budget(10);
   const std::uint64_t owner = budget.next_owner();
   const auto get = [&](std::size_t step, std::uint64_t bytes, Urgency urgency) {
@@ -203,7 +203,7 @@ TEST(Budget, WhatFitsBesideALoadInTurnDoesNotWaitForIt) {
   EXPECT_TRUE(next.get());
 }
 
-TEST_F(Turn, NobodyWaitsAtTheEnd) {
+TEST_F(Turn, ShutdownEndsAllWaits) {
   const auto shown = dataset_->volume("a", 0);
   ASSERT_TRUE(shown);
   const auto begin = TurnClock::now();
@@ -232,12 +232,12 @@ class HungrySource : public PlainSource {
   Reservation work_;
 };
 
-TEST(Reservation, WaitsWhereItIsPartOfALoadInTurn) {
+TEST(Reservation, WaitsAsPartOfALoadInTurn) {
   const auto budget = std::make_shared<Budget>(plain_bytes * 2);
   Dataset dataset(std::make_unique<HungrySource>(budget), "hungry", budget);
   auto shown = dataset.volume("a", 0);
   ASSERT_TRUE(shown);
-  EXPECT_FALSE(dataset.volume("a", 1)) << "there is room for the volume alone";
+  EXPECT_FALSE(dataset.volume("a", 1)) << "there is memory for the volume only";
   auto next = std::async(std::launch::async, [&] {
     Dataset patient = dataset.in_turn();
     return patient.volume("a", 1);
@@ -248,29 +248,29 @@ TEST(Reservation, WaitsWhereItIsPartOfALoadInTurn) {
   EXPECT_TRUE(loaded) << loaded.error().message;
 }
 
-TEST(Reservation, CountsMakesRoomAndIsGivenBack) {
+TEST(Reservation, IsCountedEvictsAndIsReleased) {
   const auto budget = std::make_shared<Budget>(2 * plain_bytes);
   Dataset dataset(std::make_unique<PlainSource>(), "series", budget);
   ASSERT_TRUE(dataset.volume("a", 0));
   ASSERT_TRUE(dataset.volume("a", 1));
   {
     Reservation work(budget, Reservation::Term::lasting);
-    EXPECT_TRUE(work.resize(plain_bytes)) << "a volume that nobody holds goes for it";
+    EXPECT_TRUE(work.resize(plain_bytes)) << "an unreferenced volume is evicted for it";
     EXPECT_EQ(budget->counts().bytes, 2 * plain_bytes);
     EXPECT_EQ(dataset.resident_bytes(), plain_bytes);
     const auto too_much = work.resize(2 * plain_bytes + 1);
     ASSERT_FALSE(too_much);
     EXPECT_EQ(too_much.error().kind, ErrorKind::out_of_memory);
-    EXPECT_EQ(work.bytes(), plain_bytes) << "it stays as it was";
+    EXPECT_EQ(work.bytes(), plain_bytes) << "it stays unchanged";
     const auto begin = TurnClock::now();
     Dataset patient = dataset.in_turn();
     const auto first = patient.volume("a", 2);
     EXPECT_TRUE(first);
-    EXPECT_FALSE(patient.volume("a", 3)) << "a lasting reservation is not waited for";
+    EXPECT_FALSE(patient.volume("a", 3)) << "a permanent reservation is not waited for";
     EXPECT_LT(TurnClock::now() - begin, Budget::patience / 2);
   }
   EXPECT_EQ(budget->counts().bytes, plain_bytes);
-  EXPECT_TRUE(Reservation().resize(plain_bytes)) << "without a budget all is allowed";
+  EXPECT_TRUE(Reservation().resize(plain_bytes)) << "without a budget everything is allowed";
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Front, orders and medians of curves made by hand.
+// Fronts, orders and medians of synthetic curves.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -24,13 +24,13 @@ std::vector<bool> front(std::vector<Point> points) {
   return marks;
 }
 
-TEST(Pareto, HoldsThosePointsThatNoOtherBeatsInBoth) {
+TEST(Pareto, ContainsTheUndominatedPoints) {
   const std::vector<bool> expected{true, false, true, true, false};
   EXPECT_EQ(front({point(1, 0.1), point(2, 0.2), point(2, 0.05), point(9, 0.01), point(9, 0.02)}),
             expected);
 }
 
-TEST(Pareto, KeepsTwinsAndLeavesOutTheUnstableAndTheUnknown) {
+TEST(Pareto, KeepsEqualPointsAndOmitsUnstableAndUnknownOnes) {
   EXPECT_EQ(front({point(1, 0.1), point(1, 0.1)}), (std::vector<bool>{true, true}));
   EXPECT_EQ(front({point(1, 0.1), point(0.5, 0.01, false)}), (std::vector<bool>{true, false}));
   constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
@@ -47,14 +47,14 @@ TEST(Slope, IsTheExponentOfAPowerLaw) {
   }
 }
 
-TEST(Slope, PassesOverWhatHasNoLogarithmAndNeedsThreeOthers) {
+TEST(Slope, SkipsNonPositiveValuesAndNeedsThreePoints) {
   constexpr double inf = std::numeric_limits<double>::infinity();
   EXPECT_NEAR(log_slope({4, 2, 1, 0, 8}, {16, 4, 1, 1, inf}), 2, 1e-12);
   EXPECT_TRUE(std::isnan(log_slope({4, 2, 0}, {16, 4, 1})));
   EXPECT_TRUE(std::isnan(log_slope({2, 2, 2}, {16, 4, 1})));
 }
 
-TEST(Order, IsTakenOverTheCurvesKnobAndItsStablePoints) {
+TEST(Order, IsFittedOverTheParameterOfTheCurveAndStablePoints) {
   std::vector<Point> points;
   for (const double thickness : {2.0, 1.0, 0.5, 0.25}) {
     points.push_back(point(1 / thickness, 0.01 * thickness * thickness));
@@ -69,7 +69,7 @@ TEST(Order, IsTakenOverTheCurvesKnobAndItsStablePoints) {
   EXPECT_NEAR(curve.order, 2, 1e-12);
 }
 
-TEST(Median, IsTheMiddleOfOddManyAndBetweenTheMiddleTwoOfEvenMany) {
+TEST(Median, IsTheMiddleValueOrTheMeanOfTheMiddleTwo) {
   EXPECT_EQ(median({9, 1, 5}), 5);
   EXPECT_EQ(median({9, 1, 5, 7}), 6);
 }

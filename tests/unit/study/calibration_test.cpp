@@ -1,4 +1,4 @@
-// What a calibration compares, and what is said of it, with numbers made up.
+// Comparisons of the calibration report, with synthetic numbers.
 #include "server/study/calibration.hpp"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ Compared compared(double told, double truth, std::size_t setting = 0, std::size_
   one.look = look;
   one.setting = setting;
   one.error = truth;
-  one.forecast = {told, std::log(2.0) / 1.65, 1, true};  // bounded by twice what is told
+  one.forecast = {told, std::log(2.0) / 1.65, 1, true};  // bounded by twice the estimate
   one.prior = {10 * truth, 0, 1, false};
   return one;
 }
@@ -38,7 +38,7 @@ Calibration made_up() {
   return calibration;
 }
 
-TEST(Looks, AreThoseThatASubjectHas) {
+TEST(Looks, MatchTheContentOfTheSubject) {
   const auto names_of = [](const char* scene) {
     std::set<std::string> names;
     for (const Look& look : looks_of(standard_subject(scene, true).value())) {
@@ -51,7 +51,7 @@ TEST(Looks, AreThoseThatASubjectHas) {
   EXPECT_EQ(names_of("scalar"), (std::set<std::string>{"as it is", "ten times as dense"}));
 }
 
-TEST(Looks, DifferAsTheirNamesSay) {
+TEST(Looks, DifferInTheNamedProperties) {
   const Subject subject = standard_subject("soft", true).value();
   for (const Look& look : looks_of(subject)) {
     const bool lines = look.view.vector.field.kind == protocol::FieldChoice::Kind::named;
@@ -64,7 +64,7 @@ TEST(Looks, DifferAsTheirNamesSay) {
   }
 }
 
-TEST(Seen, IsTheSameEachTimeAndAnotherFromEveryPlace) {
+TEST(Seen, IsReproducibleAndDiffersByViewpoint) {
   const Subject subject = standard_subject("soft", true).value();
   std::set<double> heights;
   for (std::uint64_t n = 0; n < 20; ++n) {
@@ -92,7 +92,7 @@ TEST(Agreement, CountsSharesAndTheMedianRatio) {
   EXPECT_EQ(agreement(Calibration()).count, 0U);
 }
 
-TEST(Agreement, ErrorsOfRoundingAreAllAlike) {
+TEST(Agreement, RoundingErrorsAreEquivalent) {
   Calibration calibration;
   calibration.compared = {compared(1e-5, 1e-9)};
   EXPECT_DOUBLE_EQ(agreement(calibration).within_two, 1);
@@ -129,13 +129,13 @@ TEST(Calibrate, ComparesEverySettingOfEveryHeldOutView) {
     EXPECT_LE(aimed.promised_kept, aimed.promised);
     EXPECT_LE(aimed.possible_kept, aimed.possible);
   }
-  // An even grey is no truth of it.
+  // A uniform grey picture is not a valid reference.
   EXPECT_EQ(asked, 2);
   ASSERT_EQ(made.checks.size(), 2U);
   EXPECT_GT(made.checks[0].apart, 0.1);
 }
 
-TEST(Calibrate, EndsWhenItIsCancelled) {
+TEST(Calibrate, StopsWhenCancelled) {
   ThreadPool pool(1);
   const CancelToken cancel;
   const auto made = calibrate(standard_subject("vectors", true).value(), {100, 80, 1, 2}, {}, pool,
@@ -144,7 +144,7 @@ TEST(Calibrate, EndsWhenItIsCancelled) {
   EXPECT_EQ(made.error().kind, ErrorKind::cancelled);
 }
 
-TEST(CalibrationReport, IsInTheJsonThePageAndThePlot) {
+TEST(CalibrationReport, IsPartOfTheJsonThePageAndThePlot) {
   Report report;
   report.scenes.emplace_back();
   SceneReport& scene = report.scenes[0];
@@ -171,7 +171,7 @@ TEST(CalibrationReport, IsInTheJsonThePageAndThePlot) {
     for (std::size_t at = svg.find(what); at != std::string::npos; at = svg.find(what, at + 1)) ++n;
     return n;
   };
-  EXPECT_EQ(count("r=\"2.4\""), 4) << "one a comparison";
+  EXPECT_EQ(count("r=\"2.4\""), 4) << "one per comparison";
   EXPECT_EQ(svg.find("a<b"), std::string::npos);
   EXPECT_EQ(svg.find("nan"), std::string::npos);
   const std::string page = report_page(report).value();

@@ -1,4 +1,4 @@
-// What a study keeps and when it takes it up again: keys, truths and foreign files.
+// The cache of a study and its reuse: keys, references and foreign files.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -31,7 +31,7 @@ class Keep : public testing::Test {
   std::filesystem::path folder;
 };
 
-TEST(Keys, ChangeWithAllThatAPointDependsOn) {
+TEST(Keys, ChangeWithEveryInputOfAPoint) {
   const Subject subject = standard_subject("vectors", true).value();
   const Machine machine = this_machine(2).value();
   EXPECT_EQ(machine.program.size(), 16U);
@@ -63,8 +63,8 @@ TEST(Keys, ChangeWithAllThatAPointDependsOn) {
   EXPECT_EQ(keys.size(), 10U);
 }
 
-// Not with what only the time depends on.
-TEST(Keys, OfATruthChangesWithToleranceAndProgramAlone) {
+// Independent of inputs that affect only the time.
+TEST(Keys, OfAReferenceChangeWithToleranceAndProgramOnly) {
   const Subject subject = standard_subject("vectors", true).value();
   const Machine machine = this_machine(2).value();
   const std::string key = truth_key(subject, machine, 1e-7);
@@ -78,7 +78,7 @@ TEST(Keys, OfATruthChangesWithToleranceAndProgramAlone) {
   EXPECT_EQ(truth_key(subject, other, 1e-7), key);
 }
 
-TEST_F(Keep, ATruthComesBackWithItsSecondsAndTolerance) {
+TEST_F(Keep, ReferenceIsRestoredWithItsTimeAndTolerance) {
   const auto path = folder / "truth";
   ASSERT_TRUE(write_truth(path, {{1, 2, {1, 2, 3, 4, 5, 6, 7, 1.0 / 3}, 11, 12}, 2.5, 1e-7}));
   const auto kept = read_truth(path, 1, 2, 1e-7);
@@ -92,7 +92,7 @@ TEST_F(Keep, ATruthComesBackWithItsSecondsAndTolerance) {
   EXPECT_FALSE(read_truth(path, 2, 1, 1e-7));
 }
 
-TEST_F(Keep, ATruthThatIsDamagedOrNotFiniteIsNotReused) {
+TEST_F(Keep, DamagedOrNonFiniteReferenceIsNotReused) {
   const auto path = folder / "truth";
   ASSERT_TRUE(write_truth(path, {{1, 1, {1, 2, 3, 4}, 11, 12}, 2.5, 1e-7}));
   const std::string whole = read(path);
@@ -106,7 +106,7 @@ TEST_F(Keep, ATruthThatIsDamagedOrNotFiniteIsNotReused) {
   EXPECT_FALSE(read_truth(path, 1, 1, 1e-7));
 }
 
-TEST_F(Keep, AForeignPointsFileIsAnErrorThatLeavesItAlone) {
+TEST_F(Keep, ForeignPointsFileIsAnErrorAndIsKept) {
   const auto path = folder / "points.csv";
   for (const std::string text : {"x,y\n1,2\n", "x", "key,rmse\n", "\n"}) {
     std::ofstream(path, std::ios::binary | std::ios::trunc) << text;
@@ -118,7 +118,7 @@ TEST_F(Keep, AForeignPointsFileIsAnErrorThatLeavesItAlone) {
   }
 }
 
-TEST_F(Keep, APointsFileThatCannotBeReadIsAnError) {
+TEST_F(Keep, UnreadablePointsFileIsAnError) {
   const auto path = folder / "points.csv";
   std::filesystem::create_directory(path);
   const auto opened = PointsFile::open(path);

@@ -1,4 +1,4 @@
-// Errors in linear light against sums by hand, and FLIP by its known properties.
+// Errors in linear light against manual sums, and FLIP by its known properties.
 #include "server/study/metrics.hpp"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ Rgb noisy(const Rgb& from, double sigma) {
   return out;
 }
 
-TEST(Difference, IsTheRootOfTheMeanSquareTheLargestAndItsDecibels) {
+TEST(Difference, ContainsRootMeanSquareMaximumAndDecibels) {
   const std::vector<float> picture{0.5F, 0, 0, 1, 0, 0, 0, 0};
   const std::vector<double> truth{0.25, 0, 0, 1, 0, 0.5, 0, 0};
   const frame::Difference d = frame::difference_of(picture, truth);
@@ -43,7 +43,7 @@ TEST(Difference, IsTheRootOfTheMeanSquareTheLargestAndItsDecibels) {
   EXPECT_NEAR(d.psnr, 10 * std::log10(8 / 0.3125), 1e-12);
 }
 
-TEST(Difference, OfEqualPicturesIsNothingAndOfAHoleUnknown) {
+TEST(Difference, EqualPicturesGiveZeroAndNanIsUnknown) {
   std::vector<float> picture{0.5F, 0, 0, 1};
   const std::vector<double> truth(picture.begin(), picture.end());
   EXPECT_EQ(frame::difference_of(picture, truth).rmse, 0);
@@ -53,7 +53,7 @@ TEST(Difference, OfEqualPicturesIsNothingAndOfAHoleUnknown) {
   EXPECT_TRUE(std::isnan(frame::difference_of(picture, truth).max));
 }
 
-TEST(WithinUnit, HoldsUpToTheSlackAndForNoHole) {
+TEST(WithinUnit, HoldsUpToTheSlackAndNotForNan) {
   EXPECT_TRUE(within_unit(std::vector<float>{0, 1, -0.0005F, 1.0005F}, 1e-3));
   EXPECT_FALSE(within_unit(std::vector<float>{0, 1.01F}, 1e-3));
   EXPECT_FALSE(within_unit(std::vector<float>{-0.01F}, 1e-3));
@@ -61,7 +61,7 @@ TEST(WithinUnit, HoldsUpToTheSlackAndForNoHole) {
   EXPECT_FALSE(within_unit(std::vector<float>{std::numeric_limits<float>::infinity()}, 1e-3));
 }
 
-TEST(Resample, KeepsAPlaneAndItsOwnSize) {
+TEST(Resample, KeepsAPlaneAndEqualSize) {
   constexpr int w = 6;
   constexpr int h = 4;
   const auto plane = [](int width, int height) {  // in pixels of the picture of w x h
@@ -86,30 +86,30 @@ TEST(Resample, KeepsAPlaneAndItsOwnSize) {
   }
 }
 
-TEST(Flip, OfEqualPicturesIsZero) {
+TEST(Flip, EqualPicturesGiveZero) {
   const Rgb picture = noisy(filled(120, 80, 200), 40);
   EXPECT_EQ(flip(picture, picture), 0);
 }
 
 // |dL*| = 100; the largest difference there is, green to blue after Hunt, is 203.7:
 // 0.95 + 0.05 (100^.7 - .4 m) / (.6 m) with m = 203.7^.7.
-TEST(Flip, OfBlackAndWhiteIsNearlyOne) {
+TEST(Flip, BlackAndWhiteGiveNearlyOne) {
   const double m = std::pow(203.7, 0.7);
   const double expected = 0.95 + 0.05 * (std::pow(100, 0.7) - 0.4 * m) / (0.6 * m);
   EXPECT_NEAR(flip(filled(0, 0, 0), filled(255, 255, 255)), expected, 2e-4);
 }
 
-TEST(Flip, OfGreenAndBlueIsOne) {
+TEST(Flip, GreenAndBlueGiveOne) {
   EXPECT_NEAR(flip(filled(0, 255, 0), filled(0, 0, 255)), 1, 1e-9);
 }
 
-TEST(Flip, DoesNotAskWhichOfTheTwoIsTheReference) {
+TEST(Flip, IsSymmetric) {
   const Rgb a = noisy(filled(120, 80, 200), 10);
   const Rgb b = noisy(filled(90, 100, 150), 25);
   EXPECT_NEAR(flip(a, b), flip(b, a), 1e-12);
 }
 
-TEST(Flip, OfOneCodeIsSmallAndGrowsWithNoise) {
+TEST(Flip, OneCodeIsSmallAndGrowsWithNoise) {
   const Rgb clean = filled(128, 128, 128);
   const double one_code = flip(clean, filled(129, 129, 129));
   EXPECT_GT(one_code, 0);
@@ -123,9 +123,9 @@ TEST(Flip, OfOneCodeIsSmallAndGrowsWithNoise) {
   }
 }
 
-// The eye blurs fine patterns: a checkerboard of single pixels is nearer to its own mean light than
-// one of coarse squares.
-TEST(Flip, ForgivesWhatIsTooFineToSee) {
+// The eye blurs fine patterns: a checkerboard of single pixels is closer to its mean light than one
+// of coarse squares.
+TEST(Flip, IgnoresInvisiblyFineDetail) {
   const auto checker = [](int cell) {
     Rgb rgb;
     for (int y = 0; y < side; ++y) {
@@ -140,9 +140,9 @@ TEST(Flip, ForgivesWhatIsTooFineToSee) {
   EXPECT_LT(flip(mean, checker(1)), 0.5 * flip(mean, checker(12)));
 }
 
-// Stripes differ from an even ground in as many pixels as one half that is brighter, and blurring
-// by the eye (about a pixel) changes little at 8 pixels a stripe; but they have more edges.
-TEST(Flip, CountsDifferencesAtEdgesForMore) {
+// Stripes differ from a uniform background in as many pixels as one brighter half, and blurring
+// (about a pixel) changes little at 8 pixels per stripe; but they have more edges.
+TEST(Flip, WeightsDifferencesAtEdges) {
   const auto stripes = [](int wide) {
     Rgb rgb;
     for (int i = 0; i < side * side; ++i) {

@@ -1,4 +1,5 @@
-// The stiffness sweep through the engine: what the formulas of one kernel say of every compositing.
+// The stiffness sweep through the engine: predictions of the one-kernel formulas for every
+// compositing.
 #include "server/study/stability.hpp"
 
 #include <gtest/gtest.h>
@@ -32,8 +33,8 @@ TEST(Stability, AnalyticIsExactBoundedAndMonotoneAtEveryStiffness) {
   }
 }
 
-// No slack here but a float's rounding: what is bounded is so at every optical depth.
-TEST(Stability, CorrectedAndAnalyticStayWithinTheUnitIntervalForEveryOpticalDepth) {
+// No tolerance beyond float rounding: bounded methods are bounded at every optical depth.
+TEST(Stability, CorrectedAndAnalyticStayWithinTheUnitInterval) {
   constexpr double rounding = 1e-6;
   for (const Compositing compositing : {Compositing::cd, Compositing::analytic}) {
     for (const Stiffness& s : sweep_of(compositing)) {
@@ -51,7 +52,7 @@ TEST(Stability, CorrectedAndAnalyticStayWithinTheUnitIntervalForEveryOpticalDept
 // exp(-tau x) and its chord 1 - x (1 - exp(-tau)) differ by at most tau^2 / 8, and by less than 1;
 // times the line's opacity 0.6 and the largest distance of its colour from the medium's, 0.7. The
 // error grows with tau: the bound is not met by being exact.
-TEST(Stability, TheChordOfCorrectedErrsByAtMostAnEighthOfTheSquare) {
+TEST(Stability, ChordOfCorrectedDeviatesByAtMostAnEighthOfTheSquare) {
   for (const Stiffness& s : sweep_of(Compositing::cd)) {
     const double most = 0.6 * 0.7 * std::min(1.0, s.tau * s.tau / 8);
     EXPECT_LE(s.error, most + 1e-6) << s.tau;
@@ -62,8 +63,8 @@ TEST(Stability, TheChordOfCorrectedErrsByAtMostAnEighthOfTheSquare) {
 }
 
 // The transmittance of n layers is (1 - tau)^n: beyond 1 the first layer leaves [0, 1], below 2
-// those behind it heal that, from 2 on they make it no better or worse.
-TEST(Stability, EulerLeavesTheUnitIntervalBeyondOneAndDivergesFromTwoOn) {
+// later layers correct that, from 2 on they make it no better or worse.
+TEST(Stability, EulerLeavesTheUnitIntervalAboveOneAndDivergesFromTwo) {
   for (const Stiffness& s : sweep_of(Compositing::cd_euler)) {
     EXPECT_EQ(s.bounded, s.tau <= 1) << s.tau;
     EXPECT_EQ(s.diverges, s.tau >= 2) << s.tau;
@@ -76,7 +77,7 @@ TEST(Stability, EulerLeavesTheUnitIntervalBeyondOneAndDivergesFromTwoOn) {
   }
 }
 
-TEST(Stability, SimpleAndNaiveAreBoundedButWrong) {
+TEST(Stability, SimpleAndNaiveAreBoundedButInaccurate) {
   for (const Compositing compositing : {Compositing::simple, Compositing::cd_naive}) {
     double worst = 0;
     for (const Stiffness& s : sweep_of(compositing)) {

@@ -1,4 +1,4 @@
-// A whole study with a stand-in for the integral: what it keeps, skips and reports.
+// A whole study with a substitute for the integral: caching, skipping and reports.
 #include "server/study/study.hpp"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ std::string read(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-// An even grey; counts how often it was asked.
+// A uniform grey picture; counts its evaluations.
 Truth grey(int& asked) {
   return [&asked](const scene::Scene& scene) -> Result<Picture> {
     ++asked;
@@ -53,7 +53,7 @@ Result<Report> study(const Folder& folder, Truth truth, const CancelToken& cance
   return run_study(vectors_only(), {folder.path, true, std::move(truth)}, pool, cancel, listen);
 }
 
-TEST(Study, ASecondRunSkipsEveryPointAndTellsTheSameNumbers) {
+TEST(Study, SecondRunSkipsEveryPointAndReportsTheSameNumbers) {
   const Folder folder;
   int asked = 0;
   const Report first = study(folder, grey(asked)).value();
@@ -68,7 +68,7 @@ TEST(Study, ASecondRunSkipsEveryPointAndTellsTheSameNumbers) {
   EXPECT_EQ(second.scenes[0].truth_seconds, first.scenes[0].truth_seconds);
 }
 
-TEST(Study, AnInterruptedOneGoesOnWhereItStopped) {
+TEST(Study, InterruptedStudyContinues) {
   const Folder folder;
   int asked = 0;
   const CancelToken cancel;
@@ -83,7 +83,7 @@ TEST(Study, AnInterruptedOneGoesOnWhereItStopped) {
   EXPECT_EQ(asked, 1);
 }
 
-TEST(Study, ProgressNeverGoesBackAndEndsAtOne) {
+TEST(Study, ProgressIsMonotonicAndEndsAtOne) {
   const Folder folder;
   int asked = 0;
   double last = 0;
@@ -95,7 +95,7 @@ TEST(Study, ProgressNeverGoesBackAndEndsAtOne) {
   EXPECT_DOUBLE_EQ(last, 1);
 }
 
-TEST(Study, AnotherTruthIsAnotherPoint) {
+TEST(Study, AnotherReferenceGivesAnotherPoint) {
   const Folder folder;
   int asked = 0;
   ASSERT_TRUE(study(folder, grey(asked)));
@@ -105,7 +105,7 @@ TEST(Study, AnotherTruthIsAnotherPoint) {
   EXPECT_TRUE(std::isfinite(extrapolated.scenes[0].truth_estimate));
 }
 
-TEST(Study, AnotherToleranceIsAnotherTruthAndOtherPoints) {
+TEST(Study, AnotherToleranceGivesAnotherReferenceAndOtherPoints) {
   const Folder folder;
   int asked = 0;
   ASSERT_TRUE(study(folder, grey(asked)));
@@ -117,7 +117,7 @@ TEST(Study, AnotherToleranceIsAnotherTruthAndOtherPoints) {
   EXPECT_EQ(finer.scenes[0].tolerance, 1e-9);
 }
 
-TEST(Study, ATruthThatIsNotFiniteIsAnErrorAndNotKept) {
+TEST(Study, NonFiniteReferenceIsAnErrorAndNotKept) {
   const Folder folder;
   int asked = 0;
   const Truth broken = [&](const scene::Scene& scene) {
@@ -132,8 +132,8 @@ TEST(Study, ATruthThatIsNotFiniteIsAnErrorAndNotKept) {
   EXPECT_EQ(asked, 2);
 }
 
-// Seconds that nobody knows are null, as is the tolerance of what is no integral.
-TEST(Study, WhatIsUnknownIsNull) {
+// Unknown times are null, as is the tolerance of a reference that is not an integral.
+TEST(Study, UnknownValuesAreNull) {
   Report report;
   report.scenes.emplace_back();
   report.scenes[0].view = vectors_only()[0].view;
@@ -144,8 +144,8 @@ TEST(Study, WhatIsUnknownIsNull) {
   EXPECT_TRUE(reference.at("tolerance").is_null());
 }
 
-// The page opens with both methods at the view's own thickness, which is not the default's.
-TEST(Page, SummaryLooksAtTheViewsOwnKnobs) {
+// The page opens with both methods at the thickness of the view, which is not the default.
+TEST(Page, SummaryUsesTheParametersOfTheView) {
   Report report;
   SceneReport scene;
   scene.name = "thin";
@@ -175,7 +175,7 @@ TEST(Page, SummaryLooksAtTheViewsOwnKnobs) {
   EXPECT_EQ(summary.find("3.75e-01"), std::string::npos);
 }
 
-TEST(Study, WritesJsonOfTheShapeThatProgramsRelyOn) {
+TEST(Study, WritesJsonOfTheDocumentedShape) {
   const Folder folder;
   int asked = 0;
   const Report report = study(folder, grey(asked)).value();
@@ -205,7 +205,7 @@ TEST(Study, WritesJsonOfTheShapeThatProgramsRelyOn) {
   EXPECT_EQ(json.at("stability").at(0).at("tau"), 1e-30);
 }
 
-TEST(Study, WritesOneLineAPointAndAPageThatNeedsNothingElse) {
+TEST(Study, WritesOneLinePerPointAndASelfContainedPage) {
   const Folder folder;
   int asked = 0;
   const Report report = study(folder, grey(asked)).value();
@@ -222,7 +222,7 @@ TEST(Study, WritesOneLineAPointAndAPageThatNeedsNothingElse) {
   EXPECT_TRUE(std::filesystem::exists(folder.path / "plot-vectors.svg"));
 }
 
-TEST(PointsFile, KeepsEveryDigitAndValuesThatAreNotFinite) {
+TEST(PointsFile, KeepsEveryDigitAndNonFiniteValues) {
   const Folder folder;
   const std::filesystem::path path = folder.path / "points.csv";
   const Measurement m{1.0 / 3, NAN, INFINITY, 1e-300, 0.1, 0.05, 2.0 / 7, false};
@@ -238,8 +238,8 @@ TEST(PointsFile, KeepsEveryDigitAndValuesThatAreNotFinite) {
   EXPECT_FALSE(PointsFile::open(path).value().find(key_of("b")));
 }
 
-// A line that a crash cut off anywhere is measured again, and what follows it is not spoilt.
-TEST(PointsFile, LeavesOutALineThatWasCutOff) {
+// A line truncated by a crash is measured again, and later lines are unaffected.
+TEST(PointsFile, OmitsATruncatedLine) {
   const Folder folder;
   const std::filesystem::path path = folder.path / "points.csv";
   {
@@ -266,7 +266,7 @@ TEST(Key, IsFnv1a) {
   EXPECT_EQ(key_of("a"), "af63dc4c8601ec8c");
 }
 
-// Two curves of one colour each; the mark of what is unstable is a cross, not a disc.
+// Two curves of one colour each; unstable points are marked by crosses instead of discs.
 TEST(Plot, DrawsDiscsRingsAndCrosses) {
   SceneReport scene;
   scene.name = "a<b";

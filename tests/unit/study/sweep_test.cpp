@@ -1,4 +1,4 @@
-// What is swept, how a point is measured against a truth, and the floor of splats.
+// The swept settings, the error of a point against a reference, and the error floor of splats.
 #include "server/study/sweep.hpp"
 
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ TEST(Sweep, MeasuresEveryCompositingAndNoSettingTwice) {
   }
 }
 
-TEST(Sweep, ACurveDiffersInItsKnobAlone) {
+TEST(Sweep, CurveVariesOneParameterOnly) {
   const Subject subject = standard_subject("dense", false).value();
   const Sweep sweep = plan_sweep(subject, false);
   for (const Curve& curve : sweep.curves) {
@@ -56,14 +56,14 @@ TEST(Sweep, ACurveDiffersInItsKnobAlone) {
   }
 }
 
-TEST(Sweep, LeavesOutWhatASceneHasNot) {
+TEST(Sweep, OmitsContentTheSceneLacks) {
   const Sweep vectors = plan_sweep(standard_subject("vectors", false).value(), false);
   EXPECT_FALSE(has(vectors, Method::kernel, Compositing::cd));
   const Sweep scalar = plan_sweep(standard_subject("scalar", false).value(), false);
   for (const Curve& curve : scalar.curves) EXPECT_NE(curve.knob, Knob::span);
 }
 
-TEST(Scene, TurnsTheKnobsItIsToldAndScalesLinesWithThePicture) {
+TEST(Scene, AppliesItsParametersAndScalesLinesWithThePicture) {
   const Subject subject = standard_subject("soft", false).value();
   Setting setting{Method::slab, Compositing::cd, own_knobs(subject)};
   setting.knobs.stride = 2;
@@ -88,7 +88,7 @@ TEST(Scene, TurnsTheKnobsItIsToldAndScalesLinesWithThePicture) {
 }
 
 // soft and dense are named for the optical depth of their deepest row of samples.
-TEST(Scene, HasTheOpticalDepthItsNameSays) {
+TEST(Scene, HasTheNamedOpticalDepth) {
   for (const auto& [name, depth] : {std::pair{"soft", 1.0}, std::pair{"dense", 10.0}}) {
     const Subject subject = standard_subject(name, true).value();
     const scene::Scene scene =
@@ -108,8 +108,8 @@ TEST(Scene, HasTheOpticalDepthItsNameSays) {
   }
 }
 
-// A truth that is the setting's own picture but for a known amount in one channel.
-TEST(Measure, IsTheDistanceFromTheTruthItIsGiven) {
+// A reference equal to the setting's own picture except for a known amount in one channel.
+TEST(Measure, IsTheDistanceFromTheGivenReference) {
   const Subject subject = standard_subject("soft", true).value();
   const Setting setting{Method::kernel, Compositing::analytic, own_knobs(subject)};
   ThreadPool pool(1);
@@ -129,7 +129,7 @@ TEST(Measure, IsTheDistanceFromTheTruthItIsGiven) {
   EXPECT_GT(off.flip, 0);
 }
 
-TEST(Measure, ASmallerPictureIsComparedAtTheTruthsSize) {
+TEST(Measure, SmallerPictureIsComparedAtTheReferenceSize) {
   const Subject subject = standard_subject("soft", true).value();
   Setting setting{Method::kernel, Compositing::analytic, own_knobs(subject)};
   ThreadPool pool(1);
@@ -144,8 +144,8 @@ TEST(Measure, ASmallerPictureIsComparedAtTheTruthsSize) {
 }
 
 // Overlapping footprints ripple by 1 % peak to peak on axis to 4 % at 45 degrees, of tau = 1: an
-// error of alpha below 4 % / e, and not nothing.
-TEST(Ripple, IsBetweenNothingAndWhatTheFootprintAllows) {
+// error of alpha below 4 % / e, and above zero.
+TEST(Ripple, IsBetweenZeroAndTheRippleOfTheFootprint) {
   ThreadPool pool(1);
   const double floor =
       reconstruction_ripple(standard_subject("scalar", true).value(), pool, CancelToken()).value();
@@ -153,7 +153,7 @@ TEST(Ripple, IsBetweenNothingAndWhatTheFootprintAllows) {
   EXPECT_LT(floor, 0.5 * 0.039 / std::exp(1.0));
 }
 
-TEST(Ripple, IsNoneOfABentLatticeAndOfASlice) {
+TEST(Ripple, IsAbsentForCurvedLatticesAndSlices) {
   ThreadPool pool(1);
   const Subject flat = standard_subject("climate", true).value();
   EXPECT_TRUE(std::isfinite(reconstruction_ripple(flat, pool, CancelToken()).value()));
@@ -165,8 +165,8 @@ TEST(Ripple, IsNoneOfABentLatticeAndOfASlice) {
   EXPECT_TRUE(std::isnan(reconstruction_ripple(slice, pool, CancelToken()).value()));
 }
 
-// Heights bend the lattice and its box; the study's own orbit looks at that box.
-TEST(Scene, FramesHeightsUnlessTheViewSaysAnythingOfItsFrame) {
+// Heights bend the lattice and its box; the orbit of the study views that box.
+TEST(Scene, FramesHeightsUnlessTheViewSetsItsFrame) {
   const auto terrain = [] {
     auto source = std::make_unique<scene::FakeSource>(
         scene::atmosphere_grid(),
@@ -192,7 +192,7 @@ TEST(Scene, FramesHeightsUnlessTheViewSaysAnythingOfItsFrame) {
   EXPECT_EQ(make_subject("t", own, view, {40, 30}).value().view.camera.height, 0.75);
 }
 
-TEST(Encoding, ErrsLessAndTakesMoreBytesTheHigherItsQuality) {
+TEST(Encoding, HigherQualityReducesErrorAndIncreasesBytes) {
   ThreadPool pool(1);
   const auto all =
       measure_encoding(standard_subject("dense", true).value(), pool, CancelToken()).value();

@@ -29,7 +29,7 @@ class Idle : public Connection {
   Since since_;
 };
 
-TEST(Connections, end_the_one_that_is_idle_for_longest) {
+TEST(Connections, CloseTheLongestIdleConnection) {
   const Clock::time_point now = Clock::now();
   const auto of = [&](int seconds) {
     return std::make_shared<Idle>(now - std::chrono::seconds(seconds));
@@ -39,7 +39,7 @@ TEST(Connections, end_the_one_that_is_idle_for_longest) {
   Connections connections;
   connections.add(connections.next_id(), busy, false);
   for (const auto& one : idle) connections.add(connections.next_id(), one, false);
-  EXPECT_FALSE(connections.end_longest(&Connection::idle_since, 3)) << "so many there may be";
+  EXPECT_FALSE(connections.end_longest(&Connection::idle_since, 3)) << "the limit";
   EXPECT_FALSE(connections.end_longest(&Connection::unasked_since));
   EXPECT_TRUE(connections.end_longest(&Connection::idle_since, 2));
   EXPECT_TRUE(idle[1]->ended);
@@ -70,14 +70,14 @@ class Shaking : public Connection {
   const bool known_;
 };
 
-TEST(Connections, end_a_handshake_of_whom_has_most_and_strangers_first) {
+TEST(Connections, CloseAHandshakeOfTheLargestHolderAndUnauthenticatedFirst) {
   std::vector<std::shared_ptr<Shaking>> all;
   Connections connections;
   const auto come = [&](const std::string& address, int seconds, bool known = false) {
     all.push_back(std::make_shared<Shaking>(address, seconds, known));
     connections.add(connections.next_id(), all.back(), false);
   };
-  const auto next = [&](std::size_t most) {  // which one ended; -1: none
+  const auto next = [&](std::size_t most) {  // index of the closed connection; -1: none
     std::vector<bool> before;
     for (const auto& one : all) before.push_back(one->ended());
     if (!connections.end_handshake(most)) return -1;
@@ -95,7 +95,7 @@ TEST(Connections, end_a_handshake_of_whom_has_most_and_strangers_first) {
   come("a", 70, true);   // 5
   connections.add(connections.next_id(), std::make_shared<Idle>(std::nullopt), false);
   EXPECT_EQ(next(6), -1);
-  EXPECT_EQ(next(5), 3) << "the oldest of the stranger with two";
+  EXPECT_EQ(next(5), 3) << "the oldest of the unauthenticated address with two";
   EXPECT_EQ(next(4), 1) << "one each";
   EXPECT_EQ(next(3), 2);
   EXPECT_EQ(next(2), 0) << "no other connection is left";

@@ -17,7 +17,7 @@
 namespace windsplat::net {
 namespace {
 
-// Steps are queued behind one that waits, so that the order is the thread's own choice.
+// Steps are queued behind a blocked one, so that the thread alone decides the order.
 class Held {
  public:
   Held() {
@@ -35,7 +35,7 @@ class Held {
   std::promise<void> gate_;
 };
 
-TEST(HandshakeThread, addresses_take_turns) {
+TEST(HandshakeThread, AddressesTakeTurns) {
   std::string order;
   Held held;
   for (int n = 0; n < 4; ++n) held.thread.submit("a", [&order] { order += 'a'; });
@@ -52,7 +52,7 @@ TEST(HandshakeThread, addresses_take_turns) {
   EXPECT_EQ(order, "abcabaa");
 }
 
-TEST(HandshakeThread, goes_on_after_a_step_that_throws) {
+TEST(HandshakeThread, ContinuesAfterAStepThatThrows) {
   std::promise<void> done;
   Held held;
   held.thread.submit("a", [] { throw std::runtime_error("no memory"); });
@@ -61,7 +61,7 @@ TEST(HandshakeThread, goes_on_after_a_step_that_throws) {
   EXPECT_EQ(done.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
 }
 
-TEST(HandshakeThread, leaves_the_processor_to_others) {
+TEST(HandshakeThread, YieldsTheProcessorToOthers) {
   int nice = 0;
   Held held;
   held.thread.submit(
@@ -70,7 +70,7 @@ TEST(HandshakeThread, leaves_the_processor_to_others) {
   EXPECT_GT(nice, ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())));
 }
 
-TEST(HandshakeThread, lets_go_of_an_owners_steps_at_once) {
+TEST(HandshakeThread, ReleasesTheStepsOfAnOwnerAtOnce) {
   const auto kept = std::make_shared<int>(0);
   std::string order;
   const int mine = 0;
@@ -108,11 +108,11 @@ class Task final : public HandshakeTask {
   void pay() override { ++paid; }
 };
 
-TEST(HandshakeTask, that_has_ended_waits_for_no_turn) {
+TEST(HandshakeTask, EndedTaskDoesNotWaitForATurn) {
   Held held;
   const auto task = std::make_shared<Task>(held.thread);
   task->submit([] {});
-  EXPECT_EQ(task.use_count(), 2) << "the step that waits keeps it";
+  EXPECT_EQ(task.use_count(), 2) << "the waiting step keeps it";
   task->end();
   EXPECT_EQ(task.use_count(), 1);
   const auto kept = std::make_shared<int>(0);
@@ -124,7 +124,7 @@ TEST(HandshakeTask, that_has_ended_waits_for_no_turn) {
   EXPECT_EQ(*kept, 0);
 }
 
-TEST(HandshakeTask, is_told_what_a_step_took_that_threw) {
+TEST(HandshakeTask, ReceivesTheTimeOfAStepThatThrew) {
   Held held;
   const auto task = std::make_shared<Task>(held.thread);
   task->submit([] { throw std::runtime_error("no memory"); });
@@ -132,7 +132,7 @@ TEST(HandshakeTask, is_told_what_a_step_took_that_threw) {
   EXPECT_EQ(task->steps, 1);
 }
 
-TEST(HandshakeThread, drops_what_waits_when_it_ends) {
+TEST(HandshakeThread, DiscardsWaitingStepsAtShutdown) {
   const auto kept = std::make_shared<int>(0);
   std::promise<void> gate;
   std::promise<void> begun;
@@ -144,7 +144,7 @@ TEST(HandshakeThread, drops_what_waits_when_it_ends) {
   begun.get_future().wait();
   thread.submit("a", [kept] { ++*kept; });
   std::thread ending([&thread] { thread.stop(); });
-  while (kept.use_count() > 1) std::this_thread::yield();  // dropped while a step is under way
+  while (kept.use_count() > 1) std::this_thread::yield();  // dropped while a step runs
   gate.set_value();
   ending.join();
   thread.submit("a", [kept] { ++*kept; });

@@ -54,7 +54,7 @@ bool comes_true(const std::function<bool()>& holds) {
   return false;
 }
 
-TEST(Peer, has_left_when_it_closed_its_side_also_behind_unread_bytes) {
+TEST(Peer, HasDisconnectedWhenItClosesEvenWithUnreadBytes) {
   Listening listening;
   for (const bool byte_first : {false, true}) {
     for (const bool half : {false, true}) {
@@ -75,7 +75,7 @@ TEST(Peer, has_left_when_it_closed_its_side_also_behind_unread_bytes) {
   EXPECT_TRUE(peer_has_left(-1));
 }
 
-TEST(SpareDescriptor, turns_a_client_away_when_there_is_no_other) {
+TEST(SpareDescriptor, RefusesAClientWhenDescriptorsRunOut) {
   Listening listening;
   SpareDescriptor spare;
   EXPECT_FALSE(spare.turn_away(listening.socket())) << "no pending connection";
@@ -91,7 +91,7 @@ TEST(SpareDescriptor, turns_a_client_away_when_there_is_no_other) {
   EXPECT_TRUE(spare.turn_away(listening.socket()));
   char byte = 0;
   EXPECT_LE(::recv(client, &byte, 1, 0), 0) << "closed at once";
-  EXPECT_EQ(::open("/dev/null", O_RDONLY), -1) << "the spare one is taken again";
+  EXPECT_EQ(::open("/dev/null", O_RDONLY), -1) << "the spare descriptor is reopened";
   for (const int one : taken) ::close(one);
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
   ::close(client);

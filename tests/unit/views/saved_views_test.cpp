@@ -41,7 +41,7 @@ Result<std::optional<SavedView>> set_step(SavedViews& views, const std::string& 
 
 std::size_t bytes_of(const SavedView& saved) { return protocol::encode_view_file(saved).size(); }
 
-TEST(SavedViewsFolder, ThatAnybodyMayChangeIsNamed) {
+TEST(SavedViewsFolder, WorldWritableFolderIsReported) {
   const test::Folder folder;
   const auto warnings = [&](fs::perms state, fs::perms views) {
     fs::create_directories(folder / "state/views");
@@ -66,7 +66,7 @@ TEST(SavedViewsFolder, ThatAnybodyMayChangeIsNamed) {
   EXPECT_THAT(warnings(group, all), HasSubstr("/state/views mode=0777"));
 }
 
-TEST(SavedViewsInMemory, AreFoundUnderIdsOfTheirOwn) {
+TEST(SavedViewsInMemory, AreFoundByTheirIds) {
   const auto views = SavedViews::open({}).value();
   EXPECT_FALSE(views->on_disk());
   std::set<std::string> ids;
@@ -79,13 +79,13 @@ TEST(SavedViewsInMemory, AreFoundUnderIdsOfTheirOwn) {
     EXPECT_EQ(views->find(saved->id)->created, time_of_all);
   }
   EXPECT_EQ(ids.size(), 100U);
-  // Chance that is none would leave letters out: 1000 of them miss one of 32 once in 10^12 runs.
+  // A poor random generator would omit letters: 1000 ids miss one of 32 once in 10^12 runs.
   std::set<char> letters;
   for (const std::string& id : ids) letters.insert(id.begin(), id.end());
   EXPECT_EQ(letters.size(), 32U);
 }
 
-TEST(SavedViewsInMemory, WhatIsNotThereIsNotFound) {
+TEST(SavedViewsInMemory, MissingViewIsNotFound) {
   const auto views = SavedViews::open({}).value();
   for (const std::string id : {"0123456789", "", "..", "../views", "/etc/passwd"}) {
     EXPECT_EQ(views->find(id).error().kind, ErrorKind::not_found) << id;
@@ -94,7 +94,7 @@ TEST(SavedViewsInMemory, WhatIsNotThereIsNotFound) {
   }
 }
 
-TEST(SavedViewsInMemory, AFullStoreRefusesAndKeepsWhatItHas) {
+TEST(SavedViewsInMemory, FullStoreRefusesAndKeepsItsViews) {
   const auto views = SavedViews::open({{}, 3}).value();
   std::vector<std::string> ids;
   for (int step = 0; step < 3; ++step) {
@@ -107,13 +107,13 @@ TEST(SavedViewsInMemory, AFullStoreRefusesAndKeepsWhatItHas) {
   for (int step = 0; step < 3; ++step) {
     EXPECT_EQ(views->find(ids[static_cast<std::size_t>(step)])->view.view().step, step);
   }
-  EXPECT_TRUE(set_step(*views, ids[0], 9)) << "needs no room";
+  EXPECT_TRUE(set_step(*views, ids[0], 9)) << "needs no space";
   EXPECT_TRUE(views->remove(ids[1], always).value());
   EXPECT_TRUE(views->add(view_of_step(3), time_of_all));
   EXPECT_FALSE(views->add(view_of_step(4), time_of_all));
 }
 
-TEST(SavedViewsInMemory, BytesAreCountedAsViewsComeChangeAndGo) {
+TEST(SavedViewsInMemory, BytesFollowAdditionsChangesAndRemovals) {
   const std::size_t one = bytes_of({"0123456789", time_of_all, view_of_step(1)});
   const auto views = SavedViews::open({{}, 100, 2 * one + 1}).value();
   const std::string first = views->add(view_of_step(1), time_of_all)->id;
@@ -126,17 +126,17 @@ TEST(SavedViewsInMemory, BytesAreCountedAsViewsComeChangeAndGo) {
   EXPECT_FALSE(set_step(*views, second, 10)) << "and now none";
   EXPECT_EQ(views->find(second)->view.view().step, 2);
   EXPECT_TRUE(set_step(*views, first, 1));
-  EXPECT_TRUE(set_step(*views, second, 10)) << "it is left again";
+  EXPECT_TRUE(set_step(*views, second, 10)) << "it is available again";
   EXPECT_TRUE(views->remove(first, always).value());
   EXPECT_TRUE(views->add(view_of_step(3), time_of_all));
 }
 
-TEST(SavedViewsInMemory, AChangeIsMadeOnlyWhereItMayBe) {
+TEST(SavedViewsInMemory, ConditionalChangeIsMadeOnlyWhenItsConditionHolds) {
   const auto views = SavedViews::open({}).value();
   const std::string id = views->add(view_of_step(1), time_of_all)->id;
   const auto never = [](const SavedView&) { return false; };
   const auto kept = views->replace(id, never, [](const ViewDocument&) -> Result<ViewDocument> {
-    ADD_FAILURE() << "asked though it may not change";
+    ADD_FAILURE() << "requested though it may not change";
     return view_of_step(2);
   });
   ASSERT_TRUE(kept);
@@ -148,7 +148,7 @@ TEST(SavedViewsInMemory, AChangeIsMadeOnlyWhereItMayBe) {
   EXPECT_EQ(views->find(id)->view.view().step, 1);
 }
 
-TEST(SavedViewsInMemory, ManyThreadsAddChangeAndReadAtOnce) {
+TEST(SavedViewsInMemory, ManyThreadsAddChangeAndReadConcurrently) {
   const auto views = SavedViews::open({}).value();
   const std::string shared = views->add(view_of_step(0), time_of_all)->id;
   std::atomic<int> bad{0};
@@ -158,7 +158,7 @@ TEST(SavedViewsInMemory, ManyThreadsAddChangeAndReadAtOnce) {
       for (int i = 0; i < 200; ++i) {
         const auto own = views->add(view_of_step(i), time_of_all);
         if (!own || views->find(own->id)->view.view().step != i) ++bad;
-        // Each adds one to what it finds: none of them may be lost.
+        // Each adds one to the value it finds: no increment may be lost.
         const auto add = [](const ViewDocument& now) { return view_of_step(now.view().step + 1); };
         if (!views->replace(shared, always, add)) ++bad;
         if (i % 2 == 0 && !views->remove(own->id, always)) ++bad;
@@ -181,7 +181,7 @@ class SavedViewsOnDisk : public testing::Test {
   [[nodiscard]] Result<std::shared_ptr<SavedViews>> open() const {
     return SavedViews::open({state()});
   }
-  // Every file below the folder of views with what it holds; of what is none, its kind.
+  // Every file below the views folder with its content, or the kind of other entries.
   [[nodiscard]] std::map<std::string, std::string> files() const {
     std::map<std::string, std::string> out;
     for (const auto& entry : fs::directory_iterator(state() / "views")) {
@@ -196,7 +196,7 @@ class SavedViewsOnDisk : public testing::Test {
   test::Folder root_;
 };
 
-TEST_F(SavedViewsOnDisk, OutlastARestart) {
+TEST_F(SavedViewsOnDisk, SurviveARestart) {
   std::map<std::string, std::string> told;
   std::string gone;
   {
@@ -211,7 +211,7 @@ TEST_F(SavedViewsOnDisk, OutlastARestart) {
     gone = told.rbegin()->first;
     EXPECT_TRUE(views->remove(gone, always).value());
     told.erase(gone);
-    EXPECT_EQ(files().size(), told.size()) << "one file a view, and nothing besides";
+    EXPECT_EQ(files().size(), told.size()) << "one file per view, and nothing else";
   }
   const auto views = open().value();
   for (const auto& [id, text] : told) {
@@ -223,7 +223,7 @@ TEST_F(SavedViewsOnDisk, OutlastARestart) {
   EXPECT_EQ(set_step(*views, told.begin()->first, 5).value()->created, time_of_all);
 }
 
-TEST_F(SavedViewsOnDisk, CountAgainstTheBoundsAfterARestart) {
+TEST_F(SavedViewsOnDisk, CountAgainstTheLimitsAfterARestart) {
   std::string id;
   {
     const auto views = open().value();
@@ -240,8 +240,8 @@ TEST_F(SavedViewsOnDisk, CountAgainstTheBoundsAfterARestart) {
   EXPECT_FALSE(set_step(*views, id, 10));
 }
 
-// A lower bound than before: what there is no room for stays on the disk.
-TEST_F(SavedViewsOnDisk, NoneIsRemovedToKeepABound) {
+// A lower limit than before: views above it stay on the disk.
+TEST_F(SavedViewsOnDisk, NoneIsRemovedToMeetALimit) {
   {
     const auto views = open().value();
     for (int step = 0; step < 5; ++step) EXPECT_TRUE(views->add(view_of_step(step), time_of_all));
@@ -251,7 +251,7 @@ TEST_F(SavedViewsOnDisk, NoneIsRemovedToKeepABound) {
   EXPECT_EQ(files(), before);
 }
 
-TEST_F(SavedViewsOnDisk, TornAndForeignFilesAreIgnoredAndLeftAlone) {
+TEST_F(SavedViewsOnDisk, TruncatedAndForeignFilesAreIgnoredAndKept) {
   std::string good;
   {
     const auto views = open().value();
@@ -267,7 +267,7 @@ TEST_F(SavedViewsOnDisk, TornAndForeignFilesAreIgnoredAndLeftAlone) {
   };
   write("0000000000.json", renamed("0000000000").substr(0, text.size() / 2));  // torn
   write("1111111111.json", "");
-  write("2222222222.json", renamed("bbbbbbbbbb"));  // another's id
+  write("2222222222.json", renamed("bbbbbbbbbb"));  // id of another view
   write("3333333333.json", renamed("3333333333") + std::string(70000, ' '));
   write("4444444444.json.part", renamed("4444444444"));
   write("notes.json.1234.part", renamed("4444444444"));
@@ -293,7 +293,7 @@ TEST_F(SavedViewsOnDisk, TornAndForeignFilesAreIgnoredAndLeftAlone) {
   EXPECT_EQ(files(), before);
 }
 
-TEST_F(SavedViewsOnDisk, AWriteThatNeverEndedIsClearedAway) {
+TEST_F(SavedViewsOnDisk, UnfinishedWriteIsRemoved) {
   std::string good;
   {
     const auto views = open().value();
@@ -307,7 +307,7 @@ TEST_F(SavedViewsOnDisk, AWriteThatNeverEndedIsClearedAway) {
   EXPECT_EQ(files(), before);
 }
 
-TEST_F(SavedViewsOnDisk, AWriteThatFailsChangesNothing) {
+TEST_F(SavedViewsOnDisk, FailedWriteChangesNothing) {
   const auto views = SavedViews::open({state(), 2}).value();
   const std::string id = views->add(view_of_step(1), time_of_all)->id;
   const auto before = files();
@@ -322,15 +322,15 @@ TEST_F(SavedViewsOnDisk, AWriteThatFailsChangesNothing) {
   ASSERT_FALSE(changed);
   for (const Error& error : {added.error(), changed.error()}) {
     EXPECT_EQ(error.message.find(root_.path().native()), std::string::npos)
-        << "no client's business";
+        << "paths are not shown to clients";
   }
   EXPECT_EQ(files(), before);
   EXPECT_EQ(views->find(id)->view.view().step, 1);
-  EXPECT_TRUE(views->add(view_of_step(2), time_of_all)) << "what failed takes no room";
+  EXPECT_TRUE(views->add(view_of_step(2), time_of_all)) << "a failed view takes no space";
   EXPECT_FALSE(views->add(view_of_step(3), time_of_all));
 }
 
-// The folder and the one of views can be read and not written to, also by root.
+// Both folders can be read but not written, also by root.
 class ReadOnly {
  public:
   explicit ReadOnly(const fs::path& root) : root_(root), user_(::geteuid()) {
@@ -357,7 +357,7 @@ class ReadOnly {
   uid_t user_;
 };
 
-TEST_F(SavedViewsOnDisk, AFolderThatBecomesReadOnlyServesItsViewsAndRefusesChangesWithTheReason) {
+TEST_F(SavedViewsOnDisk, ReadOnlyFolderServesItsViewsAndRefusesChangesWithTheReason) {
   const auto views = open().value();
   const std::string id = views->add(view_of_step(1), time_of_all)->id;
   {
@@ -372,10 +372,10 @@ TEST_F(SavedViewsOnDisk, AFolderThatBecomesReadOnlyServesItsViewsAndRefusesChang
       EXPECT_EQ(error.message.find(root_.path().native()), std::string::npos);
     }
   }
-  EXPECT_TRUE(set_step(*views, id, 3)) << "it can be written to again";
+  EXPECT_TRUE(set_step(*views, id, 3)) << "it is writable again";
 }
 
-TEST_F(SavedViewsOnDisk, AFolderThatIsMissingIsMadeByTheFirstChange) {
+TEST_F(SavedViewsOnDisk, MissingFolderIsCreatedByTheFirstChange) {
   const auto views = open().value();
   fs::remove_all(state() / "views");
   const auto saved = views->add(view_of_step(4), time_of_all);
@@ -383,7 +383,7 @@ TEST_F(SavedViewsOnDisk, AFolderThatIsMissingIsMadeByTheFirstChange) {
   EXPECT_EQ(files().count(saved->id + ".json"), 1U);
 }
 
-TEST_F(SavedViewsOnDisk, AReadOnlyFolderIsOpenedAndRead) {
+TEST_F(SavedViewsOnDisk, ReadOnlyFolderIsOpenedAndRead) {
   const std::string id = open().value()->add(view_of_step(1), time_of_all)->id;
   fs::create_directory(root_ / "empty");
   const ReadOnly disk(root_.path());
@@ -395,15 +395,15 @@ TEST_F(SavedViewsOnDisk, AReadOnlyFolderIsOpenedAndRead) {
   EXPECT_EQ((*without)->add(view_of_step(1), time_of_all).error().kind, ErrorKind::out_of_memory);
 }
 
-TEST_F(SavedViewsOnDisk, AnIdWhoseFileIsThereIsNotGivenAgain) {
+TEST_F(SavedViewsOnDisk, IdOfAnExistingFileIsNotReused) {
   const auto views = open().value();
   const std::string id = views->add(view_of_step(1), time_of_all)->id;
   fs::remove(file_of(id));
-  EXPECT_TRUE(views->remove(id, always).value()) << "somebody removed its file";
+  EXPECT_TRUE(views->remove(id, always).value()) << "its file was removed externally";
   EXPECT_FALSE(views->find(id));
 }
 
-TEST_F(SavedViewsOnDisk, OneProcessAtATimeHasTheFolder) {
+TEST_F(SavedViewsOnDisk, OneProcessAtATimeLocksTheFolder) {
   auto views = open().value();
   const auto second = open();
   ASSERT_FALSE(second);
@@ -413,7 +413,7 @@ TEST_F(SavedViewsOnDisk, OneProcessAtATimeHasTheFolder) {
   EXPECT_TRUE(open());
 }
 
-TEST_F(SavedViewsOnDisk, AFolderThatIsNoneIsRefused) {
+TEST_F(SavedViewsOnDisk, PathThatIsNoFolderIsRefused) {
   std::ofstream(root_ / "deep") << "a file";
   const auto refused = open();
   ASSERT_FALSE(refused);
@@ -425,7 +425,7 @@ TEST_F(SavedViewsOnDisk, AFolderThatIsNoneIsRefused) {
   EXPECT_FALSE(open());
 }
 
-TEST_F(SavedViewsOnDisk, AreForTheOwnerAlone) {
+TEST_F(SavedViewsOnDisk, AreAccessibleToTheOwnerOnly) {
   const auto views = open().value();
   EXPECT_EQ(fs::status(state() / "views").permissions(), fs::perms::owner_all);
 }

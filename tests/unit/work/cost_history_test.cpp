@@ -12,13 +12,13 @@ namespace {
 constexpr auto slab = protocol::MethodName::slab;
 constexpr auto kernel = protocol::MethodName::kernel;
 
-TEST(RenderCosts, take_what_is_unknown_for_what_is_usual) {
+TEST(RenderCosts, UseTypicalCostsForUnknownOnes) {
   const RenderCosts costs(2);
   EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 1e6), 3) << "6 ns of a thread's time";
   EXPECT_DOUBLE_EQ(RenderCosts(6).estimate_ms("a", slab, 1e6), 1);
 }
 
-TEST(RenderCosts, follow_the_work_and_the_times_by_dataset_and_method) {
+TEST(RenderCosts, FollowWorkAndTimesByDatasetAndMethod) {
   RenderCosts costs(2);
   costs.learn("a", slab, 1e6, 2000);
   EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 5e5), 1);
@@ -30,7 +30,7 @@ TEST(RenderCosts, follow_the_work_and_the_times_by_dataset_and_method) {
   EXPECT_NEAR(costs.estimate_ms("a", slab, 1e6), 2, 0.01);
 }
 
-TEST(RenderCosts, lie_above_most_of_what_was_seen) {
+TEST(RenderCosts, AreAboveMostMeasuredCosts) {
   RenderCosts costs(2);
   int above = 0;
   for (int i = 0; i < 1000; ++i) {
@@ -43,13 +43,13 @@ TEST(RenderCosts, lie_above_most_of_what_was_seen) {
 }
 
 // A machine that slept in the middle of a picture has none refused for good.
-TEST(RenderCosts, believe_no_picture_that_took_an_age) {
+TEST(RenderCosts, IgnoreOutliers) {
   RenderCosts costs(2);
   costs.learn("a", slab, 1e6, 3'600'000'000);
   EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 1e6), 50);
 }
 
-TEST(RenderCosts, forget_the_dataset_that_was_not_drawn_for_longest) {
+TEST(RenderCosts, ForgetTheLeastRecentlyRenderedDataset) {
   RenderCosts costs(2);
   costs.learn("first", slab, 1e6, 1000);
   costs.learn("second", slab, 1e6, 1000);

@@ -11,7 +11,7 @@
 namespace windsplat::net {
 namespace {
 
-TEST(LoadService, bounds_what_waits_for_a_dataset_and_in_all) {
+TEST(LoadService, LimitsWaitingJobsPerDatasetAndInTotal) {
   constexpr std::size_t most = 3;
   std::promise<void> let_go;
   const std::shared_future<void> gone = let_go.get_future().share();
@@ -39,15 +39,15 @@ TEST(LoadService, bounds_what_waits_for_a_dataset_and_in_all) {
     EXPECT_FALSE(ask(dataset)) << n;
   }
   EXPECT_EQ(taken, static_cast<int>(most * LoadService::datasets_full));
-  EXPECT_FALSE(ask(std::make_shared<const int>(0))) << "another one, but so many in all";
-  EXPECT_TRUE(ask(nullptr, true)) << "let in before";
+  EXPECT_FALSE(ask(std::make_shared<const int>(0))) << "the limit of all datasets";
+  EXPECT_TRUE(ask(nullptr, true)) << "admitted before";
   EXPECT_EQ(refusals, static_cast<int>(LoadService::datasets_full) + 1);
   let_go.set_value();
   loads.end();
   EXPECT_EQ(ran, taken + 1);
 }
 
-TEST(LoadService, one_payer_has_half_of_the_places) {
+TEST(LoadService, OnePayerMayUseHalfOfTheSlots) {
   std::promise<void> let_go;
   std::promise<void> begun;
   LoadService loads(1, 4, "loads");
@@ -62,7 +62,7 @@ TEST(LoadService, one_payer_has_half_of_the_places) {
   };
   EXPECT_TRUE(ask(one, "a"));
   EXPECT_TRUE(ask(one, "a"));
-  EXPECT_FALSE(ask(one, "a")) << "half of a dataset's";
+  EXPECT_FALSE(ask(one, "a")) << "half of the slots of a dataset";
   EXPECT_TRUE(ask(one, "b"));
   EXPECT_TRUE(ask(one, "b"));
   for (int n = 0; n < 6; ++n) EXPECT_TRUE(ask(std::make_shared<const int>(n), "a")) << n;
@@ -71,8 +71,8 @@ TEST(LoadService, one_payer_has_half_of_the_places) {
   let_go.set_value();
 }
 
-// Loads that wait for memory or whose files hang.
-TEST(LoadService, jobs_that_run_for_long_leave_their_places_as_far_as_there_are_spare_threads) {
+// Loads that wait for memory or block on their files.
+TEST(LoadService, LongRunningJobsReleaseTheirSlotsToSpareThreads) {
   constexpr std::size_t places = 2;
   constexpr std::size_t spare = 2;
   std::promise<void> let_go;

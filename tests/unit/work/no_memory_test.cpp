@@ -1,5 +1,5 @@
-// Where memory fails in the middle of something: nothing is left half done, and no thread of a
-// service ends. Allocations of a thread fail from the one on that a test names.
+// Allocation failures in services: no partial state remains, and no service thread ends.
+// Allocations of a thread fail from a given one on.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -30,7 +30,7 @@ thread_local int allocations_left = enough;
 
 }  // namespace
 
-// Not inlined: the compiler would take malloc for a mismatch of delete.
+// Not inlined: the compiler would report a mismatch of malloc and delete.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   if (allocations_left == 0) throw std::bad_alloc();
   if (allocations_left > 0) --allocations_left;
@@ -45,7 +45,7 @@ thread_local int allocations_left = enough;
 namespace windsplat::net {
 namespace {
 
-// Whether `body` got through with so many allocations.
+// Whether `body` succeeded with that many allocations.
 template <class Body>
 bool with_allocations(int count, const Body& body) {
   allocations_left = count;
@@ -68,7 +68,7 @@ RenderJob job_of(RenderKind kind, std::uint64_t owner) {
   return job;
 }
 
-TEST(NoMemory, a_job_that_cannot_be_queued_changes_nothing) {
+TEST(NoMemory, JobThatCannotBeQueuedChangesNothing) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     int failed = 0;
     for (int count = 0;; ++count) {
@@ -83,7 +83,7 @@ TEST(NoMemory, a_job_that_cannot_be_queued_changes_nothing) {
       queue.done(10);
       EXPECT_TRUE(queue.empty());
       EXPECT_FALSE(queue.pop()) << count;
-      // A failed job still counts for its owner's turn.
+      // A failed job still counts as its owner's turn.
       queue.push(job_of(kind, 2), 0);
       ASSERT_TRUE(queue.pop());
       queue.done(10);
@@ -93,7 +93,7 @@ TEST(NoMemory, a_job_that_cannot_be_queued_changes_nothing) {
   }
 }
 
-TEST(NoMemory, an_address_is_known_whole_or_not_at_all) {
+TEST(NoMemory, AddressIsRegisteredWholeOrNotAtAll) {
   const std::string here = "2001:db8:1:2:3:4:5:6";
   int failed = 0;
   for (int count = 0;; ++count) {
@@ -106,7 +106,7 @@ TEST(NoMemory, an_address_is_known_whole_or_not_at_all) {
   EXPECT_GE(failed, 2);
 }
 
-TEST(NoMemory, no_place_is_lost_among_connections_and_sessions) {
+TEST(NoMemory, NoConnectionOrSessionSlotIsLost) {
   Limits limits;
   limits.connections = 1;
   limits.sessions_per_address = 1;
@@ -118,7 +118,7 @@ TEST(NoMemory, no_place_is_lost_among_connections_and_sessions) {
     const auto both = [&] {
       const auto visitor = admission.connect(here);
       const auto seat = admission.open_session("2001:db8:1:2::/64");
-      // To go takes no memory.
+      // Releasing needs no memory.
       allocations_left = 0;
     };
     const bool through = with_allocations(count, both);
@@ -132,7 +132,7 @@ TEST(NoMemory, no_place_is_lost_among_connections_and_sessions) {
   EXPECT_GE(failed, 4);
 }
 
-TEST(NoMemory, an_attempt_that_fails_is_told_without_any) {
+TEST(NoMemory, FailedAttemptIsReportedWithoutAllocating) {
   const CancelToken cancel;
   const CancelToken raised;
   raised.cancel();
@@ -150,11 +150,11 @@ TEST(NoMemory, an_attempt_that_fails_is_told_without_any) {
   }));
   EXPECT_EQ(first, ErrorKind::out_of_memory);
   EXPECT_EQ(second, ErrorKind::internal);
-  EXPECT_EQ(third, ErrorKind::out_of_memory) << "there is none for its words";
+  EXPECT_EQ(third, ErrorKind::out_of_memory) << "no memory for the message";
 }
 
-// The thread has no memory from the first job on.
-TEST(NoMemory, threads_of_services_go_on) {
+// The thread cannot allocate from the first job on.
+TEST(NoMemory, ThreadsOfServicesContinue) {
   LoadService loads(1, 4, "loads");
   std::promise<void> loaded;
   EXPECT_TRUE(loads.submit({{}, [] {
@@ -180,7 +180,7 @@ TEST(NoMemory, threads_of_services_go_on) {
   drawn.get_future().wait();
 }
 
-TEST(NoMemory, a_client_s_job_without_any_is_a_failed_job) {
+TEST(NoMemory, ClientJobThatCannotAllocateIsAFailedJob) {
   Jobs jobs(4, 1);
   const auto ask = [&] {
     return jobs
@@ -193,7 +193,7 @@ TEST(NoMemory, a_client_s_job_without_any_is_a_failed_job) {
         .id;
   };
   const std::string first = ask();
-  const std::string second = ask();  // which finds no memory even to begin
+  const std::string second = ask();  // cannot allocate even at the start
   for (const std::string& id : {first, second}) {
     while (jobs.find(id).value().state == "queued" || jobs.find(id).value().state == "running") {
       std::this_thread::yield();
@@ -202,7 +202,7 @@ TEST(NoMemory, a_client_s_job_without_any_is_a_failed_job) {
   }
 }
 
-TEST(NoMemory, what_cannot_be_posted_is_called_at_home_and_given_up_elsewhere) {
+TEST(NoMemory, CallbackThatCannotBePostedRunsInPlaceOrIsCancelled) {
   boost::asio::io_context io;
   int called = 0;
   const auto call = [&] { ++called; };
@@ -223,7 +223,7 @@ TEST(NoMemory, what_cannot_be_posted_is_called_at_home_and_given_up_elsewhere) {
   EXPECT_EQ(called, 2);
 }
 
-TEST(NoMemory, a_loader_is_ended_by_its_object_s_end) {
+TEST(NoMemory, LoaderEndsWithItsObject) {
   auto process = std::make_unique<data::loader::Process>();
   ASSERT_TRUE(process->start(WINDSPLAT_PROGRAM));
   const pid_t id = process->id();
@@ -231,9 +231,8 @@ TEST(NoMemory, a_loader_is_ended_by_its_object_s_end) {
   EXPECT_EQ(::kill(id, 0), -1) << "it still runs";
 }
 
-// What has come is lost with the memory that it needed, between the system and the handler; what
-// comes next is not.
-TEST(NoMemory, a_connection_that_is_lost_is_not_the_last) {
+// Data that arrived are lost with the memory they needed; later data are not.
+TEST(NoMemory, LostConnectionDoesNotStopTheListener) {
   namespace asio = boost::asio;
   asio::io_context io;
   const auto more = asio::make_work_guard(io);  // a server has its timers

@@ -42,7 +42,7 @@ class Renderer {
   std::int64_t now_us_ = 0;
 };
 
-TEST(RenderQueue, gives_owners_equal_times_and_not_equal_numbers_of_jobs) {
+TEST(RenderQueue, GivesOwnersEqualTimesNotEqualJobCounts) {
   Renderer renderer;
   renderer.ask(RenderKind::stream, 1);
   renderer.ask(RenderKind::stream, 2);
@@ -52,7 +52,7 @@ TEST(RenderQueue, gives_owners_equal_times_and_not_equal_numbers_of_jobs) {
   EXPECT_NEAR(renderer.jobs[2], 3 * renderer.jobs[1], 3);
 }
 
-TEST(RenderQueue, gives_streams_and_requests_equal_times_however_many_owners_each_has) {
+TEST(RenderQueue, SharesTimeEquallyBetweenStreamsAndRequests) {
   Renderer renderer;
   for (std::uint64_t owner = 1; owner <= 5; ++owner) renderer.ask(RenderKind::stream, owner);
   renderer.ask(RenderKind::request, 9);
@@ -64,7 +64,7 @@ TEST(RenderQueue, gives_streams_and_requests_equal_times_however_many_owners_eac
   EXPECT_NEAR(static_cast<double>(streams), static_cast<double>(renderer.used_us[9]), 100);
 }
 
-TEST(RenderQueue, an_owner_that_was_idle_does_not_take_all_that_it_left) {
+TEST(RenderQueue, IdleOwnerCannotReclaimItsUnusedShare) {
   Renderer renderer;
   const std::map<std::uint64_t, std::int64_t> costs{{1, 10}, {2, 10}};
   renderer.ask(RenderKind::stream, 1);
@@ -79,7 +79,7 @@ TEST(RenderQueue, an_owner_that_was_idle_does_not_take_all_that_it_left) {
   EXPECT_NEAR(renderer.jobs[2], 10, 1);
 }
 
-TEST(RenderQueue, an_owner_that_used_much_is_not_forgiven_because_it_paused_for_a_moment) {
+TEST(RenderQueue, ShortPauseDoesNotResetTheShareOfAnOwner) {
   Renderer renderer;
   for (std::uint64_t owner = 1; owner <= 3; ++owner) renderer.ask(RenderKind::stream, owner);
   const std::map<std::uint64_t, std::int64_t> costs{{1, 1000}, {2, 10}, {3, 10}};
@@ -88,7 +88,7 @@ TEST(RenderQueue, an_owner_that_used_much_is_not_forgiven_because_it_paused_for_
   for (int i = 0; i < 198; ++i) EXPECT_NE(renderer.run(costs), 1U);
 }
 
-TEST(Shares, remember_nobody_who_is_idle_and_not_ahead) {
+TEST(Shares, ForgetIdleOwnersThatAreNotAhead) {
   Shares shares;
   shares.come(1);
   for (std::uint64_t party = 2; party < 1000; ++party) {
@@ -104,7 +104,7 @@ TEST(Shares, remember_nobody_who_is_idle_and_not_ahead) {
   EXPECT_EQ(shares.known(), 0U);
 }
 
-TEST(RenderQueue, background_waits_for_all_others) {
+TEST(RenderQueue, BackgroundWaitsForAllOthers) {
   Renderer renderer;
   const std::map<std::uint64_t, std::int64_t> costs{{1, 10}, {2, 10}, {3, 10}};
   renderer.ask(RenderKind::background, 1);
@@ -115,7 +115,7 @@ TEST(RenderQueue, background_waits_for_all_others) {
   EXPECT_EQ(renderer.run(costs, false), 1U);
 }
 
-TEST(RenderQueue, a_background_job_that_runs_is_cancelled_by_a_job_of_another_kind_alone) {
+TEST(RenderQueue, RunningBackgroundJobIsCancelledByOtherJobsOnly) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     RenderQueue queue;
     RenderJob job;
@@ -139,7 +139,7 @@ TEST(RenderQueue, a_background_job_that_runs_is_cancelled_by_a_job_of_another_ki
   }
 }
 
-TEST(RenderQueue, a_newer_background_job_takes_the_place_of_the_older_which_is_told) {
+TEST(RenderQueue, NewerBackgroundJobReplacesTheOlderWithNotice) {
   RenderQueue queue;
   const auto push = [&](RenderKind kind, std::uint64_t owner) {
     RenderJob job;
@@ -166,7 +166,7 @@ TEST(RenderQueue, a_newer_background_job_takes_the_place_of_the_older_which_is_t
 }
 
 // Cancelled jobs of a closed session: new owners without usage run before them.
-TEST(RenderQueue, a_cancelled_job_does_not_wait_for_its_turn) {
+TEST(RenderQueue, CancelledJobDoesNotWaitForItsTurn) {
   for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
     SCOPED_TRACE(static_cast<int>(kind));
     Renderer make;
@@ -193,7 +193,7 @@ TEST(RenderQueue, a_cancelled_job_does_not_wait_for_its_turn) {
   }
 }
 
-TEST(RenderQueue, counts_what_somebody_still_waits_for) {
+TEST(RenderQueue, CountsJobsThatAreStillAwaited) {
   RenderQueue queue;
   RenderJob job;
   job.cost_ms = 100;
@@ -209,7 +209,7 @@ TEST(RenderQueue, counts_what_somebody_still_waits_for) {
   EXPECT_DOUBLE_EQ(queue.requests_waiting().cost_ms, 100);
 }
 
-TEST(RenderQueue, takes_jobs_of_unknown_cost_for_what_it_is_told) {
+TEST(RenderQueue, UsesTheGivenCostForJobsOfUnknownCost) {
   RenderQueue queue;
   RenderJob job;
   job.payer = "a";

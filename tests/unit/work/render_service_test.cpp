@@ -50,7 +50,7 @@ class HeldService {
   RenderService service_;  // last: its thread uses the above
 };
 
-TEST(RenderService, refuses_requests_beyond_its_estimate_of_the_work_that_waits) {
+TEST(RenderService, RefusesRequestsAboveItsEstimateOfWaitingWork) {
   HeldService held({16, 10'000, {}});
   EXPECT_TRUE(held.request(60'000)) << "one alone is let in, whatever it costs";
   const auto refused = held.request(1);
@@ -59,7 +59,7 @@ TEST(RenderService, refuses_requests_beyond_its_estimate_of_the_work_that_waits)
   EXPECT_EQ(refused.error().retry_after_s, 60);
 }
 
-TEST(RenderService, tells_when_what_waits_will_be_done) {
+TEST(RenderService, EstimatesWhenWaitingWorkWillBeDone) {
   HeldService held({16, 10'000, {}});
   EXPECT_TRUE(held.request(4'200));
   EXPECT_TRUE(held.request(3'000));
@@ -70,7 +70,7 @@ TEST(RenderService, tells_when_what_waits_will_be_done) {
   EXPECT_TRUE(held.request(2'000)) << "a smaller one has room";
 }
 
-TEST(RenderService, refuses_by_number_where_no_cost_is_known) {
+TEST(RenderService, LimitsTheNumberOfJobsOfUnknownCost) {
   HeldService held({3, 10'000, {}});
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(held.request(0));
   const auto refused = held.request(0);
@@ -78,7 +78,7 @@ TEST(RenderService, refuses_by_number_where_no_cost_is_known) {
   EXPECT_EQ(refused.error().retry_after_s, 1);
 }
 
-TEST(RenderService, what_was_let_in_before_is_not_refused) {
+TEST(RenderService, AdmittedJobsAreNotRefusedLater) {
   HeldService held({1, 10, {}});
   EXPECT_TRUE(held.request(100));
   RenderJob rest;
@@ -88,7 +88,7 @@ TEST(RenderService, what_was_let_in_before_is_not_refused) {
   EXPECT_TRUE(held.service().submit(std::move(rest)));
 }
 
-TEST(RenderService, charges_what_its_clock_says_and_tells_how_long_a_job_waited) {
+TEST(RenderService, ChargesMeasuredTimeAndReportsTheWait) {
   std::atomic<std::int64_t> now_us{0};
   std::vector<std::uint64_t> order;
   std::map<std::uint64_t, std::int64_t> queued_us;
@@ -117,7 +117,7 @@ TEST(RenderService, charges_what_its_clock_says_and_tells_how_long_a_job_waited)
   EXPECT_EQ(std::count(order.begin(), order.end(), 8U), 12);
 }
 
-TEST(RenderService, ends_a_background_job_for_a_frame) {
+TEST(RenderService, CancelsABackgroundJobForAFrame) {
   std::promise<void> begun;
   std::promise<bool> ended;
   std::promise<void> drawn;
@@ -141,7 +141,7 @@ TEST(RenderService, ends_a_background_job_for_a_frame) {
 
 // A request is refused while another address's picture is drawn and one waits, unless its own cost
 // exceeds what is before it; waiting for one's own pictures is no reason for a refusal.
-TEST(RenderService, keeps_nobody_waiting_long_for_others) {
+TEST(RenderService, BoundsTheWaitForOthers) {
   std::atomic<std::int64_t> now_us{0};
   RenderService::Options options;
   options.others_ms_max = 100;
@@ -186,7 +186,7 @@ TEST(RenderService, keeps_nobody_waiting_long_for_others) {
 
 // Where many are refused the next one comes soon: a request is let in when what runs is nearly
 // done.
-TEST(RenderService, under_overload_nobody_waits_for_a_whole_picture) {
+TEST(RenderService, UnderOverloadNoJobWaitsForAWholePicture) {
   std::atomic<std::int64_t> now_us{0};
   RenderService::Options options;
   options.others_ms_max = 20;
@@ -223,7 +223,7 @@ TEST(RenderService, under_overload_nobody_waits_for_a_whole_picture) {
   let_go.set_value();
 }
 
-TEST(RenderService, one_payer_has_half_of_the_places) {
+TEST(RenderService, OnePayerMayUseHalfOfTheSlots) {
   RenderService::Options options;
   options.requests_max = 6;
   std::promise<void> begun;

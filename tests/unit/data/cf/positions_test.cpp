@@ -1,5 +1,5 @@
-// Longitudes and latitudes as files tell them, and which way vectors point on the axes that come of
-// them. Expected numbers are plane and spherical geometry.
+// Longitudes and latitudes of files, and the directions of vectors on the resulting axes. Expected
+// values are plane and spherical geometry.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -52,7 +52,7 @@ TEST(Positions, RadiansOfTwoDimensionsBecomeDegrees) {
     NetcdfMaker file(folder / "r.nc");
     const int j = file.dimension("nj", 2);
     const int i = file.dimension("ni", 3);
-    // 190 degrees less 360 is where the next one of 179 goes on.
+    // 190 degrees minus 360 continues 179.
     text_variable(
         file, "clon", {j, i},
         {178 * degree, 179 * degree, -170 * degree, 178 * degree, 179 * degree, -170 * degree},
@@ -71,8 +71,8 @@ TEST(Positions, RadiansOfTwoDimensionsBecomeDegrees) {
   EXPECT_EQ(volume_of(**source, "f").values[2], 2);
 }
 
-// A grid of indices i (fastest) and j whose steps on the map are the given ones, and a wind of 10
-// along i and 1 along j, 4 upward.
+// A grid of indices i (fastest) and j with the given steps on the map, and a wind of 10 along i, 1
+// along j and 4 upward.
 struct Steps {
   std::array<double, 2> i;  // longitude, latitude
   std::array<double, 2> j;
@@ -103,7 +103,7 @@ void write_turned(const std::string& path, const Steps& steps, const std::string
 
 struct Turned {
   Steps steps;
-  std::array<float, 2> drawn;  // the wind along the drawn axes, which run east and north
+  std::array<float, 2> drawn;  // the wind along the rendered axes, which run east and north
   const char* note;
 };
 
@@ -114,7 +114,7 @@ void PrintTo(const Turned& turned, std::ostream* out) {
 // The wind's east and north are 10 steps.i + 1 steps.j, in steps of unit length.
 class TurnedAxes : public testing::TestWithParam<Turned> {};
 
-TEST_P(TurnedAxes, VectorsAlongRowsAndColumnsTurnWithThem) {
+TEST_P(TurnedAxes, VectorsAlongRowsAndColumnsAreRotatedWithThem) {
   const auto& [steps, drawn, note] = GetParam();
   const Folder folder;
   write_turned(folder / "t.nc", steps, "x_wind", "y_wind");
@@ -133,8 +133,8 @@ TEST_P(TurnedAxes, VectorsAlongRowsAndColumnsTurnWithThem) {
   EXPECT_GT(columns.latitude.back(), columns.latitude.front());
 }
 
-// Files from north to south whose v is northward are many; those whose v is along the index few.
-TEST_P(TurnedAxes, VectorsThatSayNothingStayAsTheyAreAndANoteSaysSo) {
+// Files stored north to south usually have a northward v, rarely one along the index.
+TEST_P(TurnedAxes, VectorsWithoutADirectionStayAndAreNoted) {
   const Folder folder;
   write_turned(folder / "t.nc", GetParam().steps, "", "");
   auto source = open_file(folder / "t.nc");
@@ -145,7 +145,7 @@ TEST_P(TurnedAxes, VectorsThatSayNothingStayAsTheyAreAndANoteSaysSo) {
   EXPECT_TRUE(has_note((*source)->info(), "does not specify the direction of its components"));
 }
 
-TEST_P(TurnedAxes, TheDerivedVerticalMotionsHorizontalPartToo) {
+TEST_P(TurnedAxes, HorizontalPartOfDerivedMotionIsRotated) {
   const auto& [steps, drawn, note] = GetParam();
   const Folder folder;
   write_turned(folder / "t.nc", steps, "x_wind", "y_wind", true);
@@ -211,9 +211,9 @@ void write_pole(const std::string& path, const char* mapping, double north_longi
   file.text(text_variable(file, "va", {y, x}, v, "m s-1", "northward_wind"), "grid_mapping", "rp");
 }
 
-// The rotated grid's own frame: its pole, the direction of its longitude of the true pole, and what
-// is at right angles to both.
-TEST(Positions, ARotatedPolesColumnsAndWindsAreThoseOfItsFrame) {
+// The frame of the rotated grid: its pole, the direction of its longitude of the true pole, and the
+// direction perpendicular to both.
+TEST(Positions, RotatedPoleColumnsAndWindsFollowTheirFrame) {
   for (const double north : {0.0, 25.0}) {
     const Folder folder;
     write_pole(folder / "p.nc", "rotated_latitude_longitude", north);
@@ -242,7 +242,7 @@ TEST(Positions, ARotatedPolesColumnsAndWindsAreThoseOfItsFrame) {
         const Vector to_north = cross(at, east);
         const Vector along_x = unit(cross(up, at));
         const Vector along_y = cross(at, along_x);
-        // Differences of places are of first order at the edges.
+        // Finite differences are of first order at the edges.
         EXPECT_NEAR(wind.component(0)[n], 3 * dot(east, along_x) + 4 * dot(to_north, along_x),
                     0.05);
         EXPECT_NEAR(wind.component(1)[n], 3 * dot(east, along_y) + 4 * dot(to_north, along_y),
@@ -255,7 +255,7 @@ TEST(Positions, ARotatedPolesColumnsAndWindsAreThoseOfItsFrame) {
   }
 }
 
-TEST(Positions, WindsByEastAndNorthOnAMapWithoutPositionsAreNoted) {
+TEST(Positions, EastNorthWindsOnAMapWithoutPositionsAreNoted) {
   struct Case {
     const char* mapping;
     const char* name;

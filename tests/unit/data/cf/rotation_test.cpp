@@ -1,6 +1,6 @@
-// Winds on a Lambert conformal conic whose rows are turned by a further angle: with n the sine of
-// the tangent parallel, east lies at gamma = n (lambda - lambda_0) from the projection's x axis, so
-// that a wind from due west has the components (cos, sin)(gamma - turn) along the grid's axes.
+// Winds on a rotated Lambert conformal conic: with n the sine of the tangent parallel, east is at
+// gamma = n (lambda - lambda_0) from the x axis of the projection, so that a wind from due west has
+// the components (cos, sin)(gamma - turn) along the grid axes.
 #include "server/data/cf/fields/rotation.hpp"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ struct Lambert {
   std::vector<double> gamma;
 };
 
-// Columns 60 km apart about the tangent point's surroundings, x fastest.
+// Columns 60 km apart around the tangent point, x fastest.
 Lambert make_lambert(double turn, bool south) {
   Lambert out{turn, south, {}, {}, {}};
   const double n = std::sin(parallel);
@@ -84,7 +84,7 @@ void write_lambert(const std::string& path, const Lambert& grid, const std::stri
   }
 }
 
-TEST(Rotation, EastNorthWindsAreRotatedToTheGridsAxes) {
+TEST(Rotation, EastNorthWindsAreRotatedToTheGridAxes) {
   for (const double turn : {0.0, 25 * degree, -30 * degree}) {
     for (const bool south : {false, true}) {
       for (const bool with_metres : {false, true}) {
@@ -99,12 +99,13 @@ TEST(Rotation, EastNorthWindsAreRotatedToTheGridsAxes) {
         const Volume wind = volume_of(**source, "wind");
         for (std::size_t row = 0; row < height; ++row) {
           for (std::size_t i = 0; i < width; ++i) {
-            // Volumes run north whichever way the file does.
+            // Volumes run north for any direction of the file.
             const std::size_t n = row * width + i;
             const std::size_t stored = (south ? height - 1 - row : row) * width + i;
             EXPECT_NEAR(info.grid.columns->latitude[n], grid.latitude[stored], 1e-9);
             const double angle = grid.gamma[stored] - turn;
-            // Differences of places are of second order within, of first at the edges (1/200).
+            // Finite differences of positions are of second order inside, of first at the edges
+            // (1/200).
             const bool inside = row > 0 && row + 1 < height && i > 0 && i + 1 < width;
             const double near = inside ? 2e-4 : 2e-2;
             EXPECT_NEAR(wind.component(0)[n], 3 * std::cos(angle) - 4 * std::sin(angle), near);
@@ -112,18 +113,18 @@ TEST(Rotation, EastNorthWindsAreRotatedToTheGridsAxes) {
             EXPECT_NEAR(std::hypot(wind.component(0)[n], wind.component(1)[n]), 5, 1e-5);
           }
         }
-        // The variables by themselves stay what they are called.
+        // The component variables keep their meaning.
         EXPECT_EQ(volume_of(**source, "u").range, (std::array<float, 2>{3, 3}));
       }
     }
   }
 }
 
-// What the picture shows of the components: their sum along the unit vectors of the map's own rows
-// and columns. A map of degrees is not conformal: rows at an angle a from east have the direction
-// (cos a / cos phi, sin a) on it, columns (-sin a / cos phi, cos a), and scaling both to 1 leaves
-// an eastward wind some 4 degrees off at 45 N.
-TEST(Rotation, OnTheMapOfDegreesAWindDueEastPointsEast) {
+// The rendered direction of the components: their sum along the unit vectors of the map's rows and
+// columns. A map of degrees is not conformal: rows at an angle a from east have the direction (cos
+// a / cos phi, sin a) on it, columns (-sin a / cos phi, cos a); normalising both leaves an eastward
+// wind about 4 degrees off at 45 N.
+TEST(Rotation, EastWindPointsEastOnALatitudeLongitudeMap) {
   const Lambert lambert = make_lambert(25 * degree, false);
   const Columns columns{lambert.longitude, lambert.latitude};
   const cf::GridBearing bearing = cf::bearing_of(columns, width);
@@ -151,12 +152,12 @@ TEST(Rotation, OnTheMapOfDegreesAWindDueEastPointsEast) {
                    (std::cos(a) * std::cos(a) * row + std::sin(a) * std::sin(a) * column) / shrink);
     EXPECT_NEAR(std::atan2(north, east) / degree, off / degree, 0.05);
     EXPECT_LT(std::abs(off) / degree, 4.5);
-    // Without being turned it would be off by the rows' own bearing.
+    // Without rotation it would be off by the bearing of the rows.
     EXPECT_GT(std::abs(std::atan2(x[1], x[0])) / degree, 10);
   }
 }
 
-TEST(Rotation, WindsAlongTheGridStayAndUnnamedOnesAreNoted) {
+TEST(Rotation, GridWindsStayAndUnspecifiedOnesAreNoted) {
   const Lambert grid = make_lambert(25 * degree, false);
   for (const bool named : {true, false}) {
     const Folder folder;
@@ -171,7 +172,7 @@ TEST(Rotation, WindsAlongTheGridStayAndUnnamedOnesAreNoted) {
   }
 }
 
-TEST(Rotation, AGridSeenFromBelowKeepsEastEast) {
+TEST(Rotation, MirroredGridKeepsEastwardWinds) {
   // x runs north and y runs east: an eastward wind is along y.
   Columns columns;
   for (std::size_t j = 0; j < 3; ++j) {

@@ -1,5 +1,5 @@
-// Several netCDF files as one dataset. Every sample of the test's files tells where it came from,
-// so that a step of a series can be told from all others.
+// Several netCDF files as one dataset. Every sample of the test files encodes its origin, so that a
+// step of a series differs from all others.
 #include "server/data/cf/series.hpp"
 
 #include <gtest/gtest.h>
@@ -65,7 +65,7 @@ std::vector<std::string> texts(const DatasetInfo& info) {
   return out;
 }
 
-TEST(Series, TimesToldAgainWithinAFileAreCounted) {
+TEST(Series, RepeatedTimesWithinAFileAreCounted) {
   const Folder folder;
   write_part(folder / "a.nc", {{0, 6, 6, 6}, "hours since 2001-01-01", "", 1000});
   write_part(folder / "b.nc", {{6, 12}, "hours since 2001-01-01", "", 2000});
@@ -77,7 +77,7 @@ TEST(Series, TimesToldAgainWithinAFileAreCounted) {
   EXPECT_EQ(first_sample(**source, 1), 2000);
 }
 
-TEST(Series, StepsAreInOrderOfTimeWhateverTheFilesEpochsAndNames) {
+TEST(Series, StepsAreOrderedByTimeForAnyFileEpochsAndNames) {
   const Folder folder;
   write_part(folder / "run_a.nc", {{0, 6}, "hours since 2001-01-03", "", 3000});
   write_part(folder / "run_b.nc", {{0, 0.25}, "days since 2001-01-01", "gregorian", 1000});
@@ -96,8 +96,8 @@ TEST(Series, StepsAreInOrderOfTimeWhateverTheFilesEpochsAndNames) {
   EXPECT_TRUE(has_note((*source)->info(), "3 files joined along time"));
 }
 
-// Sample (y, x) of time t is 100 t + 10 y + x, wherever the file has the time.
-TEST(Series, TimeNeedNotBeTheFirstDimension) {
+// Sample (y, x) of time t is 100 t + 10 y + x, for any order of dimensions.
+TEST(Series, TimeMayBeAnyDimension) {
   const Folder folder;
   for (const int part : {0, 1}) {
     NetcdfMaker file(folder / (part == 0 ? "t0.nc" : "t1.nc"));
@@ -125,7 +125,7 @@ TEST(Series, TimeNeedNotBeTheFirstDimension) {
   }
 }
 
-TEST(Series, OfTwoFilesWithOneTimeTheLaterCounts) {
+TEST(Series, LaterOfTwoFilesWithOneTimeIsUsed) {
   const Folder folder;
   write_part(folder / "f1.nc", {{0, 6, 12}, "hours since 2001-01-01", "", 1000});
   write_part(folder / "f2.nc", {{0, 6}, "hours since 2001-01-01 12:00", "", 5000});
@@ -138,7 +138,7 @@ TEST(Series, OfTwoFilesWithOneTimeTheLaterCounts) {
   EXPECT_TRUE(has_note((*source)->info(), "1 time lies in more than one file"));
 }
 
-TEST(Series, MembersThatDoNotFitAreNamedWithWhatDiffers) {
+TEST(Series, IncompatibleMembersAreReportedWithTheDifference) {
   struct Case {
     Part part;
     const char* says;
@@ -167,7 +167,7 @@ TEST(Series, MembersThatDoNotFitAreNamedWithWhatDiffers) {
   EXPECT_NE(source.error().message.find("'s2.nc'"), std::string::npos) << source.error().message;
 }
 
-TEST(Series, CoordinatesMayDifferByTheRoundingOfSinglePrecision) {
+TEST(Series, CoordinatesMayDifferBySinglePrecisionRounding) {
   const Folder folder;
   write_part(folder / "s1.nc", {{0}, "hours since 2001-01-01", "", 1, {-10, 0, 10.1}});
   write_part(folder / "s2.nc",
@@ -177,7 +177,7 @@ TEST(Series, CoordinatesMayDifferByTheRoundingOfSinglePrecision) {
   EXPECT_EQ(first_sample(**source, 1), 2);
 }
 
-TEST(Series, VariablesThatNotAllFilesHaveAreLeftOutWithTheReason) {
+TEST(Series, VariablesMissingInSomeFilesAreOmittedWithTheReason) {
   const Folder folder;
   Part with{{0}, "hours since 2001-01-01"};
   with.extra = true;
@@ -187,7 +187,7 @@ TEST(Series, VariablesThatNotAllFilesHaveAreLeftOutWithTheReason) {
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().find("g"), nullptr);
   EXPECT_EQ(reason_of((*source)->info(), "g"), "only some files have it: 's2.nc' does not");
-  // The other way round, and units that differ.
+  // The other way round, with different units.
   with.kelvin = "C";
   with.times = {6};
   write_part(folder / "u1.nc", {{0}, "hours since 2001-01-01"});
@@ -262,7 +262,7 @@ TEST(Series, FilesWithoutATimeDimensionAreOneStepEach) {
   EXPECT_EQ(first_sample(**timed, 0), 200);
 }
 
-// A file that knows how many like it are open.
+// A file that counts the open files of its kind.
 class Counted final : public cf::ArrayFile {
  public:
   Counted(std::unique_ptr<cf::ArrayFile> file, int& open) : file_(std::move(file)), open_(open) {
@@ -296,7 +296,7 @@ class Counted final : public cf::ArrayFile {
   int& open_;
 };
 
-TEST(Series, FewFilesAreOpenAtATimeAndOneThatChangesIsNoticed) {
+TEST(Series, FewFilesAreOpenAtATimeAndAChangedOneIsDetected) {
   const Folder folder;
   constexpr std::size_t members = 80;
   for (std::size_t m = 0; m < members; ++m) {

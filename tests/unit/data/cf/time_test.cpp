@@ -52,7 +52,7 @@ TEST(CfTime, LeapYearsOfTheGregorianCalendar) {
   }
 }
 
-TEST(CfTime, TheReformOf1582) {
+TEST(CfTime, GregorianReformOf1582) {
   EXPECT_EQ(text_of(1, "days since 1582-10-04", "standard"), "1582-10-15T00:00:00Z");
   EXPECT_EQ(text_of(-1, "days since 1582-10-15", "gregorian"), "1582-10-04T00:00:00Z");
   EXPECT_EQ(text_of(1, "days since 1582-10-04", "proleptic_gregorian"), "1582-10-05T00:00:00Z");
@@ -95,7 +95,7 @@ TEST(CfTime, MonthsOfThirtyDays) {
   EXPECT_NE(reason_of(0, "days since 2000-01-31", "360_day"), "");
 }
 
-TEST(CfTime, EveryDayOfEightCenturiesFollowsTheOneBefore) {
+TEST(CfTime, EveryDayOfEightCenturiesFollowsThePrevious) {
   for (const Calendar calendar :
        {Calendar::standard, Calendar::proleptic_gregorian, Calendar::julian, Calendar::noleap,
         Calendar::all_leap, Calendar::day360}) {
@@ -114,7 +114,7 @@ TEST(CfTime, EveryDayOfEightCenturiesFollowsTheOneBefore) {
   }
 }
 
-TEST(CfTime, MonthsAndYearsAreThoseOfTheCalendar) {
+TEST(CfTime, MonthsAndYearsFollowTheCalendar) {
   EXPECT_EQ(text_of(5, "months since 2001-01-01", ""), "2001-06-01T00:00:00Z");
   EXPECT_EQ(text_of(-1, "months since 2001-01-15 06:00", ""), "2000-12-15T06:00:00Z");
   EXPECT_EQ(text_of(1, "months since 2000-01-31", ""), "2000-02-29T00:00:00Z");
@@ -163,14 +163,14 @@ TEST(CfTime, SpellingsOfTheEpoch) {
   EXPECT_EQ(text_of(1, "days since 9999-12-31"), "+10000-01-01T00:00:00Z");
 }
 
-TEST(CfTime, ElapsedTimeIsCompleteAsANumber) {
+TEST(CfTime, ElapsedTimeKeepsAllDigits) {
   for (const char* units : {"s", "hours", "days"}) {
     EXPECT_EQ(reason_of(5, units), "") << units;
     EXPECT_EQ(decode_time({5}, units, "").steps.at(0).text, "5") << units;
   }
 }
 
-TEST(CfTime, WhatIsNotUnderstoodStaysANumberWithAReason) {
+TEST(CfTime, UnknownUnitsKeepTheNumberWithAReason) {
   for (const char* units :
        {"", "Month", "day as %Y%m%d.%f", "days since", "days since yesterday", "days since 2001",
         "days since 2001-13-01", "days since 2001-02-30", "days since 2001-01-01 25:00",
@@ -183,7 +183,7 @@ TEST(CfTime, WhatIsNotUnderstoodStaysANumberWithAReason) {
   EXPECT_NE(reason_of(-4e17, "msec since 2001-01-01"), "");
 }
 
-TEST(CfTime, NumbersReadBackExactly) {
+TEST(CfTime, NumbersAreReadBackExactly) {
   for (const double value : {0.1, 1.0 / 3.0, 1e22, -12345678.875}) {
     EXPECT_EQ(std::stod(number_text(value)), value);
   }

@@ -1,6 +1,6 @@
-// Levels that follow the ground, and fields made of others. Expected numbers are the formulas of CF
-// (appendix D) and tables of the standard atmosphere, and for vinth2p.nc what numpy makes of it:
-//   a*1e5 + b*PS of hyam, hybm and PS in double; PS[0].mean() is 96608.06500816345 Pa.
+// Terrain-following levels and derived fields. Expected values are the formulas of CF (appendix D),
+// tables of the standard atmosphere, and for vinth2p.nc the result of numpy: a*1e5 + b*PS of hyam,
+// hybm and PS in double; PS[0].mean() is 96608.06500816345 Pa.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -26,7 +26,7 @@ std::string real_file(const std::string& name) {
          "/" + name;
 }
 
-TEST(StandardAtmosphere, TableOfTheStandard) {
+TEST(StandardAtmosphere, MatchesTheTableOfTheStandard) {
   // ISO 2533: geopotential height, temperature, pressure.
   struct Row {
     double height, kelvin, pascals;
@@ -50,7 +50,7 @@ TEST(HybridLevels, Vinth2pHasThePressuresOfItsFormula) {
   EXPECT_EQ(z.kind, AxisKind::pressure);
   EXPECT_EQ(z.units, "Pa");
   ASSERT_EQ(z.coordinates.size(), 18U);
-  // PS is float32, and its mean is over what was read: to 1e-7.
+  // PS is float32, and its mean is over the read values: to 1e-7.
   EXPECT_NEAR(z.coordinates[0], 95886.22888248185, 0.01);
   EXPECT_NEAR(z.coordinates[1], 93757.4667948502, 0.01);
   EXPECT_NEAR(z.coordinates[17], 480.9299949556589, 1e-4);
@@ -141,7 +141,7 @@ TEST(HybridLevels, FormsOfTheFormulaGiveTheSamePressures) {
   }
 }
 
-TEST(HybridLevels, SigmaHasThePressureOfItsTop) {
+TEST(HybridLevels, SigmaUsesThePressureAtItsTop) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "s.nc");
@@ -161,8 +161,8 @@ TEST(HybridLevels, SigmaHasThePressureOfItsTop) {
   EXPECT_FLOAT_EQ(p.values[7], 46000);
 }
 
-// What p = ptop + sigma (ps - ptop) is at sigma 0.5 and 100000 Pa, where ptop is told badly.
-TEST(HybridLevels, ATopThatIsNotToldIsNotedAndOneWithoutAUnitHasTheSurfaces) {
+// p = ptop + sigma (ps - ptop) at sigma 0.5 and 100000 Pa, with ptop incomplete.
+TEST(HybridLevels, MissingTopIsNotedAndATopWithoutUnitUsesThatOfTheSurface) {
   struct Case {
     const char* formula;
     const char* ptop_units;
@@ -201,7 +201,7 @@ TEST(HybridLevels, ATopThatIsNotToldIsNotedAndOneWithoutAUnitHasTheSurfaces) {
   }
 }
 
-TEST(HybridLevels, WithoutASurfacePressureLevelsStayLevels) {
+TEST(HybridLevels, WithoutSurfacePressureLevelsStayLevels) {
   const Folder folder;
   write_hybrid(folder / "h.nc", {"a: A b: B p0: P0 ps: absent", {0.1, 0}, "", true, true});
   auto source = open_file(folder / "h.nc");
@@ -210,14 +210,14 @@ TEST(HybridLevels, WithoutASurfacePressureLevelsStayLevels) {
   EXPECT_EQ((*source)->info().find("pressure"), nullptr);
 }
 
-// A chunk of 256 MiB in a file of less than one: more than opening it may decode.
+// A chunk of 256 MiB in a file of less than 1 MiB: more than opening may decode.
 std::vector<std::size_t> chunk_beyond_the_limit(std::size_t values_a_step, std::size_t rank) {
   std::vector<std::size_t> chunk(rank, 2);
   chunk[0] = (std::size_t{64} << 20) / values_a_step;
   return chunk;
 }
 
-TEST(HybridLevels, WithASurfacePressureBeyondTheLimitLevelsStayLevels) {
+TEST(HybridLevels, WithOversizeSurfacePressureLevelsStayLevels) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "h.nc");
@@ -264,7 +264,7 @@ void write_omega(const std::string& path, const std::string& temperature_units,
   file.text(file.variable("ps", NC_FLOAT, {y, x}, counting(4, 99000)), "units", "Pa");
 }
 
-TEST(Omega, BecomesMetresASecondByTheFilesTemperature) {
+TEST(Omega, BecomesMetersPerSecondByTheTemperatureOfTheFile) {
   struct Case {
     std::string units;
     double value;
@@ -296,8 +296,8 @@ TEST(Omega, BecomesMetresASecondByTheFilesTemperature) {
   }
 }
 
-// What the standard name says is Pa s-1 where the file is silent. A picture turns it by its unit.
-TEST(Omega, StaysWhereLookingAtTheTemperatureIsBeyondTheLimit) {
+// A missing unit follows from the standard name, Pa s-1. A picture converts by the unit.
+TEST(Omega, StaysWhenReadingTheTemperatureExceedsTheLimit) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "o.nc");
@@ -324,7 +324,7 @@ TEST(Omega, StaysWhereLookingAtTheTemperatureIsBeyondTheLimit) {
   EXPECT_TRUE(has_note(info, "'T' is too large"));
 }
 
-TEST(Omega, IsKnownByItsUnitOrItsStandardName) {
+TEST(Omega, IsRecognizedByUnitOrStandardName) {
   for (const auto& [written, told] : {std::pair("", "Pa s-1"), {"Pa/sec", "Pa/sec"}}) {
     const Folder folder;
     write_omega(folder / "o.nc", "", {}, written);
@@ -337,7 +337,7 @@ TEST(Omega, IsKnownByItsUnitOrItsStandardName) {
   }
 }
 
-TEST(Omega, WithoutATemperatureTheStandardAtmosphereIsTaken) {
+TEST(Omega, WithoutATemperatureUsesTheStandardAtmosphere) {
   const Folder folder;
   write_omega(folder / "o.nc", "", {});
   auto source = open_file(folder / "o.nc");
@@ -368,11 +368,11 @@ TEST(Heights, FromGeopotentialAndFromTheStandardAtmosphere) {
   const std::vector<float> expected{0, 1, 10, 100, 5000, 5000, 5000, 0};
   for (std::size_t i = 0; i < 8; ++i) EXPECT_FLOAT_EQ(height.values[i], expected[i]);
   const Volume standard = volume_of(**source, "standard_height");
-  EXPECT_NEAR(standard.values[0], 110.9, 0.1);   // ISO 2533: 1000 hPa lies at 111 m
+  EXPECT_NEAR(standard.values[0], 110.9, 0.1);   // ISO 2533: 1000 hPa is at 111 m
   EXPECT_NEAR(standard.values[7], 5574.4, 0.2);  // 500 hPa at 5574 m
 }
 
-TEST(Heights, MissingLevelsOfARealFileAreMaskedWhole) {
+TEST(Heights, MissingLevelsOfARealFileAreMasked) {
   // contour.cdf: valid_range and fill hide 8988 samples of Z at the first step, 224 of the lowest
   // three levels each and all 33 x 36 = 1188 of those above but for none; netCDF4's masks.
   auto source = open_file(real_file("contour.cdf"));
@@ -390,7 +390,7 @@ TEST(Heights, MissingLevelsOfARealFileAreMaskedWhole) {
   EXPECT_FLOAT_EQ(height.range[1], z.range[1]);
 }
 
-TEST(Heights, AnOceansDepthsRunDownAndItsLandIsMissing) {
+TEST(Heights, OceanDepthsRunDownAndLandIsMasked) {
   // levitus_climatology.cdf: netCDF4 counts 577275 masked values of TEMP, 57917 of them at the
   // deepest of 20 levels and 22636 at the surface; TEMP[0, 90, 180] is 26.794998.
   auto source = open_file(real_file("levitus_climatology.cdf"));

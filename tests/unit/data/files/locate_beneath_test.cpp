@@ -63,7 +63,7 @@ class LocateBeneath : public testing::Test {
   fs::path root_;
 };
 
-TEST_F(LocateBeneath, AFileIsFoundAsLocateFindsIt) {
+TEST_F(LocateBeneath, FindsAFileLikeLocate) {
   for (const char* path : {"a.nc", "./a.nc", "runs//f2.nc", "runs/x.pvd", "odd[1].nc"}) {
     const Location found = located(path);
     const auto same = locate((root_ / path).native());
@@ -80,13 +80,13 @@ TEST_F(LocateBeneath, AFileIsFoundAsLocateFindsIt) {
   EXPECT_FALSE(located("a.nc").companions);
 }
 
-TEST_F(LocateBeneath, LinksThatStayInsideAreResolved) {
+TEST_F(LocateBeneath, LinksInsideTheRootAreResolved) {
   EXPECT_EQ(located("inside.nc").members[0].path, (root_ / "a.nc").native());
   EXPECT_EQ(located("inside.nc").stem, "inside");
   EXPECT_EQ(located("runs/may/up.nc").members[0].path, (root_ / "a.nc").native());
 }
 
-TEST_F(LocateBeneath, AFolderIsAFolder) {
+TEST_F(LocateBeneath, FolderIsAFolder) {
   const Location found = located("runs/may/");
   EXPECT_EQ(found.kind, Location::Kind::folder);
   EXPECT_EQ(found.folder, (root_ / "runs/may").native());
@@ -94,7 +94,7 @@ TEST_F(LocateBeneath, AFolderIsAFolder) {
   EXPECT_TRUE(found.members.empty());
 }
 
-TEST_F(LocateBeneath, APatternInTheLastPartIsASeriesInNaturalOrder) {
+TEST_F(LocateBeneath, PatternInTheLastPartIsASeriesInNaturalOrder) {
   const Location found = located("runs/f*.nc");
   EXPECT_EQ(found.kind, Location::Kind::series);
   EXPECT_EQ(found.stem, "f");
@@ -106,14 +106,14 @@ TEST_F(LocateBeneath, APatternInTheLastPartIsASeriesInNaturalOrder) {
   EXPECT_EQ(located("[a].nc").members.size(), 1U);
 }
 
-TEST_F(LocateBeneath, AGroupIsNamedBehindTheFile) {
+TEST_F(LocateBeneath, GroupIsNamedAfterTheFile) {
   const Location found = located("a.nc#/sub/deep");
   EXPECT_EQ(found.inside, "sub/deep");
   EXPECT_EQ(found.members[0].path, (root_ / "a.nc").native());
   EXPECT_EQ(found.stem, "a");
   EXPECT_EQ(located("runs/f*.nc#/g").inside, "g");
   EXPECT_EQ(located("runs/f*.nc#/g").members.size(), 2U);
-  // A folder that is called so is a folder.
+  // A folder with that name is a folder.
   fs::create_directory(root_ / "odd#");
   std::ofstream(root_ / "odd#/b.nc") << "data";
   EXPECT_EQ(located("odd#/b.nc").inside, "");
@@ -128,7 +128,7 @@ TEST_F(LocateBeneath, AGroupIsNamedBehindTheFile) {
   EXPECT_EQ(refusal("#/g"), ErrorKind::not_found);
 }
 
-TEST_F(LocateBeneath, WhatLeadsOutIsRefused) {
+TEST_F(LocateBeneath, PathsOutsideTheRootAreRefused) {
   for (const std::string path :
        {"..", "../secret.nc", "runs/../../secret.nc", "runs/..", "a.nc/..", "out.nc", "absolute.nc",
         "outfolder", "outfolder/secret.nc", "outfolder/*.nc", "../*.nc", "ou*.nc", "round.nc"}) {
@@ -139,7 +139,7 @@ TEST_F(LocateBeneath, WhatLeadsOutIsRefused) {
   EXPECT_EQ(inside.error().kind, ErrorKind::invalid) << "absolute, though inside";
 }
 
-TEST_F(LocateBeneath, WhatIsNoFileNameIsRefused) {
+TEST_F(LocateBeneath, InvalidFileNamesAreRefused) {
   for (const std::string path : {"", ".", "./", "./.", "/", "/etc/passwd", "http://x/a.nc",
                                  "file:///etc/passwd", "s3://b/a.nc"}) {
     EXPECT_EQ(refusal(path), ErrorKind::invalid) << path;
@@ -151,13 +151,13 @@ TEST_F(LocateBeneath, WhatIsNoFileNameIsRefused) {
   EXPECT_EQ(refusal(std::string(300, 'x')), ErrorKind::invalid) << "longer than any name";
 }
 
-TEST_F(LocateBeneath, APipeIsRefusedWithoutWaitingForItsWriter) {
+TEST_F(LocateBeneath, PipeIsRefusedWithoutBlocking) {
   EXPECT_EQ(refusal("pipe.nc"), ErrorKind::invalid);
   EXPECT_EQ(refusal("pipe*"), ErrorKind::not_found) << "a series is of files";
 }
 
 // A folder is accessed whenever its files are read, long after it was located.
-TEST_F(LocateBeneath, AFolderThatBecomesALinkLeadsNowhere) {
+TEST_F(LocateBeneath, FolderReplacedByALinkIsRefused) {
   fs::create_directories(above_ / "elsewhere");
   std::ofstream(above_ / "elsewhere/f2.nc") << "secret";
   const auto before = direct_files(located("runs"));
@@ -172,7 +172,7 @@ TEST_F(LocateBeneath, AFolderThatBecomesALinkLeadsNowhere) {
   EXPECT_FALSE(after->exists("f2.nc"));
 }
 
-TEST_F(LocateBeneath, APatternIsMatchedAgainWithinTheSameBounds) {
+TEST_F(LocateBeneath, PatternIsMatchedAgainWithinTheSameRoot) {
   const Location series = located("runs/f*.nc");
   std::ofstream(root_ / "runs/f3.nc") << "data";
   const auto again = locate_again(series);
@@ -183,11 +183,11 @@ TEST_F(LocateBeneath, APatternIsMatchedAgainWithinTheSameBounds) {
   fs::create_symlink("nowhere.nc", root_ / "runs/f5.nc");
   fs::create_symlink("f6.nc", root_ / "runs/f6.nc");
   const auto beside_links = locate_again(series);
-  ASSERT_TRUE(beside_links) << "links that lead nowhere or out are no files of the series";
+  ASSERT_TRUE(beside_links) << "links that lead nowhere or out are not part of the series";
   EXPECT_EQ(beside_links->members.size(), 3U);
 }
 
-TEST_F(LocateBeneath, LinksThatAreLeftOutOfASeriesAreTold) {
+TEST_F(LocateBeneath, LinksOmittedFromASeriesAreReported) {
   fs::create_symlink("f2.nc", root_ / "runs/f1.nc");
   EXPECT_EQ(links_left_out(located("runs/f*.nc")), "") << "a link to a file is that file";
   EXPECT_EQ(links_left_out(located("runs/f2.nc")), "");
@@ -203,7 +203,7 @@ TEST_F(LocateBeneath, LinksThatAreLeftOutOfASeriesAreTold) {
             "out");
 }
 
-TEST_F(LocateBeneath, LookingUpReadsNothing) {
+TEST_F(LocateBeneath, LookupReadsNothing) {
   const fs::path locked = root_ / "runs/f2.nc";
   fs::permissions(locked, fs::perms::none);
   EXPECT_EQ(located("runs/f2.nc").members.size(), 1U);

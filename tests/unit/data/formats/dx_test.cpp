@@ -58,7 +58,7 @@ Doubles turned(const Doubles& values) {
   return out;
 }
 
-TEST(Dx, DataLieInTheFileBehindItOrElsewhere) {
+TEST(Dx, DataAreReadFromTheSameOrAnotherFile) {
   const Folder folder;
   const Doubles values = counted(12, 0.5);
   const std::string array = "object 3 class array type float rank 0 items 12 ";
@@ -86,8 +86,8 @@ TEST(Dx, DataLieInTheFileBehindItOrElsewhere) {
   }
 }
 
-// The second index runs southward from y 20: its first row is the last of the volume.
-TEST(Dx, ADeltaBelowZeroTurnsItsAxis) {
+// The second index runs south from y 20: its first row is the last of the volume.
+TEST(Dx, NegativeDeltaReversesItsAxis) {
   const Folder folder;
   std::string southward = grid;
   southward.replace(southward.find("0 2 0\n"), 6, "0 -2 0\n");
@@ -218,8 +218,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadDxCase{"word", grid + "surprise 4\n", "'surprise' is not understood"}),
     [](const auto& test) { return std::string(test.param.name); });
 
-// A product of itself, a series of itself: there is an end.
-TEST(DxRefusal, CirclesEnd) {
+// A product or series that contains itself must end.
+TEST(DxRefusal, CyclesAreRefused) {
   const Folder folder;
   write_file(folder / "c.dx",
              "object 1 class productarray term 1 term 1\n"
@@ -242,8 +242,8 @@ std::string dx_sample(const std::string& name) {
   return path;
 }
 
-// y is up: the world's x, y, z are the file's z, x, y, and the wind turns with them.
-TEST(DxStorm, WindIsTurnedUpright) {
+// y is up: world x, y, z are z, x, y of the file, and the wind is rotated with them.
+TEST(DxStorm, WindIsRotatedUpright) {
   const auto source = opened(dx_sample("wind.dx"));
   ASSERT_TRUE(source);
   const DatasetInfo& info = source->info();
@@ -263,7 +263,7 @@ TEST(DxStorm, WindIsTurnedUpright) {
   EXPECT_FLOAT_EQ(wind.range[1], 53.89473851781615F);
 }
 
-TEST(DxStorm, ScalarsBesideIt) {
+TEST(DxStorm, ScalarsOfTheSameFile) {
   struct Expected {
     const char* name;
     float low;

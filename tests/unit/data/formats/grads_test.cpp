@@ -43,7 +43,7 @@ std::string descriptor(const std::string& more, const std::string& variables,
 const std::string two_days = "tdef 2 linear 06Z28FEB2000 1dy";
 const std::string one_u = "1\nu 2 99 wind [m/s]";
 
-TEST(Grads, RecordsAreLevelsOfVariablesOfTimes) {
+TEST(Grads, RecordsAreOrderedByTimeVariableAndLevel) {
   const Folder folder;
   write_file(folder / "d.ctl", descriptor(two_days,
                                           "3\nps 0 99 pressure\nu 2 99 wind [m/s]\n"
@@ -88,7 +88,7 @@ TEST(Grads, UndefIsMasked) {
 }
 
 // GrADS masks a hundred thousandth of the value to both sides.
-TEST(Grads, UndefIsMaskedWithWhatRoundingMadeOfIt) {
+TEST(Grads, RoundedUndefIsMasked) {
   const Folder folder;
   Doubles values = counted(24);
   values[4] = -999.00995;
@@ -106,7 +106,7 @@ TEST(Grads, UndefIsMaskedWithWhatRoundingMadeOfIt) {
   EXPECT_EQ(u[7], -998.9899F);
 }
 
-// Rows from the north and levels from above: what comes out lies as without the options.
+// Rows from the north and levels from above: the result is the same as without the options.
 TEST(Grads, ReversedRowsAndLevels) {
   const Folder folder;
   write_file(folder / "d.ctl",
@@ -164,7 +164,7 @@ TEST(Grads, ByteOrdersAndHeaders) {
   }
 }
 
-TEST(Grads, BytesThatNothingDescribesAreWholeStepsOrRefused) {
+TEST(Grads, ExtraBytesAreWholeStepsOrRefused) {
   const Folder folder;
   write_file(folder / "d.ctl", descriptor(two_days, one_u));
   write_file(folder / "d.dat", packed<float>(counted(24)));
@@ -177,7 +177,7 @@ TEST(Grads, BytesThatNothingDescribesAreWholeStepsOrRefused) {
   write_file(folder / "d.dat", packed<float>(counted(26)));
   EXPECT_THAT(refusal(folder / "d.ctl"), HasSubstr("has 104 bytes, 'd.ctl' describes 96"));
 
-  // Of a template the files' lengths may differ.
+  // Files of a template may differ in length.
   write_file(folder / "t.ctl", descriptor(two_days + "\noptions template", one_u, "^t%d2.dat"));
   write_file(folder / "t28.dat", packed<float>(counted(12)));
   write_file(folder / "t29.dat", packed<float>(counted(13)));
@@ -186,7 +186,7 @@ TEST(Grads, BytesThatNothingDescribesAreWholeStepsOrRefused) {
   EXPECT_THAT(source->info().notes, Contains(HasSubstr("4 bytes after the last steps")));
 }
 
-TEST(Grads, AMissingFileIsReportedWithItsReference) {
+TEST(Grads, MissingFileIsReportedWithItsReference) {
   const Folder folder;
   write_file(folder / "d.ctl", descriptor(two_days, one_u));
   write_file(folder / "t.ctl", descriptor(two_days + "\noptions template", one_u, "^t%d2.dat"));
@@ -200,7 +200,7 @@ TEST(Grads, AMissingFileIsReportedWithItsReference) {
               HasSubstr("'t28.dat', which 't.ctl' names, is not there"));
 }
 
-TEST(Grads, OtherOrdersAndWholeNumbers) {
+TEST(Grads, OtherByteOrdersAndIntegers) {
   const Folder folder;
   // All times of u, then of v.
   write_file(folder / "d.ctl", descriptor(two_days, "2\nu 2 -1,20 u\nv 2 -1,20 v"));
@@ -236,7 +236,7 @@ TEST(Grads, OtherOrdersAndWholeNumbers) {
   EXPECT_EQ(values_of(*source, "d"), floats(values(-100000)));
 }
 
-// One file a month of daily steps, 28 days after the 31st of January: one day, then two.
+// One file of daily steps per month, from 28 days after the 31st of January: one day, then two.
 TEST(Grads, TemplatesJoinFilesOfUnequalLength) {
   const Folder folder;
   write_file(folder / "d.ctl", descriptor("tdef 4 linear 31jan1999 1dy\noptions template", one_u,
@@ -251,7 +251,7 @@ TEST(Grads, TemplatesJoinFilesOfUnequalLength) {
   EXPECT_EQ(source->info().steps[1].text, "1999-02-01T00:00:00Z");
 }
 
-TEST(Grads, AFileThatATemplateNamesMayBeAbsent) {
+TEST(Grads, FileOfATemplateMayBeMissing) {
   const Folder folder;
   write_file(folder / "d.ctl", descriptor("tdef 3 linear 21Z31dec1999 90mn\noptions template",
                                           one_u, "^%y4%m2%d2%h2%n2_%t2_%f3.dat"));
@@ -398,8 +398,9 @@ TEST_F(GradsModel, RangesAndMaskedCountsOfTheFirstAndLastTime) {
   }
 }
 
-// The fastest wind blows at 200 hPa, 38 N, 135 E, east over Japan; mountains are masked below.
-TEST_F(GradsModel, SamplesLieWhereTheyBelong) {
+// The strongest wind is at 200 hPa, 38 N, 135 E, eastward over Japan; levels below mountains are
+// masked.
+TEST_F(GradsModel, SamplesHaveTheirExpectedPositions) {
   const auto u = values_of(*source_, "U", 0);
   const auto index = [](std::size_t x, std::size_t y, std::size_t z) {
     return x + 72 * (y + 46 * z);

@@ -1,5 +1,5 @@
-// GRIB files made of ecCodes' own samples, their values a function of place, level and time that is
-// written here in the order WMO's flag table 3.4 prescribes; and broken ones.
+// GRIB files made from the samples of ecCodes, whose values are a function of position, level and
+// time written in the order of WMO flag table 3.4; and broken files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ using testing::HasSubstr;
 
 #ifndef WINDSPLAT_GRIB
 
-TEST(Grib, IsRefusedByNameWithoutItsLibrary) {
+TEST(Grib, IsRefusedByNameWithoutTheLibrary) {
   const Folder folder;
   write_bytes(folder / "a.grib", std::string("GRIB\0\0\x30\x01", 8) + std::string(40, '\0'));
   auto source = open_file(folder / "a.grib");
@@ -150,7 +150,7 @@ class Grib : public testing::Test {
   Folder folder_;
 };
 
-// Every sample of a field where the closed form says, to a few steps of the packing.
+// Every sample of a field equals the closed form, within a few packing steps.
 void expect_form(Source& source, const std::string& field, std::size_t step, double hour) {
   const DatasetInfo& info = source.info();
   const FieldInfo* found = info.find(field);
@@ -196,7 +196,7 @@ TEST_F(Grib, MessagesOfBothEditionsBecomeAVolumeOverTimeAndLevel) {
   expect_form(*source, "t", 1, 6);
 }
 
-TEST_F(Grib, ValuesStandAtTheirPlacesHoweverTheyAreScanned) {
+TEST_F(Grib, ValuesKeepTheirPositionsInEveryScanningMode) {
   for (const int edition : {1, 2}) {
     for (int flags = 0; flags < (edition == 1 ? 8 : 16); ++flags) {
       SCOPED_TRACE(std::to_string(edition) + " " + std::to_string(flags));
@@ -226,8 +226,8 @@ double legendre_64(double x) {
   return now;
 }
 
-// N 32: the sines of its 64 latitudes are the roots of P_64. The value of a row is its latitude,
-// whichever comes first in the message.
+// N 32: the sines of its 64 latitudes are the roots of P_64. The value of a row is its latitude, in
+// either order.
 TEST_F(Grib, GaussianLatitudesFromEitherPole) {
   for (const bool north : {false, true}) {
     SCOPED_TRACE(north);
@@ -238,7 +238,7 @@ TEST_F(Grib, GaussianLatitudesFromEitherPole) {
     maker.set("bitsPerValue", 24L);
     std::vector<double> list;
     for (int row = 0; row < 64; ++row) {
-      // Latitudes lie nearly even, 180 / 64.5 degrees apart.
+      // Latitudes are nearly even, 180 / 64.5 degrees apart.
       const double about = (north ? 1 : -1) * (row - 31.5) * 180 / 64.5;
       list.insert(list.end(), 128, about);
     }
@@ -293,8 +293,8 @@ TEST_F(Grib, SeveralFieldsInOneMessageAreAllRead) {
   EXPECT_NEAR(wind->values[rows * columns], value_at(10, 20, 'v', 0), 0.02);
 }
 
-// A wind of (10, 0) on a Lambert grid whose first point lies 35 degrees west of the meridian that
-// is upright on it: there east is turned by 35 sin(25) degrees against the rows.
+// A wind of (10, 0) on a Lambert grid whose first point is 35 degrees west of the central meridian:
+// there east is rotated by 35 sin(25) degrees relative to the rows.
 std::string lambert_wind(const std::string& component, bool along_rows) {
   Maker maker("GRIB2");
   maker.set("gridType", std::string("lambert"));
@@ -318,7 +318,7 @@ std::string lambert_wind(const std::string& component, bool along_rows) {
   return maker.bytes();
 }
 
-TEST_F(Grib, WindsAlongTheRowsStayAndOthersAreTurnedToThem) {
+TEST_F(Grib, WindsAlongRowsStayAndOthersAreRotated) {
   const double angle = 35 * std::sin(25 * M_PI / 180) * M_PI / 180;
   for (const bool along_rows : {true, false}) {
     const auto source = open(lambert_wind("u", along_rows) + lambert_wind("v", along_rows));
@@ -332,8 +332,8 @@ TEST_F(Grib, WindsAlongTheRowsStayAndOthersAreTurnedToThem) {
   }
 }
 
-// A wind of (10, 0) on a polar stereographic grid whose first point lies 40 degrees west of the
-// meridian that is upright on it: there north is turned by 40 degrees clockwise from the columns.
+// A wind of (10, 0) on a polar stereographic grid whose first point is 40 degrees west of the
+// central meridian: there north is rotated 40 degrees clockwise from the columns.
 std::string polar_wind(int edition, const std::string& component, bool along_rows) {
   Maker maker(edition == 1 ? "polar_stereographic_pl_grib1" : "polar_stereographic_pl_grib2");
   maker.set("Nx", 4L);
@@ -346,7 +346,7 @@ std::string polar_wind(int edition, const std::string& component, bool along_row
   maker.set("DyInMetres", 20000.0);
   maker.set("iScansNegatively", 0L);
   maker.set("jScansPositively", 1L);
-  // Flag table 3.3, bit 5; in edition 1 table 7 has it at the same place.
+  // Flag table 3.3, bit 5; the same position in table 7 of edition 1.
   maker.set("resolutionAndComponentFlags", along_rows ? 8L : 0L);
   maker.set("level", 500L);
   maker.set("shortName", component);
@@ -373,23 +373,23 @@ TEST_F(Grib, WindsOnPolarStereographicGridsFollowTheFlagOfTheirEdition) {
   }
 }
 
-TEST_F(Grib, FurtherMembersAreToldAndLeftOut) {
+TEST_F(Grib, FurtherMembersAreReportedAndOmitted) {
   const auto source = open(message(1, "t", 500, 0) + message(1, "t", 500, 0, {}, 20));
   ASSERT_NE(source, nullptr);
   EXPECT_THAT(source->info().notes, ElementsAre(HasSubstr("1 more messages")));
   EXPECT_EQ(source->read(0, 0)->masked, 0);
 }
 
-TEST_F(Grib, AHeadingBeforeTheMessageIsPassedOver) {
+TEST_F(Grib, HeadingBeforeTheMessageIsSkipped) {
   EXPECT_EQ(fault("\x01\r\r\n001\r\r\nHTXX50 EGRR 291200\r\r\n" + message(1, "t", 500, 0)), "");
 }
 
-TEST_F(Grib, ReducedGridsAreRefusedWithTheirName) {
+TEST_F(Grib, ReducedGridsAreRefusedByName) {
   const Maker maker("reduced_gg_pl_32_grib2");
   EXPECT_THAT(fault(maker.bytes()), HasSubstr("'reduced_gg'"));
 }
 
-TEST_F(Grib, BrokenMessagesAreFaults) {
+TEST_F(Grib, BrokenMessagesAreErrors) {
   const std::string good = message(2, "t", 500, 0);
   EXPECT_EQ(fault(good), "");
   EXPECT_THAT(fault(good.substr(0, good.size() - 1)), HasSubstr("cut short"));

@@ -167,7 +167,7 @@ const std::map<std::string, std::function<void(const std::string&)>>& hostile_fi
 
 class HostileFiles : public testing::TestWithParam<std::string> {};
 
-TEST_P(HostileFiles, InspectIsQuickAndSmall) {
+TEST_P(HostileFiles, InspectIsFastAndSmall) {
   const Folder folder;
   const std::string path = folder / "a.h5";
   hostile_files().at(GetParam())(path);
@@ -185,7 +185,7 @@ TEST_P(HostileFiles, InspectIsQuickAndSmall) {
 }
 
 // Two arrays of 32 MB in less than one, as regional models write them.
-TEST(Storage, PositionsThatCompressWellAreReadWithLittleMemory) {
+TEST(Storage, CompressedPositionsAreReadWithLittleMemory) {
   const Folder folder;
   write_positions(folder / "a.nc", 2000);
   ASSERT_LT(std::filesystem::file_size(folder / "a.nc"), 1U << 20);

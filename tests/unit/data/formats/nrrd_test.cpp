@@ -1,5 +1,5 @@
-// NRRD: every encoding and layout from bytes written here; what is expected follows from the
-// format's definition (teem's documentation of nrrd).
+// NRRD: every encoding and layout, from bytes written here; expected values follow from the
+// definition of the format (teem's documentation of nrrd).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ std::string header(const std::string& fields) {
 
 const std::string plain_2x3x2 = "dimension: 3\nsizes: 2 3 2\ntype: float\nendian: little\n";
 
-TEST(Nrrd, RawSamplesLieFastestFirst) {
+TEST(Nrrd, RawSamplesAreFastestFirst) {
   const Folder folder;
   write_file(folder / "a.nrrd", header(plain_2x3x2 + "encoding: raw\ncontent: a title\n\n") +
                                     packed<float>(counted(12)));
@@ -72,7 +72,7 @@ TEST_P(NrrdType, IsReadInBothByteOrders) {
   }
 }
 
-// -32767 and its like are netCDF's fill values; here they are numbers.
+// -32767 and similar are fill values of netCDF; here they are values.
 INSTANTIATE_TEST_SUITE_P(
     All, NrrdType,
     testing::Values(TypeCase{"signed char", packed<std::int8_t>, -128, "int8"},
@@ -114,8 +114,8 @@ TEST(Nrrd, EncodingsHoldTheSameSamples) {
   }
 }
 
-// Bytes of the file, whatever they mean; lines first.
-TEST(Nrrd, LinesAndBytesInFrontOfEncodedDataAreSkipped) {
+// Bytes of the file, independent of their meaning; lines first.
+TEST(Nrrd, LinesAndBytesBeforeEncodedDataAreSkipped) {
   const Folder folder;
   for (const auto& [encoding, data] :
        std::vector<std::pair<std::string, std::string>>{{"hex", "00010203"}, {"text", "0 1 2 3"}}) {
@@ -130,7 +130,7 @@ TEST(Nrrd, LinesAndBytesInFrontOfEncodedDataAreSkipped) {
   }
 }
 
-TEST(Nrrd, NotANumberIsMasked) {
+TEST(Nrrd, NanIsMasked) {
   const Folder folder;
   write_file(folder / "m.nrrd",
              header("dimension: 2\nsizes: 2 2\ntype: float\nencoding: ascii\n\n1 nan -inf 4\n"));
@@ -139,8 +139,8 @@ TEST(Nrrd, NotANumberIsMasked) {
   EXPECT_EQ(test::volume_of(*source, "m").masked, 2);
 }
 
-// A long series in one gzip stream: steps in any order, each what it should be.
-TEST(Nrrd, StepsOfAGzipStreamAreReachedInAnyOrder) {
+// A long series in one gzip stream: steps in any order with the right values.
+TEST(Nrrd, StepsOfAGzipStreamAreReadInAnyOrder) {
   const Folder folder;
   constexpr std::size_t steps = 20;
   constexpr std::size_t cube = 64 * 64 * 64;  // 1 MiB of float a step
@@ -163,7 +163,7 @@ TEST(Nrrd, StepsOfAGzipStreamAreReachedInAnyOrder) {
   }
 }
 
-TEST(Nrrd, SpacingsAndEndsPlaceSamples) {
+TEST(Nrrd, SpacingsAndBoundsPlaceSamples) {
   const Folder folder;
   write_file(
       folder / "p.nrrd",
@@ -182,8 +182,8 @@ TEST(Nrrd, SpacingsAndEndsPlaceSamples) {
   EXPECT_EQ(values_of(*source, "p")[0], 6);
 }
 
-// Left-posterior-superior: x and y are turned, and so are a vector's first two components.
-TEST(Nrrd, AnatomicalSpaceIsTurned) {
+// Left-posterior-superior: x and y are reversed, as are the first two components of vectors.
+TEST(Nrrd, AnatomicalSpaceIsReoriented) {
   const Folder folder;
   write_file(folder / "v.nrrd",
              header("dimension: 4\nsizes: 3 2 2 2\ntype: double\nendian: big\nencoding: raw\n"
@@ -210,7 +210,7 @@ TEST(Nrrd, AnatomicalSpaceIsTurned) {
   EXPECT_THAT(source->info().notes, testing::Contains(HasSubstr("left-posterior-superior")));
 }
 
-TEST(Nrrd, DirectionsTellWhichAxisIsWhich) {
+TEST(Nrrd, DirectionsIdentifyAxes) {
   const Folder folder;
   write_file(folder / "d.nrrd",
              header("dimension: 3\nsizes: 2 3 4\ntype: uint8\nencoding: raw\n"
@@ -227,7 +227,7 @@ TEST(Nrrd, DirectionsTellWhichAxisIsWhich) {
   EXPECT_EQ(values[3 * 4], 19);  // z 2
 }
 
-TEST(Nrrd, ObliqueAxesKeepTheirSpacingAndSaySo) {
+TEST(Nrrd, ObliqueAxesKeepTheirSpacingWithANote) {
   const Folder folder;
   write_file(folder / "o.nrrd",
              header("dimension: 3\nsizes: 2 2 2\ntype: uint8\nencoding: raw\nspace dimension: 3\n"
@@ -254,7 +254,7 @@ TEST(Nrrd, ComponentsMayComeLast) {
   EXPECT_EQ(values_of(*source, "c"), floats(counted(16)));
 }
 
-TEST(Nrrd, WithoutKindsTheOuterAxesAreGuessed) {
+TEST(Nrrd, WithoutKindsTheOuterAxesAreInferred) {
   const Folder folder;
   write_file(folder / "g.nrrd", header("dimension: 5\nsizes: 3 2 2 2 4\ntype: uint8\n"
                                        "encoding: raw\n\n") +
@@ -311,7 +311,8 @@ TEST(Nrrd, BytesAfterTheSamplesAreReported) {
   write_file(folder / "a.nrrd", header(fields + "\n") + raw + "12345");
   EXPECT_THAT(opened(folder / "a.nrrd")->info().notes,
               testing::Contains("5 bytes after the last step are not described"));
-  // Two files, one of them too long; and data that are the file's end have nothing behind them.
+  // Two files, one of them too long; data that extend to the end of the file have no trailing
+  // bytes.
   write_file(folder / "b.nhdr", header(fields + "data file: LIST\nb0\nb1\n"));
   write_file(folder / "b0", raw.substr(0, 24));
   write_file(folder / "b1", raw.substr(24) + "123");
@@ -327,7 +328,7 @@ TEST(Nrrd, BytesAfterTheSamplesAreReported) {
   EXPECT_THAT(absent.error().message, HasSubstr("'c', which 'c.nhdr' names, is not there"));
 }
 
-TEST(Nrrd, ChangedDataFilesAreNoticed) {
+TEST(Nrrd, ChangedDataFilesAreDetected) {
   const Folder folder;
   write_file(folder / "c.nhdr", header("dimension: 2\nsizes: 2 6\ntype: uint8\nencoding: raw\n"
                                        "data file: c%d.raw 0 5 1\n"));
@@ -410,7 +411,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return std::string(test.param.name); });
 
 // Truncated or overwritten data yield an error, without an invalid read.
-TEST(NrrdRefusal, BrokenDataAreFoundWhenTheyAreRead) {
+TEST(NrrdRefusal, BrokenDataAreDetectedWhenRead) {
   const Folder folder;
   const std::string good = gzipped(packed<float>(counted(12)));
   std::string damaged = good;
@@ -424,7 +425,7 @@ TEST(NrrdRefusal, BrokenDataAreFoundWhenTheyAreRead) {
            {"hex", std::string(95, '0') + "g"}}) {
     write_file(folder / "b.nrrd", header(plain_2x3x2 + "encoding: " + encoding + "\n\n") + data);
     auto source = open_file(folder / "b.nrrd");
-    if (!source) continue;  // fewer bytes than are possible
+    if (!source) continue;  // fewer bytes than possible
     const auto volume = (*source)->read(0, 0);
     ASSERT_FALSE(volume) << encoding << ' ' << data;
     EXPECT_EQ(volume.error().kind, ErrorKind::bad_data);

@@ -1,5 +1,4 @@
-// Raw files and the JSON that describes them (docs/user/formats.md): what is expected follows from
-// that page.
+// Raw files and the JSON that describes them; expected values follow from docs/user/formats.md.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +30,7 @@ std::string document(const std::string& more) {
 const std::string wind = R"("fields": [{"name": "wind", "components": ["u", "v", "w"],
                                        "units": "m s-1"}, {"name": "cloud"}])";
 
-TEST(Raw, FieldsFollowOneAnotherWithinAStep) {
+TEST(Raw, FieldsAreConsecutiveWithinAStep) {
   const Folder folder;
   write_file(folder / "a.json",
              document(R"("file": "a.raw", "offset": 8, "title": "A", "steps": {"count": 2,
@@ -78,7 +77,7 @@ TEST(Raw, OrderLayoutTypeAndMissing) {
   EXPECT_EQ(values_of(*source, "f"), floats({3, 0, 4, 1, 5, 2}));
 }
 
-TEST(Raw, StepsInFilesOfTheirOwn) {
+TEST(Raw, StepsInSeparateFiles) {
   const Folder folder;
   const std::string steps = R"("steps": {"count": 6, "coordinates": [0, 1, 2, 4, 8, 16]}, )";
   const std::string field = R"("fields": [{"name": "p"}])";
@@ -114,7 +113,7 @@ TEST(Raw, StepsInFilesOfTheirOwn) {
   }
 }
 
-TEST(Raw, FieldsMayHaveFilesOfTheirOwn) {
+TEST(Raw, FieldsInSeparateFiles) {
   const Folder folder;
   write_file(folder / "j.json", document(R"("fields": [{"name": "a", "file": "a.bin"},
     {"name": "b", "file": "in/b.bin", "offset": 3, "type": "uint8"}])"));
@@ -126,7 +125,7 @@ TEST(Raw, FieldsMayHaveFilesOfTheirOwn) {
   EXPECT_EQ(values_of(*source, "b"), floats(counted(12)));
 }
 
-TEST(Raw, BytesThatNothingDescribesAreWholeStepsOrRefused) {
+TEST(Raw, ExtraBytesAreWholeStepsOrRefused) {
   const Folder folder;
   const std::string field = R"("file": "a.raw", "offset": 8, "fields": [{"name": "p"}])";
   write_file(folder / "a.json", document(field));
@@ -159,7 +158,7 @@ TEST(Raw, FieldsOfOneFileDescribeItTogether) {
   EXPECT_THAT(refusal(folder / "a.json"), HasSubstr("has 61 bytes, 'a.json' describes 60"));
 }
 
-TEST(Raw, FilesOfAPatternThatAreTooLongAreCounted) {
+TEST(Raw, OverlongFilesOfAPatternAreCounted) {
   const Folder folder;
   write_file(folder / "a.json",
              document(R"("file": "a%d.raw", "steps": {"count": 3}, "fields": [{"name": "p"}])"));
@@ -171,7 +170,7 @@ TEST(Raw, FilesOfAPatternThatAreTooLongAreCounted) {
                   "'a0.raw' has 1 more step than described, and 1 more files are too long"));
 }
 
-TEST(Raw, AMissingFileIsReportedWithItsReference) {
+TEST(Raw, MissingFileIsReportedWithItsReference) {
   const Folder folder;
   write_file(folder / "a.json", document(R"("file": "none_%03d.bin", "fields": [{"name": "p"}])"));
   const auto source = open_file(folder / "a.json");
@@ -182,7 +181,7 @@ TEST(Raw, AMissingFileIsReportedWithItsReference) {
             "'a.json'");
 }
 
-TEST(Raw, OtherJsonIsToldWhatItLacks) {
+TEST(Raw, OtherJsonIsRefusedWithTheMissingKey) {
   const Folder folder;
   for (const char* text : {R"({"file": "a.raw"})", " {\n  \"dims\": {}}", "{}"}) {
     write_file(folder / "other.json", text);

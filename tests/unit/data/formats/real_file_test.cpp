@@ -42,7 +42,7 @@ class RealFile : public testing::Test {
   std::unique_ptr<Source> source_;
 };
 
-// The sample nearest to a place, by the axes' own coordinates.
+// The sample nearest to a position, by axis coordinates.
 float at(const DatasetInfo& info, const Volume& volume, int component, double lon, double lat,
          double hpa) {
   const std::array<double, 3> place{lon, lat, hpa};
@@ -93,7 +93,7 @@ TEST_F(RealFile, NamesAndUnits) {
   EXPECT_EQ(info().time_units, "Month");
 }
 
-TEST_F(RealFile, ValuesAtPlaces) {
+TEST_F(RealFile, ValuesAtPositions) {
   const Volume wind = volume("wind");
   const Volume temperature = volume("T");
   ASSERT_EQ(wind.components, 2);
@@ -124,11 +124,12 @@ TEST_F(RealFile, RangesAndMask) {
   EXPECT_EQ(wind.masked, 0);
 }
 
-TEST_F(RealFile, TheJetBlowsEastAndItsFastestSampleIsWhereItIs) {
+TEST_F(RealFile, JetBlowsEastWithItsMaximumAtTheKnownSample) {
   // d["U"][0].argmax() is (7, 44, 119): 200 hPa, 34.9 N, 154.7 E.
   const Volume u = volume("U");
   EXPECT_EQ(at(info(), u, 0, 154.6875, 34.882523, 200), 81.63902F);
-  // The polar night is colder aloft than the tropics on the ground: up is up.
+  // The polar night aloft is colder than the tropics at the ground: the vertical direction is
+  // right.
   const Volume temperature = volume("T");
   EXPECT_GT(at(info(), temperature, 0, 0, 0, 1000), at(info(), temperature, 0, 0, 0, 100) + 80);
 }

@@ -1,5 +1,5 @@
 // Zarr stores written here byte by byte, compressed by the C libraries: values, masks, orientation,
-// what is left out, what is refused.
+// omissions, refusals.
 #include <blosc.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -81,7 +81,7 @@ class Store {
     return {volume->values.begin(), volume->values.end()};
   }
 
-  // What opening, or else reading the first field, fails with.
+  // The error of opening, or else of reading the first field.
   [[nodiscard]] std::string fault() const {
     auto source = open_file(path());
     if (!source) return source.error().message;
@@ -166,7 +166,7 @@ void expect_decoded(const std::string& compressor, const std::string& stored) {
             array_json("[24,40]", "[24,40]", "<f4", "null", compressor_json(compressor)));
   store.put("f/0.0", stored);
   expect_same(store.values(), ramp());
-  // The same bytes cut short, and longer than the array needs, are faults.
+  // The same bytes truncated, and longer than the array needs, are errors.
   store.put("f/0.0", stored.substr(0, stored.size() / 2));
   EXPECT_THAT(store.fault(), HasSubstr("'f/0.0' ")) << compressor;
   store.put("f/.zarray",
@@ -175,7 +175,7 @@ void expect_decoded(const std::string& compressor, const std::string& stored) {
   EXPECT_THAT(store.fault(), HasSubstr("'f/0.0' ")) << compressor;
 }
 
-TEST(Zarr, EveryCompressorGivesTheSameNumbers) {
+TEST(Zarr, EveryCompressorGivesTheSameValues) {
   const std::string plain = bytes_of_items(ramp());
   expect_decoded("zlib", zlib_stream(plain, 15));
   expect_decoded("gzip", zlib_stream(plain, 31));
@@ -188,7 +188,7 @@ TEST(Zarr, EveryCompressorGivesTheSameNumbers) {
   }
 }
 
-TEST(Zarr, ChunksAtTheEdgeAreCutAndBothSeparatorsAndOrdersAreRead) {
+TEST(Zarr, EdgeChunksAreCroppedAndBothSeparatorsAndOrdersRead) {
   // f[2, 3] in chunks of 2 x 2: the second one has a column beyond the edge.
   for (const char* separator : {".", "/"}) {
     for (const bool columns_first : {false, true}) {
@@ -226,7 +226,7 @@ TEST(Zarr, TypesOfEveryWidth) {
               {1.5F, std::ldexp(1.0F, -24)});
 }
 
-TEST(Zarr, AnAbsentChunkIsTheFillValueAndNeverZeroByChance) {
+TEST(Zarr, MissingChunkIsTheFillValueAndNeverZeroByChance) {
   const auto without_second = [](const std::string& dtype, const std::string& fill,
                                  const std::string& attributes) {
     const Store store;
@@ -238,17 +238,17 @@ TEST(Zarr, AnAbsentChunkIsTheFillValueAndNeverZeroByChance) {
   const std::string named = R"({"_ARRAY_DIMENSIONS":["y","x"]})";
   expect_same(without_second("<i2", "-9", "{}"), {7, 0, kMasked, kMasked});
   expect_same(without_second("<i2", "null", "{}"), {7, 0, kMasked, kMasked});
-  // By xarray 0 then means missing; without its names it is the number Zarr's default leaves.
+  // In xarray 0 then means missing; without its dimension names it is Zarr's default fill value.
   expect_same(without_second("<i2", "0", named), {7, kMasked, kMasked, kMasked});
   expect_same(without_second("<i2", "0", "{}"), {7, 0, 0, 0});
-  // netCDF's default fill values have no meaning here: -32767 is that of a short.
+  // Default fill values of netCDF have no meaning here: -32767 is that of a short.
   const Store store;
   store.put("f/.zarray", array_json("[1,2]", "[1,2]", "<i2"));
   store.put("f/0.0", bytes_of_items<std::int16_t>({-32767, 1}));
   expect_same(store.values(), {-32767, 1});
 }
 
-TEST(Zarr, AChunkThatIsALinkToNowhereIsLostAndNotAbsent) {
+TEST(Zarr, DanglingChunkLinkIsAnErrorNotAMissingChunk) {
   namespace fs = std::filesystem;
   const Store store;
   store.put("f/.zarray", array_json("[1,4]", "[1,2]", "<i2", "-9"));
@@ -295,7 +295,7 @@ TEST(Zarr, AttributesOfXarrayPackMaskAndOrient) {
                                   member("t/.zarray") + "," + member("t/.zattrs") + "}}");
       std::filesystem::remove(store.path() + "/t/.zarray");
     }
-    // Turned so that rows run from south to north.
+    // Reversed so that rows run from south to north.
     expect_same(store.values("t"), {kMasked, 125, kMasked, 100, 100.5, 101});
     auto source = open_file(store.path());
     ASSERT_TRUE(source);
@@ -308,7 +308,7 @@ TEST(Zarr, AttributesOfXarrayPackMaskAndOrient) {
   }
 }
 
-TEST(Zarr, FiltersAreUndoneLastFirst) {
+TEST(Zarr, FiltersAreReversedLastFirst) {
   const Store store;
   std::string json = array_json("[1,4]", "[1,4]", "<f8");
   json.replace(json.find("\"filters\":null"), 14,

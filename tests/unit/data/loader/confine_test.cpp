@@ -1,5 +1,5 @@
-// What a confined process can still do, tried in one: a fork of the test gives everything up and
-// reports the outcome of each attempt.
+// Capabilities of a confined process: a fork of the test drops its privileges and reports the
+// outcome of each attempt.
 #include "server/data/loader/confine.hpp"
 
 #include <fcntl.h>
@@ -28,7 +28,7 @@ namespace {
 
 struct Attempt {
   const char* what;
-  int expected;  // errno; 0: it works
+  int expected;  // errno; 0: success
   long (*act)(int file);
 };
 
@@ -106,7 +106,7 @@ const std::vector<Attempt> on_the_given_file{
 };
 
 const std::vector<Attempt> on_the_world{
-    // The world.
+    // Network and processes.
     {"socket", EPERM, [](int) -> long { return ::socket(AF_INET, SOCK_STREAM, 0); }},
     {"local socket", EPERM, [](int) -> long { return ::socket(AF_UNIX, SOCK_STREAM, 0); }},
     {"connect", EPERM, [](int) -> long { return ::connect(0, nullptr, 0); }},
@@ -233,7 +233,7 @@ std::vector<int> outcomes(const std::string& path) {
   return out;
 }
 
-TEST(LoaderConfinement, nothing_but_reading_and_computing_is_left) {
+TEST(LoaderConfinement, AllowsOnlyReadingAndComputing) {
   const test::Folder folder;
   const std::string path = folder / "given";
   std::ofstream(path) << "first";
@@ -246,7 +246,7 @@ TEST(LoaderConfinement, nothing_but_reading_and_computing_is_left) {
 
 #ifdef __x86_64__
 // No rule covers the call numbers of x32.
-TEST(LoaderConfinement, a_call_of_another_abi_ends_the_process) {
+TEST(LoaderConfinement, SystemCallOfAnotherAbiTerminatesTheProcess) {
   constexpr long x32 = 0x40000000;
   std::fflush(nullptr);
   const pid_t child = ::fork();

@@ -1,5 +1,5 @@
-// Loaders that do not do what ours does, as if a file had taken one over: scripts that speak the
-// protocol on descriptor 3. Whatever they say, the daemon gets an error or true invariants.
+// Faulty or compromised loaders: scripts that speak the protocol on descriptor 3. For any messages
+// the daemon gets an error or values that satisfy the invariants.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -23,10 +23,10 @@ namespace {
 
 using std::chrono::milliseconds;
 
-DatasetInfo told() {
+DatasetInfo sample_info() {
   DatasetInfo info;
-  info.id = "told";
-  info.source = "told.nc";
+  info.id = "sample";
+  info.source = "sample.nc";
   info.digest = "0";
   for (std::size_t a = 0; a < 3; ++a) {
     info.grid.axes[a].name = "xyz"[a];
@@ -42,12 +42,12 @@ DatasetInfo told() {
   return info;
 }
 
-class Liar : public testing::Test {
+class FaultyLoader : public testing::Test {
  protected:
   void SetUp() override {
     file_ = folder_ / "some.nc";
     std::ofstream(file_) << "never read";
-    std::ofstream(folder_ / "info", std::ios::binary) << encode_info(told());
+    std::ofstream(folder_ / "info", std::ios::binary) << encode_info(sample_info());
     limits_.open_time = milliseconds(20'000);
     limits_.read_time = milliseconds(20'000);
   }
@@ -57,24 +57,24 @@ class Liar : public testing::Test {
     EXPECT_EQ(errno, ECHILD);
   }
 
-  void be(const std::string& script) {
+  void start_program(const std::string& script) {
     const std::string path = folder_ / "loader";
     std::ofstream(path) << script;
     ::chmod(path.c_str(), 0700);
     set_program(path);
   }
 
-  // A script that knows how to speak; K is Kind.
-  void speak(const std::string& what) {
+  // A script that implements the protocol; K is Kind.
+  void respond_with(const std::string& what) {
     std::string script = "#!/usr/bin/env python3\n";
     script += "import array, mmap, os, socket, struct, sys, time\n";
     script += "s = socket.socket(fileno=3)\n";
     script += "names = 'open read descriptor names yes no ask_open ask_list ask_exists ";
     script += "ask_library progress opened filled failed'.split()\n";
     script += "K = {name: i + 1 for i, name in enumerate(names)}\n";
-    script += "def say(kind, payload=b''):\n";
+    script += "def send(kind, payload=b''):\n";
     script += "    s.sendall(struct.pack('<IIQ', K[kind], 0, len(payload)) + payload)\n";
-    script += "def hear():\n";
+    script += "def receive():\n";
     script += "    head, more, _, _ = s.recvmsg(16, 64)\n";
     script += "    if not head: os._exit(0)\n";
     script += "    kind, _, size = struct.unpack('<IIQ', head)\n";
@@ -83,16 +83,16 @@ class Liar : public testing::Test {
     script += "    fds = array.array('i', b''.join(data for _, _, data in more))\n";
     script += "    return names[kind - 1], payload, fds[0] if fds else -1\n";
     script += "def ask(kind, name):\n";
-    script += "    say(kind, name); return hear()[0]\n";
+    script += "    send(kind, name); return receive()[0]\n";
     script += "def fail(text):\n";
-    script += "    text = text.encode(); say('failed', struct.pack('<BQ', 3, len(text)) + text)\n";
+    script += "    text = text.encode(); send('failed', struct.pack('<BQ', 3, len(text)) + text)\n";
     script += "info = open('" + (folder_ / "info") + "', 'rb').read()\n";
-    script += "def told():\n";
-    script += "    say('opened', info); return hear()[2]\n";
+    script += "def send_info():\n";
+    script += "    send('opened', info); return receive()[2]\n";
     script += "def floats(*values): return struct.pack('<16f', *values)\n";
     script += "inf, nan = float('inf'), float('nan')\n";
-    script += "hear()\n";
-    be(script + what);
+    script += "receive()\n";
+    start_program(script + what);
   }
 
   Result<std::unique_ptr<RemoteSource>> opened() {
@@ -108,9 +108,9 @@ class Liar : public testing::Test {
     EXPECT_EQ(source.error().message, message);
   }
 
-  // What is told from now on is larger than the memory that is kept between reads.
+  // Later messages are larger than the memory kept between reads.
   void describe_much() {
-    DatasetInfo large = told();
+    DatasetInfo large = sample_info();
     large.grid.axes[0].coordinates.resize(5'000'000);
     std::iota(large.grid.axes[0].coordinates.begin(), large.grid.axes[0].coordinates.end(), 0);
     std::ofstream(folder_ / "info", std::ios::binary) << encode_info(large);
@@ -137,8 +137,10 @@ class Liar : public testing::Test {
   Limits limits_;
 };
 
-TEST_F(Liar, a_valid_answer_is_accepted) {
-  speak("fd = told()\nos.pwrite(fd, floats(*range(16)), 0)\nos.close(fd)\nsay('filled')\nhear()\n");
+TEST_F(FaultyLoader, ValidAnswerIsAccepted) {
+  respond_with(
+      "fd = send_info()\nos.pwrite(fd, floats(*range(16)), "
+      "0)\nos.close(fd)\nsend('filled')\nreceive()\n");
   const auto volume = read();
   ASSERT_TRUE(volume) << volume.error().message;
   ASSERT_EQ(volume->values.size(), 16U);
@@ -150,49 +152,49 @@ TEST_F(Liar, a_valid_answer_is_accepted) {
   EXPECT_FLOAT_EQ(volume->range[1], std::hypot(7.0F, 15.0F));
 }
 
-TEST_F(Liar, one_that_ends) {
-  be("#!/bin/sh\nexit 7\n");
+TEST_F(FaultyLoader, ExitIsAnError) {
+  start_program("#!/bin/sh\nexit 7\n");
   expect_not_opened("the loader of 'some.nc' ended with code 7 while opening it");
 }
 
-TEST_F(Liar, one_that_spins) {
+TEST_F(FaultyLoader, EndlessLoopIsTerminated) {
   limits_.open_time = milliseconds(300);
-  be("#!/bin/sh\nwhile :; do :; done\n");
+  start_program("#!/bin/sh\nwhile :; do :; done\n");
   expect_not_opened("the loader of 'some.nc' was ended after 0.3 s while opening it");
 }
 
-TEST_F(Liar, one_that_sends_single_bytes) {
+TEST_F(FaultyLoader, SingleByteMessagesAreRead) {
   limits_.open_time = milliseconds(700);
-  speak("while True: s.send(b'\\x01\\0\\0\\0'[:1]); time.sleep(0.06)\n");
+  respond_with("while True: s.send(b'\\x01\\0\\0\\0'[:1]); time.sleep(0.06)\n");
   expect_not_opened("the loader of 'some.nc' was ended after 0.7 s while opening it");
 }
 
-TEST_F(Liar, one_that_sends_malformed_messages) {
+TEST_F(FaultyLoader, MalformedMessagesAreRefused) {
   const std::string message =
       "the loader of 'some.nc' violated the protocol and was ended while opening it";
-  speak("s.sendall(b'x' * 1000)\nhear()\n");
+  respond_with("s.sendall(b'x' * 1000)\nreceive()\n");
   expect_not_opened(message);
-  speak("s.sendall(struct.pack('<IIQ', K['opened'], 0, 1 << 60))\nhear()\n");
+  respond_with("s.sendall(struct.pack('<IIQ', K['opened'], 0, 1 << 60))\nreceive()\n");
   expect_not_opened(message);
-  speak("say('ask_open', b'x' * 70000)\nhear()\n");
+  respond_with("send('ask_open', b'x' * 70000)\nreceive()\n");
   expect_not_opened(message);
-  speak("say('filled')\nhear()\n");
+  respond_with("send('filled')\nreceive()\n");
   expect_not_opened(message);
-  speak("say('progress', struct.pack('<d', nan))\nhear()\n");
+  respond_with("send('progress', struct.pack('<d', nan))\nreceive()\n");
   expect_not_opened(message);
 }
 
-// Where little is due, little is taken.
-TEST_F(Liar, one_that_sends_too_many_messages) {
-  speak("told()\nsay('progress', b'x' * 100000)\nhear()\n");
+// A small expected amount limits the memory taken.
+TEST_F(FaultyLoader, TooManyMessagesAreRefused) {
+  respond_with("send_info()\nsend('progress', b'x' * 100000)\nreceive()\n");
   expect_not_read(
       "the loader of 'some.nc' violated the protocol and was ended while reading 'wind'");
 }
 
 // Memory written by a loader and not reused is released with it.
-TEST_F(Liar, one_that_fails_to_fill_much_is_ended) {
+TEST_F(FaultyLoader, FailingToFillMuchMemoryIsTerminated) {
   describe_much();
-  speak("fd = told()\nos.pwrite(fd, b'x' * 1000, 0)\nfail('no')\nhear()\n");
+  respond_with("fd = send_info()\nos.pwrite(fd, b'x' * 1000, 0)\nfail('no')\nreceive()\n");
   auto source = opened();
   ASSERT_TRUE(source) << source.error().message;
   const auto volume = (*source)->read(0, 0);
@@ -201,34 +203,34 @@ TEST_F(Liar, one_that_fails_to_fill_much_is_ended) {
   EXPECT_EQ((*source)->process(), -1);
 }
 
-TEST_F(Liar, one_that_keeps_much_mapped_is_ended) {
+TEST_F(FaultyLoader, KeepingMuchMemoryMappedIsTerminated) {
   describe_much();
-  speak("fd = told()\nm = mmap.mmap(fd, 4096)\nsay('filled')\nhear()\n");
+  respond_with("fd = send_info()\nm = mmap.mmap(fd, 4096)\nsend('filled')\nreceive()\n");
   auto source = opened();
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_TRUE((*source)->read(0, 0));
   EXPECT_EQ((*source)->process(), -1);
-  speak("fd = told()\nos.close(fd)\nsay('filled')\nhear()\n");
+  respond_with("fd = send_info()\nos.close(fd)\nsend('filled')\nreceive()\n");
   source = opened();
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_TRUE((*source)->read(0, 0));
   EXPECT_GT((*source)->process(), 0);
 }
 
-TEST_F(Liar, one_that_sends_endless_requests) {
+TEST_F(FaultyLoader, EndlessRequestsAreRefused) {
   limits_.opens_max = 100;
-  speak("while True: ask('ask_exists', b'some.nc')\n");
+  respond_with("while True: ask('ask_exists', b'some.nc')\n");
   expect_not_opened("the loader of 'some.nc' violated the protocol and was ended while opening it");
 }
 
-TEST_F(Liar, one_that_requests_other_files) {
+TEST_F(FaultyLoader, RequestsForOtherFilesAreRefused) {
   std::ofstream(folder_ / "beside") << "private";
   limits_.library_folders = {folder_ / "tables"};
   std::filesystem::create_directories(folder_ / "tables");
   std::ofstream(folder_ / "tables/table") << "a table";
   std::filesystem::create_symlink(folder_ / "beside", folder_ / "tables/link");
   const std::string folder = folder_ / "";
-  speak(
+  respond_with(
       "out = [ask('ask_open', n) for n in (b'some.nc', b'beside', b'../beside', b'/etc/passwd',"
       " b'', b'some.nc\\0x', b'/proc/self/mem')]\n"
       "out += [ask('ask_list', n) for n in (b'', b'/', b'..')]\n"
@@ -239,7 +241,7 @@ TEST_F(Liar, one_that_requests_other_files) {
       "out += [ask('ask_library', n) for n in (f + b'tables/table', f + b'tables/../beside',"
       " f + b'tables/link', f + b'tables', f + b'tables/', f + b'beside', b'/etc/passwd',"
       " f + b'tables//etc/passwd', f + b'tables/table\\0')]\n"
-      "fail(' '.join(out))\nhear()\n");
+      "fail(' '.join(out))\nreceive()\n");
   const auto source = opened();
   ASSERT_FALSE(source);
   EXPECT_EQ(source.error().message,
@@ -249,15 +251,15 @@ TEST_F(Liar, one_that_requests_other_files) {
             "descriptor no no no no no no no no");
 }
 
-TEST_F(Liar, one_that_describes_no_dataset) {
-  speak("say('opened', info[:-1])\nhear()\n");
+TEST_F(FaultyLoader, InvalidDatasetsAreRefused) {
+  respond_with("send('opened', info[:-1])\nreceive()\n");
   expect_not_opened("the loader sent a description that cannot be read");
 }
 
-TEST_F(Liar, one_that_keeps_the_memory_cannot_change_what_was_read) {
-  speak(
-      "fd = told()\nm = mmap.mmap(fd, 64)\nm[:] = floats(*[1] * 16)\nsay('filled')\n"
-      "time.sleep(0.2)\nm[:] = floats(*[2] * 16)\nhear()\n");
+TEST_F(FaultyLoader, KeptMemoryCannotChangeTheVolume) {
+  respond_with(
+      "fd = send_info()\nm = mmap.mmap(fd, 64)\nm[:] = floats(*[1] * 16)\nsend('filled')\n"
+      "time.sleep(0.2)\nm[:] = floats(*[2] * 16)\nreceive()\n");
   auto source = opened();
   ASSERT_TRUE(source) << source.error().message;
   const auto volume = (*source)->read(0, 0);
@@ -267,12 +269,12 @@ TEST_F(Liar, one_that_keeps_the_memory_cannot_change_what_was_read) {
   EXPECT_GT((*source)->process(), 0);
 }
 
-TEST_F(Liar, one_that_fills_nothing_or_less_hands_over_what_was_there) {
-  speak(
-      "told()\nsay('filled')\n"
-      "kind, _, fd = hear()\n"
+TEST_F(FaultyLoader, UnfilledMemoryReadsAsZero) {
+  respond_with(
+      "send_info()\nsend('filled')\n"
+      "kind, _, fd = receive()\n"
       "if fd >= 0: fail('memory was sent twice')\n"
-      "say('filled')\nhear()\n");
+      "send('filled')\nreceive()\n");
   auto source = opened();
   ASSERT_TRUE(source) << source.error().message;
   for (int round = 0; round < 2; ++round) {
@@ -282,12 +284,12 @@ TEST_F(Liar, one_that_fills_nothing_or_less_hands_over_what_was_there) {
   }
 }
 
-TEST_F(Liar, one_that_fails_at_first_is_sent_the_memory_again) {
-  speak(
-      "told()\nfail('not yet')\n"
-      "kind, _, fd = hear()\n"
+TEST_F(FaultyLoader, FailureAtFirstSendsTheMemoryAgain) {
+  respond_with(
+      "send_info()\nfail('not yet')\n"
+      "kind, _, fd = receive()\n"
       "if fd < 0: fail('memory was not sent')\n"
-      "os.pwrite(fd, floats(*[3] * 16), 0)\nsay('filled')\nhear()\n");
+      "os.pwrite(fd, floats(*[3] * 16), 0)\nsend('filled')\nreceive()\n");
   auto source = opened();
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->read(0, 0).error().message, "not yet");
@@ -297,45 +299,46 @@ TEST_F(Liar, one_that_fails_at_first_is_sent_the_memory_again) {
 }
 
 // 64 bytes at 16 a second.
-TEST_F(Liar, one_that_is_slow_has_time_by_the_bytes_that_are_read) {
+TEST_F(FaultyLoader, TimeLimitGrowsWithTheBytesRead) {
   limits_.read_time = milliseconds(100);
   limits_.read_bytes_per_second = 16;
-  speak("told()\ntime.sleep(0.5)\nsay('filled')\nhear()\n");
+  respond_with("send_info()\ntime.sleep(0.5)\nsend('filled')\nreceive()\n");
   const auto volume = read();
   EXPECT_TRUE(volume) << volume.error().message;
 }
 
-TEST_F(Liar, progress_is_reported) {
-  speak(
-      "told()\nfor done in (0, 0.5, 1): say('progress', struct.pack('<d', done))\n"
-      "say('filled')\nhear()\n");
+TEST_F(FaultyLoader, ProgressIsReported) {
+  respond_with(
+      "send_info()\nfor done in (0, 0.5, 1): send('progress', struct.pack('<d', done))\n"
+      "send('filled')\nreceive()\n");
   auto source = opened();
   ASSERT_TRUE(source) << source.error().message;
-  std::vector<double> heard;
-  (*source)->on_progress([&](double done) { heard.push_back(done); });
+  std::vector<double> reported;
+  (*source)->on_progress([&](double done) { reported.push_back(done); });
   ASSERT_TRUE((*source)->read(0, 0));
-  EXPECT_EQ(heard, (std::vector<double>{0, 0.5, 1}));
+  EXPECT_EQ(reported, (std::vector<double>{0, 0.5, 1}));
 }
 
-TEST_F(Liar, one_that_resizes_the_memory) {
-  speak(
-      "fd = told()\n"
+TEST_F(FaultyLoader, ResizedMemoryIsRefused) {
+  respond_with(
+      "fd = send_info()\n"
       "for size in (0, 32, 128):\n"
       "    try: os.ftruncate(fd, size); fail('it could')\n"
       "    except OSError: pass\n"
-      "os.close(fd)\nsay('filled')\nhear()\n");
+      "os.close(fd)\nsend('filled')\nreceive()\n");
   const auto volume = read();
   EXPECT_TRUE(volume) << volume.error().message;
 }
 
-TEST_F(Liar, one_that_leaves_infinities_or_half_a_vector) {
-  const std::string message = "the loader of 'told.nc' left numbers unmasked while reading 'wind'";
+TEST_F(FaultyLoader, InfinitiesAndIncompleteVectorsAreRefused) {
+  const std::string message =
+      "the loader of 'sample.nc' left numbers unmasked while reading 'wind'";
   for (const char* values : {"[inf] + [0] * 15", "[0] * 15 + [-inf]", "[nan] + [0] * 15",
                              "[0] * 12 + [nan] + [0] * 3"}) {
-    std::string script = "fd = told()\nos.pwrite(fd, floats(*(";
+    std::string script = "fd = send_info()\nos.pwrite(fd, floats(*(";
     script += values;
-    script += ")), 0)\nos.close(fd)\nsay('filled')\nhear()\n";
-    speak(script);
+    script += ")), 0)\nos.close(fd)\nsend('filled')\nreceive()\n";
+    respond_with(script);
     expect_not_read(message);
   }
 }

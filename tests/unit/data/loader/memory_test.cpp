@@ -16,7 +16,7 @@ namespace {
 
 using test::NetcdfMaker;
 
-TEST_F(Loader, its_memory_and_that_of_the_transfer_count_while_it_is_there) {
+TEST_F(Loader, ItsMemoryAndTransfersAreCountedWhileItRuns) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   Limits limits;
@@ -36,7 +36,7 @@ TEST_F(Loader, its_memory_and_that_of_the_transfer_count_while_it_is_there) {
   EXPECT_THAT(refused.error().message, testing::HasSubstr("needs 8.0 MiB"));
 }
 
-TEST_F(Loader, one_that_outgrows_the_budget_while_it_opens_is_an_error) {
+TEST_F(Loader, ExceedingTheBudgetWhileOpeningIsAnError) {
   const std::string path = folder_ / "a.nc";
   test::write_positions(path, 1500);  // 36 MB of coordinates
   Limits limits;
@@ -56,7 +56,7 @@ TEST_F(Loader, one_that_outgrows_the_budget_while_it_opens_is_an_error) {
 }
 
 #ifndef WINDSPLAT_SANITIZED  // whose shadow counts as memory
-TEST_F(Loader, a_volume_is_the_same_where_the_memory_of_its_transfer_is_not_kept) {
+TEST_F(Loader, VolumeIsTheSameWhenTransferMemoryIsNotKept) {
   const std::string path = folder_ / "a.nc";
   test::write_large(path);
   Limits limits;
@@ -78,7 +78,7 @@ TEST_F(Loader, a_volume_is_the_same_where_the_memory_of_its_transfer_is_not_kept
 
 #ifndef WINDSPLAT_SANITIZED
 // A chunk of 48 MiB, compressed to a few kilobytes.
-TEST_F(Loader, a_file_that_unfolds_beyond_the_memory_is_an_error) {
+TEST_F(Loader, FileThatDecompressesBeyondTheMemoryIsAnError) {
   const std::string path = folder_ / "bomb.nc";
   {
     NetcdfMaker file(path);

@@ -1,5 +1,5 @@
-// What a loader says of a dataset is believed only where it could be true: good messages come out
-// as they went in, and no change to one breaks what the rest of the program relies on.
+// Validation of loader messages: valid ones survive a round trip, and no mutation violates the
+// invariants of the program.
 #include "server/data/loader/messages.hpp"
 
 #include <gtest/gtest.h>
@@ -64,7 +64,7 @@ DatasetInfo good() {
   return info;
 }
 
-// What the rest of the program relies on, said anew.
+// The invariants of the program, stated independently.
 void expect_sound(const DatasetInfo& info) {
   double samples = 1;
   for (const Axis& a : info.grid.axes) {
@@ -101,7 +101,7 @@ void expect_sound(const DatasetInfo& info) {
   }
 }
 
-TEST(LoaderMessages, an_info_comes_out_as_it_went_in) {
+TEST(LoaderMessages, InfoSurvivesARoundTrip) {
   const DatasetInfo info = good();
   auto out = decode_info(encode_info(info));
   ASSERT_TRUE(out) << out.error().message;
@@ -144,7 +144,7 @@ TEST(LoaderMessages, an_info_comes_out_as_it_went_in) {
   EXPECT_EQ(out->steps[1].text, "2000-01-02T12:00:00Z");
 }
 
-TEST(LoaderMessages, what_no_reader_would_say_is_refused) {
+TEST(LoaderMessages, ValuesNoReaderReportsAreRefused) {
   const std::vector<std::pair<const char*, void (*)(DatasetInfo&)>> lies{
       {"no steps", [](DatasetInfo& i) { i.steps.clear(); }},
       {"no fields", [](DatasetInfo& i) { i.fields.clear(); }},
@@ -199,7 +199,7 @@ TEST(LoaderMessages, what_no_reader_would_say_is_refused) {
   }
 }
 
-TEST(LoaderMessages, every_part_missing_or_too_much_is_refused) {
+TEST(LoaderMessages, MissingOrExtraPartsAreRefused) {
   const std::string message = encode_info(good());
   for (std::size_t size = 0; size < message.size(); ++size) {
     EXPECT_FALSE(decode_info(std::string_view(message).substr(0, size))) << size;
@@ -207,7 +207,7 @@ TEST(LoaderMessages, every_part_missing_or_too_much_is_refused) {
   EXPECT_FALSE(decode_info(message + '\0'));
 }
 
-TEST(LoaderMessages, control_characters_are_spelt_out) {
+TEST(LoaderMessages, ControlCharactersAreEscaped) {
   DatasetInfo info = good();
   info.title = "a\nb\x1b[2J";
   info.fields[1].name = std::string("T\0", 2);
@@ -217,7 +217,7 @@ TEST(LoaderMessages, control_characters_are_spelt_out) {
   EXPECT_EQ(out->fields[1].name, "T\\x00");
 }
 
-TEST(LoaderMessages, no_mutation_of_an_info_breaks_what_others_rely_on) {
+TEST(LoaderMessages, NoMutationOfAnInfoViolatesItsInvariants) {
   const std::string message = encode_info(good());
   std::mt19937 random(20240607);
   const auto pick = [&](std::size_t n) { return static_cast<std::size_t>(random()) % n; };
@@ -259,21 +259,21 @@ TEST(LoaderMessages, no_mutation_of_an_info_breaks_what_others_rely_on) {
     expect_sound(*out);
     if (HasFatalFailure()) FAIL() << "round " << round;
   }
-  EXPECT_GT(accepted, 1000);  // changed letters and numbers are none of its business
+  EXPECT_GT(accepted, 1000);  // changed letters and digits do not matter
 }
 
-TEST(LoaderMessages, errors_keep_kind_and_message_and_nothing_else_passes) {
+TEST(LoaderMessages, OnlyKindAndMessageOfErrorsPass) {
   const Error wrong = make_error(ErrorKind::out_of_memory, "no memory");
   EXPECT_EQ(decode_error(encode_error(wrong)).kind, ErrorKind::out_of_memory);
   EXPECT_EQ(decode_error(encode_error(wrong)).message, "no memory");
-  // A loader cannot make a client believe that it is the server that drains, or the like.
+  // A loader must not be able to report that the server drains, for instance.
   EXPECT_EQ(decode_error(encode_error(make_error(ErrorKind::draining, "x"))).kind,
             ErrorKind::bad_data);
   EXPECT_EQ(decode_error(encode_error(make_error(ErrorKind::bad_data, "a\nb"))).message, "a\\x0ab");
   EXPECT_EQ(decode_error("").kind, ErrorKind::bad_data);
 }
 
-TEST(LoaderMessages, a_task_says_names_but_no_paths) {
+TEST(LoaderMessages, TaskContainsNamesButNoPaths) {
   Task task;
   task.memory_bytes = 77;
   task.library_folders = {"/usr/share/tables"};

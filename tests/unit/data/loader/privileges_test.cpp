@@ -17,7 +17,7 @@
 namespace windsplat::data::loader {
 namespace {
 
-// The lines of /proc/PID/status that begin so, of the children of this process: name and value.
+// The /proc/PID/status lines with these prefixes, for the children of this process: name and value.
 std::vector<std::string> of_children(const std::string& begin) {
   std::vector<std::string> out;
   for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
@@ -31,7 +31,7 @@ std::vector<std::string> of_children(const std::string& begin) {
   return out;
 }
 
-TEST(LoaderPrivileges, a_loader_has_no_capabilities) {
+TEST(LoaderPrivileges, LoaderHasNoCapabilities) {
   const test::Folder folder;
   const std::string path = folder / "a.nc";
   test::write_wind(path, NC_NETCDF4);
@@ -45,8 +45,8 @@ TEST(LoaderPrivileges, a_loader_has_no_capabilities) {
   }
 }
 
-// A process of its own, for what it mounts. Its exit code: 0, 1 where something failed, 2 where the
-// system does not let it.
+// A separate process for its mounts. Exit code: 0, 1 if a step failed, 2 if the system does not
+// permit it.
 int read_without_devices(const std::string& path) {
   const int spaces = ::geteuid() == 0 ? CLONE_NEWNS : CLONE_NEWNS | CLONE_NEWUSER;
   if (::unshare(spaces) != 0 || ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) {
@@ -63,7 +63,7 @@ int read_without_devices(const std::string& path) {
   return 0;
 }
 
-TEST(LoaderPrivileges, a_loader_starts_where_the_null_device_is_gone_meanwhile) {
+TEST(LoaderPrivileges, LoaderStartsWithoutTheNullDevice) {
   const test::Folder folder;
   const std::string path = folder / "a.nc";
   test::write_wind(path, NC_NETCDF4);
@@ -74,7 +74,7 @@ TEST(LoaderPrivileges, a_loader_starts_where_the_null_device_is_gone_meanwhile) 
   int status = 0;
   ASSERT_EQ(::waitpid(id, &status, 0), id);
   ASSERT_TRUE(WIFEXITED(status));
-  if (WEXITSTATUS(status) == 2) GTEST_SKIP() << "no mounts of its own are allowed here";
+  if (WEXITSTATUS(status) == 2) GTEST_SKIP() << "mounts are not permitted here";
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 

@@ -23,7 +23,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-TEST_F(Loader, one_that_dies_is_an_error_and_the_next_read_starts_another) {
+TEST_F(Loader, CrashIsAnErrorAndTheNextReadStartsAnother) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   const auto source = opened(path);
@@ -50,7 +50,7 @@ TEST_F(Loader, one_that_dies_is_an_error_and_the_next_read_starts_another) {
   expect_same(*first, *again);
 }
 
-TEST_F(Loader, one_that_died_while_nothing_was_asked_is_replaced_unseen) {
+TEST_F(Loader, CrashWhileIdleIsReplacedSilently) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, 0);
   const auto source = opened(path);
@@ -63,7 +63,7 @@ TEST_F(Loader, one_that_died_while_nothing_was_asked_is_replaced_unseen) {
   EXPECT_TRUE(read) << read.error().message;
 }
 
-TEST_F(Loader, one_that_takes_too_long_is_ended) {
+TEST_F(Loader, TimeoutEndsIt) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   Limits limits;
@@ -82,7 +82,7 @@ TEST_F(Loader, one_that_takes_too_long_is_ended) {
   EXPECT_TRUE(again) << again.error().message;
 }
 
-TEST_F(Loader, one_that_is_stopped_is_ended_and_others_are_read_meanwhile) {
+TEST_F(Loader, StoppedLoaderIsEndedWhileOthersAreRead) {
   const std::string path = folder_ / "a.nc";
   const std::string other_path = folder_ / "b.nc";
   test::write_wind(path, NC_NETCDF4);
@@ -112,7 +112,7 @@ TEST_F(Loader, one_that_is_stopped_is_ended_and_others_are_read_meanwhile) {
   EXPECT_NE(source->process(), id);
 }
 
-TEST_F(Loader, a_read_can_be_cancelled_from_another_thread) {
+TEST_F(Loader, ReadCanBeCancelledFromAnotherThread) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   const auto source = opened(path);
@@ -132,7 +132,7 @@ TEST_F(Loader, a_read_can_be_cancelled_from_another_thread) {
   EXPECT_TRUE(source->read(0, 0));
 }
 
-TEST_F(Loader, released_it_holds_nothing_and_comes_back_for_the_same_file_only) {
+TEST_F(Loader, ReleasedLoaderHoldsNothingAndReopensTheSameFileOnly) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, NC_NETCDF4);
   const auto source = opened(path);
@@ -162,7 +162,7 @@ std::size_t open_descriptors() {
   return count;
 }
 
-TEST_F(Loader, nothing_is_left_behind_by_200_of_them) {
+TEST_F(Loader, TwoHundredLoadersLeaveNothingBehind) {
   const std::string path = folder_ / "a.nc";
   const std::string text = folder_ / "text.nc";
   test::write_wind(path, 0);
@@ -183,7 +183,7 @@ TEST_F(Loader, nothing_is_left_behind_by_200_of_them) {
   EXPECT_EQ(errno, ECHILD);
 }
 
-TEST_F(Loader, none_outlives_the_daemon_not_even_at_work) {
+TEST_F(Loader, NoneOutlivesTheDaemonEvenWhileBusy) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, 0);
   ASSERT_EQ(::prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0), 0);  // orphans come to us
@@ -212,7 +212,7 @@ TEST_F(Loader, none_outlives_the_daemon_not_even_at_work) {
   ::prctl(PR_SET_CHILD_SUBREAPER, 0, 0, 0, 0);
 }
 
-TEST_F(Loader, no_program_is_started_that_was_not_named) {
+TEST_F(Loader, StartsOnlyTheNamedProgram) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, 0);
   set_program("");

@@ -41,7 +41,7 @@ void expect_same_as_here(const std::string& path) {
   }
 }
 
-TEST_F(Loader, classic_files_read_as_in_this_process) {
+TEST_F(Loader, ClassicFilesReadAsInThisProcess) {
   for (const int mode : {0, NC_64BIT_OFFSET, NC_64BIT_DATA}) {
     const std::string path = folder_ / "classic.nc";
     test::write_wind(path, mode);
@@ -49,7 +49,7 @@ TEST_F(Loader, classic_files_read_as_in_this_process) {
   }
 }
 
-TEST_F(Loader, netcdf4_files_read_as_in_this_process) {
+TEST_F(Loader, Netcdf4FilesReadAsInThisProcess) {
   const std::string path = folder_ / "four.nc";
   test::write_wind(path, NC_NETCDF4);
   expect_same_as_here(path);
@@ -57,7 +57,7 @@ TEST_F(Loader, netcdf4_files_read_as_in_this_process) {
 
 // Chunks that were never written, in a file that says not to fill them in: HDF5 leaves alone what
 // it should read into, and the memory between the two had another field's numbers. They are masked.
-TEST_F(Loader, what_a_library_leaves_alone_is_nothing_of_the_volume_before) {
+TEST_F(Loader, UnwrittenSamplesHoldNothingOfAnEarlierVolume) {
   const std::string path = folder_ / "unfilled.nc";
   {
     NetcdfMaker file(path);
@@ -99,7 +99,7 @@ double shared_by(pid_t id) {
 
 // The memory between the two is used again for the scalar, and made anew for the vector, which is
 // too large for it to be kept.
-TEST_F(Loader, volumes_small_and_large_read_as_in_this_process) {
+TEST_F(Loader, SmallAndLargeVolumesReadAsInThisProcess) {
   std::ofstream(folder_ / "large.json")
       << R"({"windsplat": "raw", "file": "large.raw", "type": "float32", "endian": "little",
              "dims": {"x": 160, "y": 150, "z": 128}, "steps": {"count": 2},
@@ -125,7 +125,7 @@ TEST_F(Loader, volumes_small_and_large_read_as_in_this_process) {
 }
 
 // What a header refers to is part of the dataset.
-TEST_F(Loader, a_companion_that_changes_is_noticed) {
+TEST_F(Loader, ChangedCompanionFileIsDetected) {
   std::ofstream(folder_ / "c.json")
       << R"({"windsplat": "raw", "file": "c.raw", "type": "float32", "endian": "little",
              "dims": {"x": 4, "y": 4, "z": 4}, "fields": [{"name": "cloud"}]})";
@@ -143,7 +143,7 @@ TEST_F(Loader, a_companion_that_changes_is_noticed) {
   EXPECT_EQ(store.find("c").value()->volume("cloud", 0).value()->values[0], 2.0F);
 }
 
-TEST_F(Loader, files_of_others_read_as_in_this_process) {
+TEST_F(Loader, ForeignFilesReadAsInThisProcess) {
   const char* given = std::getenv("WINDSPLAT_TEST_DATA");
   const std::string data = given != nullptr ? given : WINDSPLAT_SOURCE_DIR "/build/test-data";
   int files = 0;
@@ -156,7 +156,7 @@ TEST_F(Loader, files_of_others_read_as_in_this_process) {
   EXPECT_EQ(files, 5);
 }
 
-TEST_F(Loader, a_file_may_be_called_like_an_address) {
+TEST_F(Loader, FileNameMayLookLikeAUrl) {
   for (const char* name : {"file.nc#mode=zarr,s3", "http:x.nc", "[dap4]x.nc", "dods:.nc"}) {
     const std::string path = folder_ / name;
     test::write_wind(folder_ / "plain.nc", NC_NETCDF4);
@@ -181,7 +181,7 @@ void write_two_groups(const std::string& path) {
   }
 }
 
-TEST_F(Loader, a_series_is_told_by_its_pattern) {
+TEST_F(Loader, SeriesKeepsItsPatternAsName) {
   test::write_wind(folder_ / "part_1.nc", 0);
   test::write_wind(folder_ / "part_2.nc", 0);
   const auto source = opened(folder_ / "part_*.nc");
@@ -191,7 +191,7 @@ TEST_F(Loader, a_series_is_told_by_its_pattern) {
   expect_same_as_here(folder_ / "part_*.nc");
 }
 
-TEST_F(Loader, a_group_that_is_named_is_the_one_that_is_read) {
+TEST_F(Loader, NamedGroupIsRead) {
   const std::string path = folder_ / "two.nc";
   write_two_groups(path);
   for (const auto& [group, first] : {std::pair("#/a", 1.0F), std::pair("#/b", 100.0F)}) {
@@ -213,7 +213,7 @@ TEST_F(Loader, a_group_that_is_named_is_the_one_that_is_read) {
   EXPECT_EQ(absent.error().message, "'two.nc' has no group '/nope', but '/a', '/b'");
 }
 
-TEST_F(Loader, what_is_no_dataset_is_the_same_error_as_in_this_process) {
+TEST_F(Loader, InvalidFileGivesTheSameErrorAsInThisProcess) {
   const std::string path = folder_ / "text.nc";
   std::ofstream(path) << "no dataset, whatever its name says";
   const auto here = open_file(path);
@@ -225,7 +225,7 @@ TEST_F(Loader, what_is_no_dataset_is_the_same_error_as_in_this_process) {
 }
 
 // HDF5 reads external files that a dataset names.
-TEST_F(Loader, external_storage_is_refused_by_name) {
+TEST_F(Loader, ExternalStorageIsRefusedByName) {
   const std::string other = folder_ / "other";
   test::write_floats(other, 64, 42.0F);
   const std::string path = folder_ / "crafted.nc";
@@ -236,7 +236,7 @@ TEST_F(Loader, external_storage_is_refused_by_name) {
   }
 }
 
-TEST_F(Loader, an_external_link_is_refused_by_name) {
+TEST_F(Loader, ExternalLinkIsRefusedByName) {
   const std::string other = folder_ / "other.nc";
   test::write_wind(other, NC_NETCDF4);
   const std::string path = folder_ / "crafted.nc";

@@ -52,7 +52,7 @@ TEST(AxisCheck, AxesWithoutRoomForCellsAreRefused) {
   for (const auto& [axis, fault] : axes) EXPECT_THAT(axis_fault(axis), HasSubstr(fault));
 }
 
-TEST(AxisCheck, ARefusedAxisIsNamedWhateverTheFormat) {
+TEST(AxisCheck, RefusedAxisIsNamedForEveryFormat) {
   const VtkFolder vtk;
   EXPECT_THAT(refusal(vtk.write("a.vti", spaced("5e-324 1 1"))), HasSubstr("steps below"));
   EXPECT_THAT(refusal(vtk.write("b.vti", spaced("1 1e300 1"))), HasSubstr("beyond 1e290"));

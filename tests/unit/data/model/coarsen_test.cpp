@@ -1,4 +1,4 @@
-// Coarser volumes: what averages conserve, how masks combine, and how a dataset shares levels.
+// Averaged volumes: conservation, masks, and sharing of levels by a dataset.
 #include "server/data/model/coarsen.hpp"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ std::vector<double> sums(const std::vector<double>& widths, int halvings) {
   return out;
 }
 
-// The integral of a component over space, its unmasked cells alone.
+// The integral of a component over space, over unmasked cells only.
 double integral(const Volume& volume, int c, const std::array<std::vector<double>, 3>& widths) {
   double sum = 0;
   std::size_t n = 0;
@@ -77,7 +77,7 @@ TEST(Coarsen, KeepsTheIntegralOverUnevenCells) {
   }
 }
 
-TEST(Coarsen, WeighsNeighboursByTheirCells) {
+TEST(Coarsen, WeightsNeighborsByTheirCells) {
   const Volume fine = volume_of({3, 1, 1}, 1, {1, 5, 7});
   const Volume coarse = coarsen(fine, {{1, 0, 0}, {std::vector<double>{3, 1, 2}, {}, {}}});
   EXPECT_EQ(coarse.dims, (std::array{2, 1, 1}));
@@ -87,7 +87,7 @@ TEST(Coarsen, WeighsNeighboursByTheirCells) {
   EXPECT_FLOAT_EQ(coarse.range[1], 7);
 }
 
-TEST(Coarsen, AConstantStaysConstant) {
+TEST(Coarsen, ConstantStaysConstant) {
   std::mt19937 random(3);
   const std::array<int, 3> dims{9, 7, 4};
   Coarsening how{{2, 1, 1}, {}};
@@ -99,7 +99,7 @@ TEST(Coarsen, AConstantStaysConstant) {
   }
 }
 
-TEST(Coarsen, MaskedSamplesCountOnlyWhereAllAre) {
+TEST(Coarsen, IsMaskedOnlyWhereAllSamplesAre) {
   const Volume fine = volume_of({4, 2, 1}, 2,
                                 {1, masked, masked, masked, 3, masked, masked, masked,  //
                                  10, masked, masked, masked, 30, masked, masked, masked});
@@ -130,7 +130,7 @@ class Levels : public testing::Test {
   }
 };
 
-TEST_F(Levels, AreAveragedOnceAndSharedAndPaidFor) {
+TEST_F(Levels, AreAveragedOnceSharedAndCounted) {
   const auto dataset = dataset_within(1U << 20U);
   const auto coarse = dataset->level("vorticity", 1, halves());
   ASSERT_TRUE(coarse) << coarse.error().message;
@@ -148,7 +148,7 @@ TEST_F(Levels, AreAveragedOnceAndSharedAndPaidFor) {
                       8);
 }
 
-TEST_F(Levels, NothingHalvedIsTheVolumeItself) {
+TEST_F(Levels, LevelZeroIsTheVolumeItself) {
   const auto dataset = dataset_within(1U << 20U);
   const auto same = dataset->level("cloud", 0, Coarsening{});
   ASSERT_TRUE(same);
@@ -156,10 +156,10 @@ TEST_F(Levels, NothingHalvedIsTheVolumeItself) {
   EXPECT_EQ(dataset->resident_bytes(), fine_bytes);
 }
 
-TEST_F(Levels, KeepWithinTheMemoryLimit) {
+TEST_F(Levels, StayWithinTheMemoryLimit) {
   EXPECT_EQ(dataset_within(fine_bytes)->level("cloud", 0, halves()).error().kind,
             ErrorKind::out_of_memory);
-  // Room for a volume and its level: the next step's evict both.
+  // Memory for a volume and its level: the next step evicts both.
   const auto dataset = dataset_within(fine_bytes + coarse_bytes);
   ASSERT_TRUE(dataset->level("cloud", 0, halves()));
   ASSERT_TRUE(dataset->level("cloud", 1, halves()));
@@ -167,17 +167,17 @@ TEST_F(Levels, KeepWithinTheMemoryLimit) {
   EXPECT_EQ(dataset->loads(), 2U);
 }
 
-TEST_F(Levels, NeverCostTheVolumeThatTheyAreMadeOf) {
+TEST_F(Levels, DoNotEvictTheirSourceVolume) {
   const auto dataset = dataset_within(fine_bytes + coarse_bytes - 1);
   ASSERT_TRUE(dataset->volume("cloud", 0));
   for (int again = 0; again < 2; ++again) {
     EXPECT_EQ(dataset->level("cloud", 0, halves()).error().kind, ErrorKind::out_of_memory);
     EXPECT_EQ(dataset->resident_bytes(), fine_bytes);
   }
-  EXPECT_EQ(dataset->loads(), 1U) << "no room for a level is no reason to read the volume again";
+  EXPECT_EQ(dataset->loads(), 1U) << "lack of memory for a level must not cause another read";
 }
 
-TEST_F(Levels, AreTheSameInAnyUnitOfWidth) {
+TEST_F(Levels, DoNotDependOnTheUnitOfWidth) {
   const auto dataset = dataset_within(1U << 20U);
   const auto coarse = dataset->level("cloud", 0, halves(2));
   for (const double unit : {1e-3, 1 / 3.0, 0.1, 7.3}) {
@@ -190,7 +190,7 @@ TEST_F(Levels, AreTheSameInAnyUnitOfWidth) {
   EXPECT_EQ(dataset->resident_bytes(), fine_bytes + coarse_bytes);
 }
 
-TEST_F(Levels, OutliveTheVolumeTheyComeFrom) {
+TEST_F(Levels, OutliveTheirSourceVolume) {
   const auto dataset = dataset_within(fine_bytes + 2 * coarse_bytes);
   const auto held = dataset->level("cloud", 0, halves());
   ASSERT_TRUE(held);
@@ -200,14 +200,14 @@ TEST_F(Levels, OutliveTheVolumeTheyComeFrom) {
   EXPECT_EQ(dataset->loads(), 2U) << "the cloud is not read again";
 }
 
-TEST_F(Levels, WrongNamesAndStepsAreNotFound) {
+TEST_F(Levels, UnknownNamesAndStepsAreNotFound) {
   const auto dataset = dataset_within(1U << 20U);
   EXPECT_EQ(dataset->level("fog", 0, halves()).error().kind, ErrorKind::not_found);
   EXPECT_EQ(dataset->level("cloud", 4, halves()).error().kind, ErrorKind::not_found);
   EXPECT_EQ(dataset->resident_bytes(), 0U);
 }
 
-TEST(SizedSample, SaysHowLargeASampleIs) {
+TEST(SizedSample, ReportsTheSizeOfASample) {
   EXPECT_EQ(sized_sample("tornado")->dims, (std::array{0, 0, 0}));
   EXPECT_EQ(sized_sample("tornado:256")->name, "tornado");
   EXPECT_EQ(sized_sample("tornado:256")->dims, (std::array{256, 256, 256}));
@@ -219,7 +219,7 @@ TEST(SizedSample, SaysHowLargeASampleIs) {
   }
 }
 
-TEST(SizedSample, IsADatasetUnderItsOwnName) {
+TEST(SizedSample, IsADatasetWithItsOwnName) {
   Store store(1U << 20U);
   const auto dataset = store.add("tornado:12x10x8");
   ASSERT_TRUE(dataset) << dataset.error().message;

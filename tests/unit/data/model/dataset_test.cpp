@@ -1,4 +1,4 @@
-// Grid sizes, look-up by name, and what finish_volume promises.
+// Grid sizes, look-up by name, and guarantees of finish_volume.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -48,7 +48,7 @@ TEST(DatasetInfo, FindsFieldsByNameAndKind) {
   EXPECT_EQ(info.first(FieldKind::vector), nullptr);
 }
 
-TEST(FinishVolume, MasksInfinityAndNanAndRangesTheRest) {
+TEST(FinishVolume, MasksInfinityAndNanAndComputesTheRange) {
   const Volume volume = make_volume({3, 2, 1}, 1, {4, kNan, -2, kInfinity, 7, -kInfinity});
   EXPECT_EQ(volume.masked, 3);
   EXPECT_EQ(volume.range, (std::array<float, 2>{-2, 7}));
@@ -57,7 +57,7 @@ TEST(FinishVolume, MasksInfinityAndNanAndRangesTheRest) {
   }
 }
 
-TEST(FinishVolume, MakesAVectorsMaskCommonAndRangesItsMagnitude) {
+TEST(FinishVolume, UnitesTheMasksOfAVectorAndRangesItsMagnitude) {
   // Sample 0 is (3, 4, 12): length 13. Samples 1 and 2 lack one component each. Sample 3 is zero.
   const Volume volume = make_volume({4, 1, 1}, 3, {3, kNan, 5, 0, 4, 1, 5, 0, 12, 1, kInfinity, 0});
   EXPECT_EQ(volume.masked, 2);
@@ -73,11 +73,11 @@ TEST(FinishVolume, HugeComponentsDoNotOverflowTheMagnitude) {
   // 3e38 squared is beyond float32, and the length of (max, max) beyond its largest value.
   EXPECT_FLOAT_EQ(make_volume({1, 1, 1}, 2, {1.8e38F, 2.4e38F}).range[1], 3e38F);
   EXPECT_EQ(make_volume({1, 1, 1}, 2, {kMax, kMax}).range[1], kMax);
-  // And tiny ones do not vanish: (3e-30, 4e-30) is 5e-30 long though its square underflows.
+  // Tiny components do not vanish: (3e-30, 4e-30) has length 5e-30 though its square underflows.
   EXPECT_FLOAT_EQ(make_volume({1, 1, 1}, 2, {3e-30F, 4e-30F}).range[1], 5e-30F);
 }
 
-TEST(FinishVolume, AllMaskedHasRangeZero) {
+TEST(FinishVolume, FullyMaskedVolumeHasRangeZero) {
   const Volume volume = make_volume({2, 1, 1}, 2, {kNan, kNan, 1, 2});
   EXPECT_EQ(volume.masked, 2);
   EXPECT_EQ(volume.range, (std::array<float, 2>{0, 0}));

@@ -28,7 +28,7 @@ Volume volume_of(std::vector<float> values, int components = 1) {
   return volume;
 }
 
-// 0, 1, ..., count - 1 in an order that is neither.
+// 0, 1, ..., count - 1, neither ascending nor descending.
 Volume ramp(int count) {
   std::vector<float> values(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
@@ -47,7 +47,7 @@ std::int64_t total(const Histogram& h) {
   return std::accumulate(h.counts.begin(), h.counts.end(), std::int64_t{0});
 }
 
-TEST(Histogram, ARampFillsItsBinsEvenly) {
+TEST(Histogram, RampFillsItsBinsEvenly) {
   const Histogram h = made(ramp(1000), {.bins = 10, .range = std::array{0.0, 1000.0}});
   EXPECT_THAT(h.counts, Each(100));
   EXPECT_THAT(h.edges, testing::Pointwise(testing::DoubleNear(1e-9),
@@ -55,13 +55,13 @@ TEST(Histogram, ARampFillsItsBinsEvenly) {
   EXPECT_EQ(h.below + h.above + h.masked, 0);
 }
 
-TEST(Histogram, WithoutARangeItIsTheVolumesAndTheLastBinHoldsItsUpperEdge) {
+TEST(Histogram, DefaultRangeIsThatOfTheVolumeIncludingItsUpperEdge) {
   const Histogram h = made(ramp(5), {.bins = 2});
   EXPECT_THAT(*h.range, ElementsAre(0, 4));
   EXPECT_THAT(h.counts, ElementsAre(2, 3)) << "0 1 | 2 3 4";
 }
 
-TEST(Histogram, WhatIsOutsideOrMaskedIsCountedApartAndNothingIsLost) {
+TEST(Histogram, OutsideAndMaskedSamplesAreCountedSeparately) {
   const Volume volume = volume_of({-5, -1, 0, 1, 2, nan, 3, 4, 9, nan, nan});
   const Histogram h = made(volume, {.bins = 4, .range = std::array{0.0, 4.0}});
   EXPECT_EQ(h.below, 2);
@@ -71,8 +71,8 @@ TEST(Histogram, WhatIsOutsideOrMaskedIsCountedApartAndNothingIsLost) {
   EXPECT_EQ(total(h) + h.below + h.above + h.masked, 11);
 }
 
-TEST(Histogram, OfAVectorItIsOfTheMagnitude) {
-  // (3,4) and (0,0) and (-6,8) and one that is masked.
+TEST(Histogram, VectorsAreCountedByMagnitude) {
+  // (3,4), (0,0), (-6,8) and a masked sample.
   const Volume volume = volume_of({3, 0, -6, 1, 4, 0, 8, nan}, 2);
   const Histogram h = made(volume, {.bins = 2});
   EXPECT_THAT(*h.range, ElementsAre(0, 10));
@@ -80,8 +80,8 @@ TEST(Histogram, OfAVectorItIsOfTheMagnitude) {
   EXPECT_EQ(h.masked, 1);
 }
 
-// Of n values a share c leaves out floor(c n) at either end, and no more.
-TEST(Histogram, ClippingLeavesOutTheShareAtEitherEnd) {
+// Of n values a share c omits floor(c n) at either end.
+TEST(Histogram, ClippingOmitsTheShareAtEitherEnd) {
   const Volume volume = ramp(10'000);
   for (const auto& [clip, dropped] :
        {std::pair{0.01, 100}, {0.25, 2500}, {0.00015, 1}, {0.4999, 4999}}) {
@@ -93,7 +93,7 @@ TEST(Histogram, ClippingLeavesOutTheShareAtEitherEnd) {
   }
 }
 
-TEST(Histogram, PercentilesAreThoseOfSortingWhateverTheSignsAndMagnitudes) {
+TEST(Histogram, PercentilesEqualThoseOfSorting) {
   std::vector<float> values;
   for (int i = 0; i < 4001; ++i) {
     const int mixed = i * 2741 % 4001 - 2000;
@@ -108,7 +108,7 @@ TEST(Histogram, PercentilesAreThoseOfSortingWhateverTheSignsAndMagnitudes) {
               ElementsAre(static_cast<double>(sorted[400]), static_cast<double>(sorted[3600])));
 }
 
-TEST(Histogram, AnOutlierNoLongerDecidesTheRange) {
+TEST(Histogram, OutlierDoesNotDecideTheRange) {
   std::vector<float> values(999, 1.0F);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i % 10);
   values.push_back(3e38F);
@@ -134,8 +134,8 @@ TEST(Histogram, LogarithmicBinsOfAGeometricSeriesAreEven) {
   EXPECT_THAT(own.counts, ElementsAre(5, 5, 6));
 }
 
-// A bin holds what its edges say, also where arithmetic of bins would round otherwise.
-TEST(Histogram, CountsFollowTheEdgesThatAreTold) {
+// A bin contains the values between its edges, also where bin arithmetic would round otherwise.
+TEST(Histogram, CountsMatchTheReturnedEdges) {
   std::vector<float> values;
   for (int i = 0; i <= 3000; ++i) values.push_back(static_cast<float>(i) / 1000.0F + 0.1F);
   const Volume volume = volume_of(values);
@@ -172,7 +172,7 @@ TEST(Histogram, ExtremeAndDegenerateVolumes) {
   EXPECT_EQ(total(made(volume_of({0, least}), {.bins = 5})), 2);
 }
 
-TEST(Histogram, WhatCannotBeIsRefused) {
+TEST(Histogram, InvalidRequestsAreRefused) {
   const Volume volume = ramp(4);
   const auto refused = [&](const HistogramRequest& request, const CancelToken& cancel = {}) {
     const auto h = histogram(volume, request, cancel);
@@ -190,7 +190,7 @@ TEST(Histogram, WhatCannotBeIsRefused) {
   EXPECT_EQ(refused({.clip = 0.1}, gone).first, ErrorKind::cancelled);
 }
 
-TEST(FieldRange, SpansTheStepsAndPassesOverThoseWithoutAValue) {
+TEST(FieldRange, CoversTheStepsAndSkipsFullyMaskedOnes) {
   FieldRange over;
   over.add(volume_of({nan, nan}));
   EXPECT_FALSE(over.range);

@@ -1,4 +1,4 @@
-// Which sample a place is nearest to, on axes of every kind.
+// The sample nearest to a position, on axes of every kind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ Axis axis_of(AxisKind kind, std::vector<double> coordinates, std::string units =
   return axis;
 }
 
-// A quarter of the way round, descending latitudes, uneven pressures that descend upwards.
+// A quarter of the globe, descending latitudes, uneven pressures that descend upwards.
 Grid model_grid() {
   Grid grid;
   grid.axes[0] =
@@ -58,7 +58,7 @@ TEST(NearestSample, OnDescendingAndUnevenAxes) {
   EXPECT_THAT(place->coordinates, ElementsAre(40, 40, 850));
 }
 
-TEST(NearestSample, TheBoxEndsHalfACellBeyondTheSamples) {
+TEST(NearestSample, BoxExtendsHalfACellBeyondTheSamples) {
   const Grid grid = model_grid();
   EXPECT_THAT(found(grid, 94.9, 25.1, 1037), ElementsAre(9, 3, 0));
   EXPECT_THAT(found(grid, -4.9, 64.9, -99), ElementsAre(0, 0, 4));
@@ -69,7 +69,7 @@ TEST(NearestSample, TheBoxEndsHalfACellBeyondTheSamples) {
   EXPECT_THAT(refusal(grid, {0, 40, std::nullopt}), HasSubstr("z is required"));
 }
 
-TEST(NearestSample, LongitudesAreModulo360AndNothingElseIs) {
+TEST(NearestSample, OnlyLongitudesArePeriodic) {
   const Grid grid = model_grid();
   EXPECT_THAT(found(grid, 360 + 42, 40, 850)[0], 4);
   EXPECT_THAT(found(grid, -360 * 7 + 42, 40, 850)[0], 4);
@@ -80,7 +80,7 @@ TEST(NearestSample, LongitudesAreModulo360AndNothingElseIs) {
   refusal(box, {370, 40, 850});
 }
 
-TEST(NearestSample, RoundTheWorldTheSeamIsNoEdge) {
+TEST(NearestSample, GlobalGridHasNoEdgeAtTheSeam) {
   Grid grid = model_grid();
   std::vector<double> longitudes;
   for (int i = 0; i < 144; ++i) longitudes.push_back(-180 + 2.5 * i);
@@ -91,14 +91,14 @@ TEST(NearestSample, RoundTheWorldTheSeamIsNoEdge) {
   EXPECT_EQ(found(grid, -1e6 * 360 - 90, 40, 850)[0], 36);
 }
 
-TEST(NearestSample, NoLatitudeIsBeyondThePole) {
+TEST(NearestSample, LatitudesEndAtThePole) {
   Grid grid = model_grid();
   grid.axes[1] = axis_of(AxisKind::latitude, {-90, 0, 90}, "degrees_north");
   EXPECT_EQ(found(grid, 0, 90, 850)[1], 2);
   EXPECT_THAT(refusal(grid, {0, 91, 850}), HasSubstr("-90 to 90"));
 }
 
-TEST(NearestSample, ADimensionOfOneNeedsNoCoordinate) {
+TEST(NearestSample, DimensionOfOneNeedsNoCoordinate) {
   Grid grid = model_grid();
   grid.axes[2] = axis_of(AxisKind::level, {1});
   const auto place = nearest_sample(grid, {10, 40, std::nullopt});
@@ -107,8 +107,8 @@ TEST(NearestSample, ADimensionOfOneNeedsNoCoordinate) {
   EXPECT_EQ(place->coordinates[2], 1);
 }
 
-// Columns of a grid whose pole is moved: a cap round the real pole, where longitude and latitude
-// say nothing about neighbours.
+// Columns of a rotated-pole grid: a cap around the true pole, where longitude and latitude do not
+// indicate neighbours.
 Grid polar_grid(int n, double spacing) {
   auto columns = std::make_shared<Columns>();
   for (int j = 0; j < n; ++j) {
@@ -128,7 +128,7 @@ Grid polar_grid(int n, double spacing) {
   return grid;
 }
 
-TEST(NearestSample, OfColumnsTheNearestOnTheSphere) {
+TEST(NearestSample, NearestColumnIsMeasuredOnTheSphere) {
   const int n = 20;
   const Grid grid = polar_grid(n, 1);
   const Columns& columns = *grid.columns;
@@ -140,7 +140,7 @@ TEST(NearestSample, OfColumnsTheNearestOnTheSphere) {
     const double latitude = 90 - std::hypot(x, y);
     const double longitude = std::atan2(y, x) * 180 / M_PI + 360 * (trial % 3 - 1);
     const std::array<int, 3> index = found(grid, longitude, latitude, 850);
-    // By unit vectors, another way to the same distance.
+    // By unit vectors, an independent formula for the distance.
     const auto unit = [](double lon, double lat) {
       const double a = lon * M_PI / 180;
       const double b = lat * M_PI / 180;

@@ -1,4 +1,4 @@
-// The built-in samples: sizes, determinism, and the physics that their formulas promise.
+// The built-in samples: sizes, determinism, and the physics of their formulas.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -70,7 +70,7 @@ TEST(Samples, RefuseUnknownNamesAndSizes) {
   EXPECT_EQ(open_sample("tornado", {8, 8, 8}, -2).error().kind, ErrorKind::invalid);
 }
 
-TEST(Samples, TakeAnyDimensionsAndSteps) {
+TEST(Samples, AcceptAnyDimensionsAndSteps) {
   const std::array<int, 3> dims = {7, 5, 3};
   const std::array<int, 3> single = {1, 1, 1};
   for (const std::string& name : sample_names()) {
@@ -89,7 +89,7 @@ TEST(Samples, TakeAnyDimensionsAndSteps) {
   EXPECT_EQ(sample("climate")->info().grid.dims(), (std::array<int, 3>{320, 160, 19}));
 }
 
-TEST(Samples, AreTheSameEveryTimeAndChangeWithTheStep) {
+TEST(Samples, AreReproducibleAndChangeWithTheStep) {
   for (const std::string& name : sample_names()) {
     auto first = sample(name, {24, 20, 16});
     auto second = sample(name, {24, 20, 16});
@@ -111,7 +111,7 @@ TEST(Tornado, AirTurnsCounterClockwiseAndRisesEverywhere) {
   const Volume vorticity = read(*source, "vorticity", 5);
   const double spacing = 1500.0 / 64;
   for (int k = 2; k < 62; k += 12) {
-    // The axis is where the stated vorticity peaks.
+    // The axis is where the documented vorticity peaks.
     int ai = 2;
     int aj = 2;
     for (int j = 2; j < 62; ++j) {
@@ -163,7 +163,8 @@ TEST(Tornado, WindConservesMass) {
       }
     }
   }
-  // What is left is the differences' own truncation, (spacing / core)^2 / 6 of the gradients.
+  // The remainder is the truncation error of the differences, (spacing / core)^2 / 6 of the
+  // gradients.
   EXPECT_LT(std::sqrt(divergence / shear), 0.03);
 }
 
@@ -186,7 +187,7 @@ TEST(Tornado, FunnelIsCloudMovesAndClearsOutwards) {
   EXPECT_LT(edge, 0.05);
 }
 
-TEST(Climate, SaysWhatItIsInCfTerms) {
+TEST(Climate, FollowsCfConventions) {
   auto source = sample("climate");
   const DatasetInfo& info = source->info();
   EXPECT_EQ(info.grid.axes[0].kind, AxisKind::longitude);
@@ -335,15 +336,14 @@ TEST(Climate, CloudIsAFractionAndFollowsTheWeather) {
     }
     return sum / count;
   };
-  // The tropics' towers and the storm tracks stand over the clear subtropics, and nothing is in
-  // the stratosphere.
+  // Tropical towers and storm tracks are cloudier than the subtropics; the stratosphere is clear.
   EXPECT_GT(cover(-8, 6, 700, 250), 2.0 * cover(17, 24, 700, 250));
   EXPECT_GT(cover(42, 58, 700, 300), 2.0 * cover(17, 24, 700, 300));
   EXPECT_GT(cover(-60, -44, 700, 300), 2.0 * cover(-24, -17, 700, 300));
   EXPECT_EQ(cover(-89, 89, 70, 10), 0.0);
 }
 
-TEST(Climate, AirRisesWhereItsFrontsAreCloudy) {
+TEST(Climate, AirRisesInCloudyFronts) {
   auto source = sample("climate");
   const Volume cloud = read(*source, "cloud");
   const Volume wind = read(*source, "wind");
@@ -398,7 +398,7 @@ TEST(ElectricField, OneStepIsOneSixteenthOfAPeriod) {
   for (std::size_t n = 0; n < now.values.size(); ++n) {
     worst = std::max(worst, std::abs(static_cast<double>(now.values[n] + half_later.values[n])));
   }
-  EXPECT_LT(worst, 1e-3);  // half a period turns the field about
+  EXPECT_LT(worst, 1e-3);  // half a period reverses the field
   EXPECT_NEAR(source->info().steps[8].value, 0.5e9 / 600e6, 1e-9);
 }
 
@@ -413,7 +413,7 @@ TEST(ElectricField, EnergyIsHalfEpsilonTimesSquare) {
   }
 }
 
-TEST(ElectricField, CabinShadesAndItsWallsKeepTheFieldOut) {
+TEST(ElectricField, CabinShadesAndItsWallsExcludeTheField) {
   auto source = sample("efield");
   const auto& axes = source->info().grid.axes;
   const auto peak = [&](double x, double y, double z) {
@@ -438,7 +438,7 @@ TEST(ElectricField, CabinShadesAndItsWallsKeepTheFieldOut) {
   EXPECT_EQ(at(walls, 0, nearest(axes[0], 0.2), 13, 16), 0.0);
 }
 
-TEST(ElectricField, HasNoChargeInTheOpenAir) {
+TEST(ElectricField, HasNoChargeInFreeSpace) {
   auto source = sample("efield", {96, 48, 48}, 4);
   const Volume field = read(*source, "E", 1);
   const auto& axes = source->info().grid.axes;

@@ -1,4 +1,4 @@
-// Axes of files the tests wrote: any order of dimensions, any direction, any way of naming.
+// Axes of generated files: any order of dimensions, any direction, any naming.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ float place_value(double x, double y, double z) {
   return static_cast<float>(x + 1000 * y + z / 16);
 }
 
-// Every sample of the volume is that of its axes' coordinates.
+// Every sample of the volume has the value of its coordinates.
 void expect_placed(const DatasetInfo& info, const Volume& volume) {
   const auto& [x, y, z] = info.grid.axes;
   ASSERT_EQ(volume.dims, info.grid.dims());
@@ -70,7 +70,7 @@ TEST_P(AnyOrder, AndAnyDirectionGiveTheSameVolume) {
             at.at(order[2]) = c;
             for (const double d : coordinates.at(order[3])) {
               at.at(order[3]) = d;
-              // Step 0 holds the places, step 6 h their negatives.
+              // Step 0 contains the encoded positions, step 6 h their negatives.
               values.push_back(static_cast<double>(place_value(at[3], at[2], at[1])) *
                                (at[0] == 0 ? 1 : -1));
             }
@@ -111,7 +111,7 @@ std::vector<std::array<int, 4>> every_order() {
 INSTANTIATE_TEST_SUITE_P(NetcdfAxes, AnyOrder, testing::ValuesIn(every_order()));
 
 // A second dimension of length 1 along one axis is ignored, at any position.
-TEST(NetcdfAxes, ASecondTimeOrLevelOfLengthOneIsPassedOver) {
+TEST(NetcdfAxes, SecondTimeOrLevelOfLengthOneIsSkipped) {
   for (const int second : {0, 1, 2, 3}) {
     const Folder folder;
     {
@@ -135,7 +135,7 @@ TEST(NetcdfAxes, ASecondTimeOrLevelOfLengthOneIsPassedOver) {
   }
   const Folder folder;
   {
-    NetcdfMaker file(folder / "u.nc");  // five without a role: the long ones have the places
+    NetcdfMaker file(folder / "u.nc");  // five without a role: the long ones become the axes
     const std::vector<int> dims{file.dimension("a", 1), file.dimension("b", 2),
                                 file.dimension("c", 1), file.dimension("d", 3),
                                 file.dimension("e", 4)};
@@ -173,7 +173,7 @@ TEST(NetcdfAxes, TimesOutOfOrderAreNoted) {
   }
 }
 
-TEST(NetcdfAxes, RecognisesAxesByTheAxisAttributeAgainstTheNames) {
+TEST(NetcdfAxes, RecognizesAxesByTheAxisAttributeAgainstTheNames) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "a.nc");
@@ -192,7 +192,7 @@ TEST(NetcdfAxes, RecognisesAxesByTheAxisAttributeAgainstTheNames) {
   EXPECT_EQ(volume->values, (std::vector<float>{0, 2, 4, 1, 3, 5}));
 }
 
-TEST(NetcdfAxes, UnknownNamesTakePlacesFromTheRight) {
+TEST(NetcdfAxes, UnknownDimensionsAreAssignedFromTheRight) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "plain.nc");
@@ -214,7 +214,7 @@ TEST(NetcdfAxes, UnknownNamesTakePlacesFromTheRight) {
   EXPECT_EQ(volume->values[4], 4.0F);
 }
 
-TEST(NetcdfAxes, AnUnlimitedUnknownFirstDimensionIsTime) {
+TEST(NetcdfAxes, UnknownUnlimitedFirstDimensionIsTime) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "u.nc", 0);
@@ -232,7 +232,7 @@ TEST(NetcdfAxes, AnUnlimitedUnknownFirstDimensionIsTime) {
   EXPECT_EQ(volume->values[0], 12.0F);
 }
 
-TEST(NetcdfAxes, UnevenAxesAndWrappedLongitudesStayAsTheyAre) {
+TEST(NetcdfAxes, UnevenAxesAndWrappedLongitudesAreKept) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "w.nc");
@@ -268,7 +268,7 @@ TEST(NetcdfAxes, DimensionsOfOne) {
   EXPECT_EQ(volume->values, (std::vector<float>{3, 4}));
 }
 
-TEST(NetcdfAxes, AFileWithoutTimeHasOneStepAndAScalarTimeNamesIt) {
+TEST(NetcdfAxes, FileWithoutTimeHasOneStepNamedByAScalarTime) {
   const Folder folder;
   for (const bool timed : {false, true}) {
     {
@@ -323,8 +323,8 @@ TEST(NetcdfAxes, CoordinatesThatAreNotMonotonicAreRefused) {
   }
 }
 
-TEST(NetcdfAxes, CurvilinearCoordinatesTellWhichDimensionRunsWhere) {
-  // Rows run east and columns south, as no name betrays; longitude crosses the date line.
+TEST(NetcdfAxes, CurvilinearCoordinatesDecideDimensionDirections) {
+  // Rows run east and columns south, which no name indicates; longitude crosses the date line.
   const Folder folder;
   {
     NetcdfMaker file(folder / "c.nc");
@@ -367,7 +367,7 @@ TEST(NetcdfAxes, CurvilinearCoordinatesTellWhichDimensionRunsWhere) {
   }
 }
 
-TEST(NetcdfAxes, CurvilinearCoordinatesWithGapsTellDirectionsAlone) {
+TEST(NetcdfAxes, CurvilinearCoordinatesWithGapsGiveDirectionsOnly) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "g.nc");

@@ -1,4 +1,4 @@
-// Which variables become fields, which become a vector together, and why the rest is left out.
+// Which variables become fields, which form vectors, and why others are omitted.
 #include "server/data/cf/fields/fields.hpp"
 
 #include <gtest/gtest.h>
@@ -88,7 +88,7 @@ TEST(NetcdfFields, WindsByStandardNameWhateverTheirNames) {
                      variable("c", "m s-1", "upward_air_velocity"),
                      variable("d", "Pa s-1", "lagrangian_tendency_of_air_pressure")}),
             (Expected{{"wind", {"a", "b", "c"}}}));
-  // Only the horizontal parts carry the attribute.
+  // Only the horizontal components have the attribute.
   EXPECT_EQ(vectors({variable("ua", "m s-1", "eastward_wind"),
                      variable("va", "m s-1", "northward_wind"), variable("wa")}),
             (Expected{{"wind", {"ua", "va", "wa"}}}));
@@ -124,7 +124,7 @@ TEST(NetcdfFields, OtherVectorsByTheirStem) {
             (Expected{{"uvstress", {"ustress", "vstress"}}}));
 }
 
-TEST(NetcdfFields, WhatIsNoVector) {
+TEST(NetcdfFields, OtherVariablesFormNoVector) {
   EXPECT_EQ(vectors({variable("u"), variable("w")}), Expected{});
   EXPECT_EQ(vectors({variable("u", "m/s"), variable("v", "V")}), Expected{});  // v: a voltage
   EXPECT_EQ(vectors({variable("max", "K"), variable("min", "K")}), Expected{});
@@ -133,13 +133,13 @@ TEST(NetcdfFields, WhatIsNoVector) {
   EXPECT_EQ(vectors(elsewhere), Expected{});
 }
 
-TEST(NetcdfFields, VectorsNeverShareANameWithAVariable) {
+TEST(NetcdfFields, VectorNamesDifferFromVariableNames) {
   EXPECT_EQ(
       vectors({variable("wind"), variable("u"), variable("v"), variable("ua"), variable("va")}),
       (Expected{{"wind_vector", {"u", "v"}}, {"wind_vector_2", {"ua", "va"}}}));
 }
 
-TEST(NetcdfFields, AVectorsInfoSpeaksForItsComponents) {
+TEST(NetcdfFields, VectorInfoReplacesThatOfItsComponents) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "w.nc");
@@ -158,7 +158,7 @@ TEST(NetcdfFields, AVectorsInfoSpeaksForItsComponents) {
   auto source = open_file(folder / "w.nc");
   ASSERT_TRUE(source) << source.error().message;
   const DatasetInfo& info = (*source)->info();
-  ASSERT_EQ(info.fields.size(), 6U);  // wind, its three components, and what they make
+  ASSERT_EQ(info.fields.size(), 6U);  // wind, its three components, and derived fields
   EXPECT_EQ(info.fields[4].name, "standard_height");
   EXPECT_EQ(info.fields[5].name, "wind_m");
   const FieldInfo& wind = info.fields[0];
@@ -185,7 +185,7 @@ TEST(NetcdfFields, AVectorsInfoSpeaksForItsComponents) {
   EXPECT_EQ(alone->masked, 0);
 }
 
-TEST(NetcdfFields, TheLargestGridWinsAndEverythingElseIsExplained) {
+TEST(NetcdfFields, LargestGridIsUsedAndTheRestIsExplained) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "many.nc");
@@ -225,7 +225,7 @@ TEST(NetcdfFields, TheLargestGridWinsAndEverythingElseIsExplained) {
   EXPECT_EQ(reasons["ps"], "on another grid (lat 3, lon 4)");
   EXPECT_EQ(reasons["moisture"], "on another grid (depth 2, lat 3, lon 4)");
   EXPECT_EQ(reasons["lat_bnds"], "bounds of a coordinate");
-  EXPECT_EQ(reasons.count("lat"), 0U) << "a coordinate places the fields";
+  EXPECT_EQ(reasons.count("lat"), 0U) << "the fields have coordinates";
   EXPECT_EQ(reasons["label"], "text, not numbers");
   EXPECT_EQ(reasons["hyam"], "fewer than two spatial dimensions");
   EXPECT_EQ(reasons["spread"], "its dimension 'member' is neither space nor time");

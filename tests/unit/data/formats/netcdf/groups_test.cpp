@@ -51,7 +51,7 @@ void write_groups(const std::string& path, bool root_field) {
   put(b, "g", {rows, columns}, {200, 201, 202, 203, 204, 205});
 }
 
-TEST(Groups, AGroupIsNamedBehindTheFile) {
+TEST(Groups, GroupIsNamedAfterTheFile) {
   const Folder folder;
   write_groups(folder / "g.nc", true);
   for (const char* name : {"g.nc#/a/deep", "g.nc#/a/deep/"}) {
@@ -84,7 +84,7 @@ TEST(Groups, AGroupIsNamedBehindTheFile) {
   EXPECT_EQ(nowhere.error().kind, ErrorKind::not_found);
 }
 
-TEST(Groups, WithoutAFieldInTheRootTheFirstGroupByBreadthIsShown) {
+TEST(Groups, WithoutARootFieldTheFirstGroupByBreadthIsUsed) {
   const Folder folder;
   write_groups(folder / "g.nc", false);
   auto source = open_file(folder / "g.nc");
@@ -93,9 +93,9 @@ TEST(Groups, WithoutAFieldInTheRootTheFirstGroupByBreadthIsShown) {
   EXPECT_TRUE(has_note((*source)->info(), "the group '/b' is shown"));
 }
 
-// Rows that run north-east in the root, which also has a surface pressure and a field of its own;
-// the winds and levels are in a group.
-TEST(Groups, PositionsAndSurfacePressureOfTheGroupsAboveCount) {
+// Rows run north-east in the root, which also has a surface pressure and a field; winds and levels
+// are in a group.
+TEST(Groups, PositionsAndSurfacePressureOfParentGroupsApply) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "g.nc");
@@ -133,7 +133,8 @@ TEST(Groups, PositionsAndSurfacePressureOfTheGroupsAboveCount) {
   const DatasetInfo& info = (*source)->info();
   ASSERT_NE(info.grid.columns, nullptr);
   EXPECT_TRUE(has_note(info, "'wind' is given by east and north: turned"));
-  // Rows run north-east, so that a wind from due west is half along them, half against columns.
+  // Rows run north-east, so that a wind from due west is half along the rows, half against the
+  // columns.
   const Volume wind = volume_of(**source, "wind");
   EXPECT_NEAR(wind.component(0)[1], 10 * std::sqrt(0.5), 0.05);
   EXPECT_NEAR(wind.component(1)[1], -10 * std::sqrt(0.5), 0.05);
@@ -142,7 +143,7 @@ TEST(Groups, PositionsAndSurfacePressureOfTheGroupsAboveCount) {
   EXPECT_EQ(info.find("other"), nullptr);
 }
 
-TEST(Groups, FilesOfASeriesMayBeGroupsToo) {
+TEST(Groups, FilesOfASeriesMayBeGroups) {
   const Folder folder;
   write_groups(folder / "g1.nc", true);
   write_groups(folder / "g2.nc", true);
@@ -152,7 +153,7 @@ TEST(Groups, FilesOfASeriesMayBeGroupsToo) {
   EXPECT_EQ(volume_of(**source, "f", 1).values[0], 103);
 }
 
-TEST(Groups, AFileWhoseNameHasTheMarkIsThatFile) {
+TEST(Groups, FileWhoseNameContainsTheSeparatorIsThatFile) {
   const Folder folder;
   std::filesystem::create_directory(folder / "odd#");
   write_groups(folder / "odd#/g.nc", true);
@@ -161,7 +162,7 @@ TEST(Groups, AFileWhoseNameHasTheMarkIsThatFile) {
   EXPECT_EQ(volume_of(**source, "r").values[0], 4);
 }
 
-TEST(Groups, AFormatWithoutGroupsHasNoneThatCouldBeNamed) {
+TEST(Groups, FormatsWithoutGroupsRefuseAGroupName) {
   const Folder folder;
   write_bytes(folder / "v.vtk",
               "# vtk DataFile Version 3.0\nt\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 1\n"
@@ -178,7 +179,7 @@ TEST(Groups, AFormatWithoutGroupsHasNoneThatCouldBeNamed) {
   }
 }
 
-// As h5py or a simulation writes it: no netCDF conventions, no dimension scales.
+// As written by h5py or a simulation: no netCDF conventions, no dimension scales.
 TEST(Groups, PlainHdf5) {
   const Folder folder;
   {
@@ -216,8 +217,8 @@ TEST(Groups, PlainHdf5) {
   }
 }
 
-// Arrays [x][y][z] or [x][y][z][t], with no word about it. The value: component, x, y, z, t as
-// digits.
+// Arrays [x][y][z] or [x][y][z][t] without metadata. The value has the digits component, x, y, z,
+// t.
 void write_like_meep(const std::string& path, const std::vector<const char*>& names,
                      const std::vector<hsize_t>& dims) {
   const netcdf::LibraryLock lock;
@@ -248,7 +249,7 @@ void write_like_meep(const std::string& path, const std::vector<const char*>& na
   H5Fclose(file);
 }
 
-TEST(Groups, ArraysOfMeepRunAlongXFirst) {
+TEST(Groups, MeepArraysVaryFastestAlongX) {
   const Folder folder;
   write_like_meep(folder / "e.h5", {"ex", "ey", "ez"}, {2, 3, 4});
   auto source = open_file(folder / "e.h5");
@@ -292,9 +293,9 @@ void write_bare(const std::string& path,
   H5Fclose(file);
 }
 
-TEST(Groups, OfFourBareDimensionsTheFirstIsTime) {
+TEST(Groups, FirstOfFourUnnamedDimensionsIsTime) {
   const Folder folder;
-  // As many rows as steps: to the library both are one dimension.
+  // As many rows as steps: the library treats both as one dimension.
   write_bare(folder / "b.h5", {{"q", {6, 2, 3, 5}}, {"p", {6, 2, 3, 5}}, {"still", {2, 6, 5}}});
   auto source = open_file(folder / "b.h5");
   ASSERT_TRUE(source) << source.error().message;
@@ -309,7 +310,7 @@ TEST(Groups, OfFourBareDimensionsTheFirstIsTime) {
   EXPECT_NE(reason_of(info, "still"), "");
 }
 
-TEST(Groups, WhatMayBeComponentsIsNotTakenForSteps) {
+TEST(Groups, PossibleComponentsAreNotTreatedAsSteps) {
   const Folder folder;
   write_bare(folder / "c.h5", {{"short", {7}}, {"v", {4, 5, 6, 3}}});
   auto source = open_file(folder / "c.h5");

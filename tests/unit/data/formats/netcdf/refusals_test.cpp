@@ -1,4 +1,4 @@
-// Files that are not what they should be: each is refused with a reason, none crashes the reader.
+// Invalid files: each is refused with a reason, none crashes the reader.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -32,7 +32,7 @@ void write_good(const std::string& path, int mode, std::size_t records = 2) {
   file.variable("h", NC_SHORT, {y, x}, counting(20, 1));
 }
 
-TEST(NetcdfRefusals, WhatIsNoFile) {
+TEST(NetcdfRefusals, MissingAndIrregularFiles) {
   const Folder folder;
   expect_refused(folder / "absent.nc", ErrorKind::not_found, "no such file");
   expect_refused(folder / "no/folder.nc", ErrorKind::not_found, "no such file");
@@ -44,7 +44,7 @@ TEST(NetcdfRefusals, WhatIsNoFile) {
   expect_refused("/dev/null", ErrorKind::bad_data, "not a regular file");
 }
 
-TEST(NetcdfRefusals, WhatIsNoNetcdf) {
+TEST(NetcdfRefusals, OtherFormats) {
   const Folder folder;
   write_bytes(folder / "empty.nc", "");
   expect_refused(folder / "empty.nc", ErrorKind::bad_data, "is empty");
@@ -60,14 +60,14 @@ TEST(NetcdfRefusals, WhatIsNoNetcdf) {
   expect_refused(folder / "hdf.nc", ErrorKind::bad_data, "cut short or damaged");
 }
 
-TEST(NetcdfRefusals, UrlsAndDirectionsToTheLibrary) {
+TEST(NetcdfRefusals, UrlsAndLibraryDirectives) {
   const Folder folder;
   expect_refused("http://127.0.0.1:9/a.nc", ErrorKind::bad_data, "URL");
   expect_refused("file:///etc/passwd", ErrorKind::bad_data, "URL");
   expect_refused("[mode=bytes]https://127.0.0.1:9/a.nc", ErrorKind::bad_data, "URL");
   write_good(folder / "a.nc", 0);
   expect_refused((folder / "a.nc") + "#mode=zarr", ErrorKind::not_found, "no such file");
-  // The library never sees a file's name: one that looks like directions to it is a plain file.
+  // The library never sees a file name: one that resembles its directives is a plain file.
   std::filesystem::copy_file(folder / "a.nc", folder / "a.nc#mode=zarr");
   std::filesystem::create_symlink(folder / "a.nc#mode=zarr", folder / "innocent.nc");
   for (const char* name : {"a.nc#mode=zarr", "innocent.nc"}) {
@@ -81,7 +81,7 @@ TEST(NetcdfRefusals, UrlsAndDirectionsToTheLibrary) {
   }
 }
 
-TEST(NetcdfRefusals, NothingToShow) {
+TEST(NetcdfRefusals, FilesWithoutFields) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "line.nc");
@@ -92,7 +92,7 @@ TEST(NetcdfRefusals, NothingToShow) {
   expect_refused(folder / "bare.nc", ErrorKind::bad_data, "no numeric variable");
 }
 
-TEST(NetcdfRefusals, GridsBeyondTheLimitAreRefusedBeforeTheyAreAllocated) {
+TEST(NetcdfRefusals, OversizeGridsAreRefusedBeforeAllocation) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "vast.nc");  // 10^12 samples that were never written: a small file
@@ -114,8 +114,8 @@ TEST(NetcdfRefusals, GridsBeyondTheLimitAreRefusedBeforeTheyAreAllocated) {
                  "'x' has 1000000000 entries, more than the");
 }
 
-// A file cut at every length that may matter either opens and gives the very numbers of the whole
-// file, or is refused. Nothing in between: no zeros, no crash.
+// A file truncated at any relevant length either opens and gives the values of the whole file, or
+// is refused: no zeros, no crash.
 void cut_everywhere(int mode, const std::vector<std::size_t>& lengths_to_keep_back, bool all) {
   const Folder folder;
   write_good(folder / "whole.nc", mode);
@@ -145,18 +145,18 @@ void cut_everywhere(int mode, const std::vector<std::size_t>& lengths_to_keep_ba
     ASSERT_TRUE(volume) << length << " of " << whole.size();
     ASSERT_EQ(volume->values, expected->values) << length << " of " << whole.size();
   }
-  // Only padding behind the last value can be missing without loss: at most three bytes.
+  // Only padding after the last value can be missing without loss: at most three bytes.
   EXPECT_GE(refused, static_cast<int>(lengths.size()) - 3);
   EXPECT_GT(refused, 0);
 }
 
-TEST(NetcdfRefusals, ClassicCutAtEveryByte) {
+TEST(NetcdfRefusals, ClassicFileTruncatedAtEveryByte) {
   for (const int mode : {0, NC_64BIT_OFFSET, NC_64BIT_DATA}) {
     cut_everywhere(mode, {}, true);
   }
 }
 
-TEST(NetcdfRefusals, Netcdf4CutInManyPlaces) {
+TEST(NetcdfRefusals, Netcdf4FileTruncatedAtManyPlaces) {
   std::vector<std::size_t> back;
   for (std::size_t n = 1; n < 200; ++n) {
     back.push_back(n);
@@ -167,7 +167,7 @@ TEST(NetcdfRefusals, Netcdf4CutInManyPlaces) {
   cut_everywhere(NC_NETCDF4, back, false);
 }
 
-TEST(NetcdfRefusals, AClassicFileIsSpokenOfWithBothSizes) {
+TEST(NetcdfRefusals, TruncatedClassicFileIsReportedWithBothSizes) {
   const Folder folder;
   write_good(folder / "whole.nc", 0);
   const std::string whole = bytes_of(folder / "whole.nc");
@@ -176,9 +176,9 @@ TEST(NetcdfRefusals, AClassicFileIsSpokenOfWithBothSizes) {
                  std::to_string(whole.size() - 100) + " bytes");
 }
 
-TEST(NetcdfRefusals, TheHeaderWalkAgreesWithFilesOfEveryShape) {
-  // Sizes that the format's rules give by hand: records of one variable are not padded, of several
-  // are; the last value's padding is not asked for.
+TEST(NetcdfRefusals, HeaderSizeMatchesFilesOfEveryShape) {
+  // Sizes by the rules of the format: records of a single variable are not padded, those of several
+  // are; padding after the last value is optional.
   struct Case {
     nc_type type;
     std::size_t columns;
@@ -216,8 +216,8 @@ TEST(NetcdfRefusals, TheHeaderWalkAgreesWithFilesOfEveryShape) {
   }
 }
 
-TEST(NetcdfRefusals, AWrittenOverClassicHeaderNeverCrashes) {
-  // Every header byte set to each of four values; whatever opens must also be readable or refused.
+TEST(NetcdfRefusals, CorruptClassicHeaderNeverCrashes) {
+  // Every header byte set to each of four values; whatever opens must be readable or refused.
   const Folder folder;
   write_good(folder / "good.nc", 0);
   const std::string good = bytes_of(folder / "good.nc");
@@ -243,7 +243,7 @@ TEST(NetcdfRefusals, AWrittenOverClassicHeaderNeverCrashes) {
   EXPECT_GT(refused, 100);
 }
 
-TEST(NetcdfRefusals, AFileThatChangesWhileOpenIsNotReadAsZeros) {
+TEST(NetcdfRefusals, FileTruncatedWhileOpenIsNotReadAsZeros) {
   for (const int mode : {0, NC_NETCDF4}) {
     const Folder folder;
     write_good(folder / "f.nc", mode);
@@ -257,7 +257,7 @@ TEST(NetcdfRefusals, AFileThatChangesWhileOpenIsNotReadAsZeros) {
   }
 }
 
-TEST(NetcdfRefusals, AFileReplacedByAnotherStillGivesItsOldNumbers) {
+TEST(NetcdfRefusals, ReplacedFileStillGivesItsOldValues) {
   for (const int mode : {0, NC_NETCDF4}) {
     const Folder folder;
     write_good(folder / "f.nc", mode);
@@ -272,7 +272,7 @@ TEST(NetcdfRefusals, AFileReplacedByAnotherStillGivesItsOldNumbers) {
   }
 }
 
-TEST(NetcdfRefusals, TheDigestFollowsTheContentNotThePlace) {
+TEST(NetcdfRefusals, DigestFollowsContentNotPath) {
   const Folder folder;
   write_good(folder / "a.nc", 0);
   std::filesystem::create_directory(folder / "sub");

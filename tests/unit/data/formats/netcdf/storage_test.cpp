@@ -29,7 +29,7 @@ void expect_refused(const std::string& path, const std::string& part) {
   EXPECT_THAT(source.error().message, HasSubstr(part));
 }
 
-TEST(Storage, AVirtualDatasetIsRefusedByName) {
+TEST(Storage, VirtualDatasetIsRefusedByName) {
   const Folder folder;
   { Hdf5Maker(folder / "source.h5").ones("u"); }
   {
@@ -47,7 +47,7 @@ TEST(Storage, AVirtualDatasetIsRefusedByName) {
                  "('source.h5')");
 }
 
-TEST(Storage, LinksThatLeadNowhereOrRoundAreRefusedByName) {
+TEST(Storage, DanglingAndCyclicLinksAreRefusedByName) {
   const Folder folder;
   {
     const Hdf5Maker file(folder / "nowhere.h5");
@@ -63,7 +63,7 @@ TEST(Storage, LinksThatLeadNowhereOrRoundAreRefusedByName) {
   expect_refused(folder / "round.h5", "a group that contains itself: '/g'");
 }
 
-TEST(Storage, AFilterThatIsNotThereIsNamed) {
+TEST(Storage, MissingFilterIsNamed) {
   const Folder folder;
   {
     const Hdf5Maker file(folder / "a.h5");
@@ -84,7 +84,7 @@ TEST(Storage, AFilterThatIsNotThereIsNamed) {
   EXPECT_EQ(volume_of(**source, "v").masked, 0);
 }
 
-TEST(Storage, WhatWasNeverWrittenIsMasked) {
+TEST(Storage, UnwrittenDataAreMasked) {
   const Folder folder;
   {
     const Hdf5Maker file(folder / "a.h5");
@@ -119,7 +119,7 @@ TEST(Storage, WhatWasNeverWrittenIsMasked) {
   EXPECT_FALSE(has_note((*source)->info(), "'all'"));
 }
 
-TEST(Storage, ManyChunksAreLookedForInPart) {
+TEST(Storage, LookupOfManyChunksIsPartial) {
   const Folder folder;
   {
     const Hdf5Maker file(folder / "a.h5");
@@ -135,7 +135,7 @@ TEST(Storage, ManyChunksAreLookedForInPart) {
 }
 
 // Two chunks with one number would be taken for each other: present or absent.
-TEST(Storage, MoreChunksThanNumbersAreNotRead) {
+TEST(Storage, MoreChunksThanValuesAreRefused) {
   const Folder folder;
   {
     const Hdf5Maker file(folder / "a.h5");
@@ -179,7 +179,7 @@ TEST(Storage, OnlyNetcdfIsCalledNetcdf) {
 
 // The library says of an absent chunk that it is there once it was read: of the second block, too,
 // it is masked.
-TEST(Storage, AnAbsentChunkThatSeveralBlocksReadIsMaskedInAll) {
+TEST(Storage, MissingChunkIsMaskedInEveryBlock) {
   const Folder folder;
   {
     const Hdf5Maker file(folder / "a.h5");
@@ -191,7 +191,7 @@ TEST(Storage, AnAbsentChunkThatSeveralBlocksReadIsMaskedInAll) {
 }
 
 // Bytes have no default fill value in CF: those beyond what was written read as -127.
-TEST(Storage, AVariableShorterThanTheUnlimitedDimensionIsMaskedBeyond) {
+TEST(Storage, VariableShorterThanTheUnlimitedDimensionIsMasked) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "a.nc");
@@ -208,7 +208,7 @@ TEST(Storage, AVariableShorterThanTheUnlimitedDimensionIsMaskedBeyond) {
   EXPECT_EQ(volume_of(**source, "short", 2).masked, 16);
 }
 
-TEST(Storage, ChunksBeyondTheLimitAreNotRead) {
+TEST(Storage, ChunksAboveTheLimitAreRefused) {
   const Folder folder;
   {
     const Hdf5Maker file(folder / "a.h5");
@@ -218,7 +218,7 @@ TEST(Storage, ChunksBeyondTheLimitAreNotRead) {
 }
 
 // A chunk that many blocks need is decoded once: what is read is right, too.
-TEST(Storage, AChunkLargerThanTheLibrarysCacheIsReadWhole) {
+TEST(Storage, ChunkLargerThanTheLibraryCacheIsReadWhole) {
   const Folder folder;
   {
     const Hdf5Maker file(folder / "a.h5");
@@ -232,7 +232,7 @@ TEST(Storage, AChunkLargerThanTheLibrarysCacheIsReadWhole) {
 }
 
 // Chunks of several steps are kept for the next step, of all variables as far as they fit together.
-TEST(Storage, WhatIsKeptOfAllVariablesHasOneLimit) {
+TEST(Storage, MetadataOfAllVariablesShareOneLimit) {
   const Folder folder;
   const Lengths chunk{2, 4, 1024, 1024};  // 32 MiB
   const std::string names = "abcdefgh";

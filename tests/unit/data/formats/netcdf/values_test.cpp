@@ -1,4 +1,4 @@
-// Numbers of files the tests wrote: packing, masks, types, formats, blocks larger than a read.
+// Values of generated files: packing, masks, types, formats, blocks larger than a read.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -77,7 +77,7 @@ TEST(NetcdfValues, ValidRangeIsInStoredNumbers) {
   });
   const auto tenth = static_cast<double>(0.1F);
   expect_values(packed, {kNan, 0, 50 * tenth, 100 * tenth, kNan});
-  // Fractions about packed integers can only mean what comes out of them.
+  // Fractional limits of packed integers can only refer to unpacked values.
   const Volume unpacked = read_row(NC_SHORT, {-1, 0, 50, 100, 101}, [](NetcdfMaker& file, int f) {
     file.number(f, "scale_factor", NC_DOUBLE, {0.5});
     file.number(f, "valid_range", NC_DOUBLE, {0, 25});
@@ -88,7 +88,7 @@ TEST(NetcdfValues, ValidRangeIsInStoredNumbers) {
   });
   expect_values(one_sided, {kNan, -1, 5});
   const Volume other_side = read_row(NC_FLOAT, {-2, 0.3F, 0.4F}, [](NetcdfMaker& file, int f) {
-    file.number(f, "valid_max", NC_DOUBLE, {0.3});  // wider than the data it speaks of
+    file.number(f, "valid_max", NC_DOUBLE, {0.3});  // wider than the packed data
   });
   expect_values(other_side, {-2, 0.3F, kNan});
 }
@@ -205,7 +205,7 @@ TEST(NetcdfValues, SignedShortsMarkedUnsigned) {
   expect_values(described(-32768, -2), {kNan, kNan, kNan, 32768, 65533, 65534, kNan});
 }
 
-TEST(NetcdfValues, EveryFormatHoldsTheSame) {
+TEST(NetcdfValues, EveryFormatHoldsTheSameValues) {
   struct Case {
     int mode;
     const char* format;
@@ -243,8 +243,8 @@ TEST(NetcdfValues, EveryFormatHoldsTheSame) {
   }
 }
 
-// Without chunks a read is smaller: 13 x 150 x 200 doubles are more than one, cut between levels.
-// With them what the library kept of a field is let go, and the field is read again and again.
+// Without chunks a read is smaller: 13 x 150 x 200 doubles take several, split between levels. With
+// chunks the library cache of a field is released, and the field is read repeatedly.
 TEST(NetcdfValues, BlocksAndStepsReadAgainAreTheSame) {
   const Folder folder;
   const std::array<std::size_t, 4> lengths{2, 13, 150, 200};
@@ -274,8 +274,8 @@ TEST(NetcdfValues, BlocksAndStepsReadAgainAreTheSame) {
   }
 }
 
-TEST(NetcdfValues, AVolumeReadInManyBlocksIsWhole) {
-  // 40 x 300 x 500 doubles are more than one read's worth; chunks do not divide the levels.
+TEST(NetcdfValues, VolumeReadInManyBlocksIsComplete) {
+  // 40 x 300 x 500 doubles take more than one read; chunks do not divide the levels.
   const Folder folder;
   const std::array<std::size_t, 3> lengths{40, 300, 500};
   {
@@ -292,7 +292,8 @@ TEST(NetcdfValues, AVolumeReadInManyBlocksIsWhole) {
   ASSERT_TRUE(source) << source.error().message;
   auto volume = (*source)->read(0, 0);
   ASSERT_TRUE(volume) << volume.error().message;
-  // Pressure rises with the file's index, so the file's last level is the volume's first.
+  // Pressure rises with the index in the file, so the last level of the file is the first of the
+  // volume.
   std::size_t i = 0;
   for (std::size_t z = 0; z < lengths[0]; ++z) {
     const std::size_t level = (lengths[0] - 1 - z) * lengths[1] * lengths[2];

@@ -78,7 +78,7 @@ INSTANTIATE_TEST_SUITE_P(
                     VerticalCase{"sigma", "sigma_level", "", "up", AxisKind::level, false},
                     VerticalCase{"lev", "sigma_level", "", "", AxisKind::level, false}));
 
-TEST(NetcdfAxes, ValuesTellTheWayWherePositiveIsSilent) {
+TEST(NetcdfAxes, ValuesDecideTheDirectionWithoutPositive) {
   struct Case {
     const char* name;
     const char* units;
@@ -121,7 +121,7 @@ TEST(NetcdfAxes, ValuesTellTheWayWherePositiveIsSilent) {
   }
 }
 
-TEST(NetcdfAxes, OceanPressureIsNoAir) {
+TEST(NetcdfAxes, OceanPressureIsNotAirPressure) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "o.nc");

@@ -1,4 +1,4 @@
-// What write_netcdf writes, open_file reads back bit for bit, and other programs find CF in it.
+// open_file reads files of write_netcdf bit for bit, and other programs find CF metadata.
 #include "server/data/formats/netcdf/writer.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@
 namespace windsplat::data::test {
 namespace {
 
-// Numbers with every awkward float among them, from a plain formula.
+// Values including every special float, from a simple formula.
 class FakeSource : public Source {
  public:
   explicit FakeSource(DatasetInfo info) : info_(std::move(info)) {}
@@ -247,7 +247,7 @@ TEST(NetcdfWriter, FollowsCfConventions) {
   ASSERT_EQ(nc_inq_varid(ncid, "u", &u), NC_NOERR);
   ASSERT_EQ(nc_inq_var_deflate(ncid, u, nullptr, &deflate, &level), NC_NOERR);
   EXPECT_EQ(deflate, 1);
-  // The masked sample is the announced fill value for whoever reads it.
+  // The masked sample has the declared fill value.
   float fill = 0;
   float value = 0;
   const std::array<std::size_t, 4> third{0, 0, 1, 0};
@@ -257,7 +257,7 @@ TEST(NetcdfWriter, FollowsCfConventions) {
   nc_close(ncid);
 }
 
-TEST(NetcdfWriter, WhatALinkLeadsToIsWrittenAlsoWhereItIsNotThereYet) {
+TEST(NetcdfWriter, LinkTargetIsWrittenEvenIfMissing) {
   FakeSource source(
       make_info({axis("x", AxisKind::cartesian, {0, 1}), axis("y", AxisKind::cartesian, {0, 1}),
                  axis("z", AxisKind::cartesian, {0, 1})}));
@@ -273,7 +273,7 @@ TEST(NetcdfWriter, WhatALinkLeadsToIsWrittenAlsoWhereItIsNotThereYet) {
   EXPECT_TRUE(std::filesystem::is_symlink(folder / "loop.nc"));
 }
 
-TEST(NetcdfWriter, AFailureLeavesTheOldFileAndNoRemains) {
+TEST(NetcdfWriter, FailureKeepsTheOldFileAndLeavesNoPart) {
   FakeSource source(
       make_info({axis("x", AxisKind::cartesian, {0, 1}), axis("y", AxisKind::cartesian, {0, 1}),
                  axis("z", AxisKind::cartesian, {0, 1})}));

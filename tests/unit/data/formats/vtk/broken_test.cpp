@@ -1,5 +1,5 @@
-// VTK files that are cut short or lie: each is an error, and none makes the reader take memory for
-// what the file cannot hold.
+// Truncated or inconsistent VTK files: each is an error, and none makes the reader allocate memory
+// for data the file cannot contain.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
@@ -25,7 +25,7 @@ std::string image(const VtkCoding& coding) {
   return xml.image(broken_dims, "", data);
 }
 
-TEST(VtkBroken, EveryCutIsAnError) {
+TEST(VtkBroken, EveryTruncationIsAnError) {
   const VtkFolder folder;
   for (const char* format : {"ascii", "base64", "appended-raw", "appended-base64"}) {
     for (const char* compressor : {"", "ZLib", "LZ4"}) {
@@ -42,8 +42,8 @@ TEST(VtkBroken, EveryCutIsAnError) {
   }
 }
 
-// Any changed byte yields an error or numbers, never a crash.
-TEST(VtkBroken, AnyByteMayBeWrong) {
+// Any changed byte gives an error or values, never a crash.
+TEST(VtkBroken, AnyByteMayBeCorrupt) {
   const VtkFolder folder;
   for (const char* format : {"ascii", "appended-raw"}) {
     const std::string whole = image({format, "ZLib", false, 8});
@@ -74,7 +74,7 @@ long peak_kilobytes() {
   return usage.ru_maxrss;
 }
 
-TEST(VtkBroken, HugeClaimsAreRefusedBeforeMemoryIsTaken) {
+TEST(VtkBroken, HugeSizesAreRefusedBeforeAllocation) {
   const VtkFolder folder;
   const long before = peak_kilobytes();
   const std::string ascii =
@@ -88,7 +88,7 @@ TEST(VtkBroken, HugeClaimsAreRefusedBeforeMemoryIsTaken) {
   EXPECT_THAT(refusal(folder.write(
                   "a.vti", claim("-9223372036854775808 9223372036854775807 0 1 0 1", ascii))),
               HasSubstr("2^31"));
-  // A table that claims blocks of much more than its compressed bytes can become.
+  // A table that declares blocks much larger than its compressed bytes can produce.
   std::string table;
   for (const std::uint32_t n : {64U, 134217728U, 0U}) table += bytes_of_number(n, false);
   for (int b = 0; b < 64; ++b) table += bytes_of_number<std::uint32_t>(4, false);
@@ -108,8 +108,8 @@ TEST(VtkBroken, HugeClaimsAreRefusedBeforeMemoryIsTaken) {
   EXPECT_LT(peak_kilobytes() - before, 64 * 1024);
 }
 
-// Eight points and their values; the whole claims 301^3.
-TEST(VtkBroken, PiecesThatCannotFillTheWholeAreRefusedBeforeMemoryIsTaken) {
+// Eight points and their values; the declared extent is 301^3.
+TEST(VtkBroken, PiecesThatCannotFillTheWholeAreRefusedBeforeAllocation) {
   const VtkFolder folder;
   const long before = peak_kilobytes();
   VtkXml xml;
@@ -143,7 +143,7 @@ TEST(VtkBroken, PiecesThatCannotFillTheWholeAreRefusedBeforeMemoryIsTaken) {
   EXPECT_LT(peak_kilobytes() - before, 64 * 1024);
 }
 
-TEST(VtkBroken, PiecesMustNotOverlapWithoutBound) {
+TEST(VtkBroken, OverlapOfPiecesIsBounded) {
   const VtkFolder folder;
   VtkXml xml;
   const std::string data = xml.array("Float32", "a", 1, {1, 2, 3, 4, 5, 6, 7, 8});
@@ -159,7 +159,7 @@ TEST(VtkBroken, PiecesMustNotOverlapWithoutBound) {
   EXPECT_THAT(file(pieces + piece + piece), HasSubstr("overlap"));
 }
 
-TEST(VtkBroken, OffsetsMustLieInTheFile) {
+TEST(VtkBroken, OffsetsMustBeInsideTheFile) {
   const VtkFolder folder;
   for (const char* offset : {"100000", "-5", "18446744073709551615", "x", ""}) {
     VtkXml xml({"appended-raw", "", false, 4});

@@ -1,4 +1,4 @@
-// The slanted box around a cell, against the cell itself: whatever is found lies in the box.
+// The oblique box around a cell, against the cell itself: everything in the cell is in the box.
 #include "server/data/formats/vtk/cells.hpp"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace {
 constexpr std::array shapes{Shape::triangle, Shape::quad,  Shape::tetra,
                             Shape::pyramid,  Shape::wedge, Shape::hexahedron};
 
-// The unit cell of a shape; turned, stretched, moved far away and with its corners knocked about.
+// The unit cell of a shape: rotated, stretched, moved far away, with perturbed corners.
 class Distorted {
  public:
   explicit Distorted(unsigned seed) : random_(seed) {}
@@ -72,7 +72,7 @@ class Distorted {
   std::mt19937 random_;
 };
 
-TEST(VtkCells, WhatIsFoundInACellLiesInItsSlantedBox) {
+TEST(VtkCells, PointsFoundInACellAreInItsObliqueBox) {
   Distorted distorted(7);
   constexpr std::size_t row = 16;
   std::size_t found = 0;
@@ -83,7 +83,7 @@ TEST(VtkCells, WhatIsFoundInACellLiesInItsSlantedBox) {
     const Corners corners = distorted.cell(shape);
     const auto count = static_cast<std::size_t>(corners_of(shape));
     const SlantedBox box(shape, corners);
-    // Rows over the cell's box, their y and z those of random places within.
+    // Rows over the box of the cell, with y and z of random points inside.
     Point low = corners[0];
     Point high = corners[0];
     for (std::size_t i = 1; i < count; ++i) {
@@ -118,9 +118,9 @@ TEST(VtkCells, WhatIsFoundInACellLiesInItsSlantedBox) {
   EXPECT_GT(left_out, 20'000U);
 }
 
-// A plate along the diagonal of x and z, a hundredth thick: of a row along x all but a piece of
-// that thickness times the square root of two is left out.
-TEST(VtkCells, ASlantedPlateLeavesOutAllButItself) {
+// A plate along the diagonal of x and z, a hundredth thick: of a row along x everything is omitted
+// but that thickness times the square root of two.
+TEST(VtkCells, ObliquePlateLeavesTheRestEmpty) {
   const double t = 0.01 / std::numbers::sqrt2;
   Corners corners{};
   for (std::size_t i = 0; i < 8; ++i) {

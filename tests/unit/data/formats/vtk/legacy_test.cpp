@@ -39,9 +39,9 @@ class VtkLegacyFile : public testing::TestWithParam<bool> {
 };
 INSTANTIATE_TEST_SUITE_P(TextAndBytes, VtkLegacyFile, testing::Bool());
 
-// Nine bits fill two bytes; what follows is read from behind them. Old files call the spacing an
+// Nine bits fill two bytes; the following data are read after them. Old files call the spacing an
 // aspect ratio.
-TEST_P(VtkLegacyFile, BitsArePassedOverAndAnAspectRatioIsASpacing) {
+TEST_P(VtkLegacyFile, BitsAreSkippedAndAnAspectRatioIsASpacing) {
   std::string file = head(GetParam()) + "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 3 1\n";
   file += "ASPECT_RATIO 2 3 1\nORIGIN 0 0 0\nPOINT_DATA 9\nSCALARS mask bit 1\n";
   file += "LOOKUP_TABLE default\n";
@@ -57,7 +57,7 @@ TEST_P(VtkLegacyFile, BitsArePassedOverAndAnAspectRatioIsASpacing) {
   EXPECT_EQ(flow.component(2)[8], 31);
 }
 
-TEST_P(VtkLegacyFile, AnImageWithAttributesOfAllKinds) {
+TEST_P(VtkLegacyFile, ImageWithAttributesOfAllKinds) {
   std::string file = head(GetParam()) + "DATASET STRUCTURED_POINTS\nDIMENSIONS 4 3 2\n";
   file += "SPACING 1 2 3\nORIGIN 5 6 7\nFIELD FieldData 1\nTIME 1 1 double\n";
   file += values(GetParam(), "double", {2.5}) + "POINT_DATA 24\nSCALARS the%20count short 1\n";
@@ -84,7 +84,7 @@ TEST_P(VtkLegacyFile, AnImageWithAttributesOfAllKinds) {
   EXPECT_THAT(reason_of(info, "stress"), HasSubstr("9 components"));
 }
 
-TEST_P(VtkLegacyFile, ARectilinearGridWithCellData) {
+TEST_P(VtkLegacyFile, RectilinearGridWithCellData) {
   std::string file = head(GetParam()) + "DATASET RECTILINEAR_GRID\nDIMENSIONS 3 4 2\n";
   file += "X_COORDINATES 3 float\n" + values(GetParam(), "float", {0, 2, 6});
   file += "Y_COORDINATES 4 double\n" + values(GetParam(), "double", {9, 4, 1, 0});
@@ -102,7 +102,7 @@ TEST_P(VtkLegacyFile, ARectilinearGridWithCellData) {
   EXPECT_EQ(volume.values[5], 1);
 }
 
-TEST_P(VtkLegacyFile, AStructuredGridOnAxesIsTakenAsItIs) {
+TEST_P(VtkLegacyFile, StructuredGridOnAxesIsNotResampled) {
   std::vector<double> points;
   for (int k = 0; k < 2; ++k) {
     for (int j = 0; j < 3; ++j) {
@@ -161,7 +161,7 @@ TEST_P(VtkLegacyFile, CellsOfBothVersionsOfTheFormat) {
   }
 }
 
-TEST_P(VtkLegacyFile, EveryCutIsAnError) {
+TEST_P(VtkLegacyFile, EveryTruncationIsAnError) {
   const std::string whole = cube(GetParam(), true);
   for (std::size_t bytes = 30; bytes + 8 < whole.size(); bytes += 3) {
     EXPECT_NE(refusal(folder_.write("cut.vtk", whole.substr(0, bytes))), "") << bytes;

@@ -34,7 +34,7 @@ std::array<double, 3> place(const DatasetInfo& info, std::array<std::size_t, 3> 
           axes[2].coordinates[index[2]]};
 }
 
-TEST(VtkRealFile, ALegacyRectilinearGrid) {
+TEST(VtkRealFile, LegacyRectilinearGrid) {
   const auto source = real("RectGrid2.vtk");
   ASSERT_TRUE(source);
   const DatasetInfo& info = source->info();
@@ -57,7 +57,7 @@ TEST(VtkRealFile, ALegacyRectilinearGrid) {
   EXPECT_FLOAT_EQ(speed.range[1], 10.3964F);
 }
 
-TEST(VtkRealFile, AnImageWithUnlikeSpacings) {
+TEST(VtkRealFile, ImageWithDifferentSpacings) {
   const auto source = real("heart.vti");
   ASSERT_TRUE(source);
   const DatasetInfo& info = source->info();
@@ -71,7 +71,7 @@ TEST(VtkRealFile, AnImageWithUnlikeSpacings) {
 }
 
 // The bounding box holds 36, the cells 35.5475.
-TEST(VtkRealFile, AnUnstructuredGridOfHexahedra) {
+TEST(VtkRealFile, UnstructuredGridOfHexahedra) {
   const auto source = real("fire_ug.vtu");
   ASSERT_TRUE(source);
   const DatasetInfo& info = source->info();
@@ -107,7 +107,7 @@ TEST(VtkRealFile, AnUnstructuredGridOfHexahedra) {
   }
 }
 
-TEST(VtkRealFile, ACurvedStructuredGrid) {
+TEST(VtkRealFile, CurvedStructuredGrid) {
   const auto source = real("SampleStructGrid.vtk");
   ASSERT_TRUE(source);
   EXPECT_THAT(all_notes(source->info()), HasSubstr("resampled from 24000 points"));

@@ -1,5 +1,5 @@
-// Meshes on an even lattice: linear fields come back as they are, the share of samples inside is
-// the mesh's share of its box, smooth fields converge with the square of the cells' size.
+// Meshes resampled on an even lattice: linear fields are reproduced, the share of inside samples is
+// the mesh's share of its box, smooth fields converge with the square of the cell size.
 #include <gmock/gmock.h>
 
 #include <numbers>
@@ -11,7 +11,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// Turned about z by up to a third of a right angle with height: the faces between are not flat.
+// Rotated about z by up to a third of a right angle with height: the internal faces are not planar.
 Place twist(const Place& p) {
   const double angle = p[2] * std::numbers::pi / 6;
   const double x = p[0] - 0.5;
@@ -20,7 +20,7 @@ Place twist(const Place& p) {
           2 * p[2]};
 }
 
-TEST_F(VtkResampling, LinearFieldsComeBackOnTwistedCellsOfEveryShape) {
+TEST_F(VtkResampling, LinearFieldsAreExactOnTwistedCellsOfEveryShape) {
   // The twist keeps areas at each height, so the volume is 2.
   for (const auto& cut : {as_hexahedron, as_voxel, as_wedges, as_tetrahedra, as_pyramids}) {
     const TestMesh mesh = boxes(12, twist, cut);
@@ -32,7 +32,7 @@ TEST_F(VtkResampling, LinearFieldsComeBackOnTwistedCellsOfEveryShape) {
   }
 }
 
-TEST_F(VtkResampling, SmoothFieldsConvergeWithTheSquareOfTheCellsSize) {
+TEST_F(VtkResampling, SmoothFieldsConvergeWithTheSquareOfTheCellSize) {
   const Function smooth = [](const Place& p) { return std::sin(2 * p[0]) * std::cos(p[1] + p[2]); };
   for (const auto& cut : {as_hexahedron, as_tetrahedra, as_wedges}) {
     const double coarse = outcome(boxes(8, twist, cut), smooth).worst;
@@ -42,8 +42,8 @@ TEST_F(VtkResampling, SmoothFieldsConvergeWithTheSquareOfTheCellsSize) {
   }
 }
 
-// A shell: what lies in its hole and outside of it is in no cell, and is not made up.
-TEST_F(VtkResampling, TheShareInsideIsThatOfTheMesh) {
+// A shell: samples in its hole and outside are in no cell and must be masked.
+TEST_F(VtkResampling, ShareOfInsideSamplesIsThatOfTheMesh) {
   const Map shell = [](const Place& p) {
     const double angle = p[0] * 2 * std::numbers::pi;
     const double radius = 1 + p[1];
@@ -56,7 +56,7 @@ TEST_F(VtkResampling, TheShareInsideIsThatOfTheMesh) {
   EXPECT_LT(out.worst, 1e-5);
 }
 
-TEST_F(VtkResampling, ACurvedStructuredGridIsResampledTooAndItsHiddenCellsAreNot) {
+TEST_F(VtkResampling, CurvedStructuredGridIsResampledWithoutHiddenCells) {
   constexpr int n = 11;
   std::vector<double> points;
   std::vector<double> values;
@@ -91,7 +91,7 @@ TEST_F(VtkResampling, ACurvedStructuredGridIsResampledTooAndItsHiddenCellsAreNot
   EXPECT_LT(inside, 0.7);
 }
 
-TEST_F(VtkResampling, AFlatMeshIsAPlane) {
+TEST_F(VtkResampling, FlatMeshIsAPlane) {
   TestMesh mesh;
   // y = 5; both cells are as high as long.
   mesh.points = {0, 5, 0, 2, 5, 0, 2, 5, 2, 0, 5, 2, 4, 5, 0};
@@ -109,7 +109,7 @@ TEST_F(VtkResampling, AFlatMeshIsAPlane) {
   EXPECT_NEAR(out.inside, 0.75, 0.03);
 }
 
-TEST_F(VtkResampling, CellDataAreThoseOfTheCellThatHoldsTheSample) {
+TEST_F(VtkResampling, CellDataAreThoseOfTheContainingCell) {
   const Map stretch = [](const Place& p) { return Place{p[0] + 0.3 * p[2], p[1], p[2]}; };
   const TestMesh mesh = boxes(2, stretch, as_hexahedron);
   VtkXml xml;
@@ -138,9 +138,8 @@ TEST_F(VtkResampling, CellDataAreThoseOfTheCellThatHoldsTheSample) {
   }
 }
 
-// Tetrahedra along the diagonal, which have all samples in their boxes and few in themselves: just
-// those whose barycentric coordinates are not negative. The boxes hold 600 times the samples
-// wanted.
+// Tetrahedra along the diagonal, whose boxes contain all samples and which contain few: those with
+// nonnegative barycentric coordinates. The boxes contain 600 times the samples.
 TestMesh slivers(double width, int count) {
   TestMesh mesh;
   mesh.points = {0, 0, 0, width, 0, 0, 0, width, 0, 1, 1, 1};
@@ -148,7 +147,7 @@ TestMesh slivers(double width, int count) {
   return mesh;
 }
 
-TEST_F(VtkResampling, SliversHoldWhatTheirBarycentricCoordinatesSay) {
+TEST_F(VtkResampling, SliversUseTheirBarycentricCoordinates) {
   constexpr double width = 0.1;
   const TestMesh mesh = slivers(width, 20);
   VtkXml xml;
@@ -177,7 +176,7 @@ TEST_F(VtkResampling, SliversHoldWhatTheirBarycentricCoordinatesSay) {
 
 // Wedges that lie one upon the other in half of a cube: samples of the other half are sought in
 // every one of them. A few kilobytes must not make a minute of work.
-TEST_F(VtkResampling, CellsThatAskForMoreWorkThanTheirFileIsWorthAreRefused) {
+TEST_F(VtkResampling, CellsWithExcessiveWorkForTheirFileAreRefused) {
   for (const int count : {20, 200}) {
     TestMesh mesh;
     mesh.points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1};
@@ -188,7 +187,7 @@ TEST_F(VtkResampling, CellsThatAskForMoreWorkThanTheirFileIsWorthAreRefused) {
     EXPECT_EQ(said.find("too thin and oblique to be resampled") != std::string::npos, count == 200)
         << said;
   }
-  // So thin that the lattice has all the samples that it may, whose rows are in every one's box.
+  // So thin that the lattice has the maximum number of samples, whose rows are in every box.
   const TestMesh thin = slivers(1e-4, 60);
   VtkXml xml;
   const auto data = xml.array("Float64", "a", 1, at_points(thin, linear));
@@ -196,8 +195,8 @@ TEST_F(VtkResampling, CellsThatAskForMoreWorkThanTheirFileIsWorthAreRefused) {
               HasSubstr("too thin and oblique to be resampled"));
 }
 
-// As much overlap as a file can honestly have: a cell that lies in the cube a thousand times over.
-TEST_F(VtkResampling, CellsThatLieOneUponTheOtherAreReadWithinThatBound) {
+// The most overlap of a valid file: a cell repeated a thousand times.
+TEST_F(VtkResampling, OverlappingCellsWithinThatBoundAreRead) {
   TestMesh mesh = boxes(
       1, [](const Place& p) { return p; }, as_hexahedron);
   for (int c = 1; c < 1000; ++c) mesh.cell(12, {0, 1, 3, 2, 4, 5, 7, 6});
@@ -206,7 +205,7 @@ TEST_F(VtkResampling, CellsThatLieOneUponTheOtherAreReadWithinThatBound) {
   EXPECT_LT(out.worst, 1e-5);
 }
 
-// Every piece counts its points and cells from 0. A cell's value is its piece's number.
+// Every piece numbers its points and cells from 0. A cell's value is the number of its piece.
 TEST_F(VtkResampling, PiecesOfOneMeshAreOne) {
   const auto at_x = [](double from) {
     return [from](const Place& p) { return Place{from + p[0], p[1], p[2]}; };
@@ -225,7 +224,7 @@ TEST_F(VtkResampling, PiecesOfOneMeshAreOne) {
     }
     const auto source = opened(folder_.write("p.vtu", xml.file("UnstructuredGrid", "", inner)));
     ASSERT_TRUE(source);
-    // Samples on the face between belong to the cells that come first.
+    // Samples on a shared face belong to the cells that come first.
     const Outcome got = compare(*source, [&](const Place& p) {
       return of_cells ? (p[0] < 1 + 1e-6 ? 1.0 : 2.0) : linear(p);
     });
@@ -248,8 +247,8 @@ TEST_F(VtkResampling, HiddenCellsHoldNothing) {
   EXPECT_NEAR(compare(*source, linear).volume, 0.5, 0.01);
 }
 
-// At x = 0 the corners at x = 1 have no weight.
-TEST_F(VtkResampling, WhatHasNoWeightMayBeMissing) {
+// At x = 0 the corners at x = 1 have zero weight.
+TEST_F(VtkResampling, PointsOfZeroWeightMayBeMissing) {
   const TestMesh mesh = boxes(
       1, [](const Place& p) { return p; }, as_hexahedron);
   VtkXml xml({"base64", "", false, 4});
@@ -266,7 +265,7 @@ TEST_F(VtkResampling, WhatHasNoWeightMayBeMissing) {
   EXPECT_EQ(volume.range, (std::array<float, 2>{5, 5}));
 }
 
-TEST_F(VtkResampling, DegenerateAndUnreadableCellsAreCountedAndTheOthersShown) {
+TEST_F(VtkResampling, DegenerateCellsAreCountedAndTheOthersShown) {
   TestMesh mesh = boxes(
       3, [](const Place& p) { return p; }, as_hexahedron);
   mesh.cell(12, {0, 0, 0, 0, 1, 1, 1, 1});
@@ -310,7 +309,7 @@ TEST_F(VtkResampling, BrokenCellsAreErrors) {
               HasSubstr("without any volume"));
 }
 
-TEST_F(VtkResampling, ASurfaceInSpaceIsRefused) {
+TEST_F(VtkResampling, SurfaceInSpaceIsRefused) {
   TestMesh mesh;
   mesh.points = {0, 0, 0, 1, 0, 0, 1, 1, 1};
   mesh.cell(5, {0, 1, 2});

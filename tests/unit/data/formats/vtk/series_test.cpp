@@ -1,4 +1,4 @@
-// Steps in files of their own: collections and patterns, their times, their common grid.
+// Steps in separate files: collections and patterns, their times, their common grid.
 #include <gmock/gmock.h>
 
 #include "tests/unit/data/formats/vtk/vtk_maker.hpp"
@@ -30,7 +30,7 @@ std::string collection(const std::string& sets) {
          "</Collection></VTKFile>";
 }
 
-TEST(VtkSeries, APatternIsStepsInOrderWithTheFilesTimes) {
+TEST(VtkSeries, PatternGivesOrderedStepsWithTheFilesTimes) {
   const VtkFolder folder;
   folder.write("f10.vti", image(10, "2.5"));
   folder.write("f2.vti", image(2, "0.5"));
@@ -45,7 +45,7 @@ TEST(VtkSeries, APatternIsStepsInOrderWithTheFilesTimes) {
   EXPECT_EQ(volume_of(*source, "b", 2).values[7], -10);
 }
 
-TEST(VtkSeries, WithoutTimesStepsAreCounted) {
+TEST(VtkSeries, StepsWithoutTimesAreNumbered) {
   const VtkFolder folder;
   folder.write("f1.vti", image(1, ""));
   folder.write("f2.vti", image(2, ""));
@@ -54,7 +54,7 @@ TEST(VtkSeries, WithoutTimesStepsAreCounted) {
   EXPECT_EQ(source->info().steps[1].value, 1);
 }
 
-TEST(VtkSeries, ACollectionGivesTheTimes) {
+TEST(VtkSeries, CollectionGivesTheTimes) {
   const VtkFolder folder;
   std::filesystem::create_directory(folder.path("data"));
   folder.write("data/late.vti", image(5, "77"));
@@ -71,7 +71,7 @@ TEST(VtkSeries, ACollectionGivesTheTimes) {
   EXPECT_EQ(volume_of(*source, "a", 1).values[0], 5);
 }
 
-TEST(VtkSeries, WhatACollectionMayNotDo) {
+TEST(VtkSeries, InvalidCollectionsAreRefused) {
   const VtkFolder folder;
   folder.write("a.vti", image(1, ""));
   const auto set = [](const std::string& file, const std::string& time) {
@@ -89,7 +89,7 @@ TEST(VtkSeries, WhatACollectionMayNotDo) {
   EXPECT_NE(refused(set("all.pvd", "0")), "");
 }
 
-TEST(VtkSeries, AStepOnAnotherGridIsNamed) {
+TEST(VtkSeries, StepOnAnotherGridIsReported) {
   const VtkFolder folder;
   folder.write("f1.vti", image(1, ""));
   folder.write("f2.vti", image(2, ""));
@@ -100,7 +100,7 @@ TEST(VtkSeries, AStepOnAnotherGridIsNamed) {
   EXPECT_THAT(message, HasSubstr("another grid"));
 }
 
-TEST(VtkSeries, AFieldThatAStepLacksIsLeftOut) {
+TEST(VtkSeries, FieldMissingInAStepIsOmitted) {
   const VtkFolder folder;
   folder.write("f1.vti", image(1, ""));
   folder.write("f2.vti", image(2, "", {2, 2, 2}, "other"));
@@ -118,7 +118,7 @@ std::string tetrahedron(double top, double value) {
   return file + "LOOKUP_TABLE default\n" + std::to_string(value) + "\n";
 }
 
-TEST(VtkSeries, MeshesMustNotMove) {
+TEST(VtkSeries, MovingMeshesAreRefused) {
   const VtkFolder folder;
   folder.write("m1.vtk", tetrahedron(1, 3));
   folder.write("m2.vtk", tetrahedron(1, 4));
@@ -129,7 +129,7 @@ TEST(VtkSeries, MeshesMustNotMove) {
   EXPECT_THAT(refusal(folder.path("m*.vtk")), HasSubstr("step 1"));
 }
 
-TEST(VtkSeries, AFileThatChangedIsAnError) {
+TEST(VtkSeries, ChangedFileIsAnError) {
   const VtkFolder folder;
   folder.write("m1.vtk", tetrahedron(1, 3));
   folder.write("m2.vtk", tetrahedron(1, 4));

@@ -101,7 +101,7 @@ TEST_F(VtkResampling, SlopesDoNotThickenLayers) {
 }
 
 // The same of wedges without indices: what is known is their boxes.
-TEST_F(VtkResampling, SpacingFollowsTheCellsOfAMeshToo) {
+TEST_F(VtkResampling, SpacingFollowsTheCellsOfAMesh) {
   const Map flat = [](const Place& p) { return Place{1000 * p[0], 400 * p[1], 10 * p[2]}; };
   const TestMesh mesh = boxes(16, flat, as_wedges);
   VtkXml xml({"appended-raw", "", false, 8});

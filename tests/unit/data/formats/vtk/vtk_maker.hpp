@@ -1,4 +1,4 @@
-// Small VTK files as bytes, encoded here and not by the program under test.
+// Small VTK files as bytes, encoded here independently of the program under test.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@
 
 namespace windsplat::data::vtk_test {
 
-// A folder of its own for a test's files.
+// A folder for the files of one test.
 class VtkFolder {
  public:
   VtkFolder() {
@@ -113,7 +113,7 @@ class VtkXml {
     return tag;
   }
 
-  // The whole document: `inner` is what stands within the element called `type`.
+  // The whole document: `inner` is the content of the element `type`.
   std::string file(const std::string& type, const std::string& attributes,
                    const std::string& inner) const {
     std::string out = "<?xml version=\"1.0\"?>\n<VTKFile type=\"" + type + "\" version=\"1.0\" ";
@@ -211,7 +211,7 @@ inline std::unique_ptr<Source> opened(const std::string& path) {
   return std::move(*source);
 }
 
-// The message of the error that opening, or else reading the first field, must end with.
+// The message of the expected error of opening, or of reading the first field.
 inline std::string refusal(const std::string& path) {
   auto source = open_file(path);
   if (!source) return source.error().message;

@@ -1,4 +1,4 @@
-// VTK's XML grids: every way of writing numbers, extents, pieces, ghosts, directions, cells.
+// VTK XML grids: every encoding of numbers, extents, pieces, ghosts, directions, cells.
 #include <gmock/gmock.h>
 
 #include "tests/unit/data/formats/vtk/vtk_maker.hpp"
@@ -30,7 +30,7 @@ std::vector<VtkCoding> all_codings() {
   return out;
 }
 
-TEST(VtkXmlFile, NumbersAreTheSameHoweverTheyAreWritten) {
+TEST(VtkXmlFile, ValuesAreTheSameInEveryEncoding) {
   const VtkFolder folder;
   const std::vector<std::string> types{"Int8",   "UInt8", "Int16",  "UInt16",  "Int32",
                                        "UInt32", "Int64", "UInt64", "Float32", "Float64"};
@@ -63,8 +63,8 @@ TEST(VtkXmlFile, NumbersAreTheSameHoweverTheyAreWritten) {
   }
 }
 
-// Some writers end the header's base64 with its own padding, without a compressor too.
-TEST(VtkXmlFile, AHeaderInAUnitOfItsOwnIsRead) {
+// Some writers pad the base64 of the header separately, also without a compressor.
+TEST(VtkXmlFile, SeparatelyEncodedHeaderIsRead) {
   const VtkFolder folder;
   const std::string bytes = packed("Float32", even_ramp(samples), false);
   const std::string data = "<DataArray type=\"Float32\" Name=\"a\" format=\"binary\">" +
@@ -86,16 +86,16 @@ TEST(VtkXmlFile, OriginSpacingAndExtentPlaceTheSamples) {
   ASSERT_TRUE(source);
   const auto& axes = source->info().grid.axes;
   EXPECT_THAT(axes[0].coordinates, ElementsAre(11, 11.5, 12, 12.5, 13));
-  // 20 - 2 * {-1 .. 2}, turned to ascend.
+  // 20 - 2 * {-1 .. 2}, reversed to ascend.
   EXPECT_THAT(axes[1].coordinates, ElementsAre(16, 18, 20, 22));
   EXPECT_THAT(axes[2].coordinates, ElementsAre(30, 34, 38));
   const Volume volume = volume_of(*source, "a");
-  EXPECT_EQ(volume.values[0], 16);  // j = 3 lies lowest
+  EXPECT_EQ(volume.values[0], 16);  // j = 3 is lowest
   EXPECT_EQ(volume.values[15], 1);
 }
 
 // i runs along y, j against x, k along z: world = origin + direction * (spacing * index).
-TEST(VtkXmlFile, ADirectionMayPermuteAndTurnAxes) {
+TEST(VtkXmlFile, DirectionMayPermuteAndReverseAxes) {
   const VtkFolder folder;
   VtkXml xml;
   const auto source = opened(folder.write(
@@ -121,7 +121,7 @@ TEST(VtkXmlFile, ADirectionMayPermuteAndTurnAxes) {
       HasSubstr("Direction"));
 }
 
-TEST(VtkXmlFile, ARectilinearGridKeepsItsUnevenCoordinatesAndTurnsThoseThatDescend) {
+TEST(VtkXmlFile, RectilinearGridKeepsUnevenAndReversesDescendingAxes) {
   const VtkFolder folder;
   VtkXml xml({"appended-raw", "ZLib", true, 8});
   std::string inner = "<Piece Extent=\"0 4 0 3 0 2\"><PointData>";
@@ -138,7 +138,7 @@ TEST(VtkXmlFile, ARectilinearGridKeepsItsUnevenCoordinatesAndTurnsThoseThatDesce
   EXPECT_EQ(volume_of(*source, "a").values[40], 0);
 }
 
-TEST(VtkXmlFile, PiecesAreAssembledAndWhatNoneCoversIsMasked) {
+TEST(VtkXmlFile, PiecesAreAssembledAndGapsMasked) {
   const VtkFolder folder;
   VtkXml xml({"appended-base64", "LZ4", false, 4});
   const auto piece = [&](int first, int last, double value) {
@@ -188,8 +188,8 @@ TEST(VtkXmlFile, CellsBetweenPiecesAreMaskedAndNoted) {
   }
 }
 
-// x descends: the first piece lies in the east. Values are 10 times the world's x, plus y.
-TEST(VtkXmlFile, PiecesAlongAnAxisThatDescendsStandWhereTheyBelong) {
+// x descends: the first piece is in the east. Values are 10 times the world x, plus y.
+TEST(VtkXmlFile, PiecesAlongADescendingAxisKeepTheirPositions) {
   const VtkFolder folder;
   VtkXml xml;
   const auto piece = [&](int first, const std::vector<double>& x) {
@@ -214,7 +214,7 @@ TEST(VtkXmlFile, PiecesAlongAnAxisThatDescendsStandWhereTheyBelong) {
   EXPECT_THAT(values, ElementsAre(0, 10, 40, 90, 160, 1, 11, 41, 91, 161));
 }
 
-TEST(VtkXmlFile, HiddenPointsAndWhatIsNotANumberAreMasked) {
+TEST(VtkXmlFile, HiddenPointsAndNanAreMasked) {
   const VtkFolder folder;
   VtkXml xml({"base64", "", false, 4});
   std::vector<double> values = even_ramp(samples);
@@ -234,7 +234,7 @@ TEST(VtkXmlFile, HiddenPointsAndWhatIsNotANumberAreMasked) {
   EXPECT_EQ(volume.values[11], 12);
 }
 
-TEST(VtkXmlFile, CellsAreShownAtTheirCentresWhereTheyHaveMoreFields) {
+TEST(VtkXmlFile, CellCentersAreUsedWhereTheyHaveMoreFields) {
   const VtkFolder folder;
   VtkXml xml;
   const auto source =
@@ -253,7 +253,7 @@ TEST(VtkXmlFile, CellsAreShownAtTheirCentresWhereTheyHaveMoreFields) {
   EXPECT_THAT(reason_of(info, "p"), HasSubstr("at points"));
 }
 
-TEST(VtkXmlFile, ArraysOfOtherKindsAreLeftOutWithTheReason) {
+TEST(VtkXmlFile, UnsupportedArraysAreOmittedWithTheReason) {
   const VtkFolder folder;
   VtkXml xml;
   std::string data = xml.array("Float32", "stress", 6, even_ramp(6 * samples));
@@ -270,7 +270,7 @@ TEST(VtkXmlFile, ArraysOfOtherKindsAreLeftOutWithTheReason) {
   EXPECT_THAT(reason_of(info, "words"), HasSubstr("String"));
 }
 
-TEST(VtkXmlFile, LzmaAndOtherDataSetsAreRefusedWithTheReason) {
+TEST(VtkXmlFile, LzmaAndUnsupportedDataSetsAreRefusedWithTheReason) {
   const VtkFolder folder;
   EXPECT_THAT(
       refusal(folder.write("a.vti", VtkXml({"ascii", "LZMA", false, 4}).image(xml_dims, "", ""))),
@@ -279,8 +279,8 @@ TEST(VtkXmlFile, LzmaAndOtherDataSetsAreRefusedWithTheReason) {
               HasSubstr("'PolyData'"));
 }
 
-// Numbers beyond a double's range are those of data all the same: infinite with their sign, or 0.
-TEST(VtkXmlFile, TextBeyondTheRangeOfNumbersIsMaskedOrZero) {
+// Numbers beyond the range of double are data: infinite with their sign, or 0.
+TEST(VtkXmlFile, TextBeyondTheNumericRangeIsMaskedOrZero) {
   const VtkFolder folder;
   VtkXml xml;
   std::string data = xml.array("Float64", "a", 1, {11, 22, 33, 44});
