@@ -14,7 +14,8 @@ Json point_json(const StudyPoint& point) {
               {"max", point.max},       {"psnr", point.psnr},
               {"flip", point.flip},     {"ms", point.ms},
               {"msMin", point.ms_min},  {"msMax", point.ms_max},
-              {"pareto", point.pareto}, {"stable", point.stable}};
+              {"own", point.own},       {"pareto", point.pareto},
+              {"stable", point.stable}};
 }
 
 Json calibration_json(const StudyCalibration& calibration) {
@@ -43,6 +44,7 @@ Json calibration_json(const StudyCalibration& calibration) {
   for (const StudyCompared& one : calibration.points) {
     points.push_back(Json{{"look", one.look},
                           {"view", one.view},
+                          {"settingClass", one.setting_class},
                           {"method", one.method},
                           {"halfLevel", one.half_level},
                           {"coarser", one.coarser},
@@ -52,11 +54,19 @@ Json calibration_json(const StudyCalibration& calibration) {
                           {"spread", one.spread},
                           {"prior", one.prior}});
   }
+  Json measured = Json::array();
+  for (const StudyMeasuredFrame& one : calibration.measured) {
+    measured.push_back(Json{{"look", one.look},
+                            {"method", one.method},
+                            {"error", one.error},
+                            {"measured", one.measured}});
+  }
   return Json{{"width", calibration.width},        {"height", calibration.height},
               {"surveyed", calibration.surveyed},  {"heldOut", calibration.held_out},
               {"seconds", calibration.seconds},    {"looks", calibration.looks},
               {"agreement", std::move(agreement)}, {"aims", std::move(aims)},
-              {"checks", std::move(checks)},       {"points", std::move(points)}};
+              {"checks", std::move(checks)},       {"points", std::move(points)},
+              {"measured", std::move(measured)}};
 }
 
 Json scene_json(const StudyScene& scene) {
@@ -95,6 +105,11 @@ Json scene_json(const StudyScene& scene) {
             {"reconstructionRipple", scene.reconstruction_ripple},
             {"jpeg", std::move(jpeg)}};
   if (scene.calibration) json["calibration"] = calibration_json(*scene.calibration);
+  for (const StudyPicture& picture : scene.pictures) {
+    Json one{{"title", picture.title}, {"png", picture.png}};
+    if (!picture.difference_png.empty()) one["differencePng"] = picture.difference_png;
+    json["pictures"].push_back(std::move(one));
+  }
   return json;
 }
 
@@ -113,7 +128,7 @@ Json stability_json(const StudyStability& one) {
 
 }  // namespace
 
-std::string encode_study(const StudyDocument& study) {
+std::string encode_study(const StudyDocument& study, bool compact) {
   Json scenes = Json::array();
   for (const StudyScene& scene : study.scenes) scenes.push_back(scene_json(scene));
   Json stability = Json::array();
@@ -132,8 +147,9 @@ std::string encode_study(const StudyDocument& study) {
                       {"measured", study.measured},
                       {"skipped", study.skipped},
                       {"scenes", std::move(scenes)},
-                      {"stability", std::move(stability)}};
-  return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+                      {"stability", std::move(stability)},
+                      {"stabilityLayers", study.stability_layers}};
+  return document.dump(compact ? -1 : 2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace windsplat::protocol

@@ -1,4 +1,4 @@
-// The report of `windsplat study` as typed values -> study.json. Numbers that are not finite become
+// A study's report as typed values -> JSON of study.schema.json. Numbers that are not finite become
 // null.
 #pragma once
 
@@ -19,6 +19,7 @@ struct StudyPoint {
   std::vector<std::pair<std::string, double>> knobs;  // named as in the view
   double rmse = 0, max = 0, psnr = 0, flip = 0;
   double ms = 0, ms_min = 0, ms_max = 0;
+  bool own = false;  // the settings of the scene's view
   bool pareto = false;
   bool stable = true;
 };
@@ -46,32 +47,41 @@ struct StudyReference {
   std::int64_t pieces = 0, evaluations = 0;
 };
 
-// Agreement of reported and true errors: fractions within a factor of 2, and within the bound.
+// Reported against true errors: shares within a factor of 2, and within the predicted bound.
 struct StudyAgreement {
   std::string of;
   std::size_t count = 0;
   double within_two = 0, median = 0, bounded = 0;
 };
 
-// Results of choosing settings for one error limit.
+// Held-out frames whose setting was chosen for a requested maximum error.
 struct StudyAim {
   double max_error = 0;
   std::size_t frames = 0;
-  std::size_t promised = 0, promised_kept = 0;  // forecast to satisfy it; of these, did
-  std::size_t possible = 0, possible_kept = 0;  // some setting satisfies it; chosen one did
+  std::size_t promised = 0, promised_kept = 0;  // forecast to meet it; and met it
+  std::size_t possible = 0, possible_kept = 0;  // some setting meets it; and the chosen one did
 };
 
 // One setting at one held-out view.
 struct StudyCompared {
   std::string look;
   std::size_t view = 0;
+  std::string setting_class;  // as in the agreement
   std::string method;
   int half_level = 0, coarser = 0, thinner = 1;
   double error = 0;  // true
   double estimate = 0, spread = 0, prior = 0;
 };
 
-// Comparison of the extrapolated reference with the integral.
+// A frame of a held-out view whose error was measured by rendering it more finely.
+struct StudyMeasuredFrame {
+  std::string look;
+  std::string method;
+  double error = 0;  // true
+  double measured = 0;
+};
+
+// The extrapolated reference against the integral.
 struct StudyCheck {
   std::string look;
   double apart = 0, estimate = 0;
@@ -86,6 +96,14 @@ struct StudyCalibration {
   std::vector<StudyAim> aims;
   std::vector<StudyCheck> checks;
   std::vector<StudyCompared> points;
+  std::vector<StudyMeasuredFrame> measured;
+};
+
+// A picture and its amplified difference from the reference, as base64 PNG.
+struct StudyPicture {
+  std::string title;
+  std::string png;
+  std::string difference_png;  // empty: the reference itself
 };
 
 struct StudyScene {
@@ -97,6 +115,7 @@ struct StudyScene {
   double reconstruction_ripple = 0;  // null: curved lattice or slice
   std::vector<StudyEncoding> jpeg;
   std::optional<StudyCalibration> calibration;
+  std::vector<StudyPicture> pictures;
 };
 
 struct StudyStability {
@@ -117,9 +136,10 @@ struct StudyDocument {
   std::size_t measured = 0, skipped = 0;
   std::vector<StudyScene> scenes;
   std::vector<StudyStability> stability;
+  int stability_layers = 0;  // cells of `layers_min` and `layers_max`
 };
 
-// Indented by two spaces.
-std::string encode_study(const StudyDocument& study);
+// Indented by two for human readers; `compact`: one line.
+std::string encode_study(const StudyDocument& study, bool compact = false);
 
 }  // namespace windsplat::protocol

@@ -21,7 +21,7 @@
 #include "server/cli/signals.hpp"
 #include "server/data/resident/store.hpp"
 #include "server/engine/reference/reference.hpp"
-#include "server/study/report.hpp"
+#include "server/study/report/report.hpp"
 
 namespace windsplat::cli {
 namespace {

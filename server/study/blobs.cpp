@@ -35,10 +35,10 @@ double density(double x, double y, double z) {
 }
 
 std::array<double, 3> flow(double x, double y, double z) {
-  const double cx = x - 0.25 * std::sin(2 * z);  // the axis leans
+  const double cx = x - 0.25 * std::sin(2 * z);  // the axis tilts
   const double cy = y - 0.25 * std::cos(2 * z);
   const double r2 = cx * cx + cy * cy;
-  // Gusts: the fastest samples are spread over the volume.
+  // Modulated, so that the fastest samples are spread over the volume.
   const double wave = std::sin(6 * x + 1) * std::sin(6 * y + 2) * std::sin(6 * z + 3);
   const double gust = 0.25 + 0.75 * wave * wave;
   const double swirl = 1.6 * gust * std::exp(-1.2 * r2);
@@ -75,7 +75,7 @@ class Blobs final : public data::Source {
     info_.title = "Blobs in a swirl";
     info_.source = "study";
     info_.format = "sample";
-    info_.digest = "study:blobs:v1";  // a new number whenever a formula changes
+    info_.digest = "study:blobs:v1";  // increment the version when a formula changes
     info_.grid.axes = {edge("x"), edge("y"), edge("z")};
     info_.fields = {field("density", data::FieldKind::scalar, {"density"}, "1"),
                     field("flow", data::FieldKind::vector, {"u", "v", "w"}, "m s-1")};

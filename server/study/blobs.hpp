@@ -9,8 +9,8 @@ namespace windsplat::study {
 
 inline constexpr int blob_samples = 24;  // along each axis
 
-// Scalar "density" in [0, 1] (Gaussian blobs) and vector "flow" (a gusty helix about z that leans
-// with height, magnitude up to about 0.8) on the cube [-1, 1]^3.
+// Scalar "density" in [0, 1] (Gaussian blobs) and vector "flow" (a turbulent helix about an axis
+// that tilts with height, magnitude up to about 0.8) on the cube [-1, 1]^3.
 std::unique_ptr<data::Source> make_blobs();
 
 }  // namespace windsplat::study

@@ -1,4 +1,5 @@
-// Views of a fixed sequence, some surveyed, the others drawn at every setting and compared.
+// Views of a fixed sequence: some are calibrated, the others rendered at every setting and
+// compared.
 #include "server/study/calibration.hpp"
 
 #include <algorithm>
@@ -30,7 +31,7 @@ constexpr double density_factor = 10;
 constexpr double thick_radius = 4;  // pixels at a height of 720
 constexpr double zoom_least = 0.6;
 constexpr double zoom_most = 4;
-// Places of the sequence: those before the first one are what quality/laws.cpp was fitted to.
+// Indices into the sequence. quality/laws.cpp was fitted to views before the first one.
 constexpr std::uint64_t first_view = 100'000;
 constexpr std::uint64_t views_of_a_look = 1000;  // at most
 constexpr std::array<double, 7> max_errors{0.1, 0.05, 0.03, 0.02, 0.01, 3e-3, 1e-3};
@@ -46,7 +47,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// Errors of one view by setting; not a number where a setting is not allowed.
+// Errors of one view by setting; NaN where a setting is not allowed.
 using SettingErrors = std::array<double, quality::settings_count>;
 
 class Calibrator {
@@ -181,7 +182,7 @@ class Calibrator {
     }
   }
 
-  // The picture and the error of its own are the workspace's then.
+  // Leaves the picture and its measured error in the workspace.
   Result<void> draw_measured(const protocol::View& view) {
     frame::Encoding encoding;
     encoding.format = frame::Format::npy;
@@ -194,7 +195,7 @@ class Calibrator {
     return frame::draw(*prepared, *subject_.dataset, pool_, cancel_, workspace_);
   }
 
-  // Of the workspace's picture; the planes are the workspace's too.
+  // Encodes the workspace's picture; leaves its planes in the workspace.
   Result<image::Bytes> encoded(const protocol::View& view, int quality,
                                image::Subsampling subsampling) {
     const auto& [width, height, rgba] = workspace_.space.image();
@@ -292,11 +293,11 @@ std::vector<Look> looks_of(const Subject& subject) {
   const protocol::View& own = subject.view;
   const bool lines = own.vector.field.kind == protocol::FieldChoice::Kind::named;
   const bool medium = !own.scalars->empty();
-  std::vector<Look> looks{{"as it is", own}};
+  std::vector<Look> looks{{"unchanged", own}};
   if (lines && medium) {
-    looks.push_back({"lines alone", own});
+    looks.push_back({"lines only", own});
     looks.back().view.scalars->clear();
-    looks.push_back({"medium alone", own});
+    looks.push_back({"medium only", own});
     looks.back().view.vector.field = {protocol::FieldChoice::Kind::none, ""};
   }
   if (medium) {

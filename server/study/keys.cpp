@@ -17,7 +17,7 @@ std::string exactly(double value) {
   return text.data();
 }
 
-// All that a scene's numbers depend on, but for the truth and the setting.
+// What a scene's numbers depend on, except reference and setting.
 std::string identity(const Subject& subject, const Machine& machine) {
   std::string text = "windsplat " + machine.program;
   text += ' ';

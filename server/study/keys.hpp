@@ -1,4 +1,4 @@
-// What a kept result depends on -> the key under which a study finds it again.
+// What a stored result depends on -> its key.
 #pragma once
 
 #include <string>
@@ -9,18 +9,18 @@
 
 namespace windsplat::study {
 
-// What a point is measured against, and how.
+// The reference of a point, and how often it is timed.
 struct Measuring {
-  bool integral = true;  // the truth; else it is extrapolated from slabs
+  bool integral = true;  // the reference; else extrapolated from slabs
   double tolerance = 0;  // of the integral
-  int runs = 1;          // by the clock
+  int runs = 1;          // timed
 };
 
-// Of a subject's integral: the subject's data and view, the tolerance, and the program itself.
+// Key of a subject's integral: data and view, tolerance, and the executable.
 std::string truth_key(const Subject& subject, const Machine& machine, double tolerance);
 
-// Of one point: the truth, the setting and the runs, and what the time depends on: processor,
-// threads and instruction set.
+// Key of one point: reference, setting and runs, and what the time depends on: processor, threads
+// and instruction set.
 std::string point_key(const Subject& subject, const Setting& setting, const Machine& machine,
                       const Measuring& measuring);
 

@@ -1,4 +1,4 @@
-// The system's own words -> Machine.
+// /proc, uname and the compiler -> Machine.
 #include "server/study/machine.hpp"
 
 #include <sys/utsname.h>
@@ -39,7 +39,7 @@ Result<Machine> this_machine(unsigned threads) {
     machine.system += names.machine;
   }
 #ifdef __clang__
-  machine.compiler = __VERSION__;  // it names itself
+  machine.compiler = __VERSION__;  // includes the name
 #else
   machine.compiler = "g++ " __VERSION__;
 #endif

@@ -1,4 +1,4 @@
-// What a study ran on.
+// The machine and build that a study ran on.
 #pragma once
 
 #include <string>
@@ -13,12 +13,12 @@ struct Machine {
   std::string compiler;
   std::string version;  // of windsplat
   std::string program;  // digest of the running executable's bytes
-  std::string kernels;  // the instruction set chosen
+  std::string kernels;  // the selected instruction set
   unsigned hardware_threads = 0;
-  unsigned threads = 0;  // that rendered
+  unsigned threads = 0;  // render threads
 };
 
-// Asks the system. Errors: internal (the executable cannot be read).
+// Errors: internal (the executable cannot be read).
 Result<Machine> this_machine(unsigned threads);
 
 }  // namespace windsplat::study

@@ -1,5 +1,5 @@
-// DIR/points.csv: every finished point of a study, one line each, appended as soon as it is
-// measured, so that a study that was interrupted goes on where it stopped.
+// DIR/points.csv: one line for each finished point of a study, appended as soon as it is measured,
+// so that an interrupted study can resume.
 #pragma once
 
 #include <cstdint>
@@ -17,14 +17,14 @@ namespace windsplat::study {
 // FNV-1a, 64 bits.
 std::uint64_t hash_of(std::string_view bytes);
 
-// 16 hexadecimal digits of a text that says all a result depends on: its hash.
+// Hash of a text that lists everything a result depends on: 16 hexadecimal digits.
 std::string key_of(std::string_view text);
 
 class PointsFile {
  public:
-  // Reads what is there. A line that was cut off or is no point is left out, and the file is
-  // written anew without it. Errors, which leave the file as it is: bad_data (a file that does not
-  // open with our heading), internal (it cannot be read or written).
+  // Reads an existing file. Truncated and malformed lines are skipped, and the file is rewritten
+  // without them. Errors, which leave the file unchanged: bad_data (the file does not start with
+  // the heading), internal (it cannot be read or written).
   static Result<PointsFile> open(const std::filesystem::path& path);
 
   [[nodiscard]] std::optional<Measurement> find(const std::string& key) const;

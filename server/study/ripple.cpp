@@ -16,7 +16,7 @@ constexpr int side = 48;            // pixels
 constexpr double seen_cells = 4;    // of the widest, along the picture's side
 constexpr double margin_cells = 2;  // a footprint reaches 1.37 beyond its sample
 
-// The stretch of a ray inside the box, empty where it passes by.
+// The segment of a ray inside the box; empty if it misses.
 struct Chord {
   double enter = 0;
   double leave = 0;
@@ -39,8 +39,8 @@ Chord chord(const scene::Lattice& lattice, const glm::dvec3& from, const glm::dv
   return {enter, leave};
 }
 
-// How far a point lies inside the faces of the box other than those the ray goes through there, in
-// cells; a splat beyond the margin knows nothing of them.
+// Distance in cells from a point to the faces of the box other than those that the ray crosses;
+// beyond the margin, these faces do not affect a splat.
 bool clear_of_edges(const scene::Lattice& lattice, const glm::dvec3& point) {
   int near = 0;
   for (int a = 0; a < 3; ++a) {

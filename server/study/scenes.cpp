@@ -20,7 +20,7 @@ namespace {
 constexpr std::uint64_t resident_bytes_max = 4ULL << 30;
 constexpr std::array<const char*, 5> blob_names{"soft", "dense", "stiff", "vectors", "scalar"};
 constexpr std::array<const char*, 3> sample_scenes{"climate", "tornado", "efield"};
-constexpr double azimuth = 30;    // oblique, along no axis and no diagonal
+constexpr double azimuth = 30;    // oblique: along no axis and no diagonal
 constexpr double elevation = 25;  // degrees
 
 bool is_one_of(const std::string& name, const auto& names) {
@@ -73,7 +73,7 @@ Result<Subject> blob_subject(const std::string& name, bool quick) {
     view.vector.field = {protocol::FieldChoice::Kind::none, ""};
   } else {
     view.vector.field = {protocol::FieldChoice::Kind::named, "flow"};
-    // The fastest tenth alone, or less before a medium: more would hide all that is behind them.
+    // Only the fastest tenth, or less before a medium: more would hide everything behind them.
     view.vector.min_magnitude = name == "vectors" ? 0.34 : 0.45;
     view.vector.r1 = 3;  // about a pixel wide at the study's size
     view.vector.r2 = 7;
@@ -87,7 +87,7 @@ Result<Subject> blob_subject(const std::string& name, bool quick) {
   }
   const int side = quick ? 64 : 128;
   auto subject = make_subject(name, std::move(dataset), view, {side, side});
-  if (subject) subject->calibrated = false;  // made for the methods, not for viewers
+  if (subject) subject->calibrated = false;  // made to compare methods, unlike viewed data
   return subject;
 }
 
@@ -159,7 +159,7 @@ Result<scene::Scene> scene_at(const Subject& subject, const Setting& setting) {
   scene->compositing = setting.compositing;
   scene->slab_thickness = knobs.slab_thickness;
   scene->stop_transmittance = knobs.stop_transmittance;
-  // Layers of several strides keep their ratio.
+  // Layers of different strides keep their ratio.
   const int own = own_knobs(subject).stride;
   const auto strided = [&](int stride) { return std::max(1, stride * knobs.stride / own); };
   if (scene->vector) {

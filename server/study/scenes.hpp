@@ -1,4 +1,4 @@
-// What is studied: a dataset and a view of it, by name; and scenes of it at any setting.
+// Subjects of a study (a dataset and a view of it, by name) and their scenes at any setting.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@ struct Subject {
   std::string name;
   protocol::View view;  // complete; its image is the size of the study's pictures
   std::shared_ptr<data::Dataset> dataset;
-  bool calibrated = true;  // whether a study asks if errors told of it are true
+  bool calibrated = true;  // whether the study checks its reported errors
 };
 
 struct PictureSize {
@@ -31,12 +31,12 @@ std::vector<std::string> standard_names();
 // Errors: not_found for any other name; those of the samples.
 Result<Subject> standard_subject(const std::string& name, bool quick);
 
-// Any dataset seen as a view says, but for the picture's size; obliquely if the view says nothing
-// of eye, target and height. Errors: those of scene::complete().
+// Any dataset with a view except its picture size; seen obliquely if the view sets none of eye,
+// target and height. Errors: those of scene::complete().
 Result<Subject> make_subject(const std::string& name, std::shared_ptr<data::Dataset> dataset,
                              const protocol::View& view, PictureSize size);
 
-// The knobs that a complete view has.
+// The knobs of a complete view.
 Knobs own_knobs(const protocol::View& view);
 Knobs own_knobs(const Subject& subject);
 

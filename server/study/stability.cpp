@@ -1,5 +1,5 @@
-// A cell or a row of cells behind each other, its line leaning almost along the view so that the
-// pixels of one row meet it at different depths of the cell.
+// One cell or a row of cells behind each other. Its line is almost parallel to the view, so that
+// the pixels of one row meet it at different depths of the cell.
 #include "server/study/stability.hpp"
 
 #include <algorithm>
@@ -37,11 +37,11 @@ scene::ColorTable one_color(const std::array<float, 3>& rgb) {
   return {{0, 1}, std::vector<std::array<float, 3>>(256, rgb)};
 }
 
-// Cells of edge 1 in a row along y, the way of the view.
+// Cells of edge 1 in a row along y, the view direction.
 scene::Scene make_scene(int layers, double tau, scene::Compositing compositing, bool with_line) {
   scene::Scene scene;
   scene.compositing = compositing;
-  // Nothing is left out, not even behind a transmittance that a false compositing makes negative.
+  // No early termination, not even at a negative transmittance of an unstable compositing.
   scene.stop_transmittance = -1e30;
   scene.lattice.dims = {1, layers, 1};
   for (int a = 0; a < 3; ++a) {
@@ -99,7 +99,7 @@ void take(const std::vector<float>& rgba, double& low, double& high) {
   low = std::numeric_limits<double>::infinity();
   high = -low;
   for (const float v : rgba) {
-    if (std::isnan(v)) {  // as far out as can be
+    if (std::isnan(v)) {  // counts as the largest excess
       low = -std::numeric_limits<double>::infinity();
       high = -low;
       return;
@@ -129,14 +129,14 @@ Result<Stiffness> measure_one(scene::Compositing compositing, double tau,
   take(plain->image.rgba, plain_min, plain_max);
   take(layers->image.rgba, out.layers_min, out.layers_max);
   for (int i = 0; i < pixels; ++i) {
-    // The line's way through the cell and the row's width are one: pixel i meets it at x.
+    // The line crosses the cell over the width of the row: pixel i meets it at x.
     const auto truth = exact(tau, (i + 0.5) / pixels);
     for (std::size_t c = 0; c < 4; ++c) {
       const double apart = std::abs(rgba[4 * static_cast<std::size_t>(i) + c] - truth[c]);
       if (!(apart <= out.error)) out.error = apart;
     }
     const float alpha = rgba[4 * static_cast<std::size_t>(i) + 3];
-    // Rounding may undo what grows by less than a float tells.
+    // Tolerates decreases within the rounding of a float.
     if (!alphas.empty() && !(alpha >= alphas[i] - 1e-6F)) out.monotone = false;
   }
   alphas.clear();

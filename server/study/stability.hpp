@@ -1,5 +1,5 @@
-// The stiffness sweep: one kernel with a line through its medium, drawn by the engine itself, over
-// optical depths from next to nothing to beyond all measure.
+// The stiffness sweep: one kernel with a line through its medium, rendered by the engine over the
+// whole range of optical depths.
 #pragma once
 
 #include <vector>
@@ -11,23 +11,23 @@
 namespace windsplat::study {
 
 // 1e-30 .. 1e30, the last being the largest: extinctions of a view are bounded by 1e30 per world
-// unit. No float tells its transmittance from that of infinity.
+// unit. As a float its transmittance equals that of infinity.
 const std::vector<double>& stiffness();
 
 struct Stiffness {
   scene::Compositing compositing = scene::Compositing::analytic;
   double tau = 0;
   double error = 0;  // largest of any channel and line depth, against the exact kernel
-  double min = 0;    // over channels and depths
+  double min = 0;    // over channels and line depths
   double max = 0;
   bool bounded = true;    // within [0, 1] but for 1e-3
   bool monotone = true;   // alpha no less than at the next smaller tau, at every depth of the line
-  double layers_min = 0;  // the same of stiff_layers cells behind each other, their medium alone
+  double layers_min = 0;  // of stiff_layers cells behind each other, without line
   double layers_max = 0;
-  bool diverges = false;  // the layers do not heal how far beyond [0, 1] one cell's medium goes
+  bool diverges = false;  // the layers do not reduce one cell's excess over [0, 1]
 };
 
-inline constexpr int stiff_layers = 17;  // odd: an even number of sign changes looks like none
+inline constexpr int stiff_layers = 17;  // odd: an even number of sign changes cancels
 
 // Every compositing of method kernel at every optical depth of stiffness(). Exact for one kernel
 // (medium c_s, line c_v of opacity a at the fraction x of the cell's depth):

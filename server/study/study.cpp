@@ -1,5 +1,5 @@
-// For each subject: its truth, every point of its sweep, its reconstruction ripple, its encodings,
-// its pictures and its calibration. What the folder holds is not measured again.
+// For each subject: reference, every point of the sweep, reconstruction ripple, encodings, pictures
+// and calibration. Points in the folder are not measured again.
 #include "server/study/study.hpp"
 
 #include <algorithm>
@@ -19,9 +19,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double truth_weight = 12;       // points that take as long as one truth
-constexpr double pictures_weight = 2;     // and as the rest of a scene
-constexpr double calibration_weight = 3;  // and as one view of a calibration
+constexpr double truth_weight = 12;       // cost of a reference, in points
+constexpr double pictures_weight = 2;     // of the rest of a scene
+constexpr double calibration_weight = 3;  // of one view of a calibration
 constexpr int amplification = 10;
 
 double seconds_since(Clock::time_point start) {
@@ -50,7 +50,7 @@ class Study {
 
   Result<Report> run() {
     const Clock::time_point start = Clock::now();
-    weigh();
+    estimate_work();
     for (const Subject& subject : subjects_) {
       if (const auto done = study_scene(subject); !done) return done.error();
     }
@@ -74,8 +74,8 @@ class Study {
     return options_.folder / name;
   }
 
-  // How much there is to do.
-  void weigh() {
+  // Estimates the work of this run, in points.
+  void estimate_work() {
     for (const Subject& subject : subjects_) {
       for (const Setting& setting : plan_sweep(subject, options_.quick).settings) {
         if (!points_.find(point_key(subject, setting))) left_ += 1;
@@ -95,7 +95,7 @@ class Study {
     return static_cast<int>(looks_of(subject).size()) * (plan.surveyed + plan.held_out);
   }
 
-  void tell(const Subject& subject, const std::string& doing) const {
+  void report_progress(const Subject& subject, const std::string& doing) const {
     if (listen_) listen_({subject.name, doing, left_ > 0 ? std::min(1.0, done_ / left_) : 1.0});
   }
 
@@ -115,7 +115,7 @@ class Study {
       scene.truth_seconds = kept->seconds;
       return std::move(kept->picture);
     }
-    tell(subject, "reference");
+    report_progress(subject, "reference");
     const auto truth_scene = scene_at(
         subject, {scene::Method::reference, scene::Compositing::analytic, own_knobs(subject)});
     if (!truth_scene) return truth_scene.error();
@@ -123,7 +123,7 @@ class Study {
     if (!truth) return truth.error();
     if (!finite(*truth)) {
       return make_error(ErrorKind::internal,
-                        "the truth of '" + printable(subject.name) + "' is not finite");
+                        "the reference of '" + printable(subject.name) + "' is not finite");
     }
     scene.truth_seconds = seconds_since(start);
     KeptTruth made{std::move(*truth), scene.truth_seconds, options_.tolerance};
@@ -142,9 +142,10 @@ class Study {
         scene.points.push_back({setting, *known, false});
         continue;
       }
-      // Small pictures end before the engine asks.
+      // Small pictures finish before the engine polls for cancellation.
       if (cancel_.cancelled()) return make_error(ErrorKind::cancelled, "the study was interrupted");
-      tell(subject, std::string(name_of(setting.method)) + " " + name_of(setting.compositing));
+      report_progress(subject,
+                      std::string(name_of(setting.method)) + " " + name_of(setting.compositing));
       const auto measured = measure(subject, setting, truth, pool_, cancel_, report_.runs);
       if (!measured) return measured.error();
       if (const auto kept = points_.append(key, *measured); !kept) return kept.error();
@@ -157,7 +158,7 @@ class Study {
     return {};
   }
 
-  // The truth, every compositing of method kernel, and method slab, at the view's own knobs.
+  // The reference, every compositing of method kernel, and method slab, at the view's own knobs.
   Result<void> draw_pictures(const Subject& subject, const Picture& truth, SceneReport& scene) {
     const auto base = scene_at(
         subject, {scene::Method::kernel, scene::Compositing::analytic, own_knobs(subject)});
@@ -191,11 +192,11 @@ class Study {
   }
 
   Result<Calibration> calibrate_scene(const Subject& subject) {
-    tell(subject, "calibration");
+    report_progress(subject, "calibration");
     return calibrate(subject, calibration_plan(subject, options_.quick), options_.truth, pool_,
                      cancel_, [&](int) {
                        done_ += calibration_weight;
-                       tell(subject, "calibration");
+                       report_progress(subject, "calibration");
                      });
   }
 
@@ -210,7 +211,7 @@ class Study {
     scene.pieces = truth->pieces;
     scene.evaluations = truth->evaluations;
     if (const auto done = measure_points(subject, *truth, scene); !done) return done.error();
-    tell(subject, "pictures");
+    report_progress(subject, "pictures");
     if (!subject.view.scalars->empty()) {
       const auto ripple = reconstruction_ripple(subject, pool_, cancel_);
       if (!ripple) return ripple.error();
@@ -226,7 +227,7 @@ class Study {
       if (!calibration) return calibration.error();
       scene.calibration = std::move(*calibration);
     }
-    tell(subject, "done");
+    report_progress(subject, "done");
     report_.scenes.push_back(std::move(scene));
     return {};
   }
@@ -249,7 +250,7 @@ Result<Report> run_study(const std::vector<Subject>& subjects, const Options& op
   std::error_code fault;
   std::filesystem::create_directories(options.folder, fault);
   if (fault) {
-    std::string message = "cannot make the folder '";
+    std::string message = "cannot create the folder '";
     message += printable(options.folder.native());
     message += "': ";
     message += fault.message();

@@ -1,4 +1,4 @@
-// Settings of the sweep, and their measurement against the truth.
+// Settings of the sweep, and their measurement against the reference.
 #include "server/study/sweep.hpp"
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// A subject -> the settings to measure and the curves they form; a setting -> what it costs and
-// errs.
+// A subject -> the settings to measure and their curves; a setting -> its run time and error.
 #pragma once
 
 #include <span>
@@ -15,10 +14,10 @@ namespace windsplat::study {
 
 inline constexpr int timed_runs = 9;
 inline constexpr int quick_runs = 3;        // of a quick study
-inline constexpr double unit_slack = 1e-3;  // how far beyond [0, 1] a stable picture may go
+inline constexpr double unit_slack = 1e-3;  // allowed excess of a stable picture over [0, 1]
 
 struct Sweep {
-  std::vector<Setting> settings;  // no two alike
+  std::vector<Setting> settings;  // unique
   std::vector<Curve> curves;      // points are indices of settings
 };
 
@@ -26,12 +25,12 @@ struct Sweep {
 // span, without a medium one compositing (they are the same picture). `quick`: fewer of each.
 Sweep plan_sweep(const Subject& subject, bool quick);
 
-// The setting's picture once, at its own size. Errors: those of scene_at and the engine.
+// One rendering of the setting, at its own size. Errors: those of scene_at and the engine.
 Result<engine::Image> draw(const Subject& subject, const Setting& setting, ThreadPool& pool,
                            const CancelToken& cancel);
 
-// Draws the setting once to warm up and `runs` times by the clock, and compares the picture,
-// brought to the truth's size, with the truth.
+// Renders the setting once to warm up and `runs` times timed, and compares the picture, resampled
+// to the size of the reference, with it.
 Result<Measurement> measure(const Subject& subject, const Setting& setting, const Picture& truth,
                             ThreadPool& pool, const CancelToken& cancel, int runs = timed_runs);
 
@@ -40,8 +39,8 @@ std::vector<std::uint8_t> displayed(std::span<const float> rgba, int width, int 
                                     const std::array<float, 3>& background);
 std::vector<float> to_floats(const Picture& picture);
 
-// The truth of the subject where no integral is at hand: slabs of thickness 1/4 and 1/8 with their
-// error's leading term removed, I + (I_1/8 - I_1/4) / 3. `estimate` is the RMS of that term.
+// The reference of the subject without an integral: slabs of thickness 1/4 and 1/8 with the leading
+// term of their error removed, I + (I_1/8 - I_1/4) / 3. `estimate` is the RMS of that term.
 struct Extrapolated {
   Picture picture;
   double estimate = 0;
@@ -50,13 +49,13 @@ Result<Extrapolated> extrapolate(const Subject& subject, ThreadPool& pool,
                                  const CancelToken& cancel);
 
 // RMSE over RGBA of a uniform white medium, optical depth 1 through the middle, on the subject's
-// lattice in the subject's direction, against -expm1(-rho L): what overlapping footprints ripple.
-// Not in the errors against the integral, which is of the same footprints, and so no floor of them.
-// Not a number for a bent lattice and a slice: neither is a box with an even medium.
+// lattice in the subject's direction, against -expm1(-rho L): the ripple of overlapping footprints.
+// It is not part of the errors against the integral, which has the same footprints, and no lower
+// bound of them. NaN for a bent lattice and a slice, which are no box with a uniform medium.
 Result<double> reconstruction_ripple(const Subject& subject, ThreadPool& pool,
                                      const CancelToken& cancel);
 
-// An encoding's own error, in linear light and by FLIP, of the subject's picture.
+// The error of the encoding alone, in linear light and by FLIP, of the subject's picture.
 struct Encoded {
   int quality = 0;
   double rmse = 0;

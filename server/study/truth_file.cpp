@@ -1,5 +1,5 @@
-// Six numbers (width, height, pieces, evaluations, seconds, tolerance), then RGBA; doubles as this
-// machine keeps them. Before them all, eight bytes: their hash.
+// Six numbers (width, height, pieces, evaluations, seconds, tolerance), then RGBA; doubles in
+// native byte order. The first eight bytes are their hash.
 #include "server/study/truth_file.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// A truth kept in the study's folder: it may have taken minutes. Picture <-> 8-byte numbers.
+// A reference stored in the study's folder, because it may take minutes. Picture <-> doubles.
 #pragma once
 
 #include <filesystem>
@@ -10,11 +10,11 @@ namespace windsplat::study {
 
 struct KeptTruth {
   Picture picture;
-  double seconds = 0;    // that it took
-  double tolerance = 0;  // that it was integrated to
+  double seconds = 0;    // to compute it
+  double tolerance = 0;  // of the integral
 };
 
-// Empty if there is none, or it is damaged, not finite, or not of that size or tolerance.
+// Empty if the file is missing or damaged, not finite, or of another size or tolerance.
 std::optional<KeptTruth> read_truth(const std::filesystem::path& path, int width, int height,
                                     double tolerance);
 

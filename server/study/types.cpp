@@ -1,4 +1,4 @@
-// Names of settings, and what is read off measured points: front, orders, medians.
+// Names of settings, and results of measured points: Pareto front, orders, medians.
 #include "server/study/types.hpp"
 
 #include <algorithm>

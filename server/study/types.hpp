@@ -1,5 +1,4 @@
-// What a study measures: settings of the engine, what each costs and errs, and the curves that they
-// form.
+// What a study measures: settings of the engine, their run times and errors, and their curves.
 #pragma once
 
 #include <array>
@@ -13,7 +12,7 @@
 
 namespace windsplat::study {
 
-// Everything that a study turns, named as in the view.
+// The parameters that a study varies, named as in the view.
 struct Knobs {
   int stride = 1;
   double span = 7;
@@ -56,10 +55,10 @@ struct Curve {
   scene::Compositing compositing = scene::Compositing::analytic;
   Knob knob = Knob::stride;
   std::vector<std::size_t> points;
-  double order = 0;  // slope of log rmse over log knob; not a number below three stable points
+  double order = 0;  // slope of log rmse over log knob; NaN below three stable points
 };
 
-// The same picture, in double precision.
+// A picture in double precision.
 struct Picture {
   int width = 0;
   int height = 0;
@@ -68,7 +67,7 @@ struct Picture {
   std::int64_t evaluations = 0;
 };
 
-// The truth of a scene. Errors: as those of the integrator.
+// The reference of a scene. Errors: those of the integrator.
 using Truth = std::function<Result<Picture>(const scene::Scene&)>;
 
 inline constexpr std::array<scene::Compositing, 5> compositings{
@@ -80,11 +79,11 @@ const char* name_of(scene::Compositing compositing);
 const char* name_of(Knob knob);
 double value_of(const Knobs& knobs, Knob knob);
 
-// Marks the stable points that no other stable point beats in both time and error.
+// Marks the stable points that no other stable point dominates in time and error.
 void mark_pareto(std::vector<Point>& points);
 
-// Least-squares slope of log y over log x; only pairs of two positive finite numbers count. Not a
-// number for fewer than three of them or a single x.
+// Least-squares slope of log y over log x; only pairs of two positive finite numbers count. NaN for
+// fewer than three of them or a single x.
 double log_slope(const std::vector<double>& x, const std::vector<double>& y);
 
 void find_order(const std::vector<Point>& points, Curve& curve);

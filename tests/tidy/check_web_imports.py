@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Checks the imports of the page (web/src): which folder may import from which, no circle between
-files, and how many files a folder holds. Usage: check_web_imports.py [ROOT]"""
+"""Checks the imports of the page (web/src) and of the study's report (web/report): which folder may
+import from which, no circle between files, and how many files a folder holds.
+Usage: check_web_imports.py [ROOT]"""
 import pathlib
 import posixpath
 import re
@@ -20,6 +21,7 @@ MAY_IMPORT = {
     "app": ["base", "wire", "view", "viewport", "panels", "save"],
     "styles": [],                     # style sheets only
 }
+REPORT = "web/report"                 # the report of a study; imports nothing of the page
 GENERATED = "web/generated"           # types of the protocol; any folder may import them
 MAX_FILES = 30                        # of one folder
 
@@ -58,6 +60,12 @@ def circles(imports):
     return found
 
 
+def complaints_about_report(path, imports):
+    for line, imported in imports:
+        if posixpath.dirname(imported) not in (REPORT, GENERATED):
+            yield f"{path}:{line}: the report may not import {imported}"
+
+
 def complaints_about(path, imports):
     folder = folder_of(path)
     if folder not in MAY_IMPORT:
@@ -73,11 +81,13 @@ def complaints_about(path, imports):
 
 
 def check(root):
-    complaints, imports, counts = [], {}, {}
+    complaints, imports, report, counts = [], {}, {}, {}
     for index, (folder, allowed) in enumerate(MAY_IMPORT.items()):
         if not set(allowed) <= set(list(MAY_IMPORT)[:index]):
             complaints.append(f"MAY_IMPORT: {folder} names a folder that is not above it")
     for path, file in tree.files(root):
+        if path.startswith(REPORT + "/") and path.endswith(".ts"):
+            report[path[:-3]] = list(imports_of(path, tree.text(file) or ""))
         if not path.startswith("web/src/"):
             continue
         if path.count("/") != 3:
@@ -88,7 +98,10 @@ def check(root):
             imports[path[:-3]] = list(imports_of(path, tree.text(file) or ""))
     for path, found in imports.items():
         complaints += complaints_about(path + ".ts", found)
-    complaints += [f"a circle of imports: {' -> '.join(path)}" for path in circles(imports)]
+    for path, found in report.items():
+        complaints += complaints_about_report(path + ".ts", found)
+    complaints += [f"a circle of imports: {' -> '.join(path)}"
+                   for path in circles(imports | report)]
     complaints += [f"web/src/{folder}: {count} files, more than {MAX_FILES}"
                    for folder, count in counts.items() if count > MAX_FILES]
     return complaints

@@ -27,6 +27,8 @@ CLEAN = {
     "web/src/wire/api.ts": 'import type { View } from "../../generated/view";\n',
     "web/src/app/app.ts": 'import {\n  api,\n} from "../wire/api";\nimport "../base/text";\n',
     "web/src/styles/base.css": "p {}\n",
+    "web/report/text.ts": 'import type { Study } from "../generated/study";\n',
+    "web/report/main.ts": 'import { short } from "./text";\n',
     "README.md": "Reads /usr/share and /tmp; see https://example.org/home/here.\n",
 }
 
@@ -72,6 +74,13 @@ class Planted(unittest.TestCase):
         self.plant("web/src/save/a.ts", 'import { run } from "../../scripts/build";\n')
         self.expect(check_web_imports, "main.ts: belongs in a folder", "extra/a.ts: no rule",
                     "web/scripts/build is no file of the page")
+
+    def test_imports_of_the_report(self):
+        self.plant("web/report/a.ts", 'import { text } from "../src/base/text";\n')
+        self.plant("web/report/b.ts", 'import { c } from "./c";\n')
+        self.plant("web/report/c.ts", 'import { b } from "./b";\n')
+        self.expect(check_web_imports, "web/report/a.ts:1: the report may not import web/src/base",
+                    "web/report/b -> web/report/c -> web/report/b")
 
     def test_web_folder_with_too_many_files(self):
         for n in range(check_web_imports.MAX_FILES):

@@ -1,5 +1,5 @@
 // The built page -> an assembly file that includes the gzipped files, and a C++ file that lists
-// them, for web/embed.cmake.
+// them; the page of a study's report likewise, as it is. For web/embed.cmake.
 // Usage: node scripts/embed.mjs OUTDIR
 import { execFileSync } from "node:child_process";
 import { createHash } from "node:crypto";
@@ -76,14 +76,45 @@ ${assets.map(entry).join("")}  }};
 }  // namespace windsplat::net
 `;
 
+const reportAssembly = (path, digest) => `/* Made by web/scripts/embed.mjs. ${digest} */
+    .section .rodata
+    .global windsplat_report_template
+    .hidden windsplat_report_template
+windsplat_report_template:
+    .incbin "${path}"
+    .section .note.GNU-stack, "", %progbits
+`;
+
+const reportListing = (size) => `// Made by web/scripts/embed.mjs from web/report.
+#include "server/study/report/template.hpp"
+
+extern "C" {
+extern const char windsplat_report_template[${size}];
+}
+
+namespace windsplat::study {
+
+std::string_view report_template() {
+  return {windsplat_report_template, sizeof(windsplat_report_template)};
+}
+
+}  // namespace windsplat::study
+`;
+
 const outdir = resolve(process.argv[2]);
 const dist = join(outdir, "dist");
 mkdirSync(dist, { recursive: true });
 installModules();
-// In a process of its own: its modules are there only now.
-execFileSync(process.execPath, [join(scripts, "build.mjs"), "--quiet", "--outdir", dist], {
-  stdio: "inherit",
-});
+// In processes of their own: their modules are installed only now.
+const run = (script, ...args) =>
+  execFileSync(process.execPath, [join(scripts, script), ...args], { stdio: "inherit" });
+const report = join(outdir, "report.html");
+run("build.mjs", "--quiet", "--outdir", dist);
+run("report.mjs", report);
 const assets = pack(dist, outdir);
 writeFileSync(join(outdir, "web_assets.S"), assembly(assets));
 writeFileSync(join(outdir, "web_assets.cpp"), listing(assets));
+const page = readFileSync(report);
+const digest = createHash("sha256").update(page).digest("hex");
+writeFileSync(join(outdir, "report_template.S"), reportAssembly(report, digest));
+writeFileSync(join(outdir, "report_template.cpp"), reportListing(page.length));

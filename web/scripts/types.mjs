@@ -7,7 +7,7 @@ import { compile } from "json-schema-to-typescript";
 
 const web = join(dirname(fileURLToPath(import.meta.url)), "..");
 const protocol = join(web, "..", "protocol");
-const schemas = ["view", "messages"];
+const schemas = ["view", "messages", "study"];
 
 // json-schema-to-typescript reads drafts before 2020-12: tuples by `items`, no `prefixItems`.
 function toOlderDraft(node) {

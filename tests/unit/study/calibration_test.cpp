@@ -9,7 +9,7 @@
 #include <string>
 
 #include "server/quality/pick.hpp"
-#include "server/study/report.hpp"
+#include "server/study/report/report.hpp"
 
 namespace windsplat::study {
 namespace {
@@ -27,7 +27,7 @@ Compared compared(double told, double truth, std::size_t setting = 0, std::size_
 Calibration made_up() {
   Calibration calibration;
   calibration.plan = {64, 48, 1, 1};
-  calibration.looks = {"as it is", "lines <alone>"};
+  calibration.looks = {"unchanged", "lines only"};
   const std::size_t slab = quality::index_of({protocol::MethodName::slab, 0, 0}).value();
   calibration.compared = {compared(0.01, 0.01), compared(0.019, 0.01), compared(0.01, 0.019, slab),
                           compared(0.01, 0.021, slab, 1)};
@@ -47,16 +47,16 @@ TEST(Looks, MatchTheContentOfTheSubject) {
     return names;
   };
   EXPECT_EQ(names_of("soft").size(), 5U);
-  EXPECT_EQ(names_of("vectors"), (std::set<std::string>{"as it is", "thick lines"}));
-  EXPECT_EQ(names_of("scalar"), (std::set<std::string>{"as it is", "ten times as dense"}));
+  EXPECT_EQ(names_of("vectors"), (std::set<std::string>{"unchanged", "thick lines"}));
+  EXPECT_EQ(names_of("scalar"), (std::set<std::string>{"unchanged", "ten times as dense"}));
 }
 
 TEST(Looks, DifferInTheNamedProperties) {
   const Subject subject = standard_subject("soft", true).value();
   for (const Look& look : looks_of(subject)) {
     const bool lines = look.view.vector.field.kind == protocol::FieldChoice::Kind::named;
-    EXPECT_EQ(lines, look.name != "medium alone");
-    EXPECT_EQ(look.view.scalars->empty(), look.name == "lines alone");
+    EXPECT_EQ(lines, look.name != "medium only");
+    EXPECT_EQ(look.view.scalars->empty(), look.name == "lines only");
     if (look.name != "ten times as dense") continue;
     const auto& own = *subject.view.scalars->front().extinction;
     const auto& dense = *look.view.scalars->front().extinction;
@@ -144,40 +144,30 @@ TEST(Calibrate, StopsWhenCancelled) {
   EXPECT_EQ(made.error().kind, ErrorKind::cancelled);
 }
 
-TEST(CalibrationReport, IsPartOfTheJsonThePageAndThePlot) {
+TEST(CalibrationReport, IsInTheJson) {
   Report report;
   report.scenes.emplace_back();
   SceneReport& scene = report.scenes[0];
-  scene.name = "a<b";
   scene.view = standard_subject("vectors", true).value().view;
-  scene.width = scene.view.image.width;
-  scene.height = scene.view.image.height;
   using Json = nlohmann::json;
   EXPECT_FALSE(Json::parse(report_json(report)).at("scenes").at(0).contains("calibration"));
-  EXPECT_EQ(calibration_section(scene), "");
 
   scene.calibration = made_up();
+  scene.calibration->measured.push_back({0, true, 0.25, 0.5});
   const Json json = Json::parse(report_json(report)).at("scenes").at(0).at("calibration");
   EXPECT_EQ(json.at("agreement").at(0).at("of"), "estimated");
   EXPECT_EQ(json.at("agreement").at(0).at("withinTwo"), 0.75);
-  EXPECT_EQ(json.at("points").size(), 4U);
+  ASSERT_EQ(json.at("points").size(), 4U);
   EXPECT_EQ(json.at("points").at(3).at("method"), "slab");
+  for (std::size_t i = 0; i < 4; ++i) {
+    const quality::Setting& setting = quality::settings[scene.calibration->compared[i].setting];
+    EXPECT_EQ(json.at("points").at(i).at("settingClass"), name_of(class_of(setting)));
+  }
   EXPECT_EQ(json.at("aims").at(0).at("promisedKept"), 2);
   EXPECT_EQ(json.at("checks").at(0).at("apart"), 2e-6);
-
-  const std::string svg = calibration_svg(scene);
-  const auto count = [&](const std::string& what) {
-    int n = 0;
-    for (std::size_t at = svg.find(what); at != std::string::npos; at = svg.find(what, at + 1)) ++n;
-    return n;
-  };
-  EXPECT_EQ(count("r=\"2.4\""), 4) << "one per comparison";
-  EXPECT_EQ(svg.find("a<b"), std::string::npos);
-  EXPECT_EQ(svg.find("nan"), std::string::npos);
-  const std::string page = report_page(report).value();
-  EXPECT_NE(page.find(svg), std::string::npos);
-  EXPECT_NE(page.find("75.0 %"), std::string::npos);
-  EXPECT_EQ(page.find("lines <alone>"), std::string::npos);
+  const std::string first = scene.calibration->looks[0];
+  const Json frame{{"look", first}, {"method", "slab"}, {"error", 0.25}, {"measured", 0.5}};
+  EXPECT_EQ(json.at("measured").back(), frame);
 }
 
 }  // namespace

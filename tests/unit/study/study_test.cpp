@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/study/points_file.hpp"
-#include "server/study/report.hpp"
+#include "server/study/report/report.hpp"
 
 namespace windsplat::study {
 namespace {
@@ -144,35 +144,52 @@ TEST(Study, UnknownValuesAreNull) {
   EXPECT_TRUE(reference.at("tolerance").is_null());
 }
 
-// The page opens with both methods at the thickness of the view, which is not the default.
-TEST(Page, SummaryUsesTheParametersOfTheView) {
+// The view's thickness is not the default; the kernel method has none.
+TEST(Report, MarksPointsWithTheViewsOwnSettings) {
   Report report;
   SceneReport scene;
-  scene.name = "thin";
   Subject subject = vectors_only()[0];
   subject.view.method.slab_thickness = 0.5;
   scene.view = subject.view;
-  scene.width = subject.view.image.width;
-  scene.height = subject.view.image.height;
-  const auto point = [&](scene::Method method, double thickness, int stride, double rmse) {
+  const auto point = [&](scene::Method method, double thickness, int stride) {
     Point one;
     one.setting = {method, scene::Compositing::analytic, own_knobs(subject)};
     one.setting.knobs.slab_thickness = thickness;
     one.setting.knobs.stride = stride;
-    one.measured.rmse = rmse;
     scene.points.push_back(one);
   };
-  point(scene::Method::kernel, 1, 2, 0.125);
-  point(scene::Method::kernel, 1, 1, 0.25);
-  point(scene::Method::slab, 1, 1, 0.375);
-  point(scene::Method::slab, 0.5, 1, 0.5);
+  point(scene::Method::kernel, 1, 2);
+  point(scene::Method::kernel, 1, 1);
+  point(scene::Method::slab, 1, 1);
+  point(scene::Method::slab, 0.5, 1);
+  report.scenes.push_back(scene);
+  std::vector<bool> own;
+  const Json json = Json::parse(report_json(report));
+  for (const Json& one : json.at("scenes").at(0).at("points")) own.push_back(one.at("own"));
+  EXPECT_EQ(own, (std::vector{false, true, false, true}));
+}
+
+// The JSON within a page of a report.
+Json data_of(const std::string& page) {
+  const std::string opening = "<script type=\"application/json\" id=\"study\">";
+  const std::size_t at = page.find(opening);
+  if (at == std::string::npos) {
+    ADD_FAILURE() << "the page has no data";
+    return {};
+  }
+  const std::size_t start = at + opening.size();
+  return Json::parse(page.substr(start, page.find("</script", start) - start));
+}
+
+TEST(Report, NamesCannotEndTheScriptElementOfThePage) {
+  Report report;
+  SceneReport scene;
+  scene.name = "a</script><!--<script>\"\\ \xc3\xa9";
+  scene.view = vectors_only()[0].view;
   report.scenes.push_back(scene);
   const std::string page = report_page(report).value();
-  const std::string summary = page.substr(0, page.find("<h2"));
-  EXPECT_NE(summary.find("2.50e-01"), std::string::npos);
-  EXPECT_NE(summary.find("5.00e-01"), std::string::npos);
-  EXPECT_EQ(summary.find("1.25e-01"), std::string::npos);
-  EXPECT_EQ(summary.find("3.75e-01"), std::string::npos);
+  EXPECT_EQ(data_of(page).at("scenes").at(0).at("name"), scene.name);
+  EXPECT_EQ(page.find("<!--"), std::string::npos);
 }
 
 TEST(Study, WritesJsonOfTheDocumentedShape) {
@@ -205,7 +222,7 @@ TEST(Study, WritesJsonOfTheDocumentedShape) {
   EXPECT_EQ(json.at("stability").at(0).at("tau"), 1e-30);
 }
 
-TEST(Study, WritesOneLinePerPointAndASelfContainedPage) {
+TEST(Study, WritesOneLineAPointAndASelfContainedPage) {
   const Folder folder;
   int asked = 0;
   const Report report = study(folder, grey(asked)).value();
@@ -214,12 +231,22 @@ TEST(Study, WritesOneLinePerPointAndASelfContainedPage) {
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')),
             1 + report.scenes[0].points.size());
   const std::string page = read(folder.path / "index.html");
-  EXPECT_NE(page.find("<svg"), std::string::npos);
-  EXPECT_NE(page.find("data:image/png;base64,"), std::string::npos);
-  EXPECT_EQ(page.find("<script"), std::string::npos);
   EXPECT_EQ(page.find("<link"), std::string::npos);
   EXPECT_EQ(page.find("src=\"http"), std::string::npos);
-  EXPECT_TRUE(std::filesystem::exists(folder.path / "plot-vectors.svg"));
+  EXPECT_EQ(page.find("%STUDY%"), std::string::npos);
+  // Its data is study.json and the pictures.
+  Json data = data_of(page);
+  const Json pictures = data.at("scenes").at(0).at("pictures");
+  data.at("scenes").at(0).erase("pictures");
+  EXPECT_EQ(data, Json::parse(read(folder.path / "study.json")));
+  ASSERT_EQ(pictures.size(), report.scenes[0].pictures.size());
+  EXPECT_FALSE(pictures.at(0).contains("differencePng"));
+  for (const Json& picture : pictures) {
+    // The signature of PNG in base64; whole groups of four.
+    const std::string png = picture.at("png");
+    EXPECT_TRUE(png.starts_with("iVBORw0KGgo")) << png.substr(0, 16);
+    EXPECT_EQ(png.size() % 4, 0U);
+  }
 }
 
 TEST(PointsFile, KeepsEveryDigitAndNonFiniteValues) {
@@ -264,31 +291,6 @@ TEST(PointsFile, OmitsATruncatedLine) {
 TEST(Key, IsFnv1a) {
   EXPECT_EQ(key_of(""), "cbf29ce484222325");
   EXPECT_EQ(key_of("a"), "af63dc4c8601ec8c");
-}
-
-// Two curves of one colour each; unstable points are marked by crosses instead of discs.
-TEST(Plot, DrawsDiscsRingsAndCrosses) {
-  SceneReport scene;
-  scene.name = "a<b";
-  scene.reconstruction_ripple = 1e-3;
-  for (int i = 0; i < 4; ++i) {
-    Point point;
-    point.measured = {std::pow(10, -i), 0.1, 20, 0.1, 1.0 + i, 1.0 + i, 2.0 + i, i != 0};
-    scene.points.push_back(point);
-  }
-  mark_pareto(scene.points);
-  const std::string svg = plot_svg(scene);
-  const auto count = [&](const std::string& what) {
-    int n = 0;
-    for (std::size_t at = svg.find(what); at != std::string::npos; at = svg.find(what, at + 1)) ++n;
-    return n;
-  };
-  EXPECT_EQ(count("r=\"3.4\""), 3);
-  EXPECT_EQ(count("r=\"7\""), 3);
-  EXPECT_EQ(count("stroke-width:2.2"), 2);
-  EXPECT_EQ(count("reconstruction ripple (not in these errors)"), 1);
-  EXPECT_EQ(svg.find("a<b"), std::string::npos);
-  EXPECT_EQ(svg.find("nan"), std::string::npos);
 }
 
 }  // namespace

@@ -1,28 +1,41 @@
-// Report -> study.json, study.csv, and all files into their folder.
-#include "server/study/report.hpp"
+// Report -> the typed values of study.schema.json; pictures -> base64 PNG.
+#include "server/study/report/document.hpp"
 
-#include <array>
-#include <cmath>
-#include <cstdio>
+#include <algorithm>
 #include <limits>
+#include <utility>
 
-#include "protocol/study.hpp"
-#include "server/base/whole_file.hpp"
+#include "server/image/encode.hpp"
 
 namespace windsplat::study {
 
 namespace {
 
-constexpr std::array<Knob, 5> knobs{Knob::stride, Knob::span, Knob::slab_thickness,
-                                    Knob::stop_transmittance, Knob::width};
-
-// A knob that the point's method or scene does not have is not told.
-bool has_knob(const SceneReport& scene, const Setting& setting, Knob knob) {
-  if (knob == Knob::slab_thickness) return setting.method == scene::Method::slab;
-  if (knob == Knob::span) {
-    return scene.view.vector.field.kind == protocol::FieldChoice::Kind::named;
+std::string base64(const image::Bytes& bytes) {
+  constexpr const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t word = 0;
+    for (std::size_t k = 0; k < 3; ++k) word = word << 8U | (k < count ? bytes[i + k] : 0U);
+    for (std::size_t k = 0; k < 4; ++k) {
+      text += k <= count ? digits[word >> (18 - 6 * k) & 63U] : '=';
+    }
   }
-  return true;
+  return text;
+}
+
+// The kernel method has no slab thickness.
+bool is_own(const SceneReport& scene, const Setting& setting) {
+  const Knobs own = own_knobs(scene.view);
+  Knobs knobs = setting.knobs;
+  if (setting.method == scene::Method::kernel) knobs.slab_thickness = own.slab_thickness;
+  return knobs == own;
+}
+
+const char* method_name(protocol::MethodName method) {
+  return method == protocol::MethodName::slab ? "slab" : "kernel";
 }
 
 protocol::StudyAgreement document_of(const Agreement& of, std::string name) {
@@ -64,10 +77,14 @@ protocol::StudyCalibration document_of(const Calibration& calibration) {
   }
   for (const Compared& one : calibration.compared) {
     const quality::Setting& setting = quality::settings[one.setting];
-    const bool slab = setting.method == protocol::MethodName::slab;
-    out.points.push_back({calibration.looks[one.look], one.view, slab ? "slab" : "kernel",
-                          setting.half_level, setting.coarser, setting.thinner, one.error,
-                          one.forecast.error, one.forecast.spread, one.prior.error});
+    out.points.push_back({calibration.looks[one.look], one.view, name_of(class_of(setting)),
+                          method_name(setting.method), setting.half_level, setting.coarser,
+                          setting.thinner, one.error, one.forecast.error, one.forecast.spread,
+                          one.prior.error});
+  }
+  for (const MeasuredFrame& one : calibration.measured) {
+    out.measured.push_back(
+        {calibration.looks[one.look], one.slab ? "slab" : "kernel", one.error, one.measured});
   }
   return out;
 }
@@ -88,7 +105,7 @@ protocol::StudyScene document_of(const SceneReport& scene) {
     protocol::StudyPoint to;
     to.method = name_of(point.setting.method);
     to.compositing = name_of(point.setting.compositing);
-    for (const Knob knob : knobs) {
+    for (const Knob knob : report_knobs) {
       if (!has_knob(scene, point.setting, knob)) continue;
       to.knobs.emplace_back(name_of(knob), value_of(point.setting.knobs, knob));
     }
@@ -100,6 +117,7 @@ protocol::StudyScene document_of(const SceneReport& scene) {
     to.ms = m.ms;
     to.ms_min = m.ms_min;
     to.ms_max = m.ms_max;
+    to.own = is_own(scene, point.setting);
     to.pareto = point.pareto;
     to.stable = m.stable;
     out.points.push_back(std::move(to));
@@ -118,7 +136,15 @@ protocol::StudyScene document_of(const SceneReport& scene) {
 
 }  // namespace
 
-std::string report_json(const Report& report) {
+bool has_knob(const SceneReport& scene, const Setting& setting, Knob knob) {
+  if (knob == Knob::slab_thickness) return setting.method == scene::Method::slab;
+  if (knob == Knob::span) {
+    return scene.view.vector.field.kind == protocol::FieldChoice::Kind::named;
+  }
+  return true;
+}
+
+protocol::StudyDocument document_of(const Report& report) {
   protocol::StudyDocument document;
   const Machine& machine = report.machine;
   document.processor = machine.processor;
@@ -138,92 +164,24 @@ std::string report_json(const Report& report) {
     document.stability.push_back({name_of(s.compositing), s.tau, s.error, s.min, s.max, s.bounded,
                                   s.monotone, s.layers_min, s.layers_max, s.diverges});
   }
-  return protocol::encode_study(document);
+  document.stability_layers = stiff_layers;
+  return document;
 }
 
-std::string report_csv(const Report& report) {
-  std::string text =
-      "scene,method,compositing,stride,span,slabThickness,stopTransmittance,width,"
-      "rmse,max,psnr,flip,ms,msMin,msMax,pareto,stable\n";
-  for (const SceneReport& scene : report.scenes) {
-    for (const Point& point : scene.points) {
-      // A name with a comma or a quote in it is quoted (RFC 4180).
-      std::string name = scene.name;
-      if (name.find_first_of(",\"") != std::string::npos) {
-        std::string quoted(1, '"');
-        for (const char c : name) quoted.append(c == '"' ? 2 : 1, c);
-        name = quoted + '"';
-      }
-      text += name;
-      text += ',';
-      text += name_of(point.setting.method);
-      text += ',';
-      text += name_of(point.setting.compositing);
-      for (const Knob knob : knobs) {
-        text += ',';
-        if (has_knob(scene, point.setting, knob)) {
-          text += format_number("%.6g", value_of(point.setting.knobs, knob));
-        }
-      }
-      const Measurement& m = point.measured;
-      for (const double v : {m.rmse, m.max, m.psnr, m.flip, m.ms, m.ms_min, m.ms_max}) {
-        text += ',';
-        if (std::isfinite(v)) text += format_number("%.6g", v);
-      }
-      text += point.pareto ? ",1" : ",0";
-      text += m.stable ? ",1\n" : ",0\n";
+Result<std::vector<protocol::StudyPicture>> encoded_pictures(const SceneReport& scene) {
+  std::vector<protocol::StudyPicture> pictures;
+  for (const Shown& shown : scene.pictures) {
+    const auto png = image::encode_png(shown.rgb, scene.width, scene.height);
+    if (!png) return png.error();
+    protocol::StudyPicture picture{shown.title, base64(*png), {}};
+    if (!shown.difference_rgb.empty()) {
+      const auto difference = image::encode_png(shown.difference_rgb, scene.width, scene.height);
+      if (!difference) return difference.error();
+      picture.difference_png = base64(*difference);
     }
+    pictures.push_back(std::move(picture));
   }
-  return text;
-}
-
-Result<void> write_report(const Report& report, const std::filesystem::path& folder) {
-  const auto page = report_page(report);
-  if (!page) return page.error();
-  for (const SceneReport& scene : report.scenes) {
-    std::string name;
-    for (const char c : scene.name) name += c == '/' || c == '\0' ? '_' : c;
-    name += ".svg";
-    if (auto done = write_whole_file(folder / ("plot-" + name), plot_svg(scene)); !done) {
-      return done;
-    }
-    if (!scene.calibration) continue;
-    const auto path = folder / ("calibration-" + name);
-    if (auto done = write_whole_file(path, calibration_svg(scene)); !done) return done;
-  }
-  if (auto done = write_whole_file(folder / "study.csv", report_csv(report)); !done) return done;
-  if (auto done = write_whole_file(folder / "study.json", report_json(report)); !done) return done;
-  return write_whole_file(folder / "index.html", *page);
-}
-
-std::string format_number(const char* format, double value) {
-  if (std::isnan(value)) return "-";
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
-
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
+  return pictures;
 }
 
 }  // namespace windsplat::study

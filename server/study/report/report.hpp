@@ -1,0 +1,25 @@
+// Report -> the files that people and programs read.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "server/base/error.hpp"
+#include "server/study/study.hpp"
+
+namespace windsplat::study {
+
+std::string report_json(const Report& report);  // protocol/study.schema.json
+std::string report_csv(const Report& report);   // one line for each point
+
+// A self-contained HTML page: the document of report_json and the pictures as JSON, and the script
+// of web/report that draws its figures and tables. Errors: internal.
+Result<std::string> report_page(const Report& report);
+
+// study.json, study.csv and index.html. Errors: internal.
+Result<void> write_report(const Report& report, const std::filesystem::path& folder);
+
+// A printf format such as "%.3g"; "-" for NaN.
+std::string format_number(const char* format, double value);
+
+}  // namespace windsplat::study
