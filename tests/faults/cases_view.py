@@ -189,13 +189,16 @@ def overload(world, count):
     need(drawn > 0 and refused, f"{drawn} drawn, {len(refused)} refused")
     for _, _, headers in refused:
         need(int(headers.get("retry-after", "0")) >= 1, "a refusal without Retry-After")
-    took = statistics.median(a[1] for a in refused)
-    slowest = sorted(health)[int(0.99 * (len(health) - 1))]
-    need(took <= 0.01 * world.slack, f"refusals take {1000 * took:.1f} ms")
-    need(slowest <= 0.05 * world.slack, f"/livez takes {1000 * slowest:.0f} ms")
+    # A refusal waits for no picture, however slow the machine is, and neither does /livez.
+    took, picture = (statistics.median(a[1] for a in answers if (a[0] == 200) == good)
+                     for good in (False, True))
+    alive = statistics.median(health)
+    need(took < picture, f"refusals take {1000 * took:.1f} ms, pictures {1000 * picture:.1f}")
+    need(alive < picture, f"/livez takes {1000 * alive:.1f} ms, pictures {1000 * picture:.1f}")
     check_good(daemon.port)
-    return (f"{drawn} drawn, {len(refused)} refused with Retry-After in {1000 * took:.1f} ms; "
-            f"/livez p99 {1000 * slowest:.1f} ms (40 threads of Python on the same machine)")
+    return (f"{drawn} drawn in {1000 * picture:.1f} ms, {len(refused)} refused with Retry-After in "
+            f"{1000 * took:.1f} ms; /livez {1000 * alive:.1f} ms (40 threads of Python on the same "
+            "machine)")
 
 
 @case("patches faster than they can be drawn", 2000, 400)

@@ -1,12 +1,17 @@
 #!/usr/bin/env python3
 """A suite of programs that pass, fail, crash or fail once alone must be counted as just that."""
+import argparse
+import contextlib
+import io
 import pathlib
 import sys
 import tempfile
 import unittest
+from unittest import mock
 
 import ctest_suite
 import node_suite
+import suites
 from outcome import Outcome, summary
 
 # Speaks as GoogleTest does; FLAKY fails where its file is not there yet, and writes it.
@@ -95,6 +100,36 @@ class Suites(unittest.TestCase):
         self.assertIn("why c", outcome.failed["bad: c"])
         self.assertIn("flaky: d", outcome.unstable)
         self.assertEqual(outcome.passed, 3)
+
+    def test_what_a_failed_build_keeps_from_running(self):
+        class Named(suites.Run):
+            def suite(self, name, *_, **__):
+                names.append(name)
+                return name != "build release"
+
+        names = []
+        Named(argparse.Namespace(thorough=False)).everything()
+        self.assertEqual(sorted(names), ["asan ubsan", "build dev", "build release", "build tsan",
+                                         "fuzz", "page unit", "tsan"])
+
+    def test_a_suite_is_shown_as_a_whole(self):
+        def other(emit):
+            emit("other\n")
+            return Outcome(passed=1)
+
+        def one(emit):
+            emit("begin of one\n")
+            run.suite("other", other)
+            emit("end of one\n")
+            return Outcome(failed={"A.b": "why"})
+
+        shown = io.StringIO()
+        run = suites.Run(argparse.Namespace(thorough=False))
+        with mock.patch.object(suites, "LOGS", self.folder), contextlib.redirect_stdout(shown):
+            self.assertFalse(run.suite("one", one))
+        self.assertIn("begin of one\nend of one\n", shown.getvalue())
+        self.assertEqual((self.folder / "other.log").read_text(), "other\n")
+        self.assertEqual(set(run.outcomes), {"one", "other"})
 
     def test_summary(self):
         outcomes = {"one": Outcome(passed=3, unstable={"A.b": "what b said"}, durations={"A.b": 2}),

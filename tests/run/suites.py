@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
-"""Builds, and runs the suites of tests one after the other; called by scripts/test, which sets the
-machine up. Each suite's words are shown and kept in build/test-logs; the end is a table.
+"""Builds, and runs the suites of tests; called by scripts/test, which sets the machine up. What
+computes (the builds after the first, clang-tidy) runs beside the tests, which wait for clocks and
+sockets as long as they compute, and gives way to them. A suite's output is kept in build/test-logs
+and shown as a whole when it ends; the end is a table.
 
 The rule of what is repeated under which sanitizer is in tests/CMakeLists.txt."""
 import argparse
+import concurrent.futures
 import os
 import pathlib
 import re
@@ -24,6 +27,7 @@ JOBS = min(2 * CORES, CORES + 4)
 # A browser and its daemon keep a core busy; node itself runs one file fewer than cores.
 BROWSERS = min(CORES, 4)
 SEARCH_SECONDS = 30  # a fuzzer
+GIVING_WAY = ("nice", "-n", "19")  # tests have deadlines
 SANITIZERS = {
     "ASAN_OPTIONS": "detect_leaks=1:strict_string_checks=1:check_initialization_order=1",
     "UBSAN_OPTIONS": "print_stacktrace=1",
@@ -66,18 +70,19 @@ class Run:
 
     def suite(self, name, run, *words, **named):
         """Runs a suite and keeps its outcome; true if nothing failed for good."""
-        print(f"\n== {name}", flush=True)
+        print(f"-- {name} begins", flush=True)
         begin = time.monotonic()
-        with (LOGS / (name.replace(" ", "-") + ".log")).open("w") as log:
+        path = LOGS / (name.replace(" ", "-") + ".log")
+        with path.open("w") as log:
 
             def emit(text):
-                for stream in (sys.stdout, log):
-                    stream.write(text)
-                    stream.flush()
+                log.write(text)
+                log.flush()
 
             outcome = run(emit, *words, **named)
         outcome.seconds = time.monotonic() - begin
         self.outcomes[name] = outcome
+        print(f"\n== {name}, {outcome.seconds:.0f} s\n{path.read_text()}", flush=True)
         return not outcome.failed
 
     def ctest(self, name, preset, *selection, prefix=()):
@@ -85,27 +90,40 @@ class Run:
             return ctest_suite.Suite(BUILD / preset, selection, JOBS, emit, prefix).run()
         return self.suite(name, run)
 
-    def built(self, preset, *targets, prefix=()):
-        targets += ("all", "thorough_tests") if self.options.thorough else ()
+    def built(self, preset, *prefix):
+        targets = ("all", "thorough_tests") if self.options.thorough else ()
         return self.suite(f"build {preset}", command, *prefix, "scripts/build", preset, *targets)
+
+    def tidy(self):
+        words = () if self.options.thorough else ("--changed",)
+        self.suite("clang-tidy", command, *GIVING_WAY, "scripts/tidy", *words)
 
     def everything(self):
         thorough = self.options.thorough
         chosen = () if thorough else ("-LE", "thorough")
-        if self.built("release"):
-            self.ctest("release", "release", *chosen)
-            self.suite("clang-tidy", command, "scripts/tidy", *(() if thorough else ["--changed"]))
-        unit = {"web": ["npm", "--prefix", "web", "test", "--silent", "--", "--test-reporter=tap"]}
-        self.suite("page unit", node_suite.run, unit, 1)
-        browser = {path.name: ["tests/browser/run", "--test-reporter=tap", path.name]
-                   for path in sorted((ROOT / "tests/browser").glob("*.test.mjs"))}
-        self.suite("page browser", node_suite.run, browser, BROWSERS)
-        if self.built("dev"):
-            self.ctest("asan ubsan", "dev", *chosen)
-            self.suite("fuzz", command, "scripts/fuzz", "--no-build", "--seconds", "0")
         plain = fixed_addresses()
-        if self.built("tsan", prefix=plain):
-            self.ctest("tsan", "tsan", *chosen, prefix=plain)
+        beside = concurrent.futures.ThreadPoolExecutor(1)  # one at a time, in this order
+        try:
+            release = beside.submit(self.built, "release")
+            dev = beside.submit(self.built, "dev", *GIVING_WAY)
+            tsan = beside.submit(self.built, "tsan", *GIVING_WAY, *plain)
+            tidy = beside.submit(lambda: release.result() and self.tidy())
+            unit = {"web": ["npm", "--prefix", "web", "test", "--silent", "--",
+                            "--test-reporter=tap"]}
+            self.suite("page unit", node_suite.run, unit, 1)
+            if release.result():
+                self.ctest("release", "release", *chosen)
+                browser = {path.name: ["tests/browser/run", "--test-reporter=tap", path.name]
+                           for path in sorted((ROOT / "tests/browser").glob("*.test.mjs"))}
+                self.suite("page browser", node_suite.run, browser, BROWSERS)
+            if dev.result():
+                self.ctest("asan ubsan", "dev", *chosen)
+                self.suite("fuzz", command, "scripts/fuzz", "--no-build", "--seconds", "0")
+            if tsan.result():
+                self.ctest("tsan", "tsan", *chosen, prefix=plain)
+            tidy.result()
+        finally:
+            beside.shutdown(cancel_futures=True)
         if thorough:
             self.suite("fuzz search", command, "scripts/fuzz", "--seconds", str(SEARCH_SECONDS))
 
