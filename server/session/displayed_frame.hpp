@@ -1,0 +1,57 @@
+// What the client displays: the version of the frame sent last, and the views it stands for.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "protocol/frame_header.hpp"
+#include "protocol/messages.hpp"
+#include "protocol/view.hpp"
+#include "server/session/view_state.hpp"
+
+namespace windsplat::session {
+
+// Whether only the background is visible. Unknown for the reference.
+bool is_blank(const protocol::FrameInfo& info);
+
+class DisplayedFrame {
+ public:
+  [[nodiscard]] std::uint64_t version() const { return version_; }
+  [[nodiscard]] bool is_final() const { return final_; }
+  [[nodiscard]] double error() const { return error_; }  // if known, else 0 or 1
+
+  // A frame of that version was sent, which is not final.
+  void sent(std::uint64_t version, double error);
+  // A final frame of the view was sent.
+  void sent_final(const ViewState& of, std::uint32_t seq, double error, bool blank);
+  // Its frame has the same content as the final one displayed, but does not prove that.
+  void withheld(std::uint64_t version);
+  // It cannot be drawn: wait for a change.
+  void failed(std::uint64_t version);
+
+  // Frames displayed are invalid: the dataset was reopened.
+  void forget() { standing_.reset(); }
+  // Whether the final frame displayed is valid for the view: it is equivalent, or it is as blank
+  // as that was, and differs in the camera alone.
+  [[nodiscard]] bool equals(const protocol::View& view) const;
+  [[nodiscard]] bool equals_blank(const protocol::View& view) const;
+  // Marks it valid for the current view, and answers its patch.
+  std::optional<protocol::UnchangedMessage> stand_for(ViewState& of);
+
+ private:
+  // The final frame shown by the client, until another one is sent.
+  struct Standing {
+    std::uint32_t seq = 0;
+    std::uint32_t rev = 0;  // last one reported to the client
+    std::string view;
+    std::string without_camera;  // empty if the scene is not empty
+  };
+
+  std::uint64_t version_ = 0;
+  bool final_ = true;
+  double error_ = 1;
+  std::optional<Standing> standing_;
+};
+
+}  // namespace windsplat::session

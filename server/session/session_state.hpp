@@ -1,0 +1,62 @@
+// Everything a session remembers, by subject, and the effects of the current input.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "protocol/messages.hpp"
+#include "server/base/error.hpp"
+#include "server/session/displayed_frame.hpp"
+#include "server/session/effects.hpp"
+#include "server/session/flow_control.hpp"
+#include "server/session/load_progress.hpp"
+#include "server/session/open_requests.hpp"
+#include "server/session/playback_rate.hpp"
+#include "server/session/player.hpp"
+#include "server/session/prefetcher.hpp"
+#include "server/session/quality_control.hpp"
+#include "server/session/render_slot.hpp"
+#include "server/session/still_queue.hpp"
+#include "server/session/surroundings.hpp"
+#include "server/session/view_state.hpp"
+
+namespace windsplat::session {
+
+struct SessionState {
+  SessionState(Options given, Surroundings around, Micros now)
+      : options(given),
+        surroundings(std::move(around)),
+        view(now),
+        quality(surroundings.forecasts) {}
+
+  void send(protocol::ServerMessage message) { effects.emplace_back(SendText{std::move(message)}); }
+  void refuse(const Error& error, std::optional<std::uint32_t> id,
+              std::optional<std::uint32_t> rev) {
+    send(protocol::ErrorMessage{id, rev, protocol::problem_from(error)});
+  }
+  // The newest view, or at least its step, needs no frame any more.
+  [[nodiscard]] bool view_is_shown() const { return displayed.version() == view.version(); }
+  [[nodiscard]] bool step_is_shown() const { return displayed.version() >= view.step_version(); }
+
+  Options options;
+  Surroundings surroundings;
+  Effects effects;
+  bool hidden = false;  // the client does not show the picture
+
+  ViewState view;
+  OpenRequests openings;
+  StillQueue stills;
+  Player player;
+  PlaybackRate playback_rate;
+  Prefetcher prefetcher;
+  LoadProgress load_progress;
+
+  QualityControl quality;
+  FlowControl flow;
+  RenderSlot slot;
+  DisplayedFrame displayed;
+  protocol::StatsMessage stats;
+};
+
+}  // namespace windsplat::session

@@ -1,0 +1,43 @@
+// What a session may ask of its environment, and its time limits.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "protocol/view.hpp"
+#include "server/base/error.hpp"
+#include "server/quality/table.hpp"
+#include "server/session/link.hpp"
+
+namespace windsplat::session {
+
+struct Options {
+  Micros idle_timeout_us = 300'000'000;  // without a message
+  Micros quiet_us = 120'000;             // without a change, before the final frame
+  Micros quiet_most_us = 1'000'000;      // maximum of it for slow links
+};
+
+// Checks whether a view can be drawn, without loading; the value is the number of steps of its
+// dataset.
+using Check = std::function<Result<int>(const protocol::View&)>;
+
+// Progress of the current read of a dataset, if any. Must not block.
+struct Reading {
+  std::string field;
+  double done = 0;  // 0 to 1
+};
+using WhatIsRead = std::function<std::optional<Reading>(const std::string& dataset)>;
+
+// Known errors and times of the settings.
+using Forecaster =
+    std::function<quality::Forecasts(const quality::SceneSignature&, const quality::Viewpoint&)>;
+
+// Queries of a session to its environment. None may block.
+struct Surroundings {
+  Check check;
+  WhatIsRead what_is_read;  // may be empty
+  Forecaster forecasts;     // empty: the prior
+};
+
+}  // namespace windsplat::session

@@ -1,0 +1,51 @@
+// The changes of a view that no frame has confirmed as drawable, and the view before them.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "protocol/codec.hpp"
+
+namespace windsplat::session {
+
+class UnconfirmedChanges {
+ public:
+  struct Change {
+    std::uint64_t version = 0;
+    std::optional<std::uint32_t> rev;  // none if the client did not send it
+    std::string patch_json;
+  };
+
+  // More changes than a limit, or larger ones, count the oldest as confirmed.
+  void add(Change change);
+  // A frame of that version was drawn.
+  void confirm(std::uint64_t version);
+  // The newest version was drawn: its document.
+  void confirm_all(const protocol::ViewDocument& document, std::uint32_t rev);
+  // The change that a failed render of the version is blamed on. A view reconstructed by a removal
+  // has no change of its own (`newest`): the newest one is next, until the rest has been drawn
+  // before.
+  [[nodiscard]] std::optional<Change> find_fault(std::uint64_t version, bool newest) const;
+  // False: no such change.
+  bool remove(std::uint64_t version);
+
+  // The view with the changes that remain.
+  struct Rebuilt {
+    protocol::ViewDocument document;
+    std::uint32_t rev = 0;
+    std::optional<std::uint64_t> unanswered;  // the newest version that the client sent
+  };
+  [[nodiscard]] Rebuilt rebuilt() const;
+
+ private:
+  void confirm_oldest();
+  [[nodiscard]] std::size_t bytes() const;
+
+  protocol::ViewDocument confirmed_;  // the newest view known to be drawable
+  std::uint32_t confirmed_rev_ = 0;
+  std::deque<Change> changes_;
+};
+
+}  // namespace windsplat::session
