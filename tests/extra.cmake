@@ -40,8 +40,6 @@ endfunction()
 
 # Debian's own, which finds Debian's modules.
 find_program(SYSTEM_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
-windsplat_program_test(real ${SYSTEM_PYTHON} tests/integration/real_files.py
-  --program=$<TARGET_FILE:windsplat>)
 # The fuzzers do the same to the readers themselves, under the sanitizers.
 set(spoiled_count 300)
 set(drawn_options --count=340)
@@ -54,7 +52,10 @@ windsplat_program_test(spoiled python3 tests/fuzz/mutate_files.py --program=$<TA
 # Datasets that were mutated from within: opened, compared with the truth, drawn.
 windsplat_program_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py
   --program=$<TARGET_FILE:windsplat> ${drawn_options})
+# Well-formed files, of which the fuzzers replay small ones of every format.
 if(NOT WINDSPLAT_SANITIZE)
+  windsplat_program_test(real ${SYSTEM_PYTHON} tests/integration/real_files.py
+    --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(scripts python3 tests/integration/scripts_test.py)
   windsplat_program_test(sbom python3 tests/integration/sbom.py --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(hardening python3 tests/tidy/check_hardening.py $<TARGET_FILE:windsplat>)

@@ -23,7 +23,7 @@ namespace {
 namespace reference = engine::reference;
 using reference::Light;
 using reference::Samples;
-using reference::Sheet;
+using reference::Surface;
 using Rgb = std::array<double, 3>;
 
 constexpr double s = 0.48;
@@ -77,7 +77,7 @@ Formula one_color(std::function<double(double)> rho, const Rgb& color) {
 }
 
 Light along(const Formula& formula, const std::vector<double>& breaks,
-            const std::vector<Sheet>& sheets = {}, double tolerance = 1e-12) {
+            const std::vector<Surface>& sheets = {}, double tolerance = 1e-12) {
   reference::RayCount count;
   Formula medium = formula;
   return reference::integrate_ray(reference::make_rules(), medium, breaks, sheets, tolerance,
@@ -144,7 +144,7 @@ TEST(Ray, SheetsInASlabHaveTheirClosedForm) {
   std::uniform_real_distribution<double> unit(0, 1);
   for (const double rho : {0.0, 0.05, 1.0, 9.0, 500.0}) {
     for (const int count : {1, 2, 7, 30}) {
-      std::vector<Sheet> sheets;
+      std::vector<Surface> sheets;
       for (int k = 0; k < count; ++k) {
         sheets.push_back({unit(random), unit(random), {unit(random), unit(random), unit(random)}});
       }
@@ -152,10 +152,10 @@ TEST(Ray, SheetsInASlabHaveTheirClosedForm) {
       sheets.push_back({-0.5, 0.3, {1, 1, 0}});  // before the slab
       sheets.push_back({1.5, 0.8, {0, 1, 1}});   // and behind
       std::sort(sheets.begin(), sheets.end(),
-                [](const Sheet& a, const Sheet& b) { return a.depth < b.depth; });
+                [](const Surface& a, const Surface& b) { return a.depth < b.depth; });
       double open = 1;
       Rgb rgb{};
-      for (const Sheet& sheet : sheets) {
+      for (const Surface& sheet : sheets) {
         const double seen =
             open * sheet.opacity * std::exp(-rho * std::clamp(sheet.depth, 0.0, 1.0));
         for (int c = 0; c < 3; ++c) rgb[c] += seen * (sheet.color[c] - fog[c]);

@@ -92,7 +92,7 @@ bool parse_list(std::string_view text, std::array<T, N>& out, const Parse& parse
   return true;
 }
 
-std::optional<bytes::Scalar> type_named(std::string_view name) {
+std::optional<bytes::Scalar> xml_type(std::string_view name) {
   constexpr std::array<std::string_view, 10> names{"Int8",    "UInt8",  "Int16", "UInt16",
                                                    "Int32",   "UInt32", "Int64", "UInt64",
                                                    "Float32", "Float64"};
@@ -239,7 +239,7 @@ class Document {
     array.tuples = tuples;
     array.coding = coding_;
     const std::string type_name = node.attribute("type").value();
-    const auto type = type_named(type_name);
+    const auto type = xml_type(type_name);
     if (!type) {
       out.left_out.push_back({array.name, "its type " + in_quotes(type_name) + " is not numbers"});
       return std::optional<StoredArray>();
