@@ -1,4 +1,4 @@
-// Replies of a session: opening, rejected patches, stills, playback, closing.
+// Replies of a session: opening, rejected patches, playback, closing.
 #include <gmock/gmock.h>
 
 #include "driver.hpp"
@@ -22,7 +22,7 @@ TEST(Open, DescribesTheDatasetAndRendersIt) {
   driver.say(protocol::OpenMessage{5, "wind"});
   ASSERT_EQ(driver.describes.size(), 1U);
   EXPECT_EQ(driver.describes[0].dataset, "wind");
-  EXPECT_FALSE(driver.render) << "the client may still send its own view";
+  EXPECT_FALSE(driver.render) << "the client's own view may still come";
   driver.patch(1, R"({"image":{"width":640,"height":480}})");
   driver.described(5, description("wind"));
   const auto opened = driver.texts_of<protocol::OpenedMessage>();
@@ -34,7 +34,7 @@ TEST(Open, DescribesTheDatasetAndRendersIt) {
   EXPECT_EQ(driver.render->view.image.width, 640);
 }
 
-// After several errors the client may show only the last one.
+// Of several refusals a viewer may see the last alone.
 TEST(Open, FailureExplainsWhyThereIsNothingToPlay) {
   const auto why = make_error(ErrorKind::out_of_memory, "the field needs 9 MiB");
   const auto play = [](Driver& driver) {
@@ -43,7 +43,7 @@ TEST(Open, FailureExplainsWhyThereIsNothingToPlay) {
     return driver.texts_of<protocol::ErrorMessage>().at(0).problem;
   };
   Driver described;
-  EXPECT_EQ(play(described).status, 404) << "no dataset was requested";
+  EXPECT_EQ(play(described).status, 404) << "nothing was asked for";
   described.say(protocol::OpenMessage{5, "wind"});
   described.described(5, why);
   EXPECT_EQ(play(described).status, 507);
@@ -53,7 +53,7 @@ TEST(Open, FailureExplainsWhyThereIsNothingToPlay) {
   drawn.fail_render(why);
   EXPECT_EQ(play(drawn).status, 507);
 
-  // After a dataset was opened, earlier failures are irrelevant.
+  // Once another one was there, what failed before it is no reason any more.
   described.say(protocol::OpenMessage{6, "sea"});
   described.described(6, description("sea"));
   described.patch(1, R"({"dataset":null})");
@@ -105,12 +105,12 @@ TEST(Changed, DatasetIsDescribedAndRenderedAgain) {
   driver.describes.clear();
   driver.texts.clear();
   driver.changed("sea");
-  EXPECT_TRUE(driver.describes.empty()) << "a hidden dataset";
+  EXPECT_TRUE(driver.describes.empty()) << "is not shown";
   driver.changed("wind");
   ASSERT_EQ(driver.describes.size(), 1U);
   EXPECT_EQ(driver.describes[0].id, 5U);
   driver.changed("wind");
-  EXPECT_EQ(driver.describes.size(), 1U) << "loading";
+  EXPECT_EQ(driver.describes.size(), 1U) << "is on its way";
   driver.described(5, description("wind"));
   EXPECT_EQ(driver.texts_of<protocol::OpenedMessage>().size(), 1U);
   driver.settle();
@@ -226,7 +226,7 @@ TEST(Patch, UnreadableDataDiscardThatPatchOnly) {
   EXPECT_EQ(driver.frames.back().header.rev, 3U);
 }
 
-// The unreadable step is hidden by a later patch before any frame of it is rendered.
+// The step that cannot be read is hidden under a later patch before any frame is drawn of it.
 TEST(Patch, FailedPatchBelowLaterOnesIsFoundAndTheStreamContinues) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":2})");
@@ -242,11 +242,11 @@ TEST(Patch, FailedPatchBelowLaterOnesIsFoundAndTheStreamContinues) {
   };
   fail_step_3();
   driver.settle();
-  EXPECT_EQ(driver.frames.back().header.step, 2U) << "the rendered view";
+  EXPECT_EQ(driver.frames.back().header.step, 2U) << "what was drawn before";
   driver.patch(5, R"({"camera":{"fovY":25}})");
   fail_step_3();
   driver.settle();
-  EXPECT_EQ(driver.frames.back().header.rev, 5U) << "the valid patch is applied";
+  EXPECT_EQ(driver.frames.back().header.rev, 5U) << "an innocent patch is followed";
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
   bool named = false;
   for (const auto& error : driver.errors()) {
@@ -263,7 +263,7 @@ TEST(Patch, PermanentFailureIsNotRetried) {
   driver.ack(1);
   driver.patch(2, R"({"step":5})");
   driver.fail_render(make_error(ErrorKind::out_of_memory, "no room"));
-  ASSERT_TRUE(driver.render) << "the old view again, without a final frame so far";
+  ASSERT_TRUE(driver.render) << "the old view again, of which no final frame was sent";
   driver.fail_render(make_error(ErrorKind::out_of_memory, "no room"));
   const int renders = driver.renders;
   driver.wait(3000 * ms);
@@ -279,7 +279,7 @@ TEST(Patch, FailureKeepsTheFinalFrame) {
   driver.patch(2, R"({"step":5})");
   driver.fail_render(make_error(ErrorKind::out_of_memory, "no room"));
   driver.wait(3000 * ms);
-  EXPECT_EQ(driver.renders, renders + 1) << "the client sees the old view in full quality";
+  EXPECT_EQ(driver.renders, renders + 1) << "what the viewer sees is the old view, sharp";
   ASSERT_EQ(driver.errors().size(), 1U);
   EXPECT_EQ(driver.errors()[0].rev, 2U);
   EXPECT_TRUE(driver.texts_of<protocol::UnchangedMessage>().empty()) << "no patch is answered";
@@ -320,96 +320,12 @@ TEST(Ack, MayBeRepeatedOrLate) {
   driver.patch(4, R"({"step":3})");
   driver.finish_render();
   driver.patch(5, R"({"step":4})");
-  EXPECT_FALSE(driver.render) << "two unacknowledged, however often old ones are acknowledged";
+  EXPECT_FALSE(driver.render) << "two are out, however often old ones were acknowledged";
 }
 
-// --- stills -------------------------------------------------------------------------------------
+// --- steps that run -----------------------------------------------------------------------------
 
-TEST(Still, IsRenderedAtItsSizeAndAnnouncedWithItsId) {
-  Driver driver;
-  driver.patch(1, R"({"dataset":"wind","step":3})");
-  driver.settle();
-  driver.texts.clear();
-  protocol::StillMessage still;
-  still.id = 77;
-  still.width = 1000;
-  still.height = 500;
-  still.scale = 2;
-  driver.say(still);
-  ASSERT_TRUE(driver.render);
-  EXPECT_EQ(driver.render->view.image.width, 2000);
-  EXPECT_EQ(driver.render->view.image.height, 1000);
-  EXPECT_EQ(driver.render->setting.half_level, 0);
-  driver.finish_render(500 * ms);
-  const auto header = driver.frames.back().header;
-  EXPECT_EQ(header.codec, protocol::Codec::png);
-  EXPECT_EQ(header.width, 2000);
-  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
-  const auto progress = driver.texts_of<protocol::ProgressMessage>();
-  ASSERT_EQ(progress.size(), 2U);
-  EXPECT_EQ(progress[1].id, 77U);
-  EXPECT_EQ(progress[1].done, 1);
-  EXPECT_EQ(driver.texts_of<protocol::ChosenMessage>().back().seq, header.seq);
-}
-
-TEST(Still, WaitsForCreditAndIsServedWhileTheViewMoves) {
-  Driver driver;
-  driver.patch(1, R"({"dataset":"wind"})");
-  driver.finish_render();
-  driver.ack(1);
-  driver.patch(2, R"({"step":1})");
-  protocol::StillMessage still;
-  still.id = 1;
-  still.format = "jpeg";
-  driver.say(still);
-  for (std::uint32_t rev = 3; rev < 8; ++rev) {
-    driver.patch(rev, R"({"step":)" + std::to_string(rev) + "}");
-    driver.finish_render();
-    driver.ack(driver.frames.back().header.seq);
-  }
-  int stills = 0;
-  for (const SendFrame& frame : driver.frames) stills += frame.header.quality == 95 ? 1 : 0;
-  EXPECT_EQ(stills, 1);
-}
-
-TEST(Still, ReleasedDataDuringLoadingAreReported) {
-  Driver driver;
-  driver.patch(1, R"({"dataset":"wind"})");
-  driver.settle();
-  protocol::StillMessage still;
-  still.id = 77;
-  driver.say(still);
-  driver.fail_render(make_error(ErrorKind::not_resident, "its memory was released; try again"));
-  ASSERT_EQ(driver.errors().size(), 1U);
-  EXPECT_EQ(driver.errors()[0].id, 77U);
-  EXPECT_FALSE(driver.render) << "the client may ask again";
-}
-
-TEST(Still, OversizeExcessOrEmptyStillIsAnError) {
-  Driver driver;
-  protocol::StillMessage still;
-  still.id = 1;
-  driver.say(still);
-  driver.patch(1, R"({"dataset":"wind","image":{"width":4000,"height":4000}})");
-  still.scale = 4;
-  still.id = 2;
-  driver.say(still);
-  still.scale = 1;
-  for (std::uint32_t id = 3; id < 9; ++id) {
-    still.id = id;
-    driver.say(still);
-  }
-  std::vector<std::pair<std::uint32_t, int>> answers;
-  for (const auto& error : driver.errors()) {
-    answers.emplace_back(error.id.value_or(0), error.problem.status);
-  }
-  EXPECT_THAT(answers, ElementsAre(std::pair(1U, 404), std::pair(2U, 413), std::pair(5U, 429),
-                                   std::pair(6U, 429), std::pair(7U, 429), std::pair(8U, 429)));
-}
-
-// --- playback -----------------------------------------------------------------------------------
-
-// Renders each frame in `cost` and acknowledges it, for `duration`.
+// Draws each frame in `cost` and acknowledges it, for `duration`.
 void run_for(Driver& driver, Micros duration, Micros cost) {
   const Micros end = driver.now() + duration;
   while (driver.now() < end) {
@@ -445,8 +361,8 @@ TEST(Play, WithDropSkipsLateSteps) {
   }
   ASSERT_GE(shown.size(), 3U);
   for (std::size_t n = 1; n < shown.size(); ++n) EXPECT_GT(shown[n], shown[n - 1]);
-  EXPECT_LT(shown.size(), 7U) << "some must be skipped";
-  EXPECT_EQ(shown.back(), 9U) << "the last step is on time";
+  EXPECT_LT(shown.size(), 7U) << "some must be left out";
+  EXPECT_EQ(shown.back(), 9U) << "the last is where it ends, and on time";
 }
 
 TEST(Play, WithoutDropShowsEveryStep) {
@@ -514,7 +430,7 @@ TEST(Play, UnreadableStepStopsIt) {
   EXPECT_EQ(driver.frames.back().header.step, 0U);
 }
 
-// --- closing ------------------------------------------------------------------------------------
+// --- ends ---------------------------------------------------------------------------------------
 
 TEST(End, BinaryMessageClosesWith4400) {
   Driver driver;
