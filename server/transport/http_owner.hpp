@@ -1,0 +1,32 @@
+// An HTTP session as seen by its parts and by the reply to its request.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "server/http/exchange.hpp"
+#include "server/transport/guarded.hpp"
+
+namespace windsplat::net {
+
+class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
+ public:
+  HttpOwner() = default;
+  virtual ~HttpOwner() = default;
+  HttpOwner(const HttpOwner&) = delete;
+  HttpOwner& operator=(const HttpOwner&) = delete;
+
+  [[nodiscard]] virtual const std::string& request_id() const = 0;
+  virtual void on_reply(Response response) = 0;
+  virtual void abort() = 0;  // end now
+  virtual void close() = 0;  // the connection's time is over, or it has failed
+
+  // A completion handler that keeps the session alive.
+  template <class Body>
+  auto handler(Body body) {
+    return guarded(shared_from_this(), std::move(body));
+  }
+};
+
+}  // namespace windsplat::net

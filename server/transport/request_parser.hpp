@@ -1,0 +1,51 @@
+// Bytes of a connection -> requests. The header is read completely and checked as bytes before it
+// is parsed.
+#pragma once
+
+#include <boost/asio/buffer.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <cstddef>
+#include <optional>
+
+#include "server/http/exchange.hpp"
+#include "server/transport/stream.hpp"
+
+namespace windsplat::net {
+
+class RequestParser {
+ public:
+  using Parser = beast::http::request_parser<beast::http::string_body>;
+
+  void begin();  // the next request; bytes received stay
+  [[nodiscard]] Parser& parser() { return *parser_; }
+  [[nodiscard]] beast::flat_buffer& buffer() { return buffer_; }
+  [[nodiscard]] bool has_input() const { return buffer_.size() > 0; }
+  // Room for the next read.
+  asio::mutable_buffer prepare();
+  // Room for bytes that are discarded, as is what was received.
+  asio::mutable_buffer prepare_discarded();
+
+  struct Header {
+    bool complete = false;
+    std::optional<Response> refusal;
+  };
+  // Parses the header if it has arrived.
+  Header parse_header();
+  // The parsed header's method and fields.
+  void copy_header(Request& request) const;
+
+  // Whether the error is in the request's text, not in the connection; and its answer.
+  static bool is_fault_of_text(ErrorCode fault);
+  static Response refusal_of(ErrorCode fault);
+
+ private:
+  static constexpr std::size_t buffer_bytes_max = std::size_t{16} * 1024;
+
+  beast::flat_buffer buffer_{buffer_bytes_max};
+  std::size_t searched_ = 0;  // bytes of buffer_ already searched for the end of the header
+  std::optional<Parser> parser_;
+};
+
+}  // namespace windsplat::net

@@ -1,0 +1,54 @@
+// What a session has to send: texts in order, and at most one frame, which they precede. Its bytes
+// are counted by the metrics.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "protocol/frame_header.hpp"
+#include "server/metrics/metrics.hpp"
+#include "server/session/effects.hpp"
+
+namespace windsplat::net {
+
+struct QueuedFrame {
+  std::array<std::uint8_t, protocol::frame_header_bytes> header;
+  session::Payload payload;
+  session::Tier tier;
+  protocol::FrameHeader facts;
+
+  [[nodiscard]] std::size_t bytes() const { return header.size() + payload->size(); }
+};
+
+class WriteQueue {
+ public:
+  explicit WriteQueue(Metrics& metrics) : metrics_(metrics) {}
+  ~WriteQueue() { hold(-held_bytes_); }
+  WriteQueue(const WriteQueue&) = delete;
+  WriteQueue& operator=(const WriteQueue&) = delete;
+
+  void add(std::string text);
+  void set(QueuedFrame frame);  // the session provides the next one after the write
+  void pop_text();
+  void pop_frame();
+
+  [[nodiscard]] const std::deque<std::string>& texts() const { return texts_; }
+  [[nodiscard]] const std::optional<QueuedFrame>& frame() const { return frame_; }
+  // More text waits for a slow peer than is allowed: read nothing more from it.
+  [[nodiscard]] bool is_backlogged() const;
+
+ private:
+  void hold(std::int64_t more_bytes);
+
+  Metrics& metrics_;
+  std::deque<std::string> texts_;
+  std::size_t text_bytes_ = 0;
+  std::optional<QueuedFrame> frame_;
+  std::int64_t held_bytes_ = 0;  // of texts_ and frame_
+};
+
+}  // namespace windsplat::net
