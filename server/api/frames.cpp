@@ -298,13 +298,6 @@ Result<Picture> read_view(const Request& request, frame::Format format) {
 
 }  // namespace
 
-std::optional<frame::Format> format_of_suffix(std::string_view name) {
-  if (name == "frame.jpg") return frame::Format::jpeg;
-  if (name == "frame.png") return frame::Format::png;
-  if (name == "frame.npy") return frame::Format::npy;
-  return std::nullopt;
-}
-
 void get_frame(Services& services, const std::string& id, frame::Format format,
                const Request& request, Reply reply) {
   auto dataset = services.backend.catalogue.find(id);

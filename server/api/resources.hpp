@@ -47,7 +47,6 @@ void get_series(Services& services, const std::string& id, const std::string& fi
 void get_range(Services& services, const std::string& id, const std::string& field,
                const Request& request, Reply reply);
 
-std::optional<frame::Format> format_of_suffix(std::string_view name);  // "frame.jpg"
 void get_frame(Services& services, const std::string& id, frame::Format format,
                const Request& request, Reply reply);
 void post_frame(Services& services, const Request& request, Reply reply);

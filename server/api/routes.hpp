@@ -1,42 +1,51 @@
-// Names of the routes in log lines and metrics: a bounded set.
+// The table of routes: every path and method of the API, what it takes, and its handler.
 #pragma once
 
-#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "server/api/services.hpp"
+#include "server/http/exchange.hpp"
 
 namespace windsplat::net {
 
-inline constexpr const char* route_other = "other";  // unknown or unparsed path
-inline constexpr const char* route_page = "page";
-inline constexpr const char* route_login = "/login";
-inline constexpr const char* route_stream = "/v1/stream";
+// Values of the placeholders of a path, in order.
+using PathValues = std::vector<std::string>;
+// Replies once, now or later. Does not throw after the reply.
+using Handler = void (*)(Services& services, const PathValues& values, const Request& request,
+                         const Reply& reply);
 
-inline constexpr std::array route_names{
-    "/livez",
-    "/readyz",
-    "/metrics",
-    "/view.schema.json",
-    "/v1",
-    "/v1/colormaps",
-    "/v1/presets",
-    "/v1/frames",
-    "/v1/references",
-    "/v1/references/{id}",
-    "/v1/forecasts",
-    "/v1/views",
-    "/v1/views/{id}",
-    "/v1/jobs",
-    "/v1/jobs/{id}",
-    "/v1/datasets",
-    "/v1/datasets/{id}",
-    "/v1/datasets/{id}/frame",
-    "/v1/datasets/{id}/probe",
-    "/v1/datasets/{id}/fields/{field}/histogram",
-    "/v1/datasets/{id}/fields/{field}/series",
-    "/v1/datasets/{id}/fields/{field}/range",
-    route_stream,
-    route_login,
-    route_page,
-    route_other,
+enum class Query { refused, taken };
+enum class Charge {
+  none,
+  picture,       // counts as a picture of the address before the handler is called
+  valid_picture  // the same, counted by the handler once the view is valid
 };
+enum class Place {
+  base,  // below the base path
+  root   // at the root as well, and answered under any load
+};
+
+struct Route {
+  const char* method;  // GET includes HEAD
+  const char* path;    // "{...}" stands for one segment
+  Handler handler;
+  Query query = Query::refused;
+  Charge charge = Charge::none;
+  Place place = Place::base;
+  const char* name = path;  // by which requests are logged and counted
+};
+
+// In the order of methods that Allow states. Documented in docs/user/api.md.
+std::span<const Route> routes();
+
+// What requests are counted by besides the paths of routes().
+inline constexpr const char* route_stream = "/v1/stream";
+inline constexpr const char* route_login = "/login";
+inline constexpr const char* route_page = "page";
+inline constexpr const char* route_other = "other";  // unknown or unparsed path
+// All of them, without repetition: a bounded set.
+std::vector<const char*> route_names();
 
 }  // namespace windsplat::net

@@ -16,7 +16,7 @@ constexpr std::size_t view_changes_waiting_max = 64;  // each may take one disk 
 Services::Services(ServerOptions server_options, std::shared_ptr<data::Store> store,
                    std::shared_ptr<ThreadPool> threads)
     : options(std::move(server_options)),
-      metrics(route_names),
+      metrics(route_names()),
       admission(options.limits, metrics),
       backend(
           std::move(store), std::move(threads), metrics,

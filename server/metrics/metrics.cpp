@@ -165,7 +165,7 @@ struct Metrics::State {
                    {{"result", result}});
   }
 
-  explicit State(std::span<const char* const> routes) {
+  explicit State(const std::vector<const char*>& routes) {
     gauge("windsplat_build_info", "1, labelled with the version.", {{"version", WINDSPLAT_VERSION}})
         .Set(1);
     for (const char* route : routes) count_requests_of(route);
@@ -207,7 +207,8 @@ struct Metrics::State {
   std::array<Counter*, limit_names.size()> limits{};
 };
 
-Metrics::Metrics(std::span<const char* const> routes) : state_(std::make_unique<State>(routes)) {}
+Metrics::Metrics(const std::vector<const char*>& routes)
+    : state_(std::make_unique<State>(routes)) {}
 Metrics::~Metrics() = default;
 
 void Metrics::stage_took(Stage stage, std::int64_t us) {

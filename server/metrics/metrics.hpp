@@ -6,9 +6,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "protocol/frame_header.hpp"
 #include "server/data/resident/budget.hpp"
@@ -24,7 +24,7 @@ class Metrics {
   enum class Over { http, stream };
 
   // Responses are counted by route: one of `routes`, else "other".
-  explicit Metrics(std::span<const char* const> routes = {});
+  explicit Metrics(const std::vector<const char*>& routes = {});
   ~Metrics();
   Metrics(const Metrics&) = delete;
   Metrics& operator=(const Metrics&) = delete;

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "protocol/messages.hpp"
-#include "server/session/link.hpp"
+#include "server/session/pacing/link.hpp"
 #include "server/session/surroundings.hpp"
 
 namespace windsplat::session {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "protocol/messages.hpp"
-#include "server/session/link.hpp"
+#include "server/session/pacing/link.hpp"
 #include "server/session/session_state.hpp"
 
 namespace windsplat::session {

@@ -4,10 +4,10 @@
 #include <utility>
 #include <variant>
 
-#include "server/session/frame_delivery.hpp"
-#include "server/session/frame_scheduler.hpp"
 #include "server/session/message_handler.hpp"
-#include "server/session/playback.hpp"
+#include "server/session/pacing/frame_delivery.hpp"
+#include "server/session/pacing/frame_scheduler.hpp"
+#include "server/session/playback/playback.hpp"
 #include "server/session/view_changes.hpp"
 
 namespace windsplat::session {

@@ -8,7 +8,7 @@
 #include "protocol/view.hpp"
 #include "server/base/error.hpp"
 #include "server/quality/table.hpp"
-#include "server/session/link.hpp"
+#include "server/session/pacing/link.hpp"
 
 namespace windsplat::session {
 

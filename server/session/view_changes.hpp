@@ -7,7 +7,7 @@
 
 #include "protocol/codec.hpp"
 #include "protocol/messages.hpp"
-#include "server/session/link.hpp"
+#include "server/session/pacing/link.hpp"
 #include "server/session/session_state.hpp"
 
 namespace windsplat::session {

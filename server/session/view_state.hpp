@@ -7,7 +7,7 @@
 
 #include "protocol/codec.hpp"
 #include "protocol/messages.hpp"
-#include "server/session/link.hpp"
+#include "server/session/pacing/link.hpp"
 #include "server/session/unconfirmed_changes.hpp"
 
 namespace windsplat::session {

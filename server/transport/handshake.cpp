@@ -21,7 +21,7 @@
 #include "server/api/services.hpp"
 #include "server/base/log.hpp"
 #include "server/transport/guarded.hpp"
-#include "server/transport/http_session.hpp"
+#include "server/transport/http/http_session.hpp"
 #include "server/transport/post_or_retry.hpp"
 #include "server/transport/tls_context.hpp"
 #include "server/transport/wire.hpp"

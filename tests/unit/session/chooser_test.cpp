@@ -1,6 +1,6 @@
 // The chooser: times correct forecasts; finer settings are chosen with hysteresis, coarser ones at
 // once.
-#include "server/session/chooser.hpp"
+#include "server/session/pacing/chooser.hpp"
 
 #include <gtest/gtest.h>
 

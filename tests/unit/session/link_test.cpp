@@ -1,9 +1,9 @@
 // Estimates for links of known rate and delay, against closed forms. Times are microseconds.
-#include "server/session/link.hpp"
+#include "server/session/pacing/link.hpp"
 
 #include <gtest/gtest.h>
 
-#include "server/session/jpeg_rate.hpp"
+#include "server/session/pacing/jpeg_rate.hpp"
 
 namespace windsplat::session {
 namespace {

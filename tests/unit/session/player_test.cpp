@@ -1,5 +1,5 @@
 // Times of steps by the clock only: late steps are dropped or delayed.
-#include "server/session/player.hpp"
+#include "server/session/playback/player.hpp"
 
 #include <gtest/gtest.h>
 

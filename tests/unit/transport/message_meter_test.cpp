@@ -1,5 +1,5 @@
 // The bytes of an incoming message that never ends.
-#include "server/transport/message_meter.hpp"
+#include "server/transport/websocket/message_meter.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,173 @@
+#include "server/session/pacing/quality_control.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "protocol/limits.hpp"
+
+namespace windsplat::session {
+namespace {
+
+constexpr double budget_ms_default = 33;
+constexpr double budget_ms_least = 8;
+constexpr int final_quality = 92;
+constexpr int still_quality = 95;
+
+Micros budget_of(const protocol::View& view) {
+  return static_cast<Micros>(1000 * view.quality.budget_ms.value_or(budget_ms_default));
+}
+
+bool is_reference(const protocol::View& view) {
+  return view.method.name == protocol::MethodName::reference;
+}
+
+Encoding full_quality(bool png, int jpeg_quality) {
+  Encoding encoding;
+  encoding.codec = png ? protocol::Codec::png : protocol::Codec::jpeg;
+  encoding.quality = png ? 100 : jpeg_quality;
+  encoding.full_chroma = true;
+  return encoding;
+}
+
+}  // namespace
+
+// If both are null, a stream keeps the default budget.
+quality::Aim QualityControl::aim(const protocol::View& view) const {
+  quality::Aim aim{view.quality.budget_ms, view.quality.max_error};
+  if (aim.budget_ms || aim.max_error) return aim;
+  // When sessions compete for the renderer, shorten everyone's frames to raise the rate: for n
+  // similar sessions by the root of n.
+  const double waited = 1e-3 * queue_us_;
+  aim.budget_ms = std::max(budget_ms_least,
+                           budget_ms_default * budget_ms_default / (budget_ms_default + waited));
+  return aim;
+}
+
+Micros QualityControl::final_cost(const protocol::View& view, const quality::Forecasts& known,
+                                  Micros now) const {
+  const bool slab = view.method.name == protocol::MethodName::slab;
+  const double factor = final_factor_.value_or(slab ? 2.6 : 6.4);
+  const Micros own = chooser_.expected(quality::own_setting(view), known, now);
+  return static_cast<Micros>(factor * static_cast<double>(own));
+}
+
+bool QualityControl::final_is_cheap(const protocol::View& view, Micros now) const {
+  return final_cost(view, forecast_.of(view), now) <= budget_of(view);
+}
+
+FramePlan QualityControl::moving(const protocol::View& view, const Link& link, Micros now) {
+  FramePlan plan;
+  const int width = view.image.width;
+  const int height = view.image.height;
+  const Micros budget = budget_of(view);
+  const int least = jpeg_.least_level(width, height, link, budget);
+  const double pixels_most = least > 0 ? static_cast<double>(width) * height / std::pow(4.0, least)
+                                       : std::numeric_limits<double>::infinity();
+  if (!is_reference(view)) {
+    plan.setting =
+        quality::settings[chooser_.choose(view, forecast_.of(view), aim(view), pixels_most, now)];
+    moving_setting_ = plan.setting;
+  }
+  plan.encoding.quality = jpeg_.choose(quality::pixels_at(view, plan.setting), link, budget);
+  return plan;
+}
+
+std::optional<FramePlan> QualityControl::refining(const protocol::View& view, const Link& link,
+                                                  double shown_error, Micros now) const {
+  constexpr Micros long_in_coming = 200'000;
+  constexpr double better = 0.5;
+  constexpr int usual = JpegRate::quality_usual;
+  const quality::Forecasts known = forecast_.of(view);
+  const bool guessed = !final_factor_ && !known[quality::own_setting(view)].timed;
+  const Micros cost = final_cost(view, known, now);
+  if (guessed || cost <= long_in_coming || is_reference(view)) return std::nullopt;
+  const auto next = chooser_.least_error(view, known, cost / 4, now);
+  if (!next || known[*next].error >= better * shown_error) return std::nullopt;
+  FramePlan plan;
+  plan.setting = quality::settings[*next];
+  plan.encoding.quality = usual;
+  const double bytes = jpeg_.predicted_bytes(quality::pixels_at(view, plan.setting), usual);
+  if (link.transfer(bytes) >= cost / 2) return std::nullopt;
+  return plan;
+}
+
+quality::Setting QualityControl::final_setting(const protocol::View& view) const {
+  quality::Setting setting = quality::settings[quality::own_setting(view)];
+  if (thinner_ == 0) return setting;
+  const int halvings = setting.method == protocol::MethodName::slab ? thinner_ : thinner_ - 1;
+  setting.method = protocol::MethodName::slab;
+  setting.thinner = 1 << halvings;
+  return setting;
+}
+
+FramePlan QualityControl::final_frame(const protocol::View& view) const {
+  FramePlan plan;
+  plan.encoding = full_quality(view.quality.lossless, final_quality);
+  plan.encoding.measure = true;
+  if (!is_reference(view)) plan.setting = final_setting(view);
+  return plan;
+}
+
+FramePlan QualityControl::still(const protocol::View& view, bool png) {
+  return {quality::settings[quality::own_setting(view)], full_quality(png, still_quality)};
+}
+
+void QualityControl::on_view_changed(bool other_dataset) {
+  thinner_ = 0;
+  if (!other_dataset) return;
+  chooser_ = Chooser();
+  final_factor_.reset();
+  forecast_.forget();
+}
+
+void QualityControl::learn(const Render& render, const Drawn& drawn, const ViewState& state,
+                           Micros now) {
+  const protocol::View& view = state.view();
+  if (drawn.info.method == "reference" || render.purpose == Purpose::still) return;
+  if (render.dataset != view.dataset) return;
+  if (!drawn.signature.key.empty() && render.version == state.version()) {
+    forecast_.learn(view, drawn);
+  }
+  if (drawn.loaded) return;
+  if (render.purpose == Purpose::moving) {
+    constexpr double newest = 0.2;
+    queue_us_ += newest * (static_cast<double>(drawn.queue_us) - queue_us_);
+  }
+  if (render.purpose == Purpose::final) {
+    const auto cost = static_cast<double>(drawn.render_us + drawn.measure_us + drawn.encode_us);
+    const auto own = chooser_.expected(quality::own_setting(view), forecast_.of(view), now);
+    final_factor_ = cost / std::max(static_cast<double>(own), 1.0);
+  } else if (const auto setting = quality::index_of(render.setting)) {
+    chooser_.learn(*setting, drawn.render_us + drawn.encode_us, forecast_.of(view), now);
+  }
+}
+
+void QualityControl::learn_bytes(const Render& render, const Drawn& drawn, std::size_t frame_bytes,
+                                 std::size_t text_bytes) {
+  const double pixels = static_cast<double>(drawn.info.width) * drawn.info.height;
+  jpeg_.learn(pixels, render.encoding.quality, frame_bytes, text_bytes);
+}
+
+bool QualityControl::needs_thinner_slabs(const Render& render, const Drawn& drawn,
+                                         const ViewState& state) {
+  constexpr int halvings_max = 4;
+  const protocol::View& view = state.view();
+  const auto& most = view.quality.max_error;
+  if (render.purpose != Purpose::final || render.version != state.version() || !most) return false;
+  if (!drawn.info.error_value || *drawn.info.error_value <= *most) return false;
+  if (drawn.info.method == "reference" || thinner_ >= halvings_max) return false;
+  // Errors of averaged data are not reduced by thinner slabs.
+  constexpr double mended = 0.67;
+  if (thinner_ > 0 && *drawn.info.error_value > mended * thicker_error_) return false;
+  thicker_error_ = *drawn.info.error_value;
+  ++thinner_;
+  if (view.method.slab_thickness / final_setting(view).thinner >=
+      protocol::limits::slab_thickness_min) {
+    return true;
+  }
+  --thinner_;
+  return false;
+}
+
+}  // namespace windsplat::session

@@ -1,0 +1,73 @@
+// Setting and encoding of each frame: the view's aims, the measured times and the link in, how to
+// render out.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "protocol/view.hpp"
+#include "server/quality/pick.hpp"
+#include "server/quality/setting.hpp"
+#include "server/session/effects.hpp"
+#include "server/session/pacing/chooser.hpp"
+#include "server/session/pacing/jpeg_rate.hpp"
+#include "server/session/pacing/link.hpp"
+#include "server/session/pacing/render_slot.hpp"
+#include "server/session/pacing/view_forecast.hpp"
+#include "server/session/view_state.hpp"
+
+namespace windsplat::session {
+
+// How to render one frame.
+struct FramePlan {
+  quality::Setting setting;
+  Encoding encoding;
+};
+
+class QualityControl {
+ public:
+  explicit QualityControl(Forecaster forecaster) : forecast_(std::move(forecaster)) {}
+
+  [[nodiscard]] FramePlan moving(const protocol::View& view, const Link& link, Micros now);
+  // Refinement before the final frame: at most half of `shown_error`, that of the frame displayed,
+  // at a fraction of the final time. None: go on with the final frame.
+  [[nodiscard]] std::optional<FramePlan> refining(const protocol::View& view, const Link& link,
+                                                  double shown_error, Micros now) const;
+  // The view as specified; with thinner slabs if its error would exceed maxError.
+  [[nodiscard]] FramePlan final_frame(const protocol::View& view) const;
+  [[nodiscard]] static FramePlan still(const protocol::View& view, bool png);
+
+  // Whether a final frame is expected within the budget of a moving one.
+  [[nodiscard]] bool final_is_cheap(const protocol::View& view, Micros now) const;
+  // That of the last moving frame.
+  [[nodiscard]] const quality::Setting& moving_setting() const { return moving_setting_; }
+
+  void on_view_changed(bool other_dataset);
+  // Learns times from frames drawn without loading only.
+  void learn(const Render& render, const Drawn& drawn, const ViewState& state, Micros now);
+  // A moving frame is sent; `text_bytes` precede it.
+  void learn_bytes(const Render& render, const Drawn& drawn, std::size_t frame_bytes,
+                   std::size_t text_bytes);
+  // Whether a frame drawn as final exceeds maxError and thinner slabs are possible: the next one
+  // has them.
+  [[nodiscard]] bool needs_thinner_slabs(const Render& render, const Drawn& drawn,
+                                         const ViewState& state);
+
+ private:
+  [[nodiscard]] quality::Aim aim(const protocol::View& view) const;
+  // Expected time of a final frame, including the finer slab run that measures its error.
+  [[nodiscard]] Micros final_cost(const protocol::View& view, const quality::Forecasts& known,
+                                  Micros now) const;
+  [[nodiscard]] quality::Setting final_setting(const protocol::View& view) const;
+
+  ViewForecast forecast_;
+  Chooser chooser_;
+  JpegRate jpeg_;
+  std::optional<double> final_factor_;  // time of the last final frame over that of its setting
+  quality::Setting moving_setting_;     // the last one chosen
+  double queue_us_ = 0;                 // recent waiting time of moving frames for the renderer
+  int thinner_ = 0;           // number of halvings of the final frame's slabs for maxError
+  double thicker_error_ = 0;  // measured before the last halving
+};
+
+}  // namespace windsplat::session

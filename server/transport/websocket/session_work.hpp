@@ -1,0 +1,56 @@
+// Renders and loads that a session requests: throttled by its address's quota, and their results
+// brought back to the io thread.
+#pragma once
+
+#include <atomic>
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "server/access/admission.hpp"
+#include "server/session/effects.hpp"
+#include "server/transport/websocket/stream_owner.hpp"
+#include "server/work/viewer.hpp"
+
+namespace windsplat::net {
+
+class SessionWork {
+ public:
+  SessionWork(StreamOwner& owner, const boost::asio::any_io_executor& executor, Backend& backend,
+              Admission& admission, const std::string& address, DrawnReply on_rendered,
+              DescribedReply on_described);
+
+  // A throttled address gets its frames later; a long delay closes the session.
+  void start(const session::StartRender& effect);
+  void start(const session::Describe& effect);
+  void start(const session::Prefetch& effect) { viewer_.start(effect); }
+  void start(const session::Calibrate& effect) { viewer_.start(effect); }
+  void cancel(std::uint64_t ticket);
+  void stop();
+
+  // A result could not be posted to the io thread.
+  [[nodiscard]] bool has_lost_reply() const { return *reply_lost_; }
+
+ private:
+  template <class Body>
+  auto back(Body body);
+  void begin(const session::StartRender& effect);
+  void begin_throttled();
+
+  StreamOwner& owner_;
+  const boost::asio::any_io_executor executor_;
+  Admission& admission_;
+  const std::string& address_;
+  Viewer viewer_;
+  DrawnReply on_rendered_;
+  DescribedReply on_described_;
+  boost::asio::steady_timer timer_;
+  std::optional<session::StartRender> throttled_;  // starts when timer_ expires
+  const std::shared_ptr<std::atomic<bool>> reply_lost_ = std::make_shared<std::atomic<bool>>(false);
+};
+
+}  // namespace windsplat::net

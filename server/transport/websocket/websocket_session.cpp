@@ -1,0 +1,186 @@
+// The WebSocket of a session from its handshake to its end. All on the io thread.
+#include "server/transport/websocket/websocket_session.hpp"
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "protocol/limits.hpp"
+#include "server/api/routes.hpp"
+#include "server/api/services.hpp"
+#include "server/http/exchange.hpp"
+#include "server/session/session.hpp"
+#include "server/transport/websocket/session_driver.hpp"
+#include "server/transport/websocket/stream_owner.hpp"
+#include "server/transport/websocket/websocket_reader.hpp"
+#include "server/transport/websocket/websocket_stream.hpp"
+
+namespace windsplat::net {
+namespace {
+
+constexpr int close_policy = 1008;
+constexpr int close_full = 1013;
+constexpr int close_fault = 1011;
+constexpr std::chrono::seconds handshake_timeout{5};
+constexpr std::chrono::seconds silence_timeout{60};  // a ping is sent after half of it
+constexpr std::chrono::seconds close_timeout{2};
+
+bool offers_protocol(const UpgradeRequest& request) {
+  for (const auto& field : request) {
+    if (field.name() != beast::http::field::sec_websocket_protocol) continue;
+    for (const std::string_view name : split_list(field.value(), ',')) {
+      if (name == protocol::protocol_name) return true;
+    }
+  }
+  return false;
+}
+
+std::optional<session::Reading> what_is_read(const Services& services, const std::string& id) {
+  const auto dataset = services.backend.catalogue.find(id);
+  const auto loading = dataset ? (*dataset)->loading() : std::nullopt;
+  if (!loading) return std::nullopt;
+  return session::Reading{loading->field, loading->done};
+}
+
+session::Session new_session(Services& services) {
+  session::Options options;
+  options.idle_timeout_us = session::Micros{services.options.idle_timeout_s} * 1'000'000;
+  return {
+      options,
+      {[&services](const protocol::View& view) -> Result<int> {
+         const auto checked = services.backend.check(view);
+         if (!checked) return checked.error();
+         return checked->steps;
+       },
+       [&services](const std::string& id) { return what_is_read(services, id); },
+       [&services](const quality::SceneSignature& signature, const quality::Viewpoint& viewpoint) {
+         return services.backend.quality.forecasts(signature, viewpoint);
+       }},
+      now_us()};
+}
+
+class WebSocketSession final : public Connection, public StreamOwner {
+ public:
+  WebSocketSession(Wire wire, std::string request_id, Services& services, Connections& connections,
+                   Guest guest)
+      : StreamOwner(connections.next_id(), std::move(request_id)),
+        socket_(std::move(wire)),
+        services_(services),
+        connections_(connections),
+        guest_(std::move(guest)),
+        token_(services.options.token),
+        close_timer_(socket_.get_executor()),
+        driver_(*this, socket_, new_session(services), services.backend, services.metrics,
+                services.admission, guest_.address),
+        reader_(*this, socket_, services.admission, guest_.address, driver_.queue(), driver_) {}
+  ~WebSocketSession() override { connections_.remove(id_); }
+  WebSocketSession(const WebSocketSession&) = delete;
+  WebSocketSession& operator=(const WebSocketSession&) = delete;
+
+  void start(UpgradeRequest request) {
+    const bool full =
+        connections_.streams() >= static_cast<std::size_t>(services_.options.sessions_max);
+    connections_.add(id_, std::static_pointer_cast<WebSocketSession>(shared_from_this()), !full);
+    websocket::stream_base::timeout timeout{};
+    timeout.handshake_timeout = handshake_timeout;
+    timeout.idle_timeout = silence_timeout;
+    timeout.keep_alive_pings = true;
+    socket_.set_option(timeout);
+    const bool named = offers_protocol(request);
+    socket_.set_option(websocket::stream_base::decorator(
+        [named, id = request_id_](websocket::response_type& response) {
+          response.set(request_id_header, id);
+          response.set(beast::http::field::server, "windsplat");
+          if (named) {
+            response.set(beast::http::field::sec_websocket_protocol, protocol::protocol_name);
+          }
+        }));
+    socket_.auto_fragment(false);  // one WebSocket frame per picture, without copying the payload
+    reader_.prepare();
+    // The request is used while the response is composed, within this call.
+    socket_.async_accept(request, handler([this, full](ErrorCode fault) {
+                           if (fault) return abort();
+                           on_open(full);
+                         }));
+  }
+
+  void drain() override {
+    if (open_) driver_.drain();
+  }
+
+  void on_changed(const std::string& dataset) override {
+    if (open_) driver_.on_changed(dataset);
+  }
+
+  void on_new_token() override { close(close_policy, "the token has changed"); }
+
+  void abort() override {
+    ended_ = true;
+    open_ = false;
+    driver_.abort();
+    reader_.stop();
+    close_timer_.cancel();
+    beast::get_lowest_layer(socket_).close();
+  }
+
+  void close(int code, const std::string& reason) override {
+    if (!open_) return;
+    open_ = false;
+    driver_.stop();
+    reader_.stop();
+    close_timer_.expires_after(close_timeout);
+    close_timer_.async_wait(handler([this](ErrorCode fault) {
+      if (!fault) abort();
+    }));
+    log::info("closing session",
+              {{"session", id_}, {"request", request_id_}, {"code", code}, {"reason", reason}});
+    const websocket::close_reason goodbye(static_cast<websocket::close_code>(code), reason);
+    socket_.async_close(goodbye, handler([this](ErrorCode) { abort(); }));
+  }
+
+  void on_disconnected() override {
+    if (open_) log::info("session disconnected", {{"session", id_}, {"request", request_id_}});
+    abort();
+  }
+
+  void on_text_written() override { reader_.resume(); }
+
+ private:
+  void on_open(bool full) {
+    open_ = true;
+    if (is_other_token(token_.get(), services_.options.token.get())) return on_new_token();
+    services_.metrics.answered(route_stream, 101);
+    if (full) {
+      services_.metrics.refused(LimitKind::sessions);
+      return close(close_full, "the server is full");
+    }
+    if (services_.draining) return drain();
+    const auto datasets = services_.backend.catalogue.list();
+    if (!datasets) return close(close_fault, "cannot list the datasets");
+    driver_.begin({WINDSPLAT_VERSION, "session-" + std::to_string(id_), *datasets,
+                   services_.options.limits.pixels_max_reported()});
+    log::info("session opened", {{"session", id_}, {"request", request_id_}});
+    reader_.start();
+  }
+
+  WebSocketStream socket_;
+  Services& services_;
+  Connections& connections_;
+  const Guest guest_;
+  const std::shared_ptr<const Token> token_;  // token that authorised it
+  asio::steady_timer close_timer_;
+  SessionDriver driver_;
+  WebSocketReader reader_;
+};
+
+}  // namespace
+
+void start_websocket_session(Wire wire, UpgradeRequest request, std::string request_id,
+                             Services& services, Connections& connections, Guest guest) {
+  std::make_shared<WebSocketSession>(std::move(wire), std::move(request_id), services, connections,
+                                     std::move(guest))
+      ->start(std::move(request));
+}
+
+}  // namespace windsplat::net
