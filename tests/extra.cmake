@@ -18,6 +18,7 @@ endfunction()
 
 windsplat_tidy_test(includes python3 tests/tidy/check_includes.py)
 windsplat_tidy_test(links python3 tests/tidy/check_links.py)
+windsplat_tidy_test(routes python3 tests/tidy/check_routes.py)
 windsplat_tidy_test(web_imports python3 tests/tidy/check_web_imports.py)
 windsplat_tidy_test(style python3 tests/tidy/check_style.py)
 windsplat_tidy_test(self_test python3 tests/tidy/self_test.py)

@@ -6,6 +6,7 @@ import unittest
 
 import check_includes
 import check_links
+import check_routes
 import check_spelling
 import check_style
 import check_web_imports
@@ -155,6 +156,13 @@ class Planted(unittest.TestCase):
         self.expect(check_style, "a.cpp:1: 101 columns", "b.cpp:1: a function of 93 lines",
                     "c.cpp:2: a function of 92 lines", "d.cpp: 700 lines")
 
+    def test_folder_of_many_files(self):
+        for n in range(check_style.MAX_FOLDER_FILES):
+            self.plant(f"server/extra/f{n}.hpp", "#pragma once\n")
+        self.expect(check_style)
+        self.plant("server/extra/more.hpp", "#pragma once\n")
+        self.expect(check_style, "server/extra: 31 files")
+
     def test_short_functions_in_a_long_namespace_pass(self):
         body = "void f() {\n" + "  g();\n" * 40 + "}\n"
         self.plant("server/base/a.cpp", "namespace a {\n" + body * 10 + "}  // namespace a\n")
@@ -177,6 +185,16 @@ class Planted(unittest.TestCase):
         self.plant("server/base/a.cpp", "// see docs/d.md\n// ARCHITECTURE.md\n")
         self.expect(check_links, "docs/c.md:1: gone.md", "docs/c.md:3: b.md#z", "#no-heading",
                     "a.cpp:1: docs/d.md", "a.cpp:2: ARCHITECTURE.md")
+
+    def test_route_without_documentation(self):
+        self.plant("docs/user/api.md",
+                   "| `GET /v1/a`, `POST /v1/a` | x |\n| `GET /v1/{b}/c?d=` | y |\n")
+        self.plant("server/api/routes.cpp",
+                   'Route{"GET", "/v1/a", f}, Route{"GET", "/v1/{b}/c", f}\n')
+        self.expect(check_routes)
+        self.plant("server/api/routes.cpp", 'Route{"PUT", "/v1/a", f}, Route{"GET", "/v1", f}\n'
+                   'Route{method, "/v1/a", f}\n')
+        self.expect(check_routes, "a route is not in the form", "PUT /v1/a", "GET /v1")
 
     def test_name_of_a_test_in_snake_case(self):
         self.plant("tests/unit/base/a_test.cpp",
