@@ -318,7 +318,8 @@ TEST_P(GradsRefusal, NamesItsReason) {
 INSTANTIATE_TEST_SUITE_P(
     All, GradsRefusal,
     testing::Values(
-        BadGradsCase{"short", "tdef 3 linear jan2000 1mo", one_u, "has 96 bytes, 'd.ctl' says 144"},
+        BadGradsCase{"short", "tdef 3 linear jan2000 1mo", one_u,
+                     "has 96 bytes, 'd.ctl' requires 144"},
         BadGradsCase{"huge",
                      "tdef 10000000 linear jan2000 1mn\nxdef 16777216 linear 0 1\n"
                      "ydef 16777216 linear 0 1",

@@ -301,7 +301,7 @@ TEST_F(VtkResampling, BrokenCellsAreErrors) {
   EXPECT_THAT(file([](TestMesh& m) { m.offsets[7] = 72; }), HasSubstr("bytes where"));
   EXPECT_THAT(file([](TestMesh& m) { m.offsets[7] = 2e9; }), HasSubstr("bytes where"));
   EXPECT_THAT(file([](TestMesh& m) { std::fill(m.types.begin(), m.types.end(), 3); }),
-              HasSubstr("no cells of a kind"));
+              HasSubstr("no cells of a supported kind"));
   EXPECT_THAT(file([](TestMesh& m) {
                 std::fill(m.types.begin(), m.types.end(), 12);
                 std::fill(m.points.begin(), m.points.end(), 1);
