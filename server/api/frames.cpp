@@ -158,7 +158,8 @@ Result<PreparedPtr> prepare(quality::Tables& tables, const Picture& picture,
 }
 
 Result<Response> draw(Services& services, const Picture& picture, const PreparedPicture& prepared,
-                      data::Dataset& dataset, std::int64_t queue_us, const CancelToken& cancel) {
+                      data::Dataset& dataset, std::int64_t queue_us, Loading loading,
+                      const CancelToken& cancel) {
   auto drawn = frame::produce(prepared.frame, dataset, *services.backend.pool, cancel,
                               services.backend.frames);
   if (!drawn) return drawn.error();
@@ -174,9 +175,12 @@ Result<Response> draw(Services& services, const Picture& picture, const Prepared
   } else {
     response.headers = {{"Cache-Control", "no-cache"},
                         {"ETag", picture_etag(drawn->view, dataset, picture.encoding)}};
-    // Settings chosen by the server reduce the work below the estimate.
-    services.backend.costs.learn(drawn->view.dataset, drawn->view.method.name, picture.cost.kernels,
-                                 drawn->render_us + drawn->encode_us);
+    // Settings chosen by the server reduce the work below the estimate; the scene of a picture that
+    // waited for data was built elsewhere.
+    if (loading == Loading::none) {
+      services.backend.costs.learn(drawn->view.dataset, drawn->view.method.name,
+                                   picture.cost.kernels, drawn->render_us + drawn->encode_us);
+    }
   }
   response.content_type = media_type(picture.encoding.format);
   response.headers.emplace_back("Server-Timing",
@@ -221,10 +225,11 @@ void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dat
   };
   drawing.draw = [&services, picture, answer, cancel, id = request.id](
                      const PreparedPicture& prepared, data::Dataset& resident,
-                     std::int64_t queue_us, Loading /*loading*/) {
+                     std::int64_t queue_us, Loading loading) {
     auto response = run_guarded<Response>(
         "a picture", cancel,
-        [&] { return draw(services, *picture, prepared, resident, queue_us, cancel); }, id);
+        [&] { return draw(services, *picture, prepared, resident, queue_us, loading, cancel); },
+        id);
     (*answer)(response ? std::move(*response) : problem_response(response.error()));
   };
   drawing.payer = request.address;

@@ -249,10 +249,12 @@ Result<Frame> produce(const Prepared& prepared, data::Dataset& dataset, ThreadPo
 
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
                       ThreadPool& pool, const CancelToken& cancel, Workspace& workspace) {
+  const Clock::time_point start = Clock::now();
   const auto completed = complete(view, dataset, encoding.allow_reference);
   if (!completed) return completed.error();
-  const auto prepared = prepare(*completed, own_setting(*completed), dataset, encoding);
+  auto prepared = prepare(*completed, own_setting(*completed), dataset, encoding);
   if (!prepared) return prepared.error();
+  prepared->prepare_us = microseconds(start, Clock::now());
   return produce(*prepared, dataset, pool, cancel, workspace);
 }
 

@@ -84,7 +84,7 @@ struct Prepared {
   scene::Scene scene;
   quality::Setting setting;
   Encoding encoding;
-  std::int64_t prepare_us = 0;
+  std::int64_t prepare_us = 0;  // of completing and preparing, counted in render_us
 };
 // Errors: those of the scene.
 Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,

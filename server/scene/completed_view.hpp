@@ -28,7 +28,7 @@ class CompletedView {
   [[nodiscard]] int coarser() const { return coarser_; }
 
   // The same view after change(protocol::View&), which may set the camera, the method, the size of
-  // the picture and `quality`, or remove layers: nothing from which a default follows. Errors:
+  // the picture and `quality`, or remove layers. Defaults stay as they were filled in. Errors:
   // invalid with a pointer (its camera).
   template <class Change>
   [[nodiscard]] Result<CompletedView> with(const Change& change) const {

@@ -1,6 +1,7 @@
 // Passes a picture from the renderer to the loader and back.
 #include "server/work/drawing.hpp"
 
+#include <chrono>
 #include <string>
 #include <utility>
 
@@ -10,6 +11,11 @@ namespace {
 
 using DrawingPtr = std::shared_ptr<const Drawing>;
 using Held = std::shared_ptr<const void>;
+using Clock = std::chrono::steady_clock;
+
+std::int64_t us_since(Clock::time_point start) {
+  return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start).count();
+}
 
 void draw(const Drawing& drawing, const PreparedPtr& picture, std::int64_t queue_us,
           Loading loading) {
@@ -38,6 +44,7 @@ void load(Backend& backend, const DrawingPtr& drawing) {
     auto picture = backend.catalogue.load(*drawing->dataset, prepare, drawing->cancel);
     if (!picture) return drawing->fail(picture.error());
     if (*picture == nullptr) return;
+    (*picture)->frame.prepare_us = 0;  // not on the renderer's thread
     if (const auto queued = draw_after_load(backend, drawing, std::move(*picture)); !queued) {
       drawing->fail(queued.error());
     }
@@ -85,9 +92,8 @@ Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
     auto room = room_for(dataset, width, height, encoding.format);
     if (!room) return room.error();
     reserved = std::move(*room);
-    prepared->prepare_us = 0;  // loading is not drawing
   }
-  return std::make_shared<const PreparedPicture>(
+  return std::make_shared<PreparedPicture>(
       PreparedPicture{std::move(*prepared), std::move(reserved)});
 }
 
@@ -96,8 +102,10 @@ Result<void> submit(Backend& backend, Drawing asked) {
   return backend.renderer.submit({drawing->kind, drawing->owner, drawing->cancel,
                                   [&backend, drawing](std::int64_t queue_us) {
                                     data::Dataset resident = drawing->dataset->resident_only();
+                                    const Clock::time_point start = Clock::now();
                                     auto picture = drawing->prepare(resident, Loading::none);
                                     if (picture) {
+                                      if (*picture) (*picture)->frame.prepare_us = us_since(start);
                                       draw(*drawing, *picture, queue_us, Loading::none);
                                     } else if (picture.error().kind == ErrorKind::not_resident) {
                                       load(backend, drawing);

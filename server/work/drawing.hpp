@@ -17,7 +17,7 @@ struct PreparedPicture {
   frame::Prepared frame;
   std::shared_ptr<const void> reserved;
 };
-using PreparedPtr = std::shared_ptr<const PreparedPicture>;
+using PreparedPtr = std::shared_ptr<PreparedPicture>;
 
 // Whether data that is not resident may be loaded, which blocks.
 enum class Loading { none, allowed };

@@ -11,7 +11,7 @@ Result<scene::CompletedView> ViewCompletion::of(const protocol::View& view,
     }
   }
   auto completed = frame::complete(view, dataset);
-  if (!completed) return completed;
+  if (!completed || scene::is_bent(view.geometry)) return completed;
   const std::lock_guard lock(mutex_);
   latest_.emplace(Latest{view, dataset.shared_info(), *completed});
   return completed;

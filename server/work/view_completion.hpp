@@ -11,7 +11,9 @@
 
 namespace windsplat::net {
 
-// Thread-safe. Never held locked while a view is completed, which may wait for a file.
+// Thread-safe. Never held locked while a view is completed, which may wait for a file. Views on a
+// bent lattice are completed anew: their placement is as large as a field and is kept, once, by the
+// dataset.
 class ViewCompletion {
  public:
   // Errors: those of frame::complete().

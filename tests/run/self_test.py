@@ -131,6 +131,14 @@ class Suites(unittest.TestCase):
         self.assertEqual((self.folder / "other.log").read_text(), "other\n")
         self.assertEqual(set(run.outcomes), {"one", "other"})
 
+    def test_an_exception_of_the_runner_fails_its_suite_alone(self):
+        run = suites.Run(argparse.Namespace(thorough=False))
+        with mock.patch.object(suites, "LOGS", self.folder), \
+                contextlib.redirect_stdout(io.StringIO()) as shown:
+            self.assertFalse(run.suite("one", lambda emit: emit(1 / 0)))
+        self.assertIn("ZeroDivisionError", shown.getvalue())
+        self.assertIn("one", run.outcomes["one"].failed)
+
     def test_summary(self):
         outcomes = {"one": Outcome(passed=3, unstable={"A.b": "what b said"}, durations={"A.b": 2}),
                     "two": Outcome(passed=1, failed={"C.d": "what d said"})}

@@ -13,6 +13,7 @@ import re
 import subprocess
 import sys
 import time
+import traceback
 
 import ctest_suite
 import node_suite
@@ -58,7 +59,7 @@ def command(emit, *words):
         if found := pattern.search(text):
             outcome.passed = int(found[1])
     if running.returncode != 0:
-        outcome.failed[" ".join(map(str, words[:2]))] = "\n".join(text.splitlines()[-30:])
+        outcome.failed[" ".join(map(str, words[-2:]))] = "\n".join(text.splitlines()[-30:])
     return outcome
 
 
@@ -70,16 +71,21 @@ class Run:
 
     def suite(self, name, run, *words, **named):
         """Runs a suite and keeps its outcome; true if nothing failed for good."""
-        print(f"-- {name} begins", flush=True)
         begin = time.monotonic()
         path = LOGS / (name.replace(" ", "-") + ".log")
+        print(f"-- {name} begins: {os.path.relpath(path, ROOT)}", flush=True)
         with path.open("w") as log:
 
             def emit(text):
                 log.write(text)
                 log.flush()
 
-            outcome = run(emit, *words, **named)
+            try:
+                outcome = run(emit, *words, **named)
+            except Exception:  # of the runner itself: the other suites are still worth running
+                outcome = Outcome()
+                outcome.failed[name] = traceback.format_exc()
+                emit(outcome.failed[name])
         outcome.seconds = time.monotonic() - begin
         self.outcomes[name] = outcome
         print(f"\n== {name}, {outcome.seconds:.0f} s\n{path.read_text()}", flush=True)

@@ -99,16 +99,6 @@ Resident Budget::find_now(const ResidentKey& key) {
   return found->second->answer->value();
 }
 
-Resident Budget::find_held(const ResidentKey& key) {
-  if (Resident listed = find_now(key)) return listed;
-  const std::lock_guard lock(mutex_);
-  for (const Leaving& one : leaving_) {
-    if (one.key != key) continue;
-    if (Resident held = one.held.lock()) return held;
-  }
-  return nullptr;
-}
-
 bool Budget::has(const ResidentKey& key) const {
   const std::lock_guard lock(mutex_);
   const auto found = entries_.find(key);

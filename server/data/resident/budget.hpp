@@ -80,8 +80,6 @@ class Budget {
   std::optional<Result<Resident>> find(const ResidentKey& key);
   // The resident volume; null if it is absent or still loading.
   Resident find_now(const ResidentKey& key);
-  // The same, including volumes no longer listed but still referenced.
-  Resident find_held(const ResidentKey& key);
   [[nodiscard]] bool has(const ResidentKey& key) const;
 
   // Replaces the prefetch requests of `owner`.

@@ -249,12 +249,6 @@ Dataset Dataset::resident_only() const { return {state_, Manner::resident_only};
 
 Dataset Dataset::prefetching() const { return {state_, Manner::prefetch}; }
 
-Dataset Dataset::held() const { return {state_, Manner::held}; }
-
-Resident Dataset::find_held(const ResidentKey& key) const {
-  return manner_ == Manner::held ? state_->budget->find_held(key) : nullptr;
-}
-
 Dataset Dataset::in_turn(const CancelToken& cancel) const {
   Dataset out(state_, Manner::in_turn);
   out.cancel_ = cancel;
@@ -285,7 +279,6 @@ Result<VolumePtr> Dataset::volume(const std::string& field, std::size_t step) {
     const Resident there = state_->budget->find_now(key);
     return there ? as_volume(there) : state_->not_resident(*index, step);
   }
-  if (const Resident there = find_held(key)) return as_volume(there);
   return get(key, state_->values(*index) * sizeof(float),
              [&] { return state_->load(*index, step, urgency()); });
 }
@@ -304,7 +297,6 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
     const Resident there = state_->budget->find_now(key);
     return there ? as_volume(there) : state_->not_resident(*index, step);
   }
-  if (const Resident there = find_held(key)) return as_volume(there);
   const DatasetInfo& info = state_->info;
   std::uint64_t bytes = info.fields[*index].components.size() * sizeof(float);
   for (std::size_t a = 0; a < 3; ++a) {

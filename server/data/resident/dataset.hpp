@@ -50,8 +50,6 @@ class Dataset {
 
   // A handle that never loads, averages or waits: absent volumes yield the error not_resident.
   [[nodiscard]] Dataset resident_only() const;
-  // A handle that also finds volumes that were unlisted while the caller references them.
-  [[nodiscard]] Dataset held() const;
   // A handle that waits for room that others occupy (Budget::get(), in_turn), for one thread at a
   // time among all datasets that share a budget, so that each in turn gets all it needs. `cancel`
   // ends its waits for room, with the error cancelled.
@@ -137,13 +135,12 @@ class Dataset {
   [[nodiscard]] float storage_error(const std::string& field) const;
 
  private:
-  enum class Manner { in_turn, demand, held, resident_only, prefetch };
+  enum class Manner { in_turn, demand, resident_only, prefetch };
   struct State;
   Dataset(std::shared_ptr<State> state, Manner manner)
       : state_(std::move(state)), manner_(manner) {}
 
   [[nodiscard]] Urgency urgency() const;
-  [[nodiscard]] Resident find_held(const ResidentKey& key) const;
   Result<std::shared_ptr<const Volume>> get(const ResidentKey& key, std::uint64_t bytes,
                                             const Budget::Make& make);
 

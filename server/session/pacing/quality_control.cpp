@@ -83,12 +83,12 @@ std::optional<FramePlan> QualityControl::refining(const protocol::View& view, co
   const Micros cost = final_cost(view, known, now);
   if (guessed || cost <= long_in_coming || is_reference(view)) return std::nullopt;
   const auto next = chooser_.least_error(view, known, cost / 4, now);
-  if (!next || known[*next].error >= better * shown_error) return std::nullopt;
+  if (!next || !(known[*next].error < better * shown_error)) return std::nullopt;
   FramePlan plan;
   plan.setting = quality::settings[*next];
   plan.encoding.quality = usual;
   const double bytes = jpeg_.predicted_bytes(quality::pixels_at(view, plan.setting), usual);
-  if (link.transfer(bytes) >= cost / 2) return std::nullopt;
+  if (!(link.transfer(bytes) < cost / 2)) return std::nullopt;
   return plan;
 }
 
