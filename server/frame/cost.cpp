@@ -1,4 +1,4 @@
-// Samples in sight times what each covers.
+// Counts the visible samples and the pixels that each covers.
 #include "server/frame/cost.hpp"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ constexpr double footprint = 5.9;         // area of a splat in cells: pi 1.37^2
 constexpr double covered_min = 16;        // pixels: kernels are drawn into blocks of 4 x 4
 constexpr double reference_height = 720;  // pixels, for which a view gives its radii
 
-// The part of the volume that is in sight: which share, and how large a world unit is there.
+// The visible part of the volume: its share, and the size of a world unit there.
 struct VisiblePart {
   double share = 1;
   double px = 1;   // mean pixels a world unit
@@ -101,7 +101,7 @@ class Counting {
            Cost::pixels_a_kernel;
   }
 
-  // As long as the style allows, within its kernel's box.
+  // Of the largest length that the view allows, within the box of a kernel.
   void add_lines(const protocol::VectorView& vector) {
     const double widest = *std::max_element(cell_.begin(), cell_.end());
     const double length =
@@ -115,7 +115,7 @@ class Counting {
   }
 
   void add_medium(const protocol::ScalarView& scalar, const std::string& pointer) {
-    // The default absorbs.
+    // A default extinction absorbs.
     const bool absorbs =
         !scalar.extinction || std::any_of(scalar.extinction->begin(), scalar.extinction->end(),
                                           [](const auto& point) { return point[1] > 0; });

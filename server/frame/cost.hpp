@@ -1,5 +1,5 @@
-// What a picture takes at most, told from its view and its dataset's description before anything is
-// read or queued.
+// Upper bound of the work of a picture, from its view and the description of its dataset, before
+// anything is read or queued.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@
 
 namespace windsplat::frame {
 
-// Work is counted in kernels: one for each stop of the lines and each sample of each medium that is
-// looked at, and one more for every pixels_a_kernel pixels that it covers, that slabs pass, or that
-// the picture has. A kernel's own work is about that of so many pixels.
+// Work is counted in kernels: one for each kernel position of the lines and each sample of a
+// medium, and one for every pixels_a_kernel pixels that a kernel covers, that slabs cross, or that
+// the picture has. The fixed work of a kernel is about that of so many pixels.
 struct Cost {
   static constexpr double pixels_a_kernel = 16;
 

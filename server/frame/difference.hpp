@@ -1,4 +1,4 @@
-// Picture and truth -> how far apart they are in linear light.
+// Picture and truth -> their difference in linear light.
 #pragma once
 
 #include <span>

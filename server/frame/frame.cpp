@@ -22,7 +22,7 @@ std::int64_t microseconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration_cast<std::chrono::microseconds>(to - from).count();
 }
 
-// Where memory is wanting it is said at once what all fields of the view need, not one by one.
+// An out-of-memory error states what all fields of the view need together.
 Error with_need(Error error, const protocol::View& view, const data::Dataset& dataset) {
   return dataset.with_need(std::move(error), scene::fields_of(view, dataset.info()));
 }
@@ -103,9 +103,8 @@ Result<engine::WorkReport> render_reference(const scene::Scene& scene, ThreadPoo
   return work;
 }
 
-// A JPEG's pixels become codes tile by tile, while they are near; the other formats need them all,
-// and so does what is measured.
-// Whole MCU rows at a time.
+// Converts a picture to YCbCr, in strips of whole MCU rows. Unmeasured JPEGs are converted tile by
+// tile instead, while the pixels are in the cache.
 void put_in_strips(const engine::Image& picture, ThreadPool& pool, image::YccPicture& planes) {
   constexpr int strip_rows = 32;
   const auto stride = std::size_t{4} * static_cast<std::size_t>(picture.width);
@@ -149,7 +148,7 @@ Result<engine::WorkReport> render_scene(const Prepared& prepared, ThreadPool& po
   return work;
 }
 
-// Of pixels that nobody will encode nothing is kept: they may be half a gigabyte.
+// Pixels that are not encoded are freed: they may take half a gigabyte.
 Error given_up(Error error, Workspace& workspace) {
   trim_storage(workspace.space.image().rgba, 0, 0);
   return error;
@@ -225,8 +224,8 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
 Result<Frame> encode(Workspace& workspace, ThreadPool& pool, const CancelToken& cancel) {
   const Clock::time_point start = Clock::now();
   Result<image::Bytes> bytes = bytes_of(workspace, pool, cancel);
-  // Nobody needs the pixels any more, and many of them are not kept; those of a JPEG, which only
-  // its measurement needed, are not at all.
+  // The pixels are no longer needed: those of a JPEG, used only to measure it, are freed, others
+  // beyond retained_pixels.
   const bool jpeg = workspace.encoding.format == Format::jpeg;
   trim_storage(workspace.space.image().rgba, 0, jpeg ? 0 : 4 * retained_pixels);
   if (!bytes) return bytes.error();

@@ -44,13 +44,13 @@ struct Frame {
   std::int64_t render_us = 0;  // scene and engine, a JPEG's tone map in its tiles among it
   std::int64_t measure_us = 0;
   std::int64_t encode_us = 0;
-  // Measured, of linear light: of the picture against the view's own truth, of its encoding.
+  // Measured in linear light: of the picture against the truth of the view, and of its encoding.
   std::optional<double> error;
   std::optional<double> jpeg_error;
 };
 
-// What a loop of frames keeps from one to the next, and the frame between its two steps. One frame
-// at a time.
+// Storage reused from frame to frame, and the frame between drawing and encoding. One frame at a
+// time.
 struct Workspace {
   engine::RenderSpace space;  // with the picture of every format but JPEG
   image::YccPicture planes;   // of a JPEG
@@ -60,8 +60,8 @@ struct Workspace {
   std::array<float, 3> background{};  // linear
 };
 
-// What drawing and encoding a picture take beyond one of retained_pixels (base/trim_storage.hpp),
-// at most.
+// Upper bound of the memory for drawing and encoding a picture, beyond that for one of
+// retained_pixels (base/trim_storage.hpp).
 std::uint64_t bytes_beyond_kept(int width, int height, Format format);
 
 // A view completed for its dataset; where memory does not suffice the error states what all fields
@@ -109,7 +109,7 @@ Result<Frame> produce(const Prepared& prepared, data::Dataset& dataset, ThreadPo
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
                       ThreadPool& pool, const CancelToken& cancel, Workspace& workspace);
 
-// One frame by itself.
+// The same with a workspace of its own.
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
                       ThreadPool& pool, const CancelToken& cancel);
 

@@ -32,7 +32,7 @@ const char* compositing_text(protocol::Compositing compositing) {
   return "";
 }
 
-// The lines' stride; that of the medium where no lines are drawn.
+// The stride of the lines, or of the medium if no lines are drawn.
 int stride_of(const protocol::View& view) {
   const bool lines = view.vector.field.kind != protocol::FieldChoice::Kind::none;
   const bool medium = view.scalars && !view.scalars->empty();

@@ -1,4 +1,4 @@
-// Frame -> what is told of it: the Windsplat-Frame header of REST and `chosen` of the stream.
+// Frame -> its report: the Windsplat-Frame header of REST and `chosen` of the stream.
 #pragma once
 
 #include "protocol/messages.hpp"

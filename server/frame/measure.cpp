@@ -1,4 +1,4 @@
-// Pictures drawn twice, and the RMS of what lies between them.
+// Draws pictures twice and computes the RMS of the difference.
 #include "server/frame/measure.hpp"
 
 #include <algorithm>
@@ -25,14 +25,14 @@ double samples_of(const scene::Lattice& lattice) {
   return samples;
 }
 
-// Whether thinner slabs of the scene's own rules come to the truth.
+// Whether thinner slabs by the rules of the scene converge to the truth.
 bool is_exact(const scene::Scene& scene) {
   return scene.compositing == scene::Compositing::analytic &&
          scene.stop_transmittance <= quality::stop_of_the_truth;
 }
 
-// The view by analytic slabs of its thickness over `thinner`, of every sample where that is to be
-// had. The second: whether it is.
+// The view by analytic slabs of its thickness over `thinner`, from every sample if possible. The
+// second value: whether it is.
 Result<std::pair<scene::Scene, bool>> finer_scene(const scene::CompletedView& completed,
                                                   data::Dataset& dataset, int thinner,
                                                   double samples_max) {
@@ -79,8 +79,8 @@ double rms(const std::vector<float>& values) {
   return std::sqrt(squares / static_cast<double>(values.size()));
 }
 
-// RMS of what a picture, brought to the truth's size, is apart from it: bilinear between pixels'
-// centres, as a page shows it.
+// RMS of the difference between the truth and a picture resampled to its size: bilinear between
+// pixel centres, as the page displays it.
 double apart(const engine::Image& picture, const std::vector<float>& truth, int width, int height,
              ThreadPool& pool) {
   struct Tap {
@@ -161,7 +161,7 @@ class CalibrationRun {
   }
 
  private:
-  // Averages that there is no room for.
+  // The averaged data of a coarser setting do not fit into memory.
   static bool is_absent(const Error& error) {
     return error.kind == ErrorKind::not_resident || error.kind == ErrorKind::out_of_memory;
   }
@@ -236,7 +236,7 @@ class CalibrationRun {
     quality::Measured out;
     const bool full = setting.half_level == 0;
     double beyond = 0;
-    // The first run fills caches of what depends on no camera.
+    // The first run fills caches that are independent of the camera.
     constexpr double quick_ms = 20;  // such runs are repeated, for others disturb them most
     for (int run = 0; run < 4; ++run) {
       if (run > 1 && *out.ms > quick_ms) break;
@@ -258,8 +258,8 @@ class CalibrationRun {
     return out;
   }
 
-  // Pictures of the truth's size are compared as their tiles come: sum of (v - t)^2 - t^2 over
-  // them, for what never comes is 0.
+  // Pictures of the truth's size are compared tile by tile: sum of (v - t)^2 - t^2 over the tiles
+  // drawn, since pixels outside them are 0.
   Result<engine::WorkReport> compare(const scene::Scene& scene, double& beyond) {
     std::mutex mutex;
     beyond = 0;
@@ -311,7 +311,7 @@ bool is_measured(const Prepared& prepared) {
 Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dataset& dataset,
                                              ThreadPool& pool, const CancelToken& cancel,
                                              Workspace& workspace) {
-  // The renderer waits for no file, others no longer than for a few frames more.
+  // Reads no file, and takes no longer than a few frames.
   constexpr double times_as_many = 4;
   const scene::Scene& scene = prepared.scene;
   data::Dataset resident = dataset.resident_only();
@@ -319,7 +319,7 @@ Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dat
       finer_scene(prepared.completed, resident, 2,
                   std::min(truth_samples_max, times_as_many * samples_of(scene.lattice)));
   if (!finer || !finer->second) return std::optional<double>();
-  // A PNG is coded from the picture afterwards.
+  // The picture itself is encoded afterwards.
   std::vector<float>& rgba = workspace.space.image().rgba;
   std::vector<float> copy;
   if (workspace.encoding.format != Format::jpeg) copy = rgba;

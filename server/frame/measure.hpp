@@ -15,11 +15,11 @@
 
 namespace windsplat::frame {
 
-// Truths are drawn from every sample of the data up to this many; of larger data only from what the
-// picture itself is drawn from.
+// Truths are drawn from every sample of data up to this many samples, and of larger data from the
+// level that the picture is drawn from.
 inline constexpr double truth_samples_max = 32.0 * 1024 * 1024;
 
-// Where a completed view is seen from.
+// The viewpoint of a completed view.
 quality::Viewpoint viewpoint_of(const scene::CompletedView& completed);
 
 // Whether the frame will be measured: pictures of full size alone, up to retained_pixels.
@@ -35,16 +35,16 @@ Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dat
                                              Workspace& workspace);
 
 // Draws the view at every setting that is allowed for it and compares each with the truth: slabs of
-// half and a quarter of the view's thickness, extrapolated. Reports each as it is known, the
-// settings in no certain order. Pictures of more than retained_pixels are calibrated smaller;
-// `viewpoint` says how they are. Times are of drawing alone. Errors: cancelled; not_resident; those
+// half and a quarter of the view's thickness, extrapolated. Reports each when it is known, in
+// no particular order. Pictures of more than retained_pixels are calibrated smaller;
+// `viewpoint` has their size. Times are of drawing alone. Errors: cancelled; not_resident; those
 // of scenes.
 struct CalibrationSample {
   std::size_t setting = 0;
   quality::Viewpoint viewpoint;
   quality::Measured measured;
 };
-// Of the truth and of the picture that is compared with it.
+// Memory of the truth and of the picture that is compared with it.
 inline std::uint64_t calibration_bytes(const protocol::ImageView& image) {
   const auto pixels = static_cast<std::uint64_t>(image.width) * image.height;
   return std::min<std::uint64_t>(pixels, retained_pixels) * 2 * 4 * sizeof(float);

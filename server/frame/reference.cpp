@@ -1,4 +1,4 @@
-// Runs of pixels, each drawn once, by whoever comes first.
+// Draws runs of pixels, each once, by the first thread that is free.
 #include "server/frame/reference.hpp"
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t rgba_channels = 4;
 constexpr int piece_pixels = 32;  // of a row: a few milliseconds
 
-// Asks for the bytes of one drawing, and tells what all of it needs where that is refused.
+// Reserves the memory of one drawing; a refusal states what all of it needs.
 class CountedMemory {
  public:
   explicit CountedMemory(const WorkMemory& memory) : memory_(memory) {}

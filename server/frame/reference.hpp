@@ -1,5 +1,5 @@
-// View -> its truth, drawn bit by bit while others use the renderer in between, and what the view's
-// own picture errs against it.
+// View -> its truth, drawn in parts between which the renderer does other work, and the error of
+// the view's own picture.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@
 
 namespace windsplat::frame {
 
-// What counts the bytes of work in a limit.
+// Counts the memory of the work within a limit.
 struct WorkMemory {
   engine::reference::Reserve reserve;   // errors: out_of_memory
   std::function<std::uint64_t()> room;  // that could be had now
@@ -39,8 +39,8 @@ class ReferenceDrawing {
                                                          const CancelToken& cancel,
                                                          const WorkMemory& memory);
 
-  // Draws on where the last call ended, until `enough`, which any worker may ask, or all is drawn.
-  // Of what is cancelled only the few pixels in work are lost.
+  // Continues where the last call ended, until `enough` (called by any worker) or all is drawn. A
+  // cancelled call loses only the few pixels in work.
   void draw(ThreadPool& pool, const CancelToken& cancel, const std::function<bool()>& enough);
   [[nodiscard]] double done() const;  // 1: all
 

@@ -340,7 +340,7 @@ def grib_messages(model, dice):
     if model.kind not in GRIB:
         return False
     field = model.fields[-1]
-    # Each step and each level stays at least once, or the field would be on axes of its own.
+    # Keep every step and level at least once; otherwise the field gets separate axes.
     gone = [(t, z) for t, z in np.ndindex(model.shape[:2])
             if t > 0 and z > 0 and dice.random() < 0.3]
     if gone:

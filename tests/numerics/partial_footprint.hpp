@@ -9,7 +9,7 @@
 
 namespace windsplat::test {
 
-// Simpson's rule on nodes that crowd towards both ends: independent of what it tests.
+// Simpson's rule with nodes clustered at both ends; shares no code with what it tests.
 inline double simpson(const std::function<double(double)>& f, double from, double to) {
   constexpr int steps = 4000;
   double sum = 0;

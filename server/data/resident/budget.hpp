@@ -1,5 +1,6 @@
-// Memory shared by the datasets of a store: a cache of resident volumes. A load reserves its bytes
-// first; the least recently used volume is evicted when room is needed.
+// The memory limit, shared by the datasets of a store: resident volumes and their averages, and
+// what loaders and large pictures reserve. A load reserves its bytes first; the least recently used
+// volume is evicted when room is needed.
 #pragma once
 
 #include <chrono>

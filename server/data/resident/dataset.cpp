@@ -97,8 +97,8 @@ struct Dataset::State {
     return charged.bytes() + (info.stored_bytes > 0 ? loader_bytes : 0);
   }
 
-  // Measured upper bound of a loader's memory beside the volumes while it reads these fields.
-  // Chunks needed again are cached, 128 MiB in all or one chunk.
+  // Measured upper bound of the memory of a loader, in addition to the volumes, while it reads
+  // these fields. Chunks needed again are cached, 128 MiB in all or one chunk.
   [[nodiscard]] std::uint64_t reading_bytes(const std::vector<std::string>& fields) const {
     constexpr std::uint64_t mib = std::uint64_t{1} << 20;
     std::uint64_t bytes = 32 * mib;

@@ -184,7 +184,7 @@ std::array<Complex, 2> window_gradient(const Rectangle& r, const std::vector<Ele
   return {along_x, along_z};
 }
 
-// The window seen through n mirrors at +-half: n = 0 itself, +-1 beyond a wall.
+// The interval [low, high] after n reflections at the walls +-half.
 std::array<double, 2> mirrored(double low, double high, int n, double half) {
   if (n == 0) return {low, high};
   return {2.0 * n * half - high, 2.0 * n * half - low};

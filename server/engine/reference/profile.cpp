@@ -1,4 +1,4 @@
-// K by its formula, and its tabulation.
+// The kernel profile K: its formula, and a table of it.
 #include "server/engine/reference/profile.hpp"
 
 #include <algorithm>

@@ -43,7 +43,7 @@ class Link {
     bool moving = false;
   };
 
-  // Sent now, directly after a ping.
+  // Records a frame that is sent now, directly after a ping.
   void sent(const Sent& frame, Micros now);
   // The pong of that ping. Without pongs the round trip is that of the fastest frame.
   void heard(std::uint32_t seq, Micros now);

@@ -415,7 +415,7 @@ TEST(Resident, ErrorOfPackedStorageIsTheMaximumOfAllSteps) {
   EXPECT_NEAR(f.dataset->storage_error("f"), 0.5 * (999.0 / 125) / 65534, 1e-9);
 }
 
-// Limit: three volumes. Two requested ones with their packed forms fill it.
+// Limit: three volumes. Two volumes with prefetch requests and their packed forms fill it.
 TEST(Resident, PackedFormDoesNotReplaceAPrefetchRequest) {
   Fixture f(3, Storage::packed16);
   f.request_prefetch({1, 2});

@@ -1,4 +1,4 @@
-// Places of a piece's tuples among the samples of the whole grid.
+// Maps the tuples of a piece to sample indices of the whole grid.
 #pragma once
 
 #include <array>

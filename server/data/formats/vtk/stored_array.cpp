@@ -37,7 +37,7 @@ constexpr std::array<unsigned char, 256> base64_values = [] {
   return table;
 }();
 
-// Buffered reader of the bytes of a file from an offset on.
+// Buffered reader of a file, starting at an offset.
 class FileBytes {
  public:
   FileBytes(std::shared_ptr<const InputFile> file, std::uint64_t offset, std::uint64_t room)
