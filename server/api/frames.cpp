@@ -103,7 +103,7 @@ std::string picture_etag(const protocol::View& view, const data::Dataset& datase
 Result<scene::CompletedView> complete(const Picture& picture, ViewCompletion& completion,
                                       data::Dataset& dataset) {
   const auto completed = completion.of(picture.view, dataset);
-  if (!completed) return completed;
+  if (!completed) return completed.error();
   const scene::Lattice& lattice = completed->lattice();
   Result<void> preset;
   auto framed = completed->with([&](protocol::View& view) {

@@ -58,7 +58,7 @@ protocol::FrameHeader header_of(const Render& render, const Drawn& drawn, std::u
 }
 
 void stand(SessionState& state) {
-  if (auto unchanged = state.displayed.stand_for(state.view)) state.send(std::move(*unchanged));
+  if (const auto unchanged = state.displayed.stand_for(state.view)) state.send(*unchanged);
 }
 
 // Counts the frame for the link and the statistics.

@@ -368,8 +368,7 @@ class HttpSession final : public Connection, public HttpOwner {
     // The library parses only the first line of a list header.
     message.set(http::field::connection, "Upgrade");
     message.set(http::field::upgrade, "websocket");
-    start_websocket_session(std::move(wire_.wire()), std::move(message), request.id, services_,
-                            connections_,
+    start_websocket_session(std::move(wire_.wire()), message, request.id, services_, connections_,
                             {request.address, std::move(visitor_.place), std::move(seat.place)});
   }
 

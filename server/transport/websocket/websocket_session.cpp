@@ -78,7 +78,7 @@ class WebSocketSession final : public Connection, public StreamOwner {
   WebSocketSession(const WebSocketSession&) = delete;
   WebSocketSession& operator=(const WebSocketSession&) = delete;
 
-  void start(UpgradeRequest request) {
+  void start(const UpgradeRequest& request) {
     const bool full =
         connections_.streams() >= static_cast<std::size_t>(services_.options.sessions_max);
     connections_.add(id_, std::static_pointer_cast<WebSocketSession>(shared_from_this()), !full);
@@ -176,11 +176,11 @@ class WebSocketSession final : public Connection, public StreamOwner {
 
 }  // namespace
 
-void start_websocket_session(Wire wire, UpgradeRequest request, std::string request_id,
+void start_websocket_session(Wire wire, const UpgradeRequest& request, std::string request_id,
                              Services& services, Connections& connections, Guest guest) {
   std::make_shared<WebSocketSession>(std::move(wire), std::move(request_id), services, connections,
                                      std::move(guest))
-      ->start(std::move(request));
+      ->start(request);
 }
 
 }  // namespace windsplat::net

@@ -18,7 +18,7 @@ struct Guest {
 };
 
 // `request` is an authorised upgrade (auth.hpp); `request_id` names it in the response and the log.
-void start_websocket_session(Wire wire, UpgradeRequest request, std::string request_id,
+void start_websocket_session(Wire wire, const UpgradeRequest& request, std::string request_id,
                              Services& services, Connections& connections, Guest guest);
 
 }  // namespace windsplat::net
