@@ -397,7 +397,9 @@ TEST_F(Rest, PageIsServedWithSecurityAndCacheHeaders) {
 TEST(RestFrames, APostedViewIsCompletedOnceThoughItsDataHadToBeLoaded) {
   const TestServer server;
   const std::uint64_t before = windsplat::scene::completions();
-  const std::string view = R"({"dataset":"small","image":{"width":40,"height":30}})";
+  // States its ranges, so that it can be completed before its fields are loaded.
+  const std::string view = R"({"dataset":"small","image":{"width":40,"height":30},"scalars":[],
+    "vector":{"magnitudeRange":[0,30],"minMagnitude":0,"color":{"range":[0,30]}}})";
   EXPECT_EQ(post_view(server.port(), view).status, 200);
   EXPECT_EQ(windsplat::scene::completions() - before, 1U);
   EXPECT_EQ(post_view(server.port(), view).status, 200);

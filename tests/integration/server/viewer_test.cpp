@@ -34,15 +34,20 @@ bool prepared(net::Viewer& viewer, std::uint64_t ticket, const protocol::View& v
   return loaded;
 }
 
+protocol::View view_of_small(int width, int height) {
+  protocol::View view;
+  view.dataset = "small";
+  view.image.width = width;
+  view.image.height = height;
+  return view;
+}
+
 TEST(Viewer, WaitForAveragesIsReportedLikeAWaitForFields) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add(small_file()).value();
   net::Services services({}, store, std::make_shared<ThreadPool>(2));
   net::Viewer viewer(services.backend, 1, "192.0.2.1");
-  protocol::View view;
-  view.dataset = "small";
-  view.image.width = 16;
-  view.image.height = 12;
+  protocol::View view = view_of_small(16, 12);
   view.method.detail = protocol::Detail::full;
   EXPECT_TRUE(prepared(viewer, 1, view));
   EXPECT_FALSE(prepared(viewer, 2, view));
@@ -62,10 +67,7 @@ TEST(Viewer, CompletesAViewOnceForAllThatIsDrawnOfIt) {
   const auto dataset = store->add(small_file()).value();
   net::Services services({}, store, std::make_shared<ThreadPool>(2));
   net::Viewer viewer(services.backend, 1, "192.0.2.1");
-  protocol::View view;
-  view.dataset = "small";
-  view.image.width = 96;
-  view.image.height = 72;
+  protocol::View view = view_of_small(96, 72);
   const std::uint64_t before = scene::completions();
   EXPECT_TRUE(prepared(viewer, 1, view));
   EXPECT_FALSE(prepared(viewer, 2, view, {protocol::MethodName::kernel, 2}));
