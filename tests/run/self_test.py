@@ -110,7 +110,7 @@ class Suites(unittest.TestCase):
         names = []
         Named(argparse.Namespace(thorough=False)).everything()
         self.assertEqual(sorted(names), ["asan ubsan", "build dev", "build release", "build tsan",
-                                         "fuzz", "page unit", "tsan"])
+                                         "clang-tidy", "fuzz", "page unit", "tsan"])
 
     def test_a_suite_is_shown_as_a_whole(self):
         def other(emit):

@@ -39,7 +39,7 @@ COUNTS = (re.compile(r"^tidy: (\d+) files clean.* (\d+) files$", re.M),
 
 
 def fixed_addresses():
-    """GCC's thread sanitizer cannot start under the address randomisation of some kernels; where it
+    """The thread sanitizer cannot start under the address randomisation of some kernels; where it
     may be switched off for a process, it is."""
     words = ["setarch", os.uname().machine, "-R"]
     works = subprocess.run([*words, "true"], stderr=subprocess.DEVNULL, check=False)
@@ -113,7 +113,7 @@ class Run:
             release = beside.submit(self.built, "release")
             dev = beside.submit(self.built, "dev", *GIVING_WAY)
             tsan = beside.submit(self.built, "tsan", *GIVING_WAY, *plain)
-            tidy = beside.submit(lambda: release.result() and self.tidy())
+            tidy = beside.submit(lambda: dev.result() and self.tidy())
             unit = {"web": ["npm", "--prefix", "web", "test", "--silent", "--",
                             "--test-reporter=tap"]}
             self.suite("page unit", node_suite.run, unit, 1)
