@@ -87,7 +87,7 @@ export const launch = () =>
 // first; `prepare`, what to do with the page before it goes anywhere.
 export async function openPage(browser, url, { initScript, prepare, ...options } = {}) {
   const context = await browser.newContext({
-    viewport: { width: 1440, height: 900 },
+    viewport: { width: 1024, height: 640 },
     colorScheme: "dark",
     ...options,
   });
