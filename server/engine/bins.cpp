@@ -93,7 +93,7 @@ double left_out(const RenderPlan& plan, const PassPlan& pass, const KeptSummary&
   const kernels::Camera& camera = plan.camera;
   const kernels::LineStyle& line = pass.kernel.line;
   const double pixels = static_cast<double>(camera.width) * camera.height;
-  double oblique = 1;  // longest ray at unit depth
+  double oblique = 1;  // length of the longest ray at unit depth
   if (camera.perspective != 0) {
     oblique = std::hypot(1.0, std::hypot(camera.half_width_px, camera.half_height_px) *
                                   static_cast<double>(camera.pixel));
@@ -402,7 +402,7 @@ void list_by_tile(const RenderPlan& plan, const CancelToken& cancel, BinSpace& s
 }
 
 void add_load(const RenderPlan& plan, Bins& bins, const SheetBricks& sheet) {
-  constexpr std::int64_t brick_overhead = 8;  // in kernels
+  constexpr std::int64_t brick_overhead = 8;  // number of kernels
   for (std::size_t b = 0; b < sheet.bricks.size(); ++b) {
     const Brick& brick = sheet.bricks[b];
     const TileRange range = tiles_of(plan, brick);

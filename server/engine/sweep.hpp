@@ -73,7 +73,7 @@ struct SweepSpace {
   WaitingSplats splats;
   WaitingLines lines;
   std::vector<std::uint32_t> here;          // splats in the current slab
-  AlignedVector<float> gathered;            // by slab, modulo
+  AlignedVector<float> gathered;            // records of one brick
   std::vector<kernels::Hit> listed;         // of one brick
   std::vector<kernels::Hit> hits;           // in the current slab
   std::vector<kernels::MetLine> met;        // the same by block

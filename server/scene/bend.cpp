@@ -222,7 +222,8 @@ struct Shell {
   [[nodiscard]] double radius(double share) const { return inner + share * (1.0 - inner); }
 };
 
-// A single level has the thickness of the distance of its columns, at most that of a full shell.
+// A single level has the thickness of the distance between its columns, at most that of a full
+// shell.
 Shell shell_of(const Lattice& straight, const data::Grid& even, double vertical_scale,
                bool one_height) {
   Shell shell{1.0 / (1.0 + shell_share * vertical_scale)};

@@ -1,4 +1,4 @@
-// Part of the kernel body: what a vector of pixels sees of one line and of one splat.
+// Part of the kernel body: contributions of one line and of one splat to a vector of pixels.
 #pragma once
 
 #include "server/engine/kernels/body_math.hpp"

@@ -1,4 +1,4 @@
-// Part of the kernel body: the slab method's lines are recorded for the blocks that they pass.
+// Part of the kernel body: records the lines of the slab method for the blocks they cross.
 #pragma once
 
 #include "server/engine/kernels/body_gather.hpp"

@@ -239,7 +239,7 @@ KERNEL_INLINE void blend(const float* entry, float part, float* rgb) {
   }
 }
 
-// Colours of one line from that of its table in `tail`: dimmed, and desaturated by `grey` at the
+// Colours of one line from its table colour in `tail`: dimmed, and desaturated by `grey` at the
 // tail and a further `more` at the head.
 KERNEL_INLINE void shade(float dim, float grey, float more, float* tail, float* rise) {
   const ColorTag tag;

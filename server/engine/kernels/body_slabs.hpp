@@ -1,5 +1,5 @@
-// Part of the kernel body: a slab's gathered medium and the lines in it are composited, block by
-// block.
+// Part of the kernel body: composites the accumulated medium of a slab and the lines in it, block
+// by block.
 #pragma once
 
 #include "server/engine/kernels/body_line_hits.hpp"
@@ -27,7 +27,8 @@ struct Meeting {
   alignas(64) float opacity[block_pixels];
   alignas(64) float color[3][block_pixels];
 };
-constexpr int meetings_max = 64;  // sorted together; exact if no line is displaced by over half
+constexpr int meetings_max = 64;  // sorted together; exact if no line is displaced by more than
+                                  // half
 
 template <int Compositing>
 KERNEL_INLINE Passage open_passage(const float* gathered, int l) {
@@ -48,7 +49,7 @@ KERNEL_INLINE Passage open_passage(const float* gathered, int l) {
 // A line at a vector of pixels within the slab.
 struct Met {
   MaskOf<Pixel> here;  // the line covers the pixel, in this slab
-  Pixel opacity;       // elsewhere 0
+  Pixel opacity;       // 0 elsewhere
   Pixel depth;
   Pixel f;
 };

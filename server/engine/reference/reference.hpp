@@ -1,4 +1,4 @@
-// Scene -> reference picture, from which the errors of all methods are measured: the volume
+// Scene -> reference picture, relative to which the errors of all methods are measured: the volume
 // rendering integral per pixel in double precision. Independent of the number of threads.
 #pragma once
 
