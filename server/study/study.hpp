@@ -22,7 +22,8 @@ namespace windsplat::study {
 struct Shown {
   std::string title;
   std::vector<std::uint8_t> rgb;
-  std::vector<std::uint8_t> difference_rgb;  // ten times, in sRGB codes; empty: the reference
+  std::vector<std::uint8_t> difference_rgb;  // amplified ten times, in sRGB codes; empty: the
+                                             // reference
 };
 
 struct SceneReport {
@@ -31,8 +32,8 @@ struct SceneReport {
   int width = 0;
   int height = 0;
   bool integral = true;       // kind of the reference: integral, or extrapolated from slabs
-  double truth_estimate = 0;  // RMS of an extrapolated reference's own error
-  double truth_seconds = 0;   // to compute the reference; NaN: unknown
+  double truth_estimate = 0;  // RMS of the error of an extrapolated reference itself
+  double truth_seconds = 0;   // time to compute the reference; NaN: unknown
   double tolerance = 0;       // of the integral
   std::int64_t pieces = 0;
   std::int64_t evaluations = 0;
@@ -58,7 +59,7 @@ struct Report {
 struct Progress {
   std::string scene;
   std::string doing;
-  double done = 0;  // share of the work of this run, 0..1
+  double done = 0;  // fraction of the work of this run, 0..1
 };
 
 struct Options {
@@ -71,7 +72,7 @@ struct Options {
 
 using Listener = std::function<void(const Progress&)>;
 
-// Measures the points that the folder does not hold yet. Errors: cancelled (the folder then holds
+// Measures the points that are not yet in the folder. Errors: cancelled (the folder then holds
 // every finished point); internal (a reference that is not finite); those of the scenes, the engine
 // and the files.
 Result<Report> run_study(const std::vector<Subject>& subjects, const Options& options,
