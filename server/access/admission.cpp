@@ -84,7 +84,8 @@ struct Admission::State {
   State(const Limits& limits, std::function<Micros()> clock)
       : quota(limits), now(clock ? std::move(clock) : steady_us) {}
 
-  // Both require the mutex. A value: closures since the last log line; at most one a minute.
+  // Both require the mutex. Returns the closures since the last log line; nullopt if that was less
+  // than a minute ago.
   std::optional<Closed> count_refused_handshake(const std::string& address, Micros at) {
     if (closed.connections == 0) {
       closed.address = address;

@@ -82,8 +82,7 @@ Response delete_dataset(Services& services, const std::string& id, const Request
     return problem_response(403, "Forbidden", "only datasets opened by POST can be deleted");
   }
   if (forget) {
-    services.backend.catalogue.forget(
-        id);  // first, so that reads in progress end with the right error
+    services.backend.catalogue.forget(id);  // first, so that reads in progress end with this error
   } else {
     (*dataset)->evict();
   }

@@ -39,7 +39,7 @@ struct Orbit {
 struct Picture {
   protocol::View view;
   frame::Encoding encoding;
-  std::string preset;  // empty: none
+  std::string preset;  // nullopt: none
   std::optional<Orbit> orbit;
   std::string if_none_match;
   frame::Cost cost;  // of the view before preset and orbit, which change only the camera
@@ -137,7 +137,7 @@ Response unchanged_response(const std::string& etag) {
   return {304, "", {{"Cache-Control", "no-cache"}, {"ETag", etag}}, {}};
 }
 
-// Null if the client has the picture already: `reply` is called with 304.
+// Null if the client already has the picture: `reply` is called with 304.
 Result<PreparedPtr> prepare(quality::Tables& tables, const Picture& picture,
                             ViewCompletion& completion, data::Dataset& dataset, Loading loading,
                             const Reply& reply) {
@@ -176,7 +176,7 @@ Result<Response> draw(Services& services, const Picture& picture, const Prepared
     response.headers = {{"Cache-Control", "no-cache"},
                         {"ETag", picture_etag(drawn->view, dataset, picture.encoding)}};
     // Settings chosen by the server reduce the work below the estimate; the scene of a picture that
-    // waited for data was built elsewhere.
+    // waited for data was prepared elsewhere.
     if (loading == Loading::none) {
       services.backend.costs.learn(drawn->view.dataset, drawn->view.method.name,
                                    picture.cost.kernels, drawn->render_us + drawn->encode_us);
@@ -189,7 +189,7 @@ Result<Response> draw(Services& services, const Picture& picture, const Prepared
                                     ", encode;dur=" + milliseconds(drawn->encode_us));
   response.headers.emplace_back("Windsplat-Frame", ascii_json(protocol::encode_frame_info(info)));
   response.headers.emplace_back("Vary", "Accept");
-  // Other sites may embed a picture by <img>, but not read its pixels.
+  // Other sites may embed a picture by <img>, but cannot read its pixels.
   response.headers.emplace_back("Cross-Origin-Resource-Policy", "cross-origin");
   response.body = Body::of(std::move(drawn->bytes));
   return response;

@@ -110,7 +110,7 @@ struct Pass {
   std::size_t next_step = 0;
 };
 
-// The response, or none if steps remain.
+// The response, or nullopt if steps remain.
 Result<std::optional<Response>> take_turn(Pass& pass) {
   const std::size_t steps = pass.subject.dataset->info().steps.size();
   const auto until = Clock::now() + turn_budget;

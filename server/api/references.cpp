@@ -70,7 +70,7 @@ Response get_reference(Services& services, const std::string& name, const Reques
   const auto kept = services.backend.references.find(id);
   if (!kept) {
     return problem_response(
-        make_error(ErrorKind::not_found, "unknown or expired reference: post its view again"));
+        make_error(ErrorKind::not_found, "unknown or expired reference: post the view again"));
   }
   Response response;
   const std::string etag = '"' + id + '"';

@@ -17,7 +17,7 @@ namespace {
 
 // For setpriority(2): rendering and streams get ten times this thread's share of a contended core.
 constexpr int handshake_nice = 10;
-constexpr std::size_t address_chars_max = 64;  // of the address key
+constexpr std::size_t address_chars_max = 64;  // by address key
 
 }  // namespace
 

@@ -109,7 +109,7 @@ class HandshakeTask : public std::enable_shared_from_this<HandshakeTask> {
   [[nodiscard]] const std::string& address() const { return address_; }
 
  private:
-  class Timed {  // charges the time of a step that throws, too
+  class Timed {  // also charges the time of a step that throws
    public:
     explicit Timed(HandshakeTask& task) : task_(task) {}
     ~Timed() { task_.step_took(thread_cpu_us() - begin_); }

@@ -61,7 +61,7 @@ struct Server::State {
         io.poll();
         break;
       } catch (const std::exception& fault) {
-        log_fault("a fault reached the io loop", fault);
+        log_fault("an exception reached the io loop", fault);
       }
     }
   }
@@ -76,8 +76,8 @@ struct Server::State {
                      std::move(*visitor));
   }
 
-  // Frees a place by closing the connection that is idle longest, or in the reserve the longest one
-  // without a request.
+  // Frees a slot by closing the connection that has been idle longest, or in the reserve the one
+  // that has waited longest without a request.
   std::optional<Visitor> admit(const std::string& address) {
     Admission& admission = services.admission;
     if (!admission.arrive(address, services.options.tls != nullptr)) return std::nullopt;
@@ -258,7 +258,7 @@ void Server::run() {
       state_->go_on();
       state_->io.run();
     } catch (const std::exception& fault) {
-      log_fault("a fault reached the io loop", fault);
+      log_fault("an exception reached the io loop", fault);
       std::this_thread::sleep_for(after_a_fault);
     }
   }

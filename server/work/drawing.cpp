@@ -29,7 +29,7 @@ Result<void> draw_after_load(Backend& backend, const DrawingPtr& drawing, Prepar
                                   [drawing, picture = std::move(picture)](std::int64_t queue_us) {
                                     draw(*drawing, picture, queue_us, Loading::allowed);
                                   },
-                                  true, drawing->cost_ms, drawing->payer});  // admitted before
+                                  true, drawing->cost_ms, drawing->payer});  // was admitted before
 }
 
 void load(Backend& backend, const DrawingPtr& drawing) {
@@ -87,7 +87,7 @@ Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
     if (loading == Loading::none) return prepared.error();
     return with_dataset_name(prepared.error(), dataset.info().id);
   }
-  // Reserve after loading, so that a conflict of the two is found at once.
+  // Reserve after loading, so that a conflict between loading and drawing is detected at once.
   if (loading == Loading::allowed) {
     auto room = room_for(dataset, width, height, encoding.format);
     if (!room) return room.error();

@@ -7,7 +7,7 @@
 namespace windsplat::net {
 namespace {
 
-// Retry time for a reference that has not been started, whose duration is unknown.
+// Retry-After time for a reference that has not been started, whose duration is unknown.
 constexpr int retry_after_s = 5;
 
 Error too_many(std::string detail) {

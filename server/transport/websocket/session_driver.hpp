@@ -27,7 +27,7 @@ class SessionDriver final : public StreamEvents {
   void drain();
   void on_changed(const std::string& dataset);
   void stop();   // cancels its work
-  void abort();  // nothing more can be written, either
+  void abort();  // nothing more can be written either
   [[nodiscard]] const WriteQueue& queue() const { return writer_.queue(); }
 
   void on_text(const std::string& text) override;

@@ -17,14 +17,14 @@ namespace windsplat::net {
 
 class WebSocketReader {
  public:
-  // Messages are charged to `address`. While the queue is backlogged, nothing is read.
+  // Messages are charged to `address`. Nothing is read while the write queue is backlogged.
   WebSocketReader(StreamOwner& owner, WebSocketStream& socket, Admission& admission,
                   const std::string& address, const WriteQueue& queue, StreamEvents& events);
 
-  // Before the socket is accepted: limits the size of messages and listens to pings.
+  // Call before the socket is accepted: limits the size of messages and handles pings.
   void prepare();
   void start();
-  void resume();  // the queue has become shorter
+  void resume();  // call when the queue has become shorter
   void stop();    // ends the timers
 
  private:

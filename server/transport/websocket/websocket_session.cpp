@@ -168,7 +168,7 @@ class WebSocketSession final : public Connection, public StreamOwner {
   Services& services_;
   Connections& connections_;
   const Guest guest_;
-  const std::shared_ptr<const Token> token_;  // token that authorised it
+  const std::shared_ptr<const Token> token_;  // digest of the token that authorised it
   asio::steady_timer close_timer_;
   SessionDriver driver_;
   WebSocketReader reader_;
