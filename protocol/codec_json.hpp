@@ -19,7 +19,7 @@
 namespace windsplat::protocol {
 
 // Errors: too_large (over message_bytes_max), malformed (syntax, UTF-8, NUL, byte order mark,
-// nesting, duplicate keys), invalid (a number that no double holds).
+// nesting, duplicate keys), invalid (a number beyond the range of double).
 Result<Json> parse_json(std::string_view text);
 
 // Without spaces, keys sorted, invalid UTF-8 replaced, non-finite numbers as null.
@@ -37,7 +37,7 @@ void make_numbers_canonical(Json& value);
 std::string join_pointer(const std::string& pointer, std::string_view key);
 std::string join_pointer(const std::string& pointer, std::size_t index);
 
-// Invalid values in the order found. One answer lists at most problem_errors_max of them.
+// Invalid values in the order found. A response lists at most problem_errors_max of them.
 class Faults {
  public:
   void add(std::string pointer, std::string detail, ErrorKind kind = ErrorKind::invalid);

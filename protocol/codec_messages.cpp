@@ -163,7 +163,7 @@ Json to_json(const ChosenMessage& message) {
   out["type"] = "chosen";
   out["seq"] = message.seq;
   auto view = parse_json(message.view_json);
-  WINDSPLAT_CHECK(view.has_value());  // the server's own text
+  WINDSPLAT_CHECK(view.has_value());  // text made by the server itself
   out["view"] = std::move(*view);
   return out;
 }

@@ -54,7 +54,7 @@ inline constexpr double fps_min = 0.1;
 inline constexpr double fps_max = 120;
 inline constexpr double still_scale_max = 4;
 inline constexpr double decode_ms_max = 1e9;
-inline constexpr std::size_t problem_errors_max = 16;  // invalid values listed in one answer
+inline constexpr std::size_t problem_errors_max = 16;  // invalid values listed in one response
 
 inline constexpr std::size_t path_chars_max = 4096;  // code points of a path below the data root
 inline constexpr int histogram_bins_max = 4096;

@@ -1,4 +1,4 @@
-// Answers of the HTTP API about values, forecasts and jobs, as typed values. Mirrors
+// Responses of the HTTP API about values, forecasts and jobs, as typed values. Mirrors
 // messages.schema.json.
 #pragma once
 

@@ -184,8 +184,8 @@ struct StatsMessage {
   std::uint64_t steps_not_ready = 0;
 };
 struct ErrorMessage {
-  std::optional<std::uint32_t> id;   // of the invalid message, if it had one
-  std::optional<std::uint32_t> rev;  // of the invalid patch
+  std::optional<std::uint32_t> id;   // id of the invalid message, if it had one
+  std::optional<std::uint32_t> rev;  // rev of the invalid patch
   Problem problem;
 };
 using ServerMessage = std::variant<HelloMessage, OpenedMessage, ProgressMessage, ChosenMessage,

@@ -193,7 +193,7 @@ std::string inspect_text(const protocol::DatasetDescription& dataset) {
   if (!dataset.left_out.empty()) {
     std::size_t width = 0;
     for (const auto& left : dataset.left_out) width = std::max(width, word(left.first).size());
-    out += "\nleft out\n";
+    out += "\nomitted\n";
     for (const auto& [variable, reason] : dataset.left_out) {
       const std::string name = word(variable);
       out += "  " + name + std::string(width - name.size() + 2, ' ');

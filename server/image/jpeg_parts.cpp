@@ -43,11 +43,11 @@ Result<Layout> layout_of(std::span<const std::uint8_t> jpeg) {
   }
   Layout layout;
   for (std::size_t at = 2; at + 4 <= jpeg.size();) {
-    if (jpeg[at] != 0xFF) return broken("has no marker where one is due");
+    if (jpeg[at] != 0xFF) return broken("lacks a marker");
     const std::uint8_t code = jpeg[at + 1];
     const std::size_t length = (std::size_t{jpeg[at + 2]} << 8U) + jpeg[at + 3];
     const std::size_t next = at + 2 + length;
-    if (length < 2 || next + 2 > jpeg.size()) return broken("is cut short");
+    if (length < 2 || next + 2 > jpeg.size()) return broken("is truncated");
     const bool application = code >= first_application && code <= last_application;
     if (code == start_of_scan) {
       if (layout.frame == 0) return broken("has no frame");
@@ -66,7 +66,7 @@ Result<Layout> layout_of(std::span<const std::uint8_t> jpeg) {
   return broken("has no scan");
 }
 
-// Whether two strips have the same headers but for the height; different tables could not be
+// Whether two strips have the same headers except for the height; different tables could not be
 // decoded in one scan.
 bool same_header(std::span<const std::uint8_t> first, const Layout& a,
                  std::span<const std::uint8_t> other, const Layout& b) {

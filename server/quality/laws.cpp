@@ -1,4 +1,4 @@
-// Power laws, fitted to calibration runs of the samples in five looks (docs/benchmarks/error.md).
+// Power laws, fitted to calibration runs of the samples in five scenes (docs/benchmarks/error.md).
 #include "server/quality/laws.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Measurements near by -> forecasts, in logarithms.
+// Nearby measurements -> forecasts, in logarithms.
 #include "server/quality/table.hpp"
 
 #include <algorithm>

@@ -45,7 +45,8 @@ struct SceneSignature {
 };
 SceneSignature signature_of(const protocol::View& completed);
 
-// Distance of two viewpoints; at about 1, measurements at one say little about the other.
+// Distance of two viewpoints; at about 1, measurements at one are hardly informative about the
+// other.
 double distance(const Viewpoint& a, const Viewpoint& b);
 
 }  // namespace windsplat::quality

@@ -48,7 +48,7 @@ struct CancelRender {
 enum class Tier { moving, rest, final, still };
 // Sent directly before the next message or not at all. The pong calls Session::on_pong.
 struct Ping {
-  std::uint32_t seq = 0;  // of the next frame
+  std::uint32_t seq = 0;  // number of the next frame
 };
 // At most one is being written: the next follows Session::on_written.
 struct SendFrame {
@@ -86,10 +86,10 @@ struct Drawn {
   quality::Viewpoint viewpoint;
   std::int64_t queue_us = 0;
   std::int64_t render_us = 0;
-  std::int64_t measure_us = 0;  // the finer run
+  std::int64_t measure_us = 0;  // time of the finer rendering
   std::int64_t encode_us = 0;
   bool loaded =
-      false;  // fields were read or averaged for it: its time says nothing of the next one's
+      false;  // fields were read or averaged for it: its time does not predict that of the next one
 };
 
 }  // namespace windsplat::session

@@ -76,7 +76,7 @@ class Session {
   // The dataset was reopened: earlier frames of it are invalid.
   Effects on_changed(const std::string& dataset, Micros now);
 
-  // Counts of frames sent, dropped and cancelled.
+  // Numbers of frames sent, dropped and cancelled.
   [[nodiscard]] const protocol::StatsMessage& stats() const { return state_.stats; }
 
   // When to call on_time() unless another input arrives first; none after Close.

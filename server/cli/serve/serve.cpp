@@ -140,7 +140,7 @@ class Control {
   const CLI::App& given_;
   std::shared_ptr<data::Store> store_;
   std::unique_ptr<ServeSettings> started_;
-  std::shared_ptr<net::TlsContext> tls_;  // the newest
+  std::shared_ptr<net::TlsContext> tls_;  // the newest one
   std::mutex mutex_;                      // guards the members below, held briefly
   net::Server* server_ = nullptr;
   bool reload_wanted_ = false;

@@ -1,4 +1,4 @@
-// When the next frame may be started: credit, the frame being written, and the link.
+// Decides when the next frame may be started, by credit, the frame being written, and the link.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,7 @@ class FlowControl {
     std::size_t bytes = 0;  // including preceding texts
     Micros begun = 0;       // start of its render
     bool moving = false;
-    bool final = false;  // drawn as such
+    bool final = false;  // drawn as a final frame
   };
   // The frame of next_seq() is sent.
   void sent(const Sent& frame, Micros now);

@@ -14,7 +14,7 @@ constexpr Micros least_took_us = 500;
 // A small excess over the round trip proves that the link is fast, not that it became slow: such
 // samples are application-limited.
 constexpr Micros clear_took_us = 5'000;
-// A long one counts as several samples: stop flooding a slower link before the usual number of
+// A long excess counts as several samples: stop flooding a slower link before the usual number of
 // frames has confirmed it.
 constexpr Micros long_took_us = 100'000;
 constexpr Micros counts_most = 4;
