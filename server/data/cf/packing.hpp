@@ -15,7 +15,8 @@ struct Packing {
   bool packed = false;  // scale and offset apply; otherwise numbers are unchanged, including -0
   double scale = 1;
   double offset = 0;
-  double wrap = 0;              // added to negative stored numbers: a signed type that is unsigned
+  double wrap = 0;              // added to negative stored numbers of a signed type that is marked
+                                // as unsigned
   std::vector<double> missing;  // stored numbers that mean "no value"
   double valid_min = -std::numeric_limits<double>::infinity();
   double valid_max = std::numeric_limits<double>::infinity();
@@ -41,9 +42,9 @@ struct FloatMask {
   float valid_min = -std::numeric_limits<float>::max();
   float valid_max = std::numeric_limits<float>::max();
 };
-// Empty if the packing requires more than that.
+// Empty if the packing needs more than a mask.
 std::optional<FloatMask> float_mask(const Packing& packing);
-// unpack() of every value, in place.
+// Applies unpack() to every value, in place.
 void apply(const FloatMask& mask, float* values, std::size_t count);
 
 }  // namespace windsplat::data::cf

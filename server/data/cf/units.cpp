@@ -15,7 +15,7 @@ struct Unit {
   double si;
 };
 
-// A geopotential metre is taken as a metre.
+// A geopotential metre is treated as a metre.
 constexpr auto lengths = std::to_array<Unit>({{"m", 1},
                                               {"meter", 1},
                                               {"meters", 1},

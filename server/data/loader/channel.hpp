@@ -41,10 +41,10 @@ enum class Fate {
   done,
   closed,  // by the peer, at any point
   late,
-  broken,  // the bytes received are not a message, or exceed its limit
+  broken,  // the received bytes are not a message or exceed its limit
 };
 
-// done: there is data to receive, or the peer has closed.
+// done: data can be received, or the peer has closed the channel.
 Fate wait_for_message(int socket, const Deadline& deadline);
 
 struct Frame {
@@ -68,7 +68,7 @@ struct Message {
 
 enum class Descriptors { refused, taken };
 
-// Payloads are allocated as they arrive, not by the length that a frame announces.
+// Payloads are allocated as they arrive, not by the announced length.
 Fate receive_message(int socket, Message& out, std::size_t bytes_max, Descriptors descriptors,
                      const Deadline& deadline);
 

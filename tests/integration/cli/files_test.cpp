@@ -89,11 +89,11 @@ TEST(CliFiles, InspectReportsWithoutMemoryWhenRangesExceedTheLimit) {
   const Outcome whole = run({"inspect", "--json", "tornado:400", "--memory-limit", "192M"});
   EXPECT_THAT(whole.out,
               HasSubstr("needs 732.4 MiB; --memory-limit 192M leaves 68.0 MiB for data"));
-  EXPECT_THAT(whole.out, HasSubstr("--memory-limit 901M would do"));
+  EXPECT_THAT(whole.out, HasSubstr("--memory-limit 901M would suffice"));
   const Outcome asked =
       run({"inspect", "tornado:400", "--memory-limit", "192M", "--ranges", "first"});
   EXPECT_EQ(asked.code, 1);
-  EXPECT_THAT(asked.err, HasSubstr("--memory-limit 901M would do"));
+  EXPECT_THAT(asked.err, HasSubstr("--memory-limit 901M would suffice"));
 }
 
 TEST(CliFiles, BuiltInSampleNeedsNoFile) {

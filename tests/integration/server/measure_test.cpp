@@ -295,7 +295,7 @@ TEST_F(DataRoot, LinksOmittedFromAPatternAreListed) {
   ASSERT_EQ(job["state"], "done") << job;
   const Json told = json_of(get(port(), "/v1/datasets/" + job["result"].get<std::string>()));
   EXPECT_EQ(told["state"], "ready");
-  EXPECT_THAT(told["notes"].dump(), HasSubstr("1 of 2 names that the pattern matches is a link"));
+  EXPECT_THAT(told["notes"].dump(), HasSubstr("1 of 2 names that match the pattern is omitted"));
 }
 
 TEST_F(DataRoot, UnreadableFileIsAFailedJob) {

@@ -184,7 +184,7 @@ TEST_F(LargePictures, ThatNeverFitAreRefusedAtOnce) {
   net::Viewer viewer(services_->backend, 1, "192.0.2.1");
   view_.image.height = 2048;
   const std::string fault = fault_of(viewer, view_).get();
-  EXPECT_EQ(fault.find("a picture of 2048 x 2048 pixels is too large: what is beside the fields"),
+  EXPECT_EQ(fault.find("a picture of 2048 x 2048 pixels is too large: memory other than fields"),
             0U)
       << fault;
 }

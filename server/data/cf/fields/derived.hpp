@@ -27,9 +27,9 @@ struct DerivedField {
   };
   Rule rule = Rule::pressure;
   FieldInfo info;
-  std::vector<int> inputs;  // variables
-  double scale = 1;         // of inputs[0] (height), of omega to Pa/s (rise)
-  int temperature = -1;     // variable; -1: that of the standard atmosphere
+  std::vector<int> inputs;  // indices of variables
+  double scale = 1;         // to metres for height (inputs[0]), to Pa/s for rise (omega)
+  int temperature = -1;     // temperature variable; -1: standard atmosphere
   double celsius = 0;       // added to temperatures
 };
 

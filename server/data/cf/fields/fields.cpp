@@ -1,4 +1,4 @@
-// Three ways to recognise the components of a vector, the most reliable first.
+// Recognises the components of a vector in three ways, the most reliable first.
 #include "server/data/cf/fields/fields.hpp"
 
 #include <algorithm>

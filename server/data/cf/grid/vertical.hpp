@@ -14,7 +14,7 @@
 namespace windsplat::data::cf {
 
 struct HybridLevels {
-  std::vector<double> a;  // Pa, one per level, from below
+  std::vector<double> a;  // Pa, one per level, lowest first
   std::vector<double> b;  // factors of the surface pressure
   int surface = -1;       // variable of the surface pressure
   std::string units;      // of the surface pressure

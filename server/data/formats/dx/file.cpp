@@ -75,7 +75,7 @@ class Opener {
 
   void leave_out(const std::string& name, const Error& why) {
     if (!refused_) refused_ = why;
-    file_->add_note(in_quotes(name) + " is left out: " + why.message);
+    file_->add_note(in_quotes(name) + " is omitted: " + why.message);
   }
 
   void add_sequence(const Found& found, const std::string& name) {

@@ -375,7 +375,7 @@ class Parser {
     const std::uint64_t left = out_.file->size() - from;
     if (!object.numbers) return complain("text in place of numbers is not read");
     if (!size || *size > left) {
-      return complain("is cut short: the array has more numbers than the file has bytes");
+      return complain("is truncated: the array has more numbers than the file has bytes");
     }
     if (!object.text) return words_.jump(from + *size);
     const auto end = bytes::end_of_text(out_.file, from, *size);

@@ -90,7 +90,7 @@ Result<std::vector<FieldPlace>> find_fields(const InputFile& input) {
     if (!start) return start.error();
     if (*start == input.size()) break;
     std::array<unsigned char, 16> head{};
-    if (input.size() - *start < head.size()) return input.fault("is cut short in a GRIB message");
+    if (input.size() - *start < head.size()) return input.fault("is truncated in a GRIB message");
     if (auto done = input.read(*start, head.data(), head.size()); !done) return done.error();
     const int edition = head[7];
     if (edition != 1 && edition != 2) {
@@ -108,7 +108,7 @@ Result<std::vector<FieldPlace>> find_fields(const InputFile& input) {
                          " bytes; 24 to " + std::to_string(message_bytes_max) + " are read");
     }
     std::array<char, 4> tail{};
-    if (bytes > input.size() - *start) return input.fault("is cut short in the message" + place);
+    if (bytes > input.size() - *start) return input.fault("is truncated in the message" + place);
     if (auto done = input.read(*start + bytes - 4, tail.data(), 4); !done) return done.error();
     if (std::memcmp(tail.data(), "7777", 4) != 0) {
       return input.fault("has a GRIB message" + place + " without its end marker");

@@ -166,7 +166,7 @@ Result<void> File::look_before_opening() {
     return fault("is broken: " + expected.error().message);
   }
   if (*expected > input_->size()) {
-    return fault("is cut short: it has " + std::to_string(input_->size()) +
+    return fault("is truncated: it has " + std::to_string(input_->size()) +
                  " bytes, its header says " + std::to_string(*expected));
   }
   return {};
@@ -187,7 +187,7 @@ Result<void> File::open_library() {
   const int status = nc_open(input_->library_path().c_str(), NC_NOWRITE, &ncid_);
   if (status != NC_NOERR) {
     ncid_ = -1;
-    return fault(std::string("cannot be read as netCDF: it is cut short or damaged (") +
+    return fault(std::string("cannot be read as netCDF: it is truncated or damaged (") +
                  nc_strerror(status) + ")");
   }
   if (!classic_) {

@@ -127,7 +127,7 @@ class Survey {
   Result<std::map<std::string, DatasetStorage>> take() {
     const Handle file = open_hdf5(input_);
     if (!file) {
-      return input_.fault("cannot be read as HDF5: it is cut short or damaged");
+      return input_.fault("cannot be read as HDF5: it is truncated or damaged");
     }
     const Handle root(H5Gopen2(file.id(), "/", H5P_DEFAULT), H5Gclose);
     const bool listed = root && visit_group(root.id(), "");

@@ -1,5 +1,5 @@
 // Arrays stored in bytes with constant strides: the common representation of NRRD, GrADS, OpenDX
-// and raw files. Their readers fill a PlacedFile; cf/source.hpp converts it to a dataset.
+// and raw files. Their readers fill a PlacedFile, which cf/source.hpp converts to a dataset.
 #pragma once
 
 #include <array>
@@ -29,8 +29,9 @@ struct Placement {
   bool big_endian = false;
   std::vector<std::uint64_t> strides;           // bytes between neighbours, one per dimension
   std::vector<Stored> present;                  // one per dimension; the rest is masked
-  bool negated = false;                         // vector components of reversed axes
-  std::optional<std::array<double, 2>> masked;  // stored numbers from the first to the second
+  bool negated = false;                         // components of vectors along reversed axes
+  std::optional<std::array<double, 2>> masked;  // range of stored numbers that are negated, from
+                                                // the first to the second
 };
 
 // Attributes of a coordinate.

@@ -63,7 +63,7 @@ class Reader {
     const auto word = needed_word();
     if (!word) return word.error();
     const auto value = bytes::to_integer(*word);
-    if (!value || *value < 0) return fault(in_quotes(*word) + " where a count is due");
+    if (!value || *value < 0) return fault(in_quotes(*word) + " instead of a count");
     return static_cast<std::uint64_t>(*value);
   }
 
@@ -73,7 +73,7 @@ class Reader {
       const auto word = needed_word();
       if (!word) return word.error();
       const auto value = bytes::to_sample(*word);
-      if (!value) return fault(in_quotes(*word) + " where a number is due");
+      if (!value) return fault(in_quotes(*word) + " instead of a number");
       number = *value;
     }
     return {};
@@ -114,9 +114,10 @@ class Reader {
       out_.kind = Kind::unstructured;
       out_.format = "VTK unstructured grid, legacy";
     } else {
-      return file_->fault("holds VTK data of the type " + in_quotes(*word) +
-                          "; read are STRUCTURED_POINTS, RECTILINEAR_GRID, STRUCTURED_GRID and "
-                          "UNSTRUCTURED_GRID");
+      return file_->fault(
+          "holds VTK data of the type " + in_quotes(*word) +
+          "; supported are STRUCTURED_POINTS, RECTILINEAR_GRID, STRUCTURED_GRID and "
+          "UNSTRUCTURED_GRID");
     }
     return {};
   }
@@ -140,7 +141,7 @@ class Reader {
     if (key == "z_coordinates") return read_coordinates(2);
     if (key == "cells") return read_cells();
     if (key == "cell_types") return read_cell_types();
-    return fault(in_quotes(key) + " where a section is due");
+    return fault(in_quotes(key) + " instead of a section");
   }
 
   // Skips the values after the line and records their location.
@@ -148,7 +149,7 @@ class Reader {
     array.coding = {.big_endian = true, .has_header = false};
     array.encoding = binary_ ? Encoding::raw : Encoding::text;
     if (array.tuples > cf::samples_max * 16 || array.components > 1024) {
-      return fault("an array beyond all limits");
+      return fault("an array that is too large");
     }
     const std::uint64_t values = array.values();
     if (!known_bits) value_bits = 8 * bytes::size_of(array.type);
@@ -169,14 +170,14 @@ class Reader {
     }
     if (lower(type) != "bit") {
       return file_->fault("has the array " + in_quotes(array.name) + " of the type " +
-                          in_quotes(type) + ", which is not read");
+                          in_quotes(type) + ", which is not supported");
     }
     if (auto done = take(array, true, 1); !done) return done.error();
-    out_.left_out.push_back({array.name, "its type bit is not read"});
+    out_.left_out.push_back({array.name, "its type bit is not supported"});
     return false;
   }
 
-  // The same where the type ends the line and no bits will do.
+  // The same where the type ends the line and bit is not allowed.
   Result<void> take_numbers(StoredArray& array, std::string what) {
     const auto type = scan_.line();
     if (!type) return type.error();
@@ -200,7 +201,7 @@ class Reader {
   }
 
   Result<void> read_coordinates(std::size_t axis) {
-    if (out_.kind != Kind::rectilinear) return fault("coordinates of a grid that has none");
+    if (out_.kind != Kind::rectilinear) return fault("coordinates of a grid without coordinates");
     StoredArray array;
     array.name = std::string(1, static_cast<char>('x' + axis)) + " coordinates";
     const auto n = count();
@@ -297,7 +298,7 @@ class Reader {
     } else if (key == "tensors" || key == "tensors6") {
       array.components = key == "tensors" ? 9 : 6;
     } else if (key != "global_ids" && key != "pedigree_ids") {
-      return fault(in_quotes(key) + " where a section is due");
+      return fault(in_quotes(key) + " instead of a section");
     }
     if (array.components < 1) return fault("a number of components that is not 1 to 9");
     const auto taken = take_typed(array, type);

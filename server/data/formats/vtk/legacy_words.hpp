@@ -1,4 +1,4 @@
-// Words and lines of a legacy VTK file, and what its words mean.
+// Words and lines of a legacy VTK file, and the meaning of type names.
 #pragma once
 
 #include <cstdint>

@@ -11,9 +11,9 @@ namespace windsplat::data::vtk {
 namespace {
 
 // Limits of the work over all cells, in rows of samples within bounding boxes plus linear systems
-// solved; meshes with too many overlapping cells are rejected. Per sample that would lie in a cell
-// without overlap (typical simulation meshes need 3 to 12), so that small files cannot cause much
-// work; and in total (minutes).
+// solved; meshes with too many overlapping cells are rejected. One limit is per sample that would
+// lie in a cell without overlap (typical simulation meshes need 3 to 12), so that small files
+// cannot cause much work; the other is a total (minutes).
 constexpr double work_per_sample = 128;
 constexpr std::uint64_t visits_per_work = 32;  // of samples that already have a cell
 constexpr std::uint64_t work_max = std::uint64_t{1} << 31;
@@ -239,7 +239,8 @@ class Resampler {
       for (std::size_t i = 0; i < dims_[d]; ++i) {
         axis.push_back(first_[d] + spacing_[d] * static_cast<double>(i));
       }
-      if (!(axis[1] > axis[0])) return refuse("has cells too small for their distance from 0");
+      if (!(axis[1] > axis[0]))
+        return refuse("has cells too small for their distance from the origin");
     }
     std::array<std::size_t, 3> by_axis{1, 1, 1};
     for (std::size_t d = 0; d < 3; ++d) by_axis.at(order_[d]) = dims_[d];

@@ -165,15 +165,15 @@ TEST_P(TurnedAxes, VectorsByEastAndNorthStay) {
   const Volume wind = volume_of(**source, "wind");
   EXPECT_NEAR(wind.component(0)[5], 10, 0.05);
   EXPECT_NEAR(wind.component(1)[5], 1, 0.05);
-  EXPECT_FALSE(has_note((*source)->info(), "rows and columns: its components"));
+  EXPECT_FALSE(has_note((*source)->info(), "along rows and columns"));
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Positions, TurnedAxes,
-    testing::Values(Turned{{{0, 0.01}, {-0.01, 0}}, {-1, 10}, "exchanged and turned"},
-                    Turned{{{-0.01, 0}, {0, -0.01}}, {-10, -1}, "components are turned"},
-                    Turned{{{0, -0.01}, {0.01, 0}}, {1, -10}, "exchanged and turned"},
-                    Turned{{{0.01, 0}, {0, -0.01}}, {10, -1}, "components are turned"},
+    testing::Values(Turned{{{0, 0.01}, {-0.01, 0}}, {-1, 10}, "exchanged and reversed"},
+                    Turned{{{-0.01, 0}, {0, -0.01}}, {-10, -1}, "they are reversed"},
+                    Turned{{{0, -0.01}, {0.01, 0}}, {1, -10}, "exchanged and reversed"},
+                    Turned{{{0.01, 0}, {0, -0.01}}, {10, -1}, "they are reversed"},
                     Turned{{{0, 0.01}, {0.01, 0}}, {1, 10}, "exchanged with the axes"}));
 
 using Vector = std::array<double, 3>;
@@ -251,7 +251,7 @@ TEST(Positions, RotatedPoleColumnsAndWindsFollowTheirFrame) {
       }
     }
     EXPECT_TRUE(has_note((*source)->info(), "computed from the rotated pole of 'rp'"));
-    EXPECT_TRUE(has_note((*source)->info(), "'wind' is given by east and north: turned"));
+    EXPECT_TRUE(has_note((*source)->info(), "'wind' has components along east and north: rotated"));
   }
 }
 

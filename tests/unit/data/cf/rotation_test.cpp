@@ -95,7 +95,7 @@ TEST(Rotation, EastNorthWindsAreRotatedToTheGridAxes) {
         ASSERT_TRUE(source) << source.error().message;
         const DatasetInfo& info = (*source)->info();
         ASSERT_NE(info.grid.columns, nullptr);
-        EXPECT_TRUE(has_note(info, "'wind' is given by east and north: turned"));
+        EXPECT_TRUE(has_note(info, "'wind' has components along east and north: rotated"));
         const Volume wind = volume_of(**source, "wind");
         for (std::size_t row = 0; row < height; ++row) {
           for (std::size_t i = 0; i < width; ++i) {

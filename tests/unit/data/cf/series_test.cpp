@@ -186,7 +186,7 @@ TEST(Series, VariablesMissingInSomeFilesAreOmittedWithTheReason) {
   auto source = open_file(folder / "s*.nc");
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().find("g"), nullptr);
-  EXPECT_EQ(reason_of((*source)->info(), "g"), "only some files have it: 's2.nc' does not");
+  EXPECT_EQ(reason_of((*source)->info(), "g"), "not in all files: 's2.nc' lacks it");
   // The other way round, with different units.
   with.kelvin = "C";
   with.times = {6};
@@ -198,7 +198,7 @@ TEST(Series, VariablesMissingInSomeFilesAreOmittedWithTheReason) {
   write_part(folder / "u2.nc", with);
   other = open_file(folder / "u*.nc");
   ASSERT_TRUE(other) << other.error().message;
-  EXPECT_EQ(reason_of((*other)->info(), "g"), "only some files have it: 'u1.nc' does not");
+  EXPECT_EQ(reason_of((*other)->info(), "g"), "not in all files: 'u1.nc' lacks it");
 }
 
 // Each file has its own scale and offset, as reanalyses do.

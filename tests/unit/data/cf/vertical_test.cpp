@@ -171,13 +171,13 @@ TEST(HybridLevels, MissingTopIsNotedAndATopWithoutUnitUsesThatOfTheSurface) {
     double half;  // Pa
     const char* note;
   };
-  for (const Case& c : {Case{"sigma: sigma ps: ps ptop: absent", "Pa", 2000, "Pa", 50000,
-                             "the pressure at the top, 'absent', is not in the file: using 0"},
-                        Case{"sigma: sigma ps: ps", "Pa", 2000, "Pa", 50000,
-                             "names no pressure at the top: using 0"},
-                        Case{"sigma: sigma ps: ps ptop: PTOP", "Pa", 1000, "Pa", 50500, ""},
-                        Case{"sigma: sigma ps: ps ptop: PTOP", "", 1000, "Pa", 50500, ""},
-                        Case{"sigma: sigma ps: ps ptop: PTOP", "", 10, "hPa", 50500, ""}}) {
+  for (const Case& c :
+       {Case{"sigma: sigma ps: ps ptop: absent", "Pa", 2000, "Pa", 50000,
+             "the pressure at the top, 'absent', is not in the file: using 0"},
+        Case{"sigma: sigma ps: ps", "Pa", 2000, "Pa", 50000, "has no pressure at the top: using 0"},
+        Case{"sigma: sigma ps: ps ptop: PTOP", "Pa", 1000, "Pa", 50500, ""},
+        Case{"sigma: sigma ps: ps ptop: PTOP", "", 1000, "Pa", 50500, ""},
+        Case{"sigma: sigma ps: ps ptop: PTOP", "", 10, "hPa", 50500, ""}}) {
     const Folder folder;
     {
       NetcdfMaker file(folder / "s.nc");
@@ -238,7 +238,7 @@ TEST(HybridLevels, WithOversizeSurfacePressureLevelsStayLevels) {
   auto source = open_file(folder / "h.nc");
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().grid.axes[2].kind, AxisKind::level);
-  EXPECT_TRUE(has_note((*source)->info(), "their pressures are not known"));
+  EXPECT_TRUE(has_note((*source)->info(), "terrain-following levels of unknown pressure"));
   EXPECT_TRUE(has_note((*source)->info(), "'PS' is too large"));
   EXPECT_EQ(volume_of(**source, "f").masked, 0);
 }

@@ -140,7 +140,7 @@ TEST(Dx, SeriesAreStepsAndGroupsAreFields) {
   EXPECT_EQ(source->info().steps.size(), 1U);
   EXPECT_NE(source->info().find("a"), nullptr);
   EXPECT_EQ(values_of(*source, "b"), floats(turned(counted(12))));
-  EXPECT_THAT(source->info().notes, Contains(HasSubstr("'c' is left out")));
+  EXPECT_THAT(source->info().notes, Contains(HasSubstr("'c' is omitted")));
 }
 
 TEST(Dx, ProductsOfLinesAndValuesOfCells) {
@@ -186,7 +186,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         BadDxCase{"short", with_array("items 12 lsb ieee data 0"), "does not fit"},
         BadDxCase{"follows", with_array("items 12 data follows 1 2 3"), "is not a number"},
-        BadDxCase{"huge", with_array("items 4294967295 lsb ieee data follows 1 2 3"), "cut short"},
+        BadDxCase{"huge", with_array("items 4294967295 lsb ieee data follows 1 2 3"), "truncated"},
         BadDxCase{"overflow",
                   with_array("rank 2 shape 9223372036854775807 9223372036854775807 items "
                              "9223372036854775807 lsb ieee data 0"),

@@ -195,9 +195,9 @@ TEST(Grads, MissingFileIsReportedWithItsReference) {
   ASSERT_FALSE(plain);
   ASSERT_FALSE(counted_on);
   EXPECT_EQ(plain.error().kind, ErrorKind::not_found);
-  EXPECT_THAT(plain.error().message, HasSubstr("'d.dat', which 'd.ctl' names, is not there"));
+  EXPECT_THAT(plain.error().message, HasSubstr("'d.dat', referred to by 'd.ctl', is missing"));
   EXPECT_THAT(counted_on.error().message,
-              HasSubstr("'t28.dat', which 't.ctl' names, is not there"));
+              HasSubstr("'t28.dat', referred to by 't.ctl', is missing"));
 }
 
 TEST(Grads, OtherByteOrdersAndIntegers) {

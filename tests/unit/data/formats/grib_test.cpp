@@ -392,8 +392,8 @@ TEST_F(Grib, ReducedGridsAreRefusedByName) {
 TEST_F(Grib, BrokenMessagesAreErrors) {
   const std::string good = message(2, "t", 500, 0);
   EXPECT_EQ(fault(good), "");
-  EXPECT_THAT(fault(good.substr(0, good.size() - 1)), HasSubstr("cut short"));
-  EXPECT_THAT(fault(good.substr(0, 12)), HasSubstr("cut short"));
+  EXPECT_THAT(fault(good.substr(0, good.size() - 1)), HasSubstr("truncated"));
+  EXPECT_THAT(fault(good.substr(0, 12)), HasSubstr("truncated"));
   std::string without_end = good;
   without_end.back() = '8';
   EXPECT_THAT(fault(without_end), HasSubstr("end marker"));

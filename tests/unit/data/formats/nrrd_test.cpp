@@ -325,7 +325,7 @@ TEST(Nrrd, BytesAfterTheSamplesAreReported) {
   const auto absent = open_file(folder / "c.nhdr");
   ASSERT_FALSE(absent);
   EXPECT_EQ(absent.error().kind, ErrorKind::not_found);
-  EXPECT_THAT(absent.error().message, HasSubstr("'c', which 'c.nhdr' names, is not there"));
+  EXPECT_THAT(absent.error().message, HasSubstr("'c', referred to by 'c.nhdr', is missing"));
 }
 
 TEST(Nrrd, ChangedDataFilesAreDetected) {
@@ -390,7 +390,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadNrrdCase{"block",
                     "dimension: 2\nsizes: 2 2\ntype: block\nblock size: 3\nencoding: raw\n", "abcd",
                     "blocks"},
-        BadNrrdCase{"bzip2", small + "encoding: bzip2\n", "abcd", "bzip2 is not read"},
+        BadNrrdCase{"bzip2", small + "encoding: bzip2\n", "abcd", "bzip2 is not supported"},
         BadNrrdCase{"colors",
                     "dimension: 3\nsizes: 3 2 2\nkinds: RGB-color domain domain\ntype: uint8\n"
                     "encoding: raw\n",
@@ -400,7 +400,7 @@ INSTANTIATE_TEST_SUITE_P(
                     "type: uint8\nencoding: raw\n",
                     std::string(48, 't'), "neither space, time nor"},
         BadNrrdCase{"byte_skip", small + "byte skip: 9223372036854775807\nencoding: raw\n", "abcd",
-                    "cut short"},
+                    "truncated"},
         BadNrrdCase{"line_skip", small + "line skip: 9223372036854775807\nencoding: raw\n",
                     "ab\ncd", "fewer lines"},
         BadNrrdCase{"no_direction",
@@ -430,7 +430,7 @@ TEST(NrrdRefusal, BrokenDataAreDetectedWhenRead) {
     ASSERT_FALSE(volume) << encoding << ' ' << data;
     EXPECT_EQ(volume.error().kind, ErrorKind::bad_data);
     EXPECT_THAT(volume.error().message,
-                testing::AnyOf(HasSubstr("cut short"), HasSubstr("damaged")));
+                testing::AnyOf(HasSubstr("truncated"), HasSubstr("damaged")));
   }
 }
 

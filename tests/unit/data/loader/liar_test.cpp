@@ -253,7 +253,7 @@ TEST_F(FaultyLoader, RequestsForOtherFilesAreRefused) {
 
 TEST_F(FaultyLoader, InvalidDatasetsAreRefused) {
   respond_with("send('opened', info[:-1])\nreceive()\n");
-  expect_not_opened("the loader sent a description that cannot be read");
+  expect_not_opened("the loader sent a malformed description");
 }
 
 TEST_F(FaultyLoader, KeptMemoryCannotChangeTheVolume) {
@@ -332,7 +332,7 @@ TEST_F(FaultyLoader, ResizedMemoryIsRefused) {
 
 TEST_F(FaultyLoader, InfinitiesAndIncompleteVectorsAreRefused) {
   const std::string message =
-      "the loader of 'sample.nc' left numbers unmasked while reading 'wind'";
+      "the loader of 'sample.nc' did not mask all invalid numbers while reading 'wind'";
   for (const char* values : {"[inf] + [0] * 15", "[0] * 15 + [-inf]", "[nan] + [0] * 15",
                              "[0] * 12 + [nan] + [0] * 3"}) {
     std::string script = "fd = send_info()\nos.pwrite(fd, floats(*(";

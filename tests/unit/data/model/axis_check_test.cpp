@@ -48,7 +48,7 @@ TEST(AxisCheck, AxesWithoutRoomForCellsAreRefused) {
       {{0, 5e-324, 1e-323}, "steps below"},
       {{0, 1e-20, 1}, "steps below"},
       {{-1.7e308, 1.7e308}, "beyond 1e290"},
-      {{1e16, 1e16 + 2, 1e16 + 4}, "lost in the rounding"}};
+      {{1e16, 1e16 + 2, 1e16 + 4}, "below the rounding error"}};
   for (const auto& [axis, fault] : axes) EXPECT_THAT(axis_fault(axis), HasSubstr(fault));
 }
 

@@ -152,9 +152,9 @@ TEST(NetcdfAxes, TimesOutOfOrderAreNoted) {
     std::string note;
   };
   for (const Case& c :
-       {Case{{0, 6, 12}, ""}, Case{{12, 0, 6}, "'time' goes back once: "},
-        Case{{0, 6, 6, 6}, "'time' does not advance 2 times: "},
-        Case{{0, 0, 6, 1, 0}, "'time' goes back 2 times and does not advance once: "}}) {
+       {Case{{0, 6, 12}, ""}, Case{{12, 0, 6}, "'time' decreases once: "},
+        Case{{0, 6, 6, 6}, "'time' does not increase 2 times: "},
+        Case{{0, 0, 6, 1, 0}, "'time' decreases 2 times and does not increase once: "}}) {
     const Folder folder;
     {
       NetcdfMaker file(folder / "t.nc");
@@ -302,7 +302,7 @@ TEST(NetcdfAxes, TimeWithGapsIsCounted) {
   EXPECT_EQ(source->info().steps.at(2).text, "2");
   EXPECT_TRUE(std::any_of(source->info().left_out.begin(), source->info().left_out.end(),
                           [](const LeftOut& left) {
-                            return left.reason == "time has missing values: steps are counted";
+                            return left.reason == "time has missing values: steps are numbered";
                           }));
 }
 

@@ -230,7 +230,7 @@ TEST(NetcdfFields, LargestGridIsUsedAndTheRestIsExplained) {
   EXPECT_EQ(reasons["hyam"], "fewer than two spatial dimensions");
   EXPECT_EQ(reasons["spread"], "its dimension 'member' is neither space nor time");
   EXPECT_EQ(reasons["empty"], "its dimension 'obs' has length 0");
-  EXPECT_EQ(reasons["/inner"], "group: to see it, name it behind the file's name and '#'");
+  EXPECT_EQ(reasons["/inner"], "group: to open it, append '#' and its name to the file's");
   EXPECT_EQ(reasons.count("cloud"), 0U);
   // What does not depend on time is the same at each.
   auto first = (*source)->read(1, 0);

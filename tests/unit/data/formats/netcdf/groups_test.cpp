@@ -132,7 +132,7 @@ TEST(Groups, PositionsAndSurfacePressureOfParentGroupsApply) {
   ASSERT_TRUE(source) << source.error().message;
   const DatasetInfo& info = (*source)->info();
   ASSERT_NE(info.grid.columns, nullptr);
-  EXPECT_TRUE(has_note(info, "'wind' is given by east and north: turned"));
+  EXPECT_TRUE(has_note(info, "'wind' has components along east and north: rotated"));
   // Rows run north-east, so that a wind from due west is half along the rows, half against the
   // columns.
   const Volume wind = volume_of(**source, "wind");

@@ -38,7 +38,7 @@ TEST(NetcdfRefusals, MissingAndIrregularFiles) {
   expect_refused(folder / "no/folder.nc", ErrorKind::not_found, "no such file");
   expect_refused("", ErrorKind::not_found, "no file name");
   std::filesystem::create_directory(folder / "dir.nc");
-  expect_refused(folder / "dir.nc", ErrorKind::bad_data, "is a directory, and not a Zarr store");
+  expect_refused(folder / "dir.nc", ErrorKind::bad_data, "is a directory, but not a Zarr store");
   ASSERT_EQ(::mkfifo((folder / "pipe.nc").c_str(), 0600), 0);
   expect_refused(folder / "pipe.nc", ErrorKind::bad_data, "not a regular file");
   expect_refused("/dev/null", ErrorKind::bad_data, "not a regular file");
@@ -57,7 +57,7 @@ TEST(NetcdfRefusals, OtherFormats) {
   write_bytes(folder / "hdf4.nc", std::string("\x0e\x03\x13\x01 and more"));
   expect_refused(folder / "hdf4.nc", ErrorKind::bad_data, "is HDF4");
   write_bytes(folder / "hdf.nc", "\x89HDF\r\n\x1a\n and nothing of use behind it");
-  expect_refused(folder / "hdf.nc", ErrorKind::bad_data, "cut short or damaged");
+  expect_refused(folder / "hdf.nc", ErrorKind::bad_data, "truncated or damaged");
 }
 
 TEST(NetcdfRefusals, UrlsAndLibraryDirectives) {

@@ -114,7 +114,7 @@ TEST(Storage, UnwrittenDataAreMasked) {
     EXPECT_EQ(std::isfinite(some.values[n]), written) << n;
   }
   EXPECT_TRUE(has_note((*source)->info(),
-                       "masked where nothing was ever written, whatever the fill value: "
+                       "chunks that were never written are masked: "
                        "'nothing' (all of it), 'some' (7 of 8 chunks)"));
   EXPECT_FALSE(has_note((*source)->info(), "'all'"));
 }

@@ -113,8 +113,9 @@ TEST(NetcdfValues, TheValidRangeIsReported) {
   auto source = open_file(folder / "v.nc");
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().notes,
-            (std::vector<std::string>{"masked beyond what the file calls valid: 'packed' (-40 to "
-                                      "10), 'low' (from 0.3), 'high' (up to 7.5)"}));
+            (std::vector<std::string>{
+                "values outside the valid range of the file are masked: 'packed' (-40 to "
+                "10), 'low' (from 0.3), 'high' (up to 7.5)"}));
 }
 
 TEST(NetcdfValues, FillMissingNanAndInfinityAreMasked) {

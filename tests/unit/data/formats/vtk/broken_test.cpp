@@ -139,7 +139,7 @@ TEST(VtkBroken, PiecesThatCannotFillTheWholeAreRefusedBeforeAllocation) {
   const std::string empty = "<Piece Extent=\"0 16777216 0 1 0 0\"/>";
   EXPECT_THAT(refusal(folder.write(
                   "a.vti", xml.file("ImageData", "WholeExtent=\"0 16777216 0 1 0 0\"", empty))),
-              HasSubstr("without an array"));
+              HasSubstr("with no array"));
   EXPECT_LT(peak_kilobytes() - before, 64 * 1024);
 }
 

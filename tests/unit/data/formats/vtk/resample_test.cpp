@@ -280,10 +280,10 @@ TEST_F(VtkResampling, DegenerateCellsAreCountedAndTheOthersShown) {
   EXPECT_LT(out.worst, 1e-5);
   EXPECT_EQ(out.inside, 1);
   EXPECT_THAT(out.notes, HasSubstr("27 cells"));
-  EXPECT_THAT(out.notes, HasSubstr("1 cells of type 42 left out"));
-  EXPECT_THAT(out.notes, HasSubstr("1 cells of type 25 left out"));
+  EXPECT_THAT(out.notes, HasSubstr("1 cells of type 42 omitted"));
+  EXPECT_THAT(out.notes, HasSubstr("1 cells of type 25 omitted"));
   EXPECT_THAT(out.notes, HasSubstr("1 flat cells"));
-  EXPECT_THAT(out.notes, HasSubstr("2 cells left out that have no volume"));
+  EXPECT_THAT(out.notes, HasSubstr("2 cells without volume"));
 }
 
 TEST_F(VtkResampling, BrokenCellsAreErrors) {
@@ -297,9 +297,10 @@ TEST_F(VtkResampling, BrokenCellsAreErrors) {
   EXPECT_EQ(file([](TestMesh&) {}), "");
   EXPECT_THAT(file([](TestMesh& m) { m.connectivity[5] = 27; }), HasSubstr("corner 27"));
   EXPECT_THAT(file([](TestMesh& m) { m.connectivity[5] = -1; }), HasSubstr("not an index"));
-  EXPECT_THAT(file([](TestMesh& m) { m.offsets[3] = 2; }), HasSubstr("offsets go back"));
-  EXPECT_THAT(file([](TestMesh& m) { m.offsets[7] = 72; }), HasSubstr("bytes where"));
-  EXPECT_THAT(file([](TestMesh& m) { m.offsets[7] = 2e9; }), HasSubstr("bytes where"));
+  EXPECT_THAT(file([](TestMesh& m) { m.offsets[3] = 2; }),
+              HasSubstr("offsets of its cells decrease"));
+  EXPECT_THAT(file([](TestMesh& m) { m.offsets[7] = 72; }), HasSubstr("bytes instead of"));
+  EXPECT_THAT(file([](TestMesh& m) { m.offsets[7] = 2e9; }), HasSubstr("bytes instead of"));
   EXPECT_THAT(file([](TestMesh& m) { std::fill(m.types.begin(), m.types.end(), 3); }),
               HasSubstr("no cells of a supported kind"));
   EXPECT_THAT(file([](TestMesh& m) {
