@@ -1,4 +1,4 @@
-// Forecast errors of frames against their true errors, at viewpoints without measurements.
+// Forecast errors of frames compared with their true errors, at viewpoints without measurements.
 #include "server/study/calibration.hpp"
 
 #include <gtest/gtest.h>

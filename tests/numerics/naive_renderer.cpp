@@ -256,7 +256,8 @@ class Renderer {
     if (drawn || medium.drawn) composite(drawn ? &line : nullptr, medium);
   }
 
-  // A splat below the tolerance of every layer, for all view directions, is omitted.
+  // A splat whose optical depth is below the tolerance of every layer, for all view directions, is
+  // omitted.
   Medium<Real> make_medium(const Group& group) const {
     const auto density = engine::reference::make_density(group.layers.media, position_);
     if (density.rho <= 0) return {};
@@ -312,10 +313,10 @@ class Renderer {
     const Vec<Real> d = to_cells(ray);
     const Real cells = std::sqrt(dot(d, d));
     Real tau = 0;
-    Real closest = centre_[2];  // the view depth at which the ray passes nearest to the sample
+    Real closest = centre_[2];  // the view depth at which the ray is nearest to the sample
     if (medium.drawn) {
-      // From the eye in perspective, from the pixel's point of the eye plane in orthographic
-      // projection.
+      // From the eye in perspective, from the point of the pixel in the plane of the eye in
+      // orthographic projection.
       Vec<Real> o{};
       for (int a = 0; a < 3; ++a) {
         Real from = from_eye_[a];

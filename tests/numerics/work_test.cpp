@@ -60,7 +60,7 @@ TEST(Work, OpticalDepthToleranceCoversAllViewDirections) {
 
 TEST(Work, SamplesOutsideThePictureAreCulled) {
   scene::Scene scene = counted_scene();
-  scene.camera = look({0, 0, 0}, {0, -1, 0}, -5, 70, 50, true, 0.4);  // looks away
+  scene.camera = look({0, 0, 0}, {0, -1, 0}, -5, 70, 50, true, 0.4);  // looks away from the volume
   const engine::Rendered away = render(scene);
   EXPECT_EQ(away.work.culled, 8 * 8 * 4);
   EXPECT_EQ(away.work.pixel_updates, 0);
@@ -104,7 +104,7 @@ TEST(Work, OpaqueTilesTerminateEarlyAndLookTheSame) {
 }
 
 TEST(Cancel, BeforeAndDuringAFrame) {
-  // Enough work that a thread that wakes late still cancels before the end.
+  // Enough work that a thread that wakes up late still cancels before the end.
   scene::Scene scene;
   scene.lattice = even_lattice({80, 80, 80}, {0.024, 0.024, 0.024});
   const auto wind = make_volume(scene.lattice, 3, [](int, double, double, double) { return 1.0F; });
