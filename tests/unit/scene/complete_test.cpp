@@ -99,7 +99,7 @@ TEST(CompleteView, KeepsGivenValues) {
   protocol::ScalarView scalar;
   scalar.field = "temperature";
   scalar.color.map = "ice";
-  scalar.color.range = protocol::Range{300, 200};  // reversed on purpose
+  scalar.color.range = protocol::Range{300, 200};  // reversed intentionally
   scalar.extinction = {{200, 0}, {300, 5}};
   view.scalars = {scalar};
   const View full = completed(view, *dataset);
@@ -111,7 +111,7 @@ TEST(CompleteView, KeepsGivenValues) {
   ASSERT_EQ(full.scalars->size(), 1U);
   EXPECT_EQ((*full.scalars)[0].color.range, (protocol::Range{300, 200}));
   EXPECT_EQ((*full.scalars)[0].color.map, "ice");
-  EXPECT_EQ(dataset->loads(), 0U);  // every range was given
+  EXPECT_EQ(dataset->loads(), 0U);  // all ranges were given
 }
 
 TEST(CompleteView, RangesComeFromTheFirstStep) {

@@ -1,5 +1,5 @@
-// The chooser: times correct forecasts; finer settings are chosen with hysteresis, coarser ones at
-// once.
+// The chooser: measured times correct forecasts; finer settings are chosen with hysteresis, coarser
+// ones at once.
 #include "server/session/pacing/chooser.hpp"
 
 #include <gtest/gtest.h>
@@ -106,7 +106,7 @@ TEST(Chooser, WithoutACalibrationRunFinerPicturesAreTriedOneByOne) {
   Drag drag;
   const Forecasts guessed = quality::Table(quality::Kind{}).forecasts(viewpoint);
   const quality::Aim aim{30.0, std::nullopt};
-  // Ten times as slow as estimated, then a tenth of it.
+  // First ten times as slow as estimated, then a tenth of the estimate.
   const auto slow = drag.run(guessed, aim, 20, [](int) { return 10.0; });
   std::vector<std::size_t> fast;
   for (int n = 0; n < 20; ++n) {

@@ -39,7 +39,7 @@ std::vector<quality::Setting> drag(Driver& driver, int count, std::uint32_t& rev
   return drawn;
 }
 
-// Time of a setting on a machine `slower` than the calibrated one.
+// Time of a setting on a machine that is `slower` times as slow as the calibrated one.
 std::function<Micros(const quality::Setting&)> costs(const quality::Forecasts& known,
                                                      double slower = 1) {
   return [known, slower](const quality::Setting& setting) {
@@ -85,7 +85,7 @@ TEST(Setting, KeepsTheBudgetOnASlowedMachine) {
     for (std::size_t n = 10; n < drawn.size(); ++n) {
       EXPECT_LE(cost(drawn[n]), 1000 * budget) << "frame " << n << " at " << budget << " ms";
     }
-    // Of the settings well within the budget none has a smaller error.
+    // Among the settings well within the budget none has a smaller error.
     const auto error = [&](const quality::Setting& setting) {
       return (*driver.surveyed)[quality::index_of(setting).value()].error;
     };
@@ -149,7 +149,8 @@ TEST(Setting, RequestedErrorReplacesTheBudget) {
   EXPECT_EQ(late.back().method, protocol::MethodName::kernel) << "a budget has precedence";
 }
 
-// Sixteen equal sessions: each waits for fifteen frames of the others, and all shrink their frames.
+// Sixteen equal sessions: each waits for fifteen frames of the others, and all shorten their
+// frames.
 TEST(Setting, FramesBecomeCheaperWhenManyWaitForTheRenderer) {
   Driver driver;
   driver.surveyed = surveyed(33);
@@ -260,7 +261,7 @@ TEST(Refining, EndsWhereNoSlabIsThinEnough) {
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.000001}})");
   driver.settle();
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
-  EXPECT_GT(driver.frames.back().header.error, 1e-6F) << "reports that the error is not met";
+  EXPECT_GT(driver.frames.back().header.error, 1e-6F) << "reports that the error limit is not met";
 }
 
 TEST(Refining, LosslessFinalFrameIsAPng) {

@@ -87,7 +87,7 @@ TEST(Series, StepsAreOrderedByTimeForAnyFileEpochsAndNames) {
   EXPECT_EQ(texts((*source)->info()),
             (std::vector<std::string>{"2001-01-01T00:00", "2001-01-01T06:00", "2001-01-02T12:00",
                                       "2001-01-03T00:00", "2001-01-03T06:00"}));
-  EXPECT_EQ((*source)->info().time_units, "hours since 2001-01-03");  // the first file's
+  EXPECT_EQ((*source)->info().time_units, "hours since 2001-01-03");  // that of the first file
   EXPECT_EQ((*source)->info().steps[0].value, -48);
   const std::vector<float> expected{1000, 1100, 2000, 3000, 3100};
   for (std::size_t step : {4U, 0U, 2U, 1U, 3U}) {
@@ -187,7 +187,7 @@ TEST(Series, VariablesMissingInSomeFilesAreOmittedWithTheReason) {
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().find("g"), nullptr);
   EXPECT_EQ(reason_of((*source)->info(), "g"), "not in all files: 's2.nc' lacks it");
-  // The other way round, with different units.
+  // The reverse order, with different units.
   with.kelvin = "C";
   with.times = {6};
   write_part(folder / "u1.nc", {{0}, "hours since 2001-01-01"});
@@ -239,7 +239,7 @@ TEST(Series, FilesWithoutATimeDimensionAreOneStepEach) {
       file.text(file.variable("time", NC_DOUBLE, {}, {hour}), "units", "hours since 2001-01-01");
     file.variable("f", NC_FLOAT, {z, y, x}, counting(12, base));
   };
-  // In natural order where no member has times.
+  // In natural order if no member has times.
   write("snap10.nc", 300, -1);
   write("snap2.nc", 200, -1);
   write("snap1.nc", 100, -1);
@@ -327,7 +327,7 @@ TEST(Series, FewFilesAreOpenAtATimeAndAChangedOneIsDetected) {
   for (std::size_t v = 0; v < (*series)->contents().variables.size(); ++v) {
     if ((*series)->contents().variables[v].name == "f") f = static_cast<int>(v);
   }
-  // All steps in one block, twice over.
+  // All steps in one block, read twice.
   std::vector<float> values(members * 2);
   for (int pass = 0; pass < 2; ++pass) {
     ASSERT_TRUE((*series)->read(f, {0, 0, 0, 0}, {members, 2, 1, 1}, values.data()));

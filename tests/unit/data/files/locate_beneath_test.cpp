@@ -136,7 +136,7 @@ TEST_F(LocateBeneath, PathsOutsideTheRootAreRefused) {
   }
   const auto inside = locate_beneath(root_.native(), (root_ / "a.nc").native());
   ASSERT_FALSE(inside);
-  EXPECT_EQ(inside.error().kind, ErrorKind::invalid) << "absolute, though inside";
+  EXPECT_EQ(inside.error().kind, ErrorKind::invalid) << "absolute, although inside";
 }
 
 TEST_F(LocateBeneath, InvalidFileNamesAreRefused) {
@@ -153,7 +153,7 @@ TEST_F(LocateBeneath, InvalidFileNamesAreRefused) {
 
 TEST_F(LocateBeneath, PipeIsRefusedWithoutBlocking) {
   EXPECT_EQ(refusal("pipe.nc"), ErrorKind::invalid);
-  EXPECT_EQ(refusal("pipe*"), ErrorKind::not_found) << "a series is of files";
+  EXPECT_EQ(refusal("pipe*"), ErrorKind::not_found) << "a series consists of files";
 }
 
 // A folder is accessed whenever its files are read, long after it was located.

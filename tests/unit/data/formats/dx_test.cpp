@@ -1,8 +1,8 @@
 // OpenDX: small files made here, and the storm of Debian's package dxsamples (25 x 14 x 8), whose
-// expected figures come from a script that reads the tail of each file with Python's struct module:
+// expected values come from a script that reads the tail of each file with Python's struct module:
 //   v = struct.unpack(">8400f", open("wind.dx", "rb").read()[-33600:])
-//   v[((i * 14 + j) * 8 + k) * 3 + c]
-// i running along x, j along z, k along y, which is up: the updraft (c = 1) vanishes at k = 0.
+//   v[((i * 14 + j) * 8 + k) * 3 + c] i runs along x, j along z, k along y, which is up: the
+//   updraft (c = 1) vanishes at k = 0.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -47,7 +47,7 @@ std::string text_of(const Doubles& values) {
   return out + "\n";
 }
 
-// x fastest out of z fastest.
+// Reorders from z fastest to x fastest.
 Doubles turned(const Doubles& values) {
   Doubles out;
   for (std::size_t z = 0; z < 2; ++z) {
@@ -125,7 +125,7 @@ TEST(Dx, SeriesAreStepsAndGroupsAreFields) {
   ASSERT_TRUE(source);
   ASSERT_EQ(source->info().steps.size(), 3U);
   EXPECT_EQ(source->info().steps[1].value, 7.5);
-  EXPECT_EQ(source->info().steps[2].value, 9);  // behind the value
+  EXPECT_EQ(source->info().steps[2].value, 9);  // after the value
   const Volume v = volume_of(*source, "s", 2);
   EXPECT_EQ(v.components, 3);
   EXPECT_EQ(v.component(1)[1], 3 * (3 * 6 + 1));  // x 1: the seventh item
@@ -218,7 +218,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadDxCase{"word", grid + "surprise 4\n", "'surprise' is not understood"}),
     [](const auto& test) { return std::string(test.param.name); });
 
-// A product or series that contains itself must end.
+// Parsing a product or series that contains itself must end.
 TEST(DxRefusal, CyclesAreRefused) {
   const Folder folder;
   write_file(folder / "c.dx",

@@ -238,7 +238,7 @@ TEST_F(Grib, GaussianLatitudesFromEitherPole) {
     maker.set("bitsPerValue", 24L);
     std::vector<double> list;
     for (int row = 0; row < 64; ++row) {
-      // Latitudes are nearly even, 180 / 64.5 degrees apart.
+      // Latitudes are nearly evenly spaced, 180 / 64.5 degrees apart.
       const double about = (north ? 1 : -1) * (row - 31.5) * 180 / 64.5;
       list.insert(list.end(), 128, about);
     }

@@ -143,7 +143,7 @@ TEST(Raw, ExtraBytesAreWholeStepsOrRefused) {
   EXPECT_THAT(message, HasSubstr("not a whole step of 48 bytes"));
 }
 
-// Two fields of one file, each given by its offset, describe it together.
+// Two fields of one file, each given by its offset, describe the file together.
 TEST(Raw, FieldsOfOneFileDescribeItTogether) {
   const Folder folder;
   write_file(folder / "a.json", document(R"("fields": [{"name": "a", "file": "a.raw"},

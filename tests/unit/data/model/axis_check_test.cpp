@@ -1,4 +1,4 @@
-// Axes whose coordinates are strictly monotonic and yet leave no room for cells are refused.
+// Axes whose coordinates are strictly monotonic but leave no room for cells are refused.
 #include "server/data/model/axis_check.hpp"
 
 #include <gmock/gmock.h>

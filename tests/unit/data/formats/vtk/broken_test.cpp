@@ -1,5 +1,5 @@
-// Truncated or inconsistent VTK files: each is an error, and none makes the reader allocate memory
-// for data the file cannot contain.
+// Truncated or inconsistent VTK files: each causes an error, and none makes the reader allocate
+// memory for data that the file cannot contain.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
@@ -42,7 +42,7 @@ TEST(VtkBroken, EveryTruncationIsAnError) {
   }
 }
 
-// Any changed byte gives an error or values, never a crash.
+// Any changed byte causes an error or yields values, never a crash.
 TEST(VtkBroken, AnyByteMayBeCorrupt) {
   const VtkFolder folder;
   for (const char* format : {"ascii", "appended-raw"}) {
