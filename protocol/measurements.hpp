@@ -98,7 +98,7 @@ struct ForecastPoint {
   bool pareto = false;    // on the Pareto front of time and error
 };
 struct ForecastDescription {
-  int width = 0;  // of the view, pixels
+  int width = 0;  // size of the view, pixels
   int height = 0;
   std::vector<ForecastPoint> points;  // fastest first
   std::optional<std::size_t> chosen;  // index of `points`, if the view has a budget or error limit

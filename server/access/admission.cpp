@@ -62,9 +62,9 @@ std::string detail_of(const Refusal& refusal) {
 // TLS connections closed because handshakes exceeded their processor time.
 struct ClosedHandshakes {
   std::int64_t connections = 0;
-  std::string address;  // of the first one
+  std::string address;  // address of the first one
   bool several = false;
-  Admission::Micros since = 0;  // when the first was closed; logged as an age
+  Admission::Micros since = 0;  // time when the first one was closed; logged as an age
 };
 
 void log_closed(const ClosedHandshakes& closed) {

@@ -24,7 +24,7 @@ using Ticket = std::shared_ptr<const void>;
 struct Visitor {
   std::string peer;  // remote address
   Ticket place;
-  std::optional<Refusal> reserve;  // only health is served, for this reason
+  std::optional<Refusal> reserve;  // reason why only health requests are served
   bool trusted = false;            // a proxy, which has connections of many clients
   bool known = false;              // a proxy, or the address has shown the token
 };

@@ -46,7 +46,7 @@ Quota::Rate Quota::request_rate() const {
 Quota::Rate Quota::byte_rate() const {
   return {limits_.bytes_per_address, at_once_s * limits_.bytes_per_address};
 }
-Quota::Rate Quota::render_rate() const {  // in seconds
+Quota::Rate Quota::render_rate() const {  // the limit is configured in seconds
   return {limits_.render_s_per_address / s_per_minute, limits_.render_s_per_address};
 }
 Quota::Rate Quota::login_rate() const {

@@ -16,13 +16,13 @@ namespace windsplat::net {
 
 struct Refusal {
   LimitKind kind = LimitKind::connections;
-  double limit = 0;       // as in Limits
+  double limit = 0;       // limit as in Limits
   int retry_after_s = 1;  // estimated time until admission
 };
 
 class Quota {
  public:
-  using Micros = std::int64_t;  // of a monotonic clock
+  using Micros = std::int64_t;  // time of a monotonic clock
 
   static constexpr std::size_t addresses_max = 4096;  // tracked at a time
   // Size of the reserve: connections beyond the limits, which serve health requests only. One

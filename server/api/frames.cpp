@@ -42,7 +42,7 @@ struct Picture {
   std::string preset;  // nullopt: none
   std::optional<Orbit> orbit;
   std::string if_none_match;
-  frame::Cost cost;  // of the view before preset and orbit, which change only the camera
+  frame::Cost cost;  // cost of the view before preset and orbit, which change only the camera
 };
 
 std::string_view media_type(frame::Format format) {

@@ -28,7 +28,7 @@ using DatasetPtr = std::shared_ptr<data::Dataset>;
 
 constexpr int histogram_bins = 64;
 constexpr std::chrono::milliseconds turn_budget{
-    30};  // for reading steps before yielding to other jobs
+    30};  // time for reading steps before yielding to other jobs
 
 // Dataset and field of a query, resolved before loading.
 struct Subject {

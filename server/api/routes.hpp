@@ -20,11 +20,11 @@ enum class Query { refused, taken };
 enum class Charge {
   none,
   picture,       // counts as a picture of the address, before the handler is called
-  valid_picture  // the same, counted by the handler once the view is valid
+  valid_picture  // like `picture`, but counted by the handler once the view is valid
 };
 enum class Place {
   base,  // below the base path
-  root   // also at the root, and answered under any load
+  root   // also available at the root, and answered under any load
 };
 
 struct Route {

@@ -16,9 +16,9 @@ namespace {
 using Row = std::vector<std::string>;
 
 // Float32 coordinates deviate from even spacing by rounding.
-constexpr double uneven_tolerance = 1e-3;  // of the mean spacing
+constexpr double uneven_tolerance = 1e-3;  // relative to the mean spacing
 constexpr std::size_t steps_listed_max = 12;
-constexpr std::size_t line_bytes_max = 80;  // of notes and reasons
+constexpr std::size_t line_bytes_max = 80;  // for notes and reasons
 
 std::string number(double value) {
   std::array<char, 40> text{};

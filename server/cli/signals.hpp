@@ -37,7 +37,7 @@ class Errand {
 // Action on a second SIGTERM or SIGINT: exit at once.
 struct AtOnce {
   int code = 1;                            // exit code
-  std::function<void()> before = nullptr;  // on the watching thread, while others run
+  std::function<void()> before = nullptr;  // called on the watching thread before the action
 };
 
 // Construct before any other thread: blocks the signals for this thread and those it starts, and

@@ -45,7 +45,7 @@ struct WorkReport {
   double skipped_bound = 0;
   double stop_bound = 0;
   std::vector<std::string> fields;  // set by the caller
-  std::int64_t bytes = 0;           // of the fields read
+  std::int64_t bytes = 0;           // size of the fields read
   Variant variant;
 };
 

@@ -38,7 +38,7 @@ struct Encoding {
 struct Frame {
   image::Bytes bytes;
   protocol::View view;  // the completed view that was drawn, with the requested size of the picture
-  int width = 0;        // as rendered
+  int width = 0;        // rendered width
   int height = 0;
   double detail = 0;  // at the size of the view (scene::detail_shown)
   engine::WorkReport work;

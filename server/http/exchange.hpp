@@ -25,7 +25,7 @@ struct Request {
   bool below_base = true;         // false: `path` is the whole path
   bool ends_in_slash = false;
   Parameters query;  // decoded, in order
-  Headers headers;   // in order received
+  Headers headers;   // in the order received
   std::string body;
   CancelToken cancel;      // raised when the client disconnects
   std::uint64_t peer = 0;  // id of the connection

@@ -18,14 +18,14 @@ constexpr std::uint8_t huffman_tables = 0xC4;
 constexpr std::uint8_t start_of_scan = 0xDA;
 constexpr std::uint8_t quantization_tables = 0xDB;
 constexpr std::uint8_t restart_interval = 0xDD;
-constexpr std::uint8_t first_restart = 0xD0;  // of 8, used cyclically
+constexpr std::uint8_t first_restart = 0xD0;  // first of 8 markers that are used cyclically
 constexpr std::uint8_t first_application = 0xE0;
 constexpr std::uint8_t last_application = 0xEF;
 
 struct Layout {
-  std::size_t frame = 0;  // of the SOF0 segment's marker
-  std::size_t scan = 0;   // of the SOS segment's marker
-  std::size_t data = 0;   // after it
+  std::size_t frame = 0;  // offset of the SOF0 marker
+  std::size_t scan = 0;   // offset of the SOS marker
+  std::size_t data = 0;   // offset after the SOS segment
 };
 
 Error broken(const char* what) {

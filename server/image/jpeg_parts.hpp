@@ -10,7 +10,7 @@
 namespace windsplat::image {
 
 struct Stitching {
-  int width = 0;  // of the whole picture, pixels
+  int width = 0;  // size of the whole picture, pixels
   int height = 0;
   int strip_mcus = 0;  // height of every strip but the last, which may be less; at most 65535
 };

@@ -13,7 +13,7 @@
 namespace windsplat::image {
 namespace {
 
-constexpr int compression_level = 1;                        // of zlib
+constexpr int compression_level = 1;                        // level of zlib
 constexpr std::size_t chunk_bytes = std::size_t{64} << 10;  // largest IDAT
 
 enum class Fate { done, cancelled, failed };

@@ -11,7 +11,7 @@ namespace windsplat::quality {
 struct Scatter {
   double signature = 0;  // between scene signatures, the same at every viewpoint
   double viewpoint = 0;  // between viewpoints of one signature
-  double noise = 0;      // of one measurement
+  double noise = 0;      // standard deviation of one measurement
 };
 
 struct Expected {

@@ -41,7 +41,7 @@ struct Observation {
 
 struct Kriged {
   double log_ratio = 0;
-  double variance = 0;  // of a new measurement
+  double variance = 0;  // noise of a new measurement
 };
 
 double squared(double x) { return x * x; }

@@ -18,7 +18,7 @@ namespace {
 using data::AxisKind;
 using protocol::GeometryMapping;
 
-constexpr double shell_share = 0.15;  // of the inner radius
+constexpr double shell_share = 0.15;  // fraction of the inner radius
 
 Error no_heights(const std::string& detail) {
   return make_error_at(ErrorKind::invalid, "/geometry/heightField", detail);

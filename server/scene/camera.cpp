@@ -17,7 +17,7 @@ constexpr double distance_max = 5e5;    // world units, well within the limits o
 constexpr double parallel_sine = 1e-6;  // sine of the least angle between up and view direction
 constexpr double near_min = 1e-4;
 constexpr double near_max = 1e-2;
-constexpr std::size_t outline_samples = 8192;  // of each end of a curved lattice
+constexpr std::size_t outline_samples = 8192;  // samples of each end of a curved lattice
 constexpr double aside_min = 0.05;             // world units; nearer boxes count as centred
 
 glm::dvec3 to_glm(const protocol::Vec3& v) { return {v[0], v[1], v[2]}; }

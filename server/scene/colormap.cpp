@@ -22,7 +22,7 @@ struct Stops {
   const char* kind;
   std::vector<std::uint32_t> codes;  // 0xrrggbb
   Spacing spacing = Spacing::uniform;
-  std::vector<Rgb> lab{};    // the same in OKLab
+  std::vector<Rgb> lab{};    // the control points in OKLab
   std::vector<double> at{};  // position of each, 0 to 1
 };
 

@@ -17,7 +17,8 @@ namespace {
 
 // The cache entry of a dataset: a placement with the parameters that determine it.
 struct Kept {
-  protocol::GeometryView geometry;  // without the slice, which does not change positions
+  protocol::GeometryView geometry;  // the geometry without its slice, which does not change
+                                    // positions
   std::shared_ptr<const Placed> placed;
 };
 using KeptPtr = std::shared_ptr<const Kept>;

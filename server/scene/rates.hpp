@@ -17,9 +17,9 @@ namespace windsplat::scene {
 bool rises_where_negative(const data::Grid& grid, const data::FieldInfo& field);
 
 struct Rates {
-  std::vector<double> x;  // by y index: meridians converge
+  std::vector<double> x;  // indexed by y, because meridians converge
   double y = 1;
-  std::vector<double> z;  // by z index
+  std::vector<double> z;  // indexed by z
 };
 
 // World units per second per unit of each component. Horizontal: a metre per second covers 1 / (R

@@ -126,7 +126,7 @@ struct Slice {
 
 struct Scene {
   Camera camera;
-  Lattice lattice;                    // of the drawn level
+  Lattice lattice;                    // lattice of the drawn level
   std::array<int, 3> level{0, 0, 0};  // how often each axis of the data was halved
   std::optional<VectorLayer> vector;
   std::vector<ScalarLayer> scalars;
@@ -134,7 +134,7 @@ struct Scene {
   std::optional<Slice> slice;
   Method method = Method::kernel;
   Compositing compositing = Compositing::analytic;
-  double slab_thickness = 1;  // in cells along the line of sight
+  double slab_thickness = 1;  // thickness in cells along the line of sight
   double stop_transmittance = 1.5e-4;
   std::array<float, 3> background{0, 0, 0};  // linear; not part of the rendered image
 };

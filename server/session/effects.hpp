@@ -61,7 +61,7 @@ struct SendFrame {
 struct Prefetch {
   protocol::View view;  // not completed; names its dataset unless there are no steps
   std::vector<int> steps;
-  quality::Setting setting;  // for drawing them
+  quality::Setting setting;  // setting with which they will be drawn
 };
 // The view is at rest: measure time and error of each setting for it. Not answered; cancelled by
 // the next render.
@@ -82,7 +82,7 @@ struct Drawn {
   Payload payload;
   protocol::FrameInfo info;
   std::string view_json;              // the completed view, canonical
-  quality::SceneSignature signature;  // of the requested view, with its viewpoint
+  quality::SceneSignature signature;  // signature of the requested view, with its viewpoint
   quality::Viewpoint viewpoint;
   std::int64_t queue_us = 0;
   std::int64_t render_us = 0;

@@ -15,7 +15,7 @@ namespace windsplat::session {
 struct Options {
   Micros idle_timeout_us = 300'000'000;  // time without a message
   Micros quiet_us = 120'000;             // time without a change, before the final frame
-  Micros quiet_most_us = 1'000'000;      // its maximum for slow links
+  Micros quiet_most_us = 1'000'000;      // maximum of quiet_us for slow links
 };
 
 // Checks whether a view can be drawn, without loading; the value is the number of steps of its

@@ -33,7 +33,7 @@ constexpr double zoom_least = 0.6;
 constexpr double zoom_most = 4;
 // Indices into the sequence. quality/laws.cpp was fitted to views before the first one.
 constexpr std::uint64_t first_view = 100'000;
-constexpr std::uint64_t views_per_variant = 1000;  // at most
+constexpr std::uint64_t views_per_variant = 1000;  // upper bound
 constexpr std::array<double, 7> max_errors{0.1, 0.05, 0.03, 0.02, 0.01, 3e-3, 1e-3};
 constexpr std::array<int, 5> qualities{40, 60, 75, 90, 95};
 constexpr int learnt_quality = 90;

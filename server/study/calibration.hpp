@@ -29,7 +29,7 @@ Result<protocol::View> seen_from(const protocol::View& view, data::Dataset& data
                                  std::uint64_t n);
 
 struct CalibrationPlan {
-  int width = 0;  // of the pictures, pixels
+  int width = 0;  // size of the pictures, pixels
   int height = 0;
   int calibrated = 2;  // calibrated views of each variant
   int held_out = 6;
@@ -42,7 +42,7 @@ CalibrationPlan calibration_plan(const Subject& subject, bool quick);
 // One setting at one held-out view.
 struct Compared {
   std::size_t variant = 0;
-  std::size_t view = 0;  // of the variant's held-out views
+  std::size_t view = 0;  // index of a held-out view of the variant
   std::size_t setting = 0;
   double error = 0;  // true error, linear RMSE
   quality::Forecast forecast;
@@ -82,7 +82,7 @@ struct Aimed {
 struct TruthCheck {
   std::size_t variant = 0;
   double apart = 0;     // RMS
-  double estimate = 0;  // of the error of the extrapolated reference itself
+  double estimate = 0;  // estimated error of the extrapolated reference
 };
 
 struct Calibration {
@@ -125,7 +125,7 @@ const char* name_of(SettingClass kind);
 struct Agreement {
   std::size_t count = 0;
   double within_two = 0;  // fraction whose estimate is within a factor of 2
-  double median = 0;      // of estimate over true error
+  double median = 0;      // median of estimate over true error
   double bounded = 0;     // fraction whose true error is at most the predicted bound
 };
 

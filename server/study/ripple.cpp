@@ -14,7 +14,7 @@ namespace windsplat::study {
 namespace {
 
 constexpr int side = 48;            // pixels
-constexpr double seen_cells = 4;    // of the widest axis, along the side of the picture
+constexpr double seen_cells = 4;    // cells of the widest axis along the side of the picture
 constexpr double margin_cells = 2;  // a footprint reaches 1.37 beyond its sample
 
 // The segment of a ray inside the box; nullopt if the ray misses it.

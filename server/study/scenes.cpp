@@ -148,7 +148,8 @@ Knobs own_knobs(const Subject& subject) { return own_knobs(subject.view); }
 Result<scene::Scene> scene_at(const Subject& subject, const Setting& setting) {
   const Knobs& knobs = setting.knobs;
   protocol::View view = subject.view;
-  view.method.detail = protocol::Detail::full;  // one medium and one set of lines for all methods
+  view.method.detail = protocol::Detail::full;  // all methods use the same medium and the same
+                                                // lines
   view.image.width = knobs.width;
   view.image.height =
       std::max(1, static_cast<int>(std::lround(static_cast<double>(subject.view.image.height) *

@@ -16,10 +16,10 @@ namespace windsplat::study {
 namespace {
 
 constexpr double footprint_integral = 1.4476982547;  // C of docs/design/rendering-model.md
-constexpr int pixels = 9;                            // of the row, from the tail to the head of the
-                                                     // line
-constexpr double row_width = 2e-4;                   // of the row, in cells: g = 1 over the whole
-                                                     // row
+constexpr int pixels = 9;                            // pixels of the row, from the tail to the head
+                                                     // of the line
+constexpr double row_width = 2e-4;                   // width of the row, in cells: g = 1 over the
+                                                     // whole row
 constexpr double line_opacity = 0.6;
 constexpr std::array<float, 3> medium_color{0.8F, 0.3F, 0.1F};
 constexpr std::array<float, 3> line_color{0.1F, 0.9F, 0.7F};

@@ -23,7 +23,7 @@ struct Stiffness {
   bool bounded = true;    // within [0, 1] except for 1e-3
   bool monotone = true;   // alpha is at least that at the next smaller tau, at every depth of the
                           // line
-  double layers_min = 0;  // of stiff_layers cells one behind the other, without line
+  double layers_min = 0;  // for stiff_layers cells one behind the other, without line
   double layers_max = 0;
   bool diverges = false;  // the layers do not reduce the excess of one cell over [0, 1]
 };

@@ -20,8 +20,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr double truth_weight = 12;       // cost of a reference, in points
-constexpr double pictures_weight = 2;     // of the remaining work of a scene
-constexpr double calibration_weight = 3;  // of one view of a calibration
+constexpr double pictures_weight = 2;     // work of the remaining part of a scene
+constexpr double calibration_weight = 3;  // work of one view of a calibration
 constexpr int amplification = 10;
 
 double seconds_since(Clock::time_point start) {

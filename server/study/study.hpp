@@ -34,7 +34,7 @@ struct SceneReport {
   bool integral = true;       // kind of the reference: integral, or extrapolated from slabs
   double truth_estimate = 0;  // RMS of the error of an extrapolated reference itself
   double truth_seconds = 0;   // time to compute the reference; NaN: unknown
-  double tolerance = 0;       // of the integral
+  double tolerance = 0;       // tolerance of the integral
   std::int64_t pieces = 0;
   std::int64_t evaluations = 0;
   std::vector<Point> points;
@@ -42,14 +42,14 @@ struct SceneReport {
   double reconstruction_ripple = 0;  // 0: no medium; NaN: bent lattice or slice
   std::vector<Encoded> encoded;
   std::vector<Shown> pictures;
-  std::optional<Calibration> calibration;  // of calibrated subjects
+  std::optional<Calibration> calibration;  // for calibrated subjects
 };
 
 struct Report {
   Machine machine;
   bool quick = false;
   int runs = timed_runs;  // timed runs of each point
-  double seconds = 0;     // of this run
+  double seconds = 0;     // duration of this run
   std::size_t measured = 0;
   std::size_t skipped = 0;  // points of earlier runs
   std::vector<SceneReport> scenes;
@@ -65,8 +65,8 @@ struct Progress {
 struct Options {
   std::filesystem::path folder;
   bool quick = false;
-  Truth truth;           // empty: extrapolated from slabs
-  double tolerance = 0;  // of `truth`
+  Truth truth;           // empty: the reference is extrapolated from slabs
+  double tolerance = 0;  // tolerance of `truth`
   bool calibrate = true;
 };
 

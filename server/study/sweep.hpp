@@ -13,7 +13,7 @@
 namespace windsplat::study {
 
 inline constexpr int timed_runs = 9;
-inline constexpr int quick_runs = 3;        // of a quick study
+inline constexpr int quick_runs = 3;        // runs of a quick study
 inline constexpr double unit_slack = 1e-3;  // allowed excess of a stable picture over [0, 1]
 
 struct Sweep {

@@ -12,7 +12,7 @@ namespace windsplat::study {
 struct KeptTruth {
   Picture picture;
   double seconds = 0;    // time to compute it
-  double tolerance = 0;  // of the integral
+  double tolerance = 0;  // tolerance of the integral
 };
 
 // nullopt if the file is missing or damaged, not finite, or of another size or tolerance.

@@ -63,7 +63,7 @@ struct Picture {
   int width = 0;
   int height = 0;
   std::vector<double> rgba;  // linear premultiplied, row 0 on top
-  std::int64_t pieces = 0;   // of the integration
+  std::int64_t pieces = 0;   // intervals of the integration
   std::int64_t evaluations = 0;
 };
 
@@ -88,6 +88,6 @@ double log_slope(const std::vector<double>& x, const std::vector<double>& y);
 
 void find_order(const std::vector<Point>& points, Curve& curve);
 
-double median(std::vector<double> values);  // of at least one value
+double median(std::vector<double> values);  // requires at least one value
 
 }  // namespace windsplat::study

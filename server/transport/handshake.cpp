@@ -191,7 +191,7 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
 
   void end() {
     task_.reset();
-    deadline_.cancel();      // its handler holds the last reference
+    deadline_.cancel();      // the handler of the timer holds the last reference
     visitor_.place.reset();  // free the slot at once
   }
 
@@ -202,7 +202,7 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
   const std::string address_;
   const Clock::time_point came_ = Clock::now();
   asio::steady_timer deadline_;
-  std::shared_ptr<TlsTask> task_;  // null: done
+  std::shared_ptr<TlsTask> task_;  // null: the handshake has ended
   bool late_ = false;              // accepted during a drain
 };
 

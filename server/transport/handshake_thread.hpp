@@ -55,7 +55,7 @@ class HandshakeThread {
   // Entries are allocated before locking and freed after it: the io thread must not wait for this
   // thread, which has low priority.
   using Lane = std::list<Waiting>;
-  using Lanes = std::map<std::string, Lane>;  // none is empty
+  using Lanes = std::map<std::string, Lane>;  // no lane is empty
 
   void add(const std::string& address, const void* owner, std::unique_ptr<Step> step);
   std::unique_ptr<Step> next();  // blocks; null: shutdown
@@ -104,7 +104,7 @@ class HandshakeTask : public std::enable_shared_from_this<HandshakeTask> {
     dropped_ = true;
     thread_.drop(address_, this);
   }
-  void begin_no_more() { dropped_ = true; }  // on the handshake thread
+  void begin_no_more() { dropped_ = true; }  // called on the handshake thread
   [[nodiscard]] bool is_dropped() const { return dropped_; }
   [[nodiscard]] const std::string& address() const { return address_; }
 

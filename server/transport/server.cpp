@@ -220,7 +220,7 @@ struct Server::State {
   asio::steady_timer look_timer;
   asio::steady_timer cancel_timer;
   asio::steady_timer abort_timer;
-  const CancelToken never;        // for work that is never cancelled
+  const CancelToken never;        // for work that cannot be cancelled
   bool checking_files = false;    // a file check is scheduled or running
   bool drain_timers_set = false;  // the timers of a drain run
   std::thread ending;             // ends pending reads when a drain takes long

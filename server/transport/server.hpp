@@ -19,7 +19,7 @@ namespace windsplat::net {
 struct Access {
   std::vector<std::string> allow_origins;
   std::shared_ptr<const Token> token;
-  std::shared_ptr<TlsContext> tls;  // for new connections; null only if it was null before
+  std::shared_ptr<TlsContext> tls;  // for new connections; may be null only if it was null before
   bool known_hosts_only = false;
   std::vector<std::string> allow_hosts;
 };

@@ -80,7 +80,7 @@ class Catalogue {
   // Checks whether the view can be drawn, without loading. Errors: not_found (dataset), invalid
   // (with a pointer).
   struct Checked {
-    int steps = 0;  // of the dataset
+    int steps = 0;  // number of steps of the dataset
     frame::Cost cost;
   };
   [[nodiscard]] Result<Checked> check(const protocol::View& view) const;
@@ -110,7 +110,7 @@ class Catalogue {
   std::shared_ptr<data::Store> store_;
   mutable std::mutex mutex_;
   std::map<std::string, Described> described_;
-  std::map<std::string, OpenersPtr> openers_;  // by dataset
+  std::map<std::string, OpenersPtr> openers_;  // keyed by dataset
 };
 
 // An out-of-memory error extended by the name of what was being loaded; other errors are unchanged.

@@ -98,7 +98,7 @@ class RenderQueue {
   using Jobs = std::list<Waiting>;  // jobs move between lists without allocation
   using Owners = std::map<std::uint64_t, Jobs>;
   struct Line {
-    Owners owners;  // none of the lists is empty
+    Owners owners;  // no list is empty
     Shares shares;
   };
   struct Running {
@@ -119,12 +119,12 @@ class RenderQueue {
   template <class Wanted>
   [[nodiscard]] Load sum(double unknown_ms, const Wanted& wanted) const;
 
-  std::array<Line, 3> lines_;  // by kind
+  std::array<Line, 3> lines_;  // per kind
   Shares kinds_;               // streams against requests
   Jobs replaced_;
   std::optional<Running> running_;
   std::uint64_t arrivals_ = 0;
-  std::int64_t now_us_ = 0;  // when the last job was started
+  std::int64_t now_us_ = 0;  // start of the last job
   std::size_t waiting_ = 0;
 };
 

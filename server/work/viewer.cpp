@@ -92,7 +92,7 @@ struct Viewer::PrefetchState {
   };
   std::mutex
       mutex;  // held while a request is submitted, so that none is submitted after it was withdrawn
-  std::optional<Newest> newest;           // until the request is evaluated
+  std::optional<Newest> newest;           // set until the request is evaluated
   const data::DatasetInfo* of = nullptr;  // dataset of the newest request; compared only
   std::uint64_t epoch = 0;                // counts withdrawals and changes of dataset
   std::set<const data::DatasetInfo*> queued;

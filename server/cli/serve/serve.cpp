@@ -218,7 +218,7 @@ int serve(const CLI::App& given) {
     server.run();
     log::info("drained");
   }
-  control->disarm();  // from here on a signal ends the process
+  control->disarm();  // a further signal now ends the process
   if (!signals.settle(reload_patience)) {
     log::warn("reload did not finish before shutdown");
     _exit(code);

@@ -325,7 +325,7 @@ class UnrolledStore final : public ByteStore {
   std::uint64_t bytes_;
   std::uint64_t drop_;
   std::uint64_t spacing_ = first_spacing;
-  std::vector<Place> places_;  // in order, the first at 0
+  std::vector<Place> places_;  // ascending; the first is at offset 0
 };
 
 }  // namespace

@@ -191,7 +191,7 @@ Result<void> read_blocks(const ArrayFile& file, int variable, const std::vector<
   for (const Way& way : ways) all *= way.length;
   std::vector<T> buffer;
   std::size_t done = 0;
-  std::vector<std::size_t> index(ways.size(), 0);  // of the block, relative to `first`
+  std::vector<std::size_t> index(ways.size(), 0);  // index in the block, relative to `first`
   do {
     const Walk walk = block_at(ways, block, index, origin);
     bool in_place = false;

@@ -291,8 +291,8 @@ void SeriesFile::sort_steps() {
   std::stable_sort(steps_.begin(), steps_.end(),
                    [](const Step& a, const Step& b) { return a.time < b.time; });
   std::vector<Step> kept;
-  std::size_t twice = 0;   // in two files
-  std::size_t within = 0;  // in one
+  std::size_t twice = 0;   // times that occur in two files
+  std::size_t within = 0;  // times that are repeated within one file
   for (const Step& step : steps_) {
     const bool again =
         !kept.empty() && step.time - kept.back().time <= 1e-12 * std::max(1.0, std::abs(step.time));

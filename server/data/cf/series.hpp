@@ -97,8 +97,8 @@ class SeriesFile final : public ArrayFile {
   std::array<int, 3> space_{-1, -1, -1};  // the first member's dimensions
   int time_ = -1;                         // time dimension; -1: members are single steps
   int time_coordinate_ = -1;              // variable of the first member; -1: steps are numbered
-  std::vector<std::string> dropped_;      // by variable: why it is omitted, or empty
-  std::vector<bool> as_values_;           // of the first member's variables
+  std::vector<std::string> dropped_;      // per variable: why it is omitted, or empty
+  std::vector<bool> as_values_;           // per variable of the first member
   std::vector<Member> members_;
   std::vector<Step> steps_;
   FileContents contents_;

@@ -121,7 +121,7 @@ class ArraySource final : public FileSource {
   // Directions of vector components given along the rows and columns of the file.
   struct ToAxes {
     bool swapped = false;
-    std::array<bool, 2> negated{false, false};  // after the axes are exchanged
+    std::array<bool, 2> negated{false, false};  // signs after the axes are exchanged
     [[nodiscard]] bool any() const { return swapped || negated[0] || negated[1]; }
   };
 

@@ -30,7 +30,7 @@ struct Location {
   bool companions = false;      // other files below `folder` may be opened too
   std::string inside;           // a group within the file or files ("a/b"), for formats with groups
   std::string stem;             // name of the dataset: without folder and extension
-  std::string pattern;          // of a series: absolute, or below `root` if that is not empty
+  std::string pattern;          // for a series: absolute, or below `root` if that is not empty
   std::string root;
 };
 

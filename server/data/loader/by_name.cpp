@@ -27,7 +27,7 @@ constexpr std::string_view own_files = "/proc/self/fd/";
 
 struct Asking {
   int socket = -1;
-  std::vector<std::string> folders;  // each ends in '/'
+  std::vector<std::string> folders;  // every entry ends in '/'
 };
 
 // A signal handler has no context argument.

@@ -18,10 +18,10 @@ enum class Kind : std::uint32_t {
   open = 1,  // settings and location -> opened or failed
   read,      // field, step; with the memory to fill -> filled or failed
   // daemon -> loader: answers to requests of the loader
-  descriptor,  // with a descriptor
+  descriptor,  // answer: success, with a descriptor
   names,
   yes,
-  no,  // with an error, or empty
+  no,  // answer: failure, with an error or empty
   // loader -> daemon: requests
   ask_open,
   ask_list,
@@ -39,7 +39,7 @@ using Deadline = std::optional<Clock::time_point>;  // none: unlimited
 
 enum class Fate {
   done,
-  closed,  // by the peer, at any point
+  closed,  // closed by the peer, at any point
   late,
   broken,  // the received bytes are not a message or exceed its limit
 };

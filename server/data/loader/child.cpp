@@ -107,7 +107,8 @@ Result<void> fill(FileSource& source, std::size_t field, std::size_t step, const
   if (samples * components > memory.floats()) {
     return make_error(ErrorKind::internal, "the memory of a volume has another size");
   }
-  std::fill_n(memory.data(), samples * components, 0.0F);  // of the previous volume
+  std::fill_n(memory.data(), samples * components, 0.0F);  // overwrites numbers of the previous
+                                                           // volume
   if (auto done = source.fill(field, step, memory.data()); !done) return done;
   mask_volume(memory.data(), samples, static_cast<int>(components));
   return {};

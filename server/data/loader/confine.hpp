@@ -19,7 +19,7 @@ struct Confinement {
   // the initial part of it, until the daemon allows more (Process::allow_memory())
   std::uint64_t opening_bytes = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t files = 0;  // maximum number of open files
-  int socket = -1;          // to the daemon, which opens the files of libraries
+  int socket = -1;          // socket to the daemon, which opens the files of libraries
   std::vector<std::string> library_folders;
 };
 

@@ -419,7 +419,7 @@ Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits) {
   auto state = std::make_unique<RemoteSource::State>(std::move(location), std::move(limits));
   auto encoded = state->start();
   if (!encoded) return encoded.error();
-  if (!state->count_memory()) state->release();  // after its answer the loader can be restarted
+  if (!state->count_memory()) state->release();  // the loader can be restarted after its answer
   auto info = decode_info(*encoded);
   if (!info) return info.error();
   state->info = std::move(*info);

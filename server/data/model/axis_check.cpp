@@ -11,7 +11,7 @@ namespace {
 
 constexpr double coordinate_max = 1e290;
 constexpr double step_min = 1e-290;
-constexpr double share_min = 1e-18;  // its square is still a finite float
+constexpr double share_min = 1e-18;  // the square of share_min is still a finite float
 constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
 
 }  // namespace

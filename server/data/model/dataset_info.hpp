@@ -16,7 +16,7 @@ enum class AxisKind { longitude, latitude, pressure, height, depth, level, carte
 // that the index grows with the world coordinate (hence a pressure axis descends in hPa).
 struct Axis {
   std::string name;           // name of the dimension in the file
-  std::string standard_name;  // of CF; empty if none
+  std::string standard_name;  // as in CF; empty if none
   std::string units;          // as in the file; empty if none
   AxisKind kind = AxisKind::cartesian;
   std::vector<double> coordinates;  // one per sample, strictly monotonic, in `units`
@@ -48,7 +48,7 @@ struct FieldInfo {
   std::vector<std::string> component_units;  // one per component; may differ (m/s, Pa/s)
   std::string standard_name;
   std::string long_name;
-  std::string dtype;     // of the file: "float32", "int16 packed", ...
+  std::string dtype;     // type in the file: "float32", "int16 packed", ...
   bool derived = false;  // computed on request from other fields, not stored in the file
   // Bytes decoded to read one step, including whole chunks; 0 if equal to the size of the volume.
   std::uint64_t decoded_bytes = 0;

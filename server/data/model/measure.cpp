@@ -46,7 +46,7 @@ float with_order(std::uint32_t order) {
   return std::bit_cast<float>((order & 0x80000000U) != 0 ? order & 0x7fffffffU : ~order);
 }
 
-using Counts = std::vector<std::int64_t>;  // by the upper or the lower half of the bits
+using Counts = std::vector<std::int64_t>;  // counts by the upper or the lower half of the bits
 
 // The counter that contains the value of a rank; changes the rank to that within the counter.
 std::uint32_t counter_of(const Counts& counts, std::int64_t& rank) {

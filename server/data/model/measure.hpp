@@ -43,7 +43,7 @@ Result<Histogram> histogram(const Volume& volume, const HistogramRequest& reques
 // The sample nearest to a position.
 struct Place {
   std::array<int, 3> index{};
-  std::array<double, 3> coordinates{};  // of the sample, from the axes or columns
+  std::array<double, 3> coordinates{};  // coordinates of the sample, from the axes or columns
 };
 
 // `at` is in the units of the axes; for a grid with columns, longitude and latitude in degrees. A

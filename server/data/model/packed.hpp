@@ -14,7 +14,7 @@ namespace windsplat::data {
 struct PackedVolume {
   struct Component {
     float low = 0;
-    float step = 0;  // in the units of the component; 0 if all values are equal
+    float step = 0;  // quantisation step in the units of the component; 0 if all values are equal
   };
   std::array<int, 3> dims{};
   int components = 1;

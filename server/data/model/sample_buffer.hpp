@@ -43,7 +43,7 @@ class Samples {
   }
 
  private:
-  std::shared_ptr<float> memory_;  // not shared with other blocks
+  std::shared_ptr<float> memory_;  // never shared with another buffer
   std::size_t count_ = 0;
 };
 

@@ -15,8 +15,8 @@ struct Volume {
   std::array<int, 3> dims{};
   int components = 1;  // 1: scalar; 2: horizontal vector, whose third component is zero; 3: vector
   Samples values;
-  std::array<float, 2> range{0, 0};  // of the values, or of the magnitudes of vectors; unmasked
-                                     // samples only
+  std::array<float, 2> range{0, 0};  // range of the values, or of the magnitudes of vectors;
+                                     // unmasked samples only
   std::int64_t masked = 0;
 
   [[nodiscard]] std::size_t samples() const {

@@ -153,7 +153,7 @@ class Budget {
   void take_off_list(std::uint64_t bytes, const OwnPins& own);
   [[nodiscard]] std::uint64_t bytes_of_pins(const OwnPins& own) const;
   void count_released();
-  [[nodiscard]] std::uint64_t released() const;  // of the volumes in leaving_
+  [[nodiscard]] std::uint64_t released() const;  // bytes released of the volumes in leaving_
   [[nodiscard]] Error no_room(const char* what, std::uint64_t bytes) const;
 
   const std::uint64_t bytes_max_;
@@ -164,11 +164,11 @@ class Budget {
   std::map<ResidentKey, std::shared_ptr<Entry>> entries_;
   std::list<ResidentKey> recent_;  // most recently used first
   std::map<std::uint64_t, std::vector<ResidentKey>> requests_;
-  std::multiset<ResidentKey> requested_;  // of all owners
+  std::multiset<ResidentKey> requested_;  // requests of all owners
   std::list<Leaving> leaving_;
   std::uint64_t used_ = 0;            // total: listed, in construction, leaving and reserved
-  std::uint64_t reserved_ = 0;        // of this by Reservations
-  std::uint64_t lasting_ = 0;         // of these by lasting ones
+  std::uint64_t reserved_ = 0;        // part of used_ that is held by Reservations
+  std::uint64_t lasting_ = 0;         // part of reserved_ that is held by lasting ones
   std::uint64_t released_total_ = 0;  // bytes released from leaving_ so far
   bool in_turn_waits_ = false;
   std::uint64_t turn_needs_ = 0;  // during the wait: all that the load holds and needs, and what
@@ -176,7 +176,7 @@ class Budget {
   // The thread that loads in turn; its reservations wait for room as its load does.
   struct Turn {
     std::thread::id thread;
-    std::uint64_t bytes = 0;  // of the volume in construction
+    std::uint64_t bytes = 0;  // size of the volume in construction
     OwnPins own;
     const CancelToken* cancel = nullptr;
   } turn_;

@@ -226,7 +226,7 @@ struct Dataset::State {
   std::optional<Loading> loading;
   bool ended = false;
   bool forgotten = false;
-  std::map<std::pair<std::size_t, std::size_t>, Seen> seen;  // by field and step
+  std::map<std::pair<std::size_t, std::size_t>, Seen> seen;  // keyed by field and step
   std::map<std::size_t, float> errors;                       // packing errors, by field
   std::deque<std::pair<std::string, std::vector<double>>> remembered;
   std::string kept_key;
@@ -315,7 +315,7 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
     state_->add(&Counts::averages);
     return state_->guarded(*index, [&]() -> Result<Volume> { return coarsen(**fine, how); });
   });
-  if (own_) own_->erase(own_->find(fine->get()));  // not yet shared
+  if (own_) own_->erase(own_->find(fine->get()));  // the volume is not yet shared
   return level;
 }
 

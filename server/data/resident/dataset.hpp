@@ -97,7 +97,7 @@ class Dataset {
 
   struct Counts {
     std::uint64_t loads = 0;       // volumes read from the source
-    std::uint64_t prefetched = 0;  // of these, before the first request
+    std::uint64_t prefetched = 0;  // number of loads before the first request
     std::uint64_t averages = 0;    // levels averaged
     std::uint64_t unpacked = 0;    // volumes restored from their packed form
     std::uint64_t failures = 0;    // reads that failed
@@ -146,8 +146,8 @@ class Dataset {
 
   std::shared_ptr<State> state_;
   Manner manner_ = Manner::demand;
-  std::shared_ptr<OwnPins> own_;       // for in_turn: volumes it returned
-  std::optional<CancelToken> cancel_;  // for in_turn
+  std::shared_ptr<OwnPins> own_;       // for handles in_turn(): volumes they returned
+  std::optional<CancelToken> cancel_;  // for handles in_turn()
 };
 
 }  // namespace windsplat::data

@@ -55,7 +55,7 @@ struct Prefetcher::State {
     try {
       return try_to_load(request);
     } catch (const std::exception&) {
-      log::error("prefetch failed");  // without details: there may be no memory for them
+      log::error("prefetch failed");  // no details: there may be no memory for them
       return false;
     }
   }
@@ -80,10 +80,10 @@ struct Prefetcher::State {
   std::mutex mutex;
   std::condition_variable wake;
   struct Queue {
-    std::deque<PrefetchRequest> requests;  // not yet loaded; never empty
+    std::deque<PrefetchRequest> requests;  // requests that are not yet loaded; never empty
     std::uint64_t said = 0;                // distinguishes them from later requests of the owner
   };
-  std::map<std::uint64_t, Queue> queues;  // by owner
+  std::map<std::uint64_t, Queue> queues;  // keyed by owner
   std::uint64_t said = 0;
   std::uint64_t last = 0;
   bool stopping = false;
@@ -103,7 +103,7 @@ Prefetcher::~Prefetcher() {
 }
 
 void Prefetcher::request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests) {
-  if (requests.empty()) {  // as required in destructors: an empty deque needs no allocation
+  if (requests.empty()) {  // without allocation, as destructors require
     state_->budget->request_prefetch(owner, {});
     const std::lock_guard lock(state_->mutex);
     state_->queues.erase(owner);

@@ -50,18 +50,18 @@ struct Store::State {
 
   struct Entry {
     DatasetPtr dataset;
-    std::string key;  // of its files, or the sample's name
+    std::string key;  // key of its files, or the name of the sample
     std::optional<Location> location;
     std::vector<Companion> companions;
-    std::string listed;   // of a series: stamp of the folder at the last match of its pattern
-    std::string stamp;    // of the files when opened
+    std::string listed;   // for a series: stamp of the folder at the last match of its pattern
+    std::string stamp;    // stamp of the files when opened
     std::string refused;  // stamp at which reopening failed
     std::string problem;
     std::string note;
   };
   struct FailedEntry {
     std::string named;
-    std::string key;                   // of its files at the last scan
+    std::string key;                   // key of its files at the last scan
     std::optional<std::string> tried;  // their stamp at that time; nullopt: retry in any case
     Clock::time_point retry_at;        // retry even if the stamp is unchanged
     Failed listed;
@@ -145,7 +145,7 @@ struct Store::State {
       usable = make_error(ErrorKind::not_found, "it is no longer listed");
     }
     if (!usable) {
-      lock.unlock();  // its loader ends with it
+      lock.unlock();  // outside the lock: the loader of `usable` ends with it
       return usable.error();
     }
     unlist_failed(key);
@@ -250,7 +250,7 @@ struct Store::State {
 
   StoreOptions options;
   std::shared_ptr<Budget> budget;
-  mutable std::mutex mutex;  // of all below
+  mutable std::mutex mutex;  // guards all members below
   bool turn_is_taken = false;
   std::condition_variable turn_ended;
   std::condition_variable opened;

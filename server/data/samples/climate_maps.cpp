@@ -23,7 +23,7 @@ struct Track {
   double hemisphere;
   int waves;             // number of cyclones around the globe
   double longitude;      // longitude of the first one at time 0
-  double latitude;       // of the track, towards the pole
+  double latitude;       // latitude of the track, towards the pole
   double drift;          // degrees east per hour
   double jet_latitude;   // towards the pole
   double jet_speed;      // m/s

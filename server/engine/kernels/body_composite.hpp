@@ -286,7 +286,7 @@ struct Compositor {
   LineFunction line;
   SplatFunction splat[from_count];
   BothFunction both[from_count];
-  int splat_exponentials;  // per pixel
+  int splat_exponentials;  // number of exponentials per pixel
   int both_exponentials;
 };
 

@@ -11,7 +11,7 @@ constexpr float magnitude_least = 1.17549435e-38F;  // denormal vectors count as
 
 // The vectors at kernel positions.
 struct Vectors {
-  Kernel magnitude;         // of the raw data; negative: no line
+  Kernel magnitude;         // magnitude of the raw data; negative: no line
   Three<Kernel> direction;  // a unit vector along the axes of the cell
 };
 
@@ -90,7 +90,7 @@ KERNEL_INLINE Kernel cell_longest(const Rows& rows, int i) {
 }
 
 struct Extinctions {
-  Kernel rho;           // per world unit, sum of all layers
+  Kernel rho;           // extinction per world unit, sum of all layers
   MaskOf<Kernel> kept;  // optical depth reaches the tolerance in at least one view direction
 };
 

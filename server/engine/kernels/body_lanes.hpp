@@ -144,7 +144,7 @@ KERNEL_INLINE SplatLanes spread(const Splat& s) {
 struct SplatLane {
   Pixel r2;      // squared distance from the centre, cells
   Pixel tau;     // optical depth of the whole splat
-  Pixel cells;   // per unit of view depth along the ray
+  Pixel cells;   // ray length in cells per unit of view depth
   Pixel behind;  // view depth of the point closest to the centre minus that of the centre
 };
 

@@ -8,11 +8,11 @@ namespace {
 
 // Lines before projection. q runs from -1/2 at the tail to 1/2 at the head; [low, high] is drawn.
 struct Segments {
-  Three<Kernel> offset;  // of the centre of the line from the kernel position, world units
+  Three<Kernel> offset;  // from the kernel position to the centre of the line, world units
   Three<Kernel> extent;  // tail to head, world units
   Kernel low, high;
-  Kernel lift;   // of the centre of the line from the kernel position along z, cells
-  Kernel phase;  // of the texture's motion
+  Kernel lift;   // from the kernel position to the centre of the line along z, cells
+  Kernel phase;  // phase of the moving texture
 };
 
 KERNEL_INLINE UnsignedOf<Kernel> hashed_sample(const Rows& rows, int a, int i, std::uint32_t key) {
@@ -254,7 +254,8 @@ KERNEL_INLINE void shade(float dim, float grey, float more, float* tail, float* 
 
 // Inputs of the colours of lines, computed for a vector of kernel positions at a time.
 struct Shades {
-  alignas(64) std::int32_t entry[brick_kernels];  // of the table; `part`: weight of the next entry
+  alignas(64) std::int32_t entry[brick_kernels];  // entry of the table; `part`: weight of the next
+                                                  // entry
   alignas(64) float part[brick_kernels];
   alignas(64) float dim[brick_kernels];
   alignas(64) float grey[brick_kernels];

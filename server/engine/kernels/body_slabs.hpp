@@ -14,7 +14,7 @@ constexpr int compositing_no_medium = -1;
 struct Passage {
   Pixel tau;
   Attenuation<Pixel> medium;
-  Pixel color[3];  // of the medium
+  Pixel color[3];  // colour of the medium
   Pixel rgb[3];    // added by lines, minus that of the medium behind them
   Pixel through;   // product of 1 - opacity of the lines so far
   Pixel reached;   // cd-naive: relative position in the slab up to which light is composited
@@ -232,7 +232,7 @@ struct Closing {
   int count;
   float x, y;  // the block's corner, pixels
   float stop;
-  const float* transmittance;  // before the slab
+  const float* transmittance;  // transmittance in front of the slab
 };
 
 // Stable rank sort of a few lines by depth: the number of predecessors is the index.

@@ -69,12 +69,12 @@ std::vector<LayerGroup> group_layers(const scene::Scene& scene);  // the one wit
 // A kernel position.
 struct KernelPosition {
   std::array<int, 3> sample{};
-  std::size_t index = 0;         // of its sample in a field
+  std::size_t index = 0;         // index of its sample in a field
   Vec from_eye{};                // world axes
-  Vec centre{};                  // the same along right, down, forward
-  std::array<Vec, 3> edge{};     // of its cell: the columns of A, world units
+  Vec centre{};                  // from_eye along right, down, forward
+  std::array<Vec, 3> edge{};     // edges of its cell: the columns of A, world units
   std::array<Vec, 3> inverse{};  // the rows of A^-1
-  Vec cell{};                    // of the uncurved lattice
+  Vec cell{};                    // widths of the uncurved cell
   bool has_cell = true;          // false if the cell has no volume (at the pole of a globe)
 
   [[nodiscard]] Vec to_cells(const Vec& v) const {

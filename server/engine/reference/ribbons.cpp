@@ -34,8 +34,8 @@ Hash pcg3d(Hash v) {
 double unit_interval(std::uint32_t bits) { return static_cast<double>(bits >> 8U) / 16777216.0; }
 
 struct Jitter {
-  Vec stride{};      // each in [-1/2, 1/2)
-  Vec centre{};      // each in [-1/2, 1/2)
+  Vec stride{};      // each component in [-1/2, 1/2)
+  Vec centre{};      // each component in [-1/2, 1/2)
   double phase = 0;  // in [0, 1)
 };
 
@@ -59,7 +59,7 @@ Jitter jitter_of(const VectorLayer& layer, const std::array<int, 3>& sample) {
 // The vector at a kernel position as drawn: `unit` along the axes of the cell (shorter than 1 if a
 // slice removed a component), `extent` from tail to head in world units.
 struct DrawnVector {
-  double magnitude = 0;  // of the data
+  double magnitude = 0;  // magnitude of the data
   Vec unit{};
   Vec extent{};
 };

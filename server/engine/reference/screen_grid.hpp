@@ -38,7 +38,7 @@ class ScreenGrid {
 
   int width_, height_;
   std::size_t columns_, rows_;
-  std::vector<std::uint64_t> starts_;  // of the list of each tile in ids_, then the end
+  std::vector<std::uint64_t> starts_;  // start of the list of each tile in ids_, then the end
   std::unique_ptr<std::uint32_t[]> ids_;
   std::uint64_t total_ = 0;
   std::size_t longest_ = 0;

@@ -61,11 +61,11 @@ class Chooser {
   [[nodiscard]] std::size_t patient(const quality::Choice& calm,
                                     const quality::Forecasts& forecasts, Micros now);
 
-  double log_ratio_ = 0;  // of times measured over forecast
+  double log_ratio_ = 0;  // logarithm of measured over forecast times
   bool measured_ = false;
   bool timed_ = false;  // log_ratio_ is of a calibrated scene signature
   std::array<Correction, quality::settings_count> corrections_{};
-  std::optional<std::size_t> chosen_;  // for the newest frame; reset after a rest
+  std::optional<std::size_t> chosen_;  // setting of the newest frame; reset after a rest
   Micros chosen_at_ = 0;
   int slack_ = 0;  // consecutive frames that would have allowed a slower setting
   std::optional<Micros> tried_at_;

@@ -37,7 +37,7 @@ class FlowControl {
   std::uint32_t sent_seq_ = 0;
   std::uint32_t acked_seq_ = 0;
   bool writing_ = false;
-  double final_bytes_ = 0;  // of the last final frame
+  double final_bytes_ = 0;  // size of the last final frame
   Link link_;
 };
 

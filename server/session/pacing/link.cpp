@@ -84,7 +84,8 @@ void Link::acked(std::uint32_t seq, double decode_ms, Micros now) {
   const auto said = static_cast<Micros>(1000 * std::clamp(decode_ms, 0.0, 1e6));
   const Micros decode = std::min(said, now - newest.at);
   smooth(decode_us_, static_cast<double>(decode));
-  const Micros arrived = now - decode;  // and its acknowledgement returned
+  const Micros arrived = now - decode;  // time at which the acknowledgement of an instantly decoded
+                                        // frame would arrive
   trip_.add(arrived - newest.at, now);
   const Micros alone = arrived - newest.at - round_trip();
   const Micros in_row = arrived - newest.row_since - round_trip();

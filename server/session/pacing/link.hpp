@@ -21,7 +21,7 @@ class WindowedLeast {
  private:
   Micros window_us_;
   Micros since_ = 0;
-  Micros current_ = 0;  // since then
+  Micros current_ = 0;  // minimum from since_ on
   Micros least_ = 0;    // including the previous window
   int count_ = 0;
 };
@@ -56,7 +56,8 @@ class Link {
   [[nodiscard]] double bytes_per_s() const;                          // 0 while unknown
   [[nodiscard]] Micros round_trip() const { return trip_.value(); }  // 0 while unknown
   [[nodiscard]] std::size_t bytes_in_flight() const;
-  [[nodiscard]] Micros transfer(double bytes) const;  // without queueing; 0 while unknown
+  [[nodiscard]] Micros transfer(double bytes) const;  // transfer time without queueing; 0 while
+                                                      // unknown
   // When the data in flight have passed the bottleneck; in the past if there are none.
   [[nodiscard]] Micros free_at() const;
 

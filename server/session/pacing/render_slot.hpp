@@ -26,7 +26,7 @@ struct Render {
   quality::Setting setting;
   Encoding encoding;
   std::uint32_t still_id = 0;
-  bool unwanted = false;  // its frame will not be sent
+  bool unwanted = false;  // true: its frame will not be sent
   bool played = false;    // the first one of a step reached by playback
 };
 

@@ -23,8 +23,8 @@ class ViewForecast {
 
  private:
   Forecaster forecaster_;
-  std::string drawn_key_;              // of the view drawn last, before completion
-  quality::SceneSignature signature_;  // after completion
+  std::string drawn_key_;              // key of the view drawn last, before completion
+  quality::SceneSignature signature_;  // known after completion
   quality::Viewpoint viewpoint_;
 };
 

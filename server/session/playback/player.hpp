@@ -39,7 +39,7 @@ class Player {
  private:
   [[nodiscard]] bool contains(int step) const;
   [[nodiscard]] std::int64_t count() const;
-  [[nodiscard]] std::int64_t place(int step) const;     // in playback order, from 0
+  [[nodiscard]] std::int64_t place(int step) const;     // position in playback order, from 0
   [[nodiscard]] int step_of(std::int64_t place) const;  // the inverse
   [[nodiscard]] bool ended() const { return !message_.loop && step_ == message_.to; }
 
@@ -47,7 +47,7 @@ class Player {
   protocol::PlayMessage message_;
   Micros period_us_ = 100'000;
   int step_ = 0;
-  Micros due_ = 0;  // of the step after step_
+  Micros due_ = 0;  // due time of the step after step_
 };
 
 }  // namespace windsplat::session

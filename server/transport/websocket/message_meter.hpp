@@ -24,7 +24,7 @@ class MessageMeter {
  private:
   std::size_t control_bytes_ = 0;           // control frames since the last message
   std::optional<Clock::time_point> since_;  // first bytes of an incomplete message
-  int controls_ = 0;                        // since the last check
+  int controls_ = 0;                        // control frames since the last check
 };
 
 }  // namespace windsplat::net

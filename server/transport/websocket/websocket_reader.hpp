@@ -43,7 +43,7 @@ class WebSocketReader {
   beast::flat_buffer buffer_;
   MessageMeter meter_;
   asio::steady_timer watch_timer_;
-  asio::steady_timer pause_timer_;  // until the message quota allows reading
+  asio::steady_timer pause_timer_;  // expires when the message quota allows reading
   bool reading_ = false;
   bool paused_ = false;
   bool watching_ = false;

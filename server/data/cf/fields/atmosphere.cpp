@@ -13,7 +13,7 @@ namespace {
 constexpr double layer_gas_constant = 287.05287;  // name in the standard
 
 struct Layer {
-  double height;       // of the base, geopotential metres
+  double height;       // height of the base, geopotential metres
   double temperature;  // at the base, K
   double lapse;        // K per metre upwards
   double pressure;     // at the base, Pa

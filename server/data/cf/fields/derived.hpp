@@ -20,7 +20,7 @@ namespace windsplat::data::cf {
 
 struct DerivedField {
   enum class Rule {
-    pressure,         // of every sample, in the units of the surface pressure
+    pressure,         // pressure of every sample, in the units of the surface pressure
     height,           // inputs[0] times scale, in metres
     standard_height,  // height of the pressure of the sample in the standard atmosphere
     rise,             // inputs: u, v, omega: w = -omega R T / (p g) as the third component
@@ -28,7 +28,7 @@ struct DerivedField {
   Rule rule = Rule::pressure;
   FieldInfo info;
   std::vector<int> inputs;  // indices of variables
-  double scale = 1;         // to metres for height (inputs[0]), to Pa/s for rise (omega)
+  double scale = 1;         // factor to metres for height (inputs[0]), to Pa/s for rise (omega)
   int temperature = -1;     // temperature variable; -1: standard atmosphere
   double celsius = 0;       // added to temperatures
 };

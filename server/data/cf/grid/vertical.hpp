@@ -17,7 +17,7 @@ struct HybridLevels {
   std::vector<double> a;  // Pa, one per level, lowest first
   std::vector<double> b;  // factors of the surface pressure
   int surface = -1;       // variable of the surface pressure
-  std::string units;      // of the surface pressure
+  std::string units;      // units of the surface pressure
   double unit_pa = 1;
   std::vector<int> coefficients;  // variables of a and b
   std::string note;               // assumptions made

@@ -75,7 +75,7 @@ bool is_grib(const InputFile& input) {
   const auto head = input.head(heading_max + 8);
   if (!head) return false;
   const auto at = head->find("GRIB");
-  if (at >= heading_max || at + 8 > head->size()) return false;  // so is npos
+  if (at >= heading_max || at + 8 > head->size()) return false;  // npos is also beyond these limits
   const bool is_heading = std::all_of(
       head->begin(), head->begin() + static_cast<long>(at),
       [](char c) { return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == 1 || c == 3; });

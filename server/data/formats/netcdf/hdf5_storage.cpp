@@ -15,7 +15,7 @@ namespace windsplat::data::netcdf {
 
 namespace {
 
-constexpr std::size_t nesting_max = 64;  // of groups within groups
+constexpr std::size_t nesting_max = 64;  // limit of groups within groups
 
 // Largest number of objects of a file by its size: the smallest object has about 300 bytes, but a
 // link only about 20, and the netCDF library uses some kB for each.
@@ -224,7 +224,7 @@ class Survey {
   std::size_t objects_left_;
   std::string fault_;
   bool out_of_memory_ = false;
-  std::string path_;            // of the current group
+  std::string path_;            // path of the current group
   std::vector<haddr_t> above_;  // the current group and its parents
   std::unordered_map<haddr_t, DatasetStorage> by_address_;
   std::map<std::string, DatasetStorage> found_;

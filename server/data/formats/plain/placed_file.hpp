@@ -24,7 +24,7 @@ struct Stored {
 // Location of the numbers of a variable. Variables may share a store.
 struct Placement {
   std::shared_ptr<ByteStore> store;
-  std::uint64_t offset = 0;  // of the number at the first stored indices
+  std::uint64_t offset = 0;  // offset of the number at the first stored indices
   Scalar type = Scalar::float32;
   bool big_endian = false;
   std::vector<std::uint64_t> strides;           // bytes between neighbours, one per dimension
@@ -70,7 +70,7 @@ class PlacedFile final : public cf::ArrayFile {
 
  private:
   struct Entry {
-    std::vector<double> values;  // of a coordinate
+    std::vector<double> values;  // values of a coordinate
     std::optional<Placement> placement;
     std::vector<double> missing;
   };

@@ -56,7 +56,7 @@ class Opener {
   struct Extent {
     std::uint64_t size = 0;
     std::uint64_t described = 0;                 // end of the last step, bytes
-    std::vector<std::uint64_t> step_bytes = {};  // of each group of fields in it
+    std::vector<std::uint64_t> step_bytes = {};  // per group of fields in the file
   };
 
   // Undescribed bytes indicate wrong dimensions, unless they are further steps.
@@ -244,7 +244,7 @@ class Opener {
   std::vector<int> space_;
   std::vector<std::uint64_t> lengths_;
   std::vector<Group> groups_;
-  std::map<std::string, Extent> extents_;  // by file name
+  std::map<std::string, Extent> extents_;  // keyed by file name
 };
 
 }  // namespace

@@ -43,7 +43,7 @@ class SlantedBox {
  private:
   struct Slab {
     Point normal{0, 0, 0};
-    double low = 0;  // of the product with the normal, relative to origin_
+    double low = 0;  // range of the product with the normal, relative to origin_
     double high = 0;
   };
   Point origin_;

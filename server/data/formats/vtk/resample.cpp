@@ -15,7 +15,8 @@ namespace {
 // lie in a cell without overlap (typical simulation meshes need 3 to 12), so that small files
 // cannot cause much work; the other is a total (minutes).
 constexpr double work_per_sample = 128;
-constexpr std::uint64_t visits_per_work = 32;  // of samples that already have a cell
+constexpr std::uint64_t visits_per_work = 32;  // limit of visits of samples that already have a
+                                               // cell
 constexpr std::uint64_t work_max = std::uint64_t{1} << 31;
 constexpr double samples_min_3d = 4096;
 constexpr double samples_min_2d = 1024;
@@ -77,14 +78,14 @@ class Resampler {
   struct Extents {
     std::uint64_t cells = 0;
     Box all;
-    Point across{0, 0, 0};               // of bounding boxes
-    std::array<Point, 3> along_index{};  // of hexahedra: edges along i, j, k
+    Point across{0, 0, 0};               // extents of bounding boxes
+    std::array<Point, 3> along_index{};  // for hexahedra: edges along i, j, k
   };
 
   static void add(Extents& to, const Corners& corners, std::size_t count) {
     const Box box = box_of(corners.data(), count);
     if (to.cells++ == 0) to.all = box;
-    constexpr std::array<std::size_t, 3> next{1, 3, 4};  // from corner 0 along i, j, k
+    constexpr std::array<std::size_t, 3> next{1, 3, 4};  // edges from corner 0 along i, j, k
     for (std::size_t d = 0; d < 3; ++d) {
       to.all.low[d] = std::min(to.all.low[d], box.low[d]);
       to.all.high[d] = std::max(to.all.high[d], box.high[d]);
@@ -321,7 +322,7 @@ class Resampler {
   Point cell_{0, 0, 0};  // mean extents
   Point first_{0, 0, 0};
   Point spacing_{1, 1, 1};
-  std::array<std::size_t, 3> dims_{1, 1, 1};  // in that order
+  std::array<std::size_t, 3> dims_{1, 1, 1};  // in the order of order_
   std::array<std::size_t, 3> stride_{};
   std::uint64_t work_ = 0;
 };

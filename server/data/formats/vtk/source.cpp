@@ -444,7 +444,7 @@ class VtkSource final : public FileSource {
   }
 
   std::shared_ptr<Files> files_;
-  FilePtr file_;  // of the last step read
+  FilePtr file_;  // file of the last step read
   std::vector<StepFile> steps_;
   DatasetInfo info_;
   Kind kind_ = Kind::image;
@@ -452,7 +452,7 @@ class VtkSource final : public FileSource {
   std::optional<double> time_;
   bool of_cells_ = false;
   RegularGrid points_grid_;
-  RegularGrid grid_;          // of the shown data, unless resampled
+  RegularGrid grid_;          // grid of the shown data, unless resampled
   std::optional<Mesh> mesh_;  // if resampled, without its points
   Resampling resampling_;
   std::string mesh_digest_;

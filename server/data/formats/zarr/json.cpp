@@ -66,7 +66,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
  private:
   struct Open {
     Json value;
-    std::string key;  // of the member being read
+    std::string key;  // key of the member being read
   };
 
   bool put_number(double value, bool is_integer, std::int64_t integer) {

@@ -53,7 +53,7 @@ class Store final : public cf::ArrayFile {
     Json attributes;
     ArrayMetadata metadata;
     std::vector<std::string> dimensions;
-    bool named_dimensions = false;  // by _ARRAY_DIMENSIONS
+    bool named_dimensions = false;  // whether _ARRAY_DIMENSIONS is present
   };
   // A decoded chunk; without bytes if absent.
   struct Chunk {
