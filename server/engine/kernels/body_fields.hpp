@@ -134,9 +134,9 @@ void color_density(const Pass& pass, std::int64_t offset, float* color) {
     if (is_masked(value)) continue;
     const float rho = extinction_at(layer.extinction, value);
     if (rho <= 0) continue;
-    float own[3];
-    look_up(layer.color, value, own);
-    for (int c = 0; c < 3; ++c) color[c] += rho * own[c];
+    float layer_color[3];
+    look_up(layer.color, value, layer_color);
+    for (int c = 0; c < 3; ++c) color[c] += rho * layer_color[c];
     total += rho;
   }
   const float inverse = 1.0F / total;

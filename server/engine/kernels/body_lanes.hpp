@@ -113,8 +113,8 @@ KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
   if (Style == style_moving) {
     // W(frac(q + 1/2 - phase)), W(p) = 1 - |2 p - 1|.
     const Pixel one = all<Pixel>(1.0F);
-    const Pixel place = hn::MulAdd(f, r.phase_rise, r.phase);
-    const Pixel p = hn::IfThenElse(hn::Ge(place, one), place - one, place);
+    const Pixel shifted = hn::MulAdd(f, r.phase_rise, r.phase);
+    const Pixel p = hn::IfThenElse(hn::Ge(shifted, one), shifted - one, shifted);
     return {cover * (one - hn::Abs(hn::MulSub(all<Pixel>(2.0F), p, one))), f};
   }
   return {cover, f};

@@ -280,11 +280,11 @@ KERNEL_INLINE void shade_ribbons(const Camera& camera, const LineStyle& line, co
   const auto masked = is_masked(value);
   const ColorTable& table = line.color;
   const Kernel known = hn::IfThenElse(masked, all<Kernel>(table.low), value);
-  const Kernel place = clamped((known - all<Kernel>(table.low)) * all<Kernel>(table.scale), 0.0F,
-                               static_cast<float>(table.entries - 1));
-  const SignedOf<Kernel> entry = truncated(place);
+  const Kernel position = clamped((known - all<Kernel>(table.low)) * all<Kernel>(table.scale), 0.0F,
+                                  static_cast<float>(table.entries - 1));
+  const SignedOf<Kernel> entry = truncated(position);
   hn::Store(entry, hn::RebindToSigned<KernelTag>(), shades.entry + l);
-  store(place - from_integer<Kernel>(entry), shades.part + l);
+  store(position - from_integer<Kernel>(entry), shades.part + l);
   store(dim, shades.dim + l);
   const Kernel desaturation = all<Kernel>(line.head_desaturation);
   store(desaturation * (s.low + all<Kernel>(0.5F)), shades.grey + l);

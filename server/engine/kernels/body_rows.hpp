@@ -153,9 +153,9 @@ inline double dot3(const double a[3], const double b[3]) {
 void place_curved_pair(const Camera& camera, const Pass& pass, int pair, const Rows& rows,
                        KernelPositions& positions) {
   for (int i = 0; i < pair_kernels; ++i) {
-    const float* place = pass.places + 3 * offset_of(rows, i);
+    const float* position = pass.places + 3 * offset_of(rows, i);
     double at[3];
-    for (int c = 0; c < 3; ++c) at[c] = static_cast<double>(place[c]) - camera.eye[c];
+    for (int c = 0; c < 3; ++c) at[c] = static_cast<double>(position[c]) - camera.eye[c];
     const double z = dot3(camera.world_forward, at);
     const int l = pair_kernels * pair + i;
     positions.x[l] = static_cast<float>(dot3(camera.world_right, at));
