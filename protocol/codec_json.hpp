@@ -22,7 +22,8 @@ namespace windsplat::protocol {
 // nesting, duplicate keys), invalid (a number beyond the range of double).
 Result<Json> parse_json(std::string_view text);
 
-// Without spaces, keys sorted, invalid UTF-8 replaced, non-finite numbers as null.
+// Serialises without spaces, with sorted keys, with invalid UTF-8 replaced and non-finite numbers
+// as null.
 std::string dump(const Json& value);
 
 // The canonical form of a number: an integer if it is one exactly; no negative zero.

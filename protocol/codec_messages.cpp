@@ -220,7 +220,7 @@ MessageTag message_tag(std::string_view json) {
   return tag;
 }
 
-// With keys in the order of all other messages.
+// The keys are in the order of all other messages.
 std::string opened_with(const std::string& dataset, std::uint32_t id) {
   std::string text = R"({"dataset":)";
   text.reserve(dataset.size() + 64);

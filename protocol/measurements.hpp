@@ -71,7 +71,8 @@ struct ReferenceDescription {
   std::string picture;  // path
   int width = 0;
   int height = 0;
-  // In linear premultiplied RGBA; psnr in dB for a peak of 1, infinite for identical pictures.
+  // Errors are in linear premultiplied RGBA; psnr is in dB for a peak of 1, infinite for identical
+  // pictures.
   double rmse = 0;
   double max = 0;
   double psnr = 0;

@@ -62,7 +62,7 @@ struct StudyAim {
   std::size_t possible = 0, possible_kept = 0;  // any setting meets it; the chosen one does
 };
 
-// One setting at one held-out view.
+// Result of one setting at one held-out view.
 struct StudyCompared {
   std::string look;
   std::size_t view = 0;

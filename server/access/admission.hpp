@@ -40,8 +40,8 @@ class Admission {
   // `now`: clock in microseconds; empty: a steady clock.
   Admission(const Limits& limits, Metrics& metrics, std::function<Micros()> now = {});
 
-  // False: too many recent connections; close it without a response. Call before connect(). Excess
-  // handshake time is logged at most once a minute.
+  // Returns false if there are too many recent connections: close it without a response. Call
+  // before connect(). Excess handshake time is logged at most once a minute.
   bool arrive(const std::string& peer, bool tls);
   // Call periodically: logs refusals since the last log line.
   void log_refused_handshakes();
@@ -52,8 +52,7 @@ class Admission {
   // nullopt: at the limit; close without a response.
   std::optional<Visitor> connect(const std::string& peer);
 
-  // For a connection in the reserve: whether it would be admitted if a slot of the reserve were
-  // freed.
+  // Whether a connection in the reserve would be admitted if a slot of the reserve were freed.
   bool is_kept_out_by_others(const std::string& peer);
 
   // Sets request.address to that of the client. Returns a response if the request is refused.

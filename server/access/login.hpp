@@ -11,7 +11,8 @@ namespace windsplat::net {
 
 inline constexpr std::int64_t cookie_lasts_s = std::int64_t{7} * 24 * 3600;
 
-// For every verdict but `allowed`: a problem, or the login page if a browser navigates to a page.
+// The response for every verdict but `allowed`: a problem, or the login page if a browser navigates
+// to a page.
 Response turned_away(Verdict verdict, const Request& request, const std::string& base_path);
 
 // Replies to a request that is_login(): 303 to the page with a cookie, or the login page again.

@@ -28,7 +28,7 @@ Response open_in_job(Services& services, data::Location location) {
   return job_response(services, job);
 }
 
-// Only resolves the name; reads nothing.
+// Resolves only the name; reads nothing.
 Response locate_and_open(Services& services, const std::string& path) {
   const auto located = data::locate_beneath(services.options.data_root, path);
   if (located) return open_in_job(services, *located);

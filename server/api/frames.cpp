@@ -137,7 +137,7 @@ Response unchanged_response(const std::string& etag) {
   return {304, "", {{"Cache-Control", "no-cache"}, {"ETag", etag}}, {}};
 }
 
-// Null if the client already has the picture: `reply` is called with 304.
+// Returns null if the client already has the picture: `reply` is then called with 304.
 Result<PreparedPtr> prepare(quality::Tables& tables, const Picture& picture,
                             ViewCompletion& completion, data::Dataset& dataset, Loading loading,
                             const Reply& reply) {

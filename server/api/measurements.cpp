@@ -98,7 +98,7 @@ protocol::ProbedField describe(const data::FieldInfo& field) {
 
 // --- over all steps -----------------------------------------------------------------------------
 
-// One pass over the steps of a field, several per job.
+// A pass over the steps of a field, several steps per job.
 struct Pass {
   Subject subject;
   CancelToken cancel;

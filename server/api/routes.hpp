@@ -37,7 +37,7 @@ struct Route {
   const char* name = path;  // name by which requests are logged and counted
 };
 
-// In the order of methods in Allow. Documented in docs/user/api.md.
+// The table is in the order of methods in Allow. Documented in docs/user/api.md.
 std::span<const Route> routes();
 
 // Names by which requests are counted, besides the paths of routes().

@@ -62,7 +62,7 @@ std::optional<std::uint64_t> parse_bytes(std::string_view text);
 // The whole file. Errors: not_found, too_large beyond `bytes_max`.
 Result<std::string> read_text_file(const std::string& path, std::size_t bytes_max);
 
-// To a file (see write_whole_file), or to stdout for "-".
+// Writes to a file (see write_whole_file), or to stdout for "-".
 Result<void> write_output(const std::string& path, std::span<const std::uint8_t> bytes);
 Result<void> write_stdout(std::string_view text);
 

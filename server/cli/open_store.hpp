@@ -20,7 +20,7 @@ constexpr std::uint64_t memory_bytes_min = std::uint64_t{192} << 20;
 // The address space of a process on x86-64; that of arm64 is twice as large.
 constexpr std::uint64_t memory_bytes_max = std::uint64_t{1} << 47;
 
-// As a value of the option: "192M" if that is exact, otherwise in bytes.
+// Formats a value of the option: "192M" if that is exact, otherwise in bytes.
 std::string bytes_text(std::uint64_t bytes);
 
 // `memory_bytes`, at least memory_bytes_min, is the limit of the whole program including its

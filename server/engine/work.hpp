@@ -29,7 +29,8 @@ std::string text_of(const Variant& variant);
 
 struct WorkReport {
   std::int64_t samples = 0;  // kernel positions of the scene
-  // In bricks of 8 x 8 x 1 that lie entirely outside the picture or before the near plane.
+  // Kernel positions in bricks of 8 x 8 x 1 that lie entirely outside the picture or before the
+  // near plane.
   std::int64_t culled = 0;
   // Among the others, independent of the view direction:
   std::int64_t skipped_vector = 0;  // line skipped: magnitude below its tolerance, or masked

@@ -9,8 +9,8 @@ namespace windsplat::quality {
 
 // Standard deviations of the logarithm of measured over expected values.
 struct Scatter {
-  double signature = 0;  // between scene signatures, the same at every viewpoint
-  double viewpoint = 0;  // between viewpoints of one signature
+  double signature = 0;  // standard deviation between scene signatures, the same at every viewpoint
+  double viewpoint = 0;  // standard deviation between viewpoints of one signature
   double noise = 0;      // standard deviation of one measurement
 };
 

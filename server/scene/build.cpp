@@ -107,7 +107,7 @@ void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
   layer.magnitude_intensity = from.magnitude_intensity;
 }
 
-// Of the level that is drawn: all fields are averaged to the same level.
+// Fields of the level that is drawn: all are averaged to the same level.
 struct Fields {
   data::Dataset& dataset;
   std::size_t step;

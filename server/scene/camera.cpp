@@ -44,7 +44,7 @@ void each_outline_point(const Lattice& lattice, const Visit& visit) {
   const auto& places = *lattice.places;
   const std::size_t layer =
       static_cast<std::size_t>(lattice.dims[0]) * static_cast<std::size_t>(lattice.dims[1]);
-  // Only the bottom and top level; those between are rarely farther out.
+  // Only the bottom and top level are used; those between are rarely farther out.
   for (const std::size_t first : {std::size_t{0}, places.size() - layer}) {
     const std::size_t step = std::max<std::size_t>(1, layer / outline_samples);
     for (std::size_t n = 0; n < layer; n += step) {
@@ -54,7 +54,7 @@ void each_outline_point(const Lattice& lattice, const Visit& visit) {
   }
 }
 
-// Half a cell, the extent of a curved lattice beyond its samples.
+// Half a cell: the extent of a curved lattice beyond its samples.
 double outline_reach(const Lattice& lattice) {
   double reach = 0;
   for (std::size_t a = 0; lattice.places && a < 3; ++a) {

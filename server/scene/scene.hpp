@@ -63,8 +63,8 @@ enum class LineColor { world_z, screen_z, rise, magnitude, direction, scalar, co
 struct VectorLayer {
   std::shared_ptr<const data::Volume> field;
   glm::dvec3 scale{1, 1, 1};  // factor of each component, applied first
-  // For lines along trajectories in the world (space = world): world units per second per unit of
-  // each component, by y index for x (meridians converge), constant for y, by z index for z.
+  // Used for lines along trajectories in the world (space = world): world units per second per unit
+  // of each component, by y index for x (meridians converge), constant for y, by z index for z.
   // Empty: components are not scaled.
   std::vector<double> rate_x;
   double rate_y = 1;

@@ -50,7 +50,7 @@ enum class Tier { moving, rest, final, still };
 struct Ping {
   std::uint32_t seq = 0;  // number of the next frame
 };
-// At most one is being written: the next follows Session::on_written.
+// At most one frame is being written: the next one follows Session::on_written().
 struct SendFrame {
   protocol::FrameHeader header;
   Payload payload;

@@ -79,7 +79,7 @@ class Session {
   // Numbers of frames sent, dropped and cancelled.
   [[nodiscard]] const protocol::StatsMessage& stats() const { return state_.stats; }
 
-  // When to call on_time() unless another input arrives first; none after Close.
+  // Time to call on_time() unless another input arrives first; nullopt after Close.
   [[nodiscard]] std::optional<Micros> wake_at() const;
 
  private:

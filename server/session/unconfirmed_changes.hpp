@@ -28,7 +28,7 @@ class UnconfirmedChanges {
   // removal has no change of its own (`newest`): then the newest change is chosen, until the
   // remaining view has been drawn before.
   [[nodiscard]] std::optional<Change> find_fault(std::uint64_t version, bool newest) const;
-  // False: no such change.
+  // Returns false if there is no such change.
   bool remove(std::uint64_t version);
 
   // The view with the changes that remain.

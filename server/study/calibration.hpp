@@ -39,7 +39,7 @@ struct CalibrationPlan {
 // have enough.
 CalibrationPlan calibration_plan(const Subject& subject, bool quick);
 
-// One setting at one held-out view.
+// Result of one setting at one held-out view.
 struct Compared {
   std::size_t variant = 0;
   std::size_t view = 0;  // index of a held-out view of the variant

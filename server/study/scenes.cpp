@@ -73,7 +73,8 @@ Result<Subject> blob_subject(const std::string& name, bool quick) {
     view.vector.field = {protocol::FieldChoice::Kind::none, ""};
   } else {
     view.vector.field = {protocol::FieldChoice::Kind::named, "flow"};
-    // Only the fastest tenth, or less in front of a medium: more would hide everything behind them.
+    // Only the fastest tenth is drawn, or less in front of a medium: more would hide everything
+    // behind them.
     view.vector.min_magnitude = name == "vectors" ? 0.34 : 0.45;
     view.vector.r1 = 3;  // about one pixel wide at the size of the study
     view.vector.r2 = 7;

@@ -57,8 +57,8 @@ class TlsTask final : public HandshakeTask {
   TlsTask(const TlsTask&) = delete;
   TlsTask& operator=(const TlsTask&) = delete;
 
-  // On the io thread. `done` is called there with the error; after abandon() it may be called any
-  // number of times.
+  // Call on the io thread. `done` is called there with the error; after abandon() it may be called
+  // any number of times.
   void start(std::function<void(ErrorCode)> done) {
     done_ = std::move(done);
     submit([this] {
@@ -68,7 +68,7 @@ class TlsTask final : public HandshakeTask {
     });
   }
 
-  // On the io thread. Fails the handshake.
+  // Call on the io thread. Fails the handshake.
   void abandon() {
     drop();
     ::shutdown(handle_, SHUT_RDWR);
@@ -77,7 +77,7 @@ class TlsTask final : public HandshakeTask {
 
   [[nodiscard]] bool is_abandoned() const { return is_dropped(); }
 
-  // On the io thread, after completion.
+  // Call on the io thread, after completion.
   Wire take_wire() { return std::move(wire_); }
 
  private:

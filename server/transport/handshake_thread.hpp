@@ -81,7 +81,7 @@ class HandshakeTask : public std::enable_shared_from_this<HandshakeTask> {
   HandshakeTask(const HandshakeTask&) = delete;
   HandshakeTask& operator=(const HandshakeTask&) = delete;
 
-  // On the io thread. Keeps this alive until the step is done. After drop() the step and its
+  // Call on the io thread. Keeps this alive until the step is done. After drop() the step and its
   // resources are released at once.
   template <class Step>
   void submit(Step step) {
@@ -98,8 +98,8 @@ class HandshakeTask : public std::enable_shared_from_this<HandshakeTask> {
   }
 
  protected:
-  // On the io thread. Starts no further steps and removes waiting ones; the resources are released
-  // with the last reference, after a running step at the latest.
+  // Call on the io thread. Starts no further steps and removes waiting ones; the resources are
+  // released with the last reference, after a running step at the latest.
   void drop() {
     dropped_ = true;
     thread_.drop(address_, this);

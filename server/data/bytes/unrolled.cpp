@@ -197,7 +197,7 @@ class TextDecoder final : public Decoder {
   }
 
  private:
-  // Empty at the end of the file.
+  // Returns an empty token at the end of the file.
   Result<std::string> next_token() {
     constexpr std::size_t token_max = 64;
     std::string token;
@@ -255,7 +255,7 @@ class UnrolledStore final : public ByteStore {
         count -= body;
         continue;
       }
-      // One number, of which only some bytes are requested.
+      // A single number, of which only some bytes are requested.
       if (auto done = produce(scratch.data(), whole_eight(offset - lead)); !done) return done;
       const std::size_t some = std::min<std::size_t>(count, sizeof(double) - lead);
       std::memcpy(out, scratch.data() + lead, some);

@@ -39,7 +39,7 @@ double as_stored(double value, bool is_float32) {
              : value;
 }
 
-// As text with the digits of single precision.
+// Formats a number with the digits of single precision.
 std::string short_text(double value) {
   std::array<char, 40> out{};
   const auto end =

@@ -23,9 +23,9 @@ struct Packing {
   bool valid_is_unpacked = false;  // the limits are physical values, not stored numbers
 };
 
-// From _FillValue, missing_value, valid_min, valid_max, valid_range, scale_factor, add_offset and
-// _Unsigned. Without _FillValue, the default fill value of the type is missing, except for 8-bit
-// types.
+// Packing from _FillValue, missing_value, valid_min, valid_max, valid_range, scale_factor,
+// add_offset and _Unsigned. Without _FillValue, the default fill value of the type is missing,
+// except for 8-bit types.
 Packing packing_of(const ArrayFile& file, int variable);
 
 // "-150 to 5000", "from 0", "up to 1": the valid values, unpacked; empty if all are.
@@ -42,7 +42,7 @@ struct FloatMask {
   float valid_min = -std::numeric_limits<float>::max();
   float valid_max = std::numeric_limits<float>::max();
 };
-// Empty if the packing needs more than a mask.
+// The mask alone; empty if the packing needs more than a mask.
 std::optional<FloatMask> float_mask(const Packing& packing);
 // Applies unpack() to every value, in place.
 void apply(const FloatMask& mask, float* values, std::size_t count);

@@ -335,7 +335,7 @@ std::optional<Scale> parse_scale(std::string_view units, std::string_view calend
     return std::nullopt;
   }
   scale.calendar = *known;
-  // From the original text, because T and Z are upper case there.
+  // Parsed from the original text, because T and Z are upper case there.
   const auto epoch = parse_epoch(trim(units).substr(since + 7), scale.calendar);
   if (!epoch) {
     reason = "its epoch is not a date of its calendar";

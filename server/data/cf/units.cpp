@@ -1,4 +1,4 @@
-// One table per quantity.
+// Units are listed in one table per quantity.
 #include "server/data/cf/units.hpp"
 
 #include <array>

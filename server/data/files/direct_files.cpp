@@ -109,8 +109,8 @@ class DirectFiles final : public Files {
   }
 
  private:
-  // For a name that cannot be opened: whether it, or a folder above it, is a dangling link.
-  // Distinguishes lost files from files that were never written.
+  // Whether a name that cannot be opened, or a folder above it, is a dangling link. Distinguishes
+  // lost files from files that were never written.
   [[nodiscard]] bool leads_nowhere(std::string name) {
     for (;;) {
       const Descriptor found(open_any(name, O_PATH | O_NOFOLLOW | O_CLOEXEC));

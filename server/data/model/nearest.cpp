@@ -51,7 +51,8 @@ double difference(double a, double b, bool round) {
   return std::abs(round ? std::remainder(a - b, turn) : a - b);
 }
 
-// From half a cell below the least coordinate of the axis to half a cell above its greatest.
+// The range from half a cell below the least coordinate of the axis to half a cell above its
+// greatest.
 std::array<double, 2> box_of(const Axis& axis) {
   const std::vector<double>& c = axis.coordinates;
   const std::size_t n = c.size();
@@ -84,7 +85,7 @@ Result<int> nearest_along(const Axis& axis, std::size_t letter, const std::optio
   return static_cast<int>(nearest - axis.coordinates.begin());
 }
 
-// In degrees of arc, by haversines, which are exact for small distances.
+// Distance in degrees of arc, by haversines, which are exact for small distances.
 double distance(double lon_a, double lat_a, double lon_b, double lat_b) {
   const double across = std::sin((lon_a - lon_b) * radians_per_degree / 2);
   const double along = std::sin((lat_a - lat_b) * radians_per_degree / 2);

@@ -132,7 +132,7 @@ class Budget {
   void touch(Entry& entry);
   void drop(std::list<ResidentKey>::iterator listed);
   void drop_held(std::list<ResidentKey>::iterator listed);
-  // Nobody outside can add a reference while the lock is held, so a use count of one is stable.
+  // No reference can be added from outside while the lock is held, so a use count of one is stable.
   [[nodiscard]] static bool is_held(const Entry& entry) {
     return entry.answer->value().use_count() > 1;
   }
@@ -215,7 +215,7 @@ class Reservation {
   std::uint64_t bytes_ = 0;
 };
 
-// For messages: in MiB.
+// Formats bytes in MiB, for messages.
 std::string megabytes(std::uint64_t bytes);
 
 // The variant of a key under which the packed form of a volume is cached.

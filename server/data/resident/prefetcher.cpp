@@ -50,7 +50,7 @@ struct Prefetcher::State {
     return last;
   }
 
-  // False: allocation failed.
+  // Returns false if an allocation failed.
   static bool load(const PrefetchRequest& request) noexcept {
     try {
       return try_to_load(request);

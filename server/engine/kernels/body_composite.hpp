@@ -36,7 +36,7 @@ struct Light {
   Pixel most = hn::Zero(PixelTag());
 
   KERNEL_INLINE void see(Pixel transmittance) { see_positive(hn::Abs(transmittance)); }
-  // For all compositing methods but forward Euler.
+  // Valid for all compositing methods except forward Euler.
   KERNEL_INLINE void see_positive(Pixel transmittance) {
     most = pixel_lanes == block_pixels ? transmittance : hn::Max(most, transmittance);
   }

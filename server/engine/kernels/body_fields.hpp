@@ -29,7 +29,7 @@ KERNEL_INLINE Norm norm_of(const Three<Kernel>& v) {
   if (HWY_LIKELY(hn::AllTrue(KernelTag(), hn::Or(moderate, nothing)))) {
     const Kernel square = dot3(v, v);
     const Kernel inverse = inverse_root(hn::Max(square, all<Kernel>(1e-30F)));
-    // One more Newton step: a vector whose length equals a tolerance must not fall below it.
+    // A further Newton step: a vector whose length equals a tolerance must not fall below it.
     const Kernel length = square * inverse;
     const Kernel rest = hn::NegMulAdd(length, length, square);
     return {hn::MulAdd(rest, all<Kernel>(0.5F) * inverse, length), inverse};

@@ -15,7 +15,7 @@ struct Passage {
   Pixel tau;
   Attenuation<Pixel> medium;
   Pixel color[3];  // colour of the medium
-  Pixel rgb[3];    // added by lines, minus that of the medium behind them
+  Pixel rgb[3];    // light added by lines, minus that of the medium behind them
   Pixel through;   // product of 1 - opacity of the lines so far
   Pixel reached;   // cd-naive: relative position in the slab up to which light is composited
   Pixel left;      // cd-naive: transmittance up to there

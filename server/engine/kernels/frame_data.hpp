@@ -101,7 +101,7 @@ struct Camera {
   double world_right[3], world_down[3], world_forward[3];  // right, down and forward without
                                                            // rounding to float
   double eye[3];
-  double depth_origin;  // view depth of the volume's middle, from which slabs count
+  double depth_origin;  // view depth of the middle of the volume, the origin of slabs
 };
 
 // Kernel positions of one stride, with their lines and media.

@@ -126,7 +126,7 @@ Part clip_to_box(const VectorLayer& layer, const KernelPosition& position, const
   return part;
 }
 
-// In [0, 360): 0 along +y, 90 along +x.
+// The bearing in [0, 360): 0 along +y, 90 along +x.
 double bearing(const Vec& v) {
   const double degrees = std::atan2(v[0] + 0.0, v[1] + 0.0) * 180 / std::numbers::pi;
   const double turned = degrees < 0 ? degrees + 360 : degrees;

@@ -20,8 +20,8 @@ class ScreenGrid {
 
   ScreenGrid(int width, int height);
 
-  // Both return false if cancelled. First step: computes the lengths of the lists for the ids below
-  // `boxes`.
+  // Both functions return false if cancelled. The first step computes the lengths of the lists for
+  // the ids below `boxes`.
   bool count(std::size_t boxes, const BoxOf& box_of, const CancelToken& cancel);
   // Second step: fills the lists with the same boxes.
   bool fill(std::size_t boxes, const BoxOf& box_of, const CancelToken& cancel);

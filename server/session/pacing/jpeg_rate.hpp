@@ -24,16 +24,16 @@ class JpegRate {
 
   [[nodiscard]] double predicted_bytes(double pixels, int quality) const;
 
-  // For the next moving frame: the best quality within `budget`, above quality_usual within a
-  // quarter of it; rises by at most one step per call.
+  // Chooses for the next moving frame the best quality within `budget`, above quality_usual within
+  // a quarter of it; rises by at most one step per call.
   [[nodiscard]] int choose(double pixels, const Link& link, Micros budget);
 
   // Number of pixels whose frame at quality_least takes at most `budget`, or moving_most_us if
   // longer, on the link. Infinite while the rate is unknown.
   [[nodiscard]] double pixels_max(const Link& link, Micros budget) const;
 
-  // For the next moving frame: the least level (each halves width and height) within pixels_max.
-  // Tolerates deviations of a quarter, and becomes finer only after a few frames.
+  // Chooses for the next moving frame the least level (each halves width and height) within
+  // pixels_max. Tolerates deviations of a quarter, and becomes finer only after a few frames.
   [[nodiscard]] int least_level(int width, int height, const Link& link, Micros budget);
 
  private:

@@ -58,7 +58,7 @@ class Link {
   [[nodiscard]] std::size_t bytes_in_flight() const;
   [[nodiscard]] Micros transfer(double bytes) const;  // transfer time without queueing; 0 while
                                                       // unknown
-  // When the data in flight have passed the bottleneck; in the past if there are none.
+  // Time when the data in flight have passed the bottleneck; in the past if there are none.
   [[nodiscard]] Micros free_at() const;
 
   // Earliest time to start the next frame such that it finds the link free and the client ready,

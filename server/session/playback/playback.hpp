@@ -9,7 +9,7 @@
 
 namespace windsplat::session {
 
-// When the next step is due; nullopt if playback is stopped or waits for a frame.
+// Time when the next step is due; nullopt if playback is stopped or waits for a frame.
 std::optional<Micros> next_step_at(const SessionState& state);
 void advance_playback(SessionState& state, Micros now);
 // Call after the frame of the render was sent. Sends the playback rate about once a second, with

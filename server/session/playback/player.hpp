@@ -31,7 +31,7 @@ class Player {
   // The step due now. `shown`: the current one was sent; without `drop` the next step waits for
   // that. Stops after the last step unless playback loops.
   Advance advance(Micros now, bool shown);
-  // When the next step is due; nullopt if it waits for the current one.
+  // Time when the next step is due; nullopt if it waits for the current one.
   [[nodiscard]] std::optional<Micros> next_at(bool shown) const;
   // The steps after the current one, nearest first, without duplicates, at most `most`.
   [[nodiscard]] std::vector<int> upcoming(int most) const;

@@ -128,7 +128,8 @@ TEST(Ycc, MatchesTheFormulaAtEverySizeAndBeyondTheEdges) {
   }
 }
 
-// At any multiple of chroma samples: the last part may start within the last MCU or long before.
+// Parts may begin at any multiple of chroma samples: the last one may start within the last MCU or
+// long before.
 TEST(Ycc, PartsMayBeSplitWithinAnMcu) {
   const Colour background{0.02F, 0.3F, 0.9F};
   YccPicture picture;

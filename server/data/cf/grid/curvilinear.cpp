@@ -109,7 +109,7 @@ void unwrap(std::vector<double>& longitude, std::size_t width) {
   }
 }
 
-// Null where a longitude or latitude is missing.
+// Returns null if a longitude or latitude is missing.
 std::shared_ptr<const Columns> columns_of(std::array<Table, 2> tables, int x,
                                           std::array<std::size_t, 2> lengths,
                                           const std::array<bool, 2>& turned) {

@@ -83,7 +83,7 @@ bool on_columns(const FileContents& contents, const Placement& grid, int variabl
   return found.numeric && horizontal == wanted;
 }
 
-// One value per level, lowest level first; empty if the variable has other dimensions.
+// Reads one value per level, lowest level first; empty if the variable has other dimensions.
 Result<std::vector<double>> on_levels(const ArrayFile& file, const Placement& grid,
                                       const std::string& name) {
   const int v = term_variable(file.contents(), name);
@@ -103,7 +103,7 @@ struct Single {
   std::optional<double> unit_pa;
 };
 
-// Empty if the file has no such number.
+// Reads a single pressure; empty if the file has no such number.
 Result<std::optional<Single>> single_pressure(const ArrayFile& file, const std::string& name) {
   using Found = std::optional<Single>;
   const int v = term_variable(file.contents(), name);
@@ -118,7 +118,7 @@ Result<std::optional<Single>> single_pressure(const ArrayFile& file, const std::
   return Found({values->front(), pascals_in(variable.units)});
 }
 
-// In Pa; 1000 hPa if it is not in the file.
+// The reference pressure in Pa; 1000 hPa if it is not in the file.
 Result<double> reference_pressure(const ArrayFile& file, const std::string& name,
                                   std::string& note) {
   const auto found = single_pressure(file, name);
@@ -132,7 +132,8 @@ Result<double> reference_pressure(const ArrayFile& file, const std::string& name
   return usual_reference_pa;
 }
 
-// In Pa; 0 if it is not in the file. Without units, those of the surface pressure are assumed.
+// The pressure at the top in Pa; 0 if it is not in the file. Without units, those of the surface
+// pressure are assumed.
 Result<double> top_pressure(const ArrayFile& file, const std::string& name, int surface,
                             std::string& note) {
   const auto found = single_pressure(file, name);

@@ -85,8 +85,8 @@ class Placer {
     return {};
   }
 
-  // Without kinds: a fastest axis of length 2 or 3 before the space axes has the components of a
-  // vector, and a surplus slowest axis is time.
+  // Infers roles without kinds: a fastest axis of length 2 or 3 before the space axes has the
+  // components of a vector, and a surplus slowest axis is time.
   void guess_uses(const std::vector<bool>& known) {
     const bool directed = has_directions();
     const auto is_free = [&](std::size_t a) {

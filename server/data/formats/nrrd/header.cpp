@@ -193,7 +193,7 @@ class Parser {
     }
   }
 
-  // One word per axis.
+  // Splits a line into one word per axis.
   std::vector<std::string_view> one_each(const Line& line) {
     auto words = bytes::words_of(line.value);
     if (words.size() != header_.axes.size()) {
@@ -404,7 +404,7 @@ class Parser {
     return count.value_or(0);
   }
 
-  // One name, or a pattern with the first number, the last and the step.
+  // The value is one file name, or a pattern with the first number, the last and the step.
   void set_data_file(const Line& line) {
     const auto words = bytes::words_of(line.value);
     const bool pattern =

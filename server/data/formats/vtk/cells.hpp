@@ -36,7 +36,7 @@ class SlantedBox {
  public:
   SlantedBox(Shape shape, const Corners& corners);
 
-  // Half-open range of the i < count for which `from + (step * i, 0, 0)` lies within.
+  // The half-open range of the i < count for which `from + (step * i, 0, 0)` lies within.
   [[nodiscard]] std::array<std::size_t, 2> along_row(const Point& from, double step,
                                                      std::size_t count) const;
 
@@ -51,7 +51,7 @@ class SlantedBox {
   std::size_t count_;  // number of dimensions of the shape
 };
 
-// One weight per corner; their sum is 1.
+// Weights of the corners, one per corner; their sum is 1.
 std::array<double, 8> corner_weights(Shape shape, const CellPlace& place);
 
 // Volume, or area in x and y, of the simplices of the cell; 0 if degenerate.

@@ -383,7 +383,7 @@ class Reader {
     return {};
   }
 
-  // Of the field data of the file, only the time is used.
+  // The field data of the file are used for the time only.
   Result<void> take_time(const StoredArray& array) {
     const std::string name = lower(array.name);
     if ((name != "time" && name != "timevalue") || array.values() != 1) return {};

@@ -24,8 +24,8 @@ struct Target {
   }
 };
 
-// For a piece of `whole`. world: for each index axis the axis of the volume; turned: whether it is
-// reversed.
+// The target of a piece of `whole`. world: for each index axis the axis of the volume; turned:
+// whether it is reversed.
 Target target_of(const Extent& whole, const Extent& piece, bool of_cells,
                  const std::array<std::size_t, 3>& world, const std::array<bool, 3>& turned);
 

@@ -152,7 +152,7 @@ class Resampler {
     return {};
   }
 
-  // For cells in a plane x, y or z = constant, puts the axes of the plane first.
+  // If the cells are in a plane x, y or z = constant, puts the axes of the plane first.
   Result<void> find_plane() {
     std::size_t flat = 0;
     double longest = 0;
@@ -207,7 +207,7 @@ class Resampler {
     const double exponent = 1.0 / static_cast<double>(rank_);
     Point out{};
     if (high < even_ratio * low) {
-      // One spacing that divides the longest side.
+      // A common spacing that divides the longest side.
       const double spacing = std::pow(room, exponent);
       out.fill(longest / std::max(1.0, std::round(longest / spacing)));
       return out;
@@ -251,7 +251,7 @@ class Resampler {
     return {};
   }
 
-  // Half-open range of the samples from `low` to `high` along one axis.
+  // The half-open range of the samples from `low` to `high` along one axis.
   [[nodiscard]] std::array<std::size_t, 2> range(std::size_t d, double low, double high) const {
     if (d >= rank_) return {0, 1};
     constexpr double slack = 1e-6;

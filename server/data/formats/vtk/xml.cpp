@@ -23,8 +23,7 @@ constexpr std::size_t attributes_max = 4'000'000;
 constexpr std::size_t block_bytes = std::size_t{4} << 20;
 constexpr std::string_view appended_tag = "<AppendedData";
 
-// Without normalisation of line ends, so that offsets and lengths in memory equal those in the
-// file.
+// Line ends are not normalised, so that offsets and lengths in memory equal those in the file.
 constexpr unsigned parse_flags =
     pugi::parse_escapes | pugi::parse_wconv_attribute | pugi::parse_cdata;
 
@@ -116,7 +115,7 @@ class Document {
     }
     // The text before appended data lacks the end tag of the root.
     if (text_.has_appended) text_.text += "</VTKFile>";
-    // In place, so that offsets are those of the file.
+    // Parsed in place, so that offsets are those of the file.
     const auto parsed = document_.load_buffer_inplace(text_.text.data(), text_.text.size(),
                                                       parse_flags, pugi::encoding_utf8);
     if (!parsed) {

@@ -30,7 +30,8 @@ class Store final : public cf::ArrayFile {
   [[nodiscard]] const FileContents& contents() const override { return contents_; }
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] std::string format() const override { return "Zarr v2"; }
-  // By the metadata and all chunks, or 4096 evenly distributed ones if there are more.
+  // The identity covers the metadata and all chunks, or 4096 evenly distributed ones if there are
+  // more.
   [[nodiscard]] std::string identity() const override { return identity_; }
 
   [[nodiscard]] cf::Numbers numbers(int variable, const char* attribute) const override;
