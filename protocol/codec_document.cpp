@@ -149,7 +149,7 @@ Result<void> put(Json& tree, std::string_view pointer, std::string_view value) {
       target = &(*target)[token];
     } else {
       return make_error_at(ErrorKind::invalid, join_pointer(at, token),
-                           "lies within " + described(*target) + ", which is not a container");
+                           "is within " + described(*target) + ", which is not a container");
     }
     at = join_pointer(at, token);
   }

@@ -66,7 +66,7 @@ void check_still(const StillMessage& message, ObjectReader& reader) {
       std::ceil(*message.width * message.scale) * std::ceil(*message.height * message.scale);
   if (pixels > static_cast<double>(limits::image_pixels_max)) {
     reader.faults().add(reader.pointer(),
-                        "asks for " + dump(canonical_number(pixels)) + " pixels; the limit is " +
+                        "requests " + dump(canonical_number(pixels)) + " pixels; the limit is " +
                             std::to_string(limits::image_pixels_max),
                         ErrorKind::too_large);
   }

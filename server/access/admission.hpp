@@ -49,7 +49,7 @@ class Admission {
   void handshake_took(const std::string& address, bool trusted, Micros took);
   // A request has shown the token.
   void authenticated(const std::string& address);
-  // nullopt: at the limit; close without a response.
+  // Returns nullopt at the limit: close the connection without a response.
   std::optional<Visitor> connect(const std::string& peer);
 
   // Whether a connection in the reserve would be admitted if a slot of the reserve were freed.

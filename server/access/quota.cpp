@@ -281,7 +281,8 @@ bool Quota::is_idle(Entry& entry, Micros now) const {
   if (entry.connections + entry.reserved + entry.sessions > 0) return false;
   entry.bytes.refill(byte_rate(), now);
   entry.render.refill(render_rate(), now);
-  return entry.bytes.taken <= 0 && entry.render.taken <= 0;  // the other buckets refilled long ago
+  return entry.bytes.taken <= 0 && entry.render.taken <= 0;  // by then the other buckets have
+                                                             // refilled
 }
 
 // Evict one or two at a time to bound the time of a call.

@@ -67,7 +67,7 @@ class Quota {
   void rendered(const std::string& address, Micros took, Micros now);
   // Call before comparing a token: whether recent failures are within the limit.
   std::optional<Refusal> may_try_login(const std::string& address, Micros now);
-  // A message of a stream; returns how long to pause reading.
+  // Counts a message of a stream; returns how long to pause reading.
   Micros message_received(const std::string& address, std::size_t bytes, Micros now);
   // Refused above the limit of recent failures; otherwise the failure is only counted.
   std::optional<Refusal> failed_login(const std::string& address, Micros now);

@@ -10,7 +10,7 @@
 
 namespace windsplat::cli {
 
-// Runs a call on a thread of its own, so that requesting it never blocks. A request during a call
+// Runs a call on a separate thread, so that requesting it never blocks. A request during a call
 // causes one more call. Exceptions are logged.
 class Errand {
  public:
@@ -41,7 +41,7 @@ struct AtOnce {
 };
 
 // Construct before any other thread: blocks the signals for this thread and those it starts, and
-// waits for them on a thread of its own.
+// waits for them on a separate thread.
 class SignalWatch {
  public:
   // Calls `on_first` once on the watching thread for SIGTERM or SIGINT: it must not block. Calls

@@ -91,7 +91,7 @@ struct RenderPlan {
   SampleWays ways;      // distances of the last curved lattice
 
   RenderPlan() = default;
-  RenderPlan(const RenderPlan&) = delete;  // passes point into themselves
+  RenderPlan(const RenderPlan&) = delete;  // not copyable: passes contain pointers into themselves
   RenderPlan& operator=(const RenderPlan&) = delete;
   RenderPlan(RenderPlan&&) = default;
   RenderPlan& operator=(RenderPlan&&) = default;

@@ -91,7 +91,7 @@ struct Prepared {
 // Errors: those of the scene.
 Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,
                          data::Dataset& dataset, const Encoding& encoding);
-// The setting that draws the view unchanged.
+// The setting at which the view is drawn unchanged.
 quality::Setting own_setting(const scene::CompletedView& completed);
 
 // The fields and bytes of the report are those of the volumes shown. `dataset` is read only to

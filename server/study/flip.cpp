@@ -235,7 +235,7 @@ Seen look_at(std::span<const std::uint8_t> rgb, Size size) {
   return out;
 }
 
-// Most of the range goes to small differences.
+// Most of the output range is used for small differences.
 double redistributed(double e, double e_max) {
   const double knee = p_c * e_max;
   return e < knee ? p_t / knee * e : p_t + (e - knee) / (e_max - knee) * (1 - p_t);

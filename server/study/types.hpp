@@ -38,7 +38,7 @@ struct Measurement {
   double ms = 0;  // the median
   double ms_min = 0;
   double ms_max = 0;
-  bool stable = true;  // finite and within [0, 1] but for 1e-3
+  bool stable = true;  // finite and within [0, 1] except for 1e-3
 };
 
 struct Point {

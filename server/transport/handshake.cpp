@@ -108,7 +108,7 @@ class TlsTask final : public HandshakeTask {
     if (us > 0) admission_.handshake_took(address(), trusted_, us);
   }
 
-  const int handle_;  // open as long as this exists, or as wire_ after the move
+  const int handle_;  // the descriptor is open while this object, or wire_ after the move, exists
   Wire wire_;
   const asio::any_io_executor io_;
   Admission& admission_;

@@ -20,8 +20,8 @@ void Shares::come(std::uint64_t party) {
 
 void Shares::rest(std::uint64_t party) {
   parties_[party].active = false;
-  // A party whose usage is not ahead needs no entry; without active parties the virtual time
-  // advances.
+  // A party whose usage is not above the virtual time needs no entry; without active parties the
+  // virtual time advances.
   const bool all_rest = std::none_of(parties_.begin(), parties_.end(),
                                      [](const auto& known) { return known.second.active; });
   if (all_rest) {

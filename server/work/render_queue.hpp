@@ -51,7 +51,8 @@ class Shares {
     std::int64_t used_us = 0;
     bool active = false;
   };
-  std::map<std::uint64_t, Party> parties_;  // idle parties are kept only while their usage is ahead
+  std::map<std::uint64_t, Party> parties_;  // idle parties are kept only while their usage is above
+                                            // the virtual time
   std::int64_t present_us_ = 0;
 };
 

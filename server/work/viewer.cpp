@@ -174,7 +174,7 @@ void Viewer::start(const session::Prefetch& effect) {
     requests_->newest.emplace(PrefetchState::Newest{**found, effect});
     if (!requests_->queued.insert(of.get()).second) return;
   }
-  // Completing the view, to find its fields and levels, may block: not here.
+  // Completing the view finds its fields and levels but may block, so the job does it.
   const auto run = [&backend = backend_, owner = owner_, requests = requests_,
                     completion = completion_, key = of.get()] {
     resolve_prefetch(backend, owner, *requests, completion, key);

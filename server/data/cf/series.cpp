@@ -304,7 +304,8 @@ void SeriesFile::sort_steps() {
     }
   }
   if (twice > 0) {
-    contents_.notes.push_back(std::to_string(twice) + (twice == 1 ? " time lies" : " times lie") +
+    contents_.notes.push_back(std::to_string(twice) +
+                              (twice == 1 ? " time occurs" : " times occur") +
                               " in more than one file: those of the later file are shown");
   }
   if (within > 0) {

@@ -8,7 +8,8 @@
 namespace windsplat::data {
 
 struct FileStamp {
-  std::string text;      // identity, size and modification time of the file; "gone" if absent
+  std::string text;      // identity, size and modification time of the file; "gone" if it does not
+                         // exist
   double changed_s = 0;  // time of modification, since the epoch
   bool operator==(const FileStamp& other) const { return text == other.text; }
 };

@@ -19,7 +19,7 @@ namespace windsplat::data {
 struct HistogramRequest {
   int bins = 64;  // at least 1
   std::optional<std::array<double, 2>> range = std::nullopt;
-  // If no range is given: at most this share of the values is excluded at either end; below 0.5.
+  // If no range is given: at most this fraction of the values is excluded at either end; below 0.5.
   double clip = 0;
   bool logarithmic = false;  // bins of equal ratio, for positive values only
 };

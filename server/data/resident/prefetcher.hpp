@@ -16,7 +16,7 @@ class Prefetcher {
   Prefetcher(const Prefetcher&) = delete;
   Prefetcher& operator=(const Prefetcher&) = delete;
 
-  // See Store::wish().
+  // See Store::request_prefetch().
   void request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests);
   // Stops prefetching for a dataset.
   void forget(const DatasetInfo& info);

@@ -70,7 +70,7 @@ quality::Choice Chooser::best(const protocol::View& view, const quality::Forecas
 std::size_t Chooser::choose(const protocol::View& view, const quality::Forecasts& forecasts,
                             const quality::Aim& aim, double pixels_most, Micros now) {
   const quality::Choice wanted = best(view, forecasts, aim, pixels_most, now);
-  // Hysteresis avoids flicker during motion; after a rest the choice starts anew.
+  // Hysteresis avoids flicker during motion; after a rest the choice starts again.
   constexpr Micros rest = 1'000'000;
   if (now - chosen_at_ > rest) chosen_.reset();
   chosen_at_ = now;

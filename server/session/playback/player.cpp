@@ -1,4 +1,4 @@
-// The due step follows from the due time of the next one; late calls skip steps or wait.
+// Derives the due step from the due time of the next one; late calls skip steps or wait.
 #include "server/session/playback/player.hpp"
 
 #include <algorithm>

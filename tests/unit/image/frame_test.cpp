@@ -255,7 +255,7 @@ TEST(ProduceFields, OfColorAndHeightAreListedOnce) {
   EXPECT_EQ(fields(), (Names{"wind", "z"}));
 }
 
-// The source is asked for the shown fields only, for every method.
+// Only the shown fields are requested from the source, for every method.
 TEST(ProduceFields, UnusedFieldsAreNeverRead) {
   using Reads = scene::FakeSource::Reads;
   for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {

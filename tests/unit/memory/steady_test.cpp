@@ -60,7 +60,7 @@ void* counted(std::size_t size, std::align_val_t alignment) {
 
 }  // namespace
 
-// Array and nothrow forms would use these, but not under every sanitizer.
+// Array and nothrow forms call these by default, but not under every sanitizer.
 void* operator new[](std::size_t size) { return counted(size); }
 void operator delete[](void* at) noexcept { give_up(at); }
 void operator delete[](void* at, std::size_t /*size*/) noexcept { give_up(at); }

@@ -59,7 +59,7 @@ TEST(Lattice, SingleLayerIsPlacedAtAnyCoordinate) {
 
 TEST(Lattice, PressuresWithEqualLogarithmsAreRefused) {
   data::Grid grid = metres({0, 1, 2}, {0, 1, 2}, {});
-  // 16 units in the last place apart, of which the logarithm leaves one or none.
+  // 16 units in the last place apart; after the logarithm one or none remains.
   grid.axes[2] = axis(AxisKind::pressure, "Pa", {1e5 + 4.4e-10, 1e5 + 2.2e-10, 1e5});
   const auto lattice = place_lattice(grid, GeometryView{});
   ASSERT_FALSE(lattice);

@@ -194,7 +194,7 @@ TEST(Budget, LoadThatFitsBesideALoadInTurnDoesNotWait) {
   EXPECT_TRUE(get(2, 3, Urgency::demand)) << "5 and 3 are less than 10";
   EXPECT_FALSE(get(3, 3, Urgency::demand)) << "5, 3 and 3 are more";
   EXPECT_EQ(next.wait_for(std::chrono::milliseconds(20)), std::future_status::timeout);
-  held = make_error(ErrorKind::internal, "let go of");
+  held = make_error(ErrorKind::internal, "released");
   EXPECT_TRUE(next.get());
 }
 

@@ -32,7 +32,7 @@ std::vector<DimensionRole> classify_dimensions(const FileContents& contents);
 // Whether lower-case units are one of CF's spellings of degrees_east.
 bool is_east(std::string_view units);
 
-// Whether units in any case are radians.
+// Whether units are radians, in upper or lower case.
 bool is_radian(std::string_view units);
 
 // Whether a variable contains longitudes or latitudes, of any rank.

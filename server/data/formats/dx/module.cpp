@@ -373,7 +373,7 @@ class Parser {
     const std::uint64_t from = object.text ? words_.at() : words_.next_line();
     object.data_at = from;
     const std::uint64_t left = out_.file->size() - from;
-    if (!object.numbers) return complain("text in place of numbers is not read");
+    if (!object.numbers) return complain("text instead of numbers is not supported");
     if (!size || *size > left) {
       return complain("is truncated: the array has more numbers than the file has bytes");
     }

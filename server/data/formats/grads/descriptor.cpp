@@ -163,9 +163,9 @@ class Parser {
       complain(line, "data of type " + in_quotes(rest(line, 1)) +
                          " are not raw numbers; name that file itself, not its descriptor");
     } else if (line.key == "pdef") {
-      complain(line, "a grid on a map projection is not read");
+      complain(line, "a grid on a map projection is not supported");
     } else if (line.key == "edef") {
-      if (integer(line, 1, 1, axis_max) != 1) complain(line, "an ensemble is not read");
+      if (integer(line, 1, 1, axis_max) != 1) complain(line, "an ensemble is not supported");
     } else if (line.key == "stnmap" || line.key == "chsub" || line.key == "unpack") {
       complain(line, line.key + " is not supported");
     } else if (line.key != "vectorpairs" && line.key != "cachesize" && line.key != "endvars" &&

@@ -47,12 +47,12 @@ Result<void> split(const InputFile& input, const Part& message, std::vector<Fiel
   const std::uint64_t end = message.offset + message.bytes - 4;
   while (at < end) {
     std::array<unsigned char, 5> head{};
-    if (end - at < head.size()) return input.fault("has a broken section of a GRIB message");
+    if (end - at < head.size()) return input.fault("has a malformed section of a GRIB message");
     if (auto done = input.read(at, head.data(), head.size()); !done) return done;
     const std::uint64_t bytes = big_endian(head.data(), 4);
     const std::size_t number = head[4];
     if (bytes < head.size() || bytes > end - at || number < 1 || number > 7) {
-      return input.fault("has a broken section of a GRIB message at byte " + std::to_string(at));
+      return input.fault("has a malformed section of a GRIB message at byte " + std::to_string(at));
     }
     known.at(number) = {at, bytes};
     at += bytes;
@@ -100,7 +100,7 @@ Result<std::vector<FieldPlace>> find_fields(const InputFile& input) {
     const std::uint64_t bytes =
         edition == 1 ? big_endian(head.data() + 4, 3) : big_endian(head.data() + 8, 8);
     if (edition == 1 && bytes >= 0x800000) {
-      return input.fault("has a GRIB 1 message of more than 8 MiB, which is not read");
+      return input.fault("has a GRIB 1 message of more than 8 MiB, which is not supported");
     }
     const std::string place = " at byte " + std::to_string(*start);
     if (bytes < 24 || bytes > message_bytes_max) {

@@ -60,7 +60,8 @@ class Header {
       return broken(fault_);
     }
     if (records == streaming) {
-      return broken("leaves its number of records open (written as a stream), which is not read");
+      return broken(
+          "does not state its number of records (written as a stream), which is not supported");
     }
     return end_of_data(records);
   }

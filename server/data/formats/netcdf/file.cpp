@@ -152,7 +152,7 @@ Result<void> File::look_before_opening() {
     if (has_hdf5_signature(*input_)) return {};
     constexpr std::array<unsigned char, 4> hdf4{0x0e, 0x03, 0x13, 0x01};
     return magic == hdf4
-               ? fault("is HDF4, which is not read; h4toh5 makes HDF5 of it")
+               ? fault("is HDF4, which is not supported; convert it by h4toh5")
                : fault(
                      "is not a netCDF file, nor of another format that is read here: its first "
                      "bytes are none that is known");
@@ -163,11 +163,11 @@ Result<void> File::look_before_opening() {
                                  unsigned char* out) { return window.read(offset, count, out); },
                              input_->size());
   if (!expected) {
-    return fault("is broken: " + expected.error().message);
+    return fault("is malformed: " + expected.error().message);
   }
   if (*expected > input_->size()) {
     return fault("is truncated: it has " + std::to_string(input_->size()) +
-                 " bytes, its header says " + std::to_string(*expected));
+                 " bytes, its header requires " + std::to_string(*expected));
   }
   return {};
 }

@@ -29,7 +29,7 @@ std::string virtual_problem(hid_t plan) {
   if (H5Pget_virtual_filename(plan, 0, source.data(), source.size()) > 0) {
     text += " ('" + printable(source.data()) + "')";
   }
-  return text + ", which is not read";
+  return text + ", which is not supported";
 }
 
 std::string external_problem(hid_t plan) {
@@ -40,7 +40,7 @@ std::string external_problem(hid_t plan) {
   if (H5Pget_external(plan, 0, name.size() - 1, name.data(), &offset, &size) >= 0) {
     text += " ('" + printable(name.data()) + "')";
   }
-  return text + ", which is not read";
+  return text + ", which is not supported";
 }
 
 // The first filter that this build of the library cannot decode; empty if there is none.

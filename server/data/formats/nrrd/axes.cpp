@@ -149,7 +149,7 @@ class Placer {
       }
     }
     if (out_.turned[0] || out_.turned[1] || out_.turned[2]) {
-      out_.notes.push_back("turned from " + header_.space +
+      out_.notes.push_back("converted from " + header_.space +
                            ": x runs left to right, y to anterior, z to superior, and vectors' "
                            "components with them");
     } else if (header_.space.find("left-handed") != std::string::npos) {

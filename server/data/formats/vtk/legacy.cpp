@@ -177,7 +177,7 @@ class Reader {
     return false;
   }
 
-  // The same where the type ends the line and bit is not allowed.
+  // The same for a type at the end of the line, where bit is not allowed.
   Result<void> take_numbers(StoredArray& array, std::string what) {
     const auto type = scan_.line();
     if (!type) return type.error();

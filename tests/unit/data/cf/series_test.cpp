@@ -73,7 +73,7 @@ TEST(Series, RepeatedTimesWithinAFileAreCounted) {
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().steps.size(), 3U);
   EXPECT_TRUE(has_note((*source)->info(), "2 times are repeated within one file"));
-  EXPECT_TRUE(has_note((*source)->info(), "1 time lies in more than one file"));
+  EXPECT_TRUE(has_note((*source)->info(), "1 time occurs in more than one file"));
   EXPECT_EQ(first_sample(**source, 1), 2000);
 }
 
@@ -135,7 +135,7 @@ TEST(Series, LaterOfTwoFilesWithOneTimeIsUsed) {
   EXPECT_EQ(first_sample(**source, 1), 1100);
   EXPECT_EQ(first_sample(**source, 2), 5000);  // 12:00 of f2, not 1200 of f1
   EXPECT_EQ(first_sample(**source, 3), 5100);
-  EXPECT_TRUE(has_note((*source)->info(), "1 time lies in more than one file"));
+  EXPECT_TRUE(has_note((*source)->info(), "1 time occurs in more than one file"));
 }
 
 TEST(Series, IncompatibleMembersAreReportedWithTheDifference) {

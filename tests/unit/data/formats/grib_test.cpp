@@ -402,7 +402,7 @@ TEST_F(Grib, BrokenMessagesAreErrors) {
   EXPECT_THAT(fault(huge), HasSubstr("1073741824"));
   std::string section = good;
   section[16] = '\x7f';
-  EXPECT_THAT(fault(section), HasSubstr("broken section"));
+  EXPECT_THAT(fault(section), HasSubstr("malformed section"));
   std::string edition = good;
   edition += good;
   edition[good.size() + 7] = 9;

@@ -389,7 +389,7 @@ INSTANTIATE_TEST_SUITE_P(
                     "abcdefgh", "no field 'endian'"},
         BadNrrdCase{"block",
                     "dimension: 2\nsizes: 2 2\ntype: block\nblock size: 3\nencoding: raw\n", "abcd",
-                    "blocks"},
+                    "type block"},
         BadNrrdCase{"bzip2", small + "encoding: bzip2\n", "abcd", "bzip2 is not supported"},
         BadNrrdCase{"colors",
                     "dimension: 3\nsizes: 3 2 2\nkinds: RGB-color domain domain\ntype: uint8\n"

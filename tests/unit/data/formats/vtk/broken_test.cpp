@@ -100,11 +100,11 @@ TEST(VtkBroken, HugeSizesAreRefusedBeforeAllocation) {
   const std::string legacy = "# vtk DataFile Version 3.0\nt\nBINARY\nDATASET ";
   EXPECT_THAT(
       refusal(folder.write("a.vtk", legacy + "UNSTRUCTURED_GRID\nPOINTS 999999999999 float\n")),
-      HasSubstr("broken"));
+      HasSubstr("malformed"));
   EXPECT_THAT(
       refusal(folder.write("a.vtk", legacy + "STRUCTURED_POINTS\nDIMENSIONS 4000 4000 4000\n"
                                              "POINT_DATA 64000000000\nSCALARS a float\n")),
-      HasSubstr("broken"));
+      HasSubstr("malformed"));
   EXPECT_LT(peak_kilobytes() - before, 64 * 1024);
 }
 

@@ -296,7 +296,7 @@ TEST_F(VtkResampling, BrokenCellsAreErrors) {
     return refusal(folder_.write("a.vtu", vtu(mesh, data, "", xml)));
   };
   EXPECT_EQ(file([](TestMesh&) {}), "");
-  EXPECT_THAT(file([](TestMesh& m) { m.connectivity[5] = 27; }), HasSubstr("corner 27"));
+  EXPECT_THAT(file([](TestMesh& m) { m.connectivity[5] = 27; }), HasSubstr("point 27"));
   EXPECT_THAT(file([](TestMesh& m) { m.connectivity[5] = -1; }), HasSubstr("not an index"));
   EXPECT_THAT(file([](TestMesh& m) { m.offsets[3] = 2; }),
               HasSubstr("offsets of its cells decrease"));
