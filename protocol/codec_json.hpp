@@ -30,7 +30,7 @@ std::string dump(const Json& value);
 Json canonical_number(double value);
 Json number_or_null(const std::optional<double>& value);
 Json numbers_json(const std::vector<double>& values);
-// Canonical numbers throughout a tree.
+// Makes all numbers of a tree canonical.
 void make_numbers_canonical(Json& value);
 
 // pointer + "/" + key, escaped by RFC 6901; long or unprintable keys are shortened to a printable

@@ -172,7 +172,7 @@ int forbid_calls() {
   for (const int command : {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL}) {
     filter.add(SCMP_ACT_ALLOW, SCMP_SYS(fcntl), {equals(1, command)});
   }
-  // Signals that abort() sends to the own process.
+  // Signals that abort() sends to its own process.
   filter.add(SCMP_ACT_ALLOW, SCMP_SYS(tgkill), {equals(0, ::getpid())});
   filter.add(SCMP_ACT_ERRNO(ENOTTY), SCMP_SYS(ioctl));
   filter.add(SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(flock));

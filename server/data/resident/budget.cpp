@@ -107,7 +107,7 @@ bool Budget::has(const ResidentKey& key) const {
 
 void Budget::request_prefetch(std::uint64_t owner, const std::vector<ResidentKey>& keys) {
   const std::lock_guard lock(mutex_);
-  // Removing prefetch requests needs no memory: destructors do it.
+  // Removing prefetch requests needs no memory, because destructors do it.
   if (const auto before = requests_.find(owner); before != requests_.end()) {
     for (const ResidentKey& key : before->second) requested_.erase(requested_.find(key));
     requests_.erase(before);

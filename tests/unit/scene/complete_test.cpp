@@ -33,7 +33,7 @@ View completed(const View& view, data::Dataset& dataset) {
   return full->view();
 }
 
-// Every optional of a view as text, for comparison.
+// Every optional member of a view as text, for comparison.
 std::string told(const View& view) {
   const auto vec = [](const protocol::Vec3& v) {
     return std::to_string(v[0]) + " " + std::to_string(v[1]) + " " + std::to_string(v[2]) + ";";

@@ -28,7 +28,7 @@ struct Word {
   [[nodiscard]] bool is(std::string_view wanted) const { return !quoted && lower(text) == wanted; }
 };
 
-// Words of the file, read through a buffer.
+// Reads words of the file through a buffer.
 class Words {
  public:
   explicit Words(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}

@@ -75,7 +75,7 @@ class Parser {
 
   void complain(const Line& line, const std::string& what) {
     if (!problem_.empty()) return;
-    problem_ = "is refused: line " + std::to_string(line.number) + " (";
+    problem_ = "is invalid: line " + std::to_string(line.number) + " (";
     problem_ += printable(line.key, 40);
     problem_ += "): " + what;
   }
@@ -371,7 +371,7 @@ class Parser {
         if (lower(name) == lower(variable.name)) variable.units = units;
       }
       if (problem_.empty() && variable.levels > out_.z.count) {
-        problem_ = "is refused: the variable " + in_quotes(variable.name) + " has ";
+        problem_ = "is invalid: the variable " + in_quotes(variable.name) + " has ";
         problem_ +=
             std::to_string(variable.levels) + " levels, zdef has " + std::to_string(out_.z.count);
       }

@@ -95,7 +95,7 @@ Result<std::vector<FieldPlace>> find_fields(const InputFile& input) {
     const int edition = head[7];
     if (edition != 1 && edition != 2) {
       return input.fault("has a GRIB message of edition " + std::to_string(edition) +
-                         "; 1 and 2 are read");
+                         "; 1 and 2 are supported");
     }
     const std::uint64_t bytes =
         edition == 1 ? big_endian(head.data() + 4, 3) : big_endian(head.data() + 8, 8);
@@ -105,7 +105,7 @@ Result<std::vector<FieldPlace>> find_fields(const InputFile& input) {
     const std::string place = " at byte " + std::to_string(*start);
     if (bytes < 24 || bytes > message_bytes_max) {
       return input.fault("has a GRIB message" + place + " of " + std::to_string(bytes) +
-                         " bytes; 24 to " + std::to_string(message_bytes_max) + " are read");
+                         " bytes; 24 to " + std::to_string(message_bytes_max) + " are supported");
     }
     std::array<char, 4> tail{};
     if (bytes > input.size() - *start) return input.fault("is truncated in the message" + place);

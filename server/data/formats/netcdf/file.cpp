@@ -151,11 +151,10 @@ Result<void> File::look_before_opening() {
   if (!classic_) {
     if (has_hdf5_signature(*input_)) return {};
     constexpr std::array<unsigned char, 4> hdf4{0x0e, 0x03, 0x13, 0x01};
-    return magic == hdf4
-               ? fault("is HDF4, which is not supported; convert it by h4toh5")
-               : fault(
-                     "is not a netCDF file, nor of another format that is read here: its first "
-                     "bytes are none that is known");
+    return magic == hdf4 ? fault("is HDF4, which is not supported; convert it by h4toh5")
+                         : fault(
+                               "is not a netCDF file, nor of another supported format: its first "
+                               "bytes are no known signature");
   }
   Window window(*input_);
   const auto expected =

@@ -119,7 +119,7 @@ class Placer {
       const std::uint64_t size = header_.axes[a].size;
       const Use use = out_.axes[a].use;
       if (use == Use::components && size > 3) {
-        return bad("has vectors of " + std::to_string(size) + " components; 1 to 3 are drawn");
+        return bad("has vectors of " + std::to_string(size) + " components; 1 to 3 are supported");
       }
       if (use == Use::single && size != 1) {
         return bad("has an axis of kind " + in_quotes(header_.axes[a].kind) + " and size " +
@@ -127,7 +127,7 @@ class Placer {
       }
       if (size > axis_max) {
         return bad("has an axis of " + std::to_string(size) + "; at most " +
-                   std::to_string(axis_max) + " are read");
+                   std::to_string(axis_max) + " are supported");
       }
     }
     return {};

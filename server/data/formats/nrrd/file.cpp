@@ -135,7 +135,7 @@ class Opener {
     std::vector<std::uint64_t> factors{bytes::size_of(stored())};
     for (const HeaderAxis& axis : header_.axes) factors.push_back(axis.size);
     const auto total = bytes::product(factors);
-    if (!total) return input_->fault("claims more than 2^62 bytes of samples");
+    if (!total) return input_->fault("declares more than 2^62 bytes of samples");
     if (header_.data_files.empty()) return Part(header_, header_.end, *total).in(input_, rest_);
     return find_parts(*total);
   }

@@ -194,7 +194,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadDxCase{"offset", with_array("items 12 lsb ieee data 9223372036854775807"),
                   "does not fit"},
         BadDxCase{"negative", with_array("items -12 lsb ieee data 0"), "negative"},
-        BadDxCase{"count", with_array("items 2 data follows 1 2"), "with 2 values on 12 places"},
+        BadDxCase{"count", with_array("items 2 data follows 1 2"), "with 2 values on 12 positions"},
         BadDxCase{"tensor",
                   with_array("rank 1 shape 9 items 12 data follows " + text_of(counted(108))),
                   "of a shape that is not drawn"},
