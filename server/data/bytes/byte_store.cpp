@@ -97,7 +97,7 @@ std::shared_ptr<ByteStore> joined_store(std::vector<Piece> pieces) {
 
 Error absent_companion(const std::string& name, const std::string& by) {
   return make_error(ErrorKind::not_found, in_quotes(name) + ", referred to by " + in_quotes(by) +
-                                              " names, is missing; expected in the "
+                                              ", is missing; expected in the "
                                               "folder of " +
                                               in_quotes(by));
 }
