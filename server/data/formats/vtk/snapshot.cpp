@@ -82,8 +82,7 @@ Result<void> check_data(const std::shared_ptr<const InputFile>& file, Snapshot& 
       snapshot.left_out.push_back({array.name, "a second array of this name"});
     } else if (array.tuples != tuples) {
       snapshot.left_out.push_back({array.name, "has " + std::to_string(array.tuples) +
-                                                   " tuples instead of " + std::to_string(tuples) +
-                                                   ""});
+                                                   " tuples instead of " + std::to_string(tuples)});
     } else {
       if (auto reader = ArrayReader::open(file, array); !reader) return reader.error();
       kept.push_back(std::move(array));

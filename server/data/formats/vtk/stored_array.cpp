@@ -158,7 +158,7 @@ class ArrayReader::Stream {
     if (!claimed) return claimed.error();
     if (*claimed != wanted) {
       return fault("has " + std::to_string(*claimed) + " bytes instead of " +
-                   std::to_string(wanted) + "");
+                   std::to_string(wanted));
     }
     const auto header = static_cast<std::uint64_t>(array_.coding.header_bytes);
     if (wanted > capacity() || wanted + header > capacity()) {
