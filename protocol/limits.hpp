@@ -47,7 +47,8 @@ inline constexpr double max_error_min = 1e-6;  // linear RMSE
 inline constexpr double max_error_max = 1;
 inline constexpr std::int64_t step_max = 2147483647;
 inline constexpr std::int64_t seed_max = 4294967295;
-inline constexpr std::size_t name_chars_max = 256;  // code points of a dataset, field or map name
+inline constexpr std::size_t name_chars_max = 256;  // maximum length of the name of a dataset,
+                                                    // field or map, in code points
 
 inline constexpr std::int64_t serial_max = 4294967295;  // id, rev and seq of messages
 inline constexpr double fps_min = 0.1;
@@ -58,7 +59,7 @@ inline constexpr std::size_t problem_errors_max = 16;  // invalid values listed 
 
 inline constexpr std::size_t path_chars_max = 4096;  // code points of a path below the data root
 inline constexpr int histogram_bins_max = 4096;
-inline constexpr double histogram_clip_max = 0.49;  // fraction of the values, at either end
+inline constexpr double histogram_clip_max = 0.49;  // maximum fraction of the values at either end
 inline constexpr double coordinate_max = 1e30;      // largest coordinate of a probe, in the units
                                                     // of the axes
 inline constexpr int series_steps_max = 100000;

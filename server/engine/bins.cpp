@@ -361,7 +361,7 @@ void Binner::add_sheet(const SheetKey& key, SheetBricks& out) {
   }
 }
 
-// The tiles that a brick may touch, both ends included.
+// Range of the tiles that a brick may touch, both ends included.
 struct TileRange {
   int x0, x1, y0, y1;
 };

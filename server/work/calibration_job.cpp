@@ -40,12 +40,13 @@ class Study {
       if (unwanted.cancelled()) stop.cancel();
       backend_.quality.add(signature_, found.setting, found.viewpoint, found.measured);
     };
-    complete_ = static_cast<bool>(run_guarded<void>("a survey", stop, [&]() -> Result<void> {
-      const auto room =
-          backend_.catalogue.reserve(frame::calibration_bytes(completed_.view().image));
-      if (!room) return room.error();  // other users occupy the memory
-      return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
-    }));
+    complete_ =
+        static_cast<bool>(run_guarded<void>("a calibration run", stop, [&]() -> Result<void> {
+          const auto room =
+              backend_.catalogue.reserve(frame::calibration_bytes(completed_.view().image));
+          if (!room) return room.error();  // other users occupy the memory
+          return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
+        }));
   }
 
  private:

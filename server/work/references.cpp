@@ -1,4 +1,4 @@
-// A short list, most recently used first.
+// The cache is a short list, most recently used first.
 #include "server/work/references.hpp"
 
 #include <algorithm>

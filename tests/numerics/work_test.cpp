@@ -249,7 +249,7 @@ TEST(Extremes, StrideThatDoesNotDivideAnAxisOmitsNothing) {
   scene.vector->stride = scene.scalars[0].stride = 9;
   scene.camera = look({0, 0, 0}, {0.3, 1, -0.4}, 3, 40, 30, true, 0.3);
   const engine::Rendered rendered = render(scene);
-  EXPECT_EQ(rendered.work.samples, 4 * 4 * 1);  // 9 + 9 + 9 + 3 samples; all 3
+  EXPECT_EQ(rendered.work.samples, 4 * 4 * 1);  // strides of 9, 9, 9 and 3 samples; along z all 3
   EXPECT_TRUE(all_finite(rendered.image));
 }
 

@@ -231,9 +231,10 @@ void SeriesFile::compare_variables(const ArrayFile& file, Member& member) {
     }
   }
   for (const FileVariable& variable : others.variables) {
-    const bool told = std::any_of(contents_.left_out.begin(), contents_.left_out.end(),
-                                  [&](const LeftOut& left) { return left.name == variable.name; });
-    if (variable_named(own, variable.name) < 0 && variable.dims.size() > 1 && !told) {
+    const bool listed =
+        std::any_of(contents_.left_out.begin(), contents_.left_out.end(),
+                    [&](const LeftOut& left) { return left.name == variable.name; });
+    if (variable_named(own, variable.name) < 0 && variable.dims.size() > 1 && !listed) {
       contents_.left_out.push_back(
           {variable.name, "not in all files: " + in_quotes(first_->name()) + " lacks it"});
     }

@@ -217,7 +217,7 @@ class ArraySource final : public FileSource {
 
   [[nodiscard]] Levels all_levels() const { return {0, placement_.length[2]}; }
 
-  // The axis of a missing dimension: one sample.
+  // Creates the axis of a missing dimension, with one sample.
   [[nodiscard]] Axis flat_axis(std::size_t which) const {
     constexpr std::array<const char*, 3> known_names{"x", "y", "z"};
     Axis axis;
@@ -286,22 +286,22 @@ class ArraySource final : public FileSource {
   }
 
   void tell_valid_values() {
-    constexpr std::size_t told_max = 20;
+    constexpr std::size_t listed_max = 20;
     std::string text;
     std::size_t count = 0;
     for (const int v : choice_.variables) {
       const std::string valid = valid_text(packing_of(*file_, v));
-      if (valid.empty() || ++count > told_max) continue;
+      if (valid.empty() || ++count > listed_max) continue;
       text += text.empty() ? "" : ", ";
       text += in_quotes(variable_name(v)) + " (" + valid + ')';
     }
     if (count == 0) return;
-    if (count > told_max) text += " and " + std::to_string(count - told_max) + " more";
+    if (count > listed_max) text += " and " + std::to_string(count - listed_max) + " more";
     info_.notes.push_back("values outside the valid range of the file are masked: " + text);
   }
 
   void tell_unwritten() {
-    constexpr std::size_t told_max = 20;
+    constexpr std::size_t listed_max = 20;
     constexpr std::size_t chunks_of_one = 4096;
     std::size_t left = 4 * chunks_of_one;
     std::string text;
@@ -309,12 +309,12 @@ class ArraySource final : public FileSource {
     for (const int v : choice_.variables) {
       const Unwritten missing = file_->unwritten(v, std::min(left, chunks_of_one));
       left -= std::min(left, missing.looked_at);
-      if (missing.chunks == 0 || ++count > told_max) continue;
+      if (missing.chunks == 0 || ++count > listed_max) continue;
       text += text.empty() ? "" : ", ";
       text += in_quotes(variable_name(v)) + " (" + unwritten_text(missing) + ')';
     }
     if (count == 0) return;
-    if (count > told_max) text += " and " + std::to_string(count - told_max) + " more";
+    if (count > listed_max) text += " and " + std::to_string(count - listed_max) + " more";
     info_.notes.push_back("chunks that were never written are masked: " + text);
   }
 
@@ -329,7 +329,7 @@ class ArraySource final : public FileSource {
       info_.left_out.push_back({info.name, "more than 16 GiB a step"});
       return;
     }
-    if (info.kind == FieldKind::vector && follows_other_axes_) find_turning(info, plan);
+    if (info.kind == FieldKind::vector && follows_other_axes_) find_rotation(info, plan);
     double decoded = 0;
     double chunk = 0;
     for (const int v : plan.variables) {
@@ -344,7 +344,7 @@ class ArraySource final : public FileSource {
 
   // Determines how a vector is converted to the axes of the grid, which may differ from east and
   // north.
-  void find_turning(const FieldInfo& info, Plan& plan) {
+  void find_rotation(const FieldInfo& info, Plan& plan) {
     const auto& first =
         file_->contents().variables.at(static_cast<std::size_t>(plan.variables.front()));
     const bool by_earth = first.standard_name.starts_with("eastward_");

@@ -26,15 +26,15 @@ std::string last_part(const std::string& name) { return name.substr(name.find_la
 Error not_opened(const std::string& name, int reason) {
   const bool absent = reason == ENOENT || reason == ENOTDIR;
   const bool outside = reason == EXDEV || reason == ELOOP;
-  const bool unasked = reason == ENOTSUP;
+  const bool not_companion = reason == ENOTSUP;
   return make_error(
       absent ? ErrorKind::not_found : ErrorKind::bad_data,
       in_quotes(name) + ": " +
-          (absent    ? std::string("no such file")
-           : outside ? std::string("lies outside the dataset's folder")
-           : unasked ? std::string("is another file; only files whose name ends in "
-                                   ".nhdr, .json, .ctl, .dx or .pvd may refer to others")
-                     : std::generic_category().message(reason)));
+          (absent          ? std::string("no such file")
+           : outside       ? std::string("lies outside the dataset's folder")
+           : not_companion ? std::string("is another file; only files whose name ends in "
+                                         ".nhdr, .json, .ctl, .dx or .pvd may refer to others")
+                           : std::generic_category().message(reason)));
 }
 
 int open_in(int folder, const std::string& name, std::uint64_t flags, std::uint64_t resolve) {
@@ -58,7 +58,7 @@ class DirectFiles final : public Files {
     const int descriptor = open_any(name, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (descriptor < 0) {
       const int reason = errno;
-      if (reason == ENOENT && leads_nowhere(name)) {
+      if (reason == ENOENT && is_dangling(name)) {
         return make_error(ErrorKind::bad_data, in_quotes(name) + ": dangling link");
       }
       return not_opened(name, reason);
@@ -111,7 +111,7 @@ class DirectFiles final : public Files {
  private:
   // Whether a name that cannot be opened, or a folder above it, is a dangling link. Distinguishes
   // lost files from files that were never written.
-  [[nodiscard]] bool leads_nowhere(std::string name) {
+  [[nodiscard]] bool is_dangling(std::string name) {
     for (;;) {
       const Descriptor found(open_any(name, O_PATH | O_NOFOLLOW | O_CLOEXEC));
       struct stat status {};

@@ -126,7 +126,7 @@ void put_field(Writer& out, const FieldInfo& field) {
   out.number(field.chunk_bytes);
 }
 
-Error nonsense(const char* what) {
+Error malformed(const char* what) {
   return make_error(ErrorKind::bad_data, std::string("the loader sent ") + what);
 }
 
@@ -177,7 +177,7 @@ Error decode_error(std::string_view bytes) {
   const auto number = in.number<std::uint8_t>();
   std::string message = printable(in.text(text_max), 4000);
   const auto is = [number](ErrorKind kind) { return number == static_cast<std::uint8_t>(kind); };
-  if (!in.complete() || message.empty()) return nonsense("a malformed error");
+  if (!in.complete() || message.empty()) return malformed("a malformed error");
   for (const ErrorKind kind : {ErrorKind::not_found, ErrorKind::out_of_memory, ErrorKind::internal,
                                ErrorKind::too_large}) {
     if (is(kind)) return make_error(kind, std::move(message));
@@ -248,8 +248,8 @@ Result<DatasetInfo> decode_info(std::string_view bytes) {
     const auto& [x, y, z] = info.grid.axes;
     info.grid.columns = columns_of(in, x.coordinates.size() * y.coordinates.size());
   }
-  if (!in.complete()) return nonsense("a malformed description");
-  if (info.fields.empty() || info.steps.empty()) return nonsense("a dataset without data");
+  if (!in.complete()) return malformed("a malformed description");
+  if (info.fields.empty() || info.steps.empty()) return malformed("a dataset without data");
   return info;
 }
 

@@ -204,23 +204,23 @@ struct RemoteSource::State {
                              next_deadline(patience));
     std::size_t questions = 0;
     while (fate == Fate::done) {
-      Message heard;
+      Message message;
       const std::size_t bytes_max =
           what.answer == Kind::opened ? opened_bytes_max() : std::size_t{question_bytes_max};
       const Result<Fate> waited = wait(patience);
       if (!waited) return crowded_out(waited.error(), what);
       fate = *waited;
       if (fate == Fate::done) {
-        fate = receive_message(process.socket(), heard, bytes_max, Descriptors::refused,
+        fate = receive_message(process.socket(), message, bytes_max, Descriptors::refused,
                                next_deadline(patience));
       }
       if (fate != Fate::done) break;
-      if (heard.kind == what.answer) return heard;
-      if (heard.kind == Kind::failed) return decode_error(heard.payload);
-      fate = heard.kind == Kind::progress ? hear_progress(heard.payload)
+      if (message.kind == what.answer) return message;
+      if (message.kind == Kind::failed) return decode_error(message.payload);
+      fate = message.kind == Kind::progress ? receive_progress(message.payload)
              : ++questions > 2 * limits.opens_max
                  ? Fate::broken
-                 : answer(heard, what.kind, next_deadline(patience));
+                 : answer(message, what.kind, next_deadline(patience));
       patience.moved = Clock::now();
     }
     return ended(fate, what, patience);
@@ -268,7 +268,7 @@ struct RemoteSource::State {
     return std::min<std::size_t>(info_bytes_max, limits.memory_bytes);
   }
 
-  Fate hear_progress(const std::string& payload) const {
+  Fate receive_progress(const std::string& payload) const {
     Reader in(payload);
     const auto done = in.number<double>();
     if (!in.complete() || !(done >= 0 && done <= 1)) return Fate::broken;
@@ -307,7 +307,7 @@ struct RemoteSource::State {
   Error crowded_out(const Error& error, const Call& what) {
     release();
     return make_error(error.kind,
-                      whose_loader() + " was ended while " + what.doing + ": " + error.message);
+                      loader_text() + " was ended while " + what.doing + ": " + error.message);
   }
 
   // Returns why no answer was received. The loader has ended afterwards.
@@ -323,10 +323,10 @@ struct RemoteSource::State {
     } else if (fate != Fate::closed) {
       how = "violated the protocol and was ended";
     }
-    return make_error(ErrorKind::bad_data, whose_loader() + ' ' + how + " while " + what.doing);
+    return make_error(ErrorKind::bad_data, loader_text() + ' ' + how + " while " + what.doing);
   }
 
-  [[nodiscard]] std::string whose_loader() const {
+  [[nodiscard]] std::string loader_text() const {
     return "the loader of " +
            in_quotes(location.members.empty() ? location.stem : location.members.front().name);
   }

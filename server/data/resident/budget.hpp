@@ -45,8 +45,7 @@ struct BudgetCounts {
   std::uint64_t misses = 0;     // had to be loaded or computed
   std::uint64_t evictions = 0;  // volumes evicted to make room
   std::uint64_t refusals = 0;   // loads that failed for lack of room
-  std::uint64_t reads = 0;      // volumes read from a source, and the part of them that was
-                                // prefetched
+  std::uint64_t reads = 0;      // volumes read from a source, and how many of them were prefetched
   std::uint64_t reads_failed = 0;
 };
 

@@ -27,7 +27,7 @@ struct Prefetcher::State {
       if (stopping) return;
       const std::uint64_t owner = next_owner();
       Queue& queue = queues[owner];
-      const std::uint64_t said = queue.said;
+      const std::uint64_t version = queue.version;
       std::optional<PrefetchRequest> request = std::move(queue.requests.front());
       queue.requests.pop_front();
       if (queue.requests.empty()) queues.erase(owner);
@@ -38,7 +38,7 @@ struct Prefetcher::State {
       // If there is no room for this request, there is none for the later ones, until they are
       // replaced.
       const auto rest = queues.find(owner);
-      if (full && rest != queues.end() && rest->second.said == said) queues.erase(rest);
+      if (full && rest != queues.end() && rest->second.version == version) queues.erase(rest);
     }
   }
 
@@ -81,10 +81,10 @@ struct Prefetcher::State {
   std::condition_variable wake;
   struct Queue {
     std::deque<PrefetchRequest> requests;  // requests that are not yet loaded; never empty
-    std::uint64_t said = 0;                // distinguishes them from later requests of the owner
+    std::uint64_t version = 0;             // distinguishes them from later requests of the owner
   };
   std::map<std::uint64_t, Queue> queues;  // keyed by owner
-  std::uint64_t said = 0;
+  std::uint64_t version = 0;
   std::uint64_t last = 0;
   bool stopping = false;
   std::thread thread;  // last member: the thread uses all of the above
@@ -124,7 +124,7 @@ void Prefetcher::request_prefetch(std::uint64_t owner, std::vector<PrefetchReque
     if (absent.empty()) {
       state_->queues.erase(owner);
     } else {
-      state_->queues[owner] = {std::move(absent), ++state_->said};
+      state_->queues[owner] = {std::move(absent), ++state_->version};
     }
   }
   state_->wake.notify_one();

@@ -300,18 +300,18 @@ Result<Store::Added> Store::add_or_find(const Location& location) {
 }
 
 Result<void> Store::remove(const std::string& id) {
-  DatasetPtr gone;
+  DatasetPtr removed;
   {
     const std::lock_guard lock(state_->mutex);
     const State::Entry* found = state_->find(id);
     if (found == nullptr) {
       return make_error(ErrorKind::not_found, "there is no dataset " + in_quotes(id));
     }
-    gone = found->dataset;
+    removed = found->dataset;
     state_->entries.erase(state_->entries.begin() + (found - state_->entries.data()));
   }
-  state_->prefetcher.forget(gone->info());
-  gone->forget();
+  state_->prefetcher.forget(removed->info());
+  removed->forget();
   return {};
 }
 

@@ -47,7 +47,7 @@ Result<SampleSize> chosen_size(const SampleSize& own, std::array<int, 3> dims, i
   }
   if (steps < 0 || steps > steps_max) {
     return make_error(ErrorKind::invalid, "a sample must have 1 to " + std::to_string(steps_max) +
-                                              ", not " + std::to_string(steps));
+                                              " steps, not " + std::to_string(steps));
   }
   size.steps = steps == 0 ? own.steps : steps;
   return size;

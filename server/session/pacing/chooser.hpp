@@ -63,7 +63,7 @@ class Chooser {
 
   double log_ratio_ = 0;  // logarithm of measured over forecast times
   bool measured_ = false;
-  bool timed_ = false;  // log_ratio_ is of a calibrated scene signature
+  bool timed_ = false;  // whether log_ratio_ belongs to a calibrated scene signature
   std::array<Correction, quality::settings_count> corrections_{};
   std::optional<std::size_t> chosen_;  // setting of the newest frame; reset after a rest
   Micros chosen_at_ = 0;

@@ -29,7 +29,7 @@ class FlowControl {
   // The frame of next_seq() is sent.
   void sent(const Sent& frame, Micros now);
   void written(Micros now);
-  void heard(std::uint32_t seq, Micros now) { link_.heard(seq, now); }
+  void answered(std::uint32_t seq, Micros now) { link_.answered(seq, now); }
   // Error: that frame was never sent.
   Result<void> acked(const protocol::AckMessage& message, Micros now);
 

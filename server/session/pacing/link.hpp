@@ -46,7 +46,7 @@ class Link {
   // Records a frame that is sent now, directly after a ping.
   void sent(const Sent& frame, Micros now);
   // Records the pong of that ping. Without pongs the round trip is that of the fastest frame.
-  void heard(std::uint32_t seq, Micros now);
+  void answered(std::uint32_t seq, Micros now);
   // Records that the kernel has accepted the newest frame completely.
   void written(Micros now);
   // Records that every frame up to that one has been shown.

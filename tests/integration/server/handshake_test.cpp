@@ -72,7 +72,7 @@ class Client {
   [[nodiscard]] bool shaken() const { return shaken_; }
   [[nodiscard]] SSL* ssl() const { return ssl_.get(); }
 
-  // The response to a GET, and with TLS 1.3 the tickets before it.
+  // Reads the response to a GET, and with TLS 1.3 the tickets before it.
   std::string get(const std::string& target, const std::string& fields = "") {
     const std::string ask =
         "GET " + target + " HTTP/1.1\r\nHost: x\r\nConnection: close\r\n" + fields + "\r\n";

@@ -1,4 +1,4 @@
-// frame::survey and frame::measured_error on a small sample, compared with the integral.
+// frame::calibrate and frame::measured_error on a small sample, compared with the integral.
 #include "server/frame/measure.hpp"
 
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ class Measure : public testing::Test {
 
   scene::CompletedView completed() { return scene::complete(view, *dataset).value(); }
 
-  std::map<std::size_t, quality::Measured> surveyed() {
+  std::map<std::size_t, quality::Measured> calibrated() {
     std::map<std::size_t, quality::Measured> found;
     const auto done = calibrate(
         completed(), *dataset, pool, cancel, workspace, [&](const CalibrationSample& one) {
@@ -108,7 +108,7 @@ TEST_F(Measure, OtherRulesAndEarlyTerminationAreMeasuredAgainstTheIntegral) {
     ASSERT_TRUE(frame.error);
     const double truth = true_error(frame);
     EXPECT_NEAR(*frame.error / truth, 1, 0.4) << truth;
-    const auto found = surveyed();
+    const auto found = calibrated();
     const auto error_of = [&](int thinner) {
       const quality::Setting setting{protocol::MethodName::slab, 0, 0, thinner};
       return found.at(quality::index_of(setting).value()).error.value();
@@ -155,7 +155,7 @@ TEST_F(Measure, OnlyFullSizePicturesAreMeasured) {
 }
 
 TEST_F(Measure, CalibrationRunReportsEveryAllowedSettingOnce) {
-  const auto found = surveyed();
+  const auto found = calibrated();
   for (std::size_t i = 0; i < quality::settings_count; ++i) {
     EXPECT_EQ(found.count(i), quality::is_allowed(quality::settings[i], view) ? 1U : 0U) << i;
   }
@@ -167,7 +167,7 @@ TEST_F(Measure, CalibrationRunReportsEveryAllowedSettingOnce) {
 
 // Two estimates of the same error: a calibration run uses another reference than a frame.
 TEST_F(Measure, CalibrationRunAgreesWithMeasuredFrames) {
-  auto found = surveyed();
+  auto found = calibrated();
   const auto error_of = [&](const quality::Setting& setting) {
     return found.at(quality::index_of(setting).value()).error.value();
   };
@@ -184,7 +184,7 @@ TEST_F(Measure, CalibrationRunAgreesWithMeasuredFrames) {
 TEST_F(Measure, CalibrationRunRendersAveragesAsFramesDo) {
   scene::orbit(view, completed().lattice(), 20, 30, 0.05);
   EXPECT_LT(viewpoint_of(completed()).detail, 1);
-  auto found = surveyed();
+  auto found = calibrated();
   const auto error_of = [&](int thinner) {
     return found.at(quality::index_of({protocol::MethodName::slab, 0, 0, thinner}).value())
         .error.value();

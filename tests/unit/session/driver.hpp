@@ -45,7 +45,7 @@ class Driver {
                return dataset == "wind" ? reading : std::nullopt;
              },
              [this](const quality::SceneSignature& signature, const quality::Viewpoint& viewpoint) {
-               return surveyed.value_or(quality::Table(signature.kind).forecasts(viewpoint));
+               return calibrated.value_or(quality::Table(signature.kind).forecasts(viewpoint));
              }},
             now_) {}
 
@@ -147,7 +147,7 @@ class Driver {
   Micros queue = 0;                // simulated time that a frame waits for the renderer
   std::optional<Reading> reading;  // of the dataset "wind"
   std::vector<Calibrate> calibrations;
-  std::optional<quality::Forecasts> surveyed;  // forecasts known; empty: the prior
+  std::optional<quality::Forecasts> calibrated;  // forecasts known; empty: the prior
   bool averaged = false;  // averaged data: errors of final frames do not depend on their slabs
   std::optional<double> measured_error;  // error of final frames drawn by slabs of the view's own
                                          // thickness
@@ -173,8 +173,8 @@ class Driver {
       const int by = averaged ? 1 : done.setting.thinner * done.setting.thinner;
       out.info.error_value = *measured_error / by;
       out.info.error_kind = "measured";
-    } else if (const auto index = quality::index_of(done.setting); index && surveyed) {
-      out.info.error_value = (*surveyed)[*index].error;
+    } else if (const auto index = quality::index_of(done.setting); index && calibrated) {
+      out.info.error_value = (*calibrated)[*index].error;
       out.info.error_kind = "estimated";
     }
     out.info.tiles = 1;

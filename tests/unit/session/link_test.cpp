@@ -23,7 +23,7 @@ struct Known {
   }
   void send(Link& link, std::size_t bytes, bool pong = true, Micros late = 0) {
     link.sent({++seq, bytes, now - 10 * milli, true}, now);
-    if (pong) link.heard(seq, now + trip);
+    if (pong) link.answered(seq, now + trip);
     now += trip + carries(bytes) + decode + late;
     link.acked(seq, 1e-3 * static_cast<double>(decode), now);
   }
@@ -113,7 +113,7 @@ TEST(Link, ConsecutiveFramesRevealTheRateHiddenByTheSecond) {
   Link link;
   Micros now = 1'000'000;
   link.sent({1, 50'000, now, true}, now);
-  link.heard(1, now + trip);
+  link.answered(1, now + trip);
   link.sent({2, 50'000, now, true}, now);
   link.acked(2, 0, now + trip + 100 * milli);  // acknowledges both
   EXPECT_NEAR(link.bytes_per_s(), rate, 0.001 * rate);

@@ -67,7 +67,8 @@ class Renderer {
   int renders = 0;
 
  private:
-  // Deliberately not the model of the session: another power law, and sizes vary between pictures.
+  // Differs deliberately from the model of the session: another power law, and sizes vary between
+  // pictures.
   std::size_t bytes(double pixels, const StartRender& wanted) {
     const int quality = wanted.encoding.quality;
     const double scale = quality < 50 ? 50.0 / quality : 2 - quality / 50.0;

@@ -38,7 +38,8 @@ struct Header {
 // Errors: bad_data; the message is a predicate without subject.
 Result<Header> read_header(const std::vector<unsigned char>& message);
 Result<Grid> read_grid(const std::vector<unsigned char>& message);
-// rows x columns, columns fastest, in the order of the coordinates of the grid; NaN if missing.
+// values of rows x columns, columns fastest, in the order of the coordinates of the grid; NaN if
+// missing
 Result<std::vector<float>> read_values(const std::vector<unsigned char>& message, const Grid& grid);
 
 }  // namespace windsplat::data::grib

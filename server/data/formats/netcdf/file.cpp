@@ -179,7 +179,7 @@ Result<void> File::open_library() {
                       "the file requests an HDF5 plugin, which is not allowed");
   }
   if (!classic_) {
-    auto storage = survey_storage(*input_);
+    auto storage = scan_storage(*input_);
     if (!storage) return storage.error();
     storage_ = std::move(*storage);
   }

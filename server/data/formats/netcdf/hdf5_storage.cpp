@@ -120,9 +120,9 @@ DatasetStorage storage_of(hid_t dataset) {
 }
 
 // Depth first, like the netCDF library: an object is visited once per link.
-class Survey {
+class StorageScan {
  public:
-  explicit Survey(const InputFile& input) : input_(input), objects_left_(objects_max(input)) {}
+  explicit StorageScan(const InputFile& input) : input_(input), objects_left_(objects_max(input)) {}
 
   Result<std::map<std::string, DatasetStorage>> take() {
     const Handle file = open_hdf5(input_);
@@ -140,11 +140,11 @@ class Survey {
 
  private:
   static herr_t on_link(hid_t group, const char* name, const H5L_info_t* about, void* self) {
-    auto& survey = *static_cast<Survey*>(self);
+    auto& scan = *static_cast<StorageScan*>(self);
     try {
-      return survey.visit_link(group, name, *about) ? 0 : -1;
+      return scan.visit_link(group, name, *about) ? 0 : -1;
     } catch (const std::exception&) {  // must not pass the library's frames, which are C
-      survey.out_of_memory_ = true;
+      scan.out_of_memory_ = true;
       return -1;
     }
   }
@@ -166,7 +166,7 @@ class Survey {
     above_.push_back(about.addr);
     const std::string outer = std::exchange(path_, path);
     const bool done =
-        H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, nullptr, &Survey::on_link, this) >= 0;
+        H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, nullptr, &StorageScan::on_link, this) >= 0;
     path_ = outer;
     above_.pop_back();
     return done;
@@ -267,8 +267,8 @@ Handle::~Handle() {
   if (id_ >= 0) close_(id_);
 }
 
-Result<std::map<std::string, DatasetStorage>> survey_storage(const InputFile& input) {
-  return Survey(input).take();
+Result<std::map<std::string, DatasetStorage>> scan_storage(const InputFile& input) {
+  return StorageScan(input).take();
 }
 
 // Uses the same close degree as the netCDF library; HDF5 rejects opening a file with different

@@ -271,28 +271,28 @@ class Reader {
   Result<void> read_attribute(const std::string& key) {
     const auto line = scan_.line();
     if (!line) return line.error();
-    std::vector<std::string> told;
+    std::vector<std::string> words;
     std::string_view rest = *line;
-    while (!(rest = trim(rest)).empty() && told.size() < 4) {
+    while (!(rest = trim(rest)).empty() && words.size() < 4) {
       const std::size_t end = std::min(rest.find_first_of(" \t"), rest.size());
-      told.emplace_back(rest.substr(0, end));
+      words.emplace_back(rest.substr(0, end));
       rest.remove_prefix(end);
     }
-    if (told.empty()) return fault("a section " + in_quotes(key) + " without a name");
+    if (words.empty()) return fault("a section " + in_quotes(key) + " without a name");
     StoredArray array;
-    array.name = decoded(told[0]);
+    array.name = decoded(words[0]);
     array.tuples = tuples_;
-    if (key == "lookup_table") return skip_table(told);
-    if (key == "color_scalars") return read_colors(std::move(array), told);
-    if (told.size() < 2) return fault("a section " + in_quotes(key) + " without a type");
-    std::string type = told[1];
+    if (key == "lookup_table") return skip_table(words);
+    if (key == "color_scalars") return read_colors(std::move(array), words);
+    if (words.size() < 2) return fault("a section " + in_quotes(key) + " without a type");
+    std::string type = words[1];
     if (key == "scalars") {
-      if (told.size() > 2) array.components = small(told[2]);
+      if (words.size() > 2) array.components = small(words[2]);
       if (auto done = skip_table_name(); !done) return done;
     } else if (key == "texture_coordinates") {
-      if (told.size() < 3) return fault("texture coordinates without a type");
-      array.components = small(told[1]);
-      type = told[2];
+      if (words.size() < 3) return fault("texture coordinates without a type");
+      array.components = small(words[1]);
+      type = words[2];
     } else if (key == "vectors" || key == "normals") {
       array.components = 3;
     } else if (key == "tensors" || key == "tensors6") {
@@ -331,9 +331,9 @@ class Reader {
   }
 
   // Colours of a look-up table: 4 bytes each, or 4 words.
-  Result<void> skip_table(const std::vector<std::string>& told) {
+  Result<void> skip_table(const std::vector<std::string>& words) {
     StoredArray array;
-    const auto n = told.size() > 1 ? bytes::to_integer(told[1]) : std::nullopt;
+    const auto n = words.size() > 1 ? bytes::to_integer(words[1]) : std::nullopt;
     if (!n || *n < 0) return fault("a look-up table without its size");
     array.tuples = static_cast<std::uint64_t>(*n);
     array.components = 4;
@@ -341,8 +341,8 @@ class Reader {
     return take(array);
   }
 
-  Result<void> read_colors(StoredArray array, const std::vector<std::string>& told) {
-    array.components = told.size() > 1 ? small(told[1]) : 0;
+  Result<void> read_colors(StoredArray array, const std::vector<std::string>& words) {
+    array.components = words.size() > 1 ? small(words[1]) : 0;
     if (array.components < 1) return fault("colours without their number of components");
     array.type = binary_ ? bytes::Scalar::uint8 : bytes::Scalar::float32;
     if (auto done = take(array); !done) return done;

@@ -432,7 +432,7 @@ Result<std::optional<Collection>> read_collection(const std::shared_ptr<const In
   for (std::size_t i = 1; i < out.members.size(); ++i) {
     if (out.members[i].time == out.members[i - 1].time) {
       return file->fault("has a timestep of several parts (" + in_quotes(out.members[i].file) +
-                         "); only one file a timestep is supported");
+                         "); only one file per timestep is supported");
     }
   }
   return std::optional(std::move(out));
