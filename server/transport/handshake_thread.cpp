@@ -12,7 +12,7 @@
 #include "server/base/log.hpp"
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 // For setpriority(2): rendering and streams get ten times this thread's share of a contended core.
@@ -101,10 +101,10 @@ void HandshakeThread::run() {
       if (step == nullptr) return;
       step->run();
     } catch (const std::exception& fault) {
-      log_fault("TLS handshake step failed", fault);  // the deadline of the handshake closes the
-                                                      // connection
+      // The deadline of the handshake closes the connection.
+      work::log_fault("TLS handshake step failed", fault);
     }
   }
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -7,7 +7,7 @@
 #include "server/frame/measure.hpp"
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 // An entry in the tables that marks a running calibration; removed by its destructor.
@@ -95,4 +95,4 @@ void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::V
   (void)backend.loads.submit({unwanted, run, true, (*found)->shared_info()});
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -10,7 +10,7 @@
 #include "server/quality/setting.hpp"
 #include "server/work/backend.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // A picture ready to be drawn: its scene and the memory reserved for its pixels.
 struct PreparedPicture {
@@ -54,4 +54,4 @@ Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
 // each.
 Result<void> submit(Backend& backend, Drawing drawing);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

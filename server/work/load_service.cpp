@@ -14,7 +14,7 @@
 
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 struct LoadService::State {
   using Clock = std::chrono::steady_clock;
@@ -157,4 +157,4 @@ void LoadService::end() {
   }
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

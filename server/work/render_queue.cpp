@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // --- Shares --------------------------------------------------------------------------------------
 
@@ -203,4 +203,4 @@ void RenderQueue::cancel_all() const {
   if (running_) running_->cancel.cancel();
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -8,7 +8,7 @@
 #include "server/http/exchange.hpp"
 #include "server/transport/guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
  public:
@@ -18,10 +18,9 @@ class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
   HttpOwner& operator=(const HttpOwner&) = delete;
 
   [[nodiscard]] virtual const std::string& request_id() const = 0;
-  virtual void on_reply(Response response) = 0;
+  virtual void on_reply(http::Response response) = 0;
   virtual void abort() = 0;  // end immediately
-  virtual void close() = 0;  // the deadline of the connection has passed, or the connection has
-                             // failed
+  virtual void close() = 0;  // the deadline has passed, or the connection has failed
 
   // A completion handler that keeps the session alive.
   template <class Body>
@@ -30,4 +29,4 @@ class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
   }
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -12,7 +12,7 @@
 #include "server/http/exchange.hpp"
 #include "server/transport/stream.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class RequestParser {
  public:
@@ -29,17 +29,17 @@ class RequestParser {
 
   struct Header {
     bool complete = false;
-    std::optional<Response> refusal;
+    std::optional<http::Response> refusal;
   };
   // Parses the header if it has arrived.
   Header parse_header();
   // Method and fields of the parsed header.
-  void copy_header(Request& request) const;
+  void copy_header(http::Request& request) const;
 
   // Whether the error is in the text of the request rather than in the connection; and the response
   // to it.
   static bool is_fault_of_text(ErrorCode fault);
-  static Response refusal_of(ErrorCode fault);
+  static http::Response refusal_of(ErrorCode fault);
 
  private:
   static constexpr std::size_t buffer_bytes_max = std::size_t{16} * 1024;
@@ -49,4 +49,4 @@ class RequestParser {
   std::optional<Parser> parser_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 // Owners that always have work: each submits its next job as soon as one was started.
@@ -231,4 +231,4 @@ TEST(RenderQueue, UsesTheGivenCostForJobsOfUnknownCost) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::work

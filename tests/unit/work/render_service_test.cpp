@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 // A service whose thread is blocked in a job of a stream until release() or its destruction.
@@ -251,4 +251,4 @@ TEST(RenderService, OnePayerMayUseHalfOfTheSlots) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::work
