@@ -47,7 +47,7 @@ class Admission {
   void log_refused_handshakes();
   // Charges processor time of a TLS handshake to the address. Does not allocate memory.
   void handshake_took(const std::string& address, bool trusted, Micros took);
-  // A request has shown the token.
+  // Records that a request has shown the token.
   void authenticated(const std::string& address);
   // Returns nullopt at the limit: close the connection without a response.
   std::optional<Visitor> connect(const std::string& peer);

@@ -23,7 +23,7 @@ inline constexpr int exit_interrupted = 130;  // the shell convention for SIGINT
 // Runs a command with validated arguments; the value is the exit code.
 using Action = std::function<int()>;
 
-// Each adds its subcommand, which sets `chosen` when selected.
+// Each function adds a subcommand, which sets `chosen` when selected.
 void add_serve(CLI::App& app, Action& chosen);
 void add_render(CLI::App& app, Action& chosen);
 void add_animate(CLI::App& app, Action& chosen);

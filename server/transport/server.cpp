@@ -214,7 +214,7 @@ struct Server::State {
   asio::io_context io{1};
   // The loop ends by stop() only, not when all pending operations failed to allocate.
   asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
-  // Null: plain TCP. Its thread posts to io, too.
+  // Null for plain TCP. Its thread also posts to io.
   const std::unique_ptr<HandshakeThread> handshakes{
       services.options.tls ? std::make_unique<HandshakeThread>() : nullptr};
   Listener listener;

@@ -333,7 +333,7 @@ class UnrolledStore final : public ByteStore {
 bool can_hold(Encoding encoding, std::uint64_t encoded, std::uint64_t claim) {
   if (encoding == Encoding::hex) return claim <= encoded / 2;
   if (encoding == Encoding::text) return claim / sizeof(double) <= (encoded + 1) / 2;
-  return claim / 1040 <= encoded;  // deflate makes at most 1032 bytes of one
+  return claim / 1040 <= encoded;  // deflate expands one byte to at most 1032
 }
 
 std::shared_ptr<ByteStore> unrolled_store(std::shared_ptr<const InputFile> file, Encoding encoding,
